@@ -1,0 +1,181 @@
+//! Units and events, declared once.
+
+/// Declares the units and, under each, its events: `Name "column" "what one of it is"`.
+macro_rules! activity {
+    ($($unit:ident $unit_name:literal $unit_doc:literal {
+        $($event:ident $event_name:literal $event_doc:literal)*
+    })*) => {
+        /// A unit of the block diagram, in the order in which work passes through the front of the pipeline.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[repr(u8)]
+        pub enum Unit { $(#[doc = $unit_doc] $unit),* }
+
+        impl Unit {
+            /// Every unit, in declaration order.
+            pub const ALL: [Self; [$(Self::$unit),*].len()] = [$(Self::$unit),*];
+
+            /// The name used in files, for example `sample_test`.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$unit => $unit_name),* }
+            }
+
+            /// One sentence on what the unit does.
+            pub const fn doc(self) -> &'static str {
+                match self { $(Self::$unit => $unit_doc),* }
+            }
+        }
+
+        /// Something a unit does that can be counted. The energy of one and the rate at which the unit
+        /// can do it are other people's business.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[repr(u8)]
+        pub enum Event { $($(#[doc = $event_doc] $event),*),* }
+
+        impl Event {
+            /// Every event, grouped by unit, in declaration order.
+            pub const ALL: [Self; [$($(Self::$event),*),*].len()] = [$($(Self::$event),*),*];
+
+            /// The name used in files and energy tables, for example `samples_tested`.
+            pub const fn name(self) -> &'static str {
+                match self { $($(Self::$event => $event_name),*),* }
+            }
+
+            /// What one of it is.
+            pub const fn doc(self) -> &'static str {
+                match self { $($(Self::$event => $event_doc),*),* }
+            }
+
+            /// The unit that does it.
+            pub const fn unit(self) -> Unit {
+                match self { $($(Self::$event => Unit::$unit),*),* }
+            }
+        }
+    };
+}
+
+activity! {
+    Command "command" "Reads draws and indices and fetches vertices." {
+        Draws "draws" "A draw taken from the command stream."
+        Indices "indices" "A vertex index read."
+        VerticesFetched "vertices_fetched" "A vertex read after the reuse of recent ones."
+        VertexBytes "vertex_bytes" "A byte of vertex data read, both ends of the shutter counted."
+    }
+    Shader "shader" "The shader cores, shared by vertex and pixel work." {
+        VertexInvocations "vertex_invocations" "A vertex shader run."
+        PixelInvocations "pixel_invocations" "A pixel shader lane run, helper lanes included."
+        HelperInvocations "helper_invocations" "A lane run only to complete a quad."
+        ShaderOps "shader_ops" "A multiply-add or simpler operation of one shader lane."
+    }
+    Setup "setup" "Prepares a triangle for traversal." {
+        TrianglesIn "triangles_in" "A triangle that enters set-up."
+        TrianglesDegenerate "triangles_degenerate" "A triangle dropped because it has no area at any time."
+        TrianglesOutside "triangles_outside" "A triangle dropped because it is outside the view at all times."
+        TrianglesFaceCulled "triangles_face_culled" "A triangle dropped because it always shows a culled face."
+        TrianglesSetUp "triangles_set_up" "A triangle that goes on to traversal."
+        SetupMadds "setup_madds" "A multiply-add of triangle set-up."
+    }
+    Traversal "traversal" "Finds the tiles a triangle may touch, with the u, v, t box of each." {
+        CoarseTilesVisited "coarse_tiles_visited" "A coarse tile tested."
+        TilesVisited "tiles_visited" "A fine tile tested."
+        TilesCulledBox "tiles_culled_box" "A tile, coarse or fine, culled by the bounding box."
+        TilesCulledSides "tiles_culled_sides" "A tile, coarse or fine, culled by the side planes over u, v and t."
+        TilesCulledEdges "tiles_culled_edges" "A tile, coarse or fine, culled by the edges."
+        TileMadds "tile_madds" "A multiply-add of a tile test."
+    }
+    ZCull "z_cull" "Drops tiles whose every sample is known to be hidden." {
+        ZCullTests "z_cull_tests" "A depth interval compared with a tile's farthest depth."
+        TilesCulledZMax "tiles_culled_z_max" "A tile culled because the triangle lies behind all of it."
+        ZMaxUpdates "z_max_updates" "A tile's farthest depth written anew."
+        DepthIntervalMadds "depth_interval_madds" "A multiply-add spent on a depth interval."
+    }
+    SampleTest "sample_test" "Tests samples against the edges of a triangle." {
+        SamplesTested "samples_tested" "A sample tested against a triangle."
+        SamplesHit "samples_hit" "A sample found inside the triangle and beyond the near depth."
+        SampleMadds "sample_madds" "A multiply-add of a sample test, the depth at the sample included."
+    }
+    Depth "depth" "Compares and stores the depth of each sample." {
+        DepthReads "depth_reads" "A stored sample depth read for a comparison."
+        DepthWrites "depth_writes" "A sample depth written."
+        DepthLines "depth_lines" "A line of the depth cache accessed."
+        DepthMisses "depth_misses" "A line that was not in the depth cache."
+    }
+    ShadingCache "shading_cache" "Remembers shaded quads by triangle and shading-grid cell." {
+        ShadingLookups "shading_lookups" "A look-up for one visible sample."
+        ShadingHits "shading_hits" "A look-up that found its quad."
+        QuadsShaded "quads_shaded" "A quad sent to the shader cores because it was not found."
+    }
+    Texture "texture" "Filters textures through a cache of its own." {
+        TextureFetches "texture_fetches" "A bilinear filtered fetch; a trilinear one counts as two."
+        TextureLines "texture_lines" "A line of the texture cache accessed."
+        TextureMisses "texture_misses" "A line that was not in the texture cache."
+    }
+    Colour "colour" "Stores sample colours and resolves them into pixels." {
+        ColourWrites "colour_writes" "A sample colour written."
+        ColourLines "colour_lines" "A line of the colour cache accessed."
+        ColourMisses "colour_misses" "A line that was not in the colour cache."
+        SamplesResolved "samples_resolved" "A sample colour read to resolve its pixel."
+        PixelsResolved "pixels_resolved" "A pixel of the final image written."
+    }
+    L2 "l2" "The cache shared by all clients of memory." {
+        L2Reads "l2_reads" "A line read by a client."
+        L2Writes "l2_writes" "A line written back by a client."
+        L2Misses "l2_misses" "A line that was not in the L2."
+    }
+    Dram "dram" "Off-chip memory." {
+        DramReadBytes "dram_read_bytes" "A byte read from memory."
+        DramWriteBytes "dram_write_bytes" "A byte written to memory."
+    }
+}
+
+impl Unit {
+    /// How many units there are.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// The unit called `name` in files.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|unit| unit.name() == name)
+    }
+}
+
+impl Event {
+    /// How many events there are.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// The event called `name` in files.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|event| event.name() == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_lead_back() {
+        for event in Event::ALL {
+            assert_eq!(Event::from_name(event.name()), Some(event));
+        }
+        for unit in Unit::ALL {
+            assert_eq!(Unit::from_name(unit.name()), Some(unit));
+        }
+        assert_eq!(Event::from_name("no such thing"), None);
+    }
+
+    #[test]
+    fn discriminants_index_the_list() {
+        for (index, event) in Event::ALL.into_iter().enumerate() {
+            assert_eq!(event as usize, index);
+        }
+        for (index, unit) in Unit::ALL.into_iter().enumerate() {
+            assert_eq!(unit as usize, index);
+        }
+    }
+
+    #[test]
+    fn every_unit_counts_something() {
+        for unit in Unit::ALL {
+            assert!(Event::ALL.iter().any(|event| event.unit() == unit), "{unit:?}");
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! The seam of the house: what the pipeline *did*, in integers, before anyone asks when or at what cost.
+//!
+//! - [`Unit`] and [`Event`]: the units of the block diagram and what each of them counts. One
+//!   declaration gives the enum, the docs, the column in a file and the key of an energy table.
+//! - [`Counts`]: one integer per event; workers own theirs and add them up.
+//! - [`Packet`]: a piece of work that moves through the units as one, with the events it causes.
+//! - [`Timeline`]: counts over time, made by a timing model, read by a power model.
+//! - [`Warning`]: a coded remark that a run has entered a regime its methods are bad at.
+//! - [`spec`]: reading RON files with the place of every mistake and a suggestion.
+//!
+//! This crate knows no triangle, no clock rate and no joule, and depends on nothing else of the house.
+
+mod counts;
+mod events;
+mod packet;
+pub mod spec;
+mod timeline;
+mod warning;
+
+pub use counts::Counts;
+pub use events::{Event, Unit};
+pub use packet::{Packet, PacketCounts, PacketKind};
+pub use timeline::{Bin, Timeline};
+pub use warning::Warning;
