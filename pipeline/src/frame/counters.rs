@@ -1,0 +1,60 @@
+//! What the tiles of one bin did, before the caches have their say.
+
+use activity::{Event, PacketCounts};
+
+use crate::shading::QuadAccess;
+
+/// Tile tests done since the last packet of the bin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct TileWork {
+    pub coarse_visited: u32,
+    pub visited: u32,
+    pub culled_sides: u32,
+    pub culled_edges: u32,
+    pub tile_madds: u32,
+    pub z_tests: u32,
+    pub z_culled: u32,
+    pub z_updates: u32,
+    pub interval_madds: u32,
+}
+
+impl TileWork {
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    pub fn add_to(&self, counts: &mut PacketCounts) {
+        counts[Event::CoarseTilesVisited] += self.coarse_visited;
+        counts[Event::TilesVisited] += self.visited;
+        counts[Event::TilesCulledSides] += self.culled_sides;
+        counts[Event::TilesCulledEdges] += self.culled_edges;
+        counts[Event::TileMadds] += self.tile_madds;
+        counts[Event::ZCullTests] += self.z_tests;
+        counts[Event::TilesCulledZMax] += self.z_culled;
+        counts[Event::ZMaxUpdates] += self.z_updates;
+        counts[Event::DepthIntervalMadds] += self.interval_madds;
+    }
+}
+
+/// One triangle in one tile, or tile tests that led to none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Work {
+    pub triangle: u32,
+    pub tile: u32,
+    pub tests: TileWork,
+    pub tested: u32,
+    pub hit: u32,
+    pub written: u32,
+    pub sample_madds: u32,
+    pub read_pixels: u64,
+    pub written_pixels: u64,
+    /// One past this work's last entry in [`BinLog::quads`].
+    pub quads_end: u32,
+}
+
+/// Everything one bin did in one batch, in the order of the modelled hardware.
+#[derive(Clone, Debug, Default)]
+pub(super) struct BinLog {
+    pub work: Vec<Work>,
+    pub quads: Vec<QuadAccess>,
+}

@@ -1,0 +1,93 @@
+//! One frame through the pipeline: vertices, set-up, bins, tiles, the replay of what they touched, and the image.
+
+mod bin;
+mod counters;
+mod pass;
+mod replay;
+mod resolve;
+mod settings;
+mod surface;
+mod vertices;
+
+use activity::{Counts, Packet, PacketKind};
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::geometry::{Camera, Draw};
+use crate::memory::CacheError;
+use bin::Bin;
+use pass::Pass;
+use replay::Replay;
+pub use settings::{Features, PipelineSpec, Settings, SpecError};
+
+/// A rendered frame.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Linear RGB radiance of each pixel, row by row from the top left.
+    pub image: Vec<Vec3>,
+    /// How often each event happened.
+    pub counts: Counts,
+}
+
+/// Renders `draws` as seen by `camera`, handing each work packet to `emit` in the order of the modelled hardware.
+///
+/// The image and every packet are the same for any number of threads.
+///
+/// # Errors
+/// When a cache of the settings cannot be built.
+pub fn render(
+    camera: &Camera,
+    draws: &[Draw<'_>],
+    settings: &Settings<'_>,
+    mut emit: impl FnMut(&Packet),
+) -> Result<Rendered, CacheError> {
+    let pass = Pass::new(camera, draws, settings);
+    let mut counts = Counts::default();
+    let mut emit = |packet: &Packet| {
+        counts += &packet.counts;
+        emit(packet);
+    };
+    let mut replay = Replay::new(&pass)?;
+    let bins = rasterize(&pass, &mut replay, &mut emit);
+    let image = resolve::resolve(&pass, &bins);
+    replay.resolve(&bins, &mut emit);
+    Ok(Rendered { image, counts })
+}
+
+/// The triangle each sample sees (`u32::MAX` for none) and the bits of its depth, for tests and comparisons: tile by tile
+/// in rows, the samples of a tile by time.
+///
+/// # Errors
+/// When a cache of the settings cannot be built.
+pub fn visibility(
+    camera: &Camera,
+    draws: &[Draw<'_>],
+    settings: &Settings<'_>,
+) -> Result<Vec<(u32, u32)>, CacheError> {
+    let pass = Pass::new(camera, draws, settings);
+    let bins = rasterize(&pass, &mut Replay::new(&pass)?, &mut |_| ());
+    Ok(resolve::visible(&pass, &bins))
+}
+
+/// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch.
+fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Packet)) -> Vec<Bin> {
+    let mut bins = Bin::all(pass);
+    for batch in pass.batches() {
+        let ready = vertices::front_end(pass, batch, replay, emit);
+        let lists = bin::distribute(pass, &ready);
+        let logs: Vec<_> = bins
+            .par_iter_mut()
+            .zip(&lists)
+            .map_init(bin::Scratch::default, |scratch, (bin, list)| {
+                bin.rasterize(pass, &ready, list, scratch)
+            })
+            .collect();
+        logs.iter().for_each(|log| replay.bin(log, emit));
+    }
+    bins
+}
+
+/// A packet of the only pass there is so far.
+fn packet(kind: PacketKind, tile: u32, triangle: u32) -> Packet {
+    Packet::new(kind, 0, tile, triangle)
+}

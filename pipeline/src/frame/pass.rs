@@ -1,0 +1,125 @@
+//! A pass: draws and a camera, brought to the image plane, with every triangle numbered.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::Settings;
+use crate::geometry::{Camera, Draw, MovingVertex, Projection, Viewport};
+use crate::memory::{AddressMap, Allocator};
+use crate::texture::Texture;
+
+/// Everything the stages read and none of them changes.
+pub(super) struct Pass<'a> {
+    pub draws: &'a [Draw<'a>],
+    pub settings: &'a Settings<'a>,
+    pub projection: Projection,
+    /// Vertices on the image plane, by draw.
+    pub vertices: Vec<Vec<MovingVertex>>,
+    /// The first triangle of each draw, and one past the last of all.
+    first_triangle: Vec<u32>,
+    pub addresses: AddressMap,
+    /// Image coordinate of the first column and row.
+    pub origin: [f32; 2],
+    /// Whether the camera has a lens.
+    pub lens: bool,
+    /// Whether the camera does not move while the shutter is open.
+    pub still_camera: bool,
+    /// The position of the camera in world space at mid-shutter.
+    pub eye: Vec3,
+}
+
+impl<'a> Pass<'a> {
+    pub fn new(camera: &Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
+        let projection = Projection::new(camera, settings.viewport);
+        let vertices = draws.iter().map(|draw| images(&projection, draw)).collect();
+        let first_triangle = std::iter::once(0)
+            .chain(draws.iter().scan(0, |count, draw| {
+                *count += draw.geometry.triangles().len() as u32;
+                Some(*count)
+            }))
+            .collect();
+        let viewport = settings.viewport;
+        Self {
+            draws,
+            settings,
+            vertices,
+            first_triangle,
+            addresses: addresses(draws, settings),
+            origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
+            lens: !projection.shear.is_none(),
+            still_camera: camera.open() == camera.close(),
+            eye: projection.eye(),
+            projection,
+        }
+    }
+
+    /// Runs of triangles that are binned together.
+    pub fn batches(&self) -> impl Iterator<Item = Range<u32>> + use<'_> {
+        let total = self.first_triangle[self.draws.len()];
+        let size = self.settings.spec.batch_triangles;
+        (0..total.div_ceil(size)).map(move |batch| batch * size..total.min(batch * size + size))
+    }
+
+    /// The draw a triangle belongs to, and its place in the draw.
+    pub fn locate(&self, triangle: u32) -> (usize, usize) {
+        let draw = self.first_triangle.partition_point(|&first| first <= triangle) - 1;
+        (draw, (triangle - self.first_triangle[draw]) as usize)
+    }
+
+    /// The vertex indices of a triangle and its draw.
+    pub fn corners(&self, triangle: u32) -> (usize, [usize; 3]) {
+        let (draw, index) = self.locate(triangle);
+        (draw, self.draws[draw].geometry.triangles()[index].map(|vertex| vertex as usize))
+    }
+
+    /// The vertices of a triangle on the image plane.
+    pub fn images(&self, triangle: u32) -> [&MovingVertex; 3] {
+        let (draw, corners) = self.corners(triangle);
+        corners.map(|vertex| &self.vertices[draw][vertex])
+    }
+
+    /// Fine tiles in a row of the image.
+    pub fn tiles_across(&self) -> u32 {
+        self.settings.viewport.width().div_ceil(self.settings.spec.tile_px)
+    }
+}
+
+fn images(projection: &Projection, draw: &Draw<'_>) -> Vec<MovingVertex> {
+    let (open, close) = (draw.geometry.open(), draw.geometry.close());
+    open.par_iter()
+        .zip(close)
+        .with_min_len(1024)
+        .map(|(&open, &close)| projection.vertex(open, close))
+        .collect()
+}
+
+fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>) -> AddressMap {
+    let mut memory = Allocator::default();
+    let (viewport, tile_px) = (settings.viewport, settings.spec.tile_px);
+    let tiles =
+        u64::from(viewport.width().div_ceil(tile_px)) * u64::from(viewport.height().div_ceil(tile_px));
+    let pixels = tiles * u64::from(tile_px * tile_px);
+    let samples = pixels * u64::from(settings.samples.per_pixel());
+    let mut known: Vec<(*const Texture, u64)> = Vec::new();
+    let (depth, colour, image) =
+        (memory.take(samples * 4), memory.take(samples * 4), memory.take(pixels * 4));
+    let vertices = draws
+        .iter()
+        .map(|draw| memory.take(draw.geometry.open().len() as u64 * u64::from(draw.geometry.vertex_bytes())))
+        .collect();
+    let textures = draws
+        .iter()
+        .map(|draw| {
+            let Some(texture) = draw.shader.texture() else { return 0 };
+            let shared = known.iter().find(|(seen, _)| std::ptr::eq(*seen, texture));
+            shared.map(|&(_, address)| address).unwrap_or_else(|| {
+                let address = memory.take(texture.bytes());
+                known.push((texture, address));
+                address
+            })
+        })
+        .collect();
+    AddressMap { depth, colour, image, vertices, textures }
+}

@@ -1,0 +1,197 @@
+//! The replay: what workers logged is walked in the order of the modelled hardware, through its caches.
+
+use activity::{Event, Packet, PacketCounts, PacketKind};
+
+use super::bin::Bin;
+use super::counters::{BinLog, Work};
+use super::pass::Pass;
+use super::surface::Surface;
+use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
+use crate::sampling::mix;
+use crate::shading::QuadAccess;
+
+/// Bytes of a stored depth or colour of one sample, and of a pixel of the image.
+const SAMPLE_BYTES: u64 = 4;
+
+/// The state of every cache during a frame.
+pub(super) struct Replay<'a> {
+    pass: &'a Pass<'a>,
+    memory: MemorySystem,
+    shading: Cache,
+    reuse: Reuse,
+    /// Lines of depth and of colour that hold something else than the clear value.
+    depth_used: Vec<bool>,
+    colour_used: Vec<bool>,
+}
+
+/// Vertices shaded of late, first in first out.
+struct Reuse {
+    recent: Vec<(usize, u32)>,
+    next: usize,
+}
+
+impl Reuse {
+    fn knows(&mut self, vertex: (usize, u32)) -> bool {
+        if self.recent.contains(&vertex) {
+            return true;
+        }
+        self.recent[self.next] = vertex;
+        self.next = (self.next + 1) % self.recent.len();
+        false
+    }
+}
+
+impl<'a> Replay<'a> {
+    pub fn new(pass: &'a Pass<'a>) -> Result<Self, CacheError> {
+        let spec = pass.settings.spec;
+        let lines = ((pass.addresses.colour - pass.addresses.depth) / LINE_BYTES) as usize;
+        Ok(Self {
+            pass,
+            memory: MemorySystem::new(&spec.memory)?,
+            shading: Cache::new(spec.shading_cache)?,
+            reuse: Reuse { recent: vec![(usize::MAX, 0); spec.vertex_reuse as usize], next: 0 },
+            depth_used: vec![false; lines],
+            colour_used: vec![false; lines],
+        })
+    }
+
+    /// Fetches and shades the vertices of a triangle that were not shaded of late.
+    pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
+        let geometry = &self.pass.draws[draw].geometry;
+        let bytes = geometry.vertex_bytes();
+        let ends =
+            if std::ptr::eq(geometry.open(), geometry.close()) && self.pass.still_camera { 1 } else { 2 };
+        for vertex in self.pass.corners(triangle).1 {
+            if self.reuse.knows((draw, vertex as u32)) {
+                continue;
+            }
+            counts[Event::VerticesFetched] += 1;
+            counts[Event::VertexBytes] += bytes;
+            counts[Event::VertexInvocations] += 1;
+            counts[Event::ShaderOps] += ends * self.pass.draws[draw].shader.cost().vertex_ops;
+            let address = self.pass.addresses.vertices[draw] + vertex as u64 * u64::from(bytes);
+            self.memory.vertices(address, u64::from(bytes), counts);
+        }
+    }
+
+    /// The packets of one bin in one batch.
+    pub fn bin(&mut self, log: &BinLog, emit: &mut impl FnMut(&Packet)) {
+        let mut first_quad = 0;
+        for work in &log.work {
+            let quads = &log.quads[first_quad..work.quads_end as usize];
+            first_quad = work.quads_end as usize;
+            emit(&self.tile(work, quads));
+        }
+    }
+
+    fn tile(&mut self, work: &Work, quads: &[QuadAccess]) -> Packet {
+        let mut packet = super::packet(PacketKind::Tile, work.tile, work.triangle);
+        let counts = &mut packet.counts;
+        work.tests.add_to(counts);
+        counts[Event::SamplesTested] = work.tested;
+        counts[Event::SamplesHit] = work.hit;
+        counts[Event::SampleMadds] = work.sample_madds;
+        counts[Event::DepthReads] = work.hit;
+        counts[Event::DepthWrites] = work.written;
+        counts[Event::ColourWrites] = work.written;
+        let base = self.pass.addresses.depth;
+        self.lines(work.tile, work.read_pixels, |this, line, pixels| {
+            let write = pixels & work.written_pixels != 0;
+            let fresh = !std::mem::replace(&mut this.depth_used[line as usize], true);
+            this.memory.depth(base + line * LINE_BYTES, write, fresh, counts);
+        });
+        if !quads.is_empty() {
+            self.shade(work.triangle, quads, counts);
+        }
+        let base = self.pass.addresses.colour;
+        self.lines(work.tile, work.written_pixels, |this, line, _| {
+            let fresh = !std::mem::replace(&mut this.colour_used[line as usize], true);
+            this.memory.colour(base + line * LINE_BYTES, true, fresh, counts);
+        });
+        packet
+    }
+
+    fn shade(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
+        let surface = Surface::new(self.pass, triangle);
+        let cost = self.pass.draws[self.pass.locate(triangle).0].shader.cost();
+        for access in quads {
+            counts[Event::ShadingLookups] += u32::from(access.lookups);
+            let hit = self.shading.access(quad_key(triangle, access.quad), false) == Access::Hit;
+            counts[Event::ShadingHits] += u32::from(access.lookups) - u32::from(!hit);
+            if hit {
+                continue;
+            }
+            counts[Event::QuadsShaded] += 1;
+            counts[Event::PixelInvocations] += 4;
+            counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
+            counts[Event::ShaderOps] += 4 * cost.pixel_ops;
+            let memory = &mut self.memory;
+            let fetches = surface.fetch(access.quad, |line| memory.texture(line, counts));
+            counts[Event::TextureFetches] += fetches;
+        }
+    }
+
+    /// Each line of a tile's samples that holds one of `pixels`, with those of them it holds.
+    fn lines(&mut self, tile: u32, pixels: u64, mut each: impl FnMut(&mut Self, u64, u64)) {
+        let spec = self.pass.settings.spec;
+        let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
+        let first_byte = u64::from(tile) * u64::from(spec.tile_px * spec.tile_px) * pixel_bytes;
+        let (mut left, mut open) = (pixels, None);
+        while left != 0 {
+            let pixel = u64::from(left.trailing_zeros());
+            left &= left - 1;
+            let first = first_byte + pixel * pixel_bytes;
+            for line in first / LINE_BYTES..=(first + pixel_bytes - 1) / LINE_BYTES {
+                open = match open {
+                    Some((same, held)) if same == line => Some((line, held | 1 << pixel)),
+                    before => {
+                        before.into_iter().for_each(|(line, held)| each(self, line, held));
+                        Some((line, 1 << pixel))
+                    }
+                };
+            }
+        }
+        open.into_iter().for_each(|(line, held)| each(self, line, held));
+    }
+
+    /// The packets that resolve every tile, row by row, and the end of the frame.
+    pub fn resolve(&mut self, bins: &[Bin], emit: &mut impl FnMut(&Packet)) {
+        let mut tiles: Vec<_> = bins.iter().flat_map(|bin| bin.inside(self.pass)).collect();
+        tiles.sort_unstable();
+        let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
+        for (tile, _, pixels, touched) in tiles {
+            emit(&last);
+            last = self.resolve_tile(tile, pixels, touched);
+        }
+        let image = self.pass.addresses.image;
+        let end = self.pass.addresses.vertices.first().copied().unwrap_or(u64::MAX);
+        self.memory.finish(image..end, &mut last.counts);
+        emit(&last);
+    }
+
+    fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
+        let mut packet = super::packet(PacketKind::Resolve, tile, u32::MAX);
+        let counts = &mut packet.counts;
+        counts[Event::PixelsResolved] = pixels.count_ones();
+        if touched {
+            counts[Event::SamplesResolved] = pixels.count_ones() * self.pass.settings.samples.per_pixel();
+            let base = self.pass.addresses.colour;
+            self.lines(tile, pixels, |this, line, _| {
+                let fresh = !this.colour_used[line as usize];
+                this.memory.colour(base + line * LINE_BYTES, false, fresh, counts);
+            });
+        }
+        let side = u64::from(self.pass.settings.spec.tile_px);
+        let bytes = side * side * SAMPLE_BYTES;
+        let first = self.pass.addresses.image + u64::from(tile) * bytes;
+        for line in first / LINE_BYTES..=(first + bytes - 1) / LINE_BYTES {
+            self.memory.colour(line * LINE_BYTES, true, true, counts);
+        }
+        packet
+    }
+}
+
+/// The key of a quad in the shading cache, spread so that the set a quad falls into does not favour any direction.
+fn quad_key(triangle: u32, quad: [i32; 2]) -> u64 {
+    mix(u64::from(triangle) << 42 ^ (quad[0] as u64 & 0x1F_FFFF) << 21 ^ (quad[1] as u64 & 0x1F_FFFF))
+}

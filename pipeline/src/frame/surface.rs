@@ -1,0 +1,113 @@
+//! From a sample to the cell that shades it, and from a cell to the point of the surface.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::pass::Pass;
+use crate::sample_test::exact;
+use crate::sampling::TileSamples;
+use crate::setup::Corner;
+use crate::shading::{self, REFERENCE_TIME, ShadingPoint};
+use crate::texture::{Footprint, Sampler};
+
+/// The shading grid over one triangle.
+pub(super) struct Grid<'a> {
+    corners: &'a [Corner; 3],
+    reference: [[f32; 3]; 3],
+    origin: [f32; 2],
+    plain: bool,
+}
+
+impl<'a> Grid<'a> {
+    pub fn new(pass: &Pass<'_>, corners: &'a [Corner; 3], moving: bool) -> Self {
+        let reference = corners.map(|corner| corner.at(REFERENCE_TIME));
+        Self { corners, reference, origin: pass.origin, plain: !moving && !pass.lens }
+    }
+
+    /// The cell in which the sample in `slot` of a tile, which sees the triangle, is shaded. Where nothing moves and
+    /// all is in focus that is its own pixel, and so it is where its point of the surface falls behind the camera.
+    pub fn cell(&self, samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
+        let pixel = u32::from(samples.pixel[slot]);
+        let own = [(tile[0] + pixel % side) as i32, (tile[1] + pixel / side) as i32];
+        if self.plain {
+            return own;
+        }
+        let seen = exact::seen(self.corners, samples, slot);
+        let edge = |i: usize, j: usize| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
+        let e = [edge(1, 2), edge(2, 0), edge(0, 1)];
+        let sum = (e[0] + e[1]) + e[2];
+        shading::cell(&self.reference, e.map(|part| part / sum), self.origin).unwrap_or(own)
+    }
+}
+
+/// One triangle as a surface to be shaded.
+pub(super) struct Surface<'a> {
+    pass: &'a Pass<'a>,
+    draw: usize,
+    vertices: [usize; 3],
+    reference: [[f32; 3]; 3],
+    sampler: Option<Sampler<'a>>,
+}
+
+impl<'a> Surface<'a> {
+    pub fn new(pass: &'a Pass<'a>, triangle: u32) -> Self {
+        let (draw, vertices) = pass.corners(triangle);
+        let reference = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]).at(REFERENCE_TIME));
+        let texture = pass.draws[draw].shader.texture();
+        let textured = texture.filter(|_| !pass.draws[draw].geometry.uvs().is_empty());
+        let sampler = textured.map(|texture| Sampler::new(texture, pass.addresses.textures[draw]));
+        Self { pass, draw, vertices, reference, sampler }
+    }
+
+    /// Linear RGB radiance of a cell; a function of the triangle and the cell alone.
+    pub fn shade(&self, cell: [i32; 2]) -> Vec3 {
+        let weights = shading::cell_weights(&self.reference, cell, self.pass.origin);
+        let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
+            let uv = self.uv(weights);
+            sampler.sample(uv, &self.footprint(&sampler, cell.map(|c| c >> 1)))
+        });
+        self.pass.draws[self.draw].shader.shade(&self.point(weights), texel)
+    }
+
+    /// Bilinear fetches that shading the four cells of a quad takes, and each line of memory they read.
+    pub fn fetch(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> u32 {
+        let Some(sampler) = self.sampler else { return 0 };
+        let footprint = self.footprint(&sampler, quad);
+        for [x, y] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let weights =
+                shading::cell_weights(&self.reference, [2 * quad[0] + x, 2 * quad[1] + y], self.pass.origin);
+            sampler.lines(self.uv(weights), &footprint, &mut line);
+        }
+        4 * Sampler::fetches(&footprint)
+    }
+
+    /// The footprint shared by a quad, from the differences between its cells.
+    fn footprint(&self, sampler: &Sampler<'_>, quad: [i32; 2]) -> Footprint {
+        let at = |dx, dy| {
+            let cell = [2 * quad[0] + dx, 2 * quad[1] + dy];
+            self.uv(shading::cell_weights(&self.reference, cell, self.pass.origin))
+        };
+        let corner = at(0, 0);
+        sampler.footprint(at(1, 0) - corner, at(0, 1) - corner)
+    }
+
+    fn uv(&self, weights: [f32; 3]) -> Vec2 {
+        let uvs = self.pass.draws[self.draw].geometry.uvs();
+        if uvs.is_empty() { Vec2::ZERO } else { (0..3).map(|k| uvs[self.vertices[k]] * weights[k]).sum() }
+    }
+
+    fn point(&self, weights: [f32; 3]) -> ShadingPoint {
+        let geometry = &self.pass.draws[self.draw].geometry;
+        let corners = self.vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5);
+        let position: Vec3 = (0..3).map(|k| corners[k] * weights[k]).sum();
+        let flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let normals = geometry.normals();
+        let smooth = if normals.is_empty() {
+            flat
+        } else {
+            (0..3).map(|k| normals[self.vertices[k]] * weights[k]).sum::<Vec3>().normalize_or(flat)
+        };
+        let to_camera = (self.pass.eye - position).normalize_or_zero();
+        let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
+        ShadingPoint { position, normal, to_camera, uv: self.uv(weights) }
+    }
+}

@@ -1,0 +1,161 @@
+//! A thin-lens camera that may move while the shutter is open.
+
+use glam::{Affine3A, Vec2};
+
+/// A camera looking down `+z` of its own space, `x` to the right and `y` up.
+///
+/// The pose is given at both ends of the shutter; in between every vertex moves on a straight line, so a
+/// camera that turns is a chord of its true path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    open: Affine3A,
+    close: Affine3A,
+    tan_half_height: f32,
+    shift: Vec2,
+    lens: Option<Lens>,
+    near: f32,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    radius: f32,
+    focus: f32,
+}
+
+/// Why a camera or a lens cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// A value that has to be finite and above zero is not.
+    #[error("{what} is {value}; it has to be a finite number above zero")]
+    NotPositive {
+        /// Which value.
+        what: &'static str,
+        /// What was given.
+        value: f32,
+    },
+    /// A pose or a shift holds a value that is not finite.
+    #[error("{what} holds a value that is not finite")]
+    NotFinite {
+        /// Which value.
+        what: &'static str,
+    },
+}
+
+fn positive(what: &'static str, value: f32) -> Result<f32, CameraError> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(CameraError::NotPositive { what, value }) }
+}
+
+impl Lens {
+    /// A lens of `radius` focused at depth `focus`, both in scene units.
+    ///
+    /// # Errors
+    /// When either is not a finite number above zero. A pinhole is a camera without a lens.
+    pub fn new(radius: f32, focus: f32) -> Result<Self, CameraError> {
+        Ok(Self { radius: positive("lens radius", radius)?, focus: positive("focus depth", focus)? })
+    }
+
+    /// Radius in scene units.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// Depth in scene units at which everything is sharp.
+    pub fn focus(&self) -> f32 {
+        self.focus
+    }
+}
+
+impl Camera {
+    /// A still pinhole camera with the world-to-camera transform `pose`. `tan_half_height` is the tangent of
+    /// half the vertical field of view; samples nearer than `near` (scene units) are not seen.
+    ///
+    /// # Errors
+    /// When the pose is not finite, or the others are not finite and above zero.
+    pub fn new(pose: Affine3A, tan_half_height: f32, near: f32) -> Result<Self, CameraError> {
+        Self {
+            open: pose,
+            close: pose,
+            tan_half_height: positive("tangent of half the field of view", tan_half_height)?,
+            shift: Vec2::ZERO,
+            lens: None,
+            near: positive("near depth", near)?,
+        }
+        .moving(pose, pose)
+    }
+
+    /// The same camera moving from the world-to-camera transform `open` to `close` over the shutter.
+    ///
+    /// # Errors
+    /// When a pose is not finite.
+    pub fn moving(self, open: Affine3A, close: Affine3A) -> Result<Self, CameraError> {
+        if open.is_finite() && close.is_finite() {
+            Ok(Self { open, close, ..self })
+        } else {
+            Err(CameraError::NotFinite { what: "camera pose" })
+        }
+    }
+
+    /// The same camera with a lens, or as a pinhole.
+    #[must_use]
+    pub fn with_lens(self, lens: Option<Lens>) -> Self {
+        Self { lens, ..self }
+    }
+
+    /// The same camera with an off-centre frustum: `shift` moves the image by that many image heights.
+    ///
+    /// # Errors
+    /// When the shift is not finite.
+    pub fn with_shift(self, shift: Vec2) -> Result<Self, CameraError> {
+        if shift.is_finite() {
+            Ok(Self { shift, ..self })
+        } else {
+            Err(CameraError::NotFinite { what: "shift" })
+        }
+    }
+
+    /// World to camera when the shutter opens.
+    pub fn open(&self) -> Affine3A {
+        self.open
+    }
+
+    /// World to camera when the shutter closes.
+    pub fn close(&self) -> Affine3A {
+        self.close
+    }
+
+    /// Tangent of half the vertical field of view.
+    pub fn tan_half_height(&self) -> f32 {
+        self.tan_half_height
+    }
+
+    /// Shift of the image in image heights.
+    pub fn shift(&self) -> Vec2 {
+        self.shift
+    }
+
+    /// The lens, or `None` for a pinhole.
+    pub fn lens(&self) -> Option<Lens> {
+        self.lens
+    }
+
+    /// Depth in scene units below which samples are not seen.
+    pub fn near(&self) -> f32 {
+        self.near
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_cameras_cannot_be_built() {
+        assert!(Camera::new(Affine3A::IDENTITY, 0.5, 0.1).is_ok());
+        assert!(Camera::new(Affine3A::IDENTITY, 0.0, 0.1).is_err());
+        assert!(Camera::new(Affine3A::IDENTITY, 0.5, f32::NAN).is_err());
+        assert!(Camera::new(Affine3A::from_translation(glam::Vec3::splat(f32::INFINITY)), 0.5, 0.1).is_err());
+        assert!(Lens::new(0.0, 1.0).is_err());
+        assert!(Lens::new(0.1, -1.0).is_err());
+    }
+}

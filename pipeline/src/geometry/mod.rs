@@ -1,0 +1,10 @@
+//! What is drawn and from where: cameras, draws and the moving vertices they become.
+
+mod camera;
+mod draw;
+mod vertex;
+
+pub use camera::{Camera, CameraError, Lens};
+pub use draw::{Cull, Draw, DrawError, Geometry};
+pub(crate) use vertex::Projection;
+pub use vertex::{MovingVertex, Shear, Viewport};

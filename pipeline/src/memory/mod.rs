@@ -1,0 +1,10 @@
+//! Memory as the pipeline sees it: addresses, caches and what reaches the chips.
+
+mod cache;
+mod map;
+mod system;
+
+pub use cache::{Access, Cache, CacheError, CacheSpec};
+pub(crate) use map::Allocator;
+pub use map::{AddressMap, LINE_BYTES};
+pub use system::{MemorySpec, MemorySystem};

@@ -1,0 +1,173 @@
+//! The caches between the units and the memory chips, walked in the order of the modelled hardware.
+
+use activity::{Event, PacketCounts};
+use serde::Deserialize;
+
+use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES};
+
+/// The caches of memory. Entries are lines of 64 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MemorySpec {
+    /// The depth unit's cache.
+    pub depth: CacheSpec,
+    /// The colour unit's cache.
+    pub colour: CacheSpec,
+    /// The texture units' cache.
+    pub texture: CacheSpec,
+    /// The cache shared by all.
+    pub l2: CacheSpec,
+}
+
+/// A unit's own cache above the L2, and the events it counts.
+#[derive(Clone, Debug)]
+struct Client {
+    cache: Cache,
+    lines: Event,
+    misses: Event,
+}
+
+/// The state of all caches.
+#[derive(Clone, Debug)]
+pub struct MemorySystem {
+    depth: Client,
+    colour: Client,
+    texture: Client,
+    l2: Cache,
+}
+
+impl MemorySystem {
+    /// Empty caches.
+    ///
+    /// # Errors
+    /// When one of them cannot be built.
+    pub fn new(spec: &MemorySpec) -> Result<Self, CacheError> {
+        let client = |spec, lines, misses| Ok(Client { cache: Cache::new(spec)?, lines, misses });
+        Ok(Self {
+            depth: client(spec.depth, Event::DepthLines, Event::DepthMisses)?,
+            colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
+            texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
+            l2: Cache::new(spec.l2)?,
+        })
+    }
+
+    /// The depth unit reads, and where `write` changes, the line at `address`. A `fresh` line was cleared and never
+    /// written: its contents are known and not fetched.
+    pub fn depth(&mut self, address: u64, write: bool, fresh: bool, counts: &mut PacketCounts) {
+        access(&mut self.depth, &mut self.l2, address, write, fresh, counts);
+    }
+
+    /// The colour unit writes or reads the line at `address`; `fresh` as for depth.
+    pub fn colour(&mut self, address: u64, write: bool, fresh: bool, counts: &mut PacketCounts) {
+        access(&mut self.colour, &mut self.l2, address, write, fresh, counts);
+    }
+
+    /// A texture unit reads the line at `address`.
+    pub fn texture(&mut self, address: u64, counts: &mut PacketCounts) {
+        access(&mut self.texture, &mut self.l2, address, false, false, counts);
+    }
+
+    /// The vertex fetch reads the lines that hold `bytes` from `address`, straight from the L2.
+    pub fn vertices(&mut self, address: u64, bytes: u64, counts: &mut PacketCounts) {
+        let first = address / LINE_BYTES;
+        let last = (address + bytes.max(1) - 1) / LINE_BYTES;
+        (first..=last).for_each(|line| shared(&mut self.l2, line, false, counts));
+    }
+
+    /// The end of the frame: what the display will read leaves the L2; depths and sample colours are not needed again.
+    pub fn finish(&mut self, image: std::ops::Range<u64>, counts: &mut PacketCounts) {
+        for line in self.colour.cache.flush() {
+            if image.contains(&(line * LINE_BYTES)) {
+                shared(&mut self.l2, line, true, counts);
+            }
+        }
+        let written = self.l2.flush().into_iter().filter(|line| image.contains(&(line * LINE_BYTES))).count();
+        counts[Event::DramWriteBytes] += written as u32 * LINE_BYTES as u32;
+    }
+}
+
+fn access(
+    client: &mut Client,
+    l2: &mut Cache,
+    address: u64,
+    write: bool,
+    fresh: bool,
+    counts: &mut PacketCounts,
+) {
+    let line = address / LINE_BYTES;
+    counts[client.lines] += 1;
+    let found = client.cache.access(line, write);
+    if found == Access::Hit {
+        return;
+    }
+    counts[client.misses] += 1;
+    if let Access::MissEvicting(victim) = found {
+        shared(l2, victim, true, counts);
+    }
+    if !fresh {
+        shared(l2, line, false, counts);
+    }
+}
+
+/// One line through the L2. A line written whole is not fetched first.
+fn shared(l2: &mut Cache, line: u64, write: bool, counts: &mut PacketCounts) {
+    counts[if write { Event::L2Writes } else { Event::L2Reads }] += 1;
+    let found = l2.access(line, write);
+    if found == Access::Hit {
+        return;
+    }
+    counts[Event::L2Misses] += 1;
+    if matches!(found, Access::MissEvicting(_)) {
+        counts[Event::DramWriteBytes] += LINE_BYTES as u32;
+    }
+    if !write {
+        counts[Event::DramReadBytes] += LINE_BYTES as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn system() -> MemorySystem {
+        let small = CacheSpec { entries: 2, ways: 2 };
+        let l2 = CacheSpec { entries: 64, ways: 4 };
+        MemorySystem::new(&MemorySpec { depth: small, colour: small, texture: small, l2 }).unwrap()
+    }
+
+    #[test]
+    fn a_line_is_fetched_once() {
+        let (mut memory, mut counts) = (system(), PacketCounts::default());
+        memory.texture(100, &mut counts);
+        memory.texture(120, &mut counts);
+        assert_eq!((counts[Event::TextureLines], counts[Event::TextureMisses]), (2, 1));
+        assert_eq!((counts[Event::L2Reads], counts[Event::DramReadBytes]), (1, 64));
+    }
+
+    #[test]
+    fn a_fresh_line_costs_no_read() {
+        let (mut memory, mut counts) = (system(), PacketCounts::default());
+        memory.depth(0, true, true, &mut counts);
+        assert_eq!(
+            (counts[Event::DepthMisses], counts[Event::L2Reads], counts[Event::DramReadBytes]),
+            (1, 0, 0)
+        );
+    }
+
+    #[test]
+    fn only_the_image_is_written_at_the_end() {
+        let (mut memory, mut counts) = (system(), PacketCounts::default());
+        memory.depth(0, true, true, &mut counts);
+        memory.colour(1024, true, true, &mut counts);
+        memory.colour(2048, true, true, &mut counts);
+        memory.finish(2048..4096, &mut counts);
+        assert_eq!(counts[Event::DramWriteBytes], 64);
+    }
+
+    #[test]
+    fn vertices_span_lines() {
+        let (mut memory, mut counts) = (system(), PacketCounts::default());
+        memory.vertices(60, 32, &mut counts);
+        assert_eq!(counts[Event::L2Reads], 2);
+    }
+}

@@ -1,0 +1,95 @@
+//! The sample test where rounded products tie, and the weights of a hit.
+
+use crate::sampling::TileSamples;
+use crate::setup::Corner;
+
+/// A vertex seen from a sample: `[x', y', w]`.
+pub type Seen = [f32; 3];
+
+/// The vertices of a triangle as the sample in `slot` sees them, with the operations of the kernel in their order.
+pub fn seen(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> [Seen; 3] {
+    corners.map(|corner| {
+        let [x, y, w] = corner.at(samples.t[slot]);
+        [
+            (x - samples.lens[0][slot]) - samples.slope[0][slot] * w,
+            (y - samples.lens[1][slot]) - samples.slope[1][slot] * w,
+            w,
+        ]
+    })
+}
+
+/// Barycentric weights of the origin in the triangle, or `None` when it is outside. They add up to one and are not
+/// negative. Also says whether the triangle turns counter-clockwise on the screen (`y` downwards).
+///
+/// Ties are broken by moving the sample by `(eps, eps^2)` for an infinitely small `eps`: the edge becomes
+/// `e + eps B + eps^2 C` with `B = y_i w_j - y_j w_i`, `C = w_i x_j - w_j x_i`, and its first term that is not zero
+/// decides (Edelsbrunner and Mücke 1990, simulation of simplicity). Products of two `f32` are exact in `f64`.
+pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
+    let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| terms(&seen[i], &seen[j]));
+    let signs = edges.map(|levels| levels.into_iter().map(sign).find(|&s| s != 0).unwrap_or(0));
+    if signs[0] == 0 || signs[1] != signs[0] || signs[2] != signs[0] {
+        return None;
+    }
+    // The lowest order at which any edge differs from zero carries the weights.
+    let level = (0..3).find(|&level| edges.iter().any(|levels| sign(levels[level]) != 0))?;
+    let parts = edges.map(|levels| levels[level].0 - levels[level].1);
+    let parts = [0, 1, 2].map(|k| if sign(edges[k][level]) == signs[0] { parts[k].abs() } else { 0.0 });
+    let sum: f64 = parts.iter().sum();
+    (sum > 0.0).then(|| (parts.map(|part| part / sum), signs[0] < 0))
+}
+
+/// The pairs of exact products whose differences are `e`, `B` and `C` of the edge from `i` to `j`.
+fn terms(i: &Seen, j: &Seen) -> [(f64, f64); 3] {
+    let [xi, yi, wi] = i.map(f64::from);
+    let [xj, yj, wj] = j.map(f64::from);
+    [(xi * yj, xj * yi), (yi * wj, yj * wi), (wi * xj, wj * xi)]
+}
+
+fn sign((plus, minus): (f64, f64)) -> i8 {
+    i8::from(plus > minus) - i8::from(plus < minus)
+}
+
+/// The depth of a hit with the given weights, kept within the range of the vertices.
+pub fn depth(seen: &[Seen; 3], weights: &[f64; 3]) -> f32 {
+    let w = seen.map(|vertex| vertex[2]);
+    let mean: f64 = weights.iter().zip(w).map(|(weight, w)| weight * f64::from(w)).sum();
+    (mean as f32).clamp(w[0].min(w[1]).min(w[2]), w[0].max(w[1]).max(w[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_a_triangle_has_equal_weights() {
+        let seen = [[2.0, 0.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]];
+        let (w, counter_clockwise) = weights(&seen).unwrap();
+        assert!(!counter_clockwise, "x towards y is clockwise when y points down");
+        assert!(w.iter().zip([1.0 / 3.0; 3]).all(|(a, b)| (a - b).abs() < 1e-15), "{w:?}");
+    }
+
+    #[test]
+    fn a_shared_edge_has_one_owner_wherever_the_sample_lies_on_it() {
+        let (a, b) = ([-3.0_f32, -1.5, 1.0], [6.0_f32, 3.0, 2.0]);
+        let (left, right) = ([-1.0_f32, 4.0, 1.5], [2.0_f32, -5.0, 0.5]);
+        let owners = [[a, b, left], [b, a, right]].iter().filter(|t| weights(t).is_some()).count();
+        assert_eq!(owners, 1);
+    }
+
+    #[test]
+    fn a_shared_vertex_has_one_owner() {
+        // A fan of eight about a vertex that is exactly the sample.
+        let rim: Vec<Seen> = [(3, 0), (2, 2), (0, 3), (-2, 2), (-3, 0), (-2, -2), (0, -3), (2, -2)]
+            .map(|(x, y)| [x as f32, y as f32, 1.0 + 0.1 * x as f32])
+            .to_vec();
+        let centre = [0.0, 0.0, 1.0];
+        let owners = (0..8).filter(|&k| weights(&[centre, rim[k], rim[(k + 1) % 8]]).is_some()).count();
+        assert_eq!(owners, 1);
+    }
+
+    #[test]
+    fn nothing_surrounds_a_point_outside() {
+        assert!(weights(&[[1.0, 1.0, 1.0], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]).is_none());
+        assert!(weights(&[[1.0, 1.0, 1.0], [2.0, 2.0, 1.0], [3.0, 3.0, 1.0]]).is_none());
+    }
+}

@@ -1,0 +1,266 @@
+//! The sample test over a run of samples, sixteen at a time.
+//!
+//! One source serves every combination of dimensions (by const generics) and every vector width (the compiler turns
+//! the lane loop into the widest instructions of the function it is inlined into). No operation is contracted, so
+//! all of them give the same bytes.
+
+use std::ops::Range;
+use std::sync::LazyLock;
+
+use super::exact;
+use crate::sampling::TileSamples;
+use crate::setup::Triangle;
+use crate::traversal::Box5;
+
+const LANES: usize = TileSamples::LANES;
+
+/// The stored samples of a tile, in the order of its [`TileSamples`].
+pub struct Target<'a> {
+    /// Depth of the nearest hit so far, infinite where there is none.
+    pub depth: &'a mut [f32],
+    /// Triangle of the nearest hit so far; meaningless where there is none.
+    pub triangle: &'a mut [u32],
+}
+
+/// What a run of sample tests found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Hits {
+    /// Samples tested.
+    pub tested: u32,
+    /// Samples inside the triangle and beyond the near depth.
+    pub hit: u32,
+    /// The slots of samples that now see the triangle, in order.
+    pub written: Vec<u16>,
+    /// Pixels of the tile whose stored depth was read.
+    pub read_pixels: u64,
+    /// Pixels of the tile whose stored depth was written.
+    pub written_pixels: u64,
+}
+
+impl Hits {
+    /// Forgets what was found, keeping the memory.
+    pub fn clear(&mut self) {
+        self.written.clear();
+        *self = Self { written: std::mem::take(&mut self.written), ..Self::default() };
+    }
+}
+
+/// Tests the samples of a tile that lie in the box against `triangle` and stores those that see it.
+pub fn test_run(
+    triangle: &Triangle,
+    samples: &TileSamples,
+    within: &Box5,
+    near: f32,
+    target: &mut Target<'_>,
+    hits: &mut Hits,
+) {
+    let run = if triangle.moving { samples.between(within.t[0], within.t[1]) } else { 0..samples.len };
+    let mut job = Job { triangle, samples, within, near, target, hits };
+    match (triangle.moving, within.lens) {
+        (false, false) => job.dispatch::<false, false>(run),
+        (true, false) => job.dispatch::<true, false>(run),
+        (false, true) => job.dispatch::<false, true>(run),
+        (true, true) => job.dispatch::<true, true>(run),
+    }
+}
+
+/// The widest vector instructions of this machine that the kernel is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Width {
+    Plain,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+static WIDTH: LazyLock<Width> = LazyLock::new(|| {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            return Width::Avx512;
+        }
+        if is_x86_feature_detected!("avx2") {
+            return Width::Avx2;
+        }
+    }
+    Width::Plain
+});
+
+struct Job<'a, 'b> {
+    triangle: &'a Triangle,
+    samples: &'a TileSamples,
+    within: &'a Box5,
+    near: f32,
+    target: &'a mut Target<'b>,
+    hits: &'a mut Hits,
+}
+
+/// What one block of lanes found: bit masks by lane, and the depth of each.
+struct Block {
+    clockwise: u32,
+    counter_clockwise: u32,
+    tie: u32,
+    depth: [f32; LANES],
+}
+
+impl Job<'_, '_> {
+    fn dispatch<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
+        match *WIDTH {
+            Width::Plain => self.run::<MOTION, LENS>(run),
+            // SAFETY: `WIDTH` names a width only where the machine has it.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => unsafe { self.run_avx2::<MOTION, LENS>(run) },
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512 => unsafe { self.run_avx512::<MOTION, LENS>(run) },
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn run_avx2<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
+        self.run::<MOTION, LENS>(run);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn run_avx512<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
+        self.run::<MOTION, LENS>(run);
+    }
+
+    #[inline(always)]
+    fn run<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
+        let mut base = run.start / LANES * LANES;
+        while base < run.end {
+            let active = lanes(&run, base) & if LENS { self.in_lens_box(base) } else { u32::MAX };
+            if active != 0 {
+                self.hits.tested += active.count_ones();
+                let block = self.block::<MOTION, LENS>(base);
+                self.store(base, &block, active);
+            }
+            base += LANES;
+        }
+    }
+
+    /// Lanes whose place on the lens lies in the box.
+    #[inline(always)]
+    fn in_lens_box(&self, base: usize) -> u32 {
+        let ([u_lo, u_hi], [v_lo, v_hi]) = (self.within.u, self.within.v);
+        let (u, v) = (&self.samples.u[base..base + LANES], &self.samples.v[base..base + LANES]);
+        let mut mask = 0;
+        for lane in 0..LANES {
+            let inside = (u[lane] >= u_lo) & (u[lane] <= u_hi) & (v[lane] >= v_lo) & (v[lane] <= v_hi);
+            mask |= u32::from(inside) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn block<const MOTION: bool, const LENS: bool>(&self, base: usize) -> Block {
+        let s = self.samples;
+        let range = base..base + LANES;
+        let (t, slope_x, slope_y) =
+            (&s.t[range.clone()], &s.slope[0][range.clone()], &s.slope[1][range.clone()]);
+        let (lens_x, lens_y) = (&s.lens[0][range.clone()], &s.lens[1][range]);
+        let corners = &self.triangle.corners;
+        let mut block = Block { clockwise: 0, counter_clockwise: 0, tie: 0, depth: [0.0; LANES] };
+        let mut signs = [[0_u32; LANES]; 3];
+        for lane in 0..LANES {
+            let seen = corners.map(|corner| {
+                let [x, y, w] = if MOTION { corner.at(t[lane]) } else { corner.open };
+                let (x, y) = if LENS { (x - lens_x[lane], y - lens_y[lane]) } else { (x, y) };
+                [x - slope_x[lane] * w, y - slope_y[lane] * w, w]
+            });
+            let [a, b, c] = seen;
+            let e = [b[0] * c[1] - c[0] * b[1], c[0] * a[1] - a[0] * c[1], a[0] * b[1] - b[0] * a[1]];
+            let any_above = (e[0] > 0.0) | (e[1] > 0.0) | (e[2] > 0.0);
+            let any_below = (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0);
+            signs[0][lane] = u32::from((e[0] > 0.0) & (e[1] > 0.0) & (e[2] > 0.0));
+            signs[1][lane] = u32::from((e[0] < 0.0) & (e[1] < 0.0) & (e[2] < 0.0));
+            let zero = (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
+            signs[2][lane] = u32::from(zero & !(any_above & any_below));
+            let depth = ((e[0] * a[2] + e[1] * b[2]) + e[2] * c[2]) / ((e[0] + e[1]) + e[2]);
+            // The quotient may leave the range of the vertices by a rounding; depth culling relies on it.
+            block.depth[lane] = depth.max(a[2].min(b[2]).min(c[2])).min(a[2].max(b[2]).max(c[2]));
+        }
+        for lane in 0..LANES {
+            block.clockwise |= signs[0][lane] << lane;
+            block.counter_clockwise |= signs[1][lane] << lane;
+            block.tie |= signs[2][lane] << lane;
+        }
+        block
+    }
+
+    /// Resolves ties, applies facing and the near depth, and keeps what is nearest.
+    #[inline(always)]
+    fn store(&mut self, base: usize, block: &Block, active: u32) {
+        let [clockwise, counter_clockwise] = self.triangle.faces;
+        let mut inside = 0;
+        if clockwise {
+            inside |= block.clockwise;
+        }
+        if counter_clockwise {
+            inside |= block.counter_clockwise;
+        }
+        inside &= active;
+        while inside != 0 {
+            let lane = inside.trailing_zeros() as usize;
+            inside &= inside - 1;
+            self.keep(base + lane, block.depth[lane]);
+        }
+        let mut tie = block.tie & active;
+        while tie != 0 {
+            let lane = tie.trailing_zeros() as usize;
+            tie &= tie - 1;
+            self.keep_exact(base + lane);
+        }
+    }
+
+    #[cold]
+    fn keep_exact(&mut self, slot: usize) {
+        let seen = exact::seen(&self.triangle.corners, self.samples, slot);
+        if let Some((weights, counter_clockwise)) = exact::weights(&seen)
+            && self.triangle.faces[usize::from(counter_clockwise)]
+        {
+            self.keep(slot, exact::depth(&seen, &weights));
+        }
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, slot: usize, depth: f32) {
+        // A comparison that fails for NaN as well.
+        if !(depth > self.near) {
+            return;
+        }
+        let pixel = 1_u64 << self.samples.pixel[slot];
+        self.hits.hit += 1;
+        self.hits.read_pixels |= pixel;
+        let (stored, owner) = (self.target.depth[slot], self.target.triangle[slot]);
+        if depth < stored || (depth == stored && self.triangle.id < owner) {
+            self.target.depth[slot] = depth;
+            self.target.triangle[slot] = self.triangle.id;
+            self.hits.written.push(slot as u16);
+            self.hits.written_pixels |= pixel;
+        }
+    }
+}
+
+/// The lanes of the block at `base` that belong to `run`.
+fn lanes(run: &Range<usize>, base: usize) -> u32 {
+    let first = run.start.saturating_sub(base);
+    let last = (run.end - base).min(LANES);
+    ((1_u32 << last) - 1) & !((1_u32 << first) - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_of_a_run() {
+        assert_eq!(lanes(&(0..16), 0), 0xFFFF);
+        assert_eq!(lanes(&(3..40), 0), 0xFFF8);
+        assert_eq!(lanes(&(3..40), 16), 0xFFFF);
+        assert_eq!(lanes(&(3..40), 32), 0x00FF);
+    }
+}

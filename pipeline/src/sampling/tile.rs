@@ -1,0 +1,137 @@
+//! The samples of one tile, laid out for the sample test.
+
+use super::SampleTable;
+use crate::geometry::{Shear, Viewport};
+
+/// Samples of one tile as arrays, sorted by time so that a time interval is a run of them. Arrays are padded to
+/// whole blocks of [`TileSamples::LANES`]; padding lies at a time no interval holds.
+#[derive(Clone, Debug, Default)]
+pub struct TileSamples {
+    /// Samples, padding not counted.
+    pub len: usize,
+    /// Image position in pixels from the centre of the image.
+    pub x: Vec<f32>,
+    /// Image position in pixels from the centre of the image, downwards.
+    pub y: Vec<f32>,
+    /// Lens position.
+    pub u: Vec<f32>,
+    /// Lens position.
+    pub v: Vec<f32>,
+    /// Time over the shutter.
+    pub t: Vec<f32>,
+    /// `u s.x` and `v s.y`: the part of the lens shear that does not depend on depth.
+    pub lens: [Vec<f32>; 2],
+    /// `x - u a.x` and `y - v a.y`: what multiplies the depth of a vertex.
+    pub slope: [Vec<f32>; 2],
+    /// The pixel within the tile, row by row.
+    pub pixel: Vec<u8>,
+    order: Vec<u16>,
+}
+
+impl TileSamples {
+    /// Samples tested together.
+    pub const LANES: usize = 16;
+    /// The time given to padding.
+    const NEVER: f32 = f32::INFINITY;
+
+    /// Fills the arrays for the tile of `side_px` pixels (at most 8) whose first pixel is `(px, py)`. Pixels outside
+    /// the viewport get no samples.
+    pub fn fill(
+        &mut self,
+        table: &SampleTable,
+        viewport: Viewport,
+        shear: &Shear,
+        [px, py]: [u32; 2],
+        side_px: u32,
+    ) {
+        self.sort_by_time(table, viewport, [px, py], side_px);
+        self.len = self.order.len();
+        self.resize(self.len.next_multiple_of(Self::LANES));
+        let per_pixel = table.per_pixel();
+        for slot in 0..self.len {
+            let index = u32::from(self.order[slot]);
+            let (pixel, sample) = (index / per_pixel, (index % per_pixel) as usize);
+            let (column, row) = (px + pixel % side_px, py + pixel / side_px);
+            let s = table.pixel(column, row)[sample];
+            let x = Viewport::edge(column, viewport.width()) + s.x;
+            let y = Viewport::edge(row, viewport.height()) + s.y;
+            (self.x[slot], self.y[slot]) = (x, y);
+            (self.u[slot], self.v[slot], self.t[slot]) = (s.u, s.v, s.t);
+            (self.lens[0][slot], self.lens[1][slot]) = (s.u * shear.s[0], s.v * shear.s[1]);
+            (self.slope[0][slot], self.slope[1][slot]) = (x - s.u * shear.a[0], y - s.v * shear.a[1]);
+            self.pixel[slot] = pixel as u8;
+        }
+    }
+
+    fn sort_by_time(&mut self, table: &SampleTable, viewport: Viewport, [px, py]: [u32; 2], side_px: u32) {
+        self.order.clear();
+        let [columns, rows] = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
+        if [side_px, columns, rows] == [SampleTable::TURN_PX; 3] {
+            self.order.extend(table.block_by_time(px, py));
+            return;
+        }
+        let per_pixel = table.per_pixel();
+        for row in 0..rows {
+            for column in 0..columns {
+                let first = (row * side_px + column) * per_pixel;
+                self.order.extend((first..first + per_pixel).map(|index| index as u16));
+            }
+        }
+        self.order.sort_by_key(|&index| {
+            let (pixel, sample) = (u32::from(index) / per_pixel, u32::from(index) % per_pixel);
+            table.pixel(px + pixel % side_px, py + pixel / side_px)[sample as usize].t.to_bits()
+        });
+    }
+
+    fn resize(&mut self, padded: usize) {
+        let [lens_x, lens_y] = &mut self.lens;
+        let [slope_x, slope_y] = &mut self.slope;
+        for array in [&mut self.x, &mut self.y, &mut self.u, &mut self.v, lens_x, lens_y, slope_x, slope_y] {
+            array.clear();
+            array.resize(padded, 0.0);
+        }
+        self.t.clear();
+        self.t.resize(padded, Self::NEVER);
+        self.pixel.clear();
+        self.pixel.resize(padded, 0);
+    }
+
+    /// The run of samples with `lo <= t <= hi`.
+    pub fn between(&self, lo: f32, hi: f32) -> std::ops::Range<usize> {
+        let times = &self.t[..self.len];
+        times.partition_point(|&t| t < lo)..times.partition_point(|&t| t <= hi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::LensShape;
+
+    #[test]
+    fn a_tile_holds_each_sample_of_its_pixels_once() {
+        let table = SampleTable::low_discrepancy(5, 1, LensShape::Disk).unwrap();
+        let viewport = Viewport::new(20, 11).unwrap();
+        let mut tile = TileSamples::default();
+        tile.fill(&table, viewport, &Shear::default(), [16, 8], 8);
+        assert_eq!(tile.len, 4 * 3 * 5);
+        assert_eq!(tile.t.len() % TileSamples::LANES, 0);
+        assert!(tile.t[..tile.len].is_sorted());
+        for slot in 0..tile.len {
+            let (column, row) = (16 + u32::from(tile.pixel[slot]) % 8, 8 + u32::from(tile.pixel[slot]) / 8);
+            let here = table.pixel(column, row);
+            assert!(here.iter().any(|s| s.t == tile.t[slot] && column as f32 - 10.0 + s.x == tile.x[slot]));
+        }
+    }
+
+    #[test]
+    fn a_time_interval_is_a_run() {
+        let table = SampleTable::low_discrepancy(8, 1, LensShape::Disk).unwrap();
+        let mut tile = TileSamples::default();
+        tile.fill(&table, Viewport::new(64, 64).unwrap(), &Shear::default(), [8, 8], 8);
+        let run = tile.between(0.25, 0.5);
+        let inside = tile.t[..tile.len].iter().filter(|t| (0.25..=0.5).contains(*t)).count();
+        assert_eq!(run.len(), inside);
+        assert!(tile.t[run].iter().all(|t| (0.25..=0.5).contains(t)));
+    }
+}

@@ -1,0 +1,7 @@
+//! Triangle set-up: what is known of a triangle before any tile is visited.
+
+mod bounds;
+mod triangle;
+
+pub use bounds::{PixelRect, bounds};
+pub use triangle::{Corner, Outcome, Triangle, madds, set_up};

@@ -1,0 +1,194 @@
+//! A triangle ready for traversal and sample tests.
+
+use crate::geometry::{Cull, MovingVertex, Shear};
+
+/// A vertex `open + t delta` on the homogeneous image plane, as `[x, y, w]`. Written so that a still vertex is
+/// `open` to the last bit at every time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Corner {
+    /// When the shutter opens.
+    pub open: [f32; 3],
+    /// Closing minus opening position, rounded once.
+    pub delta: [f32; 3],
+}
+
+impl Corner {
+    /// The corner at `vertex`.
+    pub fn new(vertex: &MovingVertex) -> Self {
+        let delta = std::array::from_fn(|axis| vertex.close[axis] - vertex.open[axis]);
+        Self { open: vertex.open, delta }
+    }
+
+    /// The vertex at time `t`, with the rounding of the sample test: monotone in `t` on every axis.
+    pub fn at(&self, t: f32) -> [f32; 3] {
+        std::array::from_fn(|axis| self.open[axis] + t * self.delta[axis])
+    }
+}
+
+/// A triangle that traversal has to visit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// The triangle, counted through the pass. Of two at equal depth the lower one wins.
+    pub id: u32,
+    /// Its vertices.
+    pub corners: [Corner; 3],
+    /// Whether any vertex moves; where none does the time dimension is dropped.
+    pub moving: bool,
+    /// Whether any vertex is behind the camera at an end of the shutter.
+    pub behind: bool,
+    /// Whether samples may see the face that appears clockwise (`[0]`) and counter-clockwise (`[1]`) on the screen.
+    pub faces: [bool; 2],
+    /// What a tile test has to allow for rounding in `x` and in `y`, in the units of these.
+    pub slack: [f32; 2],
+}
+
+/// What became of a triangle in set-up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// It goes on.
+    Ready(Triangle),
+    /// It has no area at any time.
+    Degenerate,
+    /// It is nearer than the near depth at all times.
+    Outside,
+    /// It is still and shows a culled face.
+    FaceCulled,
+}
+
+/// Multiply-adds of setting up a triangle: the differences of moving vertices and, where both faces are not drawn,
+/// the facing determinant.
+pub fn madds(moving: bool, cull: Cull) -> u32 {
+    u32::from(moving) * 9 + if cull == Cull::None { 0 } else { 9 }
+}
+
+/// Sets up the triangle `id` with the given vertices; `half_px` is half the size of the image in pixels.
+pub fn set_up(
+    id: u32,
+    vertices: [&MovingVertex; 3],
+    cull: Cull,
+    shear: &Shear,
+    near: f32,
+    half_px: [f32; 2],
+) -> Outcome {
+    if has_no_area(vertices) {
+        return Outcome::Degenerate;
+    }
+    let corners = vertices.map(Corner::new);
+    // The depth of a sample lies between those of the vertices, which are farthest at an end of the shutter.
+    if corners.iter().all(|c| c.at(0.0)[2] <= near && c.at(1.0)[2] <= near) {
+        return Outcome::Outside;
+    }
+    let faces = [cull != Cull::Back, cull != Cull::Front];
+    let moving = vertices.iter().any(|vertex| !vertex.is_still());
+    if !moving && shear.is_none() && !(faces[0] && faces[1]) && shows_culled_face(&corners, faces) {
+        return Outcome::FaceCulled;
+    }
+    let slack = [0, 1].map(|axis| slack(&corners, shear, axis, half_px[axis]));
+    let behind = corners.iter().any(|c| c.at(0.0)[2] < 0.0 || c.at(1.0)[2] < 0.0);
+    Outcome::Ready(Triangle { id, corners, moving, behind, faces, slack })
+}
+
+/// Two vertices that agree at both ends, or three that lie on one line at all times to the last bit, leave nothing to
+/// see. The area is a vector quadratic in time; its three Bernstein coefficients vanish together.
+fn has_no_area([a, b, c]: [&MovingVertex; 3]) -> bool {
+    let side = |from: &[f32; 3], to: &[f32; 3]| [0, 1, 2].map(|i| f64::from(to[i]) - f64::from(from[i]));
+    let (ab0, ab1) = (side(&a.open, &b.open), side(&a.close, &b.close));
+    let (ac0, ac1) = (side(&a.open, &c.open), side(&a.close, &c.close));
+    let mixed = [0, 1, 2].map(|i| cross(ab0, ac1)[i] + cross(ab1, ac0)[i]);
+    [cross(ab0, ac0), mixed, cross(ab1, ac1)].iter().flatten().all(|&part| part == 0.0)
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Whether a still triangle seen through a pinhole shows a face that is not drawn: the sign of
+/// det[p0, p1, p2], trusted only well beyond its rounding error.
+fn shows_culled_face(corners: &[Corner; 3], faces: [bool; 2]) -> bool {
+    let p = corners.map(|corner| corner.open.map(f64::from));
+    let normal = cross(p[1], p[2]);
+    let terms = [0, 1, 2].map(|i| p[0][i] * normal[i]);
+    let size: f64 =
+        [0, 1, 2].map(|i| p[0][i].abs() * (p[1][(i + 1) % 3] * p[2][(i + 2) % 3]).abs()).iter().sum();
+    let size = size
+        + [0, 1, 2]
+            .map(|i| p[0][i].abs() * (p[1][(i + 2) % 3] * p[2][(i + 1) % 3]).abs())
+            .iter()
+            .sum::<f64>();
+    let det: f64 = terms.iter().sum();
+    // The sample test rounds in f32; leave everything within its reach to it.
+    det.abs() > 1e-5 * size && !faces[usize::from(det < 0.0)]
+}
+
+/// A bound on the rounding error of `(x - u s) - (X - u a) w` for any sample, eight units in the last place of the
+/// largest intermediate value and more: 2^-20 of the sum of magnitudes.
+fn slack(corners: &[Corner; 3], shear: &Shear, axis: usize, half_px: f32) -> f32 {
+    const ROUNDING: f32 = 1.0 / 1_048_576.0;
+    let largest = |axis: usize| {
+        let ends =
+            corners.iter().flat_map(|c| [c.open[axis].abs(), c.open[axis].abs() + c.delta[axis].abs()]);
+        ends.fold(0.0, f32::max)
+    };
+    let reach = half_px + 1.0 + shear.a[axis].abs();
+    ROUNDING * (largest(axis) + shear.s[axis].abs() + reach * largest(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn still(p: [f32; 3]) -> MovingVertex {
+        MovingVertex { open: p, close: p }
+    }
+
+    fn outcome(points: [[f32; 3]; 3], cull: Cull) -> Outcome {
+        let v = points.map(still);
+        set_up(3, [&v[0], &v[1], &v[2]], cull, &Shear::default(), 0.1, [64.0, 64.0])
+    }
+
+    #[test]
+    fn still_vertices_stay_to_the_last_bit() {
+        let corner = Corner::new(&still([0.1, -7.3e-5, 1e6]));
+        for t in [0.0, 0.1, 0.7, 1.0] {
+            assert_eq!(corner.at(t), [0.1, -7.3e-5, 1e6]);
+        }
+    }
+
+    #[test]
+    fn no_area_is_dropped() {
+        assert_eq!(
+            outcome([[0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [2.0, 2.0, 1.0]], Cull::None),
+            Outcome::Degenerate
+        );
+        assert_eq!(
+            outcome([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [2.0, 1.0, 1.0]], Cull::None),
+            Outcome::Degenerate
+        );
+    }
+
+    #[test]
+    fn no_area_at_one_instant_is_kept() {
+        let v = [
+            still([0.0, 0.0, 1.0]),
+            still([2.0, 0.0, 1.0]),
+            MovingVertex { open: [1.0, 1.0, 1.0], close: [1.0, -1.0, 1.0] },
+        ];
+        let outcome = set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &Shear::default(), 0.1, [64.0; 2]);
+        assert!(matches!(outcome, Outcome::Ready(t) if t.moving), "{outcome:?}");
+    }
+
+    #[test]
+    fn faces_are_culled_by_their_winding_on_the_screen() {
+        // y points down, so this order is clockwise on the screen: a back face.
+        let clockwise = [[0.0, 0.0, 1.0], [10.0, 0.0, 1.0], [0.0, 10.0, 1.0]];
+        assert_eq!(outcome(clockwise, Cull::Back), Outcome::FaceCulled);
+        assert!(matches!(outcome(clockwise, Cull::Front), Outcome::Ready(_)));
+        assert!(matches!(outcome(clockwise, Cull::None), Outcome::Ready(_)));
+    }
+
+    #[test]
+    fn what_is_too_near_is_outside() {
+        let behind = [[0.0, 0.0, -1.0], [10.0, 0.0, -1.0], [0.0, 10.0, 0.05]];
+        assert_eq!(outcome(behind, Cull::None), Outcome::Outside);
+    }
+}

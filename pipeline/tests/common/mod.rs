@@ -1,0 +1,174 @@
+//! Random scenes and a brute-force image to hold the pipeline against.
+#![allow(dead_code)]
+
+use glam::{Affine3A, Vec3, Vec4};
+use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::sampling::{TileSamples, mix};
+use pipeline::setup::{Outcome, set_up};
+use pipeline::traversal::Box5;
+use pipeline::*;
+
+/// Counter-based uniform numbers in [0, 1).
+pub struct Uniform(u64, u64);
+
+impl Uniform {
+    pub fn new(seed: u64) -> Self {
+        Self(mix(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1), 0)
+    }
+
+    pub fn next(&mut self) -> f32 {
+        self.1 += 1;
+        (mix(self.0.wrapping_add(self.1.wrapping_mul(0x9E37_79B9_7F4A_7C15))) >> 40) as f32 / 16_777_216.0
+    }
+
+    pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
+        lo + (hi - lo) * self.next()
+    }
+}
+
+/// A shader whose colour is a function of the normal, so that it does not matter which.
+pub struct Plain;
+
+impl Shader for Plain {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
+    }
+
+    fn shade(&self, at: &ShadingPoint, _texel: Vec4) -> Vec3 {
+        at.normal.abs()
+    }
+}
+
+/// Triangle soup at both ends of the shutter, in front of a camera at the origin that looks down +z.
+pub struct Soup {
+    pub open: Vec<Vec3>,
+    pub close: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// How wild a soup is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    Still,
+    Moving,
+    /// A third of the triangles reach behind the camera.
+    Crossing,
+    /// Slivers, and triangles that turn over.
+    Slivers,
+    /// Vertices on a coarse grid, shared and aligned with samples, so that ties abound.
+    Grid,
+}
+
+impl Soup {
+    pub fn new(kind: Kind, count: u32, seed: u64) -> Self {
+        let mut r = Uniform::new(seed);
+        let (mut open, mut close) = (Vec::new(), Vec::new());
+        for triangle in 0..count {
+            let behind = kind == Kind::Crossing && triangle % 3 == 0;
+            let middle = Vec3::new(
+                r.within(-4.0, 4.0),
+                r.within(-4.0, 4.0),
+                r.within(if behind { -3.0 } else { 2.0 }, 12.0),
+            );
+            let size = if behind { 4.0 } else { r.within(0.05, 2.0) };
+            let drift = Vec3::new(r.within(-2.0, 2.0), r.within(-2.0, 2.0), r.within(-1.0, 1.0));
+            for corner in 0..3 {
+                let mut offset =
+                    Vec3::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0)) * size;
+                if kind == Kind::Slivers && corner == 2 {
+                    offset = (open[open.len() - 1] - middle) * 0.999 + offset * 1e-4;
+                }
+                let p = middle + offset;
+                let wobble = Vec3::new(r.within(-0.5, 0.5), r.within(-0.5, 0.5), r.within(-0.5, 0.5));
+                open.push(p);
+                close.push(if kind == Kind::Still { p } else { p + drift + wobble * size });
+            }
+        }
+        if kind == Kind::Grid {
+            let snap = |p: &mut Vec3| *p = Vec3::new(p.x.round(), p.y.round(), 4.0);
+            open.iter_mut().for_each(snap);
+            close = open.iter().enumerate().map(|(i, p)| if i % 9 < 3 { *p + Vec3::X } else { *p }).collect();
+        }
+        Self { open, close, triangles: (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect() }
+    }
+
+    pub fn draw<'a>(&'a self, shader: &'a dyn Shader, cull: Cull) -> Draw<'a> {
+        let still = self.open == self.close;
+        let close = if still { &self.open } else { &self.close };
+        Draw { geometry: Geometry::new(&self.open, close, &self.triangles).unwrap(), shader, cull }
+    }
+}
+
+pub fn spec(features: Features) -> PipelineSpec {
+    let lines = CacheSpec { entries: 256, ways: 4 };
+    PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 32,
+        batch_triangles: 100,
+        vertex_reuse: 16,
+        shading_cache: CacheSpec { entries: 1024, ways: 4 },
+        memory: MemorySpec {
+            depth: lines,
+            colour: lines,
+            texture: lines,
+            l2: CacheSpec { entries: 4096, ways: 8 },
+        },
+        features,
+    }
+}
+
+pub fn camera(lens: bool) -> Camera {
+    let camera = Camera::new(Affine3A::IDENTITY, 0.7, 0.25).unwrap();
+    camera.with_lens(lens.then(|| Lens::new(0.3, 6.0).unwrap()))
+}
+
+/// For every pixel and sample, in table order: triangle (`u32::MAX` for none) and depth, from all triangles against all
+/// samples.
+pub fn brute_force(
+    soup: &Soup,
+    cull: Cull,
+    lens: bool,
+    viewport: Viewport,
+    table: &SampleTable,
+) -> Vec<(u32, u32)> {
+    let camera = camera(lens);
+    let scale = 0.5 * viewport.height() as f32 / 0.7;
+    let shear = if lens {
+        let s = 0.5 * f64::from(viewport.height()) / f64::from(camera.tan_half_height()) * f64::from(0.3_f32);
+        Shear { s: [s as f32, -s as f32], a: [(s / 6.0) as f32, -(s / 6.0) as f32] }
+    } else {
+        Shear::default()
+    };
+    let _ = scale;
+    let image = |p: Vec3| {
+        let k = 0.5 * f64::from(viewport.height()) / f64::from(camera.tan_half_height());
+        [(k * f64::from(p.x)) as f32, (-k * f64::from(p.y)) as f32, p.z]
+    };
+    let vertex =
+        |i: u32| MovingVertex { open: image(soup.open[i as usize]), close: image(soup.close[i as usize]) };
+    let mut seen = Vec::new();
+    let mut samples = TileSamples::default();
+    for py in (0..viewport.height()).step_by(8) {
+        for px in (0..viewport.width()).step_by(8) {
+            samples.fill(table, viewport, &shear, [px, py], 8);
+            let mut depth = vec![f32::INFINITY; samples.len];
+            let mut triangle = vec![u32::MAX; samples.len];
+            for (id, corners) in soup.triangles.iter().enumerate() {
+                let v = corners.map(vertex);
+                let half = [0.5 * viewport.width() as f32, 0.5 * viewport.height() as f32];
+                let Outcome::Ready(mut ready) =
+                    set_up(id as u32, [&v[0], &v[1], &v[2]], cull, &shear, 0.25, half)
+                else {
+                    continue;
+                };
+                // The full path for everything: no dimension dropped.
+                ready.moving = true;
+                let within = Box5::whole(true);
+                let mut target = Target { depth: &mut depth, triangle: &mut triangle };
+                test_run(&ready, &samples, &within, 0.25, &mut target, &mut Hits::default());
+            }
+            seen.extend(depth.into_iter().zip(triangle).map(|(d, t)| (t, d.to_bits())));
+        }
+    }
+    seen
+}
