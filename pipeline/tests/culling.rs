@@ -15,7 +15,8 @@ fn kinds() -> impl Strategy<Value = Kind> {
         Just(Kind::Moving),
         Just(Kind::Crossing),
         Just(Kind::Slivers),
-        Just(Kind::Grid)
+        Just(Kind::Grid),
+        Just(Kind::Layers)
     ]
 }
 
@@ -23,10 +24,14 @@ fn culls() -> impl Strategy<Value = Cull> {
     prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
 }
 
-fn check(kind: Kind, cull: Cull, lens: bool, features: Features, count: u32, seed: u64) {
+fn check(kind: Kind, cull: Cull, lens: bool, features: Features, borders: bool, count: u32, seed: u64) {
     let soup = Soup::new(kind, count, seed);
     let viewport = Viewport::new(72, 50).unwrap();
-    let table = SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap();
+    let table = if borders {
+        border_table(seed)
+    } else {
+        SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap()
+    };
     let spec = spec(features);
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
     let ours = visibility(&camera(lens), &[soup.draw(&Plain, cull)], &settings).unwrap();
@@ -45,21 +50,21 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn culling_changes_nothing(
-        kind in kinds(), cull in culls(), lens: bool, switches in 0..8_u8, count in 1..160_u32, seed: u64,
+        kind in kinds(), cull in culls(), lens: bool, switches in 0..8_u8, borders: bool, count in 1..160_u32, seed: u64,
     ) {
         let on = |bit: u8| switches & (1 << bit) != 0;
-        check(kind, cull, lens, Features { side_planes: on(0), edges: on(1), z_max: on(2) }, count, seed);
+        check(kind, cull, lens, Features { side_planes: on(0), edges: on(1), z_max: on(2) }, borders, count, seed);
     }
 }
 
 #[test]
 fn every_combination_on_one_scene_of_each_kind() {
-    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid] {
+    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid, Kind::Layers] {
         for lens in [false, true] {
             for switches in 0..8_u8 {
                 let on = |bit: u8| switches & (1 << bit) != 0;
                 let features = Features { side_planes: on(0), edges: on(1), z_max: on(2) };
-                check(kind, Cull::None, lens, features, 60, 11);
+                [false, true].map(|borders| check(kind, Cull::None, lens, features, borders, 90, 11));
             }
         }
     }

@@ -1,1 +1,24 @@
-//! To be written.
+//! Scenes: what the pipeline is given to draw.
+//!
+//! - [`load`] finds a scene by name or path: built in, RON, glTF 2.0, PLY or OBJ.
+//! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]), and
+//!   [`Frame::draws`] hands them to the pipeline.
+//! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
+//! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
+//!
+//! World space is that of glTF: right-handed, y up. Camera space is x right, y up, z forward. Scenes are
+//! deterministic: the same file gives the same bits on every machine.
+
+pub mod builtin;
+mod error;
+mod import;
+mod load;
+pub mod material;
+pub mod scene;
+pub mod shapes;
+
+pub use builtin::builtin_names;
+pub use error::LoadError;
+pub use load::load;
+pub use material::Material;
+pub use scene::{Frame, FrameError, FrameMesh, Light, Overrides, Scene, Settings};

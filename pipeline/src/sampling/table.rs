@@ -19,6 +19,15 @@ pub struct Sample {
     pub t: f32,
 }
 
+impl Sample {
+    fn is_in_range(&self) -> bool {
+        let unit = 0.0..1.0;
+        let lens = -1.0..=1.0;
+        [self.x, self.y, self.t].iter().all(|c| unit.contains(c))
+            && [self.u, self.v].iter().all(|c| lens.contains(c))
+    }
+}
+
 /// Samples for a square block of pixels. The block repeats over the image, each copy turned round in itself by an
 /// offset hashed from the seed, so that a sample is a pure function of (seed, pixel, index).
 #[derive(Clone, Debug)]
@@ -33,8 +42,22 @@ pub struct SampleTable {
 
 /// Why a sample table cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0} samples per pixel; it has to be 1 to {max}", max = SampleTable::MAX_PER_PIXEL)]
-pub struct TableError(pub u32);
+pub enum TableError {
+    /// Too few or too many samples in a pixel.
+    #[error("{0} samples per pixel; it has to be 1 to {max}", max = SampleTable::MAX_PER_PIXEL)]
+    PerPixel(u32),
+    /// The block is not filled.
+    #[error("{found} samples for a block of {expected}")]
+    Length {
+        /// Samples given.
+        found: usize,
+        /// Samples of a block.
+        expected: usize,
+    },
+    /// A sample lies outside pixel, lens or shutter.
+    #[error("sample {0} of the block lies outside [0, 1) in x, y or t, or outside [-1, 1] in u or v")]
+    Range(usize),
+}
 
 impl SampleTable {
     /// Side of the block in pixels.
@@ -52,12 +75,30 @@ impl SampleTable {
     /// When `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
     pub fn low_discrepancy(per_pixel: u32, seed: u64, shape: LensShape) -> Result<Self, TableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
-            return Err(TableError(per_pixel));
+            return Err(TableError::PerPixel(per_pixel));
         }
         let pixels = Self::SIDE_PX * Self::SIDE_PX;
         let samples = (0..pixels)
             .flat_map(|pixel| (0..per_pixel).map(move |index| scrambled(seed, pixel, index, shape)))
             .collect();
+        Self::programmed(per_pixel, seed, samples)
+    }
+
+    /// A table of one's own: `per_pixel` samples for each pixel of a block of [`Self::SIDE_PX`] pixels squared, row by row.
+    ///
+    /// # Errors
+    /// When `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`], the block is not filled, or a sample is out of range.
+    pub fn programmed(per_pixel: u32, seed: u64, samples: Vec<Sample>) -> Result<Self, TableError> {
+        if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
+            return Err(TableError::PerPixel(per_pixel));
+        }
+        let expected = (Self::SIDE_PX * Self::SIDE_PX * per_pixel) as usize;
+        if samples.len() != expected {
+            return Err(TableError::Length { found: samples.len(), expected });
+        }
+        if let Some(outside) = samples.iter().position(|sample| !sample.is_in_range()) {
+            return Err(TableError::Range(outside));
+        }
         let mut table = Self { per_pixel, seed, samples, by_time: Vec::new() };
         table.by_time = table.sorted_blocks();
         Ok(table)
@@ -149,7 +190,10 @@ mod tests {
 
     #[test]
     fn a_pixel_needs_a_sample() {
-        assert_eq!(SampleTable::low_discrepancy(0, 1, LensShape::Disk).unwrap_err(), TableError(0));
-        assert_eq!(SampleTable::low_discrepancy(257, 1, LensShape::Disk).unwrap_err(), TableError(257));
+        assert_eq!(SampleTable::low_discrepancy(0, 1, LensShape::Disk).unwrap_err(), TableError::PerPixel(0));
+        assert_eq!(
+            SampleTable::low_discrepancy(257, 1, LensShape::Disk).unwrap_err(),
+            TableError::PerPixel(257)
+        );
     }
 }

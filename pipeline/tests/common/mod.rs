@@ -3,7 +3,7 @@
 
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::sample_test::{Hits, Target, test_run};
-use pipeline::sampling::{TileSamples, mix};
+use pipeline::sampling::{Sample, TileSamples, mix};
 use pipeline::setup::{Outcome, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
@@ -57,6 +57,8 @@ pub enum Kind {
     Slivers,
     /// Vertices on a coarse grid, shared and aligned with samples, so that ties abound.
     Grid,
+    /// Large layers, each a hair nearer than the one before, so that depth culling decides.
+    Layers,
 }
 
 impl Soup {
@@ -84,8 +86,17 @@ impl Soup {
                 close.push(if kind == Kind::Still { p } else { p + drift + wobble * size });
             }
         }
+        if kind == Kind::Layers {
+            for end in [&mut open, &mut close] {
+                for (corner, p) in end.iter_mut().enumerate() {
+                    *p = Vec3::new(p.x * 5.0, p.y * 5.0, 6.0 - 1e-5 * (corner / 3) as f32);
+                }
+            }
+        }
         if kind == Kind::Grid {
-            let snap = |p: &mut Vec3| *p = Vec3::new(p.x.round(), p.y.round(), 4.0);
+            // With 50 rows and a half field of view of 0.7, this puts vertices on the corners of pixels at depth 4.
+            let px = |c: f32| (c * 10.0).round() * (4.0 * 0.7 / 25.0);
+            let snap = |p: &mut Vec3| *p = Vec3::new(px(p.x), px(p.y), 4.0);
             open.iter_mut().for_each(snap);
             close = open.iter().enumerate().map(|(i, p)| if i % 9 < 3 { *p + Vec3::X } else { *p }).collect();
         }
@@ -97,6 +108,19 @@ impl Soup {
         let close = if still { &self.open } else { &self.close };
         Draw { geometry: Geometry::new(&self.open, close, &self.triangles).unwrap(), shader, cull }
     }
+}
+
+/// A table whose samples lie on the borders of pixels, shutter and lens and next to them, where tile tests round.
+pub fn border_table(seed: u64) -> SampleTable {
+    let below_one = 1.0 - f32::EPSILON / 2.0;
+    let mut r = Uniform::new(seed);
+    let mut pick = |choices: [f32; 4]| choices[(r.next() * 4.0) as usize];
+    let unit = [0.0, below_one, 0.5, f32::EPSILON];
+    let lens = [-1.0, 1.0, 0.0, below_one];
+    let samples = (0..64 * 64 * 4)
+        .map(|_| Sample { x: pick(unit), y: pick(unit), u: pick(lens), v: pick(lens), t: pick(unit) })
+        .collect();
+    SampleTable::programmed(4, seed, samples).unwrap()
 }
 
 pub fn spec(features: Features) -> PipelineSpec {
@@ -132,14 +156,12 @@ pub fn brute_force(
     table: &SampleTable,
 ) -> Vec<(u32, u32)> {
     let camera = camera(lens);
-    let scale = 0.5 * viewport.height() as f32 / 0.7;
     let shear = if lens {
         let s = 0.5 * f64::from(viewport.height()) / f64::from(camera.tan_half_height()) * f64::from(0.3_f32);
         Shear { s: [s as f32, -s as f32], a: [(s / 6.0) as f32, -(s / 6.0) as f32] }
     } else {
         Shear::default()
     };
-    let _ = scale;
     let image = |p: Vec3| {
         let k = 0.5 * f64::from(viewport.height()) / f64::from(camera.tan_half_height());
         [(k * f64::from(p.x)) as f32, (-k * f64::from(p.y)) as f32, p.z]

@@ -1,0 +1,242 @@
+//! Frames one after another: V-sync or free-running, with idle between them.
+
+use activity::Warning;
+use traces::Curve;
+
+use crate::error::PacingError;
+use crate::frame::{FramePower, S_PER_PS};
+use crate::ledger::Ledger;
+use crate::parts::{Energy, Part};
+use crate::platform::Platform;
+use crate::quantity::Hertz;
+
+/// Picoseconds in a second.
+const PS_PER_S: f64 = 1e12;
+
+/// When the next frame starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pacing {
+    /// On the display's next tick.
+    Vsync {
+        /// Ticks per second.
+        rate: Hertz,
+    },
+    /// As soon as the driver has submitted it.
+    FreeRunning,
+}
+
+impl Pacing {
+    /// V-sync at `rate_hz` ticks per second.
+    ///
+    /// # Errors
+    /// [`PacingError::Rate`] outside the range of [`Hertz`], also for NaN.
+    pub fn vsync(rate_hz: f64) -> Result<Self, PacingError> {
+        Ok(Self::Vsync { rate: Hertz::new(rate_hz)? })
+    }
+}
+
+/// One frame in its place in a run: the truth a frame finder is scored against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PacedFrame {
+    /// When its first command is taken, in seconds from the start of the curve.
+    pub start_s: f64,
+    /// When its last pixel is written.
+    pub busy_end_s: f64,
+    /// When the next frame starts; for the last frame, when the next one would have.
+    pub end_s: f64,
+    /// Joules from `start_s` to `end_s`, the idle time after its work included as [`Part::Idle`].
+    pub energy: Energy,
+}
+
+/// A whole run: its power curve, with idle before and after, and its frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Watts from 0 s, where the recording starts with idle, to where it ends with idle.
+    pub curve: Curve,
+    /// The frames in order; each ends where the next starts.
+    pub frames: Vec<PacedFrame>,
+    /// Start of the first frame in seconds.
+    pub start_s: f64,
+    /// End of the last frame in seconds.
+    pub end_s: f64,
+    /// What went wrong on the way: `missed-vsync`.
+    pub warnings: Vec<Warning>,
+}
+
+impl Run {
+    /// Joules from the first frame's start to the last one's end, summed frame by frame.
+    pub fn energy(&self) -> Energy {
+        self.frames.iter().fold(Energy::ZERO, |mut sum, frame| {
+            sum += &frame.energy;
+            sum
+        })
+    }
+}
+
+/// Lines `frames` up on `platform`. The same frame may be given many times, as in a still animation.
+///
+/// # Errors
+/// [`PacingError::NoFrames`] for an empty list; [`PacingError::Curve`] when nothing lasts any time and
+/// [`PacingError::TooLong`] when it lasts for months.
+pub fn pace(frames: &[&FramePower], platform: &Platform, pacing: Pacing) -> Result<Run, PacingError> {
+    if frames.is_empty() {
+        return Err(PacingError::NoFrames);
+    }
+    let schedule = Schedule::new(frames, platform, pacing);
+    let mut ledger = Ledger::new();
+    rest(&mut ledger, to_ps(platform.lead_in_s.value()), platform)?;
+    let start_s = ledger.now_s();
+    let mut paced = Vec::with_capacity(frames.len());
+    for (frame, &idle_ps) in frames.iter().zip(&schedule.idle_ps) {
+        paced.push(spend_frame(&mut ledger, frame, idle_ps, platform)?);
+    }
+    let end_s = ledger.now_s();
+    rest(&mut ledger, to_ps(platform.tail_s.value()), platform)?;
+    let warnings = schedule.warning(pacing).into_iter().collect();
+    Ok(Run { curve: ledger.close()?, frames: paced, start_s, end_s, warnings })
+}
+
+/// Appends a frame and the idle time after it.
+fn spend_frame(
+    ledger: &mut Ledger,
+    frame: &FramePower,
+    idle_ps: u64,
+    platform: &Platform,
+) -> Result<PacedFrame, PacingError> {
+    let start_s = ledger.now_s();
+    for (length_ps, watts) in frame.bins_ps() {
+        let total_w: f64 = watts.iter().sum();
+        ledger.spend(length_ps, total_w * (length_ps as f64 * S_PER_PS))?;
+    }
+    let busy_end_s = ledger.now_s();
+    let mut energy = *frame.energy();
+    energy[Part::Idle] += rest(ledger, idle_ps, platform)?;
+    Ok(PacedFrame { start_s, busy_end_s, end_s: ledger.now_s(), energy })
+}
+
+/// Idles for `length_ps` picoseconds; the joules that takes.
+fn rest(ledger: &mut Ledger, length_ps: u64, platform: &Platform) -> Result<f64, PacingError> {
+    let joules = platform.idle_w.value() * (length_ps as f64 * S_PER_PS);
+    ledger.spend(length_ps, joules)?;
+    Ok(joules)
+}
+
+/// Whole picoseconds in `seconds`, which a platform keeps between 0 and an hour.
+fn to_ps(seconds: f64) -> u64 {
+    (seconds * PS_PER_S).round() as u64
+}
+
+/// How long it is idle after each frame, in whole picoseconds so that no clock drifts.
+#[derive(Debug, PartialEq)]
+struct Schedule {
+    idle_ps: Vec<u64>,
+    /// Frames that outlasted their period.
+    late: usize,
+    /// Ticks that passed while a frame was still being drawn.
+    missed: u64,
+}
+
+impl Schedule {
+    fn new(frames: &[&FramePower], platform: &Platform, pacing: Pacing) -> Self {
+        let durations = frames.iter().map(|frame| frame.duration_ps());
+        match pacing {
+            Pacing::Vsync { rate } => Self::vsync(durations, rate),
+            Pacing::FreeRunning => {
+                let gap_ps = to_ps(platform.submit_gap_s.value());
+                Self { idle_ps: vec![gap_ps; frames.len()], late: 0, missed: 0 }
+            }
+        }
+    }
+
+    /// Frame 0 starts on tick 0; each other one on the first tick at or after the end of the one before, and
+    /// never on that one's own tick.
+    fn vsync(durations_ps: impl Iterator<Item = u64>, rate: Hertz) -> Self {
+        let mut schedule = Self { idle_ps: Vec::new(), late: 0, missed: 0 };
+        let mut tick = 0;
+        for duration_ps in durations_ps {
+            let busy_end_ps = tick_ps(tick, rate).saturating_add(duration_ps);
+            let next = first_tick_from(busy_end_ps, tick + 1, rate);
+            schedule.idle_ps.push(tick_ps(next, rate).saturating_sub(busy_end_ps));
+            schedule.late += usize::from(next > tick + 1);
+            schedule.missed += next - tick - 1;
+            tick = next;
+        }
+        schedule
+    }
+
+    fn warning(&self, pacing: Pacing) -> Option<Warning> {
+        let Pacing::Vsync { rate } = pacing else { return None };
+        let (late, frames, missed) = (self.late, self.idle_ps.len(), self.missed);
+        let period_ms = 1e3 / rate.value();
+        (late > 0).then(|| {
+            Warning::new(
+                "missed-vsync",
+                format!(
+                    "{late} of {frames} frames took longer than the V-sync period of {period_ms:.3} ms and missed \
+                     {missed} ticks in all: the animation stutters, and its mean frame rate is below the display's"
+                ),
+            )
+        })
+    }
+}
+
+/// When a tick falls, in picoseconds after tick 0.
+fn tick_ps(tick: u64, rate: Hertz) -> u64 {
+    (tick as f64 * PS_PER_S / rate.value()).round() as u64
+}
+
+/// The first tick at or after `time_ps`, but none before `earliest`.
+fn first_tick_from(time_ps: u64, earliest: u64, rate: Hertz) -> u64 {
+    let near = (time_ps as f64 * rate.value() / PS_PER_S).floor() as u64;
+    let mut tick = near.saturating_sub(1).max(earliest);
+    while tick_ps(tick, rate) < time_ps {
+        tick += 1;
+    }
+    tick
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vsync(durations_ps: &[u64], rate_hz: f64) -> Schedule {
+        Schedule::vsync(durations_ps.iter().copied(), Hertz::new(rate_hz).unwrap())
+    }
+
+    #[test]
+    fn a_frame_that_ends_on_a_tick_is_followed_at_once() {
+        let schedule = vsync(&[1_000_000_000, 1_000_000_000], 1000.0);
+        assert_eq!(schedule, Schedule { idle_ps: vec![0, 0], late: 0, missed: 0 });
+    }
+
+    #[test]
+    fn a_frame_one_picosecond_too_long_misses_a_tick() {
+        let schedule = vsync(&[1_000_000_001, 400_000_000], 1000.0);
+        assert_eq!(schedule, Schedule { idle_ps: vec![999_999_999, 600_000_000], late: 1, missed: 1 });
+    }
+
+    #[test]
+    fn a_frame_of_no_length_still_takes_its_period() {
+        assert_eq!(vsync(&[0, 0], 1000.0).idle_ps, [1_000_000_000, 1_000_000_000]);
+    }
+
+    #[test]
+    fn ticks_do_not_drift() {
+        let rate = Hertz::new(60.0).unwrap();
+        assert_eq!(tick_ps(3_600, rate), 60_000_000_000_000);
+        for tick in 0..10_000 {
+            assert_eq!(first_tick_from(tick_ps(tick, rate), 0, rate), tick);
+            assert_eq!(first_tick_from(tick_ps(tick, rate) + 1, 0, rate), tick + 1);
+        }
+    }
+
+    #[test]
+    fn ticks_are_found_at_the_ends_of_the_range_of_rates() {
+        for rate_hz in [0.1, 1e5, 59.94, 1e5 / 3.0] {
+            let rate = Hertz::new(rate_hz).unwrap();
+            for tick in [0, 1, 2, 1_000] {
+                assert_eq!(first_tick_from(tick_ps(tick, rate), 0, rate), tick, "{rate_hz} Hz");
+            }
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Where joules go.
+
+use std::ops::{AddAssign, Index, IndexMut};
+
+use activity::Unit;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+
+/// A part of the power drawn: a unit's events, or something no event causes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// The events of one unit.
+    Unit(Unit),
+    /// What is drawn as long as a frame runs, whatever it does.
+    Constant,
+    /// Leakage of the powered core.
+    Leakage,
+    /// Clock trees of busy units and what powered but idle units draw.
+    ClockTree,
+    /// The floor between frames, with the core power-gated.
+    Idle,
+}
+
+/// How many parts there are.
+pub const PARTS: usize = Unit::COUNT + 4;
+
+impl Part {
+    /// Every part in the fixed order in which they are stored and summed: units as declared, then the rest.
+    pub const ALL: [Self; PARTS] = {
+        let mut all = [Self::Idle; PARTS];
+        let mut at = 0;
+        while at < Unit::COUNT {
+            all[at] = Self::Unit(Unit::ALL[at]);
+            at += 1;
+        }
+        all[Self::Constant.index()] = Self::Constant;
+        all[Self::Leakage.index()] = Self::Leakage;
+        all[Self::ClockTree.index()] = Self::ClockTree;
+        all
+    };
+
+    /// Its place in [`Part::ALL`].
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Unit(unit) => unit as usize,
+            Self::Constant => Unit::COUNT,
+            Self::Leakage => Unit::COUNT + 1,
+            Self::ClockTree => Unit::COUNT + 2,
+            Self::Idle => Unit::COUNT + 3,
+        }
+    }
+
+    /// The name used in files, for example `sample_test` or `leakage`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unit(unit) => unit.name(),
+            Self::Constant => "constant",
+            Self::Leakage => "leakage",
+            Self::ClockTree => "clock_tree",
+            Self::Idle => "idle",
+        }
+    }
+
+    /// One sentence on what draws it.
+    pub const fn doc(self) -> &'static str {
+        match self {
+            Self::Unit(unit) => unit.doc(),
+            Self::Constant => "Drawn as long as a frame runs, whatever it does.",
+            Self::Leakage => "Leakage of the powered core.",
+            Self::ClockTree => "Clock trees of busy units and what powered but idle units draw.",
+            Self::Idle => "The floor between frames, with the core power-gated.",
+        }
+    }
+}
+
+/// Joules by part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Energy {
+    /// Joules, in the order of [`Part::ALL`].
+    pub by_part_j: [f64; PARTS],
+}
+
+impl Energy {
+    /// No energy at all.
+    pub const ZERO: Self = Self { by_part_j: [0.0; PARTS] };
+
+    /// All parts summed in the order of [`Part::ALL`]. This is the energy, exactly: no total is kept beside it.
+    pub fn total_j(&self) -> f64 {
+        self.by_part_j.iter().fold(0.0, |sum, joules| sum + joules)
+    }
+
+    /// Each part with its joules, in the order of [`Part::ALL`].
+    pub fn iter(&self) -> impl Iterator<Item = (Part, f64)> + '_ {
+        Part::ALL.into_iter().zip(self.by_part_j)
+    }
+}
+
+impl Default for Energy {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl Index<Part> for Energy {
+    type Output = f64;
+    fn index(&self, part: Part) -> &f64 {
+        &self.by_part_j[part.index()]
+    }
+}
+
+impl IndexMut<Part> for Energy {
+    fn index_mut(&mut self, part: Part) -> &mut f64 {
+        &mut self.by_part_j[part.index()]
+    }
+}
+
+impl AddAssign<&Self> for Energy {
+    fn add_assign(&mut self, other: &Self) {
+        for (mine, theirs) in self.by_part_j.iter_mut().zip(other.by_part_j) {
+            *mine += theirs;
+        }
+    }
+}
+
+impl Serialize for Energy {
+    /// A map from part name to joules, in the order of [`Part::ALL`].
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(PARTS))?;
+        for (part, joules) in self.iter() {
+            map.serialize_entry(part.name(), &joules)?;
+        }
+        map.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_lie_where_their_index_says() {
+        for (at, part) in Part::ALL.into_iter().enumerate() {
+            assert_eq!(part.index(), at, "{part:?}");
+        }
+    }
+
+    #[test]
+    fn names_are_unique() {
+        for (at, part) in Part::ALL.into_iter().enumerate() {
+            assert!(Part::ALL[..at].iter().all(|other| other.name() != part.name()), "{part:?}");
+        }
+    }
+
+    #[test]
+    fn energies_add_part_by_part() {
+        let mut energy = Energy::ZERO;
+        energy[Part::Leakage] = 1.5;
+        let other = energy;
+        energy += &other;
+        assert_eq!(energy[Part::Leakage], 3.0);
+        assert_eq!(energy.total_j(), 3.0);
+    }
+}

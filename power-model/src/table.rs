@@ -1,0 +1,238 @@
+//! Energy tables: joules per event on one process node at one voltage.
+
+use std::path::Path;
+
+use activity::{Event, spec};
+use serde::Deserialize;
+
+use crate::TableError;
+use crate::quantity::{Source, Volts};
+use crate::row::{EnergyRow, EventName};
+
+/// The tables that come with the crate, by name.
+const BUILTIN: [(&str, &str); 1] = [("28nm", include_str!("../tables/28nm.ron"))];
+
+/// Which end of each row's interval to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bound {
+    /// The smallest energies the sources allow.
+    Low,
+    /// The energies to use.
+    #[default]
+    Nominal,
+    /// The largest energies the sources allow.
+    High,
+}
+
+/// What a table says of one event.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Entry {
+    /// It costs energy.
+    Costs(EnergyRow),
+    /// It costs nothing by itself, for the reason given.
+    Free(Source),
+}
+
+/// Joules per event on one process node, every event accounted for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnergyTable {
+    name: String,
+    doc: String,
+    node_nm: u32,
+    v0_v: Volts,
+    valid_v: [Volts; 2],
+    /// Indexed by event.
+    entries: Vec<Entry>,
+}
+
+/// A table as it is written in a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    name: String,
+    doc: String,
+    node_nm: u32,
+    v0_v: Volts,
+    v_min_v: Volts,
+    v_max_v: Volts,
+    rows: Vec<EnergyRow>,
+    free: Vec<FreeRow>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FreeRow {
+    event: EventName,
+    reason: Source,
+}
+
+impl EnergyTable {
+    /// The names of the tables that come with the crate.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILTIN.into_iter().map(|(name, _)| name)
+    }
+
+    /// The table called `name` that comes with the crate.
+    ///
+    /// # Errors
+    /// [`TableError::Unknown`] with the nearest known name.
+    pub fn builtin(name: &str) -> Result<Self, TableError> {
+        let Some((_, text)) = BUILTIN.into_iter().find(|(known, _)| *known == name) else {
+            let mend = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
+            return Err(TableError::Unknown { name: name.to_owned(), mend });
+        };
+        Self::parse(text, &format!("power-model/tables/{name}.ron"))
+    }
+
+    /// Reads the table in the RON file at `path`.
+    ///
+    /// # Errors
+    /// [`TableError`] when the file cannot be read, a row is wrong, or an event is missing.
+    pub fn load(path: &Path) -> Result<Self, TableError> {
+        Self::check(spec::load(path)?, &path.display().to_string())
+    }
+
+    /// Parses RON `text`; `file` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, TableError> {
+        Self::check(spec::parse(text, file)?, file)
+    }
+
+    fn check(written: Written, file: &str) -> Result<Self, TableError> {
+        let Written { name, doc, node_nm, v0_v, v_min_v, v_max_v, rows, free } = written;
+        if !(v_min_v <= v0_v && v0_v <= v_max_v) {
+            return Err(TableError::Voltages { path: file.to_owned() });
+        }
+        let costs = rows.into_iter().map(|row| (row.event(), Entry::Costs(row)));
+        let free = free.into_iter().map(|row| (row.event.0, Entry::Free(row.reason)));
+        let entries = complete(costs.chain(free), file)?;
+        Ok(Self { name, doc, node_nm, v0_v, valid_v: [v_min_v, v_max_v], entries })
+    }
+
+    /// The table's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the table describes, in words.
+    pub fn doc(&self) -> &str {
+        &self.doc
+    }
+
+    /// The process node in nanometres.
+    pub const fn node_nm(&self) -> u32 {
+        self.node_nm
+    }
+
+    /// The core voltage the energies hold at, in volts.
+    pub const fn v0_v(&self) -> f64 {
+        self.v0_v.value()
+    }
+
+    /// The core voltages, from and to, over which scaling with (V/V0)^2 is supported by the source.
+    pub fn valid_v(&self) -> [f64; 2] {
+        self.valid_v.map(Volts::value)
+    }
+
+    /// What the table says of each event, in the order of [`Event::ALL`].
+    pub fn entries(&self) -> impl Iterator<Item = (Event, &Entry)> {
+        Event::ALL.into_iter().zip(&self.entries)
+    }
+
+    /// The rows that cost energy, in the order of [`Event::ALL`].
+    pub fn rows(&self) -> impl Iterator<Item = &EnergyRow> {
+        self.entries.iter().filter_map(|entry| match entry {
+            Entry::Costs(row) => Some(row),
+            Entry::Free(_) => None,
+        })
+    }
+
+    /// Joules per event at V0, nominal, indexed by event.
+    pub fn nominal(&self) -> [f64; Event::COUNT] {
+        self.joules(Bound::Nominal)
+    }
+
+    /// Joules per event at V0, at the low end of every interval.
+    pub fn low(&self) -> [f64; Event::COUNT] {
+        self.joules(Bound::Low)
+    }
+
+    /// Joules per event at V0, at the high end of every interval.
+    pub fn high(&self) -> [f64; Event::COUNT] {
+        self.joules(Bound::High)
+    }
+
+    /// Joules per event at V0, at one end of every interval.
+    pub fn joules(&self, bound: Bound) -> [f64; Event::COUNT] {
+        let mut joules = [0.0; Event::COUNT];
+        for row in self.rows() {
+            joules[row.event() as usize] = row.joules(bound);
+        }
+        joules
+    }
+}
+
+impl EnergyRow {
+    /// The energy at one end of the interval, in joules.
+    pub fn joules(&self, bound: Bound) -> f64 {
+        match bound {
+            Bound::Low => self.low_j(),
+            Bound::Nominal => self.nominal_j(),
+            Bound::High => self.high_j(),
+        }
+    }
+}
+
+/// One entry per event in the order of [`Event::ALL`], or the event that is there twice or not at all.
+fn complete(given: impl Iterator<Item = (Event, Entry)>, file: &str) -> Result<Vec<Entry>, TableError> {
+    let mut entries: Vec<Option<Entry>> = vec![None; Event::COUNT];
+    for (event, entry) in given {
+        if entries[event as usize].replace(entry).is_some() {
+            return Err(TableError::Duplicate { path: file.to_owned(), event: event.name() });
+        }
+    }
+    let pairs = Event::ALL.into_iter().zip(entries);
+    pairs
+        .map(|(event, entry)| {
+            entry.ok_or_else(|| TableError::Missing { path: file.to_owned(), event: event.name() })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_event_costs_or_is_free_for_a_stated_reason() {
+        let table = EnergyTable::builtin("28nm").unwrap();
+        assert_eq!(table.entries().count(), Event::COUNT);
+        for (event, entry) in table.entries() {
+            let text = match entry {
+                Entry::Costs(row) => row.source(),
+                Entry::Free(reason) => reason.text(),
+            };
+            assert!(text.len() > 20, "{event:?}: `{text}` is no source");
+        }
+    }
+
+    #[test]
+    fn every_builtin_parses_under_its_own_name() {
+        for name in EnergyTable::names() {
+            assert_eq!(EnergyTable::builtin(name).unwrap().name(), name);
+        }
+    }
+
+    #[test]
+    fn bounds_enclose_the_nominal() {
+        let table = EnergyTable::builtin("28nm").unwrap();
+        let (low, nominal, high) = (table.low(), table.nominal(), table.high());
+        for event in Event::ALL {
+            let at = event as usize;
+            assert!(low[at] <= nominal[at] && nominal[at] <= high[at], "{event:?}");
+        }
+        assert!(nominal.iter().any(|&joules| joules > 0.0));
+    }
+}

@@ -1,0 +1,186 @@
+//! The folder of results. Files appear whole or not at all; `summary.json`, the marker of a whole run, comes last.
+
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Component, Path, PathBuf};
+
+/// Anything that a writer of a file can fail with.
+pub type BoxError = Box<dyn Error + Send + Sync>;
+
+/// The file whose presence says that a run is whole.
+pub const SUMMARY: &str = "summary.json";
+
+/// Why results could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// The folder could not be made or written to.
+    #[error(
+        "{path}: cannot use it as the folder for results: {source}; name another with --out or mend its permissions"
+    )]
+    Folder {
+        /// The folder as it was named.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A file could not be written.
+    #[error("{path}: cannot write it: {source}")]
+    Write {
+        /// The file, below the folder as it was named.
+        path: String,
+        /// What the writer said.
+        source: BoxError,
+    },
+    /// A stale file of an earlier run could not be removed.
+    #[error(
+        "{path}: cannot remove this file of an earlier run: {source}; remove it by hand or name another folder with --out"
+    )]
+    Stale {
+        /// The file, below the folder as it was named.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A name that leads out of the folder.
+    #[error("{path}: not a plain relative path below the folder for results")]
+    Path {
+        /// The path as it was given.
+        path: String,
+    },
+}
+
+/// The folder that a run writes into.
+#[derive(Debug)]
+pub struct OutDir {
+    root: PathBuf,
+}
+
+impl OutDir {
+    /// Makes the folder (and those above it), makes sure that it can be written to, and removes the `summary.json` of
+    /// an earlier run, so that a run that dies on the way does not look whole.
+    ///
+    /// # Errors
+    /// [`OutputError::Folder`] when the folder cannot be made or written, [`OutputError::Stale`] when the old summary
+    /// cannot be removed.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let folder = |source| OutputError::Folder { path: path.display().to_string(), source };
+        fs::create_dir_all(path).map_err(folder)?;
+        // Learn now, and not after minutes of simulation, that nothing can be written here.
+        let probe = Temporary { path: path.join(format!(".probe.{}.tmp", std::process::id())) };
+        File::create(&probe.path).map_err(folder)?;
+        drop(probe);
+        let dir = Self { root: path.to_owned() };
+        dir.remove(&path.join(SUMMARY))?;
+        Ok(dir)
+    }
+
+    /// The folder as it was named.
+    pub fn path(&self) -> &Path {
+        &self.root
+    }
+
+    /// Removes files directly in `folder` (relative, may be absent) whose name begins with `prefix` and ends with one
+    /// of `extensions` (without the dot): what an earlier, longer run left there.
+    ///
+    /// # Errors
+    /// [`OutputError::Stale`] with the file that could not be removed.
+    pub fn remove_stale(&self, folder: &str, prefix: &str, extensions: &[&str]) -> Result<(), OutputError> {
+        let Ok(entries) = fs::read_dir(self.resolve(folder)?) else { return Ok(()) };
+        for path in entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file()) {
+            let named =
+                path.file_name().and_then(|name| name.to_str()).is_some_and(|n| n.starts_with(prefix));
+            let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+            if named && extensions.contains(&extension) {
+                self.remove(&path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the file `relative` (folders in between are made) through `write`, under a temporary name that becomes
+    /// the real one only at the end. Returns the path of the file.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file and the cause; nothing is left behind then, and an older file stays.
+    pub fn write_atomic(
+        &self,
+        relative: &str,
+        write: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), BoxError>,
+    ) -> Result<PathBuf, OutputError> {
+        self.place(relative, |temporary| {
+            let mut out = BufWriter::new(File::create(temporary)?);
+            write(&mut out)?;
+            out.flush()?;
+            Ok(())
+        })
+    }
+
+    /// Like [`Self::write_atomic`] for writers that want a path: `write` makes the file at the path it is given.
+    ///
+    /// # Errors
+    /// As [`Self::write_atomic`].
+    pub fn place(
+        &self,
+        relative: &str,
+        write: impl FnOnce(&Path) -> Result<(), BoxError>,
+    ) -> Result<PathBuf, OutputError> {
+        let target = self.resolve(relative)?;
+        let failed = |source: BoxError| OutputError::Write { path: target.display().to_string(), source };
+        let temporary = Temporary::beside(&target);
+        if let Some(folder) = target.parent() {
+            fs::create_dir_all(folder).map_err(|error| failed(error.into()))?;
+        }
+        write(&temporary.path).map_err(failed)?;
+        fs::rename(&temporary.path, &target).map_err(|error| failed(error.into()))?;
+        Ok(target)
+    }
+
+    /// Writes `summary.json` and gives up the folder: nothing can be written after it.
+    ///
+    /// # Errors
+    /// As [`Self::write_atomic`].
+    pub fn complete(
+        self,
+        write: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), BoxError>,
+    ) -> Result<PathBuf, OutputError> {
+        self.write_atomic(SUMMARY, write)
+    }
+
+    fn resolve(&self, relative: &str) -> Result<PathBuf, OutputError> {
+        let path = Path::new(relative);
+        let plain = path.components().all(|part| matches!(part, Component::Normal(_)));
+        if relative.is_empty() || !plain {
+            return Err(OutputError::Path { path: relative.to_owned() });
+        }
+        Ok(self.root.join(path))
+    }
+
+    fn remove(&self, path: &Path) -> Result<(), OutputError> {
+        match fs::remove_file(path) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                Err(OutputError::Stale { path: path.display().to_string(), source })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A file that is gone when this goes out of scope, unless it was renamed before.
+struct Temporary {
+    path: PathBuf,
+}
+
+impl Temporary {
+    fn beside(target: &Path) -> Self {
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        Self { path: target.with_file_name(format!(".{name}.{}.tmp", std::process::id())) }
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // Not found after a rename; any other failure has nobody to tell.
+        let _ = fs::remove_file(&self.path);
+    }
+}

@@ -1,0 +1,140 @@
+//! Keeping tracks short enough for a viewer without losing what one looks for.
+
+/// The most points a counter track is written with.
+pub const MAX_POINTS: usize = 20_000;
+
+/// The most slices [`slices_of_bins`] returns.
+pub const MAX_SLICES: usize = 10_000;
+
+/// A stretch of time in which a unit was busy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BusySlice {
+    /// When it starts, in ns from the start of the run.
+    pub start_ns: u64,
+    /// When it ends, after `start_ns`.
+    pub end_ns: u64,
+    /// The fraction of it for which the unit was serving work, 0 to 1.
+    pub utilisation: f64,
+}
+
+/// At most `limit` (at least 4) of `points`, in order: all of them where they are few enough, else the lowest and the
+/// highest of each of `limit / 2 - 1` stretches of equal length in points, beside the first and the last of all.
+/// Points that are not finite are left out.
+pub fn decimate(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
+    let finite: Vec<(u64, f64)> = points.iter().copied().filter(|(_, value)| value.is_finite()).collect();
+    if finite.len() <= limit.max(4) {
+        return finite;
+    }
+    let stretches = limit.max(4) / 2 - 1;
+    let length = finite.len().div_ceil(stretches);
+    let last = finite.len() - 1;
+    let mut kept = vec![0, last];
+    for start in (0..finite.len()).step_by(length) {
+        let stretch = start..(start + length).min(finite.len());
+        let value = |index: &usize| finite[*index].1;
+        kept.extend(stretch.clone().min_by(|a, b| value(a).total_cmp(&value(b))));
+        kept.extend(stretch.max_by(|a, b| value(a).total_cmp(&value(b))));
+    }
+    kept.sort_unstable();
+    kept.dedup();
+    kept.into_iter().map(|index| finite[index]).collect()
+}
+
+/// The slices of a unit whose busy fraction in bin `i`, the time from `start_ns + i bin_ns` to the next, is `busy[i]`.
+///
+/// Idle bins make no slice; neighbouring bins in the same tenth of utilisation are one. Where that leaves more than
+/// `limit` slices (at least 1), bins are taken two by two, four by four and so on until it does not.
+pub fn slices_of_bins(start_ns: u64, bin_ns: f64, busy: &[f64], limit: usize) -> Vec<BusySlice> {
+    let mut group = 1;
+    loop {
+        let slices = merged(start_ns, bin_ns, busy, group);
+        if slices.len() <= limit.max(1) || group >= busy.len() {
+            return slices;
+        }
+        group *= 2;
+    }
+}
+
+/// The tenth, 1 to 10, that a utilisation above 0 lies in.
+pub(super) fn tenth(utilisation: f64) -> u32 {
+    libm::ceil(utilisation * 10.0).clamp(1.0, 10.0) as u32
+}
+
+fn merged(start_ns: u64, bin_ns: f64, busy: &[f64], group: usize) -> Vec<BusySlice> {
+    let edge = |bin: usize| start_ns.saturating_add(libm::round(bin as f64 * bin_ns) as u64);
+    let mut slices: Vec<(BusySlice, u32, usize)> = Vec::new();
+    for (index, bins) in busy.chunks(group).enumerate() {
+        let utilisation = bins.iter().map(|b| b.clamp(0.0, 1.0)).filter(|b| b.is_finite()).sum::<f64>();
+        let utilisation = utilisation / bins.len() as f64;
+        let (first, end) = (index * group, index * group + bins.len());
+        if utilisation <= 0.0 || edge(end) <= edge(first) {
+            continue;
+        }
+        let (start_ns, end_ns) = (edge(first), edge(end));
+        match slices.last_mut() {
+            Some((slice, level, count)) if slice.end_ns == start_ns && *level == tenth(utilisation) => {
+                let total = (*count + bins.len()) as f64;
+                slice.utilisation =
+                    (slice.utilisation * *count as f64 + utilisation * bins.len() as f64) / total;
+                slice.end_ns = end_ns;
+                *count += bins.len();
+            }
+            _ => slices.push((BusySlice { start_ns, end_ns, utilisation }, tenth(utilisation), bins.len())),
+        }
+    }
+    slices.into_iter().map(|(slice, _, _)| slice).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimation_keeps_every_spike_and_the_ends() {
+        let mut points: Vec<(u64, f64)> = (0..100_000).map(|i| (i * 10, 5.0)).collect();
+        points[33_333].1 = 50.0;
+        points[77_777].1 = -1.0;
+        points[50_000].1 = f64::NAN;
+        let kept = decimate(&points, 1000);
+        assert!(kept.len() <= 1000, "{}", kept.len());
+        assert!(kept.contains(&(333_330, 50.0)) && kept.contains(&(777_770, -1.0)));
+        assert_eq!((kept[0].0, kept[kept.len() - 1].0), (0, 999_990));
+        assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
+    }
+
+    #[test]
+    fn few_points_are_left_alone() {
+        let points = [(0, 1.0), (5, 2.0)];
+        assert_eq!(decimate(&points, 20), points);
+        assert!(decimate(&[], 20).is_empty());
+    }
+
+    #[test]
+    fn neighbours_alike_are_one_slice_and_idle_bins_none() {
+        let busy = [0.0, 0.51, 0.59, 0.0, 1.0, f64::NAN];
+        let slices = slices_of_bins(1000, 100.0, &busy, 10);
+        let expected = [(1100, 1300, 0.55), (1400, 1500, 1.0)];
+        assert_eq!(slices.len(), expected.len());
+        for (slice, (start, end, utilisation)) in slices.iter().zip(expected) {
+            assert_eq!((slice.start_ns, slice.end_ns), (start, end));
+            assert!((slice.utilisation - utilisation).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn too_many_slices_are_coarsened_and_keep_the_busy_time() {
+        let busy: Vec<f64> = (0..4096).map(|i| if i % 2 == 0 { 0.9 } else { 0.2 }).collect();
+        let slices = slices_of_bins(0, 10.0, &busy, 100);
+        assert!(!slices.is_empty() && slices.len() <= 100);
+        let time = |s: &BusySlice| (s.end_ns - s.start_ns) as f64 * s.utilisation;
+        let expected = busy.iter().sum::<f64>() * 10.0;
+        assert!((slices.iter().map(time).sum::<f64>() / expected - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bins_shorter_than_a_nanosecond_never_overlap() {
+        let slices = slices_of_bins(0, 0.3, &[0.1, 0.9, 0.1, 0.9, 0.1, 0.9, 0.1], 100);
+        assert!(slices.iter().all(|slice| slice.end_ns > slice.start_ns));
+        assert!(slices.windows(2).all(|pair| pair[0].end_ns <= pair[1].start_ns));
+    }
+}

@@ -1,0 +1,31 @@
+//! The plots of a run. Each is described once as a [`Picture`] and rendered into SVG and PNG from there.
+//!
+//! - [`PowerRun`]: power over the whole run, with every spike.
+//! - [`FramePower`]: one frame's power over time, stacked by part.
+//! - [`FrameEnergy`]: energy of each frame, measured against true.
+//! - [`UnitBusy`]: how busy each unit was over one frame.
+//!
+//! Nothing to draw (no samples, no frames, nothing finite) is a plot that says so, never an error. All use of the
+//! `plotters` crate is in `render`.
+
+mod axis;
+mod columns;
+mod frame_energy;
+mod frame_power;
+mod palette;
+mod panel;
+mod picture;
+mod power_run;
+mod render;
+mod unit_busy;
+
+pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
+pub use frame_power::{FramePower, PowerPart};
+pub use palette::{Colour, part_colour};
+pub use picture::Picture;
+pub use power_run::PowerRun;
+pub use render::PlotError;
+pub use unit_busy::{UnitBusy, UnitLane};
+
+#[cfg(test)]
+mod tests;

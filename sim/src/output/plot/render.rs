@@ -1,0 +1,188 @@
+//! Pictures into files: SVG through `plotters`' backend, PNG through its rasterizer into a buffer of our own.
+//!
+//! Both are drawn on a grid twice as fine as the picture; for PNG two by two pixels are then averaged.
+
+use std::fmt::Display;
+use std::sync::OnceLock;
+
+use plotters::backend::SVGBackend;
+use plotters::style::{FontFamily, FontStyle, FontTransform, IntoFont, RGBAColor, TextStyle, register_font};
+use plotters_backend::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend, DrawingErrorKind};
+
+use super::palette::Colour;
+use super::picture::{Across, Picture, Point, Shape, Text};
+use crate::output::dir::{OutDir, OutputError};
+use crate::output::{font, image};
+
+mod raster;
+
+use raster::Raster;
+
+/// How much finer than the picture things are drawn.
+const SCALE: f64 = 2.0;
+
+/// What `plotters` calls a font's size over its em.
+const SIZE_OVER_EM: f64 = 1.24;
+
+/// Why a plot could not be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// The font inside the command cannot be read.
+    #[error("the font for plots is damaged: build the command anew")]
+    Font,
+    /// A backend failed.
+    #[error("cannot draw the plot: {0}")]
+    Draw(String),
+    /// The PNG encoder failed.
+    #[error(transparent)]
+    Encode(#[from] image::ImageError),
+}
+
+impl Picture {
+    /// The text of an SVG file with real text in it, without ids, so that several fit into one page.
+    ///
+    /// # Errors
+    /// [`PlotError`] when the font is damaged or the backend fails.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        let (width, height) = self.fine_size();
+        let mut svg = String::new();
+        self.play(&mut SVGBackend::with_string(&mut svg, (width, height)))?;
+        let fine = format!("width=\"{width}\" height=\"{height}\"");
+        let label = attribute(&font::drawable(&self.title));
+        let shown = format!(
+            "width=\"{}\" height=\"{}\" role=\"img\" aria-label=\"{label}\"",
+            self.width, self.height
+        );
+        Ok(svg.replacen(&fine, &shown, 1))
+    }
+
+    /// The bytes of a PNG file.
+    ///
+    /// # Errors
+    /// [`PlotError`] when the font is damaged, or drawing or encoding fails.
+    pub fn png(&self) -> Result<Vec<u8>, PlotError> {
+        let (width, height) = self.fine_size();
+        let mut raster = Raster::new(width, height);
+        self.play(&mut raster)?;
+        Ok(image::encode_png(width / 2, height / 2, &raster.halved())?)
+    }
+
+    /// Writes the plot to `<stem>.svg` and `<stem>.png` in `dir`.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file and the cause.
+    pub fn write(&self, dir: &OutDir, stem: &str) -> Result<(), OutputError> {
+        dir.write_atomic(&format!("{stem}.svg"), |out| Ok(out.write_all(self.svg()?.as_bytes())?))?;
+        dir.write_atomic(&format!("{stem}.png"), |out| Ok(out.write_all(&self.png()?)?))?;
+        Ok(())
+    }
+
+    fn fine_size(&self) -> (u32, u32) {
+        ((self.width * SCALE) as u32, (self.height * SCALE) as u32)
+    }
+
+    fn play<B: DrawingBackend>(&self, backend: &mut B) -> Result<(), PlotError> {
+        register()?;
+        for shape in &self.shapes {
+            draw(backend, shape).map_err(failed)?;
+        }
+        backend.present().map_err(failed)
+    }
+}
+
+fn failed(error: impl Display) -> PlotError {
+    PlotError::Draw(error.to_string())
+}
+
+/// Makes the embedded fonts known to `plotters`, once.
+fn register() -> Result<(), PlotError> {
+    static DONE: OnceLock<bool> = OnceLock::new();
+    let done = DONE.get_or_init(|| {
+        register_font(font::FAMILY, FontStyle::Normal, font::REGULAR).is_ok()
+            && register_font(font::FAMILY, FontStyle::Bold, font::BOLD).is_ok()
+    });
+    if *done { Ok(()) } else { Err(PlotError::Font) }
+}
+
+struct Stroke {
+    colour: BackendColor,
+    width: u32,
+}
+
+impl BackendStyle for Stroke {
+    fn color(&self) -> BackendColor {
+        self.colour
+    }
+
+    fn stroke_width(&self) -> u32 {
+        self.width
+    }
+}
+
+fn draw<B: DrawingBackend>(backend: &mut B, shape: &Shape) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+    match shape {
+        Shape::Rect { from, to, fill } => backend.draw_rect(fine(*from), fine(*to), &colour(*fill), true),
+        Shape::Polyline { points, stroke, width } => {
+            let width = (width * SCALE).max(1.0) as u32;
+            backend.draw_path(fine_path(points), &Stroke { colour: colour(*stroke), width })
+        }
+        Shape::Polygon { points, fill } => backend.fill_polygon(fine_path(points), &colour(*fill)),
+        Shape::Dot { centre, radius, fill } => {
+            backend.draw_circle(fine(*centre), (radius * SCALE) as u32, &colour(*fill), true)
+        }
+        Shape::Text(text) => draw_text(backend, text),
+    }
+}
+
+fn draw_text<B: DrawingBackend>(backend: &mut B, text: &Text) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+    let h_pos = match text.across {
+        Across::Left => HPos::Left,
+        Across::Centre => HPos::Center,
+        Across::Right => HPos::Right,
+    };
+    let turn = if text.upwards { FontTransform::Rotate270 } else { FontTransform::None };
+    let style = TextStyle {
+        font: plotters_font(text.size, text.bold).transform(turn),
+        color: colour(text.colour),
+        pos: Pos::new(h_pos, VPos::Center),
+    };
+    backend.draw_text(&text.text, &style, fine(text.at))
+}
+
+fn plotters_font(size: f64, bold: bool) -> plotters::style::FontDesc<'static> {
+    let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
+    (FontFamily::Name(font::FAMILY), size * SCALE * SIZE_OVER_EM, style).into_font()
+}
+
+/// The width in pixels of `text` in letters of `size`.
+pub(super) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
+    // A damaged font is reported when the picture is rendered; until then about half an em a letter will do.
+    let guess = text.chars().count() as f64 * size * 0.6;
+    if register().is_err() {
+        return guess;
+    }
+    plotters_font(size, bold).box_size(text).map_or(guess, |(width, _)| f64::from(width) / SCALE)
+}
+
+fn colour(colour: Colour) -> BackendColor {
+    let [r, g, b] = colour.rgb;
+    let RGBAColor(r, g, b, alpha) = RGBAColor(r, g, b, colour.alpha);
+    BackendColor { alpha, rgb: (r, g, b) }
+}
+
+fn fine(point: Point) -> BackendCoord {
+    let round = |value: f64| libm::round(value * SCALE) as i32;
+    (round(point.0), round(point.1))
+}
+
+/// The path on the fine grid, without points that fall together.
+fn fine_path(points: &[Point]) -> Vec<BackendCoord> {
+    let mut path: Vec<BackendCoord> = points.iter().map(|point| fine(*point)).collect();
+    path.dedup();
+    path
+}
+
+fn attribute(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

@@ -1,0 +1,91 @@
+//! Progress bars: on a terminal, and nowhere else.
+
+use std::io::{IsTerminal, stderr};
+
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// The bars of a run, drawn to standard error. They may be used from any thread.
+#[derive(Clone, Debug)]
+pub struct Progress {
+    bars: MultiProgress,
+}
+
+impl Progress {
+    /// Bars on standard error, or none where `quiet` or where standard error is not a terminal.
+    pub fn new(quiet: bool) -> Self {
+        let silent = quiet || !stderr().is_terminal();
+        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        Self { bars: MultiProgress::with_draw_target(target) }
+    }
+
+    /// Whether nothing will be drawn.
+    pub fn is_silent(&self) -> bool {
+        self.bars.is_hidden()
+    }
+
+    /// A new bar below the others, for `length` steps of the work called `label`.
+    pub fn bar(&self, label: &str, length: u64) -> Bar {
+        let bar = self.bars.add(ProgressBar::new(length));
+        if let Ok(style) =
+            ProgressStyle::with_template("{prefix:>12} {bar:32} {pos}/{len} {elapsed} (left {eta})")
+        {
+            bar.set_style(style);
+        }
+        bar.set_prefix(label.to_owned());
+        Bar { bar }
+    }
+
+    /// Prints a line to standard error without breaking the bars; where they are silent, prints nothing.
+    pub fn note(&self, line: &str) {
+        // A line that cannot be shown is no reason to stop a run.
+        let _ = self.bars.println(line);
+    }
+}
+
+/// One bar; it stays on the screen, where it got to, when dropped.
+#[derive(Debug)]
+pub struct Bar {
+    bar: ProgressBar,
+}
+
+impl Bar {
+    /// One step done.
+    pub fn inc(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Steps done so far.
+    pub fn position(&self) -> u64 {
+        self.bar.position()
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.bar.abandon();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quiet_means_silent() {
+        let progress = Progress::new(true);
+        assert!(progress.is_silent());
+        progress.note("unseen");
+    }
+
+    #[test]
+    fn threads_share_a_bar() {
+        let progress = Progress::new(true);
+        let bar = progress.bar("frames", 400);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| (0..100).for_each(|_| bar.inc()));
+            }
+        });
+        assert_eq!(bar.position(), 400);
+    }
+}

@@ -1,0 +1,58 @@
+//! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
+
+mod bound;
+mod noise;
+mod quantizer;
+mod rail;
+mod sample;
+mod spec;
+
+pub use sample::{SampleError, Sampled};
+pub use spec::{DeviceError, DeviceSpec};
+
+use quantizer::Quantizer;
+use rail::Rail;
+
+/// A validated [`DeviceSpec`], ready to sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Device {
+    spec: DeviceSpec,
+    rail: Rail,
+    voltage: Quantizer,
+    current: Quantizer,
+}
+
+impl Device {
+    /// A device from its description.
+    ///
+    /// # Errors
+    /// [`DeviceError`] names the field that is out of range.
+    pub fn new(spec: DeviceSpec) -> Result<Self, DeviceError> {
+        spec.check()?;
+        Ok(Self {
+            rail: Rail::new(spec.rail_v, spec.rail_ohm),
+            voltage: Quantizer::new(spec.voltage_range_v, spec.bits),
+            current: Quantizer::new(spec.current_range_a, spec.bits),
+            spec,
+        })
+    }
+
+    /// What the device was built from.
+    pub fn spec(&self) -> &DeviceSpec {
+        &self.spec
+    }
+
+    /// The same device without noise and without low-pass filter: its only error is quantization.
+    #[must_use]
+    pub fn noise_free(&self) -> Self {
+        let mut quiet = self.clone();
+        quiet.spec.current_noise_a = 0.0;
+        quiet.spec.voltage_noise_v = 0.0;
+        quiet.spec.low_pass_s = None;
+        quiet
+    }
+
+    fn is_noise_free(&self) -> bool {
+        self.spec.current_noise_a == 0.0 && self.spec.voltage_noise_v == 0.0 && self.spec.low_pass_s.is_none()
+    }
+}

@@ -1,0 +1,194 @@
+//! Sampling a curve.
+
+use super::noise::Noise;
+use super::Device;
+use crate::curve::Curve;
+use crate::metadata::Metadata;
+use crate::trace::{Trace, TraceError};
+use thiserror::Error;
+
+/// Why a curve cannot be sampled.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SampleError {
+    /// The span is not within the curve.
+    #[error("cannot sample {start_s} s to {end_s} s: the power curve covers {curve_start_s} s to {curve_end_s} s")]
+    Span {
+        /// Asked start, s.
+        start_s: f64,
+        /// Asked end, s.
+        end_s: f64,
+        /// Start of the curve, s.
+        curve_start_s: f64,
+        /// End of the curve, s.
+        curve_end_s: f64,
+    },
+    /// The span is shorter than one sample.
+    #[error("{start_s} s to {end_s} s is shorter than one sample at {rate_hz} Hz: raise the rate or sample longer")]
+    TooShort {
+        /// Asked start, s.
+        start_s: f64,
+        /// Asked end, s.
+        end_s: f64,
+        /// The device's rate, Hz.
+        rate_hz: f64,
+    },
+    /// The rail cannot deliver the power.
+    #[error(
+        "at {time_s} s the load draws {power_w} W, more than the rail can deliver ({limit_w} W = V^2 / 4R): \
+         raise the device's rail_v or lower its rail_ohm"
+    )]
+    Overload {
+        /// Left edge of the sample, s.
+        time_s: f64,
+        /// Power drawn, W.
+        power_w: f64,
+        /// The limit, W.
+        limit_w: f64,
+    },
+    /// The result is no valid trace.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+}
+
+/// A synthetic trace, and how many of its samples were beyond the device's range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampled {
+    /// The trace.
+    pub trace: Trace,
+    /// Samples whose current was clipped to the range; above 0 is worth a warning.
+    pub clipped_currents: usize,
+    /// Samples whose voltage was clipped to the range.
+    pub clipped_voltages: usize,
+}
+
+/// The channels while they are filled.
+struct Channels {
+    voltage_v: Vec<f32>,
+    current_a: Vec<f32>,
+    clipped_voltages: usize,
+    clipped_currents: usize,
+}
+
+impl Device {
+    /// Samples a curve over the whole periods in `[start_s, end_s]`.
+    ///
+    /// Each sample is the exact mean power of its period, low-passed if asked, turned into voltage and current at
+    /// the rail (so that `V I` is the mean power), with noise added and both quantized. The trace's metadata names
+    /// the device and the seed.
+    ///
+    /// # Errors
+    /// [`SampleError`]: span outside the curve or too short, rail overloaded.
+    pub fn sample(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<Sampled, SampleError> {
+        let count = self.periods_in(curve, start_s, end_s)?;
+        let mut means_w = curve.sample_means_w(start_s, self.spec.rate_hz, count);
+        if let Some(time_constant_s) = self.spec.low_pass_s {
+            low_pass(&mut means_w, time_constant_s * self.spec.rate_hz);
+        }
+        let channels = self.convert(&means_w, start_s)?;
+        let metadata = Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..Metadata::default() };
+        let trace = Trace::new(channels.voltage_v, channels.current_a, self.spec.rate_hz, start_s, metadata)?;
+        Ok(Sampled {
+            trace,
+            clipped_currents: channels.clipped_currents,
+            clipped_voltages: channels.clipped_voltages,
+        })
+    }
+
+    fn periods_in(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<usize, SampleError> {
+        let (curve_start_s, curve_end_s) = (curve.start_s(), curve.end_s());
+        if !(start_s >= curve_start_s && end_s <= curve_end_s && start_s <= end_s) {
+            return Err(SampleError::Span { start_s, end_s, curve_start_s, curve_end_s });
+        }
+        // A span of whole periods must not lose one to the rounding of its ends.
+        let periods = (end_s - start_s) * self.spec.rate_hz;
+        let count = libm::floor(periods * (1.0 + 4.0 * f64::EPSILON) + 1e-9);
+        if count < 1.0 {
+            return Err(SampleError::TooShort { start_s, end_s, rate_hz: self.spec.rate_hz });
+        }
+        Ok(count as usize)
+    }
+
+    fn convert(&self, means_w: &[f64], start_s: f64) -> Result<Channels, SampleError> {
+        let noise = Noise::new(self.spec.seed, 0);
+        let noisy = self.spec.current_noise_a > 0.0 || self.spec.voltage_noise_v > 0.0;
+        let mut channels = Channels {
+            voltage_v: Vec::with_capacity(means_w.len()),
+            current_a: Vec::with_capacity(means_w.len()),
+            clipped_voltages: 0,
+            clipped_currents: 0,
+        };
+        for (index, &power_w) in means_w.iter().enumerate() {
+            let Some((volts, amperes)) = self.rail.solve(power_w) else {
+                let time_s = start_s + index as f64 / self.spec.rate_hz;
+                return Err(SampleError::Overload { time_s, power_w, limit_w: self.rail.limit_w() });
+            };
+            let (a, v) = if noisy { noise.pair(index as u64) } else { (0.0, 0.0) };
+            let (voltage, voltage_clipped) = self.voltage.quantize(volts + self.spec.voltage_noise_v * v);
+            let (current, current_clipped) = self.current.quantize(amperes + self.spec.current_noise_a * a);
+            channels.voltage_v.push(voltage);
+            channels.current_a.push(current);
+            channels.clipped_voltages += usize::from(voltage_clipped);
+            channels.clipped_currents += usize::from(current_clipped);
+        }
+        Ok(channels)
+    }
+}
+
+/// One pole with a time constant in samples, started at rest: `y += (1 - exp(-1/tau)) (x - y)`, the step response
+/// of an RC filter taken at sample steps.
+fn low_pass(values: &mut [f64], time_constant_samples: f64) {
+    let share = -libm::expm1(-1.0 / time_constant_samples);
+    let Some(&first) = values.first() else { return };
+    let mut state = first;
+    for value in values {
+        state += share * (*value - state);
+        *value = state;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::DeviceSpec;
+
+    fn curve(watts: f64) -> Curve {
+        Curve::new(vec![0.0, 1.0], vec![watts]).unwrap()
+    }
+
+    #[test]
+    fn a_second_at_50_khz_is_fifty_thousand_samples_wherever_it_starts() {
+        let long = Curve::new(vec![0.0, 100.0], vec![10.0]).unwrap();
+        let device = Device::new(DeviceSpec::default()).unwrap();
+        for start_s in [0.0, 0.1, 7.3, 98.999] {
+            assert_eq!(device.sample(&long, start_s, start_s + 1.0).unwrap().trace.samples(), 50_000);
+        }
+    }
+
+    #[test]
+    fn clipping_is_counted() {
+        let device = Device::new(DeviceSpec { current_range_a: [0.0, 1.0], ..DeviceSpec::default() }).unwrap();
+        let sampled = device.sample(&curve(24.0), 0.0, 0.01).unwrap();
+        assert_eq!((sampled.clipped_currents, sampled.clipped_voltages), (500, 0));
+    }
+
+    #[test]
+    fn the_filter_reaches_63_percent_of_a_step_after_its_time_constant() {
+        let mut values = vec![0.0; 1];
+        values.extend(vec![1.0; 100]);
+        low_pass(&mut values, 50.0);
+        assert!((values[50] - (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn each_way_to_fail_says_where() {
+        let device = Device::new(DeviceSpec::default()).unwrap();
+        let message = |device: &Device, watts: f64, a: f64, b: f64| device.sample(&curve(watts), a, b).unwrap_err().to_string();
+        assert!(message(&device, 1.0, 0.5, 1.5).contains("0.5 s to 1.5 s: the power curve covers 0 s to 1 s"));
+        assert!(message(&device, 1.0, f64::NAN, 1.0).contains("NaN"));
+        assert!(message(&device, 1.0, 0.5, 0.5).contains("shorter than one sample"));
+        assert!(message(&device, 9_001.0, 0.25, 0.5).contains("at 0.25 s the load draws 9001"));
+        let huge = Device::new(DeviceSpec { rate_hz: 10.0, ..DeviceSpec::default() }).unwrap();
+        let far = Curve::new(vec![0.0, 1e10], vec![1.0]).unwrap();
+        assert!(matches!(huge.sample(&far, 9.9e9, 9.9e9 + 1.0), Err(SampleError::Trace(_))));
+    }
+}

@@ -1,0 +1,77 @@
+//! Frames in a few numbers.
+
+use super::FrameEnergy;
+use serde::Serialize;
+
+/// Mean, sample standard deviation (over `n - 1`; 0 for one value) and median.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Median; the mean of the middle two for an even number.
+    pub median: f64,
+}
+
+impl Spread {
+    /// Of some values, in any order; `None` for no values.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        if values.is_empty() {
+            return None;
+        }
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        let deviation = if values.len() > 1 { libm::sqrt(squares / (count - 1.0)) } else { 0.0 };
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let middle = sorted.len() / 2;
+        let lower = sorted[(sorted.len() - 1) / 2];
+        Some(Self { mean, deviation, median: 0.5 * (lower + sorted[middle]) })
+    }
+}
+
+/// A table of frames in a few numbers. Averages are over frames; for joules per pixel divide by the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// How many frames.
+    pub frames: usize,
+    /// Sum of the energies, J.
+    pub total_j: f64,
+    /// Energy per frame, J.
+    pub energy_j: Spread,
+    /// Duration of a frame, s.
+    pub duration_s: Spread,
+    /// Mean power of a frame, W.
+    pub power_w: Spread,
+}
+
+impl Summary {
+    /// Of some frames; `None` for no frames.
+    pub fn of(frames: &[FrameEnergy]) -> Option<Self> {
+        let spread = |value: fn(&FrameEnergy) -> f64| Spread::of(&frames.iter().map(value).collect::<Vec<_>>());
+        Some(Self {
+            frames: frames.len(),
+            total_j: frames.iter().map(|frame| frame.energy_j).sum(),
+            energy_j: spread(|frame| frame.energy_j)?,
+            duration_s: spread(FrameEnergy::duration_s)?,
+            power_w: spread(FrameEnergy::power_w)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_deviation_and_median_of_known_numbers() {
+        let spread = Spread::of(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]).unwrap();
+        assert_eq!((spread.mean, spread.median), (5.0, 4.5));
+        assert!((spread.deviation - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert_eq!(Spread::of(&[3.0]), Some(Spread { mean: 3.0, deviation: 0.0, median: 3.0 }));
+        assert_eq!(Spread::of(&[]), None);
+        assert_eq!(Summary::of(&[]), None);
+    }
+}

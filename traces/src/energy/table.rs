@@ -1,0 +1,150 @@
+//! `frames.csv`.
+
+use super::{FrameEnergy, TrueFrame};
+use std::io::Write;
+use thiserror::Error;
+
+/// The columns of `frames.csv`, in order. Later versions only add columns at the end.
+///
+/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a simulator.
+pub const TABLE_COLUMNS: [&str; 11] = [
+    "frame",
+    "start_s",
+    "end_s",
+    "duration_s",
+    "energy_J",
+    "power_W",
+    "energy_per_pixel_J",
+    "confidence",
+    "flags",
+    "true_start_s",
+    "true_energy_J",
+];
+
+/// Why a table could not be built or written.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// The truth has another number of rows than the frames.
+    #[error("{frames} frames but {truths} true frames: give one (or none) per frame")]
+    Truth {
+        /// Measured frames.
+        frames: usize,
+        /// True frames.
+        truths: usize,
+    },
+    /// Writing failed.
+    #[error("cannot write the table of frames: {0}")]
+    Write(#[from] csv::Error),
+    /// Flushing failed.
+    #[error("cannot write the table of frames: {0}")]
+    Flush(#[from] std::io::Error),
+}
+
+/// Frames on their way to `frames.csv`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameTable {
+    frames: Vec<FrameEnergy>,
+    pixels: Option<u64>,
+    truth: Vec<Option<TrueFrame>>,
+}
+
+impl FrameTable {
+    /// A table of measured frames; `pixels` per frame where known.
+    pub fn new(frames: Vec<FrameEnergy>, pixels: Option<u64>) -> Self {
+        let truth = vec![None; frames.len()];
+        Self { frames, pixels, truth }
+    }
+
+    /// Puts what really happened beside each frame (`None` for a frame that never was).
+    ///
+    /// # Errors
+    /// [`TableError::Truth`] unless there is one entry per frame.
+    pub fn with_truth(self, truth: Vec<Option<TrueFrame>>) -> Result<Self, TableError> {
+        if truth.len() != self.frames.len() {
+            return Err(TableError::Truth { frames: self.frames.len(), truths: truth.len() });
+        }
+        Ok(Self { truth, ..self })
+    }
+
+    /// The frames.
+    pub fn frames(&self) -> &[FrameEnergy] {
+        &self.frames
+    }
+
+    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads back the
+    /// same.
+    ///
+    /// # Errors
+    /// [`TableError`] if the writer fails.
+    pub fn write_csv<W: Write>(&self, out: W) -> Result<(), TableError> {
+        let mut writer = csv::Writer::from_writer(out);
+        writer.write_record(TABLE_COLUMNS)?;
+        for (index, (frame, truth)) in self.frames.iter().zip(&self.truth).enumerate() {
+            writer.write_record(self.record(index, frame, truth.as_ref()))?;
+        }
+        writer.flush()?;
+        Ok(())
+    }
+
+    fn record(&self, index: usize, frame: &FrameEnergy, truth: Option<&TrueFrame>) -> [String; 11] {
+        let per_pixel_j = self.pixels.and_then(|pixels| frame.energy_per_pixel_j(pixels));
+        let or_empty = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+        [
+            index.to_string(),
+            frame.start_s.to_string(),
+            frame.end_s.to_string(),
+            frame.duration_s().to_string(),
+            frame.energy_j.to_string(),
+            frame.power_w().to_string(),
+            or_empty(per_pixel_j),
+            frame.confidence.to_string(),
+            frame.flags.to_string(),
+            or_empty(truth.map(|truth| truth.start_s)),
+            or_empty(truth.map(|truth| truth.energy_j)),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::{Flag, Flags};
+
+    fn frame() -> FrameEnergy {
+        let mut flags = Flags::default();
+        flags.insert(Flag::Marked);
+        flags.insert(Flag::Last);
+        FrameEnergy { start_s: 0.25, end_s: 0.75, energy_j: 0.125, confidence: 1.0, flags }
+    }
+
+    #[test]
+    fn golden_rows_with_and_without_truth() {
+        let truth = TrueFrame { start_s: 0.25, energy_j: 0.124 };
+        let table = FrameTable::new(vec![frame(), frame()], Some(1000)).with_truth(vec![Some(truth), None]).unwrap();
+        let mut out = Vec::new();
+        table.write_csv(&mut out).unwrap();
+        assert_eq!(
+            String::from_utf8(out).unwrap(),
+            "frame,start_s,end_s,duration_s,energy_J,power_W,energy_per_pixel_J,confidence,flags,true_start_s,true_energy_J\n\
+             0,0.25,0.75,0.5,0.125,0.25,0.000125,1,marked+last,0.25,0.124\n\
+             1,0.25,0.75,0.5,0.125,0.25,0.000125,1,marked+last,,\n"
+        );
+    }
+
+    #[test]
+    fn failures_say_what_is_wrong() {
+        let error = FrameTable::new(vec![frame()], None).with_truth(vec![]).unwrap_err();
+        assert!(error.to_string().contains("1 frames but 0 true frames"));
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::Error::other("disk full"))
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let error = FrameTable::new(vec![frame()], None).write_csv(Full).unwrap_err();
+        assert!(error.to_string().contains("disk full"), "{error}");
+    }
+}

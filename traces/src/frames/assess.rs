@@ -1,0 +1,157 @@
+//! How sure the finder is, and what it has to say about the result as a whole.
+
+use super::find::{FrameSpan, FrameStart, Found};
+use super::flags::{Flag, Flags};
+use super::marks::{Marks, Placement, Window};
+use super::threshold::{Rule, Threshold, DISTINCT};
+use crate::trace::Trace;
+use crate::warning::Warning;
+
+/// A frame of fewer samples is measured coarsely.
+const FEW_SAMPLES: f64 = 50.0;
+/// Share of frames of odd length, by number or by the time they cover, from which the spacing is called irregular.
+const IRREGULAR: f64 = 0.1;
+
+/// 1 at or below the mean distance of the matches, 0 at or above that of the rest, linear in the logarithm between;
+/// scaled down where neither the populations are distinct nor the starts evenly spaced.
+pub(super) fn confidence(distance_w2: f64, threshold: &Threshold) -> f64 {
+    let low = libm::log(threshold.matched.mean_w2.max(f64::MIN_POSITIVE));
+    let high = libm::log(threshold.rest.mean_w2.max(f64::MIN_POSITIVE));
+    if high <= low {
+        return 0.0;
+    }
+    let nearness = (high - libm::log(threshold.excess_w2(distance_w2))) / (high - low);
+    nearness.clamp(0.0, 1.0) * threshold.clarity()
+}
+
+/// Frames, flags and warnings from the starts.
+pub(super) fn conclude(
+    trace: &Trace,
+    marks: &Marks,
+    placement: &Placement,
+    starts: Vec<FrameStart>,
+    threshold: Threshold,
+) -> Found {
+    let frames = spans(&starts, marks.end_s);
+    let period_s = trace.period_s();
+    let pre_s = placement.marks.first().map_or(0.0, |mark| libm::round(mark.anchor) * period_s);
+    let window = Window { pre_s, post_s: placement.samples as f64 * period_s - pre_s };
+    let mut found = Found { starts, frames, end_s: marks.end_s, window, threshold, warnings: Vec::new() };
+    found.warnings = [
+        window_cut(placement, &found),
+        only_marks(&found),
+        weak_separation(&found),
+        irregular(&found),
+        window_too_long(&found),
+        few_samples(&found, trace.rate_hz()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    found
+}
+
+fn spans(starts: &[FrameStart], end_s: f64) -> Vec<FrameSpan> {
+    let mut frames: Vec<FrameSpan> = Vec::with_capacity(starts.len());
+    for (index, start) in starts.iter().enumerate() {
+        let next = starts.get(index + 1);
+        let mut flags = Flags::default();
+        if start.marked {
+            flags.insert(Flag::Marked);
+        }
+        if next.is_none() {
+            flags.insert(Flag::Last);
+        }
+        let confidence = next.map_or(start.confidence, |next| start.confidence.min(next.confidence));
+        if confidence < 0.5 {
+            flags.insert(Flag::Unsure);
+        }
+        frames.push(FrameSpan { start_s: start.time_s, end_s: next.map_or(end_s, |next| next.time_s), confidence, flags });
+    }
+    flag_lengths(&mut frames);
+    frames
+}
+
+fn flag_lengths(frames: &mut [FrameSpan]) {
+    let Some(median_s) = median_duration_s(frames) else { return };
+    for frame in frames {
+        let duration_s = frame.end_s - frame.start_s;
+        if duration_s > 1.5 * median_s {
+            frame.flags.insert(Flag::Long);
+        } else if duration_s < 0.5 * median_s {
+            frame.flags.insert(Flag::Short);
+        }
+    }
+}
+
+/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if alone.
+fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
+    let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
+    let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();
+    durations.sort_by(f64::total_cmp);
+    durations.get(durations.len() / 2).copied()
+}
+
+fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
+    placement.cut.then(|| {
+        Warning::new("window-cut", format!(
+            "the marked window reaches beyond the trace and was cut to {:.3} ms before and {:.3} ms after the mark; \
+             mark a frame further inside",
+            found.window.pre_s * 1e3, found.window.post_s * 1e3))
+    })
+}
+
+fn only_marks(found: &Found) -> Option<Warning> {
+    found.starts.iter().all(|start| start.marked).then(|| {
+        Warning::new("only-mark", format!(
+            "nothing in the trace resembles the marked frame ({:?}): what is reported is the mark to the end mark; \
+             mark a more typical frame, or several", found.threshold.rule))
+    })
+}
+
+fn weak_separation(found: &Found) -> Option<Warning> {
+    let threshold = &found.threshold;
+    let split = matches!(threshold.rule, Rule::Otsu | Rule::OtsuRegular);
+    (split && threshold.clarity() < 1.0).then(|| {
+        Warning::new("weak-separation", format!(
+            "frame starts and other minima are not distinct (separation {:.2}, clear above {DISTINCT}; {:.0} % evenly \
+             spaced; mean {:.3e} W^2 below the threshold {:.3e} W^2, {:.3e} W^2 above): starts may be missed or false; \
+             mark several frames, or record with V-sync",
+            threshold.separation, 100.0 * threshold.regularity, threshold.matched.mean_w2, threshold.value_w2, threshold.rest.mean_w2))
+    })
+}
+
+fn irregular(found: &Found) -> Option<Warning> {
+    let inner = found.frames.split_last().map_or(&[][..], |(_, inner)| inner);
+    let odd = |flag: Flag| inner.iter().filter(move |frame| frame.flags.contains(flag));
+    let (long, short) = (odd(Flag::Long).count(), odd(Flag::Short).count());
+    let covered_s: f64 = inner.iter().map(|frame| frame.end_s - frame.start_s).sum();
+    let long_s: f64 = odd(Flag::Long).map(|frame| frame.end_s - frame.start_s).sum();
+    let irregular = (long + short) as f64 > IRREGULAR * inner.len() as f64 || long_s > IRREGULAR * covered_s;
+    irregular.then(|| {
+        Warning::new("irregular-spacing", format!(
+            "of {} frames {long} are longer than 1.5 median durations ({:.0} % of the time) and {short} shorter than \
+             0.5: starts were missed, are false, or the frame time really jumps",
+            inner.len(), 100.0 * long_s / covered_s))
+    })
+}
+
+fn window_too_long(found: &Found) -> Option<Warning> {
+    let window_s = found.window.pre_s + found.window.post_s;
+    let median_s = median_duration_s(&found.frames).filter(|_| found.frames.len() > 1)?;
+    // A tenth of slack: a window of just the period is what default_window gives.
+    (window_s > 1.1 * median_s).then(|| {
+        Warning::new("window-longer-than-frame", format!(
+            "the window of {:.3} ms is longer than the median frame of {:.3} ms: shorter frames may be missed; shrink it",
+            window_s * 1e3, median_s * 1e3))
+    })
+}
+
+fn few_samples(found: &Found, rate_hz: f64) -> Option<Warning> {
+    let samples = median_duration_s(&found.frames)? * rate_hz;
+    (samples < FEW_SAMPLES).then(|| {
+        Warning::new("few-samples", format!(
+            "the median frame has {samples:.1} samples, fewer than {FEW_SAMPLES}: starts and energies are coarse; \
+             sample faster"))
+    })
+}

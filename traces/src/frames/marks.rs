@@ -1,0 +1,209 @@
+//! What the user points at.
+
+use crate::trace::Trace;
+use thiserror::Error;
+
+/// The fewest samples a window may have: fewer tell nothing apart.
+const LEAST_SAMPLES: usize = 4;
+
+/// A mark or window that cannot be used on this trace.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum MarkError {
+    /// No frame start was marked.
+    #[error("no frame start is marked: mark one")]
+    NoMark,
+    /// A time or a length is not finite, or a length is negative.
+    #[error("{what} = {value_s} s: it must be finite and not negative")]
+    NotFinite {
+        /// Which number.
+        what: &'static str,
+        /// Its value, s.
+        value_s: f64,
+    },
+    /// A marked start is outside the trace, or so near its ends that no usable window is left.
+    #[error(
+        "the frame start marked at {mark_s} s has no window in the trace ({start_s} s to {end_s} s): \
+         mark a frame further inside"
+    )]
+    OutsideTrace {
+        /// The mark, s.
+        mark_s: f64,
+        /// Start of the trace, s.
+        start_s: f64,
+        /// End of the trace, s.
+        end_s: f64,
+    },
+    /// The end mark is not after every marked start, or outside the trace.
+    #[error("the end mark {end_mark_s} s must be after the marked start {mark_s} s and not after the trace's end {end_s} s")]
+    End {
+        /// The end mark, s.
+        end_mark_s: f64,
+        /// The last marked start, s.
+        mark_s: f64,
+        /// End of the trace, s.
+        end_s: f64,
+    },
+    /// The window is too short for the sample rate.
+    #[error("a window of {window_s} s holds fewer than 4 samples at {rate_hz} Hz: widen it or record faster")]
+    TooShort {
+        /// Whole window, s.
+        window_s: f64,
+        /// Sample rate, Hz.
+        rate_hz: f64,
+    },
+}
+
+/// How much around a marked start is compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Before the mark, s.
+    pub pre_s: f64,
+    /// After the mark, s.
+    pub post_s: f64,
+}
+
+/// The usual window, 1 ms before to 4 ms after the mark, shrunk so that it is no longer than a frame of
+/// `period_hint_s` (one fifth before, four fifths after), but never below one sample before and three after.
+pub fn default_window(period_hint_s: f64, rate_hz: f64) -> Window {
+    let hint_s = if period_hint_s > 0.0 { period_hint_s } else { f64::INFINITY };
+    let pre_s = f64::min(1e-3, 0.2 * hint_s);
+    let post_s = f64::min(4e-3, 0.8 * hint_s);
+    Window { pre_s: pre_s.max(1.0 / rate_hz), post_s: post_s.max(3.0 / rate_hz) }
+}
+
+/// Marked frame starts, the window around them and where the last frame ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Marks {
+    /// Marked starts of frames, s; usually one. With several, a stretch is as near as its nearest window.
+    pub starts_s: Vec<f64>,
+    /// What is compared around each.
+    pub window: Window,
+    /// Where the last frame ends, s: starts found from here on are left out.
+    pub end_s: f64,
+}
+
+/// The window of one mark in samples of one trace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Placed {
+    /// First sample of the window.
+    pub first: usize,
+    /// The mark's position relative to `first`, in samples, fractional.
+    pub anchor: f64,
+    /// The marked time, s.
+    pub mark_s: f64,
+}
+
+/// All windows of the marks on one trace; they have the same length.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Placement {
+    pub marks: Vec<Placed>,
+    pub samples: usize,
+    /// Whether the trace's ends cut the window.
+    pub cut: bool,
+}
+
+impl Marks {
+    /// One marked start.
+    pub fn one(start_s: f64, window: Window, end_s: f64) -> Self {
+        Self { starts_s: vec![start_s], window, end_s }
+    }
+
+    /// Puts the windows on the samples of a trace, cutting them where the trace ends.
+    pub(super) fn place(&self, trace: &Trace) -> Result<Placement, MarkError> {
+        self.check(trace)?;
+        let rate_hz = trace.rate_hz();
+        let wanted = [libm::round(self.window.pre_s * rate_hz), libm::round(self.window.post_s * rate_hz)];
+        let centre = |mark_s: f64| libm::round(trace.position(mark_s));
+        let room_before = self.starts_s.iter().map(|&s| centre(s)).fold(f64::INFINITY, f64::min);
+        let room_after = trace.samples() as f64 - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
+        let pre = wanted[0].min(room_before);
+        let post = wanted[1].min(room_after);
+        if pre + post < LEAST_SAMPLES as f64 {
+            return Err(self.no_room(trace, wanted[0] + wanted[1]));
+        }
+        let place = |&mark_s: &f64| {
+            let first = centre(mark_s) - pre;
+            Placed { first: first as usize, anchor: trace.position(mark_s) - first, mark_s }
+        };
+        let cut = pre < wanted[0] || post < wanted[1];
+        Ok(Placement { marks: self.starts_s.iter().map(place).collect(), samples: (pre + post) as usize, cut })
+    }
+
+    fn no_room(&self, trace: &Trace, wanted_samples: f64) -> MarkError {
+        if wanted_samples < LEAST_SAMPLES as f64 {
+            let window_s = self.window.pre_s + self.window.post_s;
+            return MarkError::TooShort { window_s, rate_hz: trace.rate_hz() };
+        }
+        let mark_s = self.starts_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        MarkError::OutsideTrace { mark_s, start_s: trace.start_s(), end_s: trace.end_s() }
+    }
+
+    fn check(&self, trace: &Trace) -> Result<(), MarkError> {
+        for (what, value_s) in [("window before the mark", self.window.pre_s), ("window after the mark", self.window.post_s)] {
+            if !(value_s.is_finite() && value_s >= 0.0) {
+                return Err(MarkError::NotFinite { what, value_s });
+            }
+        }
+        if self.starts_s.is_empty() {
+            return Err(MarkError::NoMark);
+        }
+        let half_sample_s = 0.5 * trace.period_s();
+        for &mark_s in &self.starts_s {
+            // Written so that NaN fails, too.
+            if !(mark_s >= trace.start_s() && mark_s <= trace.end_s()) {
+                return Err(MarkError::OutsideTrace { mark_s, start_s: trace.start_s(), end_s: trace.end_s() });
+            }
+            if !(self.end_s > mark_s && self.end_s <= trace.end_s() + half_sample_s) {
+                return Err(MarkError::End { end_mark_s: self.end_s, mark_s, end_s: trace.end_s() });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metadata::Metadata;
+
+    const WINDOW: Window = Window { pre_s: 0.1, post_s: 0.4 };
+
+    fn trace() -> Trace {
+        Trace::new(vec![1.0; 100], vec![1.0; 100], 100.0, 2.0, Metadata::default()).unwrap()
+    }
+
+    #[test]
+    fn the_anchor_keeps_the_fraction_of_the_mark() {
+        let placed = Marks::one(2.513, WINDOW, 3.0).place(&trace()).unwrap();
+        assert_eq!((placed.samples, placed.marks[0].first, placed.cut), (50, 41, false));
+        assert!((placed.marks[0].anchor - 10.3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_window_is_cut_at_the_start_of_the_trace() {
+        let placed = Marks::one(2.02, WINDOW, 3.0).place(&trace()).unwrap();
+        assert_eq!((placed.samples, placed.marks[0].first, placed.cut), (42, 0, true));
+    }
+
+    #[test]
+    fn the_default_window_shrinks_with_the_frame_but_not_below_four_samples() {
+        assert_eq!(default_window(1.0 / 30.0, 50e3), Window { pre_s: 1e-3, post_s: 4e-3 });
+        let short = default_window(1e-3, 50e3);
+        assert!((short.pre_s + short.post_s - 1e-3).abs() < 1e-15);
+        let slow = default_window(1e-3, 1e3);
+        assert_eq!((slow.pre_s, slow.post_s), (1e-3, 3e-3));
+    }
+
+    #[test]
+    fn each_bad_mark_says_what_and_where() {
+        let message = |marks: Marks| marks.place(&trace()).unwrap_err().to_string();
+        assert!(message(Marks { starts_s: vec![], window: WINDOW, end_s: 3.0 }).contains("no frame start"));
+        assert!(message(Marks::one(9.0, WINDOW, 10.0)).contains("marked at 9 s"));
+        assert!(message(Marks::one(f64::NAN, WINDOW, 3.0)).contains("marked at NaN s"));
+        assert!(message(Marks::one(2.5, WINDOW, 2.4)).contains("end mark 2.4 s"));
+        assert!(message(Marks::one(2.5, WINDOW, 3.5)).contains("end mark 3.5 s"));
+        assert!(message(Marks::one(2.5, Window { pre_s: -1.0, post_s: 0.4 }, 3.0)).contains("window before the mark = -1 s"));
+        assert!(message(Marks::one(2.5, Window { pre_s: 0.0, post_s: 0.02 }, 3.0)).contains("fewer than 4 samples"));
+        assert!(message(Marks::one(2.999, Window { pre_s: 0.0, post_s: 0.5 }, 3.0)).contains("mark a frame further inside"));
+    }
+}

@@ -1,0 +1,207 @@
+//! Which minima are frame starts: a threshold taken from the minima themselves, with its reason as data.
+
+use super::split::{moments, otsu_tree, Split};
+use serde::Serialize;
+
+/// Excess distances below this share of the background are not told apart: how well a good match matches says nothing.
+const FLOOR: f64 = 3e-3;
+/// Nor are those below this share of the noise: by about as much do windows of a few hundred samples of it differ.
+const NOISE_SPREAD: f64 = 0.3;
+/// Below this separation two populations are not distinct. Halves of one normal population reach 1.3, of a uniform
+/// one 1.7.
+pub(super) const DISTINCT: f64 = 2.0;
+/// From this regularity on the spacing speaks for the starts; idle before the first and after the last counts against.
+const EVEN: f64 = 0.8;
+/// A match leaves less than this share of the background's excess distance.
+const ALIKE: f64 = 0.5;
+/// How often sides are split again.
+const DEPTH: usize = 3;
+/// How much more regular a further split must make the spacing to be preferred to the first one.
+const MORE_REGULAR: f64 = 0.05;
+/// A single population this far below the background consists of matches.
+const FAR_BELOW: f64 = 0.1;
+
+/// How the threshold was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// The split of the logarithms with the greatest variance between its sides (Otsu 1979).
+    Otsu,
+    /// Of the splits of these two sides, and of theirs, the one that makes the starts most evenly spaced: minima can form
+    /// more than two populations (starts, look-alikes within the frame, idle).
+    OtsuRegular,
+    /// The minima form one population far below the background: all are frame starts.
+    AllAlike,
+    /// No minimum is distinctly below the background: only the marks are kept.
+    NoneAlike,
+    /// There was no minimum besides the marks.
+    NoCandidates,
+}
+
+/// One side of the threshold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Population {
+    /// How many minima.
+    pub count: usize,
+    /// Geometric mean of their excess distances, W^2 (of those above: up to the next split).
+    pub mean_w2: f64,
+}
+
+/// The threshold and why it lies where it does.
+///
+/// Noise adds the same to the distance of a match and of anything else, so minima are told apart by their **excess**
+/// distance, that beyond `noise_w2`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Threshold {
+    /// Minima below this summed squared difference (noise included) are frame starts, W^2.
+    pub value_w2: f64,
+    /// How it was found.
+    pub rule: Rule,
+    /// The minima below (the marks themselves left out).
+    pub matched: Population,
+    /// The minima above.
+    pub rest: Population,
+    /// Median excess distance over all offsets, W^2: what no match at all looks like.
+    pub background_w2: f64,
+    /// What sensor noise leaves of a perfect match, W^2: `2 m sigma^2`, or the lowest minimum if that is less.
+    pub noise_w2: f64,
+    /// Difference of the populations' mean logarithms over the sum of their standard deviations; above 2 is clear.
+    pub separation: f64,
+    /// Share of the trace, from the first to the last minimum, that the starts divide evenly (gaps of 0.6 to 1.6 median
+    /// gaps); 0 for fewer than four gaps. Evidence of its own where the separation is weak.
+    pub regularity: f64,
+}
+
+impl Threshold {
+    /// Whether starts and the rest are told apart beyond doubt: by distance, or else by the even spacing of the starts.
+    pub(super) fn clarity(&self) -> f64 {
+        (self.separation / DISTINCT).max(self.regularity / EVEN).clamp(0.0, 1.0)
+    }
+
+    /// The part of a distance that noise does not explain, W^2; at least what can be told apart.
+    pub(super) fn excess_w2(&self, distance_w2: f64) -> f64 {
+        let floor_w2 = (FLOOR * self.background_w2).max(NOISE_SPREAD * self.noise_w2).max(f64::MIN_POSITIVE);
+        (distance_w2 - self.noise_w2).max(floor_w2)
+    }
+}
+
+/// Chooses the threshold. `distances` are those of the spaced minima, the marks left out; `background_w2` is the
+/// median distance over all offsets, `noise_w2` what the trace's noise is estimated to leave of a perfect match,
+/// `regularity` how evenly (0 to 1) the starts below a threshold are spaced.
+pub(super) fn choose(
+    distances: &[f64],
+    background_w2: f64,
+    noise_w2: f64,
+    regularity: impl Fn(f64) -> f64,
+) -> Threshold {
+    let lowest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+    let noise_w2 = noise_w2.min(lowest);
+    let none = Threshold {
+        value_w2: 0.0,
+        rule: Rule::NoCandidates,
+        matched: Population::default(),
+        rest: Population::default(),
+        background_w2: (background_w2 - noise_w2).max(0.0),
+        noise_w2,
+        separation: 0.0,
+        regularity: 0.0,
+    };
+    let mut logs: Vec<f64> = distances.iter().map(|&distance_w2| libm::log(none.excess_w2(distance_w2))).collect();
+    logs.sort_by(f64::total_cmp);
+    let between = |split: &Split| none.noise_w2 + libm::exp(0.5 * (logs[split.count - 1] + logs[split.count]));
+    let splits = otsu_tree(&logs, DEPTH);
+    // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by that.
+    // The first split stands on Otsu's criterion alone and is spared.
+    let alike = |split: &Split| between(split) - none.noise_w2 < ALIKE * none.background_w2;
+    let best = most_regular(&splits, |index, split| if index == 0 || alike(split) { regularity(between(split)) } else { 0.0 });
+    let chosen = match (splits.get(best), logs.last()) {
+        (Some(split), _) => {
+            let rule = if best == 0 { Rule::Otsu } else { Rule::OtsuRegular };
+            judge(split, &logs, Threshold { value_w2: between(split), rule, ..none })
+        }
+        (None, Some(&log)) if libm::exp(log) < FAR_BELOW * none.background_w2 => all_alike(&logs, none),
+        (None, Some(_)) => none_alike(&logs, none),
+        (None, None) => none,
+    };
+    Threshold { regularity: regularity(chosen.value_w2), ..chosen }
+}
+
+/// The first split, unless another makes the spacing distinctly more regular.
+fn most_regular(splits: &[Split], regularity: impl Fn(usize, &Split) -> f64) -> usize {
+    let mut best = (0, splits.first().map_or(0.0, |split| regularity(0, split)) + MORE_REGULAR);
+    for (index, split) in splits.iter().enumerate().skip(1) {
+        let regular = regularity(index, split);
+        if regular > best.1 {
+            best = (index, regular);
+        }
+    }
+    best.0
+}
+
+/// Whether a split tells matches from the rest.
+fn judge(split: &Split, logs: &[f64], chosen: Threshold) -> Threshold {
+    let [matched_w2, rest_w2] = [split.low.mean, split.high.mean].map(libm::exp);
+    let separation = ratio(split.high.mean - split.low.mean, split.low.deviation + split.high.deviation);
+    if chosen.rule == Rule::Otsu && separation < DISTINCT && rest_w2 < FAR_BELOW * chosen.background_w2 {
+        return all_alike(logs, chosen);
+    }
+    if matched_w2 > ALIKE * chosen.background_w2 {
+        return none_alike(logs, chosen);
+    }
+    Threshold {
+        matched: Population { count: split.count, mean_w2: matched_w2 },
+        rest: Population { count: logs.len() - split.count, mean_w2: rest_w2 },
+        separation,
+        ..chosen
+    }
+}
+
+fn all_alike(logs: &[f64], none: Threshold) -> Threshold {
+    let all = moments(logs);
+    let highest = logs.last().copied().unwrap_or(0.0);
+    let background = libm::log(none.background_w2);
+    Threshold {
+        value_w2: none.noise_w2 + libm::exp(0.5 * (highest + background)),
+        rule: Rule::AllAlike,
+        matched: Population { count: logs.len(), mean_w2: libm::exp(all.mean) },
+        rest: Population { count: 0, mean_w2: none.background_w2 },
+        separation: ratio(background - all.mean, all.deviation),
+        ..none
+    }
+}
+
+fn none_alike(logs: &[f64], none: Threshold) -> Threshold {
+    let rest = Population { count: logs.len(), mean_w2: libm::exp(moments(logs).mean) };
+    Threshold { value_w2: 0.0, rule: Rule::NoneAlike, rest, ..none }
+}
+
+/// A ratio that stays finite, so that it can be written to JSON.
+fn ratio(difference: f64, spread: f64) -> f64 {
+    f64::min(difference / spread.max(1e-3), 1e3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_clear_populations_are_split_between_them() {
+        let distances: Vec<f64> = (0..20).map(|i| 0.5 + 0.01 * f64::from(i)).chain((0..90).map(|i| 50.0 + f64::from(i))).collect();
+        let threshold = choose(&distances, 100.0, 0.4, |_| 1.0);
+        assert_eq!((threshold.rule, threshold.matched.count, threshold.rest.count), (Rule::Otsu, 20, 90));
+        assert!(threshold.value_w2 > 0.7 && threshold.value_w2 < 50.0 && threshold.separation > 5.0);
+    }
+
+    #[test]
+    fn one_low_population_is_all_frames_and_one_high_population_is_none() {
+        let spread = |centre: f64| (0..50).map(move |i| centre * (1.0 + 0.01 * f64::from(i)));
+        let low = choose(&spread(1.0).collect::<Vec<_>>(), 100.0, 0.5, |_| 1.0);
+        assert_eq!((low.rule, low.matched.count), (Rule::AllAlike, 50));
+        assert!(low.value_w2 > 1.5);
+        let high = choose(&spread(80.0).collect::<Vec<_>>(), 100.0, 0.5, |_| 1.0);
+        assert_eq!((high.rule, high.value_w2), (Rule::NoneAlike, 0.0));
+        assert_eq!(choose(&[], 100.0, 0.5, |_| 1.0).rule, Rule::NoCandidates);
+        assert_eq!(choose(&[1.0, 1.0], 100.0, 0.5, |_| 1.0).rule, Rule::AllAlike);
+        assert_eq!(choose(&[99.0, 99.0], 100.0, 0.5, |_| 1.0).rule, Rule::NoneAlike);
+    }
+}

@@ -1,0 +1,81 @@
+//! Files that are whole or not there.
+
+use super::WriteError;
+use std::error::Error;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on any
+/// failure the temporary file is removed and what stood at `path` before is untouched.
+///
+/// # Errors
+/// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`].
+pub fn write_file<E>(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), WriteError>
+where
+    E: Into<Box<dyn Error + Send + Sync>>,
+{
+    let temporary = temporary_name(path)?;
+    let written = write_whole(path, &temporary, fill);
+    if written.is_err() {
+        // The first error is the one to tell; a leftover that cannot be removed changes nothing about it.
+        let _ = fs::remove_file(&temporary);
+    }
+    written
+}
+
+fn write_whole<E>(path: &Path, temporary: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), WriteError>
+where
+    E: Into<Box<dyn Error + Send + Sync>>,
+{
+    let io = |source| WriteError::Io { path: path.to_owned(), source };
+    let mut writer = BufWriter::new(File::create(temporary).map_err(io)?);
+    fill(&mut writer).map_err(|error| WriteError::Content { path: path.to_owned(), source: error.into() })?;
+    writer.flush().map_err(io)?;
+    writer.get_ref().sync_all().map_err(io)?;
+    drop(writer);
+    fs::rename(temporary, path).map_err(io)
+}
+
+/// `.name.PID.part` beside the file: the process id keeps two runs apart.
+fn temporary_name(path: &Path) -> Result<PathBuf, WriteError> {
+    let name = path.file_name().ok_or_else(|| WriteError::NoName { path: path.to_owned() })?;
+    let mut temporary = OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}.part", std::process::id()));
+    Ok(path.with_file_name(temporary))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_file(&path, |w| w.write_all(b"old")).unwrap();
+        let error = write_file(&path, |w| {
+            w.write_all(b"half of the ne")?;
+            Err(std::io::Error::other("no more ink"))
+        })
+        .unwrap_err();
+        assert!(error.to_string().contains("a.txt: no more ink"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn failures_name_the_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let none = |_: &mut BufWriter<File>| Ok::<(), std::io::Error>(());
+        let missing = folder.path().join("no/such/a.txt");
+        assert!(write_file(&missing, none).unwrap_err().to_string().contains("no/such/a.txt: cannot be written"));
+        assert!(write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: not the name of a file"));
+    }
+}

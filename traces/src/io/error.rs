@@ -1,0 +1,201 @@
+//! What can be wrong with a file.
+
+use crate::trace::TraceError;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why a trace could not be read. Rows are rows of data, counted from 1 (a CSV header is not counted).
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// The file could not be opened or read.
+    #[error("{path}: cannot be read: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is cut off, damaged, or not of its format.
+    #[error("{path}: not a whole {format} file ({reason}): it is cut off or damaged; copy or export it again", path = path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Parquet or CSV.
+        format: &'static str,
+        /// What the reader says.
+        reason: String,
+    },
+    /// A row is damaged or cut off.
+    #[error("{path}: row {row}: {reason}: the file is cut off or damaged; mend or drop the row", path = path.display())]
+    Row {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: u64,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The file has fewer or more rows than it says.
+    #[error("{path}: {found} rows, but its description says {stated}: the file is cut off or was edited; copy or export it again", path = path.display())]
+    Rows {
+        /// The file.
+        path: PathBuf,
+        /// Rows found.
+        found: u64,
+        /// Rows stated.
+        stated: u64,
+    },
+    /// A column is missing.
+    #[error("{path}: no column {column} (found: {found}): rename or add it", path = path.display())]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+        /// What there is.
+        found: String,
+    },
+    /// Two columns have the same name but for case.
+    #[error("{path}: column {column} occurs twice (letter case does not count): drop or rename one", path = path.display())]
+    DuplicateColumn {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+    },
+    /// A column has a type that cannot be used.
+    #[error("{path}: column {column} is {found}, it must be {must}", path = path.display())]
+    ColumnType {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+        /// Its type.
+        found: String,
+        /// The types that can be read.
+        must: &'static str,
+    },
+    /// A value is missing, not a number, or not finite.
+    #[error("{path}: row {row}: {column} is {value}, not a finite number: mend it or cut the stretch out", path = path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: u64,
+        /// The column.
+        column: &'static str,
+        /// What stands there.
+        value: String,
+    },
+    /// A time stamp is not later than the one before it.
+    #[error("{path}: row {row}: time {time_s} s is not after {before_s} s: sort the rows and drop repeats", path = path.display())]
+    Unsorted {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: u64,
+        /// Its time, s.
+        time_s: f64,
+        /// The time of the row before, s.
+        before_s: f64,
+    },
+    /// A time stamp is not where an even rate puts it.
+    #[error(
+        "{path}: row {row}: time {time_s} s is {off_periods:.2} sample periods off an even rate of {rate_hz} Hz \
+         (missing samples or a wrong rate): cut the trace there or resample it", path = path.display()
+    )]
+    Uneven {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: u64,
+        /// Its time, s.
+        time_s: f64,
+        /// How far it is off, in sample periods.
+        off_periods: f64,
+        /// The rate it was held against, Hz.
+        rate_hz: f64,
+    },
+    /// There is no row.
+    #[error("{path}: no samples: record at least one", path = path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The sample rate cannot be told.
+    #[error("{path}: a single row and no stated rate: the sample rate is unknown; state rate_hz in the description", path = path.display())]
+    NoRate {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The JSON description cannot be used.
+    #[error("{path}: the JSON description: {reason}: mend or leave out the description", path = path.display())]
+    Description {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The content is no valid trace.
+    #[error("{path}: {source}", path = path.display())]
+    Trace {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: TraceError,
+    },
+}
+
+impl ReadError {
+    pub(super) fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_owned(), source }
+    }
+
+    pub(super) fn trace(path: &Path, source: TraceError) -> Self {
+        match source {
+            TraceError::Empty => Self::Empty { path: path.to_owned() },
+            TraceError::NotFinite { row, channel, value } => {
+                Self::Value { path: path.to_owned(), row: row as u64, column: channel, value: value.to_string() }
+            }
+            source => Self::Trace { path: path.to_owned(), source },
+        }
+    }
+}
+
+/// Why a file could not be written.
+#[derive(Debug, Error)]
+pub enum WriteError {
+    /// The file system refused.
+    #[error("{path}: cannot be written: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A path that names no file.
+    #[error("{path}: not the name of a file", path = path.display())]
+    NoName {
+        /// The path.
+        path: PathBuf,
+    },
+    /// Encoding or writing failed.
+    #[error("cannot write the trace: {0}")]
+    Encode(String),
+    /// A mark is not a finite time.
+    #[error("mark {index} is at {time_s} s: a mark must be at a finite time")]
+    Mark {
+        /// Which mark, from 0.
+        index: usize,
+        /// Its time, s.
+        time_s: f64,
+    },
+    /// Something else failed while a file was written.
+    #[error("{path}: {source}", path = path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What failed.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}

@@ -1,0 +1,69 @@
+//! The JSON description that goes with every trace.
+
+use super::{ReadError, WriteError};
+use crate::metadata::Metadata;
+use crate::trace::Trace;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Version of the description; it only gains keys.
+const VERSION: u32 = 1;
+/// The key of the description in a Parquet file's metadata, and other keys it is looked for under.
+pub(super) const KEYS: [&str; 2] = ["trace", "power_trace"];
+
+/// The description: what the columns alone do not say, and the exact rate and start, which rounded time stamps lose.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(super) struct Header {
+    pub version: u32,
+    #[serde(alias = "sample_rate_hz")]
+    pub rate_hz: Option<f64>,
+    pub start_s: Option<f64>,
+    pub samples: Option<u64>,
+    pub units: BTreeMap<String, serde_json::Value>,
+    #[serde(flatten)]
+    pub metadata: Metadata,
+}
+
+/// The description of a trace as JSON, on one line if it is to be put into a file's metadata.
+pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError> {
+    if let Some((index, mark)) = trace.metadata.marks.iter().enumerate().find(|(_, mark)| !mark.time_s.is_finite()) {
+        return Err(WriteError::Mark { index, time_s: mark.time_s });
+    }
+    let mut metadata = trace.metadata.clone();
+    for key in ["version", "rate_hz", "sample_rate_hz", "start_s", "samples", "units"] {
+        metadata.other.remove(key);
+    }
+    let unit = |(column, unit): (&str, &str)| (column.to_owned(), serde_json::Value::from(unit));
+    let header = Header {
+        version: VERSION,
+        rate_hz: Some(trace.rate_hz()),
+        start_s: Some(trace.start_s()),
+        samples: Some(trace.samples() as u64),
+        units: [("time_ns", "ns"), ("time_s", "s"), ("voltage_V", "V"), ("current_A", "A")].map(unit).into(),
+        metadata,
+    };
+    let json = if pretty { serde_json::to_string_pretty(&header) } else { serde_json::to_string(&header) };
+    json.map_err(|error| WriteError::Encode(error.to_string()))
+}
+
+/// Reads a description. Keys it does not know are kept in [`Metadata::other`].
+pub(super) fn from_json(path: &Path, json: &str) -> Result<Header, ReadError> {
+    let refuse = |reason: String| ReadError::Description { path: path.to_owned(), reason };
+    let header: Header = serde_json::from_str(json).map_err(|error| refuse(error.to_string()))?;
+    match header.rate_hz {
+        Some(rate_hz) if !(rate_hz.is_finite() && rate_hz > 0.0) => Err(refuse(format!("rate_hz is {rate_hz}, not above 0"))),
+        _ => Ok(header),
+    }
+}
+
+impl Header {
+    /// Holds the stated number of samples against the rows found.
+    pub(super) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
+        match self.samples {
+            Some(stated) if stated != found => Err(ReadError::Rows { path: path.to_owned(), found, stated }),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The native format: Parquet with the columns `time_ns`, `voltage_V` and `current_A`, and one JSON text under the
+//! key `trace` in the file's metadata.
+
+mod column;
+mod read;
+mod write;
+
+pub use read::read;
+pub use write::{save, write};

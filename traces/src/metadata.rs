@@ -1,0 +1,49 @@
+//! What a trace file says about itself beside its samples.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a [`Mark`] stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkKind {
+    /// The start of one frame.
+    FrameStart,
+    /// The end of the last frame.
+    End,
+    /// Anything else; the label says what.
+    Other,
+}
+
+/// A time somebody (or the simulator) pointed at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mark {
+    /// When, s.
+    pub time_s: f64,
+    /// What it stands for.
+    pub kind: MarkKind,
+    /// Free text.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub label: String,
+}
+
+/// Where a trace comes from. Every field may be left out; keys of other programs are kept in `other`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Metadata {
+    /// The instrument.
+    pub device: String,
+    /// What was drawn.
+    pub scene: String,
+    /// What it was drawn on.
+    pub platform: String,
+    /// Seed of the noise; 0 for a recording.
+    pub seed: u64,
+    /// Pixels per frame, for energies per pixel.
+    pub pixels: Option<u64>,
+    /// Marked times, in the order given.
+    pub marks: Vec<Mark>,
+    /// Everything else found in the file, by key.
+    #[serde(flatten)]
+    pub other: BTreeMap<String, serde_json::Value>,
+}

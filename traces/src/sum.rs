@@ -1,0 +1,81 @@
+//! Sums carried in two f64, so that differences of long running totals keep full precision.
+
+/// A running sum as an unevaluated pair `hi + lo` (double-double; two-sum: Knuth 1969, TAOCP vol. 2, 4.2.2;
+/// Dekker 1971 for the renormalization).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct PairSum {
+    hi: f64,
+    lo: f64,
+}
+
+/// The rounded sum and its exact rounding error.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_part = sum - a;
+    (sum, (a - (sum - b_part)) + (b - b_part))
+}
+
+impl PairSum {
+    /// Starts from one number.
+    pub(crate) fn from_f64(value: f64) -> Self {
+        Self { hi: value, lo: 0.0 }
+    }
+
+    /// This sum and one more number.
+    #[must_use]
+    pub(crate) fn plus(self, value: f64) -> Self {
+        let (sum, error) = two_sum(self.hi, value);
+        let tail = error + self.lo;
+        let hi = sum + tail;
+        Self { hi, lo: tail - (hi - sum) }
+    }
+
+    /// This sum and the exact product `a b`.
+    #[must_use]
+    pub(crate) fn plus_product(self, a: f64, b: f64) -> Self {
+        let product = a * b;
+        self.plus(product).plus(libm::fma(a, b, -product))
+    }
+
+    /// This sum and `(end - begin) x`, with the difference taken exactly.
+    #[must_use]
+    pub(crate) fn plus_span(self, begin: f64, end: f64, x: f64) -> Self {
+        let (width, error) = two_sum(end, -begin);
+        self.plus_product(width, x).plus(error * x)
+    }
+
+    /// `self - earlier`, rounded once at the end.
+    pub(crate) fn minus(self, earlier: Self) -> f64 {
+        let (difference, error) = two_sum(self.hi, -earlier.hi);
+        difference + (error + (self.lo - earlier.lo))
+    }
+
+    /// The sum, rounded to one f64.
+    pub(crate) fn value(self) -> f64 {
+        self.hi + self.lo
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_million_tenths_keep_the_last_one() {
+        let mut sum = PairSum::default();
+        for _ in 0..10_000_000 {
+            sum = sum.plus(0.1);
+        }
+        let before = sum;
+        assert_eq!(sum.plus(0.1).minus(before), 0.1);
+        // 0.1 as f64 is 0.1 + 5.55e-18; the sum is exactly 1e7 times that.
+        assert!((sum.value() - 1.0e6).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_product_keeps_the_bits_one_f64_loses() {
+        let x = 1.0 + f64::EPSILON;
+        let sum = PairSum::default().plus_product(x, x);
+        assert_eq!(sum.plus(-1.0).plus(-2.0 * f64::EPSILON).value(), f64::EPSILON * f64::EPSILON);
+    }
+}

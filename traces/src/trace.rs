@@ -1,0 +1,191 @@
+//! Voltage and current over time, recorded or synthetic alike.
+
+use crate::metadata::Metadata;
+use thiserror::Error;
+
+/// The largest |time| a trace may reach, s: its nanoseconds must fit an i64.
+pub const TIME_LIMIT_S: f64 = 9.0e9;
+/// The lowest and highest sample rate, Hz: above it, time stamps in whole nanoseconds could not be told apart.
+pub const RATE_LIMITS_HZ: [f64; 2] = [1e-6, 1e8];
+
+/// Why a [`Trace`] cannot be built. Rows count samples from 1.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum TraceError {
+    /// No samples.
+    #[error("the trace has no samples: record at least one")]
+    Empty,
+    /// The channels differ in length.
+    #[error("{voltages} voltages but {currents} currents: a sample needs one of each")]
+    Lengths {
+        /// Samples of voltage.
+        voltages: usize,
+        /// Samples of current.
+        currents: usize,
+    },
+    /// The sample rate is out of [`RATE_LIMITS_HZ`].
+    #[error("sample rate {rate_hz} Hz is not between 1e-6 and 1e8 Hz")]
+    Rate {
+        /// The rate, Hz.
+        rate_hz: f64,
+    },
+    /// Start or end is not finite or beyond [`TIME_LIMIT_S`].
+    #[error("the trace reaches {time_s} s: times must be finite and within 9e9 s of zero")]
+    Time {
+        /// The time, s.
+        time_s: f64,
+    },
+    /// A sample is not a finite number.
+    #[error("row {row}: {channel} is {value}, not a finite number; cut the stretch out or mend it")]
+    NotFinite {
+        /// Sample, from 1.
+        row: usize,
+        /// Column name.
+        channel: &'static str,
+        /// The value.
+        value: f32,
+    },
+}
+
+/// Evenly sampled voltage (V) and current (A).
+///
+/// Sample `i` begins at `start_s + i / rate_hz` (its **left edge**) and is the mean over the period that follows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    voltage_v: Vec<f32>,
+    current_a: Vec<f32>,
+    rate_hz: f64,
+    start_s: f64,
+    /// Where the trace comes from.
+    pub metadata: Metadata,
+}
+
+impl Trace {
+    /// A trace from its two channels, V and A, one value each per sample.
+    ///
+    /// # Errors
+    /// [`TraceError`]: empty, unequal lengths, rate or times out of range, or a value that is not finite.
+    pub fn new(
+        voltage_v: Vec<f32>,
+        current_a: Vec<f32>,
+        rate_hz: f64,
+        start_s: f64,
+        metadata: Metadata,
+    ) -> Result<Self, TraceError> {
+        if voltage_v.len() != current_a.len() {
+            return Err(TraceError::Lengths { voltages: voltage_v.len(), currents: current_a.len() });
+        }
+        if voltage_v.is_empty() {
+            return Err(TraceError::Empty);
+        }
+        if !(RATE_LIMITS_HZ[0]..=RATE_LIMITS_HZ[1]).contains(&rate_hz) {
+            return Err(TraceError::Rate { rate_hz });
+        }
+        for time_s in [start_s, start_s + voltage_v.len() as f64 / rate_hz] {
+            if !time_s.is_finite() || time_s.abs() > TIME_LIMIT_S {
+                return Err(TraceError::Time { time_s });
+            }
+        }
+        check_finite(&voltage_v, "voltage_V")?;
+        check_finite(&current_a, "current_A")?;
+        Ok(Self { voltage_v, current_a, rate_hz, start_s, metadata })
+    }
+
+    /// Number of samples; never 0.
+    pub fn samples(&self) -> usize {
+        self.voltage_v.len()
+    }
+
+    /// Voltage of each sample, V.
+    pub fn voltage_v(&self) -> &[f32] {
+        &self.voltage_v
+    }
+
+    /// Current of each sample, A.
+    pub fn current_a(&self) -> &[f32] {
+        &self.current_a
+    }
+
+    /// Samples per second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Duration of a sample, s.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+
+    /// Left edge of the first sample, s.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    /// Right edge of the last sample, s.
+    pub fn end_s(&self) -> f64 {
+        self.time_s(self.samples())
+    }
+
+    /// Left edge of sample `index`, s.
+    pub fn time_s(&self, index: usize) -> f64 {
+        self.start_s + index as f64 / self.rate_hz
+    }
+
+    /// Left edge of sample `index` to the nearest nanosecond, as trace files store it. Saturates beyond i64.
+    pub fn time_ns(&self, index: usize) -> i64 {
+        // A float-to-int cast saturates; the constructor keeps times within i64.
+        libm::round(self.start_s * 1e9 + index as f64 * 1e9 / self.rate_hz) as i64
+    }
+
+    /// Position of a time in samples, fractional, not limited to the trace.
+    pub fn position(&self, time_s: f64) -> f64 {
+        (time_s - self.start_s) * self.rate_hz
+    }
+
+    /// Power of sample `index`, W: `V I`. The product of two f32 is exact in f64.
+    ///
+    /// # Panics
+    /// If `index` is not below [`Trace::samples`].
+    pub fn power_w(&self, index: usize) -> f64 {
+        f64::from(self.voltage_v[index]) * f64::from(self.current_a[index])
+    }
+
+    /// Power of every sample, W, in order.
+    pub fn powers_w(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
+        self.voltage_v.iter().zip(&self.current_a).map(|(&v, &i)| f64::from(v) * f64::from(i))
+    }
+}
+
+fn check_finite(values: &[f32], channel: &'static str) -> Result<(), TraceError> {
+    match values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+        Some((index, &value)) => Err(TraceError::NotFinite { row: index + 1, channel, value }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn build(v: Vec<f32>, i: Vec<f32>, rate_hz: f64, start_s: f64) -> Result<Trace, TraceError> {
+        Trace::new(v, i, rate_hz, start_s, Metadata::default())
+    }
+
+    #[test]
+    fn times_are_left_edges_and_nanoseconds_are_exact_at_50_khz() {
+        let trace = build(vec![1.0; 4], vec![2.0; 4], 50e3, 0.25).unwrap();
+        assert_eq!((trace.time_ns(0), trace.time_ns(3)), (250_000_000, 250_060_000));
+        assert_eq!(trace.end_s(), 0.25 + 4.0 / 50e3);
+        assert_eq!(trace.power_w(3), 2.0);
+    }
+
+    #[test]
+    fn each_bad_trace_names_what_is_wrong() {
+        let message = |v: &[f32], i: &[f32], rate: f64, start: f64| build(v.to_vec(), i.to_vec(), rate, start).unwrap_err().to_string();
+        assert!(message(&[], &[], 1.0, 0.0).contains("no samples"));
+        assert!(message(&[1.0], &[], 1.0, 0.0).contains("1 voltages but 0 currents"));
+        assert!(message(&[1.0], &[1.0], -5.0, 0.0).contains("-5 Hz"));
+        assert!(message(&[1.0], &[1.0], f64::NAN, 0.0).contains("NaN Hz"));
+        assert!(message(&[1.0], &[1.0], 1.0, 1e10).contains("10000000000 s"));
+        assert!(message(&[1.0, 1.0], &[1.0, f32::NAN], 1.0, 0.0).contains("row 2: current_A is NaN"));
+    }
+}

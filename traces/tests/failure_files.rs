@@ -1,0 +1,199 @@
+//! Every way a file can be wrong gives one error that names the file, the place and the mend, and no panic.
+
+use ::parquet::basic::{Repetition, Type as Physical};
+use ::parquet::data_type::{DoubleType, FloatType, Int64Type};
+use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::writer::SerializedFileWriter;
+use ::parquet::schema::types::Type;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tempfile::TempDir;
+use traces::io::{ReadError, csv, parquet};
+use traces::{Mark, MarkKind, Metadata, Trace};
+
+fn in_folder(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, content).unwrap();
+    (folder, path)
+}
+
+fn csv_error(content: &str) -> ReadError {
+    let (_folder, path) = in_folder("bad.csv", content.as_bytes());
+    csv::read(&path).unwrap_err()
+}
+
+#[track_caller]
+fn says(error: &ReadError, parts: &[&str]) {
+    let message = error.to_string();
+    assert!(parts.iter().all(|part| message.contains(part)), "{message} should say {parts:?}");
+}
+
+#[test]
+fn csv_errors_name_file_row_and_column() {
+    let head = "time_s,voltage_V,current_A\n";
+    let with = |rows: &str| csv_error(&format!("{head}{rows}"));
+    says(&csv_error("time_s,voltage_V\n0,1\n"), &["bad.csv", "no column current_A", "time_s, voltage_V", "rename or add"]);
+    says(&csv_error("voltage_V,current_A\n0,1\n"), &["no column time_s"]);
+    says(&csv_error(""), &["bad.csv", "no column voltage_V (found: none)"]);
+    says(&csv_error("voltage_V,Voltage_v,current_A\n"), &["column voltage_V occurs twice"]);
+    says(&with(""), &["bad.csv", "no samples"]);
+    says(&with("0,1,2\n1,nan,2\n"), &["bad.csv: row 2: voltage_V is \"nan\""]);
+    says(&with("0,1,2\n1,1,1e99\n"), &["row 2: current_A is \"1e99\""]);
+    says(&with("0,1,2\n1,,2\n"), &["row 2: voltage_V is empty"]);
+    says(&with("0,1,2\nx,1,2\n"), &["row 2: time_s is \"x\""]);
+    says(&with("0,1,2\n1,1\n"), &["row 2: 2 fields instead of 3", "cut off"]);
+    says(&with("0,1,2\n1,1,2\n0.5,1,2\n"), &["row 3: time 0.5 s is not after 1 s", "sort"]);
+    says(&with("0,1,2\n1,1,2\n2,1,2\n7,1,2\n"), &["row 4: time 7 s", "off an even rate", "cut the trace there"]);
+    says(&with("0,1,2\n"), &["single row", "rate_hz"]);
+    says(&with("0,1,2\n1e-12,1,2\n"), &["bad.csv: sample rate 1000000000000 Hz"]);
+    assert!(matches!(with("0,1,2\n1e-12,1,2\n"), ReadError::Trace { .. }));
+}
+
+#[test]
+fn a_file_that_is_not_there_or_not_text() {
+    let error = csv::read(Path::new("/no/such/trace.csv")).unwrap_err();
+    says(&error, &["/no/such/trace.csv: cannot be read"]);
+    assert!(matches!(parquet::read(Path::new("/no/such/trace.parquet")), Err(ReadError::Io { .. })));
+    let (_folder, path) = in_folder("bad.csv", b"time_s,voltage_V,current_A\n0,\xff\xfe,1\n");
+    says(&csv::read(&path).unwrap_err(), &["row 1: voltage_V"]);
+    // A folder where a file should be: the CSV reader fails while reading.
+    let folder = tempfile::tempdir().unwrap();
+    assert!(matches!(csv::read(folder.path()), Err(ReadError::Damaged { .. } | ReadError::Io { .. })));
+}
+
+#[test]
+fn descriptions_are_held_against_the_rows() {
+    let (_folder, path) = in_folder("a.csv", b"time_s,voltage_V,current_A\n0,1,2\n1,1,2\n");
+    let describe = |json: &str| {
+        std::fs::write(csv::sidecar_path(&path), json).unwrap();
+        csv::read(&path).unwrap_err()
+    };
+    says(&describe("{"), &["a.json: the JSON description"]);
+    says(&describe(r#"{"rate_hz": -1}"#), &["a.json", "rate_hz is -1"]);
+    says(&describe(r#"{"samples": 3}"#), &["a.csv: 2 rows, but its description says 3", "cut off"]);
+    says(&describe(r#"{"rate_hz": 3.0}"#), &["a.csv: row 2", "3 Hz"]);
+}
+
+/// Writes a Parquet file of the given columns.
+enum Values {
+    Int(Vec<i64>),
+    Float(Vec<f32>),
+    /// Optional doubles: `None` is a null.
+    Maybe(Vec<Option<f64>>),
+}
+
+fn parquet_file(columns: Vec<(&str, Values)>) -> (TempDir, PathBuf) {
+    let field = |(name, values): &(&str, Values)| {
+        let (physical, repetition) = match values {
+            Values::Int(_) => (Physical::INT64, Repetition::REQUIRED),
+            Values::Float(_) => (Physical::FLOAT, Repetition::REQUIRED),
+            Values::Maybe(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
+        };
+        Arc::new(Type::primitive_type_builder(name, physical).with_repetition(repetition).build().unwrap())
+    };
+    let fields = columns.iter().map(field).collect();
+    let schema = Arc::new(Type::group_type_builder("t").with_fields(fields).build().unwrap());
+    let mut bytes = Vec::new();
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(WriterProperties::builder().build())).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    for (_, values) in &columns {
+        let mut column = group.next_column().unwrap().unwrap();
+        match values {
+            Values::Int(values) => column.typed::<Int64Type>().write_batch(values, None, None),
+            Values::Float(values) => column.typed::<FloatType>().write_batch(values, None, None),
+            Values::Maybe(values) => {
+                let present: Vec<f64> = values.iter().flatten().copied().collect();
+                let levels: Vec<i16> = values.iter().map(|value| i16::from(value.is_some())).collect();
+                column.typed::<DoubleType>().write_batch(&present, Some(&levels), None)
+            }
+        }
+        .unwrap();
+        column.close().unwrap();
+    }
+    group.close().unwrap();
+    writer.close().unwrap();
+    in_folder("bad.parquet", &bytes)
+}
+
+fn parquet_error(columns: Vec<(&str, Values)>) -> ReadError {
+    let (_folder, path) = parquet_file(columns);
+    parquet::read(&path).unwrap_err()
+}
+
+#[test]
+fn parquet_errors_name_file_row_and_column() {
+    use Values::{Float, Int, Maybe};
+    let ones = || Float(vec![1.0; 3]);
+    let times = || Int(vec![0, 1000, 2000]);
+    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", ones())]), &["bad.parquet", "no column current_A", "time_ns, voltage_V"]);
+    says(&parquet_error(vec![("voltage_V", ones()), ("current_A", ones())]), &["no column time_ns"]);
+    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", times()), ("current_A", ones())]), &["column voltage_V is INT64", "FLOAT"]);
+    says(&parquet_error(vec![("time_ns", ones()), ("voltage_V", ones()), ("current_A", ones())]), &["column time_ns is FLOAT", "INT64"]);
+    says(&parquet_error(vec![("VOLTAGE_v", ones()), ("voltage_V", ones()), ("current_A", ones())]), &["occurs twice"]);
+    let nan = Float(vec![1.0, f32::NAN, 1.0]);
+    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", nan), ("current_A", ones())]), &["row 2: voltage_V is NaN"]);
+    let null = Maybe(vec![Some(1.0), Some(1.0), None]);
+    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", null), ("current_A", ones())]), &["row 3: voltage_V is missing"]);
+    let gap = Int(vec![0, 1000, 9000]);
+    says(&parquet_error(vec![("time_ns", gap), ("voltage_V", ones()), ("current_A", ones())]), &["row 2", "off an even rate"]);
+    let empty = || Float(vec![]);
+    says(&parquet_error(vec![("time_ns", Int(vec![])), ("voltage_V", empty()), ("current_A", empty())]), &["no samples"]);
+}
+
+#[test]
+fn optional_doubles_and_any_letter_case_are_read() {
+    let column = |values: [f64; 3]| Values::Maybe(values.map(Some).to_vec());
+    let (_folder, path) = parquet_file(vec![
+        ("Current_a", column([1.0, 2.0, 3.0])),
+        ("TIME_S", column([0.5, 0.75, 1.0])),
+        ("voltage_v", column([4.0; 3])),
+    ]);
+    let trace = parquet::read(&path).unwrap();
+    assert_eq!((trace.rate_hz(), trace.start_s(), trace.current_a()), (4.0, 0.5, &[1.0, 2.0, 3.0][..]));
+}
+
+fn small() -> Vec<u8> {
+    let ramp: Vec<f32> = (0..2000_u16).map(|i| f32::from(i % 300)).collect();
+    let trace = Trace::new(ramp.clone(), ramp, 50e3, 0.0, Metadata::default()).unwrap();
+    let mut bytes = Vec::new();
+    parquet::write(&trace, &mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn a_truncated_parquet_file_is_an_error_wherever_it_is_cut() {
+    let whole = small();
+    for length in (0..whole.len()).step_by(7).chain([whole.len() - 1]) {
+        let (_folder, path) = in_folder("cut.parquet", &whole[..length]);
+        says(&parquet::read(&path).unwrap_err(), &["cut.parquet", "cut off or damaged", "copy or export it again"]);
+    }
+}
+
+#[test]
+fn a_parquet_file_with_any_byte_changed_gives_a_trace_or_an_error_but_no_panic() {
+    let whole = small();
+    let (_folder, path) = in_folder("flip.parquet", &whole);
+    let mut errors = 0;
+    for position in 0..whole.len() {
+        for flip in [0x01, 0x80, 0xff] {
+            let mut bytes = whole.clone();
+            bytes[position] ^= flip;
+            std::fs::write(&path, &bytes).unwrap();
+            errors += usize::from(parquet::read(&path).is_err());
+        }
+    }
+    assert!(errors > whole.len() / 10, "{errors} of {}", 3 * whole.len());
+}
+
+#[test]
+fn marks_that_are_no_times_are_not_written() {
+    let mark = Mark { time_s: f64::NAN, kind: MarkKind::End, label: String::new() };
+    let metadata = Metadata { marks: vec![mark], ..Metadata::default() };
+    let trace = Trace::new(vec![1.0], vec![1.0], 1.0, 0.0, metadata).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    let error = parquet::save(&trace, &path).unwrap_err();
+    assert!(error.to_string().contains("t.parquet: mark 0 is at NaN s"), "{error}");
+    assert!(!path.exists());
+}

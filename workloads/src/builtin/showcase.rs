@@ -1,0 +1,140 @@
+//! The default scene: what the tool is for, in one picture.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3, Vec3};
+
+use super::checker;
+use crate::error::LoadError;
+use crate::material::Material;
+use crate::scene::{
+    Graph, Local, Mesh, Motion, Node, Parts, Place, Rig, Scene, SceneCamera, Settings, Spin, Trs, rotation, tan_half,
+};
+use crate::shapes;
+
+/// Materials by name.
+struct Palette {
+    tiles: usize,
+    steel: usize,
+    brass: usize,
+    red: usize,
+    blue: usize,
+    green: usize,
+    cream: usize,
+    stripes: usize,
+}
+
+pub(super) fn scene() -> Result<Scene, LoadError> {
+    let mut parts = Parts::new("default");
+    let palette = palette(&mut parts.graph);
+    floor(&mut parts.graph, &palette);
+    gears(&mut parts.graph, &palette);
+    propeller(&mut parts.graph, &palette);
+    in_flight(&mut parts.graph, &palette);
+    foreground(&mut parts.graph, &palette);
+    background(&mut parts.graph, &palette);
+    parts.camera = SceneCamera {
+        rig: Rig::LookAt {
+            position: Place::fixed(DVec3::new(0.6, 2.3, 8.2)),
+            target: Place::fixed(DVec3::new(0.0, 1.15, 0.0)),
+            up: DVec3::Y,
+        },
+        tan_half_height: tan_half(38.0),
+        near: None,
+    };
+    parts.background = Vec3::new(0.50, 0.62, 0.76);
+    parts.settings = Settings { frames: 0..36, lens_radius: 0.11, ..Settings::default() };
+    Scene::new(parts)
+}
+
+fn palette(graph: &mut Graph) -> Palette {
+    let mut plain = |name: &str, r: f32, g: f32, b: f32| {
+        graph.push_material(Material::colored(name, Vec3::new(r, g, b)))
+    };
+    let [steel, brass] = [plain("steel", 0.42, 0.46, 0.50), plain("brass", 0.72, 0.47, 0.12)];
+    let [red, blue] = [plain("red", 0.70, 0.08, 0.05), plain("blue", 0.06, 0.20, 0.62)];
+    let [green, cream] = [plain("green", 0.08, 0.42, 0.16), plain("cream", 0.80, 0.72, 0.55)];
+    let mut textured = |name: &str, colors: [[u8; 3]; 2]| {
+        let texture = checker(256, colors).map(Arc::new);
+        graph.push_material(Material { texture, ..Material::colored(name, Vec3::ONE) })
+    };
+    let tiles = textured("tiles", [[226, 218, 200], [98, 116, 138]]);
+    let stripes = textured("ball", [[240, 232, 214], [214, 72, 44]]);
+    Palette { tiles, steel, brass, red, blue, green, cream, stripes }
+}
+
+fn place(graph: &mut Graph, name: &str, mesh: Mesh, at: [f64; 3], turn: DQuat, motion: Motion) {
+    let trs = Trs { translation: DVec3::from_array(at), rotation: turn, ..Trs::default() };
+    let node = graph.push_node(Node { motion, ..Node::new(name, None, Local::Trs(trs)) });
+    graph.hang(Mesh { name: name.to_owned(), ..mesh }, node);
+}
+
+fn spin(axis: DVec3, rate_hz: f64) -> Motion {
+    Motion { spin: Spin::new(axis, rate_hz), ..Motion::default() }
+}
+
+fn upright() -> DQuat {
+    rotation(DVec3::X, 0.25)
+}
+
+fn floor(graph: &mut Graph, palette: &Palette) {
+    let mesh = shapes::plane(60.0, 40, 30.0, palette.tiles);
+    place(graph, "floor", mesh, [0.0, 0.0, -14.0], DQuat::IDENTITY, Motion::default());
+}
+
+/// Two gears in mesh: 24 teeth against 16, so their rates are as 2 to 3 and opposite.
+fn gears(graph: &mut Graph, palette: &Palette) {
+    let large = shapes::gear(24, 1.2, 0.35, palette.brass);
+    place(graph, "large gear", large, [-1.15, 1.3, 0.0], DQuat::IDENTITY, spin(DVec3::Z, 2.0));
+    let small = shapes::gear(16, 0.8, 0.35, palette.steel);
+    let turn = rotation(DVec3::Z, 0.5 / 16.0);
+    place(graph, "small gear", small, [0.66, 1.3, 0.0], turn, spin(DVec3::Z, -3.0));
+}
+
+fn propeller(graph: &mut Graph, palette: &Palette) {
+    let blades = shapes::propeller(4, 0.95, palette.red);
+    let turn = rotation(DVec3::Y, 0.06);
+    place(graph, "propeller", blades, [2.45, 1.5, -0.3], turn, spin(DVec3::Z, 7.0));
+    let mast = shapes::cuboid(Vec3::new(0.12, 1.45, 0.12), palette.steel);
+    place(graph, "mast", mast, [2.40, 0.725, -0.45], DQuat::IDENTITY, Motion::default());
+}
+
+/// A ball that crosses the picture in the run, and rings that tumble.
+fn in_flight(graph: &mut Graph, palette: &Palette) {
+    let ball = shapes::sphere(0.42, 64, palette.stripes);
+    let flight = Motion { velocity: DVec3::new(9.0, 0.0, 0.0), spin: Spin::new(DVec3::Z, -3.4) };
+    place(graph, "ball", ball, [-3.6, 0.45, 1.3], DQuat::IDENTITY, flight);
+    let ring = shapes::torus(0.62, 0.17, 64, palette.green);
+    place(graph, "tumbling ring", ring, [-3.1, 2.5, -0.8], upright(), spin(DVec3::new(1.0, 0.4, 0.2), 2.5));
+    let ring = shapes::torus(0.45, 0.13, 64, palette.blue);
+    place(graph, "spinning ring", ring, [1.5, 2.75, -0.6], upright(), spin(DVec3::Z.cross(DVec3::X), 1.2));
+}
+
+/// Close to the camera and far out of focus.
+fn foreground(graph: &mut Graph, palette: &Palette) {
+    let ring = shapes::torus(0.40, 0.12, 64, palette.blue);
+    place(graph, "near ring", ring, [-1.15, 1.45, 5.3], rotation(DVec3::X, 0.20), Motion::default());
+    let ball = shapes::sphere(0.26, 48, palette.red);
+    place(graph, "near ball", ball, [1.65, 1.35, 5.2], DQuat::IDENTITY, Motion::default());
+    let block = shapes::cuboid(Vec3::splat(0.55), palette.cream);
+    place(graph, "near block", block, [1.9, 0.28, 3.6], rotation(DVec3::Y, 0.09), Motion::default());
+}
+
+/// Rows of balls and rings that go out of focus with their distance.
+fn background(graph: &mut Graph, palette: &Palette) {
+    let colors = [palette.blue, palette.cream, palette.green, palette.brass, palette.red];
+    for row in 0..3_u32 {
+        for column in 0..5_u32 {
+            let color = colors[((row * 2 + column) % 5) as usize];
+            let across = (f64::from(column) - 2.0) * (3.0 + 0.9 * f64::from(row));
+            let back = -5.0 - 5.0 * f64::from(row);
+            if (row + column) % 2 == 0 {
+                let mesh = shapes::sphere(0.8, 32, color);
+                place(graph, "far ball", mesh, [across, 0.8, back], DQuat::IDENTITY, Motion::default());
+            } else {
+                let mesh = shapes::torus(0.75, 0.25, 32, color);
+                place(graph, "far ring", mesh, [across, 1.0, back], upright(), Motion::default());
+            }
+        }
+    }
+}

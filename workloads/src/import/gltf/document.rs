@@ -1,0 +1,102 @@
+//! The file itself: its JSON, checked, and its buffers.
+
+use gltf::json::validation::{Error, Validate};
+use gltf::json::{Path as JsonPath, Root, mesh::Semantic, validation::Checked};
+
+use super::buffers;
+use crate::error::{LoadError, Source};
+
+/// A glTF file: indices in the JSON are in range, buffers are there. Accessors are checked when read.
+pub(super) struct Document<'a> {
+    pub source: Source<'a>,
+    pub root: Root,
+    pub buffers: Vec<Vec<u8>>,
+}
+
+impl<'a> Document<'a> {
+    pub fn read(source: Source<'a>) -> Result<Self, LoadError> {
+        let bytes = source.read()?;
+        let (json, binary) = if bytes.starts_with(b"glTF") { split(source, &bytes)? } else { (&bytes[..], None) };
+        let root = Root::from_slice(json)
+            .map_err(|error| source.broken("JSON", format!("not a glTF 2.0 file: {error}; export it again")))?;
+        check_positions(source, &root)?;
+        validate(source, &root)?;
+        let buffers = buffers::load(source, &root, binary)?;
+        Ok(Self { source, root, buffers })
+    }
+}
+
+/// JSON and binary chunk of a `.glb` (glTF 2.0, section 4).
+fn split<'b>(source: Source, bytes: &'b [u8]) -> Result<(&'b [u8], Option<&'b [u8]>), LoadError> {
+    let word = |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
+    let truncated = |what: &str, needed: usize| {
+        let message = format!("truncated: {needed} bytes are needed, there are {}: get the file again", bytes.len());
+        source.broken(what, message)
+    };
+    let (Some(version), Some(length)) = (word(4), word(8)) else { return Err(truncated("GLB header", 12)) };
+    if version != 2 {
+        return Err(source.broken("GLB header", format!("version {version}; only version 2 is supported")));
+    }
+    if (length as usize) > bytes.len() {
+        return Err(truncated("GLB header", length as usize));
+    }
+    let chunk = |at: usize, kind: &[u8; 4], what: &str| {
+        let Some(length) = word(at) else { return Err(truncated(what, at + 8)) };
+        let (start, end) = (at + 8, (at + 8).saturating_add(length as usize));
+        match (bytes.get(at + 4..at + 8), bytes.get(start..end)) {
+            (Some(found), Some(body)) if found == kind => Ok((body, end)),
+            (Some(found), Some(_)) if found != kind => {
+                Err(source.broken(what, format!("a chunk of type {found:?} where {kind:?} is due")))
+            }
+            _ => Err(truncated(what, end)),
+        }
+    };
+    let (json, end) = chunk(12, b"JSON", "GLB chunk 0")?;
+    let binary = if end + 8 <= bytes.len() { Some(chunk(end, b"BIN\0", "GLB chunk 1")?.0) } else { None };
+    Ok((json, binary))
+}
+
+/// The crate's own check indexes accessors with these before it has checked them.
+fn check_positions(source: Source, root: &Root) -> Result<(), LoadError> {
+    for (mesh, of_mesh) in root.meshes.iter().enumerate() {
+        for (primitive, of_primitive) in of_mesh.primitives.iter().enumerate() {
+            let accessor = of_primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            if accessor.is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
+                let message = format!("index out of range: there are {} accessors: export it again", root.accessors.len());
+                return Err(source.broken(format!("meshes[{mesh}].primitives[{primitive}].attributes.POSITION"), message));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn validate(source: Source, root: &Root) -> Result<(), LoadError> {
+    let mut first = None;
+    root.validate(root, JsonPath::new, &mut |path, error| {
+        let path = path();
+        if first.is_none() && !is_harmless(path.as_str(), error) {
+            first = Some((path.as_str().to_owned(), error));
+        }
+    });
+    let Some((place, error)) = first else { return Ok(()) };
+    let message = match error {
+        Error::IndexOutOfBounds => "index out of range: export it again".to_owned(),
+        Error::Missing => "this is required and missing: export it again".to_owned(),
+        Error::Unsupported => {
+            format!("a required extension is not supported; supported are {}: export it without", supported())
+        }
+        Error::Invalid | Error::Oversize => format!("{error}: export it again"),
+    };
+    Err(source.broken(place, message))
+}
+
+fn supported() -> String {
+    gltf::json::extensions::ENABLED_EXTENSIONS.join(", ")
+}
+
+/// Bounds of positions are not used, and a texture without an image that we know is a missing image.
+fn is_harmless(path: &str, error: Error) -> bool {
+    let bounds = path.contains("POSITION") && (path.ends_with("min") || path.ends_with("max"));
+    let source = path.starts_with("textures[") && path.ends_with("].source") && error == Error::Missing;
+    bounds || source
+}

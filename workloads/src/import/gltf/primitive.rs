@@ -1,0 +1,226 @@
+//! One primitive of a mesh: its vertices, triangles, morph targets and joints.
+
+use activity::Warning;
+use glam::{Vec2, Vec3};
+use gltf::json::accessor::Type;
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+use super::accessor::Values;
+use super::document::Document;
+use crate::error::LoadError;
+use crate::material::Material;
+use crate::scene::{Influences, Mesh, Normals, Target};
+
+/// Where errors about a primitive point.
+struct Reading<'d, 'a> {
+    document: &'d Document<'a>,
+    primitive: &'d Primitive,
+    place: String,
+}
+
+/// Reads a primitive; nothing for points and lines.
+pub(super) fn read(
+    document: &Document,
+    [mesh, index]: [usize; 2],
+    materials: &mut Vec<Material>,
+    warnings: &mut Vec<Warning>,
+) -> Result<Option<Mesh>, LoadError> {
+    let described = &document.root.meshes[mesh];
+    let primitive = &described.primitives[index];
+    let place = format!("meshes[{mesh}].primitives[{index}]");
+    let reading = Reading { document, primitive, place };
+    if reading.dropped(warnings) {
+        return Ok(None);
+    }
+    let Some(positions) = reading.attribute(Semantic::Positions, &[Type::Vec3])? else {
+        let message = format!("{} has no positions and is not drawn", reading.place);
+        warnings.push(Warning::new("primitive-dropped", message));
+        return Ok(None);
+    };
+    let positions: Vec<Vec3> = positions.vectors().map(Vec3::from_array).collect();
+    let triangles = reading.triangles(positions.len())?;
+    let name = described.name.clone().unwrap_or_else(|| format!("mesh {mesh}"));
+    let count = positions.len();
+    let material = primitive.material.map_or(document.root.materials.len(), |material| material.value());
+    let made = Mesh::new(name, positions, triangles, material);
+    let mut made = made.map_err(|what| reading.broken(&what))?;
+    made.normals = reading.normals(count)?;
+    reading.texture_coordinates(&mut made, materials, warnings)?;
+    made.targets = reading.targets(count)?;
+    made.weights = described.weights.iter().flatten().map(|weight| f64::from(*weight)).collect();
+    made.influences = reading.influences(count)?;
+    Ok(Some(made))
+}
+
+impl Reading<'_, '_> {
+    fn broken(&self, what: &str) -> LoadError {
+        self.document.source.broken(self.place.clone(), format!("{what}: export it again"))
+    }
+
+    fn mode(&self) -> Mode {
+        match self.primitive.mode {
+            Checked::Valid(mode) => mode,
+            Checked::Invalid => Mode::Triangles,
+        }
+    }
+
+    fn dropped(&self, warnings: &mut Vec<Warning>) -> bool {
+        let surface = matches!(self.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan);
+        if !surface {
+            let message = format!("{} is made of points or lines and is not drawn", self.place);
+            warnings.push(Warning::new("primitive-dropped", message));
+        }
+        let colors = self.primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(0)));
+        if surface && colors {
+            let message = format!("{}: vertex colours are not used; the material's colour is", self.place);
+            warnings.push(Warning::new("vertex-colors-ignored", message));
+        }
+        !surface
+    }
+
+    fn accessor(&self, index: usize, kinds: &[Type], what: &str) -> Result<Values, LoadError> {
+        self.document.values(index, kinds, &format!("{} {what}", self.place))
+    }
+
+    fn attribute(&self, semantic: Semantic, kinds: &[Type]) -> Result<Option<Values>, LoadError> {
+        let what = format!("{semantic:?}");
+        let accessor = self.primitive.attributes.get(&Checked::Valid(semantic));
+        accessor.map(|accessor| self.accessor(accessor.value(), kinds, &what)).transpose()
+    }
+
+    /// `values` as vectors, one for each of `count` vertices, all finite.
+    fn vectors<const N: usize>(&self, values: &Values, count: usize, what: &str) -> Result<Vec<[f32; N]>, LoadError> {
+        let vectors: Vec<[f32; N]> = values.vectors().collect();
+        if vectors.len() != count {
+            return Err(self.broken(&format!("{} {what} for {count} vertices", vectors.len())));
+        }
+        match vectors.iter().position(|vector| vector.iter().any(|part| !part.is_finite())) {
+            Some(vertex) => Err(self.broken(&format!("{what} of vertex {vertex} is NaN or infinite"))),
+            None => Ok(vectors),
+        }
+    }
+
+    /// Vertex indices of triangles; strips and fans unrolled (glTF 2.0, 3.7.2.1).
+    fn triangles(&self, vertices: usize) -> Result<Vec<[u32; 3]>, LoadError> {
+        let indices: Vec<u32> = match self.primitive.indices {
+            Some(accessor) => {
+                let values = self.accessor(accessor.value(), &[Type::Scalar], "indices")?;
+                values.numbers.iter().map(|index| *index as u32).collect()
+            }
+            None => (0..vertices as u32).collect(),
+        };
+        Ok(match self.mode() {
+            Mode::TriangleStrip => strip(&indices),
+            Mode::TriangleFan => fan(&indices),
+            _ => indices.chunks_exact(3).map(|corner| [corner[0], corner[1], corner[2]]).collect(),
+        })
+    }
+
+    fn normals(&self, count: usize) -> Result<Normals, LoadError> {
+        let Some(values) = self.attribute(Semantic::Normals, &[Type::Vec3])? else { return Ok(Normals::Flat) };
+        let normals = self.vectors(&values, count, "normal")?;
+        Ok(Normals::Given(normals.into_iter().map(Vec3::from_array).collect()))
+    }
+
+    fn texture_coordinates(
+        &self,
+        mesh: &mut Mesh,
+        materials: &mut Vec<Material>,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(), LoadError> {
+        if materials.get(mesh.material).is_none_or(|material| material.texture.is_none()) {
+            return Ok(());
+        }
+        let described = &self.document.root.materials[mesh.material];
+        let Some(info) = &described.pbr_metallic_roughness.base_color_texture else { return Ok(()) };
+        let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+        let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
+        let Some(values) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
+            let message = format!("{} has no texture coordinates {set}: its base colour is used alone", self.place);
+            warnings.push(Warning::new("missing-texcoord", message));
+            materials.push(Material { texture: None, ..materials[mesh.material].clone() });
+            mesh.material = materials.len() - 1;
+            return Ok(());
+        };
+        let uvs = self.vectors(&values, mesh.positions.len(), "texture coordinate")?;
+        let placed = |uv: [f32; 2]| transform.map_or(Vec2::from_array(uv), |transform| place(uv, transform));
+        mesh.uvs = uvs.into_iter().map(placed).collect();
+        Ok(())
+    }
+
+    fn targets(&self, count: usize) -> Result<Vec<Target>, LoadError> {
+        let mut targets = Vec::new();
+        for (index, target) in self.primitive.targets.iter().flatten().enumerate() {
+            let read = |accessor: Option<gltf::json::Index<_>>, what: &str| -> Result<Vec<Vec3>, LoadError> {
+                let Some(accessor) = accessor else { return Ok(Vec::new()) };
+                let what = format!("{what} of target {index}");
+                let values = self.accessor(accessor.value(), &[Type::Vec3], &what)?;
+                Ok(self.vectors(&values, count, &what)?.into_iter().map(Vec3::from_array).collect())
+            };
+            targets.push(Target { positions: read(target.positions, "position")?, normals: read(target.normals, "normal")? });
+        }
+        Ok(targets)
+    }
+
+    /// Joints and weights of all sets together, weights made to add up to one.
+    fn influences(&self, count: usize) -> Result<Option<Influences>, LoadError> {
+        let mut sets: Vec<(Vec<[f32; 4]>, Vec<[f32; 4]>)> = Vec::new();
+        for set in 0.. {
+            let joints = self.attribute(Semantic::Joints(set), &[Type::Vec4])?;
+            let weights = self.attribute(Semantic::Weights(set), &[Type::Vec4])?;
+            let (Some(joints), Some(weights)) = (joints, weights) else { break };
+            sets.push((self.vectors(&joints, count, "joint")?, self.vectors(&weights, count, "weight")?));
+        }
+        if sets.is_empty() {
+            return Ok(None);
+        }
+        let mut influences = Influences { per_vertex: 4 * sets.len(), ..Influences::default() };
+        for vertex in 0..count {
+            let sum: f32 = sets.iter().flat_map(|(_, weights)| weights[vertex]).sum();
+            let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+            for (joints, weights) in &sets {
+                influences.joints.extend(joints[vertex].map(|joint| joint as u16));
+                influences.weights.extend(weights[vertex].map(|weight| weight * scale));
+            }
+            // A vertex that nothing carries follows the first joint instead of falling to the origin.
+            if sum <= 0.0 {
+                influences.weights[vertex * 4 * sets.len()] = 1.0;
+            }
+        }
+        Ok(Some(influences))
+    }
+}
+
+fn strip(indices: &[u32]) -> Vec<[u32; 3]> {
+    let turned = |(at, corner): (usize, &[u32])| {
+        if at % 2 == 0 { [corner[0], corner[1], corner[2]] } else { [corner[0], corner[2], corner[1]] }
+    };
+    indices.windows(3).enumerate().map(turned).collect()
+}
+
+fn fan(indices: &[u32]) -> Vec<[u32; 3]> {
+    let [first, rest @ ..] = indices else { return Vec::new() };
+    rest.windows(2).map(|pair| [pair[0], pair[1], *first]).collect()
+}
+
+/// KHR_texture_transform: scale, then rotate, then offset.
+fn place(uv: [f32; 2], transform: &gltf::json::extensions::texture::TextureTransform) -> Vec2 {
+    let angle = f64::from(transform.rotation.0);
+    let (sin, cos) = (libm::sin(angle) as f32, libm::cos(angle) as f32);
+    let scaled = Vec2::from_array(uv) * Vec2::from_array(transform.scale.0);
+    let turned = Vec2::new(cos * scaled.x + sin * scaled.y, cos * scaled.y - sin * scaled.x);
+    turned + Vec2::from_array(transform.offset.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_keep_their_facing_and_fans_their_centre() {
+        assert_eq!(strip(&[0, 1, 2, 3]), [[0, 1, 2], [1, 3, 2]]);
+        assert_eq!(fan(&[0, 1, 2, 3]), [[1, 2, 0], [2, 3, 0]]);
+        assert!(strip(&[0, 1]).is_empty() && fan(&[]).is_empty());
+    }
+}

@@ -1,0 +1,81 @@
+//! The file's camera and light.
+
+use activity::Warning;
+use glam::{DVec3, Vec3};
+use gltf::json::camera::Type as CameraType;
+use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
+use gltf::json::validation::Checked;
+
+use super::document::Document;
+use super::nodes::Tree;
+use crate::scene::{Instant, Light, Rig, SceneCamera, world_poses};
+
+/// The first perspective camera and the first directional light of the default scene, or what stands in.
+pub(super) fn view(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> (SceneCamera, Light) {
+    (camera(document, tree, warnings), light(document, tree, warnings))
+}
+
+fn camera(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> SceneCamera {
+    let root = &document.root;
+    for (index, node) in root.nodes.iter().enumerate() {
+        let Some(camera) = node.camera.and_then(|camera| root.cameras.get(camera.value())) else { continue };
+        if !tree.in_scene[index] {
+            continue;
+        }
+        match (&camera.type_, &camera.perspective) {
+            (Checked::Valid(CameraType::Perspective), Some(lens))
+                if lens.yfov > 0.0 && lens.yfov < 3.1 && lens.znear > 0.0 =>
+            {
+                return SceneCamera {
+                    rig: Rig::Node(tree.place[index]),
+                    tan_half_height: libm::tan(f64::from(lens.yfov) / 2.0),
+                    near: Some(f64::from(lens.znear)),
+                };
+            }
+            (Checked::Valid(CameraType::Orthographic), _) => {
+                let message = format!("the camera at node {index} is orthographic, which is not supported: another one is used");
+                warnings.push(Warning::new("camera-ignored", message));
+            }
+            _ => {
+                let message = format!("the camera at node {index} has no usable field of view or near plane: another one is used");
+                warnings.push(Warning::new("camera-ignored", message));
+            }
+        }
+    }
+    SceneCamera::default()
+}
+
+fn light(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Light {
+    let root = &document.root;
+    let lights = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
+    let lights = lights.map_or(&[][..], |lights| &lights.lights);
+    let worlds = world_poses(&tree.nodes, Instant { open_s: 0.0, offset_s: 0.0 });
+    let mut found = None;
+    for (index, node) in root.nodes.iter().enumerate() {
+        let hung = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
+        let Some(light) = hung.and_then(|hung| lights.get(hung.light.value())) else { continue };
+        if !tree.in_scene[index] {
+            continue;
+        }
+        // A directional light shines along its node's -z (KHR_lights_punctual).
+        let toward = worlds[tree.place[index]].matrix3.z_axis;
+        let directional = matches!(light.type_, Checked::Valid(LightType::Directional));
+        if directional && found.is_none() && toward.length() > 0.0 && toward.is_finite() {
+            found = Some((toward, light.color));
+        } else {
+            let message = format!("the light at node {index} is not used: one directional light is");
+            warnings.push(Warning::new("light-ignored", message));
+        }
+    }
+    found.map_or_else(Light::default, |(toward, color)| lamp(toward, color))
+}
+
+/// The lamp keeps the file's direction and hue, but not its intensity: there is no exposure to go with it.
+fn lamp(toward: DVec3, color: [f32; 3]) -> Light {
+    let plain = Light::default();
+    let hue = Vec3::from_array(color.map(|part| if part.is_finite() { part.clamp(0.0, 1.0) } else { 1.0 }));
+    let brightest = hue.max_element();
+    let hue = if brightest > 0.0 { hue * (1.0 / brightest) } else { Vec3::ONE };
+    let toward = toward * (1.0 / toward.length());
+    Light { toward: Some(toward.as_vec3()), color: hue * plain.color.max_element(), ..plain }
+}

@@ -1,0 +1,151 @@
+//! PLY files: vertices with optional normals and texture coordinates, and faces of any number of corners.
+
+use std::path::Path;
+
+use activity::Warning;
+use glam::{Vec2, Vec3};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+
+use super::reader;
+use super::soup::Soup;
+use crate::error::{LoadError, Source};
+
+/// Most elements of one kind: a header that asks for more is broken.
+const MOST: usize = 100_000_000;
+
+#[derive(Default)]
+struct Vertex {
+    position: Vec3,
+    normal: Vec3,
+    uv: Vec2,
+}
+
+#[derive(Default)]
+struct Face {
+    corners: Option<Vec<u32>>,
+}
+
+/// An element that is read past.
+struct Skipped;
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let slot = match name {
+            "x" => &mut self.position.x,
+            "y" => &mut self.position.y,
+            "z" => &mut self.position.z,
+            "nx" => &mut self.normal.x,
+            "ny" => &mut self.normal.y,
+            "nz" => &mut self.normal.z,
+            "s" | "u" | "texture_u" => &mut self.uv.x,
+            "t" | "v" | "texture_v" => &mut self.uv.y,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        match property.to_f32_lossy() {
+            Some(value) => {
+                *slot = value;
+                PropertyAccessResult::Set
+            }
+            None => PropertyAccessResult::UnsupportedType,
+        }
+    }
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !is_corners(name) {
+            return PropertyAccessResult::Ignored;
+        }
+        self.corners = property.to_u32_list();
+        if self.corners.is_some() { PropertyAccessResult::Set } else { PropertyAccessResult::UnsupportedType }
+    }
+}
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}
+
+fn is_corners(name: &str) -> bool {
+    matches!(name, "vertex_indices" | "vertex_index")
+}
+
+/// Reads the PLY file at `path`, gzipped or not.
+pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
+    let source = Source { path };
+    let mut input = Reader::new(reader::open(path)?);
+    let header = Parser::<Skipped>::new().read_header(&mut input);
+    let header = header.map_err(|error| source.broken("header", format!("not a PLY file: {error}")))?;
+    check(&header).map_err(|message| source.broken("header", message))?;
+    let mut soup = Soup::default();
+    for element in header.elements.values() {
+        let damaged = |error: ply_rs_bw::parser::ParseError| {
+            let place = format!("element {}", element.name);
+            source.broken(place, format!("{error}; the file may be truncated: get it again"))
+        };
+        match element.name.as_str() {
+            "vertex" => {
+                let read = Parser::<Vertex>::new().read_payload_for_element(&mut input, element, &header);
+                take_vertices(&mut soup, element, read.map_err(damaged)?);
+            }
+            "face" => {
+                let read = Parser::<Face>::new().read_payload_for_element(&mut input, element, &header);
+                read.map_err(damaged)?.iter().for_each(|face| soup.polygon(face.corners.as_deref().unwrap_or(&[])));
+            }
+            _ => {
+                let read = Parser::<Skipped>::new().read_payload_for_element(&mut input, element, &header);
+                read.map_err(damaged)?;
+            }
+        }
+    }
+    Ok(soup)
+}
+
+fn take_vertices(soup: &mut Soup, element: &ElementDef, vertices: Vec<Vertex>) {
+    let has = |names: &[&str]| names.iter().any(|name| element.properties.contains_key(*name));
+    soup.positions = vertices.iter().map(|vertex| vertex.position).collect();
+    if has(&["nx"]) && has(&["ny"]) && has(&["nz"]) {
+        soup.normals = vertices.iter().map(|vertex| vertex.normal).collect();
+    }
+    if has(&["s", "u", "texture_u"]) && has(&["t", "v", "texture_v"]) {
+        // PLY and OBJ count v upwards from the last row.
+        soup.uvs = vertices.iter().map(|vertex| Vec2::new(vertex.uv.x, 1.0 - vertex.uv.y)).collect();
+    }
+    if has(&["red"]) {
+        let message = "vertex colours are not used; the material's colour is";
+        soup.warnings.push(Warning::new("vertex-colors-ignored", message));
+    }
+}
+
+fn check(header: &Header) -> Result<(), String> {
+    let element = |name: &str| {
+        let missing = || format!("it has no element `{name}`: the file holds no triangles");
+        header.elements.get(name).ok_or_else(missing)
+    };
+    let vertex = element("vertex")?;
+    if let Some(missing) = ["x", "y", "z"].iter().find(|name| !vertex.properties.contains_key(**name)) {
+        return Err(format!("its vertices have no property `{missing}`"));
+    }
+    if !element("face")?.properties.values().any(|property| is_corners(&property.name)) {
+        return Err("its faces have no property `vertex_indices`".to_owned());
+    }
+    for element in header.elements.values() {
+        if element.count > MOST {
+            return Err(format!("{} {} elements; up to {MOST} are taken", element.count, element.name));
+        }
+        if element.properties.values().next().is_none() && element.count > 0 {
+            return Err(format!("element `{}` has no properties", element.name));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,158 @@
+//! RON scene files: what is in them ([`spec`]), and scenes made from that.
+
+mod bounded;
+mod object;
+mod spec;
+
+use std::path::Path;
+
+use activity::Warning;
+use glam::{DVec3, Vec3};
+
+use crate::error::{LoadError, Source};
+use crate::scene::{Light, Parts, Place, Rig, SceneCamera, Settings, Track, tan_half};
+use spec::{CameraSpec, LightSpec, SceneSpec, SettingsSpec};
+
+/// Reads the scene at `path`.
+pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
+    let spec: SceneSpec = activity::spec::load(path)?;
+    build(spec, path)
+}
+
+/// A scene file being turned into a scene.
+#[derive(Clone, Copy)]
+struct Context<'a> {
+    path: &'a Path,
+}
+
+impl Context<'_> {
+    fn wrong(self, place: impl Into<String>, message: impl Into<String>) -> LoadError {
+        let file = self.path.display().to_string();
+        LoadError::Description { file, place: place.into(), message: message.into() }
+    }
+
+    /// A file named in the scene, relative to it.
+    fn beside(self, name: &str) -> std::path::PathBuf {
+        self.path.parent().map_or_else(|| Path::new(name).to_path_buf(), |folder| folder.join(name))
+    }
+}
+
+fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
+    let context = Context { path };
+    let mut parts = Parts::new(spec.name.unwrap_or_else(|| path.display().to_string()));
+    parts.settings = settings(&spec.settings);
+    // The settings are checked with the scene, but an object's default timing needs a rate that makes sense.
+    parts.settings.check().map_err(|error| context.wrong("settings", error.to_string()))?;
+    if let Some(background) = spec.background {
+        parts.background = color(context, "background", background)?;
+    }
+    if let Some(light) = &spec.light {
+        parts.light = lamp(context, light)?;
+    }
+    if spec.objects.is_empty() {
+        return Err(context.wrong("objects", "there are none: add a `file` or a `shape`"));
+    }
+    for (index, object) in spec.objects.iter().enumerate() {
+        object::add(context, &mut parts, index, object)?;
+    }
+    if let Some(camera) = &spec.camera {
+        parts.camera = looking(context, camera, &parts.settings)?;
+    }
+    if parts.camera.rig == Rig::Fitted && parts.settings.focus.is_some() {
+        let message = "`focus` is a depth from a camera that is placed by itself: give the scene a `camera` to be sure of it";
+        parts.warnings.push(Warning::new("focus-of-fitted-camera", message));
+    }
+    Ok(parts)
+}
+
+fn settings(spec: &SettingsSpec) -> Settings {
+    let plain = Settings::default();
+    let (start, end) = spec.frames.unwrap_or((0, 12));
+    Settings {
+        width: spec.width.unwrap_or(plain.width),
+        height: spec.height.unwrap_or(plain.height),
+        samples: spec.samples.unwrap_or(plain.samples),
+        frame_rate_hz: spec.frame_rate_hz.unwrap_or(plain.frame_rate_hz),
+        shutter: spec.shutter.unwrap_or(plain.shutter),
+        frames: start..end,
+        lens_radius: spec.lens_radius.unwrap_or(plain.lens_radius),
+        focus: spec.focus,
+    }
+}
+
+/// A linear RGB value that is finite and not below zero.
+fn color(context: Context, place: &str, value: [f32; 3]) -> Result<Vec3, LoadError> {
+    let usable = value.iter().all(|part| part.is_finite() && *part >= 0.0);
+    let message = "a colour is linear RGB: three finite numbers from zero upwards";
+    if usable { Ok(Vec3::from_array(value)) } else { Err(context.wrong(place, message)) }
+}
+
+/// Three finite numbers.
+fn vector(context: Context, place: &str, value: [f64; 3]) -> Result<DVec3, LoadError> {
+    let value = DVec3::from_array(value);
+    if value.is_finite() { Ok(value) } else { Err(context.wrong(place, "it has a value that is NaN or infinite")) }
+}
+
+fn lamp(context: Context, spec: &LightSpec) -> Result<Light, LoadError> {
+    let plain = Light::default();
+    let shade = |place: &str, value: Option<[f32; 3]>, otherwise: Vec3| {
+        value.map_or(Ok(otherwise), |value| color(context, place, value))
+    };
+    let toward = match spec.toward {
+        Some(toward) => {
+            let toward = vector(context, "light.toward", toward)?;
+            let length = toward.length();
+            if !(length.is_finite() && length > 0.0) {
+                return Err(context.wrong("light.toward", "it has no length: point it from the scene to the lamp"));
+            }
+            Some((toward / length).as_vec3())
+        }
+        None => None,
+    };
+    Ok(Light {
+        toward,
+        color: shade("light.color", spec.color, plain.color)?,
+        sky: shade("light.sky", spec.sky, plain.sky)?,
+        ground: shade("light.ground", spec.ground, plain.ground)?,
+    })
+}
+
+fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<SceneCamera, LoadError> {
+    let position = vector(context, "camera.position", spec.position)?;
+    let target = vector(context, "camera.target", spec.target)?;
+    if position == target {
+        return Err(context.wrong("camera", "position and target coincide: move one of them"));
+    }
+    let up = vector(context, "camera.up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?;
+    let end_s = f64::from(settings.frames.end) / settings.frame_rate_hz;
+    let path = |place: &str, rest: DVec3, end: Option<[f64; 3]>, key: fn(&spec::CameraKey) -> Option<[f64; 3]>| {
+        let track = match (end, spec.keyframes.is_empty()) {
+            (Some(_), false) => return Err(context.wrong(place, "give an end or `keyframes`, not both")),
+            (Some(end), true) => Some((vec![0.0, end_s], vec![rest, vector(context, place, end)?])),
+            (None, true) => None,
+            (None, false) => Some((
+                spec.keyframes.iter().map(|key| key.time_s).collect(),
+                spec.keyframes.iter().map(|one| key(one).map_or(rest, DVec3::from_array)).collect(),
+            )),
+        };
+        let track = track.map(|(times, points): (Vec<f64>, Vec<DVec3>)| {
+            let numbers = points.iter().flat_map(|point| point.to_array()).collect();
+            Track::new(times, numbers, 3, spec.interpolation.into()).map_err(|what| context.wrong(place, what))
+        });
+        Ok(Place { rest, track: track.transpose()? })
+    };
+    Ok(SceneCamera {
+        rig: Rig::LookAt {
+            position: path("camera.end_position", position, spec.end_position, |key| key.position)?,
+            target: path("camera.end_target", target, spec.end_target, |key| key.target)?,
+            up,
+        },
+        tan_half_height: tan_half(spec.fov_deg.unwrap_or(crate::scene::DEFAULT_FOV_DEG)),
+        near: spec.near,
+    })
+}
+
+/// Errors in a file that a scene names point at that file.
+fn broken(path: &Path, place: &str, message: String) -> LoadError {
+    Source { path }.broken(place, message)
+}

@@ -1,0 +1,243 @@
+//! Objects of a RON scene.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use activity::Warning;
+use glam::{DQuat, DVec3, Vec3};
+use pipeline::{Wrap, linear_to_srgb8};
+
+use super::spec::{MaterialSpec, ObjectSpec, ShapeSpec, TextureSpec};
+use super::{Context, broken, color, vector};
+use crate::builtin::checker;
+use crate::error::LoadError;
+use crate::import::{Format, gltf, image, soup};
+use crate::material::Material;
+use crate::scene::{Local, Mesh, Node, Parts, Spin, Target, Track, Trs, rotation};
+use crate::shapes;
+
+/// Adds `object`, number `index` of the file, to `parts`.
+pub(super) fn add(
+    context: Context,
+    parts: &mut Parts,
+    index: usize,
+    object: &ObjectSpec,
+) -> Result<(), LoadError> {
+    let place = object.name.as_ref().map_or_else(|| format!("objects[{index}]"), |name| format!("object `{name}`"));
+    let node = node(context, &place, object)?;
+    let node = parts.graph.push_node(node);
+    match (&object.file, &object.shape) {
+        (Some(file), None) => add_file(context, parts, &place, object, (file, node)),
+        (None, Some(shape)) => {
+            if object.end.is_some() || object.clip.is_some() {
+                return Err(context.wrong(place, "`end` and `clip` go with a `file`, not with a `shape`"));
+            }
+            let material = material(context, parts, &place, object.material.as_ref())?;
+            let mesh = solid(shape, material).map_err(|what| context.wrong(&place, what))?;
+            parts.graph.hang(Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh }, node);
+            Ok(())
+        }
+        _ => Err(context.wrong(place, "give it either a `file` or a `shape`")),
+    }
+}
+
+fn add_file(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    object: &ObjectSpec,
+    (file, node): (&str, usize),
+) -> Result<(), LoadError> {
+    let path = context.beside(file);
+    match Format::of(&path) {
+        Some(Format::Gltf) if object.end.is_some() => {
+            Err(context.wrong(place, "`end` goes with PLY and OBJ files; glTF files bring their own animation"))
+        }
+        Some(Format::Gltf) => add_gltf(context, parts, place, object, (&path, node)),
+        Some(_) if object.clip.is_some() => Err(context.wrong(place, "`clip` goes with glTF files")),
+        Some(format @ (Format::Ply | Format::Obj)) => {
+            let material = material(context, parts, place, object.material.as_ref())?;
+            let mut start = soup(&path, format)?;
+            parts.warnings.append(&mut start.warnings);
+            let mut mesh = start.into_mesh(&path, material)?;
+            if let Some(end) = &object.end {
+                let end = context.beside(end);
+                let arrival_s = object.end_s.unwrap_or(1.0 / parts.settings.frame_rate_hz);
+                mesh.targets = vec![to_end(&mesh, &end)?];
+                let track = Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, crate::scene::Interpolation::Linear);
+                parts.graph.nodes[node].channels.weights = Some(track.map_err(|what| context.wrong(place, what))?);
+            }
+            parts.graph.hang(mesh, node);
+            Ok(())
+        }
+        Some(Format::Ron) | None => {
+            let message = format!("`{file}` is not a .gltf, .glb, .ply, .obj, .ply.gz or .obj.gz file");
+            Err(context.wrong(place, message))
+        }
+    }
+}
+
+fn add_gltf(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    object: &ObjectSpec,
+    (path, node): (&Path, usize),
+) -> Result<(), LoadError> {
+    let asset = gltf::import(path, object.clip.as_deref());
+    let mut asset = asset.map_err(|error| match error {
+        LoadError::Setting { message, .. } => context.wrong(format!("{place}.clip"), message),
+        error => error,
+    })?;
+    if let Some(own) = &object.material {
+        let material = make_material(context, &mut parts.warnings, place, own)?;
+        asset.graph.materials = vec![material];
+        asset.graph.meshes.iter_mut().for_each(|mesh| mesh.material = 0);
+    }
+    parts.warnings.append(&mut asset.warnings);
+    parts.graph.adopt(asset.graph, node);
+    Ok(())
+}
+
+/// What takes `mesh` to the vertices in the file at `end`, as a morph target.
+fn to_end(mesh: &Mesh, end: &Path) -> Result<Target, LoadError> {
+    let format = Format::of(end).filter(|format| matches!(format, Format::Ply | Format::Obj));
+    let format = format.ok_or_else(|| broken(end, "end", "it has to be a PLY or OBJ file".to_owned()))?;
+    let other = soup(end, format)?.into_mesh(end, 0)?;
+    let same = other.positions.len() == mesh.positions.len() && other.triangles == mesh.triangles;
+    if !same {
+        let message = format!(
+            "its {} vertices and {} triangles are not those of {} ({} and {}): both ends need equal topology",
+            other.positions.len(),
+            other.triangles.len(),
+            mesh.name,
+            mesh.positions.len(),
+            mesh.triangles.len()
+        );
+        return Err(broken(end, "end", message));
+    }
+    let positions = mesh.positions.iter().zip(&other.positions).map(|(from, to)| *to - *from).collect();
+    Ok(Target { positions, normals: Vec::new() })
+}
+
+fn solid(shape: &ShapeSpec, material: usize) -> Result<Mesh, String> {
+    let positive = |what: &str, values: &[f64]| {
+        let usable = values.iter().all(|value| value.is_finite() && *value > 0.0);
+        if usable { Ok(()) } else { Err(format!("{what}: every length has to be a finite number above zero")) }
+    };
+    Ok(match *shape {
+        ShapeSpec::Sphere { radius, segments } => {
+            positive("Sphere", &[radius])?;
+            shapes::sphere(radius, segments, material)
+        }
+        ShapeSpec::Box { size } => {
+            positive("Box", &size)?;
+            shapes::cuboid(DVec3::from_array(size).as_vec3(), material)
+        }
+        ShapeSpec::Plane { size, cells, tiles } => {
+            positive("Plane", &[size, tiles])?;
+            shapes::plane(size, cells, tiles, material)
+        }
+        ShapeSpec::Torus { ring, tube, segments } => {
+            positive("Torus", &[ring, tube])?;
+            shapes::torus(ring, tube, segments, material)
+        }
+        ShapeSpec::Gear { teeth, radius, thickness } => {
+            positive("Gear", &[radius, thickness])?;
+            shapes::gear(teeth, radius, thickness, material)
+        }
+        ShapeSpec::Propeller { blades, radius } => {
+            positive("Propeller", &[radius])?;
+            shapes::propeller(blades, radius, material)
+        }
+    })
+}
+
+fn material(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    spec: Option<&MaterialSpec>,
+) -> Result<usize, LoadError> {
+    let made = match spec {
+        Some(spec) => make_material(context, &mut parts.warnings, place, spec)?,
+        None => soup::grey(),
+    };
+    Ok(parts.graph.push_material(made))
+}
+
+fn make_material(
+    context: Context,
+    warnings: &mut Vec<Warning>,
+    place: &str,
+    spec: &MaterialSpec,
+) -> Result<Material, LoadError> {
+    let plain = soup::grey();
+    let otherwise = if spec.texture.is_some() { Vec3::ONE } else { plain.base_color };
+    let shade = |value| color(context, &format!("{place}.material.color"), value);
+    let base_color = spec.color.map_or(Ok(otherwise), shade)?;
+    let texture = match &spec.texture {
+        Some(TextureSpec::Checker { colors, texels }) => {
+            checker(*texels, colors.map(|color| color.map(linear_to_srgb8))).map(Arc::new)
+        }
+        Some(TextureSpec::Image { file }) => match image::load(&context.beside(file), [Wrap::Repeat; 2]) {
+            Ok(texture) => Some(Arc::new(texture)),
+            Err(why) => {
+                let message = format!("{place}: image `{file}`: {why}; its colour is used without a texture");
+                warnings.push(Warning::new("missing-image", message));
+                None
+            }
+        },
+        None => None,
+    };
+    let (double_sided, unlit) = (spec.double_sided, spec.unlit);
+    Ok(Material { name: place.to_owned(), base_color, texture, double_sided, unlit })
+}
+
+fn node(context: Context, place: &str, object: &ObjectSpec) -> Result<Node, LoadError> {
+    let part = |name: &str| format!("{place}.{name}");
+    let rest = Trs {
+        translation: vector(context, &part("position"), object.position)?,
+        rotation: turned(object.rotation_deg),
+        scale: vector(context, &part("scale"), object.scale.unwrap_or([1.0; 3]))?,
+    };
+    vector(context, &part("rotation_deg"), object.rotation_deg)?;
+    let mut node = Node::new(place, None, Local::Trs(rest));
+    node.motion.velocity = vector(context, &part("velocity"), object.velocity)?;
+    if let Some(spin) = &object.spin {
+        let made = Spin::new(DVec3::from_array(spin.axis), spin.rate_hz);
+        let message = "the axis needs a length, and the rate has to be finite";
+        node.motion.spin = Some(made.ok_or_else(|| context.wrong(part("spin"), message))?);
+    }
+    keyframes(object, &rest, &mut node).map_err(|what| context.wrong(part("keyframes"), what))?;
+    Ok(node)
+}
+
+/// About x, then y, then z, in degrees.
+fn turned(degrees: [f64; 3]) -> DQuat {
+    let [x, y, z] = degrees.map(|angle| angle / 360.0);
+    rotation(DVec3::Z, z) * rotation(DVec3::Y, y) * rotation(DVec3::X, x)
+}
+
+fn keyframes(object: &ObjectSpec, rest: &Trs, node: &mut Node) -> Result<(), String> {
+    let keys = &object.keyframes;
+    let Some(last) = keys.last() else { return Ok(()) };
+    let track = |width: usize, numbers: Vec<f64>| {
+        let times = keys.iter().map(|key| key.time_s).collect();
+        let track = Track::new(times, numbers, width, object.interpolation.into())?;
+        Ok::<_, String>(if object.repeat { track.looping(last.time_s) } else { track })
+    };
+    if keys.iter().any(|key| key.position.is_some()) {
+        let of = |key: &super::spec::ObjectKey| key.position.unwrap_or(rest.translation.to_array());
+        node.channels.translation = Some(track(3, keys.iter().flat_map(of).collect())?);
+    }
+    if keys.iter().any(|key| key.rotation_deg.is_some()) {
+        let of = |key: &super::spec::ObjectKey| key.rotation_deg.map_or(rest.rotation, turned).to_array();
+        node.channels.rotation = Some(track(4, keys.iter().flat_map(of).collect())?);
+    }
+    if keys.iter().any(|key| key.scale.is_some()) {
+        let of = |key: &super::spec::ObjectKey| key.scale.unwrap_or(rest.scale.to_array());
+        node.channels.scale = Some(track(3, keys.iter().flat_map(of).collect())?);
+    }
+    Ok(())
+}

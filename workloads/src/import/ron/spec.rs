@@ -1,0 +1,274 @@
+//! What a RON scene file holds.
+//!
+//! Lengths are in scene units, times in seconds, angles in degrees, colours in linear RGB; `y` is up. Fields
+//! that are left out take their defaults, unknown ones are errors.
+
+use serde::Deserialize;
+
+use super::bounded;
+use crate::scene::Interpolation;
+
+/// A scene file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneSpec {
+    /// Name in reports; the file's own by default.
+    pub name: Option<String>,
+    /// Size of the image, sampling, time and lens.
+    #[serde(default)]
+    pub settings: SettingsSpec,
+    /// The camera; without one it is fitted to the scene over all frames.
+    pub camera: Option<CameraSpec>,
+    /// The light; by default a lamp over the camera's shoulder under a pale sky.
+    pub light: Option<LightSpec>,
+    /// Radiance where nothing is hit.
+    pub background: Option<[f32; 3]>,
+    /// What there is to see, at least one.
+    pub objects: Vec<ObjectSpec>,
+}
+
+/// How the scene is rendered unless the command line says otherwise.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct SettingsSpec {
+    /// Pixels across, 1280 by default.
+    #[serde(deserialize_with = "bounded::side")]
+    pub width: Option<u32>,
+    /// Pixels down, 720 by default.
+    #[serde(deserialize_with = "bounded::side")]
+    pub height: Option<u32>,
+    /// Samples in a pixel, 8 by default.
+    #[serde(deserialize_with = "bounded::samples")]
+    pub samples: Option<u32>,
+    /// Frames in a second, 60 by default.
+    #[serde(deserialize_with = "bounded::positive")]
+    pub frame_rate_hz: Option<f64>,
+    /// Fraction of the frame period for which the shutter is open, 0 to 1, 0.5 by default.
+    #[serde(deserialize_with = "bounded::fraction")]
+    pub shutter: Option<f64>,
+    /// First frame and the one after the last, (0, 12) by default.
+    #[serde(deserialize_with = "bounded::frames")]
+    pub frames: Option<(u32, u32)>,
+    /// Radius of the lens; zero, the default, is a pinhole.
+    #[serde(deserialize_with = "bounded::radius")]
+    pub lens_radius: Option<f32>,
+    /// Depth at which the lens is sharp; the camera's target by default.
+    #[serde(deserialize_with = "bounded::depth")]
+    pub focus: Option<f32>,
+}
+
+/// A camera that looks from one point at another.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraSpec {
+    /// Where it is.
+    pub position: [f64; 3],
+    /// What it looks at.
+    pub target: [f64; 3],
+    /// Which way is up, +y by default.
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view, 40 degrees by default.
+    #[serde(default, deserialize_with = "bounded::field_of_view")]
+    pub fov_deg: Option<f64>,
+    /// Depth below which nothing is seen; a thousandth of the target's by default.
+    #[serde(default, deserialize_with = "bounded::positive")]
+    pub near: Option<f64>,
+    /// Where it is at the end of the last frame; it goes there on a straight line from time zero.
+    pub end_position: Option<[f64; 3]>,
+    /// What it looks at by then.
+    pub end_target: Option<[f64; 3]>,
+    /// Instead of an end, where it is when.
+    #[serde(default)]
+    pub keyframes: Vec<CameraKey>,
+    /// How it goes from one key to the next.
+    #[serde(default)]
+    pub interpolation: InterpolationSpec,
+}
+
+/// Where a camera is at one time; what is left out is the camera's own.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraKey {
+    pub time_s: f64,
+    pub position: Option<[f64; 3]>,
+    pub target: Option<[f64; 3]>,
+}
+
+/// One lamp at infinity, and a sky over a ground.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LightSpec {
+    /// From the scene to the lamp, of any length; over the camera's right shoulder by default.
+    pub toward: Option<[f64; 3]>,
+    /// Radiance that a white surface facing the lamp sends back.
+    pub color: Option<[f32; 3]>,
+    /// Radiance of a white surface looking up, from the sky alone.
+    pub sky: Option<[f32; 3]>,
+    /// The same of one looking down.
+    pub ground: Option<[f32; 3]>,
+}
+
+/// Something to see: a file or a shape, placed and perhaps moving.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObjectSpec {
+    /// Name in messages.
+    pub name: Option<String>,
+    /// A `.gltf`, `.glb`, `.ply`, `.obj`, `.ply.gz` or `.obj.gz` file, relative to the scene file.
+    pub file: Option<String>,
+    /// Or a shape.
+    pub shape: Option<ShapeSpec>,
+    /// A second PLY or OBJ file of equal topology: vertices go there on straight lines.
+    pub end: Option<String>,
+    /// When they arrive; by default after one frame period. They stay there.
+    #[serde(default, deserialize_with = "bounded::positive")]
+    pub end_s: Option<f64>,
+    /// Which animation clip of a glTF file plays, by name or number; the first by default.
+    pub clip: Option<String>,
+    /// How it looks; glTF files bring their own materials, which this one replaces.
+    pub material: Option<MaterialSpec>,
+    /// Where it is.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// How it is turned: about x, then y, then z, right-handed.
+    #[serde(default)]
+    pub rotation_deg: [f64; 3],
+    /// How large it is, as a factor along each axis; a negative one mirrors.
+    pub scale: Option<[f64; 3]>,
+    /// Steady motion, in units per second.
+    #[serde(default)]
+    pub velocity: [f64; 3],
+    /// Steady turning about an axis of its own.
+    pub spin: Option<SpinSpec>,
+    /// Where it is when, instead of `position`, `rotation_deg` and `scale`.
+    #[serde(default)]
+    pub keyframes: Vec<ObjectKey>,
+    /// How it goes from one key to the next.
+    #[serde(default)]
+    pub interpolation: InterpolationSpec,
+    /// Whether the keys start over after the last.
+    #[serde(default)]
+    pub repeat: bool,
+}
+
+/// Where an object is at one time; what is left out is the object's own.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObjectKey {
+    pub time_s: f64,
+    pub position: Option<[f64; 3]>,
+    pub rotation_deg: Option<[f64; 3]>,
+    pub scale: Option<[f64; 3]>,
+}
+
+/// Steady turning.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SpinSpec {
+    /// The axis, of any length, in the object's own space.
+    pub axis: [f64; 3],
+    /// Turns in a second, right-handed.
+    pub rate_hz: f64,
+}
+
+/// Between keys.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+pub(super) enum InterpolationSpec {
+    /// Straight lines and even turns.
+    #[default]
+    Linear,
+    /// Jumps.
+    Step,
+}
+
+impl From<InterpolationSpec> for Interpolation {
+    fn from(spec: InterpolationSpec) -> Self {
+        match spec {
+            InterpolationSpec::Linear => Self::Linear,
+            InterpolationSpec::Step => Self::Step,
+        }
+    }
+}
+
+/// Shapes centred at the object's origin.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) enum ShapeSpec {
+    /// A sphere with that many segments around.
+    Sphere {
+        radius: f64,
+        #[serde(default = "segments")]
+        segments: u32,
+    },
+    /// A box with those edges.
+    Box { size: [f64; 3] },
+    /// A square looking up, in cells x cells quads, its texture repeated that many times along an edge.
+    Plane {
+        size: f64,
+        #[serde(default = "one")]
+        cells: u32,
+        #[serde(default = "unit")]
+        tiles: f64,
+    },
+    /// A torus about y.
+    Torus {
+        ring: f64,
+        tube: f64,
+        #[serde(default = "segments")]
+        segments: u32,
+    },
+    /// A gear about z.
+    Gear { teeth: u32, radius: f64, thickness: f64 },
+    /// A propeller about z.
+    Propeller { blades: u32, radius: f64 },
+}
+
+fn segments() -> u32 {
+    48
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn unit() -> f64 {
+    1.0
+}
+
+/// How a surface looks.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MaterialSpec {
+    /// Reflectance; multiplies the texture. White with a texture, else grey by default.
+    pub color: Option<[f32; 3]>,
+    /// Colour texture; the object needs texture coordinates.
+    pub texture: Option<TextureSpec>,
+    /// Whether back faces are drawn; so by default.
+    #[serde(default = "yes")]
+    pub double_sided: bool,
+    /// Whether the colour is shown as it is, whatever the light.
+    #[serde(default)]
+    pub unlit: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Where a texture comes from.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) enum TextureSpec {
+    /// Two by two fields of two colours, with that many texels along an edge.
+    Checker {
+        colors: [[f32; 3]; 2],
+        #[serde(default = "texels")]
+        texels: u32,
+    },
+    /// A PNG or JPEG file, relative to the scene file.
+    Image { file: String },
+}
+
+fn texels() -> u32 {
+    256
+}

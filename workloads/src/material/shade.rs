@@ -1,0 +1,123 @@
+//! The surface shader: Lambert under one lamp and a sky, with a Blinn-Phong highlight.
+
+use std::sync::Arc;
+
+use glam::{Vec3, Vec4};
+use pipeline::{Shader, ShaderCost, ShadingPoint, Texture};
+
+use super::Material;
+use crate::scene::Light;
+
+/// Colours a material under a scene's light.
+///
+/// `texel * base * (lamp * max(0, n.l) + mix(ground, sky, n.y)) + highlight * lamp * max(0, n.h)^32`, with the
+/// half vector `h` of Blinn (Models of light reflection, SIGGRAPH 1977).
+#[derive(Clone, Debug)]
+pub struct SurfaceShader {
+    base_color: Vec3,
+    texture: Option<Arc<Texture>>,
+    unlit: bool,
+    toward: Vec3,
+    lamp: Vec3,
+    ground: Vec3,
+    sky_over_ground: Vec3,
+}
+
+/// Share of the lamp that the highlight sends back at its brightest.
+const HIGHLIGHT: f32 = 0.12;
+
+/// Base colour by texel: one multiplication for each of three channels.
+const BASE_OPS: u32 = 3;
+
+/// Counted from [`SurfaceShader::lit`]; a square root, a division, a comparison count as one operation each.
+/// Half vector: 3 additions, 3 multiply-adds, root, reciprocal, 3 to scale = 11; two cosines with their clamp,
+/// 4 each = 8; power of 32 = 5 squarings; hemisphere: 1 + 3; lamp onto it: 3; times base: 3; strength of the
+/// highlight 1, added 3.
+const LIT_OPS: u32 = 11 + 8 + 5 + 4 + 3 + 3 + 4;
+
+/// World to camera: 9 multiply-adds; projection of x and y: 2.
+const VERTEX_OPS: u32 = 11;
+
+impl SurfaceShader {
+    /// The shader of `material` under `light`, whose direction has to be known.
+    pub fn new(material: &Material, light: &Light) -> Self {
+        Self {
+            base_color: material.base_color,
+            texture: material.texture.clone(),
+            unlit: material.unlit,
+            toward: light.toward.unwrap_or(Vec3::Y),
+            lamp: light.color,
+            ground: light.ground,
+            sky_over_ground: light.sky - light.ground,
+        }
+    }
+
+    fn lit(&self, at: &ShadingPoint, base: Vec3) -> Vec3 {
+        let half = self.toward + at.to_camera;
+        let length = half.dot(half).sqrt();
+        let half = half * (1.0 / length.max(f32::MIN_POSITIVE));
+        let facing = at.normal.dot(self.toward).max(0.0);
+        let glint = pow32(at.normal.dot(half).max(0.0));
+        let up = 0.5 * at.normal.y + 0.5;
+        let ambient = self.ground + up * self.sky_over_ground;
+        let diffuse = base * (facing * self.lamp + ambient);
+        // No highlight on the side turned away from the lamp.
+        let glint = if facing > 0.0 { HIGHLIGHT * glint } else { 0.0 };
+        diffuse + glint * self.lamp
+    }
+}
+
+fn pow32(x: f32) -> f32 {
+    let (x2, square) = (x * x, |x: f32| x * x);
+    square(square(square(square(x2))))
+}
+
+impl Shader for SurfaceShader {
+    fn cost(&self) -> ShaderCost {
+        let pixel_ops = if self.unlit { BASE_OPS } else { BASE_OPS + LIT_OPS };
+        ShaderCost { pixel_ops, vertex_ops: VERTEX_OPS }
+    }
+
+    fn texture(&self) -> Option<&Texture> {
+        self.texture.as_deref()
+    }
+
+    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
+        let base = self.base_color * texel.truncate();
+        if self.unlit { base } else { self.lit(at, base) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec2;
+
+    fn shader(unlit: bool) -> SurfaceShader {
+        let light = Light { toward: Some(Vec3::Y), color: Vec3::ONE, sky: Vec3::splat(0.25), ground: Vec3::ZERO };
+        SurfaceShader::new(&Material { unlit, ..Material::colored("m", Vec3::new(0.5, 0.25, 1.0)) }, &light)
+    }
+
+    fn point(normal: Vec3) -> ShadingPoint {
+        ShadingPoint { position: Vec3::ZERO, normal, to_camera: Vec3::X, uv: Vec2::ZERO }
+    }
+
+    #[test]
+    fn a_surface_facing_the_lamp_shows_lamp_and_sky() {
+        let seen = shader(false).shade(&point(Vec3::Y), Vec4::ONE);
+        // The half vector is 45 degrees off, so the highlight adds 0.12 / 2^16.
+        let expected = Vec3::new(0.5, 0.25, 1.0) * 1.25 + Vec3::splat(0.12 / 65536.0);
+        assert!((seen - expected).length() < 1e-5, "{seen}");
+    }
+
+    #[test]
+    fn a_surface_turned_away_shows_the_ground_only() {
+        assert_eq!(shader(false).shade(&point(Vec3::NEG_Y), Vec4::ONE), Vec3::ZERO);
+    }
+
+    #[test]
+    fn an_unlit_surface_shows_its_colour_and_costs_less() {
+        assert_eq!(shader(true).shade(&point(Vec3::Z), Vec4::splat(0.5)), Vec3::new(0.25, 0.125, 0.5));
+        assert!(shader(true).cost().pixel_ops < shader(false).cost().pixel_ops);
+    }
+}

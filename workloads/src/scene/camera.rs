@@ -1,0 +1,180 @@
+//! Cameras of a scene, and the pipeline's camera made from them for one frame.
+
+use glam::{Affine3A, DAffine3, DMat3, DVec3};
+use pipeline::{Camera, Lens};
+
+use super::deform::Pose;
+use super::track::{Instant, Track};
+
+/// A point that may move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// Where it is when no track says otherwise.
+    pub rest: DVec3,
+    /// Where it goes.
+    pub track: Option<Track>,
+}
+
+impl Place {
+    /// A point that stays at `rest`.
+    pub fn fixed(rest: DVec3) -> Self {
+        Self { rest, track: None }
+    }
+
+    /// The point at `at`.
+    pub fn at(&self, at: Instant) -> DVec3 {
+        self.track.as_ref().map_or(self.rest, |track| track.vec3(at))
+    }
+}
+
+/// What holds a camera.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Rig {
+    /// It looks from one point at another.
+    LookAt {
+        /// Where it is.
+        position: Place,
+        /// What it looks at, and what a lens is focused on unless told otherwise.
+        target: Place,
+        /// Which way is up.
+        up: DVec3,
+    },
+    /// It hangs on a node, looking down the node's -z with +y up (glTF 2.0, 3.10).
+    Node(usize),
+    /// It is placed so that the whole scene is in view over all frames, from above the front and to the right.
+    Fitted,
+}
+
+/// A scene's camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneCamera {
+    /// What holds it.
+    pub rig: Rig,
+    /// Tangent of half the vertical field of view.
+    pub tan_half_height: f64,
+    /// Depth in scene units below which nothing is seen; `None` for a thousandth of the distance of the
+    /// target (a quarter of the nearest vertex's depth for a fitted camera).
+    pub near: Option<f64>,
+}
+
+/// Vertical field of view of cameras that do not say, in degrees.
+pub const DEFAULT_FOV_DEG: f64 = 40.0;
+
+/// Tangent of half of an angle in degrees.
+pub fn tan_half(fov_deg: f64) -> f64 {
+    libm::tan(fov_deg.to_radians() / 2.0)
+}
+
+impl Default for SceneCamera {
+    fn default() -> Self {
+        Self { rig: Rig::Fitted, tan_half_height: tan_half(DEFAULT_FOV_DEG), near: None }
+    }
+}
+
+/// Where a camera is and how it is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stand {
+    pub eye: DVec3,
+    pub right: DVec3,
+    pub up: DVec3,
+    pub forward: DVec3,
+}
+
+impl Stand {
+    /// At `eye`, looking along `forward`; `None` where that has no length or is not finite. Where `up` is
+    /// parallel to it another axis serves.
+    pub fn new(eye: DVec3, forward: DVec3, up: DVec3) -> Option<Self> {
+        let forward = unit(forward)?;
+        let right = [up, DVec3::Y, DVec3::NEG_Z, DVec3::X].into_iter().find_map(|up| {
+            let across = forward.cross(unit(up)?);
+            (across.length() > 1e-6).then(|| unit(across)).flatten()
+        })?;
+        eye.is_finite().then(|| Self { eye, right, up: right.cross(forward), forward })
+    }
+
+    /// On a node whose transform to the world is `world`; scale and shear do not count.
+    pub fn on_node(world: DAffine3) -> Option<Self> {
+        Self::new(world.translation, -world.matrix3.z_axis, world.matrix3.y_axis)
+    }
+
+    /// Depth of a point in front of the camera, in scene units.
+    pub fn depth(&self, point: DVec3) -> f64 {
+        (point - self.eye).dot(self.forward)
+    }
+
+    /// World to camera: x right, y up, z forward.
+    pub fn pose(&self) -> Affine3A {
+        let to_axes = DMat3::from_cols(self.right, self.up, self.forward).transpose();
+        let place = to_axes * -self.eye;
+        Affine3A::from_mat3_translation(to_axes.as_mat3(), place.as_vec3())
+    }
+}
+
+fn unit(v: DVec3) -> Option<DVec3> {
+    let length = v.length();
+    (length.is_finite() && length > 0.0).then(|| v / length)
+}
+
+impl SceneCamera {
+    /// Where the camera stands in `pose`; `None` for a camera that still has to be fitted or has no direction.
+    pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<Stand> {
+        match &self.rig {
+            Rig::LookAt { position, target, up } => {
+                let eye = position.at(at);
+                Stand::new(eye, target.at(at) - eye, *up)
+            }
+            Rig::Node(node) => Stand::on_node(pose.world(*node)),
+            Rig::Fitted => None,
+        }
+    }
+
+    /// Distance of what a lens is focused on when not told: the target, or `centre` for a camera on a node.
+    pub(super) fn subject_depth(&self, stand: &Stand, at: Instant, centre: DVec3) -> f64 {
+        let subject = match &self.rig {
+            Rig::LookAt { target, .. } => target.at(at),
+            Rig::Node(_) | Rig::Fitted => centre,
+        };
+        stand.depth(subject)
+    }
+}
+
+/// The pipeline's camera between two stands.
+pub(super) fn between(
+    open: &Stand,
+    close: &Stand,
+    tan_half_height: f64,
+    near: f64,
+    lens: Option<(f32, f64)>,
+) -> Result<Camera, String> {
+    let describe = |error: &dyn std::fmt::Display| error.to_string();
+    let lens = match lens {
+        Some((radius, focus)) => Some(Lens::new(radius, focus as f32).map_err(|e| describe(&e))?),
+        None => None,
+    };
+    let camera = Camera::new(open.pose(), tan_half_height as f32, near as f32).map_err(|e| describe(&e))?;
+    let camera = camera.moving(open.pose(), close.pose()).map_err(|e| describe(&e))?;
+    Ok(camera.with_lens(lens))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3A;
+
+    #[test]
+    fn camera_space_is_right_up_forward() {
+        let stand = Stand::new(DVec3::new(0.0, 0.0, 5.0), DVec3::NEG_Z, DVec3::Y).unwrap();
+        let pose = stand.pose();
+        assert_eq!(pose.transform_point3a(Vec3A::ZERO), Vec3A::new(0.0, 0.0, 5.0));
+        assert_eq!(pose.transform_vector3a(Vec3A::X), Vec3A::X);
+        assert_eq!(pose.transform_vector3a(Vec3A::Y), Vec3A::Y);
+        assert_eq!(pose.transform_vector3a(Vec3A::Z), Vec3A::NEG_Z);
+    }
+
+    #[test]
+    fn a_camera_that_looks_straight_up_still_has_axes() {
+        let stand = Stand::new(DVec3::ZERO, DVec3::Y, DVec3::Y).unwrap();
+        assert!(stand.right.is_finite() && stand.right.dot(DVec3::Y).abs() < 1e-12);
+        assert!(Stand::new(DVec3::ZERO, DVec3::ZERO, DVec3::Y).is_none());
+    }
+}

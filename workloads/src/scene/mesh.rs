@@ -1,0 +1,159 @@
+//! A mesh at rest: its triangles and everything that can deform it.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, Vec2, Vec3};
+
+/// Where the normals of a mesh come from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Normals {
+    /// None are stored: every face is flat.
+    #[default]
+    Flat,
+    /// Made from the faces around each vertex, weighted by area, wherever the vertices are at mid-shutter.
+    Smooth,
+    /// One for each vertex, as stored.
+    Given(Vec<Vec3>),
+}
+
+/// One morph target: what is added to each vertex at weight one. Either list may be empty for nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Target {
+    /// Displacements in the mesh's units.
+    pub positions: Vec<Vec3>,
+    /// Changes of the normals.
+    pub normals: Vec<Vec3>,
+}
+
+/// Which joints of a skin carry each vertex.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Influences {
+    /// Joints for each vertex.
+    pub per_vertex: usize,
+    /// Indices into the skin's joints, `per_vertex` for each vertex.
+    pub joints: Vec<u16>,
+    /// Their weights, adding up to one for each vertex.
+    pub weights: Vec<f32>,
+}
+
+/// Triangles of one material in their own space.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// Name for messages.
+    pub name: String,
+    /// Positions in the mesh's units.
+    pub positions: Vec<Vec3>,
+    /// Where normals come from.
+    pub normals: Normals,
+    /// Texture coordinates, one for each vertex or none.
+    pub uvs: Arc<[Vec2]>,
+    /// Vertex indices of each triangle, all in range.
+    pub triangles: Arc<[[u32; 3]]>,
+    /// Index of the material.
+    pub material: usize,
+    /// Morph targets.
+    pub targets: Vec<Target>,
+    /// Weights of the targets where neither node nor track gives them.
+    pub weights: Vec<f64>,
+    /// Joints that carry each vertex, for skinned meshes.
+    pub influences: Option<Influences>,
+}
+
+/// Joints and the poses in which the mesh was bound to them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Skin {
+    /// Node of each joint.
+    pub joints: Vec<usize>,
+    /// Mesh to joint when bound, one for each joint.
+    pub inverse_bind: Vec<DAffine3>,
+}
+
+/// A mesh hung on a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instance {
+    /// Index of the node.
+    pub node: usize,
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// Index of the skin; a skinned mesh follows its joints, not its node.
+    pub skin: Option<usize>,
+}
+
+impl Mesh {
+    /// A rigid mesh of `triangles` over `positions`, flat, without texture coordinates.
+    ///
+    /// # Errors
+    /// In words, the first index out of range or position that is not finite.
+    pub fn new(
+        name: impl Into<String>,
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        material: usize,
+    ) -> Result<Self, String> {
+        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(format!("vertex {vertex} has a coordinate that is NaN or infinite"));
+        }
+        let count = positions.len();
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(vertex) = corners.iter().find(|&&v| v as usize >= count) {
+                return Err(format!("triangle {triangle} uses vertex {vertex}, but there are only {count}"));
+            }
+        }
+        Ok(Self {
+            name: name.into(),
+            positions,
+            normals: Normals::Flat,
+            uvs: Arc::from([]),
+            triangles: triangles.into(),
+            material,
+            targets: Vec::new(),
+            weights: Vec::new(),
+            influences: None,
+        })
+    }
+}
+
+/// Unit normals from the faces around each vertex, weighted by area; +y where there are none.
+pub fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut sums = vec![glam::DVec3::ZERO; positions.len()];
+    for corners in triangles {
+        let [a, b, c] = corners.map(|v| positions.get(v as usize).copied().unwrap_or_default().as_dvec3());
+        let face = (b - a).cross(c - a);
+        for &vertex in corners {
+            if let Some(sum) = sums.get_mut(vertex as usize) {
+                *sum += face;
+            }
+        }
+    }
+    sums.into_iter().map(unit).collect()
+}
+
+/// `v` with unit length, or +y where it has none: a shader must be able to rely on its normal.
+pub fn unit(v: glam::DVec3) -> Vec3 {
+    let length = v.length();
+    if length.is_finite() && length > 0.0 { (v / length).as_vec3() } else { Vec3::Y }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_index_out_of_range_and_a_nan_are_named() {
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let error = Mesh::new("m", corners.clone(), vec![[0, 1, 2], [2, 1, 7]], 0).unwrap_err();
+        assert!(error.contains("triangle 1 uses vertex 7"), "{error}");
+        let error = Mesh::new("m", vec![Vec3::ZERO, Vec3::NAN, Vec3::Y], vec![], 0).unwrap_err();
+        assert!(error.contains("vertex 1"), "{error}");
+    }
+
+    #[test]
+    fn smooth_normals_of_a_fold_lie_between_its_faces() {
+        // Two unit squares' worth of triangles meeting at a right angle along x.
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::Y];
+        let normals = smooth_normals(&positions, &[[0, 2, 1], [0, 1, 3]]);
+        assert_eq!(normals[2], Vec3::Y);
+        assert_eq!(normals[3], Vec3::Z);
+        assert!((normals[0] - Vec3::new(0.0, 0.5f32.sqrt(), 0.5f32.sqrt())).length() < 1e-6);
+    }
+}
