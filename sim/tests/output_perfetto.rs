@@ -77,13 +77,23 @@ fn get(message: &[(u64, Field)], number: u64) -> Option<&Field> {
     message.iter().find(|(field, _)| *field == number).map(|(_, value)| value)
 }
 
-/// Track names by uuid, and events in file order: time, type, uuid, name, counter value.
+/// A decoded `TrackEvent` with the time of its packet.
+#[derive(Debug)]
+struct Event {
+    time_ns: u64,
+    kind: u64,
+    uuid: u64,
+    name: Option<String>,
+    value: Option<f64>,
+}
+
+/// Track names by uuid, and events in file order.
 #[derive(Debug, Default)]
 struct Decoded {
     tracks: BTreeMap<u64, String>,
     parents: BTreeMap<u64, u64>,
     process: Option<(u64, String)>,
-    events: Vec<(u64, u64, u64, Option<String>, Option<f64>)>,
+    events: Vec<Event>,
 }
 
 impl Decoded {
@@ -101,13 +111,13 @@ impl Decoded {
     }
 
     fn event(&mut self, time_ns: u64, event: &[(u64, Field)]) {
-        self.events.push((
+        self.events.push(Event {
             time_ns,
-            get(event, 9).unwrap().uint(),
-            get(event, 11).unwrap().uint(),
-            get(event, 23).map(Field::text),
-            get(event, 44).map(Field::double),
-        ));
+            kind: get(event, 9).unwrap().uint(),
+            uuid: get(event, 11).unwrap().uint(),
+            name: get(event, 23).map(Field::text),
+            value: get(event, 44).map(Field::double),
+        });
     }
 }
 
@@ -173,28 +183,29 @@ fn slices_nest_and_close_on_every_track() {
     let decoded = read(&bytes(&timeline(vec![])));
     let mut open: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
     let mut last: BTreeMap<u64, u64> = BTreeMap::new();
-    for (time, kind, uuid, name, _) in &decoded.events {
+    for Event { time_ns, kind, uuid, name, .. } in &decoded.events {
         assert!(decoded.tracks.contains_key(uuid), "an event on a track that was described");
-        assert!(*last.get(uuid).unwrap_or(&0) <= *time, "time does not run back");
-        last.insert(*uuid, *time);
+        assert!(*last.get(uuid).unwrap_or(&0) <= *time_ns, "time does not run back");
+        last.insert(*uuid, *time_ns);
         match kind {
             1 => {
                 assert!(name.is_some());
-                open.entry(*uuid).or_default().push(*time);
+                open.entry(*uuid).or_default().push(*time_ns);
             }
-            2 => assert!(open.get_mut(uuid).unwrap().pop().unwrap() < *time),
+            2 => assert!(open.get_mut(uuid).unwrap().pop().unwrap() < *time_ns),
             other => panic!("event type {other}"),
         }
     }
     assert!(open.values().all(Vec::is_empty));
-    let named: Vec<_> = decoded.events.iter().filter_map(|event| event.3.as_deref()).collect();
+    let named: Vec<_> = decoded.events.iter().filter_map(|event| event.name.as_deref()).collect();
     assert_eq!(named, ["frame 0", "busy", "idle", "frame 1", "busy", "idle", "60 %", "100 %"]);
 }
 
 #[test]
 fn counters_carry_their_values() {
     let decoded = read(&bytes(&timeline(vec![(0, 10.25), (50, 11.5), (80, f64::NAN)])));
-    let values: Vec<_> = decoded.events.iter().filter(|e| e.1 == 4).map(|e| (e.0, e.4.unwrap())).collect();
+    let values: Vec<_> =
+        decoded.events.iter().filter(|e| e.kind == 4).map(|e| (e.time_ns, e.value.unwrap())).collect();
     assert_eq!(values, [(0, 10.25), (50, 11.5)]);
 }
 
@@ -203,9 +214,9 @@ fn a_long_counter_is_bounded_and_keeps_its_spike() {
     let mut points: Vec<(u64, f64)> = (0..500_000).map(|i| (i, 5.0)).collect();
     points[123_456].1 = 99.0;
     let decoded = read(&bytes(&timeline(points)));
-    let counters: Vec<_> = decoded.events.iter().filter(|event| event.1 == 4).collect();
+    let counters: Vec<_> = decoded.events.iter().filter(|event| event.kind == 4).collect();
     assert!(counters.len() <= MAX_POINTS);
-    assert!(counters.iter().any(|event| event.0 == 123_456 && event.4 == Some(99.0)));
+    assert!(counters.iter().any(|event| event.time_ns == 123_456 && event.value == Some(99.0)));
 }
 
 #[test]

@@ -31,7 +31,11 @@ pub fn pairs(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<(usize, 
     let mut pairs = Vec::new();
     while let (Some(&found), Some(&truth)) = (found_s.get(f), truth_s.get(t)) {
         if (found - truth).abs() > tolerance_s {
-            if found < truth { f += 1 } else { t += 1 }
+            if found < truth {
+                f += 1
+            } else {
+                t += 1
+            }
             continue;
         }
         while let Some(&next) = found_s.get(f + 1) {
@@ -148,7 +152,10 @@ mod tests {
         assert!((score.worst_timing_error_s().unwrap() - 0.01).abs() < 1e-12);
         // Only frame 0 has both ends right; frame 1 is followed by a false start.
         assert_eq!(score.energy_errors, [0.0]);
-        assert_eq!(truth_beside(&found, &truth, 0.1).iter().map(Option::is_some).collect::<Vec<_>>(), [true, true, false, true]);
+        assert_eq!(
+            truth_beside(&found, &truth, 0.1).iter().map(Option::is_some).collect::<Vec<_>>(),
+            [true, true, false, true]
+        );
     }
 
     #[test]

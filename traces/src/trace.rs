@@ -180,7 +180,9 @@ mod tests {
 
     #[test]
     fn each_bad_trace_names_what_is_wrong() {
-        let message = |v: &[f32], i: &[f32], rate: f64, start: f64| build(v.to_vec(), i.to_vec(), rate, start).unwrap_err().to_string();
+        let message = |v: &[f32], i: &[f32], rate: f64, start: f64| {
+            build(v.to_vec(), i.to_vec(), rate, start).unwrap_err().to_string()
+        };
         assert!(message(&[], &[], 1.0, 0.0).contains("no samples"));
         assert!(message(&[1.0], &[], 1.0, 0.0).contains("1 voltages but 0 currents"));
         assert!(message(&[1.0], &[1.0], -5.0, 0.0).contains("-5 Hz"));

@@ -1,4 +1,5 @@
 //! Every way a file can be wrong gives one error that names the file, the place and the mend, and no panic.
+#![allow(clippy::unwrap_used)]
 
 use ::parquet::basic::{Repetition, Type as Physical};
 use ::parquet::data_type::{DoubleType, FloatType, Int64Type};
@@ -33,7 +34,10 @@ fn says(error: &ReadError, parts: &[&str]) {
 fn csv_errors_name_file_row_and_column() {
     let head = "time_s,voltage_V,current_A\n";
     let with = |rows: &str| csv_error(&format!("{head}{rows}"));
-    says(&csv_error("time_s,voltage_V\n0,1\n"), &["bad.csv", "no column current_A", "time_s, voltage_V", "rename or add"]);
+    says(
+        &csv_error("time_s,voltage_V\n0,1\n"),
+        &["bad.csv", "no column current_A", "time_s, voltage_V", "rename or add"],
+    );
     says(&csv_error("voltage_V,current_A\n0,1\n"), &["no column time_s"]);
     says(&csv_error(""), &["bad.csv", "no column voltage_V (found: none)"]);
     says(&csv_error("voltage_V,Voltage_v,current_A\n"), &["column voltage_V occurs twice"]);
@@ -44,7 +48,10 @@ fn csv_errors_name_file_row_and_column() {
     says(&with("0,1,2\nx,1,2\n"), &["row 2: time_s is \"x\""]);
     says(&with("0,1,2\n1,1\n"), &["row 2: 2 fields instead of 3", "cut off"]);
     says(&with("0,1,2\n1,1,2\n0.5,1,2\n"), &["row 3: time 0.5 s is not after 1 s", "sort"]);
-    says(&with("0,1,2\n1,1,2\n2,1,2\n7,1,2\n"), &["row 4: time 7 s", "off an even rate", "cut the trace there"]);
+    says(
+        &with("0,1,2\n1,1,2\n2,1,2\n7,1,2\n"),
+        &["row 4: time 7 s", "off an even rate", "cut the trace there"],
+    );
     says(&with("0,1,2\n"), &["single row", "rate_hz"]);
     says(&with("0,1,2\n1e-12,1,2\n"), &["bad.csv: sample rate 1000000000000 Hz"]);
     assert!(matches!(with("0,1,2\n1e-12,1,2\n"), ReadError::Trace { .. }));
@@ -95,7 +102,8 @@ fn parquet_file(columns: Vec<(&str, Values)>) -> (TempDir, PathBuf) {
     let fields = columns.iter().map(field).collect();
     let schema = Arc::new(Type::group_type_builder("t").with_fields(fields).build().unwrap());
     let mut bytes = Vec::new();
-    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(WriterProperties::builder().build())).unwrap();
+    let mut writer =
+        SerializedFileWriter::new(&mut bytes, schema, Arc::new(WriterProperties::builder().build())).unwrap();
     let mut group = writer.next_row_group().unwrap();
     for (_, values) in &columns {
         let mut column = group.next_column().unwrap().unwrap();
@@ -126,19 +134,43 @@ fn parquet_errors_name_file_row_and_column() {
     use Values::{Float, Int, Maybe};
     let ones = || Float(vec![1.0; 3]);
     let times = || Int(vec![0, 1000, 2000]);
-    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", ones())]), &["bad.parquet", "no column current_A", "time_ns, voltage_V"]);
+    says(
+        &parquet_error(vec![("time_ns", times()), ("voltage_V", ones())]),
+        &["bad.parquet", "no column current_A", "time_ns, voltage_V"],
+    );
     says(&parquet_error(vec![("voltage_V", ones()), ("current_A", ones())]), &["no column time_ns"]);
-    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", times()), ("current_A", ones())]), &["column voltage_V is INT64", "FLOAT"]);
-    says(&parquet_error(vec![("time_ns", ones()), ("voltage_V", ones()), ("current_A", ones())]), &["column time_ns is FLOAT", "INT64"]);
-    says(&parquet_error(vec![("VOLTAGE_v", ones()), ("voltage_V", ones()), ("current_A", ones())]), &["occurs twice"]);
+    says(
+        &parquet_error(vec![("time_ns", times()), ("voltage_V", times()), ("current_A", ones())]),
+        &["column voltage_V is INT64", "FLOAT"],
+    );
+    says(
+        &parquet_error(vec![("time_ns", ones()), ("voltage_V", ones()), ("current_A", ones())]),
+        &["column time_ns is FLOAT", "INT64"],
+    );
+    says(
+        &parquet_error(vec![("VOLTAGE_v", ones()), ("voltage_V", ones()), ("current_A", ones())]),
+        &["occurs twice"],
+    );
     let nan = Float(vec![1.0, f32::NAN, 1.0]);
-    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", nan), ("current_A", ones())]), &["row 2: voltage_V is NaN"]);
+    says(
+        &parquet_error(vec![("time_ns", times()), ("voltage_V", nan), ("current_A", ones())]),
+        &["row 2: voltage_V is NaN"],
+    );
     let null = Maybe(vec![Some(1.0), Some(1.0), None]);
-    says(&parquet_error(vec![("time_ns", times()), ("voltage_V", null), ("current_A", ones())]), &["row 3: voltage_V is missing"]);
+    says(
+        &parquet_error(vec![("time_ns", times()), ("voltage_V", null), ("current_A", ones())]),
+        &["row 3: voltage_V is missing"],
+    );
     let gap = Int(vec![0, 1000, 9000]);
-    says(&parquet_error(vec![("time_ns", gap), ("voltage_V", ones()), ("current_A", ones())]), &["row 2", "off an even rate"]);
+    says(
+        &parquet_error(vec![("time_ns", gap), ("voltage_V", ones()), ("current_A", ones())]),
+        &["row 2", "off an even rate"],
+    );
     let empty = || Float(vec![]);
-    says(&parquet_error(vec![("time_ns", Int(vec![])), ("voltage_V", empty()), ("current_A", empty())]), &["no samples"]);
+    says(
+        &parquet_error(vec![("time_ns", Int(vec![])), ("voltage_V", empty()), ("current_A", empty())]),
+        &["no samples"],
+    );
 }
 
 #[test]
@@ -154,7 +186,7 @@ fn optional_doubles_and_any_letter_case_are_read() {
 }
 
 fn small() -> Vec<u8> {
-    let ramp: Vec<f32> = (0..2000_u16).map(|i| f32::from(i % 300)).collect();
+    let ramp: Vec<f32> = (0..400_u16).map(|i| f32::from(i % 100)).collect();
     let trace = Trace::new(ramp.clone(), ramp, 50e3, 0.0, Metadata::default()).unwrap();
     let mut bytes = Vec::new();
     parquet::write(&trace, &mut bytes).unwrap();
@@ -166,7 +198,10 @@ fn a_truncated_parquet_file_is_an_error_wherever_it_is_cut() {
     let whole = small();
     for length in (0..whole.len()).step_by(7).chain([whole.len() - 1]) {
         let (_folder, path) = in_folder("cut.parquet", &whole[..length]);
-        says(&parquet::read(&path).unwrap_err(), &["cut.parquet", "cut off or damaged", "copy or export it again"]);
+        says(
+            &parquet::read(&path).unwrap_err(),
+            &["cut.parquet", "cut off or damaged", "copy or export it again"],
+        );
     }
 }
 
@@ -176,14 +211,12 @@ fn a_parquet_file_with_any_byte_changed_gives_a_trace_or_an_error_but_no_panic()
     let (_folder, path) = in_folder("flip.parquet", &whole);
     let mut errors = 0;
     for position in 0..whole.len() {
-        for flip in [0x01, 0x80, 0xff] {
-            let mut bytes = whole.clone();
-            bytes[position] ^= flip;
-            std::fs::write(&path, &bytes).unwrap();
-            errors += usize::from(parquet::read(&path).is_err());
-        }
+        let mut bytes = whole.clone();
+        bytes[position] ^= [0x01, 0x80, 0xff][position % 3];
+        std::fs::write(&path, &bytes).unwrap();
+        errors += usize::from(parquet::read(&path).is_err());
     }
-    assert!(errors > whole.len() / 10, "{errors} of {}", 3 * whole.len());
+    assert!(errors > whole.len() / 10, "{errors} of {}", whole.len());
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! The finder against frames whose starts and energies are known.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
-use common::{free_running, vsync, Case};
+use common::{Case, free_running, vsync};
 use traces::device::{Device, DeviceSpec};
 use traces::energy::{PowerIntegral, TrueFrame};
-use traces::frames::{default_window, find, Found, Marks};
-use traces::score::{score, Score, TOLERANCE_S};
+use traces::frames::{Found, Marks, default_window, find};
+use traces::score::{Score, TOLERANCE_S, score};
 use traces::{Curve, CurveBuilder, Trace};
 
 /// The mobile device of `shared/peers/traces`, with noise for a ratio of power variance to noise variance.
@@ -47,8 +48,16 @@ fn vsync_frames_are_all_found_from_40_to_10_db_without_a_warning() {
         let (found, score) = analyse(&sampled(&case, snr_db), &case, 20, 1.0 / 30.0);
         assert_eq!((score.matched, score.found), (60, 60), "{snr_db} dB: {:?}", found.threshold);
         assert!(found.warnings.is_empty(), "{snr_db} dB: {:?}", found.warnings);
-        assert!(score.median_timing_error_s().unwrap() < timing_s, "{snr_db} dB: {:?}", score.median_timing_error_s());
-        assert!(score.median_energy_error().unwrap() < energy, "{snr_db} dB: {:?}", score.median_energy_error());
+        assert!(
+            score.median_timing_error_s().unwrap() < timing_s,
+            "{snr_db} dB: {:?}",
+            score.median_timing_error_s()
+        );
+        assert!(
+            score.median_energy_error().unwrap() < energy,
+            "{snr_db} dB: {:?}",
+            score.median_energy_error()
+        );
     }
 }
 
@@ -58,8 +67,16 @@ fn free_running_frames_are_all_found_from_40_to_10_db() {
     for (snr_db, timing_s, energy) in [(40.0, 25e-6, 0.002), (20.0, 25e-6, 0.004), (10.0, 60e-6, 0.01)] {
         let (found, score) = analyse(&sampled(&case, snr_db), &case, 40, 1.0 / 90.0);
         assert_eq!((score.matched, score.found), (120, 120), "{snr_db} dB: {:?}", found.threshold);
-        assert!(score.median_timing_error_s().unwrap() < timing_s, "{snr_db} dB: {:?}", score.median_timing_error_s());
-        assert!(score.median_energy_error().unwrap() < energy, "{snr_db} dB: {:?}", score.median_energy_error());
+        assert!(
+            score.median_timing_error_s().unwrap() < timing_s,
+            "{snr_db} dB: {:?}",
+            score.median_timing_error_s()
+        );
+        assert!(
+            score.median_energy_error().unwrap() < energy,
+            "{snr_db} dB: {:?}",
+            score.median_energy_error()
+        );
     }
 }
 
@@ -69,7 +86,10 @@ fn square_wave(count: u32, period_s: f64, busy_s: f64) -> Case {
     builder.push(0.01, 5.0).unwrap();
     let mut truth = Vec::new();
     for _ in 0..count {
-        truth.push(TrueFrame { start_s: builder.now_s(), energy_j: 20.0 * busy_s + 5.0 * (period_s - busy_s) });
+        truth.push(TrueFrame {
+            start_s: builder.now_s(),
+            energy_j: 20.0 * busy_s + 5.0 * (period_s - busy_s),
+        });
         builder.push(busy_s, 20.0).unwrap();
         builder.push(period_s - busy_s, 5.0).unwrap();
     }
@@ -102,7 +122,11 @@ fn analytic_a_square_wave_off_the_sample_grid_gives_its_starts_and_energies() {
 fn frames_shorter_than_the_usual_window_are_found_with_one_that_fits() {
     // 80 samples a frame, against a usual window of 250.
     let case = square_wave(300, 80.0 / 50e3, 30.0 / 50e3);
-    let trace = Device::new(DeviceSpec::default()).unwrap().sample(&case.curve, 0.0, case.curve.end_s()).unwrap().trace;
+    let trace = Device::new(DeviceSpec::default())
+        .unwrap()
+        .sample(&case.curve, 0.0, case.curve.end_s())
+        .unwrap()
+        .trace;
     let (found, score) = analyse(&trace, &case, 100, 80.0 / 50e3);
     assert_eq!((score.matched, score.found), (300, 300), "{:?}", found.threshold);
 }
@@ -114,7 +138,10 @@ fn several_marks_are_all_exact_and_help_each_other() {
     let marks = [10, 50, 90].map(|frame: usize| case.truth[frame].start_s);
     let window = default_window(0.01, 50e3);
     let found = find(&trace, &Marks { starts_s: marks.to_vec(), window, end_s: case.end_s }).unwrap();
-    assert_eq!(found.starts.iter().filter(|start| start.marked).map(|start| start.time_s).collect::<Vec<_>>(), marks);
+    assert_eq!(
+        found.starts.iter().filter(|start| start.marked).map(|start| start.time_s).collect::<Vec<_>>(),
+        marks
+    );
     let score = score(&PowerIntegral::new(&trace).frames(&found), &case.truth, TOLERANCE_S);
     assert_eq!((score.matched, score.found), (100, 100));
 }
@@ -130,16 +157,26 @@ fn a_frame_like_no_other_is_reported_alone_with_a_warning() {
     for _ in 0..2000 {
         builder.push(0.1e-3 + 1e-3 * dice.roll(), 1.0 + 10.0 * dice.roll()).unwrap();
     }
-    let case = Case { truth: vec![TrueFrame { start_s: 0.5, energy_j: 1.0 }], end_s: 1.0, curve: builder.build().unwrap() };
+    let case = Case {
+        truth: vec![TrueFrame { start_s: 0.5, energy_j: 1.0 }],
+        end_s: 1.0,
+        curve: builder.build().unwrap(),
+    };
     let (found, _) = analyse(&sampled(&case, 40.0), &case, 0, 1.0);
-    assert!(codes(&found).iter().any(|code| ["only-mark", "weak-separation"].contains(code)), "{:?}", found.threshold);
+    assert!(
+        codes(&found).iter().any(|code| ["only-mark", "weak-separation"].contains(code)),
+        "{:?}",
+        found.threshold
+    );
 }
 
 #[test]
 fn each_warning_fires_on_its_case() {
     // One frame in idle: nothing to compare with.
     let case = square_wave(1, 0.02, 0.005);
-    let quiet = |curve: &Curve| Device::new(DeviceSpec::default()).unwrap().sample(curve, 0.0, curve.end_s()).unwrap().trace;
+    let quiet = |curve: &Curve| {
+        Device::new(DeviceSpec::default()).unwrap().sample(curve, 0.0, curve.end_s()).unwrap().trace
+    };
     assert_eq!(codes(&analyse(&quiet(&case.curve), &case, 0, 0.02).0), ["only-mark"]);
     // A mark right at the start of the trace.
     let case = square_wave(20, 0.01, 0.004);

@@ -1,11 +1,12 @@
 //! What holds for every curve, trace and set of frames.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
 use proptest::prelude::*;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::PowerIntegral;
-use traces::frames::{default_window, find, Marks};
+use traces::frames::{Marks, default_window, find};
 use traces::{Curve, CurveBuilder, Metadata, Trace};
 
 fn curve_from(segments: &[(f64, f64)]) -> Curve {
@@ -59,11 +60,13 @@ fn the_quantization_bound_is_no_more_than_a_hundred_times_the_typical_error() {
     let mut dice = common::Dice(17);
     let (mut errors_j, mut bounds_j) = (0.0, 0.0);
     for _ in 0..50 {
-        let segments: Vec<(f64, f64)> = (0..1000).map(|_| (1e-3 * dice.roll(), 100.0 * dice.roll())).collect();
+        let segments: Vec<(f64, f64)> =
+            (0..1000).map(|_| (1e-3 * dice.roll(), 100.0 * dice.roll())).collect();
         let curve = curve_from(&segments);
         let device = Device::new(DeviceSpec { rate_hz: 1e3, ..DeviceSpec::default() }).unwrap().noise_free();
         let sampled = device.sample(&curve, 0.0, curve.end_s()).unwrap();
-        errors_j += (PowerIntegral::new(&sampled.trace).total_j() - curve.energy_j(0.0, sampled.trace.end_s())).abs();
+        errors_j +=
+            (PowerIntegral::new(&sampled.trace).total_j() - curve.energy_j(0.0, sampled.trace.end_s())).abs();
         bounds_j += device.quantization_energy_bound_j(&sampled).unwrap();
     }
     assert!(bounds_j < 100.0 * errors_j, "bound over error: {}", bounds_j / errors_j);
@@ -91,7 +94,8 @@ fn frames_add_up_to_the_integral_from_the_first_start_to_the_end_mark() {
     for (case, period_s) in [(common::vsync(40), 1.0 / 30.0), (common::free_running(80), 0.01)] {
         let device = Device::new(DeviceSpec { current_noise_a: 0.02, ..DeviceSpec::default() }).unwrap();
         let trace = device.sample(&case.curve, 0.0, case.curve.end_s()).unwrap().trace;
-        let marks = Marks::one(case.truth[13].start_s, default_window(period_s, 50e3), case.end_s - 0.0012345);
+        let marks =
+            Marks::one(case.truth[13].start_s, default_window(period_s, 50e3), case.end_s - 0.0012345);
         let found = find(&trace, &marks).unwrap();
         let integral = PowerIntegral::new(&trace);
         let sum_j: f64 = integral.frames(&found).iter().map(|frame| frame.energy_j).sum();
@@ -107,7 +111,8 @@ fn sampling_and_finding_give_the_same_bits_twice() {
     let run = || {
         let device = Device::new(DeviceSpec::default()).unwrap();
         let trace = device.sample(&case.curve, 0.0, case.curve.end_s()).unwrap().trace;
-        let found = find(&trace, &Marks::one(case.truth[9].start_s, default_window(0.01, 50e3), case.end_s)).unwrap();
+        let found =
+            find(&trace, &Marks::one(case.truth[9].start_s, default_window(0.01, 50e3), case.end_s)).unwrap();
         (trace, found)
     };
     assert_eq!(run(), run());

@@ -1,4 +1,5 @@
 //! What is written is what is read, to the bit, and the same bytes every time.
+#![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -82,7 +83,9 @@ fn the_same_trace_gives_the_same_bytes() {
 
 #[test]
 fn golden_csv_of_three_samples_at_50_khz() {
-    let trace = Trace::new(vec![3.85, 3.845_215, 0.0], vec![0.1, -0.25, 1e-7], 50e3, -2e-5, Metadata::default()).unwrap();
+    let trace =
+        Trace::new(vec![3.85, 3.845_215, 0.0], vec![0.1, -0.25, 1e-7], 50e3, -2e-5, Metadata::default())
+            .unwrap();
     let mut out = Vec::new();
     csv::write(&trace, &mut out).unwrap();
     assert_eq!(
@@ -95,9 +98,16 @@ fn golden_csv_of_three_samples_at_50_khz() {
 fn without_a_description_csv_takes_rate_and_start_from_its_times() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("meter.csv");
-    std::fs::write(&path, "note, CURRENT_a ,Time_S,voltage_v\nx,1,10.00002,5\ny,2,10.00004,5\nz,3,10.00006,5\n").unwrap();
+    std::fs::write(
+        &path,
+        "note, CURRENT_a ,Time_S,voltage_v\nx,1,10.00002,5\ny,2,10.00004,5\nz,3,10.00006,5\n",
+    )
+    .unwrap();
     let trace = csv::read(&path).unwrap();
-    assert_eq!((trace.rate_hz(), trace.start_s(), trace.current_a()), (50e3, 10.000_02, &[1.0, 2.0, 3.0][..]));
+    assert_eq!(
+        (trace.rate_hz(), trace.start_s(), trace.current_a()),
+        (50e3, 10.000_02, &[1.0, 2.0, 3.0][..])
+    );
 }
 
 #[test]
@@ -105,7 +115,8 @@ fn a_stated_rate_stands_in_for_missing_times() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("meter.csv");
     std::fs::write(&path, "voltage_V,current_A\n5,1\n5,2\n").unwrap();
-    std::fs::write(csv::sidecar_path(&path), r#"{"sample_rate_hz": 1000.0, "start_s": 2.5, "case": "v30"}"#).unwrap();
+    std::fs::write(csv::sidecar_path(&path), r#"{"sample_rate_hz": 1000.0, "start_s": 2.5, "case": "v30"}"#)
+        .unwrap();
     let trace = csv::read(&path).unwrap();
     assert_eq!((trace.rate_hz(), trace.start_s()), (1000.0, 2.5));
     assert_eq!(trace.metadata.other["case"], "v30");

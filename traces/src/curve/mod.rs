@@ -78,7 +78,9 @@ impl Curve {
             return Err(CurveError::Lengths { edges: edges_s.len(), segments: watts.len() });
         }
         check_edges(&edges_s)?;
-        if let Some((index, &power_w)) = watts.iter().enumerate().find(|(_, w)| !(w.is_finite() && **w >= 0.0)) {
+        if let Some((index, &power_w)) =
+            watts.iter().enumerate().find(|(_, w)| !(w.is_finite() && **w >= 0.0))
+        {
             return Err(CurveError::Power { index, power_w });
         }
         let prefix_j = prefix_energy(&edges_s, &watts);
@@ -209,7 +211,9 @@ mod tests {
 
     #[test]
     fn each_bad_curve_names_what_is_wrong() {
-        let message = |edges: &[f64], watts: &[f64]| Curve::new(edges.to_vec(), watts.to_vec()).unwrap_err().to_string();
+        let message = |edges: &[f64], watts: &[f64]| {
+            Curve::new(edges.to_vec(), watts.to_vec()).unwrap_err().to_string()
+        };
         assert!(message(&[0.0], &[]).contains("at least one segment"));
         assert!(message(&[0.0, 1.0], &[1.0, 2.0]).contains("2 segments need 3 edges, 2 were given"));
         assert!(message(&[0.0, 0.0], &[1.0]).contains("edge 1 at 0 s"));

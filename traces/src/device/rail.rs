@@ -37,7 +37,9 @@ mod tests {
 
     #[test]
     fn volts_times_amperes_is_the_power_and_the_rail_sags_by_r_i() {
-        for (volts, ohm, power_w) in [(12.0, 0.004, 150.0), (3.85, 0.06, 3.2), (5.0, 0.0, 7.0), (1.0, 1.0, 0.25)] {
+        for (volts, ohm, power_w) in
+            [(12.0, 0.004, 150.0), (3.85, 0.06, 3.2), (5.0, 0.0, 7.0), (1.0, 1.0, 0.25)]
+        {
             let (v, i) = Rail::new(volts, ohm).solve(power_w).unwrap();
             assert!((v * i / power_w - 1.0).abs() < 1e-14);
             assert!((volts - ohm * i - v).abs() < 1e-14 * volts);

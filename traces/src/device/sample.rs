@@ -1,7 +1,7 @@
 //! Sampling a curve.
 
-use super::noise::Noise;
 use super::Device;
+use super::noise::Noise;
 use crate::curve::Curve;
 use crate::metadata::Metadata;
 use crate::trace::{Trace, TraceError};
@@ -11,7 +11,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SampleError {
     /// The span is not within the curve.
-    #[error("cannot sample {start_s} s to {end_s} s: the power curve covers {curve_start_s} s to {curve_end_s} s")]
+    #[error(
+        "cannot sample {start_s} s to {end_s} s: the power curve covers {curve_start_s} s to {curve_end_s} s"
+    )]
     Span {
         /// Asked start, s.
         start_s: f64,
@@ -23,7 +25,9 @@ pub enum SampleError {
         curve_end_s: f64,
     },
     /// The span is shorter than one sample.
-    #[error("{start_s} s to {end_s} s is shorter than one sample at {rate_hz} Hz: raise the rate or sample longer")]
+    #[error(
+        "{start_s} s to {end_s} s is shorter than one sample at {rate_hz} Hz: raise the rate or sample longer"
+    )]
     TooShort {
         /// Asked start, s.
         start_s: f64,
@@ -85,7 +89,8 @@ impl Device {
             low_pass(&mut means_w, time_constant_s * self.spec.rate_hz);
         }
         let channels = self.convert(&means_w, start_s)?;
-        let metadata = Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..Metadata::default() };
+        let metadata =
+            Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..Metadata::default() };
         let trace = Trace::new(channels.voltage_v, channels.current_a, self.spec.rate_hz, start_s, metadata)?;
         Ok(Sampled {
             trace,
@@ -166,7 +171,8 @@ mod tests {
 
     #[test]
     fn clipping_is_counted() {
-        let device = Device::new(DeviceSpec { current_range_a: [0.0, 1.0], ..DeviceSpec::default() }).unwrap();
+        let device =
+            Device::new(DeviceSpec { current_range_a: [0.0, 1.0], ..DeviceSpec::default() }).unwrap();
         let sampled = device.sample(&curve(24.0), 0.0, 0.01).unwrap();
         assert_eq!((sampled.clipped_currents, sampled.clipped_voltages), (500, 0));
     }
@@ -182,8 +188,12 @@ mod tests {
     #[test]
     fn each_way_to_fail_says_where() {
         let device = Device::new(DeviceSpec::default()).unwrap();
-        let message = |device: &Device, watts: f64, a: f64, b: f64| device.sample(&curve(watts), a, b).unwrap_err().to_string();
-        assert!(message(&device, 1.0, 0.5, 1.5).contains("0.5 s to 1.5 s: the power curve covers 0 s to 1 s"));
+        let message = |device: &Device, watts: f64, a: f64, b: f64| {
+            device.sample(&curve(watts), a, b).unwrap_err().to_string()
+        };
+        assert!(
+            message(&device, 1.0, 0.5, 1.5).contains("0.5 s to 1.5 s: the power curve covers 0 s to 1 s")
+        );
         assert!(message(&device, 1.0, f64::NAN, 1.0).contains("NaN"));
         assert!(message(&device, 1.0, 0.5, 0.5).contains("shorter than one sample"));
         assert!(message(&device, 9_001.0, 0.25, 0.5).contains("at 0.25 s the load draws 9001"));

@@ -84,10 +84,17 @@ impl DeviceSpec {
             ("bits", f64::from(self.bits), (1..=24).contains(&self.bits), "between 1 and 24"),
             ("current_noise_a", self.current_noise_a, quiet(self.current_noise_a), not_negative),
             ("voltage_noise_v", self.voltage_noise_v, quiet(self.voltage_noise_v), not_negative),
-            ("low_pass_s", low_pass_s, low_pass_s.is_finite() && low_pass_s > 0.0, "a finite number above 0, or absent"),
+            (
+                "low_pass_s",
+                low_pass_s,
+                low_pass_s.is_finite() && low_pass_s > 0.0,
+                "a finite number above 0, or absent",
+            ),
         ];
         match checks.into_iter().find(|(_, _, good, _)| !good) {
-            Some((field, value, _, must)) => Err(DeviceError { device: self.name.clone(), field, value, must }),
+            Some((field, value, _, must)) => {
+                Err(DeviceError { device: self.name.clone(), field, value, must })
+            }
             None => Ok(()),
         }
     }

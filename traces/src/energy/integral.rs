@@ -84,7 +84,10 @@ mod tests {
         let integral = PowerIntegral::new(&trace);
         for (a_s, b_s) in [(1.0, 101.0), (1.234, 77.7), (26.55, 26.61), (0.0, 30.0)] {
             let by_rule: f64 = (0..trace.samples())
-                .map(|i| trace.power_w(i) * (f64::min(trace.time_s(i + 1), b_s) - f64::max(trace.time_s(i), a_s)).max(0.0))
+                .map(|i| {
+                    trace.power_w(i)
+                        * (f64::min(trace.time_s(i + 1), b_s) - f64::max(trace.time_s(i), a_s)).max(0.0)
+                })
                 .sum();
             assert!((integral.energy_j(a_s, b_s) / by_rule - 1.0).abs() < 1e-12);
         }

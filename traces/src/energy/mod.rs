@@ -8,4 +8,4 @@ mod table;
 pub use frame::{FrameEnergy, TrueFrame};
 pub use integral::PowerIntegral;
 pub use summary::{Spread, Summary};
-pub use table::{FrameTable, TableError, TABLE_COLUMNS};
+pub use table::{FrameTable, TABLE_COLUMNS, TableError};

@@ -50,7 +50,8 @@ pub struct Summary {
 impl Summary {
     /// Of some frames; `None` for no frames.
     pub fn of(frames: &[FrameEnergy]) -> Option<Self> {
-        let spread = |value: fn(&FrameEnergy) -> f64| Spread::of(&frames.iter().map(value).collect::<Vec<_>>());
+        let spread =
+            |value: fn(&FrameEnergy) -> f64| Spread::of(&frames.iter().map(value).collect::<Vec<_>>());
         Some(Self {
             frames: frames.len(),
             total_j: frames.iter().map(|frame| frame.energy_j).sum(),

@@ -120,7 +120,8 @@ mod tests {
     #[test]
     fn golden_rows_with_and_without_truth() {
         let truth = TrueFrame { start_s: 0.25, energy_j: 0.124 };
-        let table = FrameTable::new(vec![frame(), frame()], Some(1000)).with_truth(vec![Some(truth), None]).unwrap();
+        let table =
+            FrameTable::new(vec![frame(), frame()], Some(1000)).with_truth(vec![Some(truth), None]).unwrap();
         let mut out = Vec::new();
         table.write_csv(&mut out).unwrap();
         assert_eq!(

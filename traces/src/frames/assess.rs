@@ -1,9 +1,9 @@
 //! How sure the finder is, and what it has to say about the result as a whole.
 
-use super::find::{FrameSpan, FrameStart, Found};
+use super::find::{Found, FrameSpan, FrameStart};
 use super::flags::{Flag, Flags};
 use super::marks::{Marks, Placement, Window};
-use super::threshold::{Rule, Threshold, DISTINCT};
+use super::threshold::{DISTINCT, Rule, Threshold};
 use crate::trace::Trace;
 use crate::warning::Warning;
 
@@ -66,7 +66,12 @@ fn spans(starts: &[FrameStart], end_s: f64) -> Vec<FrameSpan> {
         if confidence < 0.5 {
             flags.insert(Flag::Unsure);
         }
-        frames.push(FrameSpan { start_s: start.time_s, end_s: next.map_or(end_s, |next| next.time_s), confidence, flags });
+        frames.push(FrameSpan {
+            start_s: start.time_s,
+            end_s: next.map_or(end_s, |next| next.time_s),
+            confidence,
+            flags,
+        });
     }
     flag_lengths(&mut frames);
     frames

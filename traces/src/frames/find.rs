@@ -5,7 +5,7 @@ use super::marks::{MarkError, Marks, Placement, Window};
 use super::minima::spaced_minima;
 use super::profile::summed_squared_difference;
 use super::regularity::regularity;
-use super::threshold::{choose, Threshold};
+use super::threshold::{Threshold, choose};
 use super::{assess, refine};
 use crate::trace::Trace;
 use crate::warning::Warning;
@@ -104,12 +104,15 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let candidates: Vec<Candidate> = spaced_minima(&profile, spacing)
         .into_iter()
         .map(|offset| Candidate { offset, distance_w2: profile[offset] })
-        .filter(|candidate| placement.marks.iter().all(|mark| mark.first.abs_diff(candidate.offset) >= spacing))
+        .filter(|candidate| {
+            placement.marks.iter().all(|mark| mark.first.abs_diff(candidate.offset) >= spacing)
+        })
         .collect();
     let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
     let noise_w2 = 2.0 * placement.samples as f64 * noise_variance(&power);
     let background_w2 = median(profile.iter().copied(), profile.len());
-    let threshold = choose(&distances, background_w2, noise_w2, |value_w2| evenness(&candidates, &placement, value_w2));
+    let threshold =
+        choose(&distances, background_w2, noise_w2, |value_w2| evenness(&candidates, &placement, value_w2));
 
     let mut starts = marked_starts(&placement, &profile);
     let view = View { trace, power: &power, placement: &placement, threshold: &threshold };
@@ -128,10 +131,14 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
 
 /// How evenly the starts are spaced if the threshold is `value_w2`.
 fn evenness(candidates: &[Candidate], placement: &Placement, value_w2: f64) -> f64 {
-    let below = candidates.iter().filter(|candidate| candidate.distance_w2 < value_w2).map(|candidate| candidate.offset);
+    let below = candidates
+        .iter()
+        .filter(|candidate| candidate.distance_w2 < value_w2)
+        .map(|candidate| candidate.offset);
     let mut offsets: Vec<usize> = below.chain(placement.marks.iter().map(|mark| mark.first)).collect();
     offsets.sort_unstable();
-    let span = candidates.last().map_or(0, |last| last.offset) - candidates.first().map_or(0, |first| first.offset);
+    let span =
+        candidates.last().map_or(0, |last| last.offset) - candidates.first().map_or(0, |first| first.offset);
     regularity(&offsets, span)
 }
 
@@ -143,7 +150,10 @@ fn spacing(window_samples: usize) -> usize {
 /// The smallest distance to any mark's window at each offset, and with several marks which one it was.
 fn nearest_profile(power: &[f64], placement: &Placement) -> (Vec<f64>, Vec<usize>) {
     let template = |first: usize| &power[first..first + placement.samples];
-    let mut profile = placement.marks.first().map_or(Vec::new(), |mark| summed_squared_difference(power, template(mark.first)));
+    let mut profile = placement
+        .marks
+        .first()
+        .map_or(Vec::new(), |mark| summed_squared_difference(power, template(mark.first)));
     let mut nearest = Vec::new();
     for (index, mark) in placement.marks.iter().enumerate().skip(1) {
         nearest.resize(profile.len(), 0);

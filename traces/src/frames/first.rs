@@ -1,7 +1,7 @@
 //! The first frame of a free-running stretch: nothing was drawn before it, so what lies before the mark differs.
 
 use super::assess::confidence;
-use super::find::{FrameStart, View, REACH};
+use super::find::{FrameStart, REACH, View};
 use super::profile::summed_squared_difference;
 use super::refine::align;
 
@@ -29,7 +29,12 @@ impl View<'_> {
             (inside && distance_w2 < self.threshold.value_w2).then_some((time_s, distance_w2))
         });
         let (time_s, distance_w2) = found.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some(FrameStart { time_s, distance_w2, confidence: confidence(distance_w2, self.threshold), marked: false })
+        Some(FrameStart {
+            time_s,
+            distance_w2,
+            confidence: confidence(distance_w2, self.threshold),
+            marked: false,
+        })
     }
 }
 

@@ -34,7 +34,9 @@ pub enum MarkError {
         end_s: f64,
     },
     /// The end mark is not after every marked start, or outside the trace.
-    #[error("the end mark {end_mark_s} s must be after the marked start {mark_s} s and not after the trace's end {end_s} s")]
+    #[error(
+        "the end mark {end_mark_s} s must be after the marked start {mark_s} s and not after the trace's end {end_s} s"
+    )]
     End {
         /// The end mark, s.
         end_mark_s: f64,
@@ -115,7 +117,8 @@ impl Marks {
         let wanted = [libm::round(self.window.pre_s * rate_hz), libm::round(self.window.post_s * rate_hz)];
         let centre = |mark_s: f64| libm::round(trace.position(mark_s));
         let room_before = self.starts_s.iter().map(|&s| centre(s)).fold(f64::INFINITY, f64::min);
-        let room_after = trace.samples() as f64 - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
+        let room_after =
+            trace.samples() as f64 - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
         let pre = wanted[0].min(room_before);
         let post = wanted[1].min(room_after);
         if pre + post < LEAST_SAMPLES as f64 {
@@ -126,7 +129,11 @@ impl Marks {
             Placed { first: first as usize, anchor: trace.position(mark_s) - first, mark_s }
         };
         let cut = pre < wanted[0] || post < wanted[1];
-        Ok(Placement { marks: self.starts_s.iter().map(place).collect(), samples: (pre + post) as usize, cut })
+        Ok(Placement {
+            marks: self.starts_s.iter().map(place).collect(),
+            samples: (pre + post) as usize,
+            cut,
+        })
     }
 
     fn no_room(&self, trace: &Trace, wanted_samples: f64) -> MarkError {
@@ -139,7 +146,9 @@ impl Marks {
     }
 
     fn check(&self, trace: &Trace) -> Result<(), MarkError> {
-        for (what, value_s) in [("window before the mark", self.window.pre_s), ("window after the mark", self.window.post_s)] {
+        for (what, value_s) in
+            [("window before the mark", self.window.pre_s), ("window after the mark", self.window.post_s)]
+        {
             if !(value_s.is_finite() && value_s >= 0.0) {
                 return Err(MarkError::NotFinite { what, value_s });
             }
@@ -151,7 +160,11 @@ impl Marks {
         for &mark_s in &self.starts_s {
             // Written so that NaN fails, too.
             if !(mark_s >= trace.start_s() && mark_s <= trace.end_s()) {
-                return Err(MarkError::OutsideTrace { mark_s, start_s: trace.start_s(), end_s: trace.end_s() });
+                return Err(MarkError::OutsideTrace {
+                    mark_s,
+                    start_s: trace.start_s(),
+                    end_s: trace.end_s(),
+                });
             }
             if !(self.end_s > mark_s && self.end_s <= trace.end_s() + half_sample_s) {
                 return Err(MarkError::End { end_mark_s: self.end_s, mark_s, end_s: trace.end_s() });
@@ -202,8 +215,17 @@ mod tests {
         assert!(message(Marks::one(f64::NAN, WINDOW, 3.0)).contains("marked at NaN s"));
         assert!(message(Marks::one(2.5, WINDOW, 2.4)).contains("end mark 2.4 s"));
         assert!(message(Marks::one(2.5, WINDOW, 3.5)).contains("end mark 3.5 s"));
-        assert!(message(Marks::one(2.5, Window { pre_s: -1.0, post_s: 0.4 }, 3.0)).contains("window before the mark = -1 s"));
-        assert!(message(Marks::one(2.5, Window { pre_s: 0.0, post_s: 0.02 }, 3.0)).contains("fewer than 4 samples"));
-        assert!(message(Marks::one(2.999, Window { pre_s: 0.0, post_s: 0.5 }, 3.0)).contains("mark a frame further inside"));
+        assert!(
+            message(Marks::one(2.5, Window { pre_s: -1.0, post_s: 0.4 }, 3.0))
+                .contains("window before the mark = -1 s")
+        );
+        assert!(
+            message(Marks::one(2.5, Window { pre_s: 0.0, post_s: 0.02 }, 3.0))
+                .contains("fewer than 4 samples")
+        );
+        assert!(
+            message(Marks::one(2.999, Window { pre_s: 0.0, post_s: 0.5 }, 3.0))
+                .contains("mark a frame further inside")
+        );
     }
 }

@@ -14,7 +14,7 @@ mod regularity;
 mod split;
 mod threshold;
 
-pub use find::{find, Found, FrameSpan, FrameStart};
+pub use find::{Found, FrameSpan, FrameStart, find};
 pub use flags::{Flag, Flags};
-pub use marks::{default_window, MarkError, Marks, Window};
+pub use marks::{MarkError, Marks, Window, default_window};
 pub use threshold::{Population, Rule, Threshold};

@@ -70,7 +70,8 @@ mod tests {
 
     #[test]
     fn three_populations_come_apart_in_two_levels() {
-        let mut values: Vec<f64> = [0.0, 5.0, 6.0].iter().flat_map(|c| (0..10).map(move |i| c + 0.01 * f64::from(i))).collect();
+        let mut values: Vec<f64> =
+            [0.0, 5.0, 6.0].iter().flat_map(|c| (0..10).map(move |i| c + 0.01 * f64::from(i))).collect();
         values.sort_by(f64::total_cmp);
         let counts: Vec<usize> = otsu_tree(&values, 2).iter().map(|split| split.count).collect();
         assert_eq!(counts[0], 10);

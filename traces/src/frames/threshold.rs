@@ -1,6 +1,6 @@
 //! Which minima are frame starts: a threshold taken from the minima themselves, with its reason as data.
 
-use super::split::{moments, otsu_tree, Split};
+use super::split::{Split, moments, otsu_tree};
 use serde::Serialize;
 
 /// Excess distances below this share of the background are not told apart: how well a good match matches says nothing.
@@ -106,14 +106,20 @@ pub(super) fn choose(
         separation: 0.0,
         regularity: 0.0,
     };
-    let mut logs: Vec<f64> = distances.iter().map(|&distance_w2| libm::log(none.excess_w2(distance_w2))).collect();
+    let mut logs: Vec<f64> =
+        distances.iter().map(|&distance_w2| libm::log(none.excess_w2(distance_w2))).collect();
     logs.sort_by(f64::total_cmp);
-    let between = |split: &Split| none.noise_w2 + libm::exp(0.5 * (logs[split.count - 1] + logs[split.count]));
+    let between =
+        |split: &Split| none.noise_w2 + libm::exp(0.5 * (logs[split.count - 1] + logs[split.count]));
     let splits = otsu_tree(&logs, DEPTH);
     // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by that.
     // The first split stands on Otsu's criterion alone and is spared.
     let alike = |split: &Split| between(split) - none.noise_w2 < ALIKE * none.background_w2;
-    let best = most_regular(&splits, |index, split| if index == 0 || alike(split) { regularity(between(split)) } else { 0.0 });
+    let best =
+        most_regular(
+            &splits,
+            |index, split| if index == 0 || alike(split) { regularity(between(split)) } else { 0.0 },
+        );
     let chosen = match (splits.get(best), logs.last()) {
         (Some(split), _) => {
             let rule = if best == 0 { Rule::Otsu } else { Rule::OtsuRegular };
@@ -186,7 +192,8 @@ mod tests {
 
     #[test]
     fn two_clear_populations_are_split_between_them() {
-        let distances: Vec<f64> = (0..20).map(|i| 0.5 + 0.01 * f64::from(i)).chain((0..90).map(|i| 50.0 + f64::from(i))).collect();
+        let distances: Vec<f64> =
+            (0..20).map(|i| 0.5 + 0.01 * f64::from(i)).chain((0..90).map(|i| 50.0 + f64::from(i))).collect();
         let threshold = choose(&distances, 100.0, 0.4, |_| 1.0);
         assert_eq!((threshold.rule, threshold.matched.count, threshold.rest.count), (Rule::Otsu, 20, 90));
         assert!(threshold.value_w2 > 0.7 && threshold.value_w2 < 50.0 && threshold.separation > 5.0);

@@ -12,7 +12,10 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`].
-pub fn write_file<E>(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), WriteError>
+pub fn write_file<E>(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<(), WriteError>
 where
     E: Into<Box<dyn Error + Send + Sync>>,
 {
@@ -25,7 +28,11 @@ where
     written
 }
 
-fn write_whole<E>(path: &Path, temporary: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), WriteError>
+fn write_whole<E>(
+    path: &Path,
+    temporary: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<(), WriteError>
 where
     E: Into<Box<dyn Error + Send + Sync>>,
 {
@@ -75,7 +82,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let none = |_: &mut BufWriter<File>| Ok::<(), std::io::Error>(());
         let missing = folder.path().join("no/such/a.txt");
-        assert!(write_file(&missing, none).unwrap_err().to_string().contains("no/such/a.txt: cannot be written"));
-        assert!(write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: not the name of a file"));
+        assert!(
+            write_file(&missing, none).unwrap_err().to_string().contains("no/such/a.txt: cannot be written")
+        );
+        assert!(
+            write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: not the name of a file")
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use super::header::{self, Header};
 use super::timing::{self, Stamps};
-use super::{atomic, ReadError, WriteError};
+use super::{ReadError, WriteError, atomic};
 use crate::trace::Trace;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 use std::fs::{self, File};
@@ -75,7 +75,8 @@ pub fn read(path: &Path) -> Result<Trace, ReadError> {
         Err(error) => return Err(ReadError::io(&sidecar, error)),
     };
     let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
-    let mut reader = ReaderBuilder::new().flexible(true).trim(::csv::Trim::All).buffer_capacity(1 << 16).from_reader(file);
+    let mut reader =
+        ReaderBuilder::new().flexible(true).trim(::csv::Trim::All).buffer_capacity(1 << 16).from_reader(file);
     let columns = Columns::find(path, &mut reader)?;
     if columns.time.is_none() && header.rate_hz.is_none() {
         return Err(columns.missing(path, TIME));
@@ -89,7 +90,8 @@ pub fn read(path: &Path) -> Result<Trace, ReadError> {
     let stamps = if columns.time.is_some() { Stamps::Seconds(times) } else { Stamps::Absent };
     let grid = timing::grid(path, &stamps, &header)?;
     let [voltage_v, current_a] = channels;
-    Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata).map_err(|error| ReadError::trace(path, error))
+    Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata)
+        .map_err(|error| ReadError::trace(path, error))
 }
 
 /// Which fields hold what.
@@ -103,13 +105,25 @@ struct Columns {
 impl Columns {
     fn find(path: &Path, reader: &mut Reader<File>) -> Result<Self, ReadError> {
         let names = reader.byte_headers().map_err(|error| damaged(path, &error))?;
-        let names: Vec<String> = names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+        let names: Vec<String> =
+            names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
         let find = |column: &'static str| {
-            let mut hits = names.iter().enumerate().filter(|(_, name)| name.trim_start_matches('\u{feff}').eq_ignore_ascii_case(column));
+            let mut hits = names
+                .iter()
+                .enumerate()
+                .filter(|(_, name)| name.trim_start_matches('\u{feff}').eq_ignore_ascii_case(column));
             let hit = hits.next().map(|(index, _)| index);
-            if hits.next().is_some() { Err(ReadError::DuplicateColumn { path: path.to_owned(), column }) } else { Ok(hit) }
+            if hits.next().is_some() {
+                Err(ReadError::DuplicateColumn { path: path.to_owned(), column })
+            } else {
+                Ok(hit)
+            }
         };
-        let listed = if names.is_empty() { "none".to_owned() } else { names.iter().take(20).cloned().collect::<Vec<_>>().join(", ") };
+        let listed = if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.iter().take(20).cloned().collect::<Vec<_>>().join(", ")
+        };
         let mut columns = Self { time: find(TIME)?, channels: [0; 2], names: listed, count: names.len() };
         for (field, column) in CHANNELS.into_iter().enumerate() {
             columns.channels[field] = find(column)?.ok_or_else(|| columns.missing(path, column))?;
@@ -121,7 +135,11 @@ impl Columns {
         ReadError::MissingColumn { path: path.to_owned(), column, found: self.names.clone() }
     }
 
-    fn read_rows(&self, path: &Path, reader: &mut Reader<File>) -> Result<(Vec<f64>, [Vec<f32>; 2]), ReadError> {
+    fn read_rows(
+        &self,
+        path: &Path,
+        reader: &mut Reader<File>,
+    ) -> Result<(Vec<f64>, [Vec<f32>; 2]), ReadError> {
         let (mut times, mut channels) = (Vec::new(), [Vec::new(), Vec::new()]);
         let mut record = ByteRecord::new();
         for row in 1.. {
@@ -145,7 +163,12 @@ impl Columns {
 }
 
 /// A finite number, or the error that names its place.
-fn number<T: std::str::FromStr + Finite>(path: &Path, row: u64, column: &'static str, field: &[u8]) -> Result<T, ReadError> {
+fn number<T: std::str::FromStr + Finite>(
+    path: &Path,
+    row: u64,
+    column: &'static str,
+    field: &[u8],
+) -> Result<T, ReadError> {
     let text = std::str::from_utf8(field).ok();
     text.and_then(|text| text.parse().ok()).filter(T::finite).ok_or_else(|| {
         let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();

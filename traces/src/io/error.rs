@@ -154,9 +154,12 @@ impl ReadError {
     pub(super) fn trace(path: &Path, source: TraceError) -> Self {
         match source {
             TraceError::Empty => Self::Empty { path: path.to_owned() },
-            TraceError::NotFinite { row, channel, value } => {
-                Self::Value { path: path.to_owned(), row: row as u64, column: channel, value: value.to_string() }
-            }
+            TraceError::NotFinite { row, channel, value } => Self::Value {
+                path: path.to_owned(),
+                row: row as u64,
+                column: channel,
+                value: value.to_string(),
+            },
             source => Self::Trace { path: path.to_owned(), source },
         }
     }

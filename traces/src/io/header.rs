@@ -28,7 +28,9 @@ pub(super) struct Header {
 
 /// The description of a trace as JSON, on one line if it is to be put into a file's metadata.
 pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError> {
-    if let Some((index, mark)) = trace.metadata.marks.iter().enumerate().find(|(_, mark)| !mark.time_s.is_finite()) {
+    if let Some((index, mark)) =
+        trace.metadata.marks.iter().enumerate().find(|(_, mark)| !mark.time_s.is_finite())
+    {
         return Err(WriteError::Mark { index, time_s: mark.time_s });
     }
     let mut metadata = trace.metadata.clone();
@@ -53,7 +55,9 @@ pub(super) fn from_json(path: &Path, json: &str) -> Result<Header, ReadError> {
     let refuse = |reason: String| ReadError::Description { path: path.to_owned(), reason };
     let header: Header = serde_json::from_str(json).map_err(|error| refuse(error.to_string()))?;
     match header.rate_hz {
-        Some(rate_hz) if !(rate_hz.is_finite() && rate_hz > 0.0) => Err(refuse(format!("rate_hz is {rate_hz}, not above 0"))),
+        Some(rate_hz) if !(rate_hz.is_finite() && rate_hz > 0.0) => {
+            Err(refuse(format!("rate_hz is {rate_hz}, not above 0")))
+        }
         _ => Ok(header),
     }
 }

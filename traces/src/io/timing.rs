@@ -1,7 +1,7 @@
 //! From time stamps to a start and a rate, or to the row where they are not even.
 
-use super::header::Header;
 use super::ReadError;
+use super::header::Header;
 use std::path::Path;
 
 /// How far a stamp may be off its place, in sample periods: rounded stamps are, by less.
@@ -87,7 +87,12 @@ fn check_order(path: &Path, stamps: &Stamps) -> Result<(), ReadError> {
         let time_s = stamps.time_s(row);
         if !time_s.is_finite() {
             let value = time_s.to_string();
-            return Err(ReadError::Value { path: path.to_owned(), row: row as u64 + 1, column: "time_s", value });
+            return Err(ReadError::Value {
+                path: path.to_owned(),
+                row: row as u64 + 1,
+                column: "time_s",
+                value,
+            });
         }
         if row > 0 && stamps.since_s(row, row - 1) <= 0.0 {
             let before_s = stamps.time_s(row - 1);
@@ -98,7 +103,8 @@ fn check_order(path: &Path, stamps: &Stamps) -> Result<(), ReadError> {
 }
 
 fn fitted_rate_hz(path: &Path, stamps: &Stamps) -> Result<f64, ReadError> {
-    let mut steps: Vec<f64> = (1..stamps.len().min(GUESS_FROM + 1)).map(|row| stamps.since_s(row, row - 1)).collect();
+    let mut steps: Vec<f64> =
+        (1..stamps.len().min(GUESS_FROM + 1)).map(|row| stamps.since_s(row, row - 1)).collect();
     let middle = steps.len() / 2;
     let guess_s = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     for row in 1..stamps.len() {
@@ -122,7 +128,13 @@ fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
 }
 
 fn uneven(path: &Path, stamps: &Stamps, row: usize, off_periods: f64, rate_hz: f64) -> ReadError {
-    ReadError::Uneven { path: path.to_owned(), row: row as u64 + 1, time_s: stamps.time_s(row), off_periods, rate_hz }
+    ReadError::Uneven {
+        path: path.to_owned(),
+        row: row as u64 + 1,
+        time_s: stamps.time_s(row),
+        off_periods,
+        rate_hz,
+    }
 }
 
 #[cfg(test)]
@@ -135,10 +147,13 @@ mod tests {
 
     #[test]
     fn rates_come_out_whole_from_rounded_stamps() {
-        let nanoseconds = |rate: f64| Stamps::Nanoseconds((0..5000).map(|i| (f64::from(i) * 1e9 / rate).round() as i64).collect());
+        let nanoseconds = |rate: f64| {
+            Stamps::Nanoseconds((0..5000).map(|i| (f64::from(i) * 1e9 / rate).round() as i64).collect())
+        };
         assert_eq!(fit(nanoseconds(50e3)).unwrap().rate_hz, 50e3);
         assert_eq!(fit(nanoseconds(3e6)).unwrap().rate_hz, 3e6);
-        let microseconds = Stamps::Seconds((0..5000).map(|i| (f64::from(i) * 1e6 / 44_100.0).round() / 1e6).collect());
+        let microseconds =
+            Stamps::Seconds((0..5000).map(|i| (f64::from(i) * 1e6 / 44_100.0).round() / 1e6).collect());
         assert_eq!(fit(microseconds).unwrap().rate_hz, 44_100.0);
         let slow = fit(Stamps::Seconds((0..9).map(|i| 100.0 + 2.5 * f64::from(i)).collect())).unwrap();
         assert_eq!(slow, Grid { start_s: 100.0, rate_hz: 0.4 });
@@ -148,7 +163,10 @@ mod tests {
     fn each_bad_stamp_is_named_with_its_row() {
         let message = |times: &[f64]| fit(Stamps::Seconds(times.to_vec())).unwrap_err().to_string();
         assert!(message(&[0.0, 1.0, 1.0]).contains("t.csv: row 3: time 1 s is not after 1 s"));
-        assert!(message(&[0.0, 1.0, 2.0, 4.0, 5.0]).contains("row 4: time 4 s is 1.00 sample periods off an even rate of 1 Hz"));
+        assert!(
+            message(&[0.0, 1.0, 2.0, 4.0, 5.0])
+                .contains("row 4: time 4 s is 1.00 sample periods off an even rate of 1 Hz")
+        );
         assert!(message(&[0.0, 1.0, 2.0, 3.4, 4.0]).contains("row 4"));
         assert!(message(&[0.0, f64::NAN]).contains("row 2: time_s is NaN"));
         assert!(message(&[0.0]).contains("sample rate is unknown"));

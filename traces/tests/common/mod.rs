@@ -1,5 +1,5 @@
 //! Synthetic curves whose frames are known.
-#![allow(dead_code, missing_docs)]
+#![allow(dead_code, missing_docs, clippy::unwrap_used)]
 
 use traces::energy::TrueFrame;
 use traces::{Curve, CurveBuilder};
@@ -53,7 +53,10 @@ fn frames(count: u32, idle_w: f64, gap_w: f64, gap_s: impl Fn(f64, &mut Dice) ->
     builder.push(0.05, idle_w).unwrap();
     let curve = builder.build().unwrap();
     let ends_s = starts_s.iter().skip(1).copied().chain([end_s]);
-    let truth = starts_s.iter().zip(ends_s).map(|(&a_s, b_s)| TrueFrame { start_s: a_s, energy_j: curve.energy_j(a_s, b_s) });
+    let truth = starts_s
+        .iter()
+        .zip(ends_s)
+        .map(|(&a_s, b_s)| TrueFrame { start_s: a_s, energy_j: curve.energy_j(a_s, b_s) });
     let truth = truth.collect();
     Case { curve, truth, end_s }
 }

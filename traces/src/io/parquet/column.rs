@@ -47,11 +47,17 @@ pub(super) fn append<D: DataType, T>(
         values.clear();
         levels.clear();
         let definitions = (column.max_definition > 0).then_some(&mut levels);
-        let (records, _, _) =
-            reader.read_records(BATCH, definitions, None, &mut values).map_err(|error| damaged(path, &error))?;
+        let (records, _, _) = reader
+            .read_records(BATCH, definitions, None, &mut values)
+            .map_err(|error| damaged(path, &error))?;
         if let Some(missing) = levels.iter().position(|&level| level < column.max_definition) {
             let row = (into.len() + missing) as u64 + 1;
-            return Err(ReadError::Value { path: path.to_owned(), row, column: column.name, value: "missing".to_owned() });
+            return Err(ReadError::Value {
+                path: path.to_owned(),
+                row,
+                column: column.name,
+                value: "missing".to_owned(),
+            });
         }
         into.extend(values.iter().map(&convert));
         if records == 0 {

@@ -1,7 +1,7 @@
 //! Writing.
 
 use crate::io::header::{self, KEYS};
-use crate::io::{atomic, WriteError};
+use crate::io::{WriteError, atomic};
 use crate::trace::Trace;
 use parquet::basic::{Compression, Encoding, Repetition, Type as Physical};
 use parquet::data_type::{DataType, FloatType, Int64Type};
@@ -61,14 +61,18 @@ fn write_column<T: DataType, W: Write + Send>(
     values: &[T::T],
     rows: Range<usize>,
 ) -> Result<(), ParquetError> {
-    let mut column = group.next_column()?.ok_or_else(|| ParquetError::General("no column left".to_owned()))?;
+    let mut column =
+        group.next_column()?.ok_or_else(|| ParquetError::General("no column left".to_owned()))?;
     column.typed::<T>().write_batch(&values[rows], None, None)?;
     column.close()
 }
 
 fn schema() -> Result<Type, ParquetError> {
     let field = |(name, physical): (&str, Physical)| {
-        Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED).build().map(Arc::new)
+        Type::primitive_type_builder(name, physical)
+            .with_repetition(Repetition::REQUIRED)
+            .build()
+            .map(Arc::new)
     };
     let fields = FIELDS.into_iter().map(field).collect::<Result<Vec<_>, _>>()?;
     Type::group_type_builder("trace").with_fields(fields).build()
