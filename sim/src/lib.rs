@@ -1,1 +1,5 @@
-//! To be written.
+//! The simulator.
+
+pub mod gpu;
+pub mod output;
+pub mod timing;

@@ -4,11 +4,22 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::process::ExitCode;
 use traces::energy::{FrameTable, PowerIntegral};
 use traces::frames::{Marks, Window, default_window, find};
 use traces::{Trace, io};
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [path, mark_s, end_s, window @ ..] = arguments.as_slice() else {
         return Err("usage: find_frames TRACE MARK_S END_S [PRE_S POST_S]".into());

@@ -2,7 +2,7 @@
 
 use std::ops::{AddAssign, Index, IndexMut};
 
-use crate::{Counts, Event};
+use crate::{Counts, Event, Unit};
 
 /// What kind of work a packet is, which decides the units it passes through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,6 +31,11 @@ impl PacketCounts {
     /// Each event with its count, in declaration order.
     pub fn iter(&self) -> impl Iterator<Item = (Event, u32)> + '_ {
         Event::ALL.into_iter().zip(self.0.iter().copied())
+    }
+
+    /// Whether the packet causes anything in `unit`.
+    pub fn uses(&self, unit: Unit) -> bool {
+        self.iter().any(|(event, count)| count > 0 && event.unit() == unit)
     }
 }
 

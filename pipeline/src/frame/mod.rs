@@ -69,11 +69,14 @@ pub fn visibility(
     Ok(resolve::visible(&pass, &bins))
 }
 
-/// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch.
+/// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch. Bins are double
+/// buffered: the front end works on the next batch while tiles are traversed, so its packets come one batch ahead.
 fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Packet)) -> Vec<Bin> {
     let mut bins = Bin::all(pass);
-    for batch in pass.batches() {
-        let ready = vertices::front_end(pass, batch, replay, emit);
+    let mut batches = pass.batches();
+    let mut next = batches.next().map(|batch| vertices::front_end(pass, batch, replay, emit));
+    while let Some(ready) = next {
+        next = batches.next().map(|batch| vertices::front_end(pass, batch, replay, emit));
         let lists = bin::distribute(pass, &ready);
         let logs: Vec<_> = bins
             .par_iter_mut()

@@ -101,13 +101,7 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let power: Vec<f64> = trace.powers_w().collect();
     let (profile, nearest) = nearest_profile(&power, &placement);
     let spacing = spacing(placement.samples);
-    let candidates: Vec<Candidate> = spaced_minima(&profile, spacing)
-        .into_iter()
-        .map(|offset| Candidate { offset, distance_w2: profile[offset] })
-        .filter(|candidate| {
-            placement.marks.iter().all(|mark| mark.first.abs_diff(candidate.offset) >= spacing)
-        })
-        .collect();
+    let candidates = candidates(&profile, &placement, spacing);
     let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
     let noise_w2 = 2.0 * placement.samples as f64 * noise_variance(&power);
     let background_w2 = median(profile.iter().copied(), profile.len());
@@ -127,6 +121,17 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
     Ok(assess::conclude(trace, marks, &placement, starts, threshold))
+}
+
+/// The minima that could be starts, the marks and their surroundings left out.
+fn candidates(profile: &[f64], placement: &Placement, spacing: usize) -> Vec<Candidate> {
+    let beside_marks =
+        |offset: &usize| placement.marks.iter().all(|mark| mark.first.abs_diff(*offset) >= spacing);
+    spaced_minima(profile, spacing)
+        .into_iter()
+        .filter(beside_marks)
+        .map(|offset| Candidate { offset, distance_w2: profile[offset] })
+        .collect()
 }
 
 /// How evenly the starts are spaced if the threshold is `value_w2`.

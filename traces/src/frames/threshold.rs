@@ -94,18 +94,7 @@ pub(super) fn choose(
     noise_w2: f64,
     regularity: impl Fn(f64) -> f64,
 ) -> Threshold {
-    let lowest = distances.iter().copied().fold(f64::INFINITY, f64::min);
-    let noise_w2 = noise_w2.min(lowest);
-    let none = Threshold {
-        value_w2: 0.0,
-        rule: Rule::NoCandidates,
-        matched: Population::default(),
-        rest: Population::default(),
-        background_w2: (background_w2 - noise_w2).max(0.0),
-        noise_w2,
-        separation: 0.0,
-        regularity: 0.0,
-    };
+    let none = nothing(distances, background_w2, noise_w2);
     let mut logs: Vec<f64> =
         distances.iter().map(|&distance_w2| libm::log(none.excess_w2(distance_w2))).collect();
     logs.sort_by(f64::total_cmp);
@@ -115,11 +104,7 @@ pub(super) fn choose(
     // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by that.
     // The first split stands on Otsu's criterion alone and is spared.
     let alike = |split: &Split| between(split) - none.noise_w2 < ALIKE * none.background_w2;
-    let best =
-        most_regular(
-            &splits,
-            |index, split| if index == 0 || alike(split) { regularity(between(split)) } else { 0.0 },
-        );
+    let best = most_regular(&splits, alike, |split| regularity(between(split)));
     let chosen = match (splits.get(best), logs.last()) {
         (Some(split), _) => {
             let rule = if best == 0 { Rule::Otsu } else { Rule::OtsuRegular };
@@ -132,11 +117,31 @@ pub(super) fn choose(
     Threshold { regularity: regularity(chosen.value_w2), ..chosen }
 }
 
-/// The first split, unless another makes the spacing distinctly more regular.
-fn most_regular(splits: &[Split], regularity: impl Fn(usize, &Split) -> f64) -> usize {
-    let mut best = (0, splits.first().map_or(0.0, |split| regularity(0, split)) + MORE_REGULAR);
-    for (index, split) in splits.iter().enumerate().skip(1) {
-        let regular = regularity(index, split);
+/// The threshold that lets nothing in, with what is known before any minimum is judged.
+fn nothing(distances: &[f64], background_w2: f64, noise_w2: f64) -> Threshold {
+    let lowest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+    let noise_w2 = noise_w2.min(lowest);
+    Threshold {
+        value_w2: 0.0,
+        rule: Rule::NoCandidates,
+        matched: Population::default(),
+        rest: Population::default(),
+        background_w2: (background_w2 - noise_w2).max(0.0),
+        noise_w2,
+        separation: 0.0,
+        regularity: 0.0,
+    }
+}
+
+/// The first split, unless another eligible one makes the spacing distinctly more regular.
+fn most_regular(
+    splits: &[Split],
+    eligible: impl Fn(&Split) -> bool,
+    regularity: impl Fn(&Split) -> f64,
+) -> usize {
+    let mut best = (0, splits.first().map_or(0.0, &regularity) + MORE_REGULAR);
+    for (index, split) in splits.iter().enumerate().skip(1).filter(|(_, split)| eligible(split)) {
+        let regular = regularity(split);
         if regular > best.1 {
             best = (index, regular);
         }

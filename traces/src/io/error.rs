@@ -63,6 +63,16 @@ pub enum ReadError {
         /// The column.
         column: &'static str,
     },
+    /// A column is compressed in a way that needs a C library.
+    #[error("{path}: column {column} is compressed with {codec}, which is not read: write it with Snappy or uncompressed", path = path.display())]
+    Compression {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// The compression.
+        codec: String,
+    },
     /// A column has a type that cannot be used.
     #[error("{path}: column {column} is {found}, it must be {must}", path = path.display())]
     ColumnType {

@@ -101,20 +101,21 @@ fn propeller(graph: &mut Graph, palette: &Palette) {
 
 /// A ball that crosses the picture in the run, and rings that tumble.
 fn in_flight(graph: &mut Graph, palette: &Palette) {
-    let ball = shapes::sphere(0.42, 64, palette.stripes);
-    let flight = Motion { velocity: DVec3::new(9.0, 0.0, 0.0), spin: Spin::new(DVec3::Z, -3.4) };
-    place(graph, "ball", ball, [-3.6, 0.45, 1.3], DQuat::IDENTITY, flight);
-    let ring = shapes::torus(0.62, 0.17, 64, palette.green);
+    let ball = shapes::sphere(0.42, 48, palette.stripes);
+    let flight = Motion { velocity: DVec3::new(13.0, 0.0, 0.0), spin: Spin::new(DVec3::Z, -4.9) };
+    place(graph, "ball", ball, [-4.2, 0.45, 1.3], DQuat::IDENTITY, flight);
+    let ring = shapes::torus(0.62, 0.17, 56, palette.green);
     place(graph, "tumbling ring", ring, [-3.1, 2.5, -0.8], upright(), spin(DVec3::new(1.0, 0.4, 0.2), 2.5));
-    let ring = shapes::torus(0.45, 0.13, 64, palette.blue);
+    let ring = shapes::torus(0.45, 0.13, 56, palette.blue);
     place(graph, "spinning ring", ring, [1.5, 2.75, -0.6], upright(), spin(DVec3::Z.cross(DVec3::X), 1.2));
 }
 
-/// Close to the camera and far out of focus.
+/// Close to the camera and far out of focus. Few triangles do: each is tested over the whole of its blur, so
+/// what is smallest on the screen would cost the most.
 fn foreground(graph: &mut Graph, palette: &Palette) {
-    let ring = shapes::torus(0.40, 0.12, 64, palette.blue);
+    let ring = shapes::torus(0.40, 0.12, 24, palette.blue);
     place(graph, "near ring", ring, [-1.15, 1.45, 5.3], rotation(DVec3::X, 0.20), Motion::default());
-    let ball = shapes::sphere(0.26, 48, palette.red);
+    let ball = shapes::sphere(0.26, 20, palette.red);
     place(graph, "near ball", ball, [1.65, 1.35, 5.2], DQuat::IDENTITY, Motion::default());
     let block = shapes::cuboid(Vec3::splat(0.55), palette.cream);
     place(graph, "near block", block, [1.9, 0.28, 3.6], rotation(DVec3::Y, 0.09), Motion::default());
@@ -129,10 +130,10 @@ fn background(graph: &mut Graph, palette: &Palette) {
             let across = (f64::from(column) - 2.0) * (3.0 + 0.9 * f64::from(row));
             let back = -5.0 - 5.0 * f64::from(row);
             if (row + column) % 2 == 0 {
-                let mesh = shapes::sphere(0.8, 32, color);
+                let mesh = shapes::sphere(0.8, 24, color);
                 place(graph, "far ball", mesh, [across, 0.8, back], DQuat::IDENTITY, Motion::default());
             } else {
-                let mesh = shapes::torus(0.75, 0.25, 32, color);
+                let mesh = shapes::torus(0.75, 0.25, 24, color);
                 place(graph, "far ring", mesh, [across, 1.0, back], upright(), Motion::default());
             }
         }

@@ -85,13 +85,14 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let source = Source { path };
     let mut input = Reader::new(reader::open(path)?);
     let header = Parser::<Skipped>::new().read_header(&mut input);
-    let header = header.map_err(|error| source.broken("header", format!("not a PLY file: {error}")))?;
+    let header = header
+        .map_err(|error| source.broken("header", format!("not a PLY file: {}", in_one_line(&error))))?;
     check(&header).map_err(|message| source.broken("header", message))?;
     let mut soup = Soup::default();
     for element in header.elements.values() {
         let damaged = |error: ply_rs_bw::parser::ParseError| {
             let place = format!("element {}", element.name);
-            source.broken(place, format!("{error}; the file may be truncated: get it again"))
+            source.broken(place, format!("{}; the file may be truncated: get it again", in_one_line(&error)))
         };
         match element.name.as_str() {
             "vertex" => {
@@ -109,6 +110,11 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
         }
     }
     Ok(soup)
+}
+
+/// The parser's messages spread over several lines.
+fn in_one_line(error: &impl std::fmt::Display) -> String {
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn take_vertices(soup: &mut Soup, element: &ElementDef, vertices: Vec<Vertex>) {

@@ -20,7 +20,7 @@ impl Default for Light {
     fn default() -> Self {
         Self {
             toward: None,
-            color: Vec3::new(0.80, 0.77, 0.72),
+            color: Vec3::new(0.74, 0.71, 0.66),
             sky: Vec3::new(0.26, 0.29, 0.34),
             ground: Vec3::new(0.12, 0.11, 0.10),
         }

@@ -11,7 +11,7 @@ pub struct Settings {
     pub width: u32,
     /// Height of the image in pixels, 1 to 16384.
     pub height: u32,
-    /// Samples in a pixel, 1 to 1024.
+    /// Samples in a pixel, 1 to 256.
     pub samples: u32,
     /// Frames in a second of the scene's time.
     pub frame_rate_hz: f64,
@@ -95,8 +95,8 @@ impl Settings {
         ensure(side.contains(&self.width) && side.contains(&self.height), "size", || {
             format!("{}x{}: each side has to be 1 to 16384 pixels", self.width, self.height)
         })?;
-        ensure((1..=1024).contains(&self.samples), "samples", || {
-            format!("{}: a pixel takes 1 to 1024 samples", self.samples)
+        ensure((1..=256).contains(&self.samples), "samples", || {
+            format!("{}: a pixel takes 1 to 256 samples", self.samples)
         })?;
         let rate = self.frame_rate_hz;
         ensure(rate.is_finite() && rate > 0.0, "frame_rate_hz", || {

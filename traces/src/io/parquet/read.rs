@@ -5,7 +5,7 @@ use crate::io::ReadError;
 use crate::io::header::{self, Header, KEYS};
 use crate::io::timing::{self, Stamps};
 use crate::trace::Trace;
-use parquet::basic::Type as Physical;
+use parquet::basic::{Compression, Type as Physical};
 use parquet::column::reader::ColumnReader;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use std::fs::File;
@@ -56,6 +56,11 @@ fn read_columns(path: &Path, file: &SerializedFileReader<File>) -> Result<Trace,
 fn check_chunks(path: &Path, file: &SerializedFileReader<File>, size_bytes: u64) -> Result<(), ReadError> {
     for group in file.metadata().row_groups() {
         for chunk in group.columns() {
+            if !matches!(chunk.compression(), Compression::UNCOMPRESSED | Compression::SNAPPY) {
+                let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
+                let codec = codec.split('(').next().unwrap_or_default().to_owned();
+                return Err(ReadError::Compression { path: path.to_owned(), column, codec });
+            }
             let start = chunk
                 .dictionary_page_offset()
                 .map_or(chunk.data_page_offset(), |page| page.min(chunk.data_page_offset()));

@@ -19,7 +19,7 @@ pub(super) fn side<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D:
 }
 
 pub(super) fn samples<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
-    checked(from, |value| (1..=1024).contains(value), "a number of samples from 1 to 1024")
+    checked(from, |value| (1..=256).contains(value), "a number of samples from 1 to 256")
 }
 
 pub(super) fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {

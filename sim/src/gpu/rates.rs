@@ -1,0 +1,53 @@
+//! How many of each event a unit does in a cycle.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use activity::{Event, spec::suggestion};
+use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
+
+/// Events per cycle of one unit, each finite and above zero. Events without a rate take no time of their own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rates(BTreeMap<Event, f64>);
+
+impl Rates {
+    /// Each event with its rate, in declaration order.
+    pub fn iter(&self) -> impl Iterator<Item = (Event, f64)> + '_ {
+        self.0.iter().map(|(&event, &rate)| (event, rate))
+    }
+}
+
+impl<'de> Deserialize<'de> for Rates {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(RatesVisitor)
+    }
+}
+
+struct RatesVisitor;
+
+impl<'de> Visitor<'de> for RatesVisitor {
+    type Value = Rates;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a map from event names to events per cycle")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Rates, A::Error> {
+        let mut rates = BTreeMap::new();
+        while let Some(name) = map.next_key::<String>()? {
+            let event = Event::from_name(&name).ok_or_else(|| {
+                let known = Event::ALL.map(Event::name);
+                de::Error::custom(format!("unknown event `{name}`, {}", suggestion(&name, &known)))
+            })?;
+            let rate = map.next_value::<f64>()?;
+            if !(rate.is_finite() && rate > 0.0) {
+                let message = format!("`{name}` has the rate {rate}; it has to be finite and above zero");
+                return Err(de::Error::custom(message));
+            }
+            if rates.insert(event, rate).is_some() {
+                return Err(de::Error::custom(format!("`{name}` has two rates")));
+            }
+        }
+        Ok(Rates(rates))
+    }
+}

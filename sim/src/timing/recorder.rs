@@ -1,0 +1,135 @@
+//! Writes down when events happen, in bins.
+
+use activity::{Bin, Event, PacketCounts, Timeline, Unit};
+
+/// Collects activity into equal bins. Where a frame outgrows the most bins allowed, pairs of bins are merged, so memory
+/// stays bounded.
+#[derive(Clone, Debug)]
+pub struct Recorder {
+    bin_ps: u64,
+    bins: Vec<Bin>,
+    most_bins: usize,
+    events: [Vec<Event>; Unit::COUNT],
+    end_ps: u64,
+}
+
+impl Recorder {
+    /// A recorder with bins of `bin_ps` picoseconds to begin with and at most `most_bins` of them; both at least 2.
+    pub fn new(bin_ps: u64, most_bins: usize) -> Self {
+        let of = |unit| Event::ALL.into_iter().filter(|event| event.unit() == unit).collect();
+        Self {
+            bin_ps: bin_ps.max(2),
+            bins: Vec::new(),
+            most_bins: most_bins.max(2),
+            events: Unit::ALL.map(of),
+            end_ps: 0,
+        }
+    }
+
+    /// `unit` did its share of `counts` evenly from `start_ps` to `end_ps`.
+    pub fn record(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
+        self.end_ps = self.end_ps.max(end_ps);
+        self.reach(end_ps.max(start_ps + 1) - 1);
+        let (first, last) = (start_ps / self.bin_ps, (end_ps.max(start_ps + 1) - 1) / self.bin_ps);
+        let length = end_ps - start_ps;
+        for bin in first..=last {
+            let from = (bin * self.bin_ps).max(start_ps) - start_ps;
+            let to = ((bin + 1) * self.bin_ps).min(end_ps.max(start_ps)) - start_ps;
+            let target = &mut self.bins[bin as usize];
+            target.busy_ps[unit as usize] += to - from;
+            for &event in &self.events[unit as usize] {
+                let count = u64::from(counts[event]);
+                if count > 0 {
+                    // The share up to a time is rounded down, so that the shares add up to the whole.
+                    target.counts[event] +=
+                        if first == last { count } else { count * to / length - count * from / length };
+                }
+            }
+        }
+    }
+
+    /// Makes room for what happens at `at_ps`.
+    fn reach(&mut self, at_ps: u64) {
+        while at_ps / self.bin_ps >= self.most_bins as u64 {
+            self.merge();
+        }
+        let needed = (at_ps / self.bin_ps) as usize + 1;
+        if needed > self.bins.len() {
+            self.bins.resize(needed, Bin::default());
+        }
+    }
+
+    fn merge(&mut self) {
+        self.bin_ps *= 2;
+        self.bins = self
+            .bins
+            .chunks(2)
+            .map(|pair| {
+                let mut merged = pair[0];
+                if let Some(second) = pair.get(1) {
+                    merged.counts += &second.counts;
+                    merged.busy_ps.iter_mut().zip(second.busy_ps).for_each(|(sum, busy)| *sum += busy);
+                }
+                merged
+            })
+            .collect();
+    }
+
+    /// The timeline of everything recorded.
+    pub fn finish(mut self) -> Timeline {
+        let duration_ps = self.end_ps.max(1);
+        self.reach(duration_ps - 1);
+        Timeline { bin_ps: self.bin_ps, duration_ps, bins: self.bins }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counts(samples: u32) -> PacketCounts {
+        let mut counts = PacketCounts::default();
+        counts[Event::SamplesTested] = samples;
+        counts[Event::DepthReads] = 5;
+        counts
+    }
+
+    #[test]
+    fn shares_add_up_to_the_whole() {
+        let mut recorder = Recorder::new(100, 1000);
+        recorder.record(Unit::SampleTest, &counts(1001), 50, 377);
+        let timeline = recorder.finish();
+        assert_eq!(timeline.bins.len(), 4);
+        assert_eq!(timeline.total()[Event::SamplesTested], 1001);
+        assert_eq!(timeline.total()[Event::DepthReads], 0, "events of other units are theirs");
+        assert_eq!(timeline.busy_ps()[Unit::SampleTest as usize], 327);
+        assert_eq!(timeline.bins[0].busy_ps[Unit::SampleTest as usize], 50);
+        assert_eq!(timeline.duration_ps, 377);
+    }
+
+    #[test]
+    fn work_that_takes_no_time_is_counted() {
+        let mut recorder = Recorder::new(100, 1000);
+        recorder.record(Unit::SampleTest, &counts(7), 200, 200);
+        let timeline = recorder.finish();
+        assert_eq!(timeline.total()[Event::SamplesTested], 7);
+        assert_eq!(timeline.busy_ps(), [0; Unit::COUNT]);
+    }
+
+    #[test]
+    fn long_frames_merge_bins_and_lose_nothing() {
+        let mut recorder = Recorder::new(10, 8);
+        for step in 0..100 {
+            recorder.record(Unit::SampleTest, &counts(3), step * 10, step * 10 + 10);
+        }
+        let timeline = recorder.finish();
+        assert!(
+            timeline.bins.len() <= 8 && timeline.bin_ps == 160,
+            "{} {}",
+            timeline.bins.len(),
+            timeline.bin_ps
+        );
+        assert_eq!(timeline.total()[Event::SamplesTested], 300);
+        assert_eq!(timeline.busy_ps()[Unit::SampleTest as usize], 1000);
+    }
+}
