@@ -1,5 +1,14 @@
-//! The simulator.
+//! The simulator: it joins what happens (`pipeline`), when (here), at what cost (`power-model`) and what a recorder would
+//! have seen of it (`traces`).
+//!
+//! - [`gpu`]: a GPU as a file.
+//! - [`timing`]: work packets become activity over time.
+//! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
+//! - [`output`]: files, plots, the timeline and the report.
+//! - [`cli`]: the command `quintile`.
 
+pub mod cli;
 pub mod gpu;
 pub mod output;
+pub mod run;
 pub mod timing;

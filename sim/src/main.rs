@@ -1,1 +1,5 @@
-fn main() {}
+//! The command `quintile`.
+
+fn main() -> std::process::ExitCode {
+    sim::cli::main()
+}

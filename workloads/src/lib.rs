@@ -6,6 +6,18 @@
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = workloads::load("tiny")?;
+//! for index in scene.settings().frames.clone() {
+//!     let frame = scene.frame(index)?;
+//!     let draws = frame.draws(&scene)?;
+//!     assert!(draws.len() > 1 && frame.camera.lens().is_some());
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! World space is that of glTF: right-handed, y up. Camera space is x right, y up, z forward. Scenes are
 //! deterministic: the same file gives the same bits on every machine.
 

@@ -44,13 +44,18 @@ mod tests {
         let error = load("defualt").unwrap_err();
         assert!(error.is_usage());
         let text = error.to_string();
-        assert!(text.starts_with("no scene called `defualt`; did you mean `default`? built in: default, tiny;"), "{text}");
+        assert!(
+            text.starts_with("no scene called `defualt`; did you mean `default`? built in: default, tiny;"),
+            "{text}"
+        );
         assert!(load("nothing-like-it").unwrap_err().to_string().contains("built in: default, tiny"));
     }
 
     #[test]
     fn a_missing_file_is_a_failure_that_names_it() {
-        for name in ["/nowhere/a.gltf", "/nowhere/a.glb", "/nowhere/a.ply", "/nowhere/a.obj.gz", "/nowhere/a.ron"] {
+        for name in
+            ["/nowhere/a.gltf", "/nowhere/a.glb", "/nowhere/a.ply", "/nowhere/a.obj.gz", "/nowhere/a.ron"]
+        {
             let error = load(name).unwrap_err();
             assert!(!error.is_usage() && error.to_string().contains(name), "{error}");
         }

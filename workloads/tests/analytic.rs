@@ -1,4 +1,5 @@
 //! Scenes whose answer is known in closed form.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
@@ -12,7 +13,8 @@ fn near(found: Vec3, expected: Vec3) {
 }
 
 fn at_rate(scene: Scene, frame_rate_hz: f64, shutter: f64) -> Scene {
-    let overrides = Overrides { frame_rate_hz: Some(frame_rate_hz), shutter: Some(shutter), ..Overrides::default() };
+    let overrides =
+        Overrides { frame_rate_hz: Some(frame_rate_hz), shutter: Some(shutter), ..Overrides::default() };
     scene.with_overrides(&overrides).unwrap()
 }
 
@@ -20,7 +22,12 @@ fn at_rate(scene: Scene, frame_rate_hz: f64, shutter: f64) -> Scene {
 fn a_turning_node_carries_its_vertices_around_a_circle() {
     let mut file = Builder::triangle();
     let half = 0.5f32.sqrt();
-    file.animate("rotation", &[0.0, 1.0, 2.0], (&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half, 0.0, 0.0, 1.0, 0.0], "VEC4"), "LINEAR");
+    file.animate(
+        "rotation",
+        &[0.0, 1.0, 2.0],
+        (&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half, 0.0, 0.0, 1.0, 0.0], "VEC4"),
+        "LINEAR",
+    );
     let scene = at_rate(load_glb(&file.bytes()).unwrap(), 8.0, 0.5);
     for index in 0..15 {
         let frame = scene.frame(index).unwrap();
@@ -30,7 +37,8 @@ fn a_turning_node_carries_its_vertices_around_a_circle() {
         };
         near(frame.meshes[0].open[1], on_circle(f64::from(index) / 8.0));
         near(frame.meshes[0].close[1], on_circle((f64::from(index) + 0.5) / 8.0));
-        let [still, closing] = [&frame.meshes[0].open, &frame.meshes[0].close].map(|p| p[0].to_array().map(f32::to_bits));
+        let [still, closing] =
+            [&frame.meshes[0].open, &frame.meshes[0].close].map(|p| p[0].to_array().map(f32::to_bits));
         assert_eq!(still, closing, "the vertex on the axis stays put to the bit");
     }
 }
@@ -107,8 +115,11 @@ fn a_mirrored_node_keeps_its_facing() {
 #[test]
 fn sparse_and_interleaved_accessors_give_their_numbers() {
     let mut file = Builder::new();
-    let interleaved: Vec<u8> =
-        [[0.0f32, 0.0, 0.0, 9.0], [1.0, 0.0, 0.0, 9.0], [0.0, 1.0, 0.0, 9.0]].concat().iter().flat_map(|v| v.to_le_bytes()).collect();
+    let interleaved: Vec<u8> = [[0.0f32, 0.0, 0.0, 9.0], [1.0, 0.0, 0.0, 9.0], [0.0, 1.0, 0.0, 9.0]]
+        .concat()
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
     file.accessor(&interleaved, 3, "VEC3", 5126);
     file.json["bufferViews"][0]["byteStride"] = json!(16);
     let which = file.shorts(&[2]);
@@ -167,7 +178,10 @@ fn two_files_are_the_two_ends_of_a_motion() {
     let files = Files::new();
     files.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 4 3\n");
     files.put("b.obj", "v 0 0 0\nv 1 0 2\nv 0 1 0\nv 1 1 0\nf 1 2 4 3\n");
-    let path = files.put("s.ron", "(settings: (shutter: 1, frame_rate_hz: 10), objects: [(file: \"a.obj\", end: \"b.obj\")])");
+    let path = files.put(
+        "s.ron",
+        "(settings: (shutter: 1, frame_rate_hz: 10), objects: [(file: \"a.obj\", end: \"b.obj\")])",
+    );
     let scene = workloads::load(&path).unwrap();
     assert_eq!(scene.triangle_count(), 2, "a quad is two triangles");
     let mesh = &scene.frame(0).unwrap().meshes[0];
@@ -183,7 +197,8 @@ fn ron_objects_turn_about_x_then_y_then_z_and_spin_about_their_own_axis() {
                 rotation_deg: (90, 0, 90), velocity: (4, 0, 0), spin: (axis: (0, 0, 2), rate_hz: 1))])";
     let scene = workloads::load(&Files::new().put("s.ron", text)).unwrap();
     let frame = scene.frame(1).unwrap();
-    let still = workloads::load(&Files::new().put("s.ron", "(objects: [(shape: Box(size: (2, 2, 2)))])")).unwrap();
+    let still =
+        workloads::load(&Files::new().put("s.ron", "(objects: [(shape: Box(size: (2, 2, 2)))])")).unwrap();
     let rest = still.frame(0).unwrap();
     let rotation = Quat::from_rotation_z(90f32.to_radians()) * Quat::from_rotation_x(90f32.to_radians());
     for (time, found) in [(0.25f32, &frame.meshes[0].open), (0.375, &frame.meshes[0].close)] {

@@ -1,4 +1,5 @@
 //! What the built-in and the example scenes promise.
+#![allow(clippy::unwrap_used)]
 
 use std::sync::Arc;
 
@@ -8,7 +9,9 @@ fn positions(scene: &Scene) -> Vec<u32> {
     let frames = scene.settings().frames.clone().map(|index| scene.frame(index).unwrap());
     frames
         .flat_map(|frame| frame.meshes)
-        .flat_map(|mesh| mesh.open.iter().chain(mesh.close.iter()).flat_map(|p| p.to_array()).collect::<Vec<_>>())
+        .flat_map(|mesh| {
+            mesh.open.iter().chain(mesh.close.iter()).flat_map(|p| p.to_array()).collect::<Vec<_>>()
+        })
         .map(f32::to_bits)
         .collect()
 }
@@ -33,7 +36,9 @@ fn the_default_scene_is_what_it_says() {
     assert!(scene.is_animated());
     let frame = scene.frame(3).unwrap();
     assert!(frame.camera.lens().is_some());
-    assert!(frame.meshes.iter().any(|mesh| !mesh.is_still()) && frame.meshes.iter().any(|mesh| mesh.is_still()));
+    assert!(
+        frame.meshes.iter().any(|mesh| !mesh.is_still()) && frame.meshes.iter().any(|mesh| mesh.is_still())
+    );
 }
 
 #[test]

@@ -1,4 +1,5 @@
 //! Every way a scene file can be bad gives one message with the file, the place and the mend, and no panic.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
@@ -46,7 +47,10 @@ fn a_header_shorter_than_itself_is_no_panic() {
 #[test]
 fn indices_out_of_range_are_named() {
     let text = broken(|file| file.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(77));
-    expect(&text, &["scene.glb: meshes[0].primitives[0].attributes.POSITION: index out of range", "export it again"]);
+    expect(
+        &text,
+        &["scene.glb: meshes[0].primitives[0].attributes.POSITION: index out of range", "export it again"],
+    );
     let text = broken(|file| file.json["meshes"][0]["primitives"][0]["indices"] = json!(5));
     expect(&text, &["meshes[0].primitives[0].indices: index out of range"]);
     let text = broken(|file| file.json["nodes"][0]["mesh"] = json!(9));
@@ -56,13 +60,21 @@ fn indices_out_of_range_are_named() {
         let start = file.json["bufferViews"][1]["byteOffset"].as_u64().unwrap() as usize;
         file.binary[start..start + 6].copy_from_slice(&bytes);
     });
-    expect(&text, &["meshes[0].primitives[0]: triangle 0 uses vertex 9, but there are only 3: export it again"]);
+    expect(
+        &text,
+        &["meshes[0].primitives[0]: triangle 0 uses vertex 9, but there are only 3: export it again"],
+    );
 }
 
 #[test]
 fn accessors_beyond_their_buffers_are_named() {
     let text = broken(|file| file.json["accessors"][0]["count"] = json!(1000));
-    expect(&text, &["meshes[0].primitives[0] Positions, accessor 0: it needs 12000 bytes of buffer view 0, which has 36"]);
+    expect(
+        &text,
+        &[
+            "meshes[0].primitives[0] Positions, accessor 0: it needs 12000 bytes of buffer view 0, which has 36",
+        ],
+    );
     let text = broken(|file| file.json["accessors"][0]["byteOffset"] = json!(u64::MAX));
     expect(&text, &["accessor 0"]);
     let text = broken(|file| file.json["bufferViews"][0]["byteLength"] = json!(99_999));
@@ -89,7 +101,12 @@ fn absurd_counts_do_not_take_memory() {
 #[test]
 fn nan_vertices_and_transforms_are_named() {
     let text = broken(|file| file.binary[12..16].copy_from_slice(&f32::NAN.to_le_bytes()));
-    expect(&text, &["scene.glb: meshes[0].primitives[0]: vertex 1 has a coordinate that is NaN or infinite: export it again"]);
+    expect(
+        &text,
+        &[
+            "scene.glb: meshes[0].primitives[0]: vertex 1 has a coordinate that is NaN or infinite: export it again",
+        ],
+    );
     let text = broken(|file| file.json["nodes"][0]["scale"] = json!([1e38, 1e38, 1e39]));
     expect(&text, &["scene.glb"]);
     let text = broken(|file| {
@@ -141,7 +158,15 @@ fn bad_animations_and_skins_are_named() {
 #[test]
 fn files_that_are_something_else_are_refused() {
     let files = Files::new();
-    for (name, bytes) in [("a.gltf", "{}"), ("a.gltf", "not json"), ("a.ply", "solid"), ("a.ply", "ply\nformat ascii 1.0\nend_header\n"), ("a.obj", "f 1 2 3\n"), ("a.obj", ""), ("a.obj.gz", "v 0 0 0")] {
+    for (name, bytes) in [
+        ("a.gltf", "{}"),
+        ("a.gltf", "not json"),
+        ("a.ply", "solid"),
+        ("a.ply", "ply\nformat ascii 1.0\nend_header\n"),
+        ("a.obj", "f 1 2 3\n"),
+        ("a.obj", ""),
+        ("a.obj.gz", "v 0 0 0"),
+    ] {
         let text = failure(load(&files.put(name, bytes)).unwrap_err());
         expect(&text, &[name]);
     }
@@ -149,7 +174,10 @@ fn files_that_are_something_else_are_refused() {
         file.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
         file.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
     });
-    expect(&text, &["extensionsRequired", "KHR_draco_mesh_compression", "not supported", "export it without"]);
+    expect(
+        &text,
+        &["extensionsRequired", "KHR_draco_mesh_compression", "not supported", "export it without"],
+    );
 }
 
 #[test]
@@ -166,7 +194,12 @@ fn a_missing_buffer_is_a_failure_and_a_missing_image_a_warning() {
         bytes.extend([8, 6, 0, 0, 0, 0, 0, 0, 0]);
         bytes
     };
-    for (name, bytes) in [("gone.png", None), ("text.png", Some(b"no image".to_vec())), ("empty.png", Some(png(0))), ("vast.png", Some(png(2_000_000)))] {
+    for (name, bytes) in [
+        ("gone.png", None),
+        ("text.png", Some(b"no image".to_vec())),
+        ("empty.png", Some(png(0))),
+        ("vast.png", Some(png(2_000_000))),
+    ] {
         let mut file = Builder::triangle();
         let uvs = file.floats(&[0.0; 6], "VEC2");
         file.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uvs);
@@ -234,7 +267,8 @@ fn two_ends_of_different_topology_are_refused() {
     let files = Files::new();
     files.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     files.put("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n");
-    let text = failure(load(&files.put("s.ron", "(objects: [(file: \"a.obj\", end: \"b.obj\")])")).unwrap_err());
+    let text =
+        failure(load(&files.put("s.ron", "(objects: [(file: \"a.obj\", end: \"b.obj\")])")).unwrap_err());
     expect(&text, &["b.obj: end: its 4 vertices and 2 triangles", "equal topology"]);
 }
 
@@ -242,9 +276,13 @@ fn two_ends_of_different_topology_are_refused() {
 fn truncated_and_absurd_ply_files_are_failures() {
     let files = Files::new();
     let header = |vertices: &str| {
-        format!("ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n")
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        )
     };
-    for (vertices, word) in [("3", "truncated"), ("99999999", "truncated"), ("4000000000", "up to 100000000 are taken")] {
+    for (vertices, word) in
+        [("3", "truncated"), ("99999999", "truncated"), ("4000000000", "up to 100000000 are taken")]
+    {
         let mut bytes = header(vertices).into_bytes();
         bytes.extend([0; 20]);
         let text = failure(load(&files.put("a.ply", bytes)).unwrap_err());

@@ -1,4 +1,5 @@
 //! What holds whatever the scene: fitted cameras see everything, and no file makes the importers panic.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
@@ -80,17 +81,18 @@ fn rich() -> Vec<u8> {
     file.json["accessors"][0]["sparse"] = json!({
         "count": 1, "indices": {"bufferView": sparse, "componentType": 5123}, "values": {"bufferView": target}});
     file.animate("weights", &[0.0, 1.0], (&[0.0, 1.0], "SCALAR"), "LINEAR");
-    file.json["nodes"] = json!([{"mesh": 0, "skin": 0, "children": [1]}, {"children": [2]}, {"translation": [0, 1, 0]}]);
+    file.json["nodes"] =
+        json!([{"mesh": 0, "skin": 0, "children": [1]}, {"children": [2]}, {"translation": [0, 1, 0]}]);
     file.json["skins"] = json!([{"joints": [1, 2]}]);
     file.bytes()
 }
 
 /// Loading and, where that works, the first frame: an error is fine, a panic is not.
 fn survives(path: &str) {
-    if let Ok(scene) = load(path) {
-        if let Ok(frame) = scene.frame(0) {
-            let _ = frame.draws(&scene);
-        }
+    if let Ok(scene) = load(path)
+        && let Ok(frame) = scene.frame(0)
+    {
+        let _ = frame.draws(&scene);
     }
 }
 

@@ -1,4 +1,5 @@
 //! Real scenes from the folder in `QUINTILE_SCENES`; skipped, with a word, where it is not set.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
@@ -40,7 +41,9 @@ fn every_scene_has_its_triangles_and_gives_every_frame() {
 
 #[test]
 fn missing_images_are_warnings_and_the_fox_has_its_own() {
-    for name in ["ToyCar/ToyCar.gltf", "MosquitoInAmber/MosquitoInAmber.gltf", "CesiumMilkTruck/CesiumMilkTruck.gltf"] {
+    for name in
+        ["ToyCar/ToyCar.gltf", "MosquitoInAmber/MosquitoInAmber.gltf", "CesiumMilkTruck/CesiumMilkTruck.gltf"]
+    {
         let Some(scene) = scene(name) else { return };
         assert!(scene.warnings().iter().any(|warning| warning.code == "missing-image"), "{name}");
     }
@@ -64,15 +67,22 @@ fn simple_skin_bends_as_its_joint_turns() {
         let bent = [(keys[0], &mesh.open), (keys[0].slerp(keys[1], 0.5), &mesh.close)];
         for (rotation, found) in bent {
             for (vertex, place) in found.iter().enumerate() {
-                let rest = DVec3::new(if vertex % 2 == 0 { -0.5 } else { 0.5 }, 0.5 * (vertex / 2) as f64, 0.0);
+                let rest =
+                    DVec3::new(if vertex % 2 == 0 { -0.5 } else { 0.5 }, 0.5 * (vertex / 2) as f64, 0.0);
                 let about_joint = rotation * (rest - DVec3::Y) + DVec3::Y;
                 let weight = rest.y / 2.0;
                 let expected = (1.0 - weight) * rest + weight * about_joint;
-                assert!((place.as_dvec3() - expected).length() < 1e-6, "{name} vertex {vertex}: {place} {expected}");
+                assert!(
+                    (place.as_dvec3() - expected).length() < 1e-6,
+                    "{name} vertex {vertex}: {place} {expected}"
+                );
             }
         }
         for foot in 0..2 {
-            assert_eq!(mesh.open[foot].to_array().map(f32::to_bits), mesh.close[foot].to_array().map(f32::to_bits));
+            assert_eq!(
+                mesh.open[foot].to_array().map(f32::to_bits),
+                mesh.close[foot].to_array().map(f32::to_bits)
+            );
         }
         assert_ne!(mesh.open[9], mesh.close[9]);
     }
@@ -104,7 +114,8 @@ fn two_frames_of_cloth_are_two_ends_of_a_shutter() {
     let ends = ["cloth_ball92.ply", "cloth_ball93.ply"]
         .map(|name| load(&folder.join(name).display().to_string()).unwrap().frame(0).unwrap());
     let frame = scene.frame(0).unwrap();
-    let off = frame.meshes[0].close.iter().zip(ends[1].meshes[0].open.iter()).map(|(a, b)| (*a - *b).length());
+    let off =
+        frame.meshes[0].close.iter().zip(ends[1].meshes[0].open.iter()).map(|(a, b)| (*a - *b).length());
     assert!(off.fold(0.0, f32::max) < 1e-6);
     assert_eq!(frame.meshes[0].open, ends[0].meshes[0].open);
     assert!(!frame.meshes[0].is_still());

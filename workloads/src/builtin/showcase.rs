@@ -8,7 +8,7 @@ use super::checker;
 use crate::error::LoadError;
 use crate::material::Material;
 use crate::scene::{
-    Graph, Local, Mesh, Motion, Node, Parts, Place, Rig, Scene, SceneCamera, Settings, Spin, Trs, rotation, tan_half,
+    Graph, Local, Mesh, Motion, Node, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs, rotation, tan_half,
 };
 use crate::shapes;
 
@@ -34,11 +34,7 @@ pub(super) fn scene() -> Result<Scene, LoadError> {
     foreground(&mut parts.graph, &palette);
     background(&mut parts.graph, &palette);
     parts.camera = SceneCamera {
-        rig: Rig::LookAt {
-            position: Place::fixed(DVec3::new(0.6, 2.3, 8.2)),
-            target: Place::fixed(DVec3::new(0.0, 1.15, 0.0)),
-            up: DVec3::Y,
-        },
+        rig: Rig::look_at(DVec3::new(0.6, 2.3, 8.2), DVec3::new(0.0, 1.15, 0.0)),
         tan_half_height: tan_half(38.0),
         near: None,
     };
@@ -48,9 +44,8 @@ pub(super) fn scene() -> Result<Scene, LoadError> {
 }
 
 fn palette(graph: &mut Graph) -> Palette {
-    let mut plain = |name: &str, r: f32, g: f32, b: f32| {
-        graph.push_material(Material::colored(name, Vec3::new(r, g, b)))
-    };
+    let mut plain =
+        |name: &str, r: f32, g: f32, b: f32| graph.push_material(Material::colored(name, Vec3::new(r, g, b)));
     let [steel, brass] = [plain("steel", 0.42, 0.46, 0.50), plain("brass", 0.72, 0.47, 0.12)];
     let [red, blue] = [plain("red", 0.70, 0.08, 0.05), plain("blue", 0.06, 0.20, 0.62)];
     let [green, cream] = [plain("green", 0.08, 0.42, 0.16), plain("cream", 0.80, 0.72, 0.55)];

@@ -15,15 +15,12 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let source = Source { path };
     let mut input = reader::open(path)?;
     // Points and lines are no surfaces; every other face becomes a fan.
-    let options = LoadOptions {
-        triangulate: true,
-        single_index: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..LoadOptions::default()
-    };
-    let (models, _) = tobj::load_obj_buf(&mut input, &options, |_| Ok(Default::default()))
-        .map_err(|error| source.broken("contents", format!("not an OBJ file as it should be: {error}; mend the file")))?;
+    let options =
+        LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
+    let (models, _) =
+        tobj::load_obj_buf(&mut input, &options, |_| Ok(Default::default())).map_err(|error| {
+            source.broken("contents", format!("not an OBJ file as it should be: {error}; mend the file"))
+        })?;
     let mut soup = Soup::default();
     let whole = |part: fn(&Mesh) -> &[f32]| models.iter().all(|model| !part(&model.mesh).is_empty());
     let (normals, uvs) = (whole(|mesh| &mesh.normals), whole(|mesh| &mesh.texcoords));
@@ -31,7 +28,8 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
         append(&mut soup, &model.mesh, normals, uvs);
     }
     if models.iter().any(|model| model.mesh.material_id.is_some()) {
-        let message = format!("{}: the materials of OBJ files are not read; the object's own is used", path.display());
+        let message =
+            format!("{}: the materials of OBJ files are not read; the object's own is used", path.display());
         soup.warnings.push(Warning::new("obj-materials-ignored", message));
     }
     Ok(soup)

@@ -101,7 +101,9 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
             }
             "face" => {
                 let read = Parser::<Face>::new().read_payload_for_element(&mut input, element, &header);
-                read.map_err(damaged)?.iter().for_each(|face| soup.polygon(face.corners.as_deref().unwrap_or(&[])));
+                read.map_err(damaged)?
+                    .iter()
+                    .for_each(|face| soup.polygon(face.corners.as_deref().unwrap_or(&[])));
             }
             _ => {
                 let read = Parser::<Skipped>::new().read_payload_for_element(&mut input, element, &header);

@@ -38,12 +38,14 @@ impl Soup {
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let source = Source { path };
         let broken = |message: String| source.broken("geometry", format!("{message}; mend the file"));
-        if self.normals.iter().any(|normal| !normal.is_finite()) || self.uvs.iter().any(|uv| !uv.is_finite()) {
+        if self.normals.iter().any(|normal| !normal.is_finite()) || self.uvs.iter().any(|uv| !uv.is_finite())
+        {
             return Err(broken("a normal or texture coordinate is NaN or infinite".to_owned()));
         }
         let count = self.positions.len();
         let mut mesh = Mesh::new(name, self.positions, self.triangles, material).map_err(broken)?;
-        mesh.normals = if self.normals.len() == count { Normals::Given(self.normals) } else { Normals::Smooth };
+        mesh.normals =
+            if self.normals.len() == count { Normals::Given(self.normals) } else { Normals::Smooth };
         if self.uvs.len() == count {
             mesh.uvs = self.uvs.into();
         }

@@ -27,22 +27,34 @@ impl Place {
     }
 }
 
+/// A line of sight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LookAt {
+    /// Where the camera is.
+    pub position: Place,
+    /// What it looks at, and what a lens is focused on unless told otherwise.
+    pub target: Place,
+    /// Which way is up.
+    pub up: DVec3,
+}
+
 /// What holds a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rig {
     /// It looks from one point at another.
-    LookAt {
-        /// Where it is.
-        position: Place,
-        /// What it looks at, and what a lens is focused on unless told otherwise.
-        target: Place,
-        /// Which way is up.
-        up: DVec3,
-    },
+    LookAt(Box<LookAt>),
     /// It hangs on a node, looking down the node's -z with +y up (glTF 2.0, 3.10).
     Node(usize),
     /// It is placed so that the whole scene is in view over all frames, from above the front and to the right.
     Fitted,
+}
+
+impl Rig {
+    /// A camera that stays at `position` and looks at `target`, +y up.
+    pub fn look_at(position: DVec3, target: DVec3) -> Self {
+        let [position, target] = [position, target].map(Place::fixed);
+        Self::LookAt(Box::new(LookAt { position, target, up: DVec3::Y }))
+    }
 }
 
 /// A scene's camera.
@@ -119,9 +131,9 @@ impl SceneCamera {
     /// Where the camera stands in `pose`; `None` for a camera that still has to be fitted or has no direction.
     pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<Stand> {
         match &self.rig {
-            Rig::LookAt { position, target, up } => {
-                let eye = position.at(at);
-                Stand::new(eye, target.at(at) - eye, *up)
+            Rig::LookAt(sight) => {
+                let eye = sight.position.at(at);
+                Stand::new(eye, sight.target.at(at) - eye, sight.up)
             }
             Rig::Node(node) => Stand::on_node(pose.world(*node)),
             Rig::Fitted => None,
@@ -131,7 +143,7 @@ impl SceneCamera {
     /// Distance of what a lens is focused on when not told: the target, or `centre` for a camera on a node.
     pub(super) fn subject_depth(&self, stand: &Stand, at: Instant, centre: DVec3) -> f64 {
         let subject = match &self.rig {
-            Rig::LookAt { target, .. } => target.at(at),
+            Rig::LookAt(sight) => sight.target.at(at),
             Rig::Node(_) | Rig::Fitted => centre,
         };
         stand.depth(subject)

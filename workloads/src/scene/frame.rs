@@ -177,7 +177,8 @@ fn moving(mesh: &Mesh, open: &Carriage, close: &Carriage) -> Path {
     };
     let (from, to): (Vec<Vec3>, Vec<Vec3>) = (0..mesh.positions.len()).map(ends).unzip();
     let from: Arc<[Vec3]> = from.into();
-    let same = from.iter().zip(&to).all(|(a, b)| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits));
+    let same =
+        from.iter().zip(&to).all(|(a, b)| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits));
     let to = if same { Arc::clone(&from) } else { to.into() };
     (from, to)
 }
@@ -187,7 +188,12 @@ fn is_noise(from: DVec3, to: DVec3) -> bool {
     (to - from).abs().max_element() <= 1e-13 * from.abs().max_element().max(to.abs().max_element())
 }
 
-fn normals(mesh: &Mesh, middle: &Carriage, (open, close): (&[Vec3], &[Vec3]), triangles: &[[u32; 3]]) -> Arc<[Vec3]> {
+fn normals(
+    mesh: &Mesh,
+    middle: &Carriage,
+    (open, close): (&[Vec3], &[Vec3]),
+    triangles: &[[u32; 3]],
+) -> Arc<[Vec3]> {
     match &mesh.normals {
         Normals::Flat => Arc::from([]),
         Normals::Smooth => {

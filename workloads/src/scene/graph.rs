@@ -62,6 +62,36 @@ impl Graph {
         self.materials.extend(other.materials);
     }
 
+    /// Checks every index, so that nothing later has to.
+    ///
+    /// # Errors
+    /// In words, the first one that is out of range, or lists of joints and weights that do not fit.
+    pub fn check(&self) -> Result<(), String> {
+        let nodes = self.nodes.len();
+        for (index, node) in self.nodes.iter().enumerate() {
+            ensure(node.parent.is_none_or(|parent| parent < index), || {
+                format!("node {index} does not come after its parent")
+            })?;
+        }
+        for instance in &self.instances {
+            let skinned = instance.skin.is_none_or(|skin| skin < self.skins.len());
+            ensure(instance.node < nodes && instance.mesh < self.meshes.len() && skinned, || {
+                format!("{instance:?} names something that is not there")
+            })?;
+        }
+        for mesh in &self.meshes {
+            ensure(mesh.material < self.materials.len(), || {
+                format!("mesh `{}` has no material {}", mesh.name, mesh.material)
+            })?;
+            let fits = mesh.influences.as_ref().is_none_or(|influences| {
+                let due = mesh.positions.len() * influences.per_vertex;
+                influences.joints.len() == due && influences.weights.len() == due
+            });
+            ensure(fits, || format!("mesh `{}` has joints or weights for other vertices", mesh.name))?;
+        }
+        Ok(())
+    }
+
     /// Triangles of all instances.
     pub fn triangle_count(&self) -> usize {
         self.instances.iter().map(|instance| self.meshes[instance.mesh].triangles.len()).sum()
@@ -90,8 +120,36 @@ impl Graph {
     pub fn last_key_s(&self) -> f64 {
         let tracks = self.nodes.iter().flat_map(|node| {
             let channels = &node.channels;
-            [&channels.translation, &channels.rotation, &channels.scale, &channels.weights].into_iter().flatten()
+            [&channels.translation, &channels.rotation, &channels.scale, &channels.weights]
+                .into_iter()
+                .flatten()
         });
         tracks.map(super::track::Track::end_s).fold(0.0, f64::max)
+    }
+}
+
+fn ensure(holds: bool, message: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(message()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Local, Trs};
+
+    #[test]
+    fn graphs_with_loose_ends_are_refused() {
+        let mesh = || Mesh::new("m", vec![glam::Vec3::ZERO; 3], vec![[0, 1, 2]], 0).unwrap();
+        let mut graph = Graph::default();
+        let node = graph.push_node(Node::new("n", None, Local::Trs(Trs::default())));
+        graph.hang(mesh(), node);
+        assert!(graph.check().unwrap_err().contains("material 0"));
+        graph.push_material(Material::colored("grey", glam::Vec3::ONE));
+        assert!(graph.check().is_ok());
+        graph.hang(mesh(), 7);
+        assert!(graph.check().is_err());
+        graph.instances.pop();
+        graph.nodes[0].parent = Some(0);
+        assert!(graph.check().is_err());
     }
 }

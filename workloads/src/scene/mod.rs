@@ -7,23 +7,26 @@ mod fit;
 mod frame;
 mod graph;
 mod light;
+mod measure;
 mod mesh;
 mod node;
+mod parts;
 mod settings;
 mod track;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use activity::Warning;
 use glam::{DVec3, Vec3};
 
-pub use camera::{DEFAULT_FOV_DEG, Place, Rig, SceneCamera, tan_half};
+pub use camera::{DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, tan_half};
 pub use clip::{Clip, Property};
 pub use frame::{Frame, FrameError, FrameMesh};
 pub use graph::Graph;
 pub use light::Light;
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
 pub use node::{Channels, Local, Motion, Node, Spin, Trs, world_poses};
+pub use parts::{DEFAULT_BACKGROUND, Parts};
 pub use settings::{Overrides, Settings};
 pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};
@@ -32,48 +35,9 @@ use crate::error::LoadError;
 use crate::material::{Material, SurfaceShader};
 use camera::{Stand, between};
 use deform::Pose;
-use fit::{Extent, Fit};
+use fit::Fit;
 use frame::Interval;
-
-/// What an importer or a program puts together; [`Scene::new`] makes it renderable.
-#[derive(Clone, Debug)]
-pub struct Parts {
-    /// Name of the scene, or the file it came from.
-    pub name: String,
-    /// Shapes, materials and their hierarchy.
-    pub graph: Graph,
-    /// Animation clips of which one at a time is played.
-    pub clips: Vec<Clip>,
-    /// The camera.
-    pub camera: SceneCamera,
-    /// The light.
-    pub light: Light,
-    /// Linear RGB radiance where nothing is hit.
-    pub background: Vec3,
-    /// Size of the image, sampling, time and lens.
-    pub settings: Settings,
-    /// What the importer has to say.
-    pub warnings: Vec<Warning>,
-}
-
-/// A light blue-grey.
-pub const DEFAULT_BACKGROUND: Vec3 = Vec3::new(0.42, 0.50, 0.60);
-
-impl Parts {
-    /// Parts with nothing but a name: no shapes, a fitted camera, default light, background and settings.
-    pub fn new(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            graph: Graph::default(),
-            clips: Vec::new(),
-            camera: SceneCamera::default(),
-            light: Light::default(),
-            background: DEFAULT_BACKGROUND,
-            settings: Settings::default(),
-            warnings: Vec::new(),
-        }
-    }
-}
+use measure::LENS_LEAVES_VIEW;
 
 /// A scene that can be asked for its frames.
 #[derive(Clone, Debug)]
@@ -95,9 +59,6 @@ pub struct Scene {
     /// Middle of the scene's bounds in the first frame.
     centre: DVec3,
 }
-
-/// Frames looked at when a camera is fitted; longer runs are sampled evenly.
-const FITTED_FRAMES: u32 = 256;
 
 /// Vertices and triangles of all instances together: a small file that asks for more is broken.
 const MOST: usize = 100_000_000;
@@ -125,6 +86,7 @@ impl Scene {
             fit: None,
             centre: DVec3::ZERO,
         };
+        scene.graph.check().map_err(|message| scene.broken(message))?;
         scene.check_size()?;
         scene.prepare()?;
         Ok(scene)
@@ -136,7 +98,8 @@ impl Scene {
             return Err(self.broken("it has no triangles: there is nothing to draw"));
         }
         if vertices > MOST || triangles > MOST {
-            let message = format!("{triangles} triangles over {vertices} vertices; up to {MOST} of each are taken");
+            let message =
+                format!("{triangles} triangles over {vertices} vertices; up to {MOST} of each are taken");
             return Err(self.broken(message));
         }
         Ok(())
@@ -157,7 +120,8 @@ impl Scene {
         let axes = [stand.right, stand.up, stand.forward].map(|axis| axis.as_vec3());
         let toward = self.light.toward.unwrap_or_else(|| light::over_the_shoulder(axes[0], axes[1], axes[2]));
         let light = Light { toward: Some(toward), ..self.light };
-        self.shaders = self.graph.materials.iter().map(|material| SurfaceShader::new(material, &light)).collect();
+        self.shaders =
+            self.graph.materials.iter().map(|material| SurfaceShader::new(material, &light)).collect();
         Ok(())
     }
 
@@ -241,61 +205,7 @@ impl Scene {
         between(&open, &close, self.camera.tan_half_height, near, lens)
             .map_err(|message| FrameError::Camera { frame: interval.frame, message })
     }
-
-    /// The middle of the first frame's bounds and, for a camera that wants it, a fit over all frames.
-    fn measure(&mut self) -> Result<(DVec3, Option<Fit>), FrameError> {
-        let first = self.settings.frames.start;
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        self.visit_points(first, false, &mut |point| {
-            low = low.min(point);
-            high = high.max(point);
-        })?;
-        let centre = low + 0.5 * (high - low);
-        if self.camera.rig != Rig::Fitted {
-            return Ok((centre, None));
-        }
-        let aspect = f64::from(self.settings.width) / f64::from(self.settings.height);
-        let tan = self.camera.tan_half_height;
-        let Some(mut extent) = Extent::new(tan * aspect, tan) else { return Ok((centre, None)) };
-        for index in self.fitted_frames() {
-            self.visit_points(index, index != first, &mut |point| extent.add(point))?;
-        }
-        let radius = f64::from(self.settings.lens_radius);
-        let fit = extent.fit((radius > 0.0).then(|| (radius, self.settings.focus.map(f64::from))));
-        if fit.is_some_and(|fit| !fit.holds_lens) {
-            let message = "the lens is so large for its focus depth that parts of the scene leave the view: the fitted camera only holds them for the centre of the lens";
-            self.warnings.push(Warning::new(LENS_LEAVES_VIEW, message));
-        }
-        Ok((centre, fit))
-    }
-
-    fn fitted_frames(&self) -> Vec<u32> {
-        let frames = &self.settings.frames;
-        let count = frames.end - frames.start;
-        let looked_at = count.min(FITTED_FRAMES);
-        let last = u64::from(looked_at.max(2) - 1);
-        let nth = |i: u32| frames.start + (u64::from(i) * u64::from(count - 1) / last) as u32;
-        (0..looked_at).map(nth).collect()
-    }
-
-    /// Calls `visit` with every vertex at both ends of a frame's shutter.
-    fn visit_points(&self, frame: u32, only_moving: bool, visit: &mut impl FnMut(DVec3)) -> Result<(), FrameError> {
-        let interval = self.interval(frame);
-        for (index, instance) in self.graph.instances.iter().enumerate() {
-            if only_moving && !self.moving[index] || self.graph.meshes[instance.mesh].triangles.is_empty() {
-                continue;
-            }
-            let (open, close) = interval.path(self, *instance)?;
-            open.iter().for_each(|point| visit(point.as_dvec3()));
-            if !Arc::ptr_eq(&open, &close) {
-                close.iter().for_each(|point| visit(point.as_dvec3()));
-            }
-        }
-        Ok(())
-    }
 }
-
-const LENS_LEAVES_VIEW: &str = "lens-leaves-view";
 
 /// What there is to know about a scene.
 impl Scene {

@@ -111,7 +111,9 @@ impl Node {
     pub fn to_parent(&self, at: Instant) -> DAffine3 {
         let mut trs = match self.local {
             Local::Matrix(matrix) if !self.moves() => return matrix,
-            Local::Matrix(matrix) => return DAffine3::from_translation(self.drift(at)) * matrix * self.spun(at),
+            Local::Matrix(matrix) => {
+                return DAffine3::from_translation(self.drift(at)) * matrix * self.spun(at);
+            }
             Local::Trs(trs) => trs,
         };
         if let Some(track) = &self.channels.translation {
@@ -189,7 +191,8 @@ mod tests {
     fn a_drifting_node_goes_straight_and_a_still_one_stays_to_the_bit() {
         let mut drifting = Node::new("d", None, Local::Trs(Trs::default()));
         drifting.motion.velocity = DVec3::new(4.0, 0.0, -2.0);
-        let nodes = [drifting, Node::new("still", None, Local::Matrix(DAffine3::from_scale(DVec3::splat(0.1))))];
+        let nodes =
+            [drifting, Node::new("still", None, Local::Matrix(DAffine3::from_scale(DVec3::splat(0.1))))];
         assert_eq!(world_poses(&nodes, at(0.5))[0].translation, DVec3::new(2.0, 0.0, -1.0));
         assert_eq!(world_poses(&nodes, at(0.1))[1], world_poses(&nodes, at(7.3))[1]);
         assert_eq!(movers(&nodes), [true, false]);

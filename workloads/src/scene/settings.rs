@@ -127,7 +127,9 @@ impl Settings {
             format!("{focus}: the focus depth has to be a finite number above zero")
         })?;
         ensure(radius > 0.0, "focus", || {
-            format!("{focus}, but there is no lens to focus: give a lens radius above zero, too, or leave it out")
+            format!(
+                "{focus}, but there is no lens to focus: give a lens radius above zero, too, or leave it out"
+            )
         })
     }
 }

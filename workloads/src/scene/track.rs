@@ -67,7 +67,11 @@ impl Track {
         }
         let expected = times_s.len().saturating_mul(width).saturating_mul(parts);
         if values.len() != expected {
-            return Err(format!("{} keys need {expected} numbers, there are {}", times_s.len(), values.len()));
+            return Err(format!(
+                "{} keys need {expected} numbers, there are {}",
+                times_s.len(),
+                values.len()
+            ));
         }
         if let Some(at) = values.iter().position(|v| !v.is_finite()) {
             return Err(format!("a value of key {} is not finite", at / (width * parts)));
@@ -258,7 +262,8 @@ mod tests {
 
     #[test]
     fn a_loop_wraps_at_the_opening_and_holds_across_the_end() {
-        let track = Track::new(vec![0.0, 2.0], vec![0.0, 2.0], 1, Interpolation::Linear).unwrap().looping(2.0);
+        let track =
+            Track::new(vec![0.0, 2.0], vec![0.0, 2.0], 1, Interpolation::Linear).unwrap().looping(2.0);
         assert_eq!(track.sample(at(4.5)), [0.5]);
         assert_eq!(track.sample(Instant { open_s: 3.75, offset_s: 0.5 }), [2.0]);
     }

@@ -1,8 +1,8 @@
 //! Solids and surfaces made by code. All are closed unless said otherwise, counter-clockwise seen from outside,
 //! centred at the origin, with normals and texture coordinates.
 
-mod round;
 mod flat;
+mod round;
 mod wheel;
 
 use glam::{Vec2, Vec3};

@@ -31,8 +31,7 @@ impl Values {
 
     /// Elements as vectors of `f32`, missing components zero.
     pub fn vectors<const N: usize>(&self) -> impl Iterator<Item = [f32; N]> {
-        self.elements()
-            .map(|element| std::array::from_fn(|i| element.get(i).copied().unwrap_or(0.0) as f32))
+        self.elements().map(|element| std::array::from_fn(|i| element.get(i).copied().unwrap_or(0.0) as f32))
     }
 }
 
@@ -48,7 +47,8 @@ impl Document<'_> {
 
     fn numbers(&self, index: usize, kinds: &[Type]) -> Result<Values, String> {
         let accessor = self.root.accessors.get(index).ok_or("there is no such accessor")?;
-        let (Checked::Valid(kind), Checked::Valid(component)) = (&accessor.type_, &accessor.component_type) else {
+        let (Checked::Valid(kind), Checked::Valid(component)) = (&accessor.type_, &accessor.component_type)
+        else {
             return Err("its type is not known".to_owned());
         };
         if !kinds.contains(kind) {
@@ -84,8 +84,14 @@ impl Document<'_> {
         };
         let count = sparse.count.0;
         let places = Layout { width: 1, component: component.0, normalized: false };
-        let at = self.bytes(sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0, count, places.size())?;
-        let new = self.bytes(sparse.values.buffer_view.value(), sparse.values.byte_offset.0, count, layout.size())?;
+        let at = self.bytes(
+            sparse.indices.buffer_view.value(),
+            sparse.indices.byte_offset.0,
+            count,
+            places.size(),
+        )?;
+        let new =
+            self.bytes(sparse.values.buffer_view.value(), sparse.values.byte_offset.0, count, layout.size())?;
         let new = layout.read(new);
         for (place, value) in places.read(at).into_iter().zip(new.chunks_exact(layout.width)) {
             let start = place as usize * layout.width;
@@ -114,7 +120,8 @@ impl Document<'_> {
 
     /// The bytes of a buffer view.
     pub fn view(&self, index: usize) -> Result<&[u8], String> {
-        let view = self.root.buffer_views.get(index).ok_or_else(|| format!("there is no buffer view {index}"))?;
+        let view =
+            self.root.buffer_views.get(index).ok_or_else(|| format!("there is no buffer view {index}"))?;
         let buffer = self.buffers.get(view.buffer.value()).ok_or("there is no such buffer")?;
         let start = view.byte_offset.map_or(0, |offset| offset.0);
         let end = start.saturating_add(view.byte_length.0);

@@ -16,7 +16,9 @@ pub(super) fn load(source: Source, root: &Root, binary: Option<&[u8]>) -> Result
         let bytes = match (&buffer.uri, binary) {
             (Some(uri), _) => fetch(source, uri).map_err(|message| source.broken(&place, message))?,
             (None, Some(binary)) if index == 0 => binary.to_vec(),
-            (None, _) => return Err(source.broken(place, "it has neither a URI nor a binary chunk: export it again")),
+            (None, _) => {
+                return Err(source.broken(place, "it has neither a URI nor a binary chunk: export it again"));
+            }
         };
         if (bytes.len() as u64) < buffer.byte_length.0 {
             let message = format!(
@@ -42,7 +44,10 @@ pub(super) fn fetch(source: Source, uri: &str) -> Result<Vec<u8>, String> {
     }
     let path = beside(source, uri)?;
     std::fs::read(&path).map_err(|error| {
-        format!("cannot read {}: {error}; put the file there, or export with everything embedded", path.display())
+        format!(
+            "cannot read {}: {error}; put the file there, or export with everything embedded",
+            path.display()
+        )
     })
 }
 

@@ -2,7 +2,9 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::json::accessor::Type;
-use gltf::json::animation::{Animation, Channel, Interpolation as JsonInterpolation, Property as JsonProperty};
+use gltf::json::animation::{
+    Animation, Channel, Interpolation as JsonInterpolation, Property as JsonProperty,
+};
 use gltf::json::validation::Checked;
 
 use super::document::Document;
@@ -34,7 +36,8 @@ fn channel(
     let fail = |message: &str| document.source.broken(place.clone(), format!("{message}: export it again"));
     let channel: &Channel = &animation.channels[number];
     let node = *tree.place.get(channel.target.node.value()).ok_or_else(|| fail("there is no such node"))?;
-    let sampler = animation.samplers.get(channel.sampler.value()).ok_or_else(|| fail("there is no such sampler"))?;
+    let sampler =
+        animation.samplers.get(channel.sampler.value()).ok_or_else(|| fail("there is no such sampler"))?;
     let Checked::Valid(path) = channel.target.path else { return Err(fail("it drives an unknown property")) };
     let (property, kind) = match path {
         JsonProperty::Translation => (Property::Translation, Type::Vec3),
@@ -56,7 +59,8 @@ fn channel(
         Property::Weights => values.numbers.len() / (times.count() * parts).max(1),
         _ => values.width,
     };
-    let track = Track::new(times.numbers, values.numbers, width, interpolation).map_err(|what| fail(&what))?;
+    let track =
+        Track::new(times.numbers, values.numbers, width, interpolation).map_err(|what| fail(&what))?;
     Ok((node, property, track))
 }
 
@@ -64,17 +68,26 @@ pub(super) fn skins(document: &Document, tree: &Tree) -> Result<Vec<Skin>, LoadE
     let mut skins = Vec::new();
     for (index, skin) in document.root.skins.iter().enumerate() {
         let place = format!("skins[{index}]");
-        let fail = |message: String| document.source.broken(place.clone(), format!("{message}: export it again"));
+        let fail =
+            |message: String| document.source.broken(place.clone(), format!("{message}: export it again"));
         let joints: Vec<usize> = skin.joints.iter().map(|joint| tree.place[joint.value()]).collect();
         let inverse_bind = match skin.inverse_bind_matrices {
             Some(accessor) => {
-                let values = document.values(accessor.value(), &[Type::Mat4], &format!("{place} inverse bind matrices"))?;
+                let values = document.values(
+                    accessor.value(),
+                    &[Type::Mat4],
+                    &format!("{place} inverse bind matrices"),
+                )?;
                 values.elements().map(affine).collect()
             }
             None => vec![DAffine3::IDENTITY; joints.len()],
         };
         if inverse_bind.len() < joints.len() {
-            return Err(fail(format!("{} inverse bind matrices for {} joints", inverse_bind.len(), joints.len())));
+            return Err(fail(format!(
+                "{} inverse bind matrices for {} joints",
+                inverse_bind.len(),
+                joints.len()
+            )));
         }
         if let Some(bad) = inverse_bind.iter().position(|matrix| !matrix.is_finite()) {
             return Err(fail(format!("inverse bind matrix {bad} has a value that is NaN or infinite")));

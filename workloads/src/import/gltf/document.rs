@@ -16,9 +16,11 @@ pub(super) struct Document<'a> {
 impl<'a> Document<'a> {
     pub fn read(source: Source<'a>) -> Result<Self, LoadError> {
         let bytes = source.read()?;
-        let (json, binary) = if bytes.starts_with(b"glTF") { split(source, &bytes)? } else { (&bytes[..], None) };
-        let root = Root::from_slice(json)
-            .map_err(|error| source.broken("JSON", format!("not a glTF 2.0 file: {error}; export it again")))?;
+        let (json, binary) =
+            if bytes.starts_with(b"glTF") { split(source, &bytes)? } else { (&bytes[..], None) };
+        let root = Root::from_slice(json).map_err(|error| {
+            source.broken("JSON", format!("not a glTF 2.0 file: {error}; export it again"))
+        })?;
         check_positions(source, &root)?;
         validate(source, &root)?;
         let buffers = buffers::load(source, &root, binary)?;
@@ -28,9 +30,11 @@ impl<'a> Document<'a> {
 
 /// JSON and binary chunk of a `.glb` (glTF 2.0, section 4).
 fn split<'b>(source: Source, bytes: &'b [u8]) -> Result<(&'b [u8], Option<&'b [u8]>), LoadError> {
-    let word = |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
+    let word =
+        |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
     let truncated = |what: &str, needed: usize| {
-        let message = format!("truncated: {needed} bytes are needed, there are {}: get the file again", bytes.len());
+        let message =
+            format!("truncated: {needed} bytes are needed, there are {}: get the file again", bytes.len());
         source.broken(what, message)
     };
     let (Some(version), Some(length)) = (word(4), word(8)) else { return Err(truncated("GLB header", 12)) };
@@ -62,8 +66,12 @@ fn check_positions(source: Source, root: &Root) -> Result<(), LoadError> {
         for (primitive, of_primitive) in of_mesh.primitives.iter().enumerate() {
             let accessor = of_primitive.attributes.get(&Checked::Valid(Semantic::Positions));
             if accessor.is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
-                let message = format!("index out of range: there are {} accessors: export it again", root.accessors.len());
-                return Err(source.broken(format!("meshes[{mesh}].primitives[{primitive}].attributes.POSITION"), message));
+                let message = format!(
+                    "index out of range: there are {} accessors: export it again",
+                    root.accessors.len()
+                );
+                return Err(source
+                    .broken(format!("meshes[{mesh}].primitives[{primitive}].attributes.POSITION"), message));
             }
         }
     }

@@ -59,7 +59,8 @@ impl Images<'_, '_> {
         match made {
             Ok(texture) => Some(Arc::clone(texture)),
             Err(why) => {
-                let message = format!("material `{material}`: image {why}; its base colour is used without a texture");
+                let message =
+                    format!("material `{material}`: image {why}; its base colour is used without a texture");
                 warnings.push(Warning::new("missing-image", message));
                 None
             }

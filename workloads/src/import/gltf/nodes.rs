@@ -47,7 +47,9 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>, LoadError> {
     for (index, node) in document.root.nodes.iter().enumerate() {
         for child in children(node) {
             if let Some(first) = parents[child].replace(index) {
-                let message = format!("it is a child of nodes {first} and {index}; a node has one parent: export it again");
+                let message = format!(
+                    "it is a child of nodes {first} and {index}; a node has one parent: export it again"
+                );
                 return Err(document.source.broken(format!("nodes[{child}]"), message));
             }
         }
@@ -91,13 +93,15 @@ fn local(node: &json::Node) -> Option<Local> {
         let columns = matrix.map(f64::from);
         let column = |at: usize| DVec3::new(columns[4 * at], columns[4 * at + 1], columns[4 * at + 2]);
         let affine = [3, 7, 11, 15].map(|at| columns[at]) == [0.0, 0.0, 0.0, 1.0];
-        let map = DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
+        let map =
+            DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
         return (affine && map.is_finite()).then_some(Local::Matrix(map));
     }
     let vector = |value: Option<[f32; 3]>, otherwise: DVec3| {
         value.map_or(otherwise, |value| DVec3::from_array(value.map(f64::from)))
     };
-    let rotation = node.rotation.map_or(DQuat::IDENTITY, |rotation| DQuat::from_array(rotation.0.map(f64::from)));
+    let rotation =
+        node.rotation.map_or(DQuat::IDENTITY, |rotation| DQuat::from_array(rotation.0.map(f64::from)));
     let trs = Trs {
         translation: vector(node.translation, DVec3::ZERO),
         rotation: unit_quat(rotation),

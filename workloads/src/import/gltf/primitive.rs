@@ -90,7 +90,12 @@ impl Reading<'_, '_> {
     }
 
     /// `values` as vectors, one for each of `count` vertices, all finite.
-    fn vectors<const N: usize>(&self, values: &Values, count: usize, what: &str) -> Result<Vec<[f32; N]>, LoadError> {
+    fn vectors<const N: usize>(
+        &self,
+        values: &Values,
+        count: usize,
+        what: &str,
+    ) -> Result<Vec<[f32; N]>, LoadError> {
         let vectors: Vec<[f32; N]> = values.vectors().collect();
         if vectors.len() != count {
             return Err(self.broken(&format!("{} {what} for {count} vertices", vectors.len())));
@@ -118,7 +123,9 @@ impl Reading<'_, '_> {
     }
 
     fn normals(&self, count: usize) -> Result<Normals, LoadError> {
-        let Some(values) = self.attribute(Semantic::Normals, &[Type::Vec3])? else { return Ok(Normals::Flat) };
+        let Some(values) = self.attribute(Semantic::Normals, &[Type::Vec3])? else {
+            return Ok(Normals::Flat);
+        };
         let normals = self.vectors(&values, count, "normal")?;
         Ok(Normals::Given(normals.into_iter().map(Vec3::from_array).collect()))
     }
@@ -137,7 +144,8 @@ impl Reading<'_, '_> {
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
         let Some(values) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
-            let message = format!("{} has no texture coordinates {set}: its base colour is used alone", self.place);
+            let message =
+                format!("{} has no texture coordinates {set}: its base colour is used alone", self.place);
             warnings.push(Warning::new("missing-texcoord", message));
             materials.push(Material { texture: None, ..materials[mesh.material].clone() });
             mesh.material = materials.len() - 1;
@@ -158,28 +166,31 @@ impl Reading<'_, '_> {
                 let values = self.accessor(accessor.value(), &[Type::Vec3], &what)?;
                 Ok(self.vectors(&values, count, &what)?.into_iter().map(Vec3::from_array).collect())
             };
-            targets.push(Target { positions: read(target.positions, "position")?, normals: read(target.normals, "normal")? });
+            targets.push(Target {
+                positions: read(target.positions, "position")?,
+                normals: read(target.normals, "normal")?,
+            });
         }
         Ok(targets)
     }
 
     /// Joints and weights of all sets together, weights made to add up to one.
     fn influences(&self, count: usize) -> Result<Option<Influences>, LoadError> {
-        let mut sets: Vec<(Vec<[f32; 4]>, Vec<[f32; 4]>)> = Vec::new();
+        let mut sets: Vec<[Vec<[f32; 4]>; 2]> = Vec::new();
         for set in 0.. {
             let joints = self.attribute(Semantic::Joints(set), &[Type::Vec4])?;
             let weights = self.attribute(Semantic::Weights(set), &[Type::Vec4])?;
             let (Some(joints), Some(weights)) = (joints, weights) else { break };
-            sets.push((self.vectors(&joints, count, "joint")?, self.vectors(&weights, count, "weight")?));
+            sets.push([self.vectors(&joints, count, "joint")?, self.vectors(&weights, count, "weight")?]);
         }
         if sets.is_empty() {
             return Ok(None);
         }
         let mut influences = Influences { per_vertex: 4 * sets.len(), ..Influences::default() };
         for vertex in 0..count {
-            let sum: f32 = sets.iter().flat_map(|(_, weights)| weights[vertex]).sum();
+            let sum: f32 = sets.iter().flat_map(|[_, weights]| weights[vertex]).sum();
             let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-            for (joints, weights) in &sets {
+            for [joints, weights] in &sets {
                 influences.joints.extend(joints[vertex].map(|joint| joint as u16));
                 influences.weights.extend(weights[vertex].map(|weight| weight * scale));
             }

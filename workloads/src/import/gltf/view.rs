@@ -33,11 +33,15 @@ fn camera(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Scen
                 };
             }
             (Checked::Valid(CameraType::Orthographic), _) => {
-                let message = format!("the camera at node {index} is orthographic, which is not supported: another one is used");
+                let message = format!(
+                    "the camera at node {index} is orthographic, which is not supported: another one is used"
+                );
                 warnings.push(Warning::new("camera-ignored", message));
             }
             _ => {
-                let message = format!("the camera at node {index} has no usable field of view or near plane: another one is used");
+                let message = format!(
+                    "the camera at node {index} has no usable field of view or near plane: another one is used"
+                );
                 warnings.push(Warning::new("camera-ignored", message));
             }
         }

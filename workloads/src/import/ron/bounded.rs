@@ -43,5 +43,9 @@ pub(super) fn field_of_view<'de, D: Deserializer<'de>>(from: D) -> Result<Option
 }
 
 pub(super) fn frames<'de, D: Deserializer<'de>>(from: D) -> Result<Option<(u32, u32)>, D::Error> {
-    checked(from, |(start, end)| start < end, "a range of frames (first, one after the last) with anything in it")
+    checked(
+        from,
+        |(start, end)| start < end,
+        "a range of frames (first, one after the last) with anything in it",
+    )
 }

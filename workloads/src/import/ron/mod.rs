@@ -10,7 +10,7 @@ use activity::Warning;
 use glam::{DVec3, Vec3};
 
 use crate::error::{LoadError, Source};
-use crate::scene::{Light, Parts, Place, Rig, SceneCamera, Settings, Track, tan_half};
+use crate::scene::{Light, LookAt, Parts, Place, Rig, SceneCamera, Settings, Track, tan_half};
 use spec::{CameraSpec, LightSpec, SceneSpec, SettingsSpec};
 
 /// Reads the scene at `path`.
@@ -90,7 +90,11 @@ fn color(context: Context, place: &str, value: [f32; 3]) -> Result<Vec3, LoadErr
 /// Three finite numbers.
 fn vector(context: Context, place: &str, value: [f64; 3]) -> Result<DVec3, LoadError> {
     let value = DVec3::from_array(value);
-    if value.is_finite() { Ok(value) } else { Err(context.wrong(place, "it has a value that is NaN or infinite")) }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(context.wrong(place, "it has a value that is NaN or infinite"))
+    }
 }
 
 fn lamp(context: Context, spec: &LightSpec) -> Result<Light, LoadError> {
@@ -103,7 +107,9 @@ fn lamp(context: Context, spec: &LightSpec) -> Result<Light, LoadError> {
             let toward = vector(context, "light.toward", toward)?;
             let length = toward.length();
             if !(length.is_finite() && length > 0.0) {
-                return Err(context.wrong("light.toward", "it has no length: point it from the scene to the lamp"));
+                return Err(
+                    context.wrong("light.toward", "it has no length: point it from the scene to the lamp")
+                );
             }
             Some((toward / length).as_vec3())
         }
@@ -125,28 +131,30 @@ fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<S
     }
     let up = vector(context, "camera.up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?;
     let end_s = f64::from(settings.frames.end) / settings.frame_rate_hz;
-    let path = |place: &str, rest: DVec3, end: Option<[f64; 3]>, key: fn(&spec::CameraKey) -> Option<[f64; 3]>| {
-        let track = match (end, spec.keyframes.is_empty()) {
-            (Some(_), false) => return Err(context.wrong(place, "give an end or `keyframes`, not both")),
-            (Some(end), true) => Some((vec![0.0, end_s], vec![rest, vector(context, place, end)?])),
-            (None, true) => None,
-            (None, false) => Some((
-                spec.keyframes.iter().map(|key| key.time_s).collect(),
-                spec.keyframes.iter().map(|one| key(one).map_or(rest, DVec3::from_array)).collect(),
-            )),
+    let path =
+        |place: &str, rest: DVec3, end: Option<[f64; 3]>, key: fn(&spec::CameraKey) -> Option<[f64; 3]>| {
+            let track = match (end, spec.keyframes.is_empty()) {
+                (Some(_), false) => return Err(context.wrong(place, "give an end or `keyframes`, not both")),
+                (Some(end), true) => Some((vec![0.0, end_s], vec![rest, vector(context, place, end)?])),
+                (None, true) => None,
+                (None, false) => Some((
+                    spec.keyframes.iter().map(|key| key.time_s).collect(),
+                    spec.keyframes.iter().map(|one| key(one).map_or(rest, DVec3::from_array)).collect(),
+                )),
+            };
+            let track = track.map(|(times, points): (Vec<f64>, Vec<DVec3>)| {
+                let numbers = points.iter().flat_map(|point| point.to_array()).collect();
+                Track::new(times, numbers, 3, spec.interpolation.into())
+                    .map_err(|what| context.wrong(place, what))
+            });
+            Ok(Place { rest, track: track.transpose()? })
         };
-        let track = track.map(|(times, points): (Vec<f64>, Vec<DVec3>)| {
-            let numbers = points.iter().flat_map(|point| point.to_array()).collect();
-            Track::new(times, numbers, 3, spec.interpolation.into()).map_err(|what| context.wrong(place, what))
-        });
-        Ok(Place { rest, track: track.transpose()? })
-    };
     Ok(SceneCamera {
-        rig: Rig::LookAt {
+        rig: Rig::LookAt(Box::new(LookAt {
             position: path("camera.end_position", position, spec.end_position, |key| key.position)?,
             target: path("camera.end_target", target, spec.end_target, |key| key.target)?,
             up,
-        },
+        })),
         tan_half_height: tan_half(spec.fov_deg.unwrap_or(crate::scene::DEFAULT_FOV_DEG)),
         near: spec.near,
     })

@@ -23,7 +23,8 @@ pub(super) fn add(
     index: usize,
     object: &ObjectSpec,
 ) -> Result<(), LoadError> {
-    let place = object.name.as_ref().map_or_else(|| format!("objects[{index}]"), |name| format!("object `{name}`"));
+    let place =
+        object.name.as_ref().map_or_else(|| format!("objects[{index}]"), |name| format!("object `{name}`"));
     let node = node(context, &place, object)?;
     let node = parts.graph.push_node(node);
     match (&object.file, &object.shape) {
@@ -34,7 +35,9 @@ pub(super) fn add(
             }
             let material = material(context, parts, &place, object.material.as_ref())?;
             let mesh = solid(shape, material).map_err(|what| context.wrong(&place, what))?;
-            parts.graph.hang(Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh }, node);
+            parts
+                .graph
+                .hang(Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh }, node);
             Ok(())
         }
         _ => Err(context.wrong(place, "give it either a `file` or a `shape`")),
@@ -51,7 +54,8 @@ fn add_file(
     let path = context.beside(file);
     match Format::of(&path) {
         Some(Format::Gltf) if object.end.is_some() => {
-            Err(context.wrong(place, "`end` goes with PLY and OBJ files; glTF files bring their own animation"))
+            Err(context
+                .wrong(place, "`end` goes with PLY and OBJ files; glTF files bring their own animation"))
         }
         Some(Format::Gltf) => add_gltf(context, parts, place, object, (&path, node)),
         Some(_) if object.clip.is_some() => Err(context.wrong(place, "`clip` goes with glTF files")),
@@ -64,8 +68,10 @@ fn add_file(
                 let end = context.beside(end);
                 let arrival_s = object.end_s.unwrap_or(1.0 / parts.settings.frame_rate_hz);
                 mesh.targets = vec![to_end(&mesh, &end)?];
-                let track = Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, crate::scene::Interpolation::Linear);
-                parts.graph.nodes[node].channels.weights = Some(track.map_err(|what| context.wrong(place, what))?);
+                let track =
+                    Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, crate::scene::Interpolation::Linear);
+                parts.graph.nodes[node].channels.weights =
+                    Some(track.map_err(|what| context.wrong(place, what))?);
             }
             parts.graph.hang(mesh, node);
             Ok(())
@@ -123,7 +129,11 @@ fn to_end(mesh: &Mesh, end: &Path) -> Result<Target, LoadError> {
 fn solid(shape: &ShapeSpec, material: usize) -> Result<Mesh, String> {
     let positive = |what: &str, values: &[f64]| {
         let usable = values.iter().all(|value| value.is_finite() && *value > 0.0);
-        if usable { Ok(()) } else { Err(format!("{what}: every length has to be a finite number above zero")) }
+        if usable {
+            Ok(())
+        } else {
+            Err(format!("{what}: every length has to be a finite number above zero"))
+        }
     };
     Ok(match *shape {
         ShapeSpec::Sphere { radius, segments } => {

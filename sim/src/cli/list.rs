@@ -1,0 +1,82 @@
+//! `quintile list`.
+
+use serde::Serialize;
+
+use super::Failure;
+use super::args::ListArgs;
+use crate::gpu::GpuSpec;
+
+/// Everything that can be named, each with a line that says what it is.
+#[derive(Serialize)]
+struct Listing {
+    scenes: Vec<Entry>,
+    gpus: Vec<Entry>,
+    platforms: Vec<Entry>,
+    energy_tables: Vec<Entry>,
+    workloads: Vec<Entry>,
+    figures: Vec<Entry>,
+}
+
+#[derive(Serialize)]
+struct Entry {
+    name: String,
+    what: String,
+}
+
+impl Entry {
+    fn new(name: impl Into<String>, what: impl Into<String>) -> Self {
+        Self { name: name.into(), what: what.into() }
+    }
+}
+
+pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
+    let listing = listing();
+    if args.json {
+        let failed =
+            |error: serde_json::Error| Failure { message: format!("printing JSON: {error}"), code: 1 };
+        println!("{}", serde_json::to_string_pretty(&listing).map_err(failed)?);
+        return Ok(());
+    }
+    let groups = [
+        ("scenes", &listing.scenes),
+        ("GPUs", &listing.gpus),
+        ("platforms", &listing.platforms),
+        ("energy tables", &listing.energy_tables),
+        ("workloads", &listing.workloads),
+        ("figures", &listing.figures),
+    ];
+    for (title, entries) in groups {
+        println!("{title}:");
+        if entries.is_empty() {
+            println!("  none yet");
+        }
+        for entry in entries {
+            println!("  {:<18} {}", entry.name, entry.what);
+        }
+    }
+    Ok(())
+}
+
+fn listing() -> Listing {
+    let gpu = |name| Entry::new(name, GpuSpec::load(name).map(|gpu| gpu.doc).unwrap_or_default());
+    let platform = |name| {
+        Entry::new(
+            name,
+            power_model::Platform::builtin(name).map(|platform| platform.doc).unwrap_or_default(),
+        )
+    };
+    let table = |name| {
+        Entry::new(
+            name,
+            power_model::EnergyTable::builtin(name).map(|table| table.doc().to_owned()).unwrap_or_default(),
+        )
+    };
+    Listing {
+        scenes: workloads::builtin_names().map(|(name, what)| Entry::new(name, what)).collect(),
+        gpus: GpuSpec::names().map(gpu).collect(),
+        platforms: power_model::Platform::names().map(platform).collect(),
+        energy_tables: power_model::EnergyTable::names().map(table).collect(),
+        workloads: vec![Entry::new("run", "draw a scene with motion and defocus, one opaque pass")],
+        figures: crate::run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
+    }
+}

@@ -1,0 +1,75 @@
+//! Each way a run can die.
+
+use crate::gpu::GpuError;
+use crate::output::OutputError;
+use crate::output::image::ImageError;
+use crate::output::plot::PlotError;
+
+/// Why a run did not finish.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum RunError {
+    #[error(transparent)]
+    Scene(#[from] workloads::LoadError),
+    #[error(transparent)]
+    Frame(#[from] workloads::FrameError),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Platform(#[from] power_model::PlatformError),
+    #[error(transparent)]
+    Table(#[from] power_model::TableError),
+    #[error("energy table and platform: {0}")]
+    Model(#[from] power_model::ModelError),
+    #[error(
+        "frame {frame}: the timing model broke its promise: {source}. This is a fault of the program; please report it"
+    )]
+    Timeline { frame: u32, source: power_model::TimelineError },
+    #[error("pacing: {0}")]
+    Pacing(#[from] power_model::PacingError),
+    #[error(transparent)]
+    Samples(#[from] pipeline::sampling::TableError),
+    #[error(transparent)]
+    Device(#[from] traces::device::DeviceError),
+    #[error("sampling the power curve: {0}")]
+    Sample(#[from] traces::device::SampleError),
+    #[error("finding frames: {0}")]
+    Marks(#[from] traces::frames::MarkError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error("drawing a plot: {0}")]
+    Plot(#[from] PlotError),
+    #[error("encoding an image: {0}")]
+    Image(#[from] ImageError),
+    #[error("frames.csv: {0}")]
+    Frames(#[from] traces::energy::TableError),
+    /// Two settings that cannot be together, or one that cannot be.
+    #[error("{0}")]
+    Setting(String),
+}
+
+impl RunError {
+    /// Whether the mistake is the caller's (exit code 2) rather than a failure (exit code 1).
+    pub fn is_usage(&self) -> bool {
+        match self {
+            Self::Scene(error) => error.is_usage(),
+            Self::Gpu(GpuError::Spec(activity::spec::SpecError::Read { .. })) => false,
+            Self::Platform(error) => !is_unreadable(error),
+            Self::Table(error) => !is_unreadable(error),
+            Self::Gpu(_) | Self::Samples(_) | Self::Device(_) | Self::Model(_) | Self::Setting(_) => true,
+            _ => false,
+        }
+    }
+}
+
+/// Whether a file could not be read at all, wherever in the chain of causes that stands.
+fn is_unreadable(error: &(dyn std::error::Error + 'static)) -> bool {
+    let mut cause = Some(error);
+    while let Some(error) = cause {
+        if error.downcast_ref::<std::io::Error>().is_some() {
+            return true;
+        }
+        cause = error.source();
+    }
+    false
+}

@@ -1,0 +1,109 @@
+//! From watts over time to a trace, and back to joules per frame as an analyst would.
+
+use power_model::{FramePower, PARTS, Run, pace};
+use traces::device::{Device, DeviceSpec, Sampled};
+use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
+use traces::frames::{Found, Marks, default_window, find};
+use traces::score::{self, Score, TOLERANCE_S};
+use traces::{Mark, MarkKind, Metadata, Trace};
+
+use super::checks::Checks;
+use super::{Plan, RunError, Simulated};
+
+/// The trace of a run and what was found in it.
+pub struct Measurement {
+    /// The frames in their places: the truth.
+    pub run: Run,
+    /// The trace as recorded.
+    pub trace: Trace,
+    /// Samples beyond the range of the recorder, currents and voltages.
+    pub clipped: usize,
+    /// The recorder.
+    pub device: Device,
+    /// The one marked frame and the end of the run.
+    pub marks: Marks,
+    /// Frame starts found.
+    pub found: Found,
+    /// The energy of every found frame.
+    pub frames: Vec<FrameEnergy>,
+    /// The true frames, as the analysis would describe them.
+    pub truth: Vec<TrueFrame>,
+    /// Found against true starts.
+    pub score: Score,
+    /// Sums that have to agree.
+    pub checks: Checks,
+}
+
+/// Paces the frames, records them, finds them again and integrates them.
+pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement, RunError> {
+    let powers: Vec<&FramePower> = simulated.in_order().map(|frame| &frame.power).collect();
+    let run = pace(&powers, &plan.platform, plan.pacing)?;
+    let device = Device::new(device_spec(plan, &powers))?;
+    let Sampled { mut trace, clipped_currents, clipped_voltages } =
+        device.sample(&run.curve, 0.0, run.curve.end_s())?;
+    let marks = marks(&run, trace.rate_hz());
+    trace.metadata = metadata(plan, &device, &marks);
+    let found = find(&trace, &marks)?;
+    let integral = PowerIntegral::new(&trace);
+    let frames = integral.frames(&found);
+    let truth: Vec<_> =
+        run.frames.iter().map(|f| TrueFrame { start_s: f.start_s, energy_j: f.energy.total_j() }).collect();
+    let score = score::score(&frames, &truth, TOLERANCE_S);
+    let checks = Checks::new(&run, &device, &integral, &found, &frames)?;
+    let clipped = (clipped_currents + clipped_voltages) as usize;
+    Ok(Measurement { run, clipped, device, marks, found, frames, truth, score, checks, trace })
+}
+
+/// A recorder on the platform's rail with the smallest range of a 1-3-10 series that holds the peak, as one would choose
+/// in a laboratory; its noise goes with the range.
+fn device_spec(plan: &Plan, powers: &[&FramePower]) -> DeviceSpec {
+    let default = DeviceSpec::default();
+    let rail_v = plan.platform.rail.voltage_v.value();
+    let peak_w = powers.iter().map(|power| power.peak_w()).fold(plan.platform.idle_w.value(), f64::max);
+    let needed_a = 1.25 * peak_w / rail_v;
+    let series = (-3..6).flat_map(|decade| [1.0, 3.0].map(|step| step * libm::pow(10.0, f64::from(decade))));
+    let range_a = series.into_iter().find(|range| *range >= needed_a).unwrap_or(needed_a);
+    let scale = range_a / default.current_range_a[1];
+    let range_v = 1.5 * rail_v;
+    DeviceSpec {
+        rate_hz: plan.options.trace_rate_hz,
+        rail_v,
+        current_range_a: [-range_a, range_a],
+        voltage_range_v: [-range_v, range_v],
+        current_noise_a: default.current_noise_a * scale,
+        voltage_noise_v: default.voltage_noise_v * range_v / default.voltage_range_v[1],
+        // A tenth of a volt of sag at full scale at most, so that the rail carries any load in range.
+        rail_ohm: default.rail_ohm.min(0.1 / range_a),
+        seed: plan.options.seed,
+        ..default
+    }
+}
+
+/// The middle frame is marked, as an analyst would pick one from the steady part; its end is the end of the run.
+fn marks(run: &Run, rate_hz: f64) -> Marks {
+    let middle = &run.frames[run.frames.len() / 2];
+    let shortest = run.frames.iter().map(|frame| frame.end_s - frame.start_s).fold(f64::INFINITY, f64::min);
+    Marks::one(middle.start_s, default_window(shortest, rate_hz), run.end_s)
+}
+
+fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {
+    let mark = |time_s, kind, label: &str| Mark { time_s, kind, label: label.to_owned() };
+    Metadata {
+        device: device.spec().name.clone(),
+        scene: plan.scene.name().to_owned(),
+        platform: plan.platform.name.clone(),
+        seed: plan.options.seed,
+        pixels: Some(plan.pixels()),
+        marks: vec![
+            mark(marks.starts_s[0], MarkKind::FrameStart, "marked frame"),
+            mark(marks.end_s, MarkKind::End, "end of the last frame"),
+        ],
+        ..Metadata::default()
+    }
+}
+
+/// The mean power of each part over the frames of a run, from start to end, idle included.
+pub(super) fn mean_parts_w(run: &Run) -> [f64; PARTS] {
+    let length_s = run.end_s - run.start_s;
+    run.energy().by_part_j.map(|joules| joules / length_s)
+}

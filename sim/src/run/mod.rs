@@ -1,0 +1,68 @@
+//! A run: scene, pipeline, clock, watts, trace, frames, files.
+//!
+//! ```text
+//! RunOptions -> Plan -> simulate -> measure -> Outcome -> write
+//! ```
+
+mod checks;
+mod error;
+mod facts;
+mod measure;
+mod modelled;
+mod options;
+mod pictures;
+mod report;
+mod simulate;
+mod summary;
+mod timeline;
+mod warnings;
+mod write;
+
+use std::path::Path;
+
+use crate::output::OutDir;
+use crate::output::progress::Progress;
+
+pub use checks::Checks;
+pub use error::RunError;
+pub use measure::Measurement;
+pub use modelled::Modelled;
+pub use options::{PacingChoice, Plan, RunOptions};
+pub use simulate::{Simulated, SimulatedFrame};
+pub use summary::{Figures, Summary};
+
+/// Everything a run found out.
+pub struct Outcome {
+    /// What was asked for.
+    pub plan: Plan,
+    /// What the simulator knows.
+    pub simulated: Simulated,
+    /// What the trace says.
+    pub measurement: Measurement,
+    /// The numbers of `summary.json`.
+    pub summary: Summary,
+}
+
+/// Runs the whole line and writes its results into `out`.
+///
+/// # Errors
+/// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures. Whatever was written before is not
+/// marked as whole: `summary.json` comes last.
+pub fn run(options: RunOptions, out: &Path, progress: &Progress) -> Result<Outcome, RunError> {
+    let plan = Plan::resolve(options)?;
+    let dir = OutDir::create(out)?;
+    let simulated = simulate::simulate(&plan, &dir, progress)?;
+    let measurement = measure::measure(&plan, &simulated)?;
+    let summary = Summary::new(&plan, &simulated, &measurement);
+    let outcome = Outcome { plan, simulated, measurement, summary };
+    write::write(&outcome, dir, progress)?;
+    Ok(outcome)
+}
+
+/// The figures that every run draws into `plots/`, and what they show.
+pub const FIGURES: [(&str, &str); 4] = [
+    ("power_run", "power over the run with found and true frame starts"),
+    ("frame_power", "power over one frame, stacked by part"),
+    ("unit_busy", "how busy each unit is over one frame"),
+    ("frame_energy", "energy of each frame, measured and true"),
+];

@@ -1,0 +1,126 @@
+//! What was asked for, and what it means.
+
+use std::path::Path;
+
+use pipeline::{LensShape, SampleTable, Viewport};
+use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
+use workloads::{Overrides, Scene};
+
+use super::RunError;
+use crate::gpu::GpuSpec;
+
+/// When the next frame starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PacingChoice {
+    /// On the next tick of a display that runs at the scene's frame rate.
+    #[default]
+    Vsync,
+    /// As soon as the one before is done.
+    Free,
+}
+
+/// A run as asked for.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// A built-in scene or a file.
+    pub scene: String,
+    /// Changes to the scene's settings.
+    pub overrides: Overrides,
+    /// A built-in GPU or a RON file.
+    pub gpu: String,
+    /// A built-in platform or a RON file.
+    pub platform: String,
+    /// A built-in energy table or a RON file.
+    pub energy: String,
+    /// Which of the table's values is used.
+    pub bound: Bound,
+    /// When the next frame starts.
+    pub pacing: PacingChoice,
+    /// Samples per second of the recorder.
+    pub trace_rate_hz: f64,
+    /// Seed of samples and noise.
+    pub seed: u64,
+    /// Whether images are written as EXR, too.
+    pub exr: bool,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        Self {
+            scene: "default".to_owned(),
+            overrides: Overrides::default(),
+            gpu: "reference".to_owned(),
+            platform: "reference".to_owned(),
+            energy: "28nm".to_owned(),
+            bound: Bound::Nominal,
+            pacing: PacingChoice::default(),
+            trace_rate_hz: 50e3,
+            seed: 1,
+            exr: false,
+        }
+    }
+}
+
+/// A run with everything loaded and checked.
+pub struct Plan {
+    /// What was asked for.
+    pub options: RunOptions,
+    /// The scene with its settings changed as asked.
+    pub scene: Scene,
+    /// Size of the image.
+    pub viewport: Viewport,
+    /// Where and when each pixel looks.
+    pub samples: SampleTable,
+    /// The hardware.
+    pub gpu: GpuSpec,
+    /// What surrounds it.
+    pub platform: Platform,
+    /// Joules per event.
+    pub table: EnergyTable,
+    /// Table and platform joined.
+    pub model: PowerModel,
+    /// When the next frame starts.
+    pub pacing: Pacing,
+}
+
+impl Plan {
+    /// Loads and checks everything that `options` names.
+    ///
+    /// # Errors
+    /// The first thing that is missing, broken or makes no sense.
+    pub fn resolve(options: RunOptions) -> Result<Self, RunError> {
+        if !(1.0..=1e7).contains(&options.trace_rate_hz) {
+            let rate = options.trace_rate_hz;
+            return Err(RunError::Setting(format!(
+                "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
+            )));
+        }
+        let scene = workloads::load(&options.scene)?.with_overrides(&options.overrides)?;
+        let settings = scene.settings();
+        let viewport = Viewport::new(settings.width, settings.height)
+            .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
+        let samples = SampleTable::low_discrepancy(settings.samples, options.seed, LensShape::Disk)?;
+        let gpu = GpuSpec::load(&options.gpu)?;
+        let platform = file_or_name(&options.platform, Platform::load, Platform::builtin)?;
+        let table = file_or_name(&options.energy, EnergyTable::load, EnergyTable::builtin)?;
+        let model = PowerModel::at(&table, &platform, options.bound)?;
+        let pacing = match options.pacing {
+            PacingChoice::Vsync => Pacing::vsync(settings.frame_rate_hz)?,
+            PacingChoice::Free => Pacing::FreeRunning,
+        };
+        Ok(Self { scene, viewport, samples, gpu, platform, table, model, pacing, options })
+    }
+
+    /// Pixels of the image.
+    pub fn pixels(&self) -> u64 {
+        self.viewport.pixels() as u64
+    }
+}
+
+fn file_or_name<T, E>(
+    name: &str,
+    load: impl FnOnce(&Path) -> Result<T, E>,
+    builtin: impl FnOnce(&str) -> Result<T, E>,
+) -> Result<T, E> {
+    if name.ends_with(".ron") { load(Path::new(name)) } else { builtin(name) }
+}

@@ -1,0 +1,160 @@
+//! The report of a run.
+
+use activity::{Event, Unit};
+use glam::Vec3;
+use power_model::Part;
+use traces::energy::Spread;
+
+use super::pictures::{Plot, parts_in_use};
+use super::simulate::image_name;
+use super::{Outcome, RunError, facts};
+use crate::output::MeanSd;
+use crate::output::image::LinearImage;
+use crate::output::report::{
+    CounterRow, FrameNumbers, FrameRow, Headline, PartRow, Report, ReportImage, ReportPlot, UnitRow,
+    WarningRow,
+};
+
+/// Fills the report.
+pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
+    let plan = &outcome.plan;
+    Ok(Report {
+        title: format!("{} on {}", plan.scene.name(), plan.gpu.name).into(),
+        facts: facts::facts(outcome),
+        warnings: warnings(outcome),
+        headline: headline(outcome),
+        images: images(outcome)?,
+        plots: plots.iter().map(plot).collect::<Result<_, _>>()?,
+        parts: parts(outcome),
+        frames: frames(outcome),
+        pixels: plan.pixels(),
+        units: units(outcome),
+        counters: counters(outcome),
+        settings: facts::settings(outcome),
+        files: facts::files(),
+    })
+}
+
+fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
+    let row = |w: &activity::Warning| WarningRow { code: w.code.to_owned(), message: w.message.clone() };
+    outcome.summary.warnings.iter().map(row).collect()
+}
+
+fn headline(outcome: &Outcome) -> Vec<Headline> {
+    let (measured, truth) = (outcome.summary.measured, outcome.summary.truth);
+    let row = |label: &str, unit: &str, pick: fn(&super::summary::Figures) -> Spread, scale: f64| {
+        let number = |figures: Option<super::summary::Figures>| {
+            figures.map(|f| MeanSd { mean: pick(&f).mean, sd: pick(&f).deviation }.scaled(scale))
+        };
+        Headline {
+            label: label.to_owned(),
+            unit: unit.to_owned(),
+            measured: number(measured),
+            truth: number(truth),
+        }
+    };
+    vec![
+        row("time per frame", "s", |f| f.duration_ms, 1e-3),
+        row("energy per frame", "J", |f| f.energy_mj, 1e-3),
+        row("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
+        row("power", "W", |f| f.power_w, 1.0),
+    ]
+}
+
+fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
+    let viewport = outcome.plan.viewport;
+    let mut pictures: Vec<_> = outcome.simulated.pictures.iter().collect();
+    // The middle one first, large; the others in order as thumbnails.
+    let middle = pictures.len() / 2;
+    pictures[..=middle].rotate_right(1);
+    pictures
+        .into_iter()
+        .enumerate()
+        .map(|(place, (number, image))| {
+            let pixels: Vec<[f32; 3]> = image.iter().map(Vec3::to_array).collect();
+            let linear = LinearImage::new(viewport.width(), viewport.height(), &pixels)?;
+            Ok(ReportImage {
+                caption: format!("frame {number}"),
+                png: linear.thumbnail_png(if place == 0 { 1280 } else { 320 })?,
+                link: Some(format!("{}.png", image_name(*number))),
+            })
+        })
+        .collect()
+}
+
+fn plot(plot: &Plot) -> Result<ReportPlot, RunError> {
+    let (caption, stem) = (plot.caption.clone(), Some(plot.stem.to_owned()));
+    Ok(ReportPlot { caption, svg: plot.picture.svg()?, stem })
+}
+
+fn parts(outcome: &Outcome) -> Vec<PartRow> {
+    let energy = outcome.measurement.run.energy();
+    let row = |part: Part| PartRow {
+        name: part.name().to_owned(),
+        doc: part.doc().to_owned(),
+        overhead: !matches!(part, Part::Unit(_)),
+        energy_j: energy[part],
+    };
+    parts_in_use(outcome).into_iter().map(row).collect()
+}
+
+fn frames(outcome: &Outcome) -> Vec<FrameRow> {
+    let measurement = &outcome.measurement;
+    let starts: Vec<f64> = measurement.truth.iter().map(|frame| frame.start_s).collect();
+    let found: Vec<f64> = measurement.frames.iter().map(|frame| frame.start_s).collect();
+    let mut matched = vec![None; starts.len()];
+    for (found, truth) in traces::score::pairs(&found, &starts, traces::score::TOLERANCE_S) {
+        matched[truth] = Some(&measurement.frames[found]);
+    }
+    let rows = outcome.summary.frames.iter().zip(matched);
+    rows.map(|(row, measured)| FrameRow {
+        frame: u64::from(row.frame),
+        start_s: row.start_s,
+        busy_s: Some(row.busy_ms * 1e-3),
+        measured: measured.map(|m| FrameNumbers {
+            time_s: m.duration_s(),
+            energy_j: m.energy_j,
+            power_w: m.power_w(),
+        }),
+        truth: Some(FrameNumbers {
+            time_s: row.duration_ms * 1e-3,
+            energy_j: row.energy_mj * 1e-3,
+            power_w: row.power_w,
+        }),
+        flags: measured.map_or("missed".to_owned(), |m| m.flags.to_string()),
+    })
+    .collect()
+}
+
+fn units(outcome: &Outcome) -> Vec<UnitRow> {
+    let busy = &outcome.summary.unit_busy;
+    let row = |unit: Unit| {
+        let share = busy.get(unit.name()).copied();
+        UnitRow {
+            name: unit.name().to_owned(),
+            doc: unit.doc().to_owned(),
+            busy: share,
+            modelled: share.is_some(),
+            note: if share.is_some() { "" } else { "nothing in the scene asks for it" }.to_owned(),
+        }
+    };
+    Unit::ALL.into_iter().map(row).collect()
+}
+
+fn counters(outcome: &Outcome) -> Vec<CounterRow> {
+    let frames = outcome.simulated.frames.len().max(1) as f64;
+    let pixels = outcome.plan.pixels() as f64;
+    let row = |event: Event| {
+        let total = outcome.summary.counts[event];
+        let per_frame = total as f64 / frames;
+        CounterRow {
+            unit: event.unit().name().to_owned(),
+            name: event.name().to_owned(),
+            doc: event.doc().to_owned(),
+            total,
+            per_frame,
+            per_pixel: per_frame / pixels,
+        }
+    };
+    Event::ALL.into_iter().map(row).collect()
+}

@@ -1,0 +1,139 @@
+//! The frames of a run through pipeline, clock and watts.
+
+use activity::{Counts, Timeline, Unit};
+use glam::Vec3;
+use power_model::FramePower;
+use rayon::prelude::*;
+use workloads::Frame;
+
+use super::{Plan, RunError};
+use crate::output::OutDir;
+use crate::output::image::LinearImage;
+use crate::output::progress::Progress;
+use crate::timing::{PacketClock, Recorder};
+
+/// Bins of a frame's timeline: a microsecond each, twenty to a sample of a 50 kHz recorder, until a frame is so long that
+/// memory matters.
+const BIN_PS: u64 = 1_000_000;
+const MOST_BINS: usize = 65_536;
+
+/// One frame as the simulator knows it.
+pub struct SimulatedFrame {
+    /// Its number in the scene.
+    pub index: u32,
+    /// Triangles drawn.
+    pub triangles: usize,
+    /// Whether anything moves while its shutter is open.
+    pub moving: bool,
+    /// Whether the camera has a lens.
+    pub lens: bool,
+    /// How often each event happened.
+    pub counts: Counts,
+    /// Watts over time and joules by part.
+    pub power: FramePower,
+    /// For how long each unit was busy, in picoseconds.
+    pub busy_ps: [u64; Unit::COUNT],
+    /// The busy share of each unit in each bin of [`FramePower::bin_s`].
+    pub busy: Vec<[f32; Unit::COUNT]>,
+}
+
+/// All frames of a run.
+pub struct Simulated {
+    /// Frames that differ.
+    pub distinct: Vec<SimulatedFrame>,
+    /// For each frame of the run, its place in `distinct`: a still scene is simulated once.
+    pub frames: Vec<usize>,
+    /// Pictures for the report: frame number and the linear image.
+    pub pictures: Vec<(u32, Vec<Vec3>)>,
+}
+
+impl Simulated {
+    /// The frames of the run in order.
+    pub fn in_order(&self) -> impl Iterator<Item = &SimulatedFrame> {
+        self.frames.iter().map(|&place| &self.distinct[place])
+    }
+
+    /// The counts of the whole run.
+    pub fn total(&self) -> Counts {
+        self.in_order().fold(Counts::default(), |mut sum, frame| {
+            sum += &frame.counts;
+            sum
+        })
+    }
+}
+
+/// Simulates every frame that differs, writing its image as soon as it is done.
+pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result<Simulated, RunError> {
+    dir.remove_stale("images", "frame_", &["png", "exr"])?;
+    let range = plan.scene.settings().frames.clone();
+    let numbers: Vec<u32> =
+        if plan.scene.is_animated() { range.clone().collect() } else { vec![range.start] };
+    let middle = numbers[numbers.len() / 2];
+    let shown = [middle, numbers[0], numbers[numbers.len() - 1]];
+    let bar = progress.bar("frames", numbers.len() as u64);
+    let done: Vec<_> = numbers
+        .par_iter()
+        .map(|&number| {
+            let (frame, image) = simulate_frame(plan, number)?;
+            write_image(plan, dir, number, &image)?;
+            bar.inc();
+            Ok((frame, shown.contains(&number).then_some((number, image))))
+        })
+        .collect::<Result<_, RunError>>()?;
+    let (distinct, pictures): (Vec<_>, Vec<_>) = done.into_iter().unzip();
+    let frames =
+        range.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
+    Ok(Simulated { distinct, frames, pictures: pictures.into_iter().flatten().collect() })
+}
+
+fn simulate_frame(plan: &Plan, number: u32) -> Result<(SimulatedFrame, Vec<Vec3>), RunError> {
+    let frame = plan.scene.frame(number)?;
+    let settings = pipeline::Settings {
+        spec: &plan.gpu.pipeline,
+        viewport: plan.viewport,
+        samples: &plan.samples,
+        background: plan.scene.background(),
+    };
+    let draws = frame.draws(&plan.scene)?;
+    let mut clock = PacketClock::new(&plan.gpu, Recorder::new(BIN_PS, MOST_BINS));
+    let rendered = pipeline::render(&frame.camera, &draws, &settings, |packet| clock.push(packet))
+        .map_err(|error| RunError::Setting(error.to_string()))?;
+    let timeline = clock.finish();
+    let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
+    let moving = is_moving(&frame);
+    let simulated = SimulatedFrame {
+        index: number,
+        triangles: frame.triangle_count(),
+        moving,
+        lens: frame.camera.lens().is_some(),
+        counts: rendered.counts,
+        power,
+        busy_ps: timeline.busy_ps(),
+        busy: busy_shares(&timeline),
+    };
+    Ok((simulated, rendered.image))
+}
+
+fn is_moving(frame: &Frame) -> bool {
+    frame.camera.open() != frame.camera.close() || frame.meshes.iter().any(|mesh| !mesh.is_still())
+}
+
+fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {
+    let share = |busy: u64| (busy as f64 / timeline.bin_ps as f64) as f32;
+    timeline.bins.iter().map(|bin| bin.busy_ps.map(share)).collect()
+}
+
+/// The name of a frame's image without its ending.
+pub(super) fn image_name(number: u32) -> String {
+    format!("images/frame_{number:04}")
+}
+
+fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result<(), RunError> {
+    let pixels: Vec<[f32; 3]> = image.iter().map(Vec3::to_array).collect();
+    let linear = LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?;
+    linear.write_png(dir, &format!("{}.png", image_name(number)))?;
+    if plan.options.exr {
+        linear.write_exr(dir, &format!("{}.exr", image_name(number)))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,285 @@
+//! The numbers of `summary.json`: the same bytes for the same input, whatever the machine did meanwhile.
+
+use std::collections::BTreeMap;
+
+use activity::{Counts, Event, Unit, Warning};
+use power_model::Energy;
+use serde::Serialize;
+use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
+
+use super::checks::Checks;
+use super::measure::mean_parts_w;
+use super::modelled::Modelled;
+use super::simulate::image_name;
+use super::{Measurement, Plan, Simulated, warnings};
+
+/// A run in numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the GPU.
+    pub gpu: String,
+    /// Name of the platform.
+    pub platform: String,
+    /// Name of the energy table, and which of its values were used.
+    pub energy_table: [String; 2],
+    /// Settings in use.
+    pub settings: SettingsSummary,
+    /// What was modelled and what not.
+    pub modelled: Modelled,
+    /// Regimes in which the methods are known to be bad.
+    pub warnings: Vec<Warning>,
+    /// Frames as measured in the trace.
+    pub measured: Option<Figures>,
+    /// Frames as the simulator knows them.
+    pub truth: Option<Figures>,
+    /// Found against true frame starts.
+    pub detection: Detection,
+    /// Sums that have to agree.
+    pub checks: Checks,
+    /// Joules of the run by part, start of the first frame to end of the last.
+    pub energy_by_part_j: Energy,
+    /// Mean watts of the run by part.
+    pub power_by_part_w: BTreeMap<&'static str, f64>,
+    /// Share of the run's frame time for which each unit in use was busy.
+    pub unit_busy: BTreeMap<&'static str, f64>,
+    /// Samples hit over samples tested.
+    pub sample_test_efficiency: Option<f64>,
+    /// How often each event happened.
+    pub counts: Counts,
+    /// A hash of the counts of every frame: equal runs have equal hashes.
+    pub counts_hash: String,
+    /// Every frame of the run.
+    pub frames: Vec<FrameRow>,
+}
+
+/// Settings as they came to be.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "the names say it, documented at their sources")]
+pub struct SettingsSummary {
+    pub width: u32,
+    pub height: u32,
+    pub samples: u32,
+    pub frame_rate_hz: f64,
+    pub shutter: f64,
+    pub first_frame: u32,
+    pub frames: u32,
+    pub lens_radius: f32,
+    pub focus: Option<f32>,
+    pub pacing: &'static str,
+    pub trace_rate_hz: f64,
+    pub seed: u64,
+    pub triangles: usize,
+}
+
+/// A table of frames in a few numbers, in the units people read.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Figures {
+    /// How many frames.
+    pub frames: usize,
+    /// Milliseconds from start to start.
+    pub duration_ms: Spread,
+    /// Millijoules.
+    pub energy_mj: Spread,
+    /// Nanojoules per pixel.
+    pub energy_nj_per_pixel: Spread,
+    /// Watts.
+    pub power_w: Spread,
+    /// Joules of all frames.
+    pub total_j: f64,
+}
+
+impl Figures {
+    fn of(frames: &[FrameEnergy], pixels: u64) -> Option<Self> {
+        let summary = FrameSummary::of(frames)?;
+        Some(Self {
+            frames: summary.frames,
+            duration_ms: scaled(summary.duration_s, 1e3),
+            energy_mj: scaled(summary.energy_j, 1e3),
+            energy_nj_per_pixel: scaled(summary.energy_j, 1e9 / pixels as f64),
+            power_w: summary.power_w,
+            total_j: summary.total_j,
+        })
+    }
+}
+
+fn scaled(spread: Spread, by: f64) -> Spread {
+    Spread { mean: spread.mean * by, deviation: spread.deviation * by, median: spread.median * by }
+}
+
+/// How the frame finder did.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "the terms of information retrieval")]
+pub struct Detection {
+    pub true_frames: usize,
+    pub found_frames: usize,
+    pub matched_frames: usize,
+    pub precision: f64,
+    pub recall: f64,
+    pub median_timing_error_s: Option<f64>,
+    pub worst_timing_error_s: Option<f64>,
+    pub median_energy_error: Option<f64>,
+    pub worst_energy_error: Option<f64>,
+}
+
+/// One frame of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameRow {
+    /// Its number in the scene.
+    pub frame: u32,
+    /// Its image.
+    pub image: String,
+    /// True start in seconds from the start of the recording.
+    pub start_s: f64,
+    /// For how long the GPU worked on it, in milliseconds.
+    pub busy_ms: f64,
+    /// From start to start, in milliseconds.
+    pub duration_ms: f64,
+    /// True energy in millijoules.
+    pub energy_mj: f64,
+    /// True energy in nanojoules per pixel.
+    pub energy_nj_per_pixel: f64,
+    /// True mean power in watts.
+    pub power_w: f64,
+    /// Energy as measured in the trace, in millijoules, where the frame was found.
+    pub measured_energy_mj: Option<f64>,
+    /// Error of the found start in seconds.
+    pub start_error_s: Option<f64>,
+}
+
+impl Summary {
+    pub(super) fn new(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Self {
+        let counts = simulated.total();
+        let truth = true_frames(measurement);
+        let by_part = mean_parts_w(&measurement.run);
+        let pixels = plan.pixels();
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            scene: plan.scene.name().to_owned(),
+            gpu: plan.gpu.name.clone(),
+            platform: plan.platform.name.clone(),
+            energy_table: [plan.table.name().to_owned(), format!("{:?}", plan.options.bound).to_lowercase()],
+            settings: settings(plan, simulated),
+            modelled: Modelled::new(plan, simulated),
+            warnings: warnings::gather(plan, simulated, measurement),
+            measured: Figures::of(&measurement.frames, pixels),
+            truth: Figures::of(&truth, pixels),
+            detection: detection(measurement),
+            checks: measurement.checks.clone(),
+            energy_by_part_j: measurement.run.energy(),
+            power_by_part_w: power_model::Part::ALL
+                .iter()
+                .map(|part| (part.name(), by_part[part.index()]))
+                .collect(),
+            unit_busy: unit_busy(simulated),
+            sample_test_efficiency: counts.sample_test_efficiency(),
+            counts,
+            counts_hash: format!("{:016x}", hash(simulated)),
+            frames: rows(plan, simulated, measurement),
+        }
+    }
+}
+
+/// The true frames in the form of measured ones, for the same statistics.
+fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
+    let frame = |f: &power_model::PacedFrame| FrameEnergy {
+        start_s: f.start_s,
+        end_s: f.end_s,
+        energy_j: f.energy.total_j(),
+        confidence: 1.0,
+        flags: traces::frames::Flags::default(),
+    };
+    measurement.run.frames.iter().map(frame).collect()
+}
+
+fn settings(plan: &Plan, simulated: &Simulated) -> SettingsSummary {
+    let scene = plan.scene.settings();
+    SettingsSummary {
+        width: scene.width,
+        height: scene.height,
+        samples: scene.samples,
+        frame_rate_hz: scene.frame_rate_hz,
+        shutter: scene.shutter,
+        first_frame: scene.frames.start,
+        frames: scene.frames.end - scene.frames.start,
+        lens_radius: scene.lens_radius,
+        focus: scene.focus,
+        pacing: match plan.options.pacing {
+            super::PacingChoice::Vsync => "vsync",
+            super::PacingChoice::Free => "free",
+        },
+        trace_rate_hz: plan.options.trace_rate_hz,
+        seed: plan.options.seed,
+        triangles: simulated.distinct.first().map_or(0, |frame| frame.triangles),
+    }
+}
+
+fn detection(measurement: &Measurement) -> Detection {
+    let score = &measurement.score;
+    Detection {
+        true_frames: score.truth,
+        found_frames: score.found,
+        matched_frames: score.matched,
+        precision: score.precision(),
+        recall: score.recall(),
+        median_timing_error_s: score.median_timing_error_s(),
+        worst_timing_error_s: score.worst_timing_error_s(),
+        median_energy_error: score.median_energy_error(),
+        worst_energy_error: score.worst_energy_error(),
+    }
+}
+
+/// Busy time over the time of the frames, idle between them not counted.
+fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
+    let total = simulated.total();
+    let time: f64 = simulated.in_order().map(|frame| frame.power.duration_s()).sum();
+    let busy = |unit: Unit| {
+        let ps: u64 = simulated.in_order().map(|frame| frame.busy_ps[unit as usize]).sum();
+        ps as f64 * 1e-12 / time
+    };
+    Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
+}
+
+fn hash(simulated: &Simulated) -> u64 {
+    simulated.in_order().fold(0, |hash, frame| {
+        Event::ALL.iter().fold(hash, |hash: u64, &event| {
+            pipeline::sampling::mix(hash.rotate_left(1) ^ frame.counts[event].wrapping_add(event as u64))
+        })
+    })
+}
+
+fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
+    let starts: Vec<f64> = measurement.truth.iter().map(|frame| frame.start_s).collect();
+    let found: Vec<f64> = measurement.frames.iter().map(|frame| frame.start_s).collect();
+    let mut matched = vec![None; starts.len()];
+    for (found, truth) in traces::score::pairs(&found, &starts, traces::score::TOLERANCE_S) {
+        matched[truth] = Some(&measurement.frames[found]);
+    }
+    let first = plan.scene.settings().frames.start;
+    measurement
+        .run
+        .frames
+        .iter()
+        .zip(simulated.in_order())
+        .zip(matched)
+        .zip(first..)
+        .map(|(((paced, simulated), measured), frame)| {
+            let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
+            FrameRow {
+                frame,
+                image: format!("{}.png", image_name(simulated.index)),
+                start_s: paced.start_s,
+                busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
+                duration_ms: duration_s * 1e3,
+                energy_mj: energy_j * 1e3,
+                energy_nj_per_pixel: energy_j * 1e9 / plan.pixels() as f64,
+                power_w: energy_j / duration_s,
+                measured_energy_mj: measured.map(|m| m.energy_j * 1e3),
+                start_error_s: measured.map(|m| m.start_s - paced.start_s),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,96 @@
+//! Regimes in which the methods of a run are known to be bad.
+
+use activity::{Event, Warning};
+use traces::frames::Flag;
+
+use super::{Measurement, Plan, Simulated};
+
+/// A frame shorter than this many samples cannot be integrated well: each end is uncertain by a good part of a sample.
+const FEWEST_SAMPLES: f64 = 50.0;
+
+/// Every warning of a run, sorted and each once.
+pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
+    let mut all = plan.scene.warnings().to_vec();
+    all.extend(measurement.run.warnings.iter().cloned());
+    all.extend(measurement.found.warnings.iter().map(|w| Warning::new(w.code, w.message.clone())));
+    all.extend(degenerate(simulated));
+    all.extend(nothing_seen(simulated));
+    all.extend(short_frames(measurement));
+    all.extend(detection(measurement));
+    all.extend(clipped(measurement));
+    all.sort();
+    all.dedup();
+    all
+}
+
+fn degenerate(simulated: &Simulated) -> Option<Warning> {
+    let worst = simulated.distinct.iter().max_by_key(|frame| frame.counts[Event::TrianglesDegenerate])?;
+    let dropped = worst.counts[Event::TrianglesDegenerate];
+    (dropped > 0).then(|| {
+        let (of, frame) = (worst.counts[Event::TrianglesIn], worst.index);
+        Warning::new(
+            "degenerate-triangle",
+            format!("{dropped} of {of} triangles have no area at any time and were dropped (frame {frame})"),
+        )
+    })
+}
+
+fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
+    let empty = simulated.in_order().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
+    (empty > 0).then(|| {
+        Warning::new(
+            "empty-frame",
+            format!("{empty} of {} frames show nothing: check the camera", simulated.frames.len()),
+        )
+    })
+}
+
+fn short_frames(measurement: &Measurement) -> Option<Warning> {
+    let rate_hz = measurement.trace.rate_hz();
+    let samples = |busy_s: f64| busy_s * rate_hz;
+    let shortest = measurement
+        .run
+        .frames
+        .iter()
+        .map(|frame| frame.busy_end_s - frame.start_s)
+        .fold(f64::INFINITY, f64::min);
+    let short =
+        measurement.run.frames.iter().filter(|f| samples(f.busy_end_s - f.start_s) < FEWEST_SAMPLES).count();
+    (short > 0).then(|| {
+        Warning::new(
+            "short-frame",
+            format!(
+                "{short} of {} frames are busy for less than {FEWEST_SAMPLES} samples of the trace (the shortest for \
+                 {:.1}): their shape is not resolved and starts are uncertain; record at a higher rate",
+                measurement.run.frames.len(),
+                samples(shortest)
+            ),
+        )
+    })
+}
+
+fn detection(measurement: &Measurement) -> Option<Warning> {
+    let score = &measurement.score;
+    let unsure = measurement.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
+    (score.matched < score.truth || score.found > score.matched).then(|| {
+        Warning::new(
+            "frames-missed",
+            format!(
+                "{} of {} frame starts were found in the trace, with {} false ones ({unsure} flagged unsure): energies \
+                 of the frames beside them are wrong",
+                score.matched,
+                score.truth,
+                score.found - score.matched
+            ),
+        )
+    })
+}
+
+fn clipped(measurement: &Measurement) -> Option<Warning> {
+    (measurement.clipped > 0).then(|| {
+        Warning::new(
+            "clipped-samples",
+            format!("{} samples are beyond the recorder's range", measurement.clipped),
+        )
+    })
+}
