@@ -19,18 +19,21 @@ pub fn nearest(triangle: &Triangle, t: [f32; 2]) -> f32 {
 pub struct DepthTile {
     /// Depth of the nearest hit of each sample, infinite where there is none.
     pub depth: Vec<f32>,
-    /// Triangle of the nearest hit; meaningless where there is none.
+    /// Triangle of the nearest hit, [`Self::NOTHING`] where there is none.
     pub triangle: Vec<u32>,
     farthest: f32,
     stale: bool,
 }
 
 impl DepthTile {
+    /// The triangle of a sample that sees none.
+    pub const NOTHING: u32 = u32::MAX;
+
     /// A cleared tile of `samples` samples.
     pub fn cleared(samples: usize) -> Self {
         Self {
             depth: vec![f32::INFINITY; samples],
-            triangle: vec![u32::MAX; samples],
+            triangle: vec![Self::NOTHING; samples],
             farthest: f32::INFINITY,
             stale: false,
         }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::Settings;
 use crate::geometry::{Camera, Draw, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressMap, Allocator};
+use crate::setup::Corner;
 use crate::texture::Texture;
 
 /// Everything the stages read and none of them changes.
@@ -78,6 +79,12 @@ impl<'a> Pass<'a> {
     pub fn images(&self, triangle: u32) -> [&MovingVertex; 3] {
         let (draw, corners) = self.corners(triangle);
         corners.map(|vertex| &self.vertices[draw][vertex])
+    }
+
+    /// The corners of a triangle and whether any of them moves.
+    pub fn moving_corners(&self, triangle: u32) -> ([Corner; 3], bool) {
+        let images = self.images(triangle);
+        (images.map(Corner::new), images.iter().any(|vertex| !vertex.is_still()))
     }
 
     /// Fine tiles in a row of the image.

@@ -1,6 +1,7 @@
 //! From what each sample sees to the image.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -9,8 +10,7 @@ use super::bin::Bin;
 use super::pass::Pass;
 use super::surface::{Grid, Surface};
 use crate::depth::DepthTile;
-use crate::sampling::TileSamples;
-use crate::setup::Corner;
+use crate::sampling::{TileSamples, mix};
 
 /// The image: each pixel the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec3> {
@@ -43,7 +43,7 @@ pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
             }
             None => {
                 let samples = (pixels.count_ones() * per_pixel) as usize;
-                seen.extend(std::iter::repeat_n((u32::MAX, f32::INFINITY.to_bits()), samples));
+                seen.extend(std::iter::repeat_n((DepthTile::NOTHING, f32::INFINITY.to_bits()), samples));
             }
         }
     }
@@ -53,7 +53,7 @@ pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
 /// The touched tiles of a bin: the first pixel of each and its pixels, row by row.
 fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
     let mut samples = TileSamples::default();
-    let mut memo = HashMap::new();
+    let mut scratch = Scratch::default();
     let mut resolved = Vec::new();
     for (place, tile) in bin.tiles.iter().enumerate() {
         let Some(tile) = tile else { continue };
@@ -66,34 +66,74 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
             origin,
             settings.spec.tile_px,
         );
-        resolved.push((origin, resolve_tile(pass, tile, &samples, origin, &mut memo)));
-        // Cells at the border of a tile are shaded again by its neighbour; memory stays small.
-        memo.clear();
+        resolved.push((origin, resolve_tile(pass, tile, &samples, origin, &mut scratch)));
     }
     resolved
 }
 
+/// Memory a worker uses over and over.
+#[derive(Default)]
+struct Scratch {
+    /// Slots of a tile, those of one triangle together.
+    slots: Vec<u16>,
+    /// Cells of one triangle shaded so far.
+    shaded: HashMap<[i32; 2], Vec3, BuildHasherDefault<CellHasher>>,
+}
+
+/// Every sample takes the colour of its cell; each cell of a triangle is shaded once for a tile.
 fn resolve_tile(
     pass: &Pass<'_>,
     tile: &DepthTile,
     samples: &TileSamples,
     origin: [u32; 2],
-    memo: &mut HashMap<(u32, [i32; 2]), Vec3>,
+    scratch: &mut Scratch,
 ) -> Vec<Vec3> {
     let side = pass.settings.spec.tile_px;
     let mut sums = vec![Vec3::ZERO; (side * side) as usize];
-    for slot in 0..samples.len {
-        let pixel = samples.pixel[slot] as usize;
-        sums[pixel] += if tile.depth[slot] == f32::INFINITY {
-            pass.settings.background
-        } else {
-            let triangle = tile.triangle[slot];
-            let corners = pass.images(triangle).map(Corner::new);
-            let moving = pass.images(triangle).iter().any(|vertex| !vertex.is_still());
-            let cell = Grid::new(pass, &corners, moving).cell(samples, slot, origin, side);
-            *memo.entry((triangle, cell)).or_insert_with(|| Surface::new(pass, triangle).shade(cell))
-        };
+    scratch.slots.clear();
+    scratch.slots.extend(0..samples.len as u16);
+    // Stable, so that sums are made in one order.
+    scratch.slots.sort_by_key(|&slot| tile.triangle[slot as usize]);
+    for group in scratch.slots.chunk_by(|&a, &b| tile.triangle[a as usize] == tile.triangle[b as usize]) {
+        let triangle = tile.triangle[group[0] as usize];
+        if triangle == DepthTile::NOTHING {
+            for &slot in group {
+                sums[samples.pixel[slot as usize] as usize] += pass.settings.background;
+            }
+            continue;
+        }
+        let (corners, moving) = pass.moving_corners(triangle);
+        let grid = Grid::new(pass, &corners, moving);
+        let surface = Surface::new(pass, triangle);
+        scratch.shaded.clear();
+        for &slot in group {
+            let cell = grid.cell(samples, slot as usize, origin, side);
+            let colour = scratch.shaded.entry(cell).or_insert_with(|| surface.shade(cell));
+            sums[samples.pixel[slot as usize] as usize] += *colour;
+        }
     }
     let per_pixel = pass.settings.samples.per_pixel() as f32;
     sums.into_iter().map(|sum| sum / per_pixel).collect()
+}
+
+/// Spreads the two coordinates of a cell; the map is never iterated, so nothing depends on its order.
+#[derive(Default)]
+struct CellHasher(u64);
+
+impl Hasher for CellHasher {
+    fn finish(&self) -> u64 {
+        mix(self.0)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = self.0.rotate_left(8) ^ u64::from(byte);
+        }
+    }
+
+    fn write_i32(&mut self, part: i32) {
+        self.0 = self.0.rotate_left(32) ^ u64::from(part as u32);
+    }
+
+    fn write_usize(&mut self, _length: usize) {}
 }

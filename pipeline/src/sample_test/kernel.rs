@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use super::exact;
 use crate::sampling::TileSamples;
-use crate::setup::Triangle;
+use crate::setup::{Corner, Triangle};
 use crate::traversal::Box5;
 
 const LANES: usize = TileSamples::LANES;
@@ -146,49 +146,41 @@ impl Job<'_, '_> {
     #[inline(always)]
     fn in_lens_box(&self, base: usize) -> u32 {
         let ([u_lo, u_hi], [v_lo, v_hi]) = (self.within.u, self.within.v);
-        let (u, v) = (&self.samples.u[base..base + LANES], &self.samples.v[base..base + LANES]);
-        let mut mask = 0;
+        let (u, v) = (block_of(&self.samples.u, base), block_of(&self.samples.v, base));
+        let mut inside = [0; LANES];
         for lane in 0..LANES {
-            let inside = (u[lane] >= u_lo) & (u[lane] <= u_hi) & (v[lane] >= v_lo) & (v[lane] <= v_hi);
-            mask |= u32::from(inside) << lane;
+            let within = (u[lane] >= u_lo) & (u[lane] <= u_hi) & (v[lane] >= v_lo) & (v[lane] <= v_hi);
+            inside[lane] = u16::from(within) << lane;
         }
-        mask
+        any(&inside)
     }
 
     #[inline(always)]
     fn block<const MOTION: bool, const LENS: bool>(&self, base: usize) -> Block {
-        let s = self.samples;
-        let range = base..base + LANES;
-        let (t, slope_x, slope_y) =
-            (&s.t[range.clone()], &s.slope[0][range.clone()], &s.slope[1][range.clone()]);
-        let (lens_x, lens_y) = (&s.lens[0][range.clone()], &s.lens[1][range]);
-        let corners = &self.triangle.corners;
-        let mut block = Block { clockwise: 0, counter_clockwise: 0, tie: 0, depth: [0.0; LANES] };
-        let mut signs = [[0_u32; LANES]; 3];
+        let view = View::<MOTION, LENS>::at(self.samples, base);
+        let [corner_a, corner_b, corner_c] = &self.triangle.corners;
+        let mut depth = [0.0; LANES];
+        let (mut clockwise, mut counter_clockwise, mut tie) =
+            ([0_u16; LANES], [0_u16; LANES], [0_u16; LANES]);
         for lane in 0..LANES {
-            let seen = corners.map(|corner| {
-                let [x, y, w] = if MOTION { corner.at(t[lane]) } else { corner.open };
-                let (x, y) = if LENS { (x - lens_x[lane], y - lens_y[lane]) } else { (x, y) };
-                [x - slope_x[lane] * w, y - slope_y[lane] * w, w]
-            });
-            let [a, b, c] = seen;
-            let e = [b[0] * c[1] - c[0] * b[1], c[0] * a[1] - a[0] * c[1], a[0] * b[1] - b[0] * a[1]];
-            let any_above = (e[0] > 0.0) | (e[1] > 0.0) | (e[2] > 0.0);
-            let any_below = (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0);
-            signs[0][lane] = u32::from((e[0] > 0.0) & (e[1] > 0.0) & (e[2] > 0.0));
-            signs[1][lane] = u32::from((e[0] < 0.0) & (e[1] < 0.0) & (e[2] < 0.0));
-            let zero = (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
-            signs[2][lane] = u32::from(zero & !(any_above & any_below));
-            let depth = ((e[0] * a[2] + e[1] * b[2]) + e[2] * c[2]) / ((e[0] + e[1]) + e[2]);
+            let (a, b, c) = (view.see(corner_a, lane), view.see(corner_b, lane), view.see(corner_c, lane));
+            let e0 = b.x * c.y - c.x * b.y;
+            let e1 = c.x * a.y - a.x * c.y;
+            let e2 = a.x * b.y - b.x * a.y;
+            let (above, below) = ((e0 > 0.0) | (e1 > 0.0) | (e2 > 0.0), (e0 < 0.0) | (e1 < 0.0) | (e2 < 0.0));
+            clockwise[lane] = u16::from((e0 > 0.0) & (e1 > 0.0) & (e2 > 0.0)) << lane;
+            counter_clockwise[lane] = u16::from((e0 < 0.0) & (e1 < 0.0) & (e2 < 0.0)) << lane;
+            tie[lane] = u16::from(((e0 == 0.0) | (e1 == 0.0) | (e2 == 0.0)) & !(above & below)) << lane;
+            let quotient = ((e0 * a.w + e1 * b.w) + e2 * c.w) / ((e0 + e1) + e2);
             // The quotient may leave the range of the vertices by a rounding; depth culling relies on it.
-            block.depth[lane] = depth.max(a[2].min(b[2]).min(c[2])).min(a[2].max(b[2]).max(c[2]));
+            depth[lane] = quotient.max(a.w.min(b.w).min(c.w)).min(a.w.max(b.w).max(c.w));
         }
-        for lane in 0..LANES {
-            block.clockwise |= signs[0][lane] << lane;
-            block.counter_clockwise |= signs[1][lane] << lane;
-            block.tie |= signs[2][lane] << lane;
+        Block {
+            clockwise: any(&clockwise),
+            counter_clockwise: any(&counter_clockwise),
+            tie: any(&tie),
+            depth,
         }
-        block
     }
 
     /// Resolves ties, applies facing and the near depth, and keeps what is nearest.
@@ -243,6 +235,65 @@ impl Job<'_, '_> {
             self.hits.written_pixels |= pixel;
         }
     }
+}
+
+/// The union of one bit for each lane.
+#[inline(always)]
+fn any(bits: &[u16; LANES]) -> u32 {
+    let mut union = 0;
+    for lane in 0..LANES {
+        union |= bits[lane];
+    }
+    u32::from(union)
+}
+
+/// What sixteen samples need to see a vertex. Plain loops and no closures, which would not be inlined into functions
+/// compiled for wider vectors.
+struct View<'a, const MOTION: bool, const LENS: bool> {
+    t: &'a [f32; LANES],
+    lens_x: &'a [f32; LANES],
+    lens_y: &'a [f32; LANES],
+    slope_x: &'a [f32; LANES],
+    slope_y: &'a [f32; LANES],
+}
+
+/// A vertex as a sample sees it.
+struct Seen {
+    x: f32,
+    y: f32,
+    w: f32,
+}
+
+impl<'a, const MOTION: bool, const LENS: bool> View<'a, MOTION, LENS> {
+    #[inline(always)]
+    fn at(samples: &'a TileSamples, base: usize) -> Self {
+        Self {
+            t: block_of(&samples.t, base),
+            lens_x: block_of(&samples.lens[0], base),
+            lens_y: block_of(&samples.lens[1], base),
+            slope_x: block_of(&samples.slope[0], base),
+            slope_y: block_of(&samples.slope[1], base),
+        }
+    }
+
+    #[inline(always)]
+    fn see(&self, corner: &Corner, lane: usize) -> Seen {
+        let ([mut x, mut y, mut w], [dx, dy, dw]) = (corner.open, corner.delta);
+        if MOTION {
+            let t = self.t[lane];
+            (x, y, w) = (x + t * dx, y + t * dy, w + t * dw);
+        }
+        if LENS {
+            (x, y) = (x - self.lens_x[lane], y - self.lens_y[lane]);
+        }
+        Seen { x: x - self.slope_x[lane] * w, y: y - self.slope_y[lane] * w, w }
+    }
+}
+
+#[inline(always)]
+fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
+    // Arrays are padded to whole blocks, so the fallback is never taken.
+    array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
 }
 
 /// The lanes of the block at `base` that belong to `run`.

@@ -138,9 +138,13 @@ impl SampleTable {
 
     /// The samples of pixel (`px`, `py`), in table order.
     pub fn pixel(&self, px: u32, py: u32) -> &[Sample] {
+        self.block(px, py).pixel(0, 0)
+    }
+
+    /// The samples of pixel (`px`, `py`) and of those after it in the same tile.
+    pub(super) fn block(&self, px: u32, py: u32) -> Block<'_> {
         let (x, y) = self.place(px, py);
-        let first = ((y * Self::SIDE_PX + x) * self.per_pixel) as usize;
-        &self.samples[first..first + self.per_pixel as usize]
+        Block { table: self, first: y * Self::SIDE_PX + x }
     }
 
     /// Where in the block pixel (`px`, `py`) looks.
@@ -150,6 +154,22 @@ impl SampleTable {
             (at + bits as u32 % Self::SIDE_PX / Self::TURN_PX * Self::TURN_PX) % Self::SIDE_PX
         };
         (turn(copy & 0xFFFF, px), turn((copy >> 16) & 0xFFFF, py))
+    }
+}
+
+/// Samples from one pixel on; a tile never wraps around the table.
+#[derive(Clone, Copy)]
+pub(super) struct Block<'a> {
+    table: &'a SampleTable,
+    first: u32,
+}
+
+impl<'a> Block<'a> {
+    /// The samples of the pixel `dx` columns and `dy` rows on.
+    pub fn pixel(&self, dx: u32, dy: u32) -> &'a [Sample] {
+        let per_pixel = self.table.per_pixel as usize;
+        let first = (self.first + dy * SampleTable::SIDE_PX + dx) as usize * per_pixel;
+        &self.table.samples[first..first + per_pixel]
     }
 }
 

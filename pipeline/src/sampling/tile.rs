@@ -48,11 +48,12 @@ impl TileSamples {
         self.len = self.order.len();
         self.resize(self.len.next_multiple_of(Self::LANES));
         let per_pixel = table.per_pixel();
+        let block = table.block(px, py);
         for slot in 0..self.len {
             let index = u32::from(self.order[slot]);
             let (pixel, sample) = (index / per_pixel, (index % per_pixel) as usize);
             let (column, row) = (px + pixel % side_px, py + pixel / side_px);
-            let s = table.pixel(column, row)[sample];
+            let s = block.pixel(pixel % side_px, pixel / side_px)[sample];
             let x = Viewport::edge(column, viewport.width()) + s.x;
             let y = Viewport::edge(row, viewport.height()) + s.y;
             (self.x[slot], self.y[slot]) = (x, y);

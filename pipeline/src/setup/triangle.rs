@@ -20,8 +20,10 @@ impl Corner {
     }
 
     /// The vertex at time `t`, with the rounding of the sample test: monotone in `t` on every axis.
+    #[inline]
     pub fn at(&self, t: f32) -> [f32; 3] {
-        std::array::from_fn(|axis| self.open[axis] + t * self.delta[axis])
+        let ([x, y, w], [dx, dy, dw]) = (self.open, self.delta);
+        [x + t * dx, y + t * dy, w + t * dw]
     }
 }
 

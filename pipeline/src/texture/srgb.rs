@@ -2,23 +2,25 @@
 
 use std::sync::LazyLock;
 
-static TO_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|code| {
-        let c = code as f64 / 255.0;
-        (if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }) as f32
-    })
-});
+static TO_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64)));
+
+fn decode(code: f64) -> f32 {
+    let c = code / 255.0;
+    (if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }) as f32
+}
 
 /// The linear value in [0, 1] of an 8-bit sRGB code.
 pub fn srgb8_to_linear(code: u8) -> f32 {
     TO_LINEAR[code as usize]
 }
 
+/// The linear values half way between neighbouring codes.
+static BORDERS: LazyLock<[f32; 255]> =
+    LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 + 0.5)));
+
 /// The nearest 8-bit sRGB code of a linear value; values outside [0, 1] are clamped, NaN becomes 0.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
-    let c = f64::from(linear).clamp(0.0, 1.0);
-    let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 };
-    (encoded * 255.0 + 0.5) as u8
+    BORDERS.partition_point(|&border| border <= linear) as u8
 }
 
 #[cfg(test)]
