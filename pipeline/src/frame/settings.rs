@@ -80,7 +80,7 @@ impl PipelineSpec {
         };
         size("tile_px", self.tile_px, [1, 2, 4, 8].contains(&self.tile_px), "it has to be 1, 2, 4 or 8")?;
         let coarse = self.coarse_tile_px;
-        let fits = (1..=256).contains(&coarse) && coarse % self.tile_px == 0;
+        let fits = (1..=256).contains(&coarse) && coarse.is_multiple_of(self.tile_px);
         size("coarse_tile_px", coarse, fits, "it has to be a multiple of `tile_px`, at most 256")?;
         let batch = self.batch_triangles;
         size("batch_triangles", batch, (1..=1 << 24).contains(&batch), "it has to be 1 to 16777216")?;

@@ -220,8 +220,7 @@ impl Job<'_, '_> {
 
     #[inline(always)]
     fn keep(&mut self, slot: usize, depth: f32) {
-        // A comparison that fails for NaN as well.
-        if !(depth > self.near) {
+        if depth <= self.near || depth.is_nan() {
             return;
         }
         let pixel = 1_u64 << self.samples.pixel[slot];
@@ -240,11 +239,7 @@ impl Job<'_, '_> {
 /// The union of one bit for each lane.
 #[inline(always)]
 fn any(bits: &[u16; LANES]) -> u32 {
-    let mut union = 0;
-    for lane in 0..LANES {
-        union |= bits[lane];
-    }
-    u32::from(union)
+    u32::from(bits.iter().fold(0, |union, bit| union | bit))
 }
 
 /// What sixteen samples need to see a vertex. Plain loops and no closures, which would not be inlined into functions

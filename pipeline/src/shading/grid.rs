@@ -12,10 +12,8 @@ const FARTHEST: f32 = 1e6;
 pub fn cell(reference: &[[f32; 3]; 3], weights: [f32; 3], origin: [f32; 2]) -> Option<[i32; 2]> {
     let mix = |axis: usize| (0..3).map(|k| weights[k] * reference[k][axis]).sum::<f32>();
     let w = mix(2);
-    if !(w > 0.0) {
-        return None;
-    }
-    Some([0, 1].map(|axis| (mix(axis) / w - origin[axis]).clamp(-FARTHEST, FARTHEST).floor() as i32))
+    (w > 0.0)
+        .then(|| [0, 1].map(|axis| (mix(axis) / w - origin[axis]).clamp(-FARTHEST, FARTHEST).floor() as i32))
 }
 
 /// Barycentric weights of the middle of a cell, which lies outside the triangle for cells its border crosses: shading

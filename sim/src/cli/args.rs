@@ -18,7 +18,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene, time it, turn it into watts, record a trace and find the energy of every frame in it
-    Run(RunArgs),
+    Run(Box<RunArgs>),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
     List(ListArgs),
 }

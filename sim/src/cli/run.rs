@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use power_model::Bound;
-use traces::energy::Spread;
 use workloads::Overrides;
 
 use super::Failure;
@@ -11,7 +10,7 @@ use super::args::{BoundArg, PacingArg, RunArgs};
 use crate::output::MeanSd;
 use crate::output::progress::Progress;
 use crate::output::table::{Table, si, si_mean_sd};
-use crate::run::{Figures, Outcome, PacingChoice, RunError, RunOptions};
+use crate::run::{Outcome, PacingChoice, RunError, RunOptions};
 
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
@@ -112,22 +111,10 @@ fn print_text(args: &RunArgs, outcome: &Outcome) {
 
 /// Measured beside true, a row for each quantity.
 fn figures(outcome: &Outcome) -> Table {
-    let mut table = Table::new(["per frame", "measured in the trace", "simulator's truth"]);
-    let (measured, truth) = (outcome.summary.measured, outcome.summary.truth);
-    let rows: [(&str, &str, fn(&Figures) -> Spread, f64); 4] = [
-        ("time", "s", |f| f.duration_ms, 1e-3),
-        ("energy", "J", |f| f.energy_mj, 1e-3),
-        ("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
-        ("power", "W", |f| f.power_w, 1.0),
-    ];
-    for (name, unit, pick, scale) in rows {
-        let cell = |figures: Option<Figures>| {
-            figures.map_or("-".to_owned(), |f| {
-                let spread = pick(&f);
-                si_mean_sd(MeanSd { mean: spread.mean, sd: spread.deviation }.scaled(scale), unit)
-            })
-        };
-        table.row([name.to_owned(), cell(measured), cell(truth)]);
+    let mut table = Table::new(["", "measured in the trace", "simulator's truth"]);
+    for row in outcome.summary.headline() {
+        let cell = |number: Option<MeanSd>| number.map_or("-".to_owned(), |n| si_mean_sd(n, &row.unit));
+        table.row([row.label.clone(), cell(row.measured), cell(row.truth)]);
     }
     table
 }

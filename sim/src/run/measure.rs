@@ -34,6 +34,19 @@ pub struct Measurement {
     pub checks: Checks,
 }
 
+impl Measurement {
+    /// For each frame of the run, the one found in the trace at its place, if any.
+    pub fn by_true_frame(&self) -> Vec<Option<&FrameEnergy>> {
+        let starts: Vec<f64> = self.truth.iter().map(|frame| frame.start_s).collect();
+        let found: Vec<f64> = self.frames.iter().map(|frame| frame.start_s).collect();
+        let mut matched = vec![None; starts.len()];
+        for (found, truth) in score::pairs(&found, &starts, TOLERANCE_S) {
+            matched[truth] = Some(&self.frames[found]);
+        }
+        matched
+    }
+}
+
 /// Paces the frames, records them, finds them again and integrates them.
 pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement, RunError> {
     let powers: Vec<&FramePower> = simulated.in_order().map(|frame| &frame.power).collect();
@@ -50,7 +63,7 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
         run.frames.iter().map(|f| TrueFrame { start_s: f.start_s, energy_j: f.energy.total_j() }).collect();
     let score = score::score(&frames, &truth, TOLERANCE_S);
     let checks = Checks::new(&run, &device, &integral, &found, &frames)?;
-    let clipped = (clipped_currents + clipped_voltages) as usize;
+    let clipped = clipped_currents + clipped_voltages;
     Ok(Measurement { run, clipped, device, marks, found, frames, truth, score, checks, trace })
 }
 

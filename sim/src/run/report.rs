@@ -3,16 +3,13 @@
 use activity::{Event, Unit};
 use glam::Vec3;
 use power_model::Part;
-use traces::energy::Spread;
 
 use super::pictures::{Plot, parts_in_use};
 use super::simulate::image_name;
 use super::{Outcome, RunError, facts};
-use crate::output::MeanSd;
 use crate::output::image::LinearImage;
 use crate::output::report::{
-    CounterRow, FrameNumbers, FrameRow, Headline, PartRow, Report, ReportImage, ReportPlot, UnitRow,
-    WarningRow,
+    CounterRow, FrameNumbers, FrameRow, PartRow, Report, ReportImage, ReportPlot, UnitRow, WarningRow,
 };
 
 /// Fills the report.
@@ -22,7 +19,7 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
         title: format!("{} on {}", plan.scene.name(), plan.gpu.name).into(),
         facts: facts::facts(outcome),
         warnings: warnings(outcome),
-        headline: headline(outcome),
+        headline: outcome.summary.headline(),
         images: images(outcome)?,
         plots: plots.iter().map(plot).collect::<Result<_, _>>()?,
         parts: parts(outcome),
@@ -38,27 +35,6 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
 fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
     let row = |w: &activity::Warning| WarningRow { code: w.code.to_owned(), message: w.message.clone() };
     outcome.summary.warnings.iter().map(row).collect()
-}
-
-fn headline(outcome: &Outcome) -> Vec<Headline> {
-    let (measured, truth) = (outcome.summary.measured, outcome.summary.truth);
-    let row = |label: &str, unit: &str, pick: fn(&super::summary::Figures) -> Spread, scale: f64| {
-        let number = |figures: Option<super::summary::Figures>| {
-            figures.map(|f| MeanSd { mean: pick(&f).mean, sd: pick(&f).deviation }.scaled(scale))
-        };
-        Headline {
-            label: label.to_owned(),
-            unit: unit.to_owned(),
-            measured: number(measured),
-            truth: number(truth),
-        }
-    };
-    vec![
-        row("time per frame", "s", |f| f.duration_ms, 1e-3),
-        row("energy per frame", "J", |f| f.energy_mj, 1e-3),
-        row("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
-        row("power", "W", |f| f.power_w, 1.0),
-    ]
 }
 
 fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
@@ -99,14 +75,7 @@ fn parts(outcome: &Outcome) -> Vec<PartRow> {
 }
 
 fn frames(outcome: &Outcome) -> Vec<FrameRow> {
-    let measurement = &outcome.measurement;
-    let starts: Vec<f64> = measurement.truth.iter().map(|frame| frame.start_s).collect();
-    let found: Vec<f64> = measurement.frames.iter().map(|frame| frame.start_s).collect();
-    let mut matched = vec![None; starts.len()];
-    for (found, truth) in traces::score::pairs(&found, &starts, traces::score::TOLERANCE_S) {
-        matched[truth] = Some(&measurement.frames[found]);
-    }
-    let rows = outcome.summary.frames.iter().zip(matched);
+    let rows = outcome.summary.frames.iter().zip(outcome.measurement.by_true_frame());
     rows.map(|(row, measured)| FrameRow {
         frame: u64::from(row.frame),
         start_s: row.start_s,

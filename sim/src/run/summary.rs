@@ -12,6 +12,8 @@ use super::measure::mean_parts_w;
 use super::modelled::Modelled;
 use super::simulate::image_name;
 use super::{Measurement, Plan, Simulated, warnings};
+use crate::output::MeanSd;
+use crate::output::report::Headline;
 
 /// A run in numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -151,6 +153,23 @@ pub struct FrameRow {
 }
 
 impl Summary {
+    /// The quantities that people compare, measured beside true, mean and standard deviation over frames in SI units.
+    pub fn headline(&self) -> Vec<Headline> {
+        let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread, scale: f64| {
+            let number = |figures: &Option<Figures>| {
+                figures.as_ref().map(pick).map(|s| MeanSd { mean: s.mean * scale, sd: s.deviation * scale })
+            };
+            let (measured, truth) = (number(&self.measured), number(&self.truth));
+            Headline { label: label.to_owned(), unit: unit.to_owned(), measured, truth }
+        };
+        vec![
+            row("time per frame", "s", |f| f.duration_ms, 1e-3),
+            row("energy per frame", "J", |f| f.energy_mj, 1e-3),
+            row("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
+            row("power", "W", |f| f.power_w, 1.0),
+        ]
+    }
+
     pub(super) fn new(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Self {
         let counts = simulated.total();
         let truth = true_frames(measurement);
@@ -252,19 +271,13 @@ fn hash(simulated: &Simulated) -> u64 {
 }
 
 fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
-    let starts: Vec<f64> = measurement.truth.iter().map(|frame| frame.start_s).collect();
-    let found: Vec<f64> = measurement.frames.iter().map(|frame| frame.start_s).collect();
-    let mut matched = vec![None; starts.len()];
-    for (found, truth) in traces::score::pairs(&found, &starts, traces::score::TOLERANCE_S) {
-        matched[truth] = Some(&measurement.frames[found]);
-    }
     let first = plan.scene.settings().frames.start;
     measurement
         .run
         .frames
         .iter()
         .zip(simulated.in_order())
-        .zip(matched)
+        .zip(measurement.by_true_frame())
         .zip(first..)
         .map(|(((paced, simulated), measured), frame)| {
             let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
