@@ -1,6 +1,8 @@
 //! Property: culling and dropped dimensions change nothing. Every visible sample of the pipeline, with any tests switched
 //! on, is that of testing every sample against every triangle on the full five-dimensional path.
 
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
 mod common;
 
 use common::*;
@@ -64,7 +66,8 @@ fn every_combination_on_one_scene_of_each_kind() {
             for switches in 0..8_u8 {
                 let on = |bit: u8| switches & (1 << bit) != 0;
                 let features = Features { side_planes: on(0), edges: on(1), z_max: on(2) };
-                [false, true].map(|borders| check(kind, Cull::None, lens, features, borders, 90, 11));
+                check(kind, Cull::None, lens, features, false, 90, 11);
+                check(kind, Cull::None, lens, features, true, 90, 11);
             }
         }
     }

@@ -49,9 +49,8 @@ pub fn render(
     };
     let mut replay = Replay::new(&pass)?;
     let bins = rasterize(&pass, &mut replay, &mut emit);
-    let image = resolve::resolve(&pass, &bins);
-    replay.resolve(&bins, &mut emit);
-    Ok(Rendered { image, counts })
+    replay.finish(&mut emit);
+    Ok(Rendered { image: resolve::resolve(&pass, &bins), counts })
 }
 
 /// The triangle each sample sees (`u32::MAX` for none) and the bits of its depth, for tests and comparisons: tile by tile
@@ -70,11 +69,14 @@ pub fn visibility(
 }
 
 /// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch. Bins are double
-/// buffered: the front end works on the next batch while tiles are traversed, so its packets come one batch ahead.
+/// buffered: the front end works on the next batch while tiles are traversed, so its packets come one batch ahead. After
+/// the last batch each bin is resolved at once, while its samples are still in the caches.
 fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Packet)) -> Vec<Bin> {
     let mut bins = Bin::all(pass);
     let mut batches = pass.batches();
-    let mut next = batches.next().map(|batch| vertices::front_end(pass, batch, replay, emit));
+    // Without a single triangle there is still an image to resolve.
+    let first = batches.next().unwrap_or(0..0);
+    let mut next = Some(vertices::front_end(pass, first, replay, emit));
     while let Some(ready) = next {
         next = batches.next().map(|batch| vertices::front_end(pass, batch, replay, emit));
         let lists = bin::distribute(pass, &ready);
@@ -85,7 +87,12 @@ fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Pa
                 bin.rasterize(pass, &ready, list, scratch)
             })
             .collect();
-        logs.iter().for_each(|log| replay.bin(log, emit));
+        for (bin, log) in bins.iter().zip(&logs) {
+            replay.bin(log, emit);
+            if next.is_none() {
+                replay.resolve(bin, emit);
+            }
+        }
     }
     bins
 }

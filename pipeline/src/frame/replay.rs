@@ -154,15 +154,16 @@ impl<'a> Replay<'a> {
         open.into_iter().for_each(|(line, held)| each(self, line, held));
     }
 
-    /// The packets that resolve every tile, row by row, and the end of the frame.
-    pub fn resolve(&mut self, bins: &[Bin], emit: &mut impl FnMut(&Packet)) {
-        let mut tiles: Vec<_> = bins.iter().flat_map(|bin| bin.inside(self.pass)).collect();
-        tiles.sort_unstable();
-        let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
-        for (tile, _, pixels, touched) in tiles {
-            emit(&last);
-            last = self.resolve_tile(tile, pixels, touched);
+    /// The packets that resolve the tiles of a bin.
+    pub fn resolve(&mut self, bin: &Bin, emit: &mut impl FnMut(&Packet)) {
+        for (tile, _, pixels, touched) in bin.inside(self.pass) {
+            emit(&self.resolve_tile(tile, pixels, touched));
         }
+    }
+
+    /// The end of the frame: the image leaves the caches.
+    pub fn finish(&mut self, emit: &mut impl FnMut(&Packet)) {
+        let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
         let image = self.pass.addresses.image;
         let end = self.pass.addresses.vertices.first().copied().unwrap_or(u64::MAX);
         self.memory.finish(image..end, &mut last.counts);
@@ -175,10 +176,12 @@ impl<'a> Replay<'a> {
         counts[Event::PixelsResolved] = pixels.count_ones();
         if touched {
             counts[Event::SamplesResolved] = pixels.count_ones() * self.pass.settings.samples.per_pixel();
-            let base = self.pass.addresses.colour;
+            let (colour, depth) = (self.pass.addresses.colour, self.pass.addresses.depth);
             self.lines(tile, pixels, |this, line, _| {
                 let fresh = !this.colour_used[line as usize];
-                this.memory.colour(base + line * LINE_BYTES, false, fresh, counts);
+                this.memory.colour(colour + line * LINE_BYTES, false, fresh, counts);
+                this.memory.discard(colour + line * LINE_BYTES);
+                this.memory.discard(depth + line * LINE_BYTES);
             });
         }
         let side = u64::from(self.pass.settings.spec.tile_px);

@@ -85,6 +85,16 @@ impl Cache {
         if victim.dirty { Access::MissEvicting(victim.key) } else { Access::Miss }
     }
 
+    /// Forgets `key`, written or not: its contents are not needed again.
+    pub fn discard(&mut self, key: u64) {
+        let first = (key % self.sets) as usize * self.ways;
+        let set = &mut self.lines[first..first + self.ways];
+        if let Some(way) = set.iter().position(|line| line.key == key) {
+            set[way..].rotate_left(1);
+            set[self.ways - 1] = Line::EMPTY;
+        }
+    }
+
     /// Forgets everything and returns the keys that had been written, in order of place.
     pub fn flush(&mut self) -> Vec<u64> {
         let dirty = self.lines.iter().filter(|line| line.dirty).map(|line| line.key).collect();
@@ -121,6 +131,17 @@ mod tests {
         c.access(3, true);
         assert_eq!(c.flush(), [3]);
         assert_eq!(c.access(3, false), Access::Miss);
+    }
+
+    #[test]
+    fn what_is_discarded_is_not_written_back() {
+        let mut c = cache(2, 2);
+        c.access(1, true);
+        c.access(2, true);
+        c.discard(1);
+        assert_eq!(c.access(3, false), Access::Miss);
+        assert_eq!(c.access(2, false), Access::Hit);
+        assert_eq!(c.flush(), [2]);
     }
 
     #[test]

@@ -62,6 +62,15 @@ impl MemorySystem {
         access(&mut self.colour, &mut self.l2, address, write, fresh, counts);
     }
 
+    /// The line at `address` holds depths or colours of samples that are not needed again: it is dropped wherever it is,
+    /// rather than written back.
+    pub fn discard(&mut self, address: u64) {
+        let line = address / LINE_BYTES;
+        for cache in [&mut self.depth.cache, &mut self.colour.cache, &mut self.l2] {
+            cache.discard(line);
+        }
+    }
+
     /// A texture unit reads the line at `address`.
     pub fn texture(&mut self, address: u64, counts: &mut PacketCounts) {
         access(&mut self.texture, &mut self.l2, address, false, false, counts);

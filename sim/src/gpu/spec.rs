@@ -209,7 +209,7 @@ mod tests {
         assert!(text.contains("above zero"), "{text}");
         let text = message(&REFERENCE.replace("\"indices\": 1", "\"depth_reads\": 1"));
         assert!(text.contains("belongs in `units.depth`"), "{text}");
-        let text = message(&REFERENCE.replace("coarse_tile_px: 64", "coarse_tile_px: 60"));
+        let text = message(&REFERENCE.replace("coarse_tile_px: 32", "coarse_tile_px: 30"));
         assert!(text.contains("coarse_tile_px"), "{text}");
     }
 

@@ -122,8 +122,8 @@ impl PacketClock {
     }
 }
 
-/// What batches wait for: tiles for the set-up of their whole batch, the front end for one of the two bin buffers, and the
-/// resolve for every tile.
+/// What batches wait for: tiles for the set-up of their whole batch and the front end for one of the two bin buffers. A
+/// resolve follows the tiles of its bin through the colour unit, which keeps the order of the stream.
 #[derive(Clone, Debug)]
 struct Batches {
     triangles: u32,
@@ -150,9 +150,7 @@ impl Batches {
             }
             PacketKind::Tile if packet.triangle == u32::MAX => at(&self.set_up_ps, self.current),
             PacketKind::Tile => at(&self.set_up_ps, self.of(packet.triangle)),
-            PacketKind::Resolve => {
-                self.traversed_ps.iter().chain(&self.set_up_ps).copied().max().unwrap_or(0)
-            }
+            PacketKind::Resolve => at(&self.set_up_ps, self.current),
         }
     }
 
