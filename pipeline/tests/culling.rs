@@ -52,10 +52,10 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn culling_changes_nothing(
-        kind in kinds(), cull in culls(), lens: bool, switches in 0..8_u8, borders: bool, count in 1..160_u32, seed: u64,
+        kind in kinds(), cull in culls(), lens: bool, switches in 0..16_u8, borders: bool, count in 1..160_u32, seed: u64,
     ) {
         let on = |bit: u8| switches & (1 << bit) != 0;
-        check(kind, cull, lens, Features { side_planes: on(0), edges: on(1), z_max: on(2) }, borders, count, seed);
+        check(kind, cull, lens, Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3) }, borders, count, seed);
     }
 }
 
@@ -63,9 +63,9 @@ proptest! {
 fn every_combination_on_one_scene_of_each_kind() {
     for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid, Kind::Layers] {
         for lens in [false, true] {
-            for switches in 0..8_u8 {
+            for switches in 0..16_u8 {
                 let on = |bit: u8| switches & (1 << bit) != 0;
-                let features = Features { side_planes: on(0), edges: on(1), z_max: on(2) };
+                let features = Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3) };
                 check(kind, Cull::None, lens, features, false, 90, 11);
                 check(kind, Cull::None, lens, features, true, 90, 11);
             }

@@ -77,7 +77,6 @@ activity! {
     Traversal "traversal" "Finds the tiles a triangle may touch, with the u, v, t box of each." {
         CoarseTilesVisited "coarse_tiles_visited" "A coarse tile tested."
         TilesVisited "tiles_visited" "A fine tile tested."
-        TilesCulledBox "tiles_culled_box" "A tile, coarse or fine, culled by the bounding box."
         TilesCulledSides "tiles_culled_sides" "A tile, coarse or fine, culled by the side planes over u, v and t."
         TilesCulledEdges "tiles_culled_edges" "A tile, coarse or fine, culled by the edges."
         TileMadds "tile_madds" "A multiply-add of a tile test."
@@ -89,6 +88,9 @@ activity! {
         DepthIntervalMadds "depth_interval_madds" "A multiply-add spent on a depth interval."
     }
     SampleTest "sample_test" "Tests samples against the edges of a triangle." {
+        SampleReads "sample_reads" "A sample's x, y, u, v, t read from the sample table, to be screened or tested."
+        SamplesScreened "samples_screened" "A sample screened by the linearized edges before it is tested."
+        ScreenMadds "screen_madds" "A multiply-add of screening a sample."
         SamplesTested "samples_tested" "A sample tested against a triangle."
         SamplesHit "samples_hit" "A sample found inside the triangle and beyond the near depth."
         SampleMadds "sample_madds" "A multiply-add of a sample test, the depth at the sample included."

@@ -37,11 +37,13 @@ impl TileWork {
 }
 
 /// One triangle in one tile, or tile tests that led to none.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Work {
     pub triangle: u32,
     pub tile: u32,
     pub tests: TileWork,
+    pub screened: u32,
+    pub screen_madds: u32,
     pub tested: u32,
     pub hit: u32,
     pub written: u32,

@@ -8,6 +8,7 @@ mod resolve;
 mod settings;
 mod surface;
 mod vertices;
+mod worker;
 
 use activity::{Counts, Packet, PacketKind};
 use glam::Vec3;
@@ -83,7 +84,7 @@ fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Pa
         let logs: Vec<_> = bins
             .par_iter_mut()
             .zip(&lists)
-            .map_init(bin::Scratch::default, |scratch, (bin, list)| {
+            .map_init(worker::Scratch::default, |scratch, (bin, list)| {
                 bin.rasterize(pass, &ready, list, scratch)
             })
             .collect();

@@ -88,6 +88,9 @@ impl<'a> Replay<'a> {
         let mut packet = super::packet(PacketKind::Tile, work.tile, work.triangle);
         let counts = &mut packet.counts;
         work.tests.add_to(counts);
+        counts[Event::SampleReads] = work.screened.max(work.tested);
+        counts[Event::SamplesScreened] = work.screened;
+        counts[Event::ScreenMadds] = work.screen_madds;
         counts[Event::SamplesTested] = work.tested;
         counts[Event::SamplesHit] = work.hit;
         counts[Event::SampleMadds] = work.sample_madds;

@@ -33,17 +33,19 @@ pub struct PipelineSpec {
 pub struct Features {
     /// Narrow the box of lens and time by the side planes of a tile.
     pub side_planes: bool,
-    /// Test tiles against the edges of triangles that are still and in focus.
+    /// Bound the edges over a tile and its box of lens and time.
     pub edges: bool,
+    /// Screen single samples by the linearized edges before they are tested.
+    pub screen: bool,
     /// Cull tiles behind the farthest stored depth.
     pub z_max: bool,
 }
 
 impl Features {
     /// Every test there is.
-    pub const ALL: Self = Self { side_planes: true, edges: true, z_max: true };
+    pub const ALL: Self = Self { side_planes: true, edges: true, screen: true, z_max: true };
     /// Bounding boxes only.
-    pub const NONE: Self = Self { side_planes: false, edges: false, z_max: false };
+    pub const NONE: Self = Self { side_planes: false, edges: false, screen: false, z_max: false };
 }
 
 /// Why a pipeline cannot be built.

@@ -8,11 +8,10 @@ use std::ops::Range;
 use std::sync::LazyLock;
 
 use super::exact;
+use super::lanes::{LANES, View, any, block_of, lanes};
 use crate::sampling::TileSamples;
-use crate::setup::{Corner, Triangle};
-use crate::traversal::Box5;
-
-const LANES: usize = TileSamples::LANES;
+use crate::setup::Triangle;
+use crate::traversal::{Box5, Screen};
 
 /// The stored samples of a tile, in the order of its [`TileSamples`].
 pub struct Target<'a> {
@@ -25,6 +24,8 @@ pub struct Target<'a> {
 /// What a run of sample tests found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Hits {
+    /// Samples screened by the linearized edges.
+    pub screened: u32,
     /// Samples tested.
     pub tested: u32,
     /// Samples inside the triangle and beyond the near depth.
@@ -54,8 +55,21 @@ pub fn test_run(
     target: &mut Target<'_>,
     hits: &mut Hits,
 ) {
+    test_screened(triangle, samples, within, None, near, target, hits);
+}
+
+/// The same for those samples only that pass the screen, where there is one.
+pub fn test_screened(
+    triangle: &Triangle,
+    samples: &TileSamples,
+    within: &Box5,
+    screen: Option<&Screen>,
+    near: f32,
+    target: &mut Target<'_>,
+    hits: &mut Hits,
+) {
     let run = if triangle.moving { samples.between(within.t[0], within.t[1]) } else { 0..samples.len };
-    let mut job = Job { triangle, samples, within, near, target, hits };
+    let mut job = Job { triangle, samples, within, screen, near, target, hits };
     match (triangle.moving, within.lens) {
         (false, false) => job.dispatch::<false, false>(run),
         (true, false) => job.dispatch::<true, false>(run),
@@ -91,6 +105,7 @@ struct Job<'a, 'b> {
     triangle: &'a Triangle,
     samples: &'a TileSamples,
     within: &'a Box5,
+    screen: Option<&'a Screen>,
     near: f32,
     target: &'a mut Target<'b>,
     hits: &'a mut Hits,
@@ -132,7 +147,13 @@ impl Job<'_, '_> {
     fn run<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
         let mut base = run.start / LANES * LANES;
         while base < run.end {
-            let active = lanes(&run, base) & if LENS { self.in_lens_box(base) } else { u32::MAX };
+            let mut active = lanes(&run, base) & if LENS { self.in_lens_box(base) } else { u32::MAX };
+            if active != 0
+                && let Some(screen) = self.screen
+            {
+                self.hits.screened += active.count_ones();
+                active &= self.pass::<MOTION, LENS>(screen, base);
+            }
             if active != 0 {
                 self.hits.tested += active.count_ones();
                 let block = self.block::<MOTION, LENS>(base);
@@ -153,6 +174,34 @@ impl Job<'_, '_> {
             inside[lane] = u16::from(within) << lane;
         }
         any(&inside)
+    }
+
+    /// Lanes that no pair of linearized edges tells to lie outside.
+    #[inline(always)]
+    fn pass<const MOTION: bool, const LENS: bool>(&self, screen: &Screen, base: usize) -> u32 {
+        let (x, y) = (block_of(&self.samples.x, base), block_of(&self.samples.y, base));
+        let (u, v) = (block_of(&self.samples.u, base), block_of(&self.samples.v, base));
+        let t = block_of(&self.samples.t, base);
+        let [middle_x, middle_y, middle_u, middle_v, middle_t] = screen.middle;
+        let mut passing = [0; LANES];
+        for lane in 0..LANES {
+            let (mut below, mut above) = (false, false);
+            for edge in 0..3 {
+                let [slope_x, slope_y, slope_u, slope_v, slope_t] = screen.gradient[edge];
+                let mut value =
+                    screen.value[edge] + slope_x * (x[lane] - middle_x) + slope_y * (y[lane] - middle_y);
+                if LENS {
+                    value += slope_u * (u[lane] - middle_u) + slope_v * (v[lane] - middle_v);
+                }
+                if MOTION {
+                    value += slope_t * (t[lane] - middle_t);
+                }
+                below |= value < -screen.margin[edge];
+                above |= value > screen.margin[edge];
+            }
+            passing[lane] = u16::from(!(below & above)) << lane;
+        }
+        any(&passing)
     }
 
     #[inline(always)]
@@ -233,80 +282,5 @@ impl Job<'_, '_> {
             self.hits.written.push(slot as u16);
             self.hits.written_pixels |= pixel;
         }
-    }
-}
-
-/// The union of one bit for each lane.
-#[inline(always)]
-fn any(bits: &[u16; LANES]) -> u32 {
-    u32::from(bits.iter().fold(0, |union, bit| union | bit))
-}
-
-/// What sixteen samples need to see a vertex. Plain loops and no closures, which would not be inlined into functions
-/// compiled for wider vectors.
-struct View<'a, const MOTION: bool, const LENS: bool> {
-    t: &'a [f32; LANES],
-    lens_x: &'a [f32; LANES],
-    lens_y: &'a [f32; LANES],
-    slope_x: &'a [f32; LANES],
-    slope_y: &'a [f32; LANES],
-}
-
-/// A vertex as a sample sees it.
-struct Seen {
-    x: f32,
-    y: f32,
-    w: f32,
-}
-
-impl<'a, const MOTION: bool, const LENS: bool> View<'a, MOTION, LENS> {
-    #[inline(always)]
-    fn at(samples: &'a TileSamples, base: usize) -> Self {
-        Self {
-            t: block_of(&samples.t, base),
-            lens_x: block_of(&samples.lens[0], base),
-            lens_y: block_of(&samples.lens[1], base),
-            slope_x: block_of(&samples.slope[0], base),
-            slope_y: block_of(&samples.slope[1], base),
-        }
-    }
-
-    #[inline(always)]
-    fn see(&self, corner: &Corner, lane: usize) -> Seen {
-        let ([mut x, mut y, mut w], [dx, dy, dw]) = (corner.open, corner.delta);
-        if MOTION {
-            let t = self.t[lane];
-            (x, y, w) = (x + t * dx, y + t * dy, w + t * dw);
-        }
-        if LENS {
-            (x, y) = (x - self.lens_x[lane], y - self.lens_y[lane]);
-        }
-        Seen { x: x - self.slope_x[lane] * w, y: y - self.slope_y[lane] * w, w }
-    }
-}
-
-#[inline(always)]
-fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
-    // Arrays are padded to whole blocks, so the fallback is never taken.
-    array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
-}
-
-/// The lanes of the block at `base` that belong to `run`.
-fn lanes(run: &Range<usize>, base: usize) -> u32 {
-    let first = run.start.saturating_sub(base);
-    let last = (run.end - base).min(LANES);
-    ((1_u32 << last) - 1) & !((1_u32 << first) - 1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lanes_of_a_run() {
-        assert_eq!(lanes(&(0..16), 0), 0xFFFF);
-        assert_eq!(lanes(&(3..40), 0), 0xFFF8);
-        assert_eq!(lanes(&(3..40), 16), 0xFFFF);
-        assert_eq!(lanes(&(3..40), 32), 0x00FF);
     }
 }

@@ -19,7 +19,8 @@
 
 pub mod exact;
 mod kernel;
+mod lanes;
 mod madds;
 
-pub use kernel::{Hits, Target, test_run};
+pub use kernel::{Hits, Target, test_run, test_screened};
 pub use madds::madds;

@@ -4,9 +4,9 @@
 //! tile, and allows for the rounding of both.
 
 mod box5;
-mod edges;
+mod edge_bounds;
 mod side_planes;
 
 pub use box5::{Box5, TileRect};
-pub use edges::StillEdges;
+pub use edge_bounds::{EdgeBounds, Screen, screen_madds, tile_madds};
 pub use side_planes::{madds, narrow};

@@ -81,7 +81,7 @@ fn bins_past_the_end_of_the_frame_cost_nothing() {
 fn counts_from_a_file_cost_what_their_rows_say() {
     let mut counts = Counts::default();
     counts[Event::DramReadBytes] = 5_000_000;
-    counts[Event::TilesCulledBox] = 99;
+    counts[Event::TilesCulledSides] = 99;
     let model = model(&reference());
     let energy = model.counts_energy(&counts);
     assert_eq!(energy.total_j(), 5e6 * model.event_j(Event::DramReadBytes));

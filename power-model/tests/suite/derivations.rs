@@ -98,7 +98,11 @@ fn front(event: Event) -> Option<Interval> {
         Event::ShaderOps => shader_op(),
         Event::TrianglesIn => sram(32, 96.0, READ),
         Event::TrianglesSetUp => sram(32, 128.0, WRITE),
-        Event::SetupMadds | Event::TileMadds | Event::DepthIntervalMadds | Event::SampleMadds => madd(),
+        Event::SetupMadds
+        | Event::TileMadds
+        | Event::DepthIntervalMadds
+        | Event::ScreenMadds
+        | Event::SampleMadds => madd(),
         Event::CoarseTilesVisited => sram(32, 128.0, READ),
         Event::TilesVisited => sum([sram(4, 32.0, WRITE), sram(4, 32.0, READ)]),
         Event::ZCullTests => sum([sram(8, 32.0, READ), times(2.0, COMPARE)]),
@@ -113,7 +117,7 @@ fn back(event: Event) -> Option<Interval> {
     let filter = 12.0 * (HMUL + 2.0 * HADD) + 4.0 * (FADD + FMUL);
     let gamma = sram(1, 48.0, READ);
     Some(match event {
-        Event::SamplesTested => sram(4, 16.0, READ),
+        Event::SampleReads => sram(4, 16.0, READ),
         Event::SamplesHit => sum([queue, wire(64.0, 0.25)]),
         Event::DepthReads => sum([wire(32.0, 0.5), COMPARE]),
         Event::DepthWrites => wire(32.0, 0.5),
@@ -187,7 +191,7 @@ fn the_reference_draws_about_a_watt_at_rest_and_a_few_at_full_load() {
     let mut bin = Bin { busy_ps: [millisecond_ps; activity::Unit::COUNT], ..Bin::default() };
     for (event, per_clock) in [
         (Event::ShaderOps, 64),
-        (Event::SamplesTested, 16),
+        (Event::SampleReads, 16),
         (Event::SampleMadds, 240),
         (Event::TileMadds, 40),
         (Event::SetupMadds, 12),

@@ -1,0 +1,58 @@
+//! Small input files, and where the real ones are.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+/// A folder of input files that goes away with the test.
+#[derive(Debug)]
+pub struct Inputs {
+    folder: TempDir,
+}
+
+impl Default for Inputs {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Inputs {
+    /// An empty folder.
+    ///
+    /// # Panics
+    /// If it cannot be made.
+    pub fn new() -> Self {
+        Self { folder: TempDir::new().expect("a temporary folder can be made") }
+    }
+
+    /// Writes a file and gives its path.
+    ///
+    /// # Panics
+    /// If it cannot be written.
+    pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        let path = self.path(name);
+        fs::write(&path, bytes).unwrap_or_else(|error| panic!("{path}: {error}"));
+        path
+    }
+
+    /// The path of `name` in the folder, whether or not it is there.
+    pub fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).display().to_string()
+    }
+}
+
+/// The root of the repository.
+pub fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_path_buf()
+}
+
+/// The file `name` among the real scenes, or nothing, saying so, where `QUINTILE_SCENES` is not set.
+pub fn real_scenes(name: &str) -> Option<String> {
+    let folder = std::env::var_os("QUINTILE_SCENES").map(PathBuf::from);
+    if folder.is_none() {
+        eprintln!("skipped: QUINTILE_SCENES is not set, so {name} is not there to be run");
+    }
+    folder.map(|folder| folder.join(name).display().to_string())
+}

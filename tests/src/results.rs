@@ -1,0 +1,146 @@
+//! The folder of results, read back.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::RgbImage;
+use serde_json::Value;
+use tempfile::TempDir;
+use traces::Trace;
+
+use crate::Ended;
+
+/// The results of a run, in a folder that goes away with this.
+#[derive(Debug)]
+pub struct Results {
+    folder: TempDir,
+    /// What the command printed.
+    pub ended: Ended,
+}
+
+/// A row of `frames.csv`, in SI units.
+#[derive(Clone, Debug)]
+pub struct FrameRow {
+    /// Found start, s.
+    pub start_s: f64,
+    /// End: the next start or the end mark, s.
+    pub end_s: f64,
+    /// Energy, J.
+    pub energy_j: f64,
+}
+
+impl Results {
+    pub(crate) fn in_new_folder() -> Self {
+        let folder = TempDir::new().expect("a temporary folder can be made");
+        Self { folder, ended: Ended { code: None, stdout: String::new(), stderr: String::new() } }
+    }
+
+    pub(crate) fn of(self, ended: Ended) -> Self {
+        Self { ended, ..self }
+    }
+
+    /// The file `relative` of the results.
+    pub fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join("out").join(relative)
+    }
+
+    /// Its bytes.
+    ///
+    /// # Panics
+    /// If it is not there.
+    pub fn bytes(&self, relative: &str) -> Vec<u8> {
+        fs::read(self.path(relative)).unwrap_or_else(|error| panic!("{relative}: {error}"))
+    }
+
+    /// Its text.
+    ///
+    /// # Panics
+    /// If it is not there or not UTF-8.
+    pub fn text(&self, relative: &str) -> String {
+        String::from_utf8(self.bytes(relative)).unwrap_or_else(|error| panic!("{relative}: {error}"))
+    }
+
+    /// `summary.json`.
+    ///
+    /// # Panics
+    /// If it is not there or no JSON.
+    pub fn summary(&self) -> Value {
+        serde_json::from_slice(&self.bytes("summary.json")).expect("summary.json is JSON")
+    }
+
+    /// The codes of the warnings in `summary.json`.
+    pub fn warning_codes(&self) -> Vec<String> {
+        let summary = self.summary();
+        let warnings = summary["warnings"].as_array().cloned().unwrap_or_default();
+        warnings.iter().filter_map(|warning| warning["code"].as_str().map(str::to_owned)).collect()
+    }
+
+    /// `trace.parquet` as the library for traces reads it.
+    ///
+    /// # Panics
+    /// If it is not a trace.
+    pub fn trace(&self) -> Trace {
+        let path = self.path("trace.parquet");
+        traces::io::parquet::read(&path).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The rows of `frames.csv`.
+    ///
+    /// # Panics
+    /// If it is not such a table.
+    pub fn frames(&self) -> Vec<FrameRow> {
+        let text = self.text("frames.csv");
+        let mut table = csv::Reader::from_reader(text.as_bytes());
+        let header = table.headers().expect("frames.csv has a header").clone();
+        let column = |name: &str| {
+            header.iter().position(|other| other == name).unwrap_or_else(|| panic!("no column {name}"))
+        };
+        let columns = ["start_s", "end_s", "energy_J"].map(column);
+        let row = |record: Result<csv::StringRecord, csv::Error>| {
+            let record = record.expect("a row of frames.csv");
+            let [start_s, end_s, energy_j] = columns.map(|at| record[at].parse().expect("a number"));
+            FrameRow { start_s, end_s, energy_j }
+        };
+        table.records().map(row).collect()
+    }
+
+    /// The PNG of frame `number`.
+    ///
+    /// # Panics
+    /// If it is not there or no PNG.
+    pub fn image(&self, number: u32) -> RgbImage {
+        let name = format!("images/frame_{number:04}.png");
+        let picture = image::load_from_memory_with_format(&self.bytes(&name), image::ImageFormat::Png);
+        picture.unwrap_or_else(|error| panic!("{name}: {error}")).to_rgb8()
+    }
+
+    /// Every file of the results by its path, with its bytes.
+    ///
+    /// # Panics
+    /// If one cannot be read.
+    pub fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        let mut files = BTreeMap::new();
+        collect(&self.path(""), Path::new(""), &mut files);
+        files
+    }
+}
+
+fn collect(root: &Path, below: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
+    for entry in fs::read_dir(root.join(below)).expect("a folder of results") {
+        let name = below.join(entry.expect("an entry of the folder").file_name());
+        if root.join(&name).is_dir() {
+            collect(root, &name, files);
+        } else {
+            files.insert(name.clone(), fs::read(root.join(&name)).expect("a file of the results"));
+        }
+    }
+}
+
+/// The number at `pointer` (such as `/checks/quantization_bound_j`) of a JSON value.
+///
+/// # Panics
+/// If there is no number.
+pub fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer}"))
+}
