@@ -274,7 +274,7 @@ impl Probe {
 }
 
 /// The place of a sample in the five dimensions, `x` and `y` in pixels from the centre of the image.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     pub x: f64,
     pub y: f64,

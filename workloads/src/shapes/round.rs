@@ -12,7 +12,8 @@ pub fn sphere(radius: f64, segments: u32, material: usize) -> Mesh {
     let mut builder = Builder::default();
     for row in 0..=rows {
         let v = f64::from(row) / f64::from(rows);
-        let (ring, height) = around(v / 2.0);
+        // At the poles the sine of half a turn is not quite zero, and the ring has to be a point.
+        let (ring, height) = if row == 0 || row == rows { (0.0, around(v / 2.0).1) } else { around(v / 2.0) };
         for column in 0..=columns {
             let u = f64::from(column) / f64::from(columns);
             let (sin, cos) = around(u);

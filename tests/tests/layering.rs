@@ -1,0 +1,95 @@
+//! The arrows between the crates, as `design.md` draws them, and the rules every crate keeps.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cargo_metadata::{Metadata, MetadataCommand};
+use tests::root;
+
+/// Which crates of the house each may use, in builds and in tests.
+const ARROWS: [(&str, &[&str]); 6] = [
+    ("activity", &[]),
+    ("pipeline", &["activity"]),
+    ("workloads", &["activity", "pipeline"]),
+    ("traces", &[]),
+    ("power-model", &["activity", "traces"]),
+    ("sim", &["activity", "pipeline", "power-model", "traces", "workloads"]),
+];
+
+fn workspace() -> Metadata {
+    let mut command = MetadataCommand::new();
+    command.manifest_path(root().join("Cargo.toml")).no_deps().exec().expect("cargo metadata answers")
+}
+
+/// What each crate of the house uses of the house.
+fn arrows() -> BTreeMap<String, BTreeSet<String>> {
+    let metadata = workspace();
+    let packages = metadata.workspace_packages();
+    let names: BTreeSet<String> = packages.iter().map(|package| package.name.to_string()).collect();
+    let uses = |package: &cargo_metadata::Package| {
+        let used = package.dependencies.iter().map(|dependency| dependency.name.clone());
+        used.filter(|name| names.contains(name)).collect()
+    };
+    packages.iter().map(|package| (package.name.to_string(), uses(package))).collect()
+}
+
+#[test]
+fn no_crate_uses_another_against_the_arrows() {
+    let arrows = arrows();
+    for (name, allowed) in ARROWS {
+        let allowed: BTreeSet<String> = allowed.iter().map(|name| (*name).to_owned()).collect();
+        let against: Vec<_> = arrows[name].difference(&allowed).collect();
+        assert!(against.is_empty(), "{name} must not use {against:?}");
+    }
+    let known: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).chain(["tests"]).collect();
+    let found: BTreeSet<&str> = arrows.keys().map(String::as_str).collect();
+    assert_eq!(found, known, "a new crate needs its place in the arrows");
+}
+
+#[test]
+fn the_arrows_that_the_design_draws_are_there() {
+    let arrows = arrows();
+    let drawn = [("workloads", "pipeline"), ("pipeline", "activity"), ("power-model", "activity"), ("power-model", "traces")];
+    let of_sim = ARROWS[5].1.iter().map(|used| ("sim", *used));
+    for (name, used) in drawn.into_iter().chain(of_sim) {
+        assert!(arrows[name].contains(used), "{name} is to use {used}");
+    }
+}
+
+#[test]
+fn every_crate_takes_the_lints_of_the_workspace() {
+    for package in workspace().workspace_packages() {
+        let manifest = fs::read_to_string(&package.manifest_path).expect("a manifest");
+        let table = manifest.split("\n[").find(|table| table.starts_with("lints]"));
+        let shared = table.is_some_and(|table| table.lines().any(|line| line.trim() == "workspace = true"));
+        assert!(shared, "{}: `[lints] workspace = true` is missing", package.manifest_path);
+    }
+}
+
+#[test]
+fn only_sim_ends_the_process() {
+    let ways = ["process::exit", "process::abort", "ExitCode"];
+    for package in workspace().workspace_packages().into_iter().filter(|package| package.name.as_str() != "sim") {
+        let sources = package.manifest_path.as_std_path().with_file_name("src");
+        for file in rust_files(&sources) {
+            let text = fs::read_to_string(&file).expect("a source file");
+            for way in ways {
+                assert!(!text.contains(way), "{}: {way} belongs in `sim`", file.display());
+            }
+        }
+    }
+}
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.expect("an entry of a source folder").path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
