@@ -12,7 +12,10 @@ const FEWEST_SAMPLES: f64 = 50.0;
 pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.scene.warnings().to_vec();
     all.extend(measurement.run.warnings.iter().cloned());
-    all.extend(measurement.found.warnings.iter().map(|w| Warning::new(w.code, w.message.clone())));
+    // A run of one frame has no other that could resemble it.
+    let alone = simulated.frames.len() == 1;
+    let told = measurement.found.warnings.iter().filter(|w| !(alone && w.code == "only-mark"));
+    all.extend(told.map(|w| Warning::new(w.code, w.message.clone())));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
     all.extend(short_frames(measurement));

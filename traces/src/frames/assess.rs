@@ -108,9 +108,9 @@ fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
 
 fn only_marks(found: &Found) -> Option<Warning> {
     found.starts.iter().all(|start| start.marked).then(|| {
-        Warning::new("only-mark", format!(
-            "nothing in the trace resembles the marked frame ({:?}): what is reported is the mark to the end mark; \
-             mark a more typical frame, or several", found.threshold.rule))
+        Warning::new("only-mark", String::from(
+            "nothing else in the trace resembles the marked frame: what is reported is the mark to the end mark; mark a \
+             more typical frame, or several"))
     })
 }
 
@@ -131,7 +131,8 @@ fn irregular(found: &Found) -> Option<Warning> {
     let odd = |flag: Flag| inner.iter().filter(move |frame| frame.flags.contains(flag));
     let (long, short) = (odd(Flag::Long).count(), odd(Flag::Short).count());
     let covered_s: f64 = inner.iter().map(|frame| frame.end_s - frame.start_s).sum();
-    let long_s: f64 = odd(Flag::Long).map(|frame| frame.end_s - frame.start_s).sum();
+    // From 0.0, as the sum of nothing is -0.0 and would be printed so.
+    let long_s = odd(Flag::Long).fold(0.0, |sum, frame| sum + (frame.end_s - frame.start_s));
     let irregular = (long + short) as f64 > IRREGULAR * inner.len() as f64 || long_s > IRREGULAR * covered_s;
     irregular.then(|| {
         Warning::new("irregular-spacing", format!(
