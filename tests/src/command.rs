@@ -1,8 +1,10 @@
 //! Running the command as a script would: no terminal, output into pipes.
 
 use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+
+use tempfile::TempDir;
 
 use crate::Results;
 
@@ -46,10 +48,25 @@ impl Quintile {
     /// # Panics
     /// If it fails.
     pub fn run(&self, scene: &str, args: &[&str]) -> Results {
-        let results = Results::in_new_folder();
-        let out = results.path("").display().to_string();
+        let temporary = TempDir::new().expect("a temporary folder can be made");
+        let folder = temporary.path().join("out");
+        let ended = self.run_into(&folder, scene, args);
+        Results::new(folder, Some(temporary), ended)
+    }
+
+    /// The same into a `folder` that stays, for results that several tests look at.
+    ///
+    /// # Panics
+    /// If it fails.
+    pub fn run_in(&self, folder: &Path, scene: &str, args: &[&str]) -> Results {
+        let ended = self.run_into(folder, scene, args);
+        Results::new(folder.to_path_buf(), None, ended)
+    }
+
+    fn run_into(&self, folder: &Path, scene: &str, args: &[&str]) -> Ended {
+        let out = folder.display().to_string();
         let ended = self.call(["run", scene, "--out", &out].iter().chain(args));
         assert_eq!(ended.code, Some(0), "quintile run {scene} {args:?}: {}", ended.stderr);
-        results.of(ended)
+        ended
     }
 }

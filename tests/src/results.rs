@@ -11,10 +11,12 @@ use traces::Trace;
 
 use crate::Ended;
 
-/// The results of a run, in a folder that goes away with this.
+/// The results of a run.
 #[derive(Debug)]
 pub struct Results {
-    folder: TempDir,
+    folder: PathBuf,
+    /// Keeps the folder until this goes away.
+    _temporary: Option<TempDir>,
     /// What the command printed.
     pub ended: Ended,
 }
@@ -31,18 +33,13 @@ pub struct FrameRow {
 }
 
 impl Results {
-    pub(crate) fn in_new_folder() -> Self {
-        let folder = TempDir::new().expect("a temporary folder can be made");
-        Self { folder, ended: Ended { code: None, stdout: String::new(), stderr: String::new() } }
-    }
-
-    pub(crate) fn of(self, ended: Ended) -> Self {
-        Self { ended, ..self }
+    pub(crate) fn new(folder: PathBuf, temporary: Option<TempDir>, ended: Ended) -> Self {
+        Self { folder, _temporary: temporary, ended }
     }
 
     /// The file `relative` of the results.
     pub fn path(&self, relative: &str) -> PathBuf {
-        self.folder.path().join("out").join(relative)
+        self.folder.join(relative)
     }
 
     /// Its bytes.

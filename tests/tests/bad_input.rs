@@ -8,53 +8,71 @@ use serde_json::json;
 use tests::{Ended, Glb, Inputs, quintile, real_scenes};
 
 /// What a mend begins with: a message has to say what to do, not only what is wrong.
-const MENDS: [&str; 20] = [
-    "add ", "ask for", "built in:", "check ", "did you mean", "due", "export it again", "get the file again", "get it again",
-    "give ", "has to be", "have to be", "known here", "leave it out", "look at", "mend ", "name another", "put ", "remove ",
-    "takes",
+const MENDS: [&str; 29] = [
+    "--help", "above zero", "add ", "ask for", "at least", "built in:", "check ", "did you mean", "due", "export it again",
+    "finite", "from ", "get it again", "get the file again", "give ", "has to be", "have to be", "known here", "leave it out",
+    "mend ", "name another", "needs", "put ", "remove ", "takes", "to 256", "with anything in it", "write it as", "move one",
 ];
 
-/// Also said of numbers: what would do.
-const RANGES: [&str; 8] = ["from ", "above zero", " to ", "in 1..", "write it as", "--help", "finite", "needs"];
-
-/// Asserts that `ended` failed with `code` and one message that has every part of `says` and a mend.
-fn assert_refused(ended: &Ended, code: i32, says: &[&str]) {
-    let Ended { stdout, stderr, .. } = ended;
-    assert_eq!(ended.code, Some(code), "{says:?}: {stderr}");
-    assert_eq!(stdout, "", "{says:?}");
-    for part in says {
-        assert!(stderr.contains(part), "no `{part}` in: {stderr}");
-    }
-    for part in ["panicked", "fault of the program", "backtrace", "RUST_BACKTRACE", "unwrap", "Err("] {
-        assert!(!stderr.contains(part), "`{part}` in: {stderr}");
-    }
-    let own = stderr.lines().filter(|line| line.starts_with("quintile: ")).count();
-    let parser = stderr.lines().filter(|line| line.starts_with("error: ")).count();
-    assert_eq!(own + parser, 1, "one message is due: {stderr}");
-    assert!(own == 0 || stderr.lines().count() == 1, "one line is due: {stderr}");
-    let mends = MENDS.iter().chain(&RANGES).any(|mend| stderr.contains(mend));
-    assert!(mends, "it does not say how to mend it: {stderr}");
+/// What is wrong with the refusals seen, all of them, so that one bad message does not hide the next.
+#[derive(Default)]
+struct Refusals {
+    complaints: Vec<String>,
 }
 
-/// Runs `quintile run ARGS` into a fresh folder; refused there, it leaves nothing.
-fn refuse(args: &[&str], code: i32, says: &[&str]) {
-    let inputs = Inputs::new();
-    let out = inputs.path("out");
-    let ended = quintile!().call(["run"].iter().chain(args).chain(&["--out", &out]));
-    assert_refused(&ended, code, says);
-    let left = fs::read_dir(&out).map_or(0, Iterator::count);
-    assert_eq!(left, 0, "{args:?} left files in its folder");
+impl Refusals {
+    /// Holds `ended` against what is due: it failed with `code` and one message that has every part of `says` and a mend.
+    fn check(&mut self, ended: &Ended, code: i32, says: &[&str]) {
+        let Ended { stdout, stderr, .. } = ended;
+        let mut complain = |holds: bool, what: &str| {
+            if !holds {
+                self.complaints.push(format!("{what}: {}", stderr.trim_end()));
+            }
+        };
+        complain(ended.code == Some(code), &format!("exit code {code} is due, not {:?}", ended.code));
+        complain(stdout.is_empty(), "standard output has to stay empty");
+        for part in says {
+            complain(stderr.contains(part), &format!("it does not say `{part}`"));
+        }
+        for part in ["panicked", "fault of the program", "backtrace", "RUST_BACKTRACE", "unwrap", "Err("] {
+            complain(!stderr.contains(part), part);
+        }
+        let own = stderr.lines().filter(|line| line.starts_with("quintile: ")).count();
+        let parser = stderr.lines().filter(|line| line.starts_with("error: ")).count();
+        complain(own + parser == 1, "one message is due");
+        complain(own == 0 || stderr.lines().count() == 1, "one line is due");
+        complain(MENDS.iter().any(|mend| stderr.contains(mend)), "it does not say how to mend it");
+    }
+
+    /// Runs `quintile run ARGS` into a fresh folder; refused there, it leaves nothing.
+    fn call(&mut self, args: &[&str], code: i32, says: &[&str]) {
+        let inputs = Inputs::new();
+        let out = inputs.path("out");
+        let ended = quintile!().call(["run"].iter().chain(args).chain(&["--out", &out]));
+        self.check(&ended, code, says);
+        if fs::read_dir(&out).is_ok_and(|mut left| left.next().is_some()) {
+            self.complaints.push(format!("{args:?} left files in its folder"));
+        }
+    }
+
+    /// The same with a scene file of these bytes; its name has to be in the message.
+    fn file(&mut self, name: &str, bytes: impl AsRef<[u8]>, code: i32, says: &[&str]) {
+        let inputs = Inputs::new();
+        let scene = inputs.put(name, bytes);
+        self.call(&[&scene], code, &[&[scene.as_str()], says].concat());
+    }
 }
 
-/// The same with a scene file of these bytes; its name has to be in the message.
-fn refuse_file(name: &str, bytes: impl AsRef<[u8]>, code: i32, says: &[&str]) {
-    let inputs = Inputs::new();
-    let scene = inputs.put(name, bytes);
-    refuse(&[&scene], code, &[&[scene.as_str()], says].concat());
+impl Drop for Refusals {
+    fn drop(&mut self) {
+        let complaints = self.complaints.join("\n");
+        assert!(complaints.is_empty() || std::thread::panicking(), "{complaints}");
+    }
 }
 
 #[test]
 fn flags() {
+    let mut refusals = Refusals::default();
     let cases: [(&[&str], &[&str]); 27] = [
         (&["--size", "0x48"], &["size", "0x48", "1 to 16384 pixels"]),
         (&["--size", "64x0"], &["size", "64x0"]),
@@ -85,85 +103,91 @@ fn flags() {
         (&["--bound", "highest"], &["--bound", "low, nominal, high"]),
     ];
     for (flags, says) in cases {
-        refuse(&[&["tiny"], flags].concat(), 2, says);
+        refusals.call(&[&["tiny"], flags].concat(), 2, says);
     }
 }
 
 #[test]
 fn a_frame_rate_that_cannot_be() {
+    let mut refusals = Refusals::default();
     for rate in ["-60", "0", "NaN", "1e9", "1e-9"] {
-        refuse(&["tiny", "--rate", rate], 2, &["rate"]);
+        refusals.call(&["tiny", "--rate", rate], 2, &["rate"]);
     }
 }
 
 #[test]
 fn names_of_nothing() {
-    refuse(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
-    refuse(&["scene.blend"], 2, &["scene.blend", ".gltf"]);
-    refuse(&[""], 2, &["scene"]);
-    refuse(&["."], 2, &["`.`"]);
-    refuse(&["tiny", "--gpu", "referense"], 2, &["referense", "did you mean `reference`?"]);
-    refuse(&["tiny", "--platform", "referense"], 2, &["referense", "did you mean `reference`?"]);
-    refuse(&["tiny", "--energy", "28mm"], 2, &["28mm", "did you mean `28nm`?"]);
-    refuse(&["tiny", "--gpu", "nothing.like.it"], 2, &["nothing.like.it", "reference"]);
+    let mut refusals = Refusals::default();
+    refusals.call(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
+    refusals.call(&["scene.blend"], 2, &["scene.blend", ".gltf"]);
+    refusals.call(&[""], 2, &["scene"]);
+    refusals.call(&["."], 2, &["`.`"]);
+    refusals.call(&["tiny", "--gpu", "referense"], 2, &["referense", "did you mean `reference`?"]);
+    refusals.call(&["tiny", "--platform", "referense"], 2, &["referense", "did you mean `reference`?"]);
+    refusals.call(&["tiny", "--energy", "28mm"], 2, &["28mm", "did you mean `28nm`?"]);
+    refusals.call(&["tiny", "--gpu", "nothing.like.it"], 2, &["nothing.like.it", "reference"]);
 }
 
 #[test]
 fn files_that_are_not_there() {
+    let mut refusals = Refusals::default();
     for scene in ["gone.glb", "gone.gltf", "gone.ron", "gone.ply", "gone.ply.gz", "gone.obj"] {
-        refuse(&[scene], 1, &[scene, "No such file"]);
+        refusals.call(&[scene], 1, &[scene, "No such file"]);
     }
     for flag in ["--gpu", "--platform", "--energy"] {
-        refuse(&["tiny", flag, "gone.ron"], 1, &["gone.ron", "No such file"]);
+        refusals.call(&["tiny", flag, "gone.ron"], 1, &["gone.ron", "No such file"]);
     }
     let inputs = Inputs::new();
     let folder = inputs.path("folder.glb");
     fs::create_dir(&folder).expect("a folder can be made");
-    refuse(&[&folder], 1, &[&folder, "directory"]);
+    refusals.call(&[&folder], 1, &[&folder, "directory"]);
     let scene = inputs.put("s.ron", "(objects: [(file: \"gone.obj\")])");
-    refuse(&[&scene], 1, &["gone.obj", "No such file"]);
+    refusals.call(&[&scene], 1, &["gone.obj", "No such file"]);
 }
 
 #[cfg(unix)]
 #[test]
 fn names_that_are_no_text() {
+    let mut refusals = Refusals::default();
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let name = OsStr::from_bytes(b"sc\xffene.glb");
     let ended = quintile!().call([OsStr::new("run"), name]);
-    assert_refused(&ended, 2, &["UTF-8"]);
+    refusals.check(&ended, 2, &["UTF-8"]);
 }
 
 #[test]
 fn a_glb_cut_anywhere() {
+    let mut refusals = Refusals::default();
     let whole = Glb::square().bytes();
     for length in [4, 11, 12, 19, 40, whole.len() / 2, whole.len() - 60, whole.len() - 1] {
-        refuse_file("cut.glb", &whole[..length], 1, &["truncated", "get the file again"]);
+        refusals.file("cut.glb", &whole[..length], 1, &["truncated", "get the file again"]);
     }
-    refuse_file("empty.glb", b"", 1, &["empty.glb"]);
+    refusals.file("empty.glb", b"", 1, &["empty.glb"]);
     if let Some(fox) = real_scenes("Fox.glb") {
         let bytes = fs::read(fox).expect("the fox is there");
-        refuse_file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated", "get the file again"]);
+        refusals.file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated", "get the file again"]);
     }
 }
 
 #[test]
 fn indices_out_of_range() {
+    let mut refusals = Refusals::default();
     let mut glb = Glb::square();
     let indices = glb.binary.len() - 2;
     glb.binary[indices] = 77;
-    refuse_file("index.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "77"]);
+    refusals.file("index.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "77"]);
     let mut glb = Glb::square();
     glb.primitive()["indices"] = json!(9);
-    refuse_file("accessor.glb", glb.bytes(), 1, &["meshes[0].primitives[0].indices", "out of range"]);
+    refusals.file("accessor.glb", glb.bytes(), 1, &["meshes[0].primitives[0].indices", "out of range"]);
     let mut glb = Glb::square();
     glb.json["accessors"][0]["count"] = json!(4_000_000_000u32);
-    refuse_file("count.glb", glb.bytes(), 1, &["accessor 0", "4000000000"]);
+    refusals.file("count.glb", glb.bytes(), 1, &["accessor 0", "4000000000"]);
     let mut glb = Glb::square();
     glb.json["bufferViews"][0]["byteLength"] = json!(u64::from(u32::MAX));
-    refuse_file("view.glb", glb.bytes(), 1, &["buffer view 0"]);
-    refuse_file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", 1, &[]);
-    refuse_file("a.ply", ply("3", "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), 1, &["triangle 0", "vertex 9"]);
+    refusals.file("view.glb", glb.bytes(), 1, &["buffer view 0"]);
+    refusals.file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", 1, &[]);
+    refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), 1, &["triangle 0", "vertex 9"]);
 }
 
 /// An ASCII PLY of so many vertices and one face.
@@ -176,39 +200,43 @@ fn ply(vertices: &str, body: &str) -> String {
 
 #[test]
 fn vertices_that_are_no_numbers() {
+    let mut refusals = Refusals::default();
     for (bad, word) in [(f32::NAN, "NaN"), (f32::INFINITY, "infinite")] {
         let corners = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, bad, 0.0], [0.0, 1.0, 0.0]];
         let glb = Glb::with_positions(&corners);
-        refuse_file("nan.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "vertex 2", word]);
+        refusals.file("nan.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "vertex 2", word]);
     }
-    refuse_file("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", 1, &["NaN"]);
-    refuse_file("nan.ply", ply("3", "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"), 1, &["element vertex"]);
+    refusals.file("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", 1, &["NaN"]);
+    refusals.file("nan.ply", ply("3", "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"), 1, &["element vertex"]);
 }
 
 #[test]
 fn geometry_files_that_are_something_else() {
+    let mut refusals = Refusals::default();
     for name in ["a.glb", "a.gltf", "a.ply", "a.obj", "a.ply.gz", "a.obj.gz"] {
-        refuse_file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 1, &[]);
-        refuse_file(name, b"", 1, &[]);
+        refusals.file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 1, &[]);
+        refusals.file(name, b"", 1, &[]);
     }
-    refuse_file("a.ply", ply("4000000000", ""), 1, &["header", "4000000000"]);
-    refuse_file("a.ply", ply("3", "0 0 0\n1 0 0\n"), 1, &["truncated"]);
+    refusals.file("a.ply", ply("4000000000", ""), 1, &["header", "4000000000"]);
+    refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n"), 1, &["truncated"]);
     let mut glb = Glb::square();
     glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
-    refuse_file("draco.glb", glb.bytes(), 1, &["KHR_draco_mesh_compression", "export it without"]);
+    refusals.file("draco.glb", glb.bytes(), 1, &["KHR_draco_mesh_compression", "export it without"]);
 }
 
 #[test]
 fn scenes_with_nothing_in_them() {
-    refuse_file("a.ron", "(objects: [])", 2, &["objects", "add a `file` or a `shape`"]);
-    refuse_file("a.obj", "v 0 0 0\n", 1, &[]);
+    let mut refusals = Refusals::default();
+    refusals.file("a.ron", "(objects: [])", 2, &["objects", "add a `file` or a `shape`"]);
+    refusals.file("a.obj", "v 0 0 0\n", 1, &[]);
     let mut glb = Glb::square();
     glb.json["nodes"] = json!([{}]);
-    refuse_file("a.glb", glb.bytes(), 1, &["no triangles"]);
+    refusals.file("a.glb", glb.bytes(), 1, &["no triangles"]);
 }
 
 #[test]
 fn scene_files_with_mistakes() {
+    let mut refusals = Refusals::default();
     let sphere = "objects: [(shape: Sphere(radius: 1))]";
     let cases = [
         (format!("(\n  settings: (widht: 640),\n  {sphere})"), ":2:", "did you mean `width`?"),
@@ -224,13 +252,14 @@ fn scene_files_with_mistakes() {
         (String::new(), ":1:", "due"),
     ];
     for (text, place, mend) in cases {
-        refuse_file("scene.ron", text, 2, &[place, mend]);
+        refusals.file("scene.ron", text, 2, &[place, mend]);
     }
-    refuse_file("scene.ron", b"(\xff\xfe)", 1, &["UTF-8"]);
+    refusals.file("scene.ron", b"(\xff\xfe)", 1, &["UTF-8"]);
 }
 
 #[test]
 fn gpu_and_platform_files_with_mistakes() {
+    let mut refusals = Refusals::default();
     let source = |path: &str| fs::read_to_string(tests::root().join(path)).expect("a file of the repository");
     let gpu = source("sim/gpus/reference.ron");
     let platform = source("power-model/platforms/reference.ron");
@@ -249,18 +278,19 @@ fn gpu_and_platform_files_with_mistakes() {
         let inputs = Inputs::new();
         let file = inputs.put("bad.ron", &text);
         assert!(text != gpu && text != platform && text != table, "{flag}: nothing was broken");
-        refuse(&["tiny", flag, &file], 2, &[&file, says]);
+        refusals.call(&["tiny", flag, &file], 2, &[&file, says]);
     }
 }
 
 /// The tests may run as root, whom no permission stops: a file stands where the folder should be.
 #[test]
 fn results_that_cannot_be_written() {
+    let mut refusals = Refusals::default();
     let inputs = Inputs::new();
     let file = inputs.put("taken", "not a folder");
     for out in [file.clone(), inputs.path("taken/below")] {
         let ended = quintile!().call(["run", "tiny", "--out", &out]);
-        assert_refused(&ended, 1, &[&out, "--out"]);
+        refusals.check(&ended, 1, &[&out, "--out"]);
     }
     assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
 }
@@ -268,6 +298,7 @@ fn results_that_cannot_be_written() {
 /// Whatever stops a run on its way, early or at the last file: the summary of the run before is gone.
 #[test]
 fn a_run_that_dies_on_the_way_does_not_look_whole() {
+    let mut refusals = Refusals::default();
     for (name, is_folder) in
         [("images", false), ("plots", false), ("trace.parquet", true), ("frames.csv", true), ("report.html", true)]
     {
@@ -279,7 +310,7 @@ fn a_run_that_dies_on_the_way_does_not_look_whole() {
         assert!(summary.exists());
         block(&path, is_folder);
         let ended = quintile!().call(arguments);
-        assert_refused(&ended, 1, &[name]);
+        refusals.check(&ended, 1, &[name]);
         assert!(!summary.exists(), "{name}: the old summary makes the broken run look whole");
         let temporary = fs::read_dir(&out).into_iter().flatten().flatten();
         let temporary: Vec<_> = temporary.map(|entry| entry.file_name()).collect();
@@ -304,11 +335,12 @@ fn block(path: &Path, with_folder: bool) {
 /// A mistake that is noticed before anything is written leaves the results of the run before whole.
 #[test]
 fn a_mistake_in_the_call_leaves_old_results_alone() {
+    let mut refusals = Refusals::default();
     let results = quintile!().run("tiny", &[]);
     let out = results.path("").display().to_string();
     let before = results.files();
     let ended = quintile!().call(["run", "tiny", "--samples", "0", "--out", &out]);
-    assert_refused(&ended, 2, &["samples"]);
+    refusals.check(&ended, 2, &["samples"]);
     assert!(before == results.files());
 }
 
@@ -317,6 +349,7 @@ fn a_mistake_in_the_call_leaves_old_results_alone() {
 #[cfg(target_os = "linux")]
 #[test]
 fn runs_beyond_all_memory() {
+    let mut refusals = Refusals::default();
     let inputs = Inputs::new();
     let still = inputs.put("still.ron", "(settings: (width: 16, height: 16), objects: [(shape: Sphere(radius: 1))])");
     let cases: [(&[&str], &str); 3] = [
@@ -329,6 +362,6 @@ fn runs_beyond_all_memory() {
         let program = env!("CARGO_BIN_EXE_quintile-e2e");
         let limited = ["-c", "ulimit -v 4000000; exec timeout 20 \"$0\" run \"$@\"", program];
         let ended = tests::Quintile::new("sh").call(limited.iter().chain(args).chain(&["--out", &out]));
-        assert_refused(&ended, 2, &[says]);
+        refusals.check(&ended, 2, &[says]);
     }
 }

@@ -1,20 +1,25 @@
 //! Books that balance, from the files alone: the rule is written out again here, not called.
 
+use std::path::Path;
+use std::sync::LazyLock;
+
 use activity::{Event, Unit};
 use power_model::{Bound, EnergyTable, Part, Platform};
 use serde_json::Value;
 use tests::{Results, number, quintile};
 
-/// The runs whose books are looked at: a tiny one, one whose frames are found, and one without V-sync.
-fn runs() -> Vec<Results> {
+/// The runs whose books are looked at: a tiny one, one whose frames are found, and one without V-sync. Every test looks at
+/// the same, run once.
+static RUNS: LazyLock<[Results; 3]> = LazyLock::new(|| {
+    let folder = |name| Path::new(env!("CARGO_TARGET_TMPDIR")).join("energies").join(name);
     let default = ["--size", "320x180", "--frames", "0..6"];
     let free = [&default[..], &["--pacing", "free"]].concat();
-    vec![
-        quintile!().run("tiny", &[]),
-        quintile!().run("default", &default),
-        quintile!().run("default", &free),
+    [
+        quintile!().run_in(&folder("tiny"), "tiny", &[]),
+        quintile!().run_in(&folder("default"), "default", &default),
+        quintile!().run_in(&folder("free"), "default", &free),
     ]
-}
+});
 
 /// `E(a, b) = sum over samples of V I |[t, t + dt] cap [a, b]|`, summed with Neumaier's compensation.
 fn integral_j(results: &Results, from_s: f64, to_s: f64) -> f64 {
@@ -40,10 +45,10 @@ fn end_mark_s(results: &Results) -> f64 {
 
 #[test]
 fn frames_add_up_to_the_integral_from_the_first_start_to_the_end_mark() {
-    for results in runs() {
+    for results in RUNS.iter() {
         let frames = results.frames();
         let sum: f64 = frames.iter().map(|frame| frame.energy_j).sum();
-        let whole = integral_j(&results, frames[0].start_s, end_mark_s(&results));
+        let whole = integral_j(results, frames[0].start_s, end_mark_s(results));
         assert!((sum / whole - 1.0).abs() < 1e-9, "{sum} J in frames, {whole} J in the trace");
         let stated = number(&results.summary(), "/checks/frames_against_integral_relative");
         assert!(stated < 1e-9, "{stated}");
@@ -52,14 +57,14 @@ fn frames_add_up_to_the_integral_from_the_first_start_to_the_end_mark() {
 
 #[test]
 fn each_frame_is_the_integral_from_its_start_to_the_next() {
-    for results in runs() {
+    for results in RUNS.iter() {
         let frames = results.frames();
         for pair in frames.windows(2) {
             assert_eq!(pair[0].end_s, pair[1].start_s);
         }
-        assert_eq!(frames.last().map(|frame| frame.end_s), Some(end_mark_s(&results)));
+        assert_eq!(frames.last().map(|frame| frame.end_s), Some(end_mark_s(results)));
         for frame in frames {
-            let whole = integral_j(&results, frame.start_s, frame.end_s);
+            let whole = integral_j(results, frame.start_s, frame.end_s);
             assert!((frame.energy_j / whole - 1.0).abs() < 1e-9, "{frame:?}: {whole} J");
         }
     }
@@ -72,7 +77,7 @@ fn by_part_j(energy: &Value) -> Vec<f64> {
 /// Parts are summed in the order of [`Part::ALL`], frames in theirs; both orders are stated in the book.
 #[test]
 fn joules_by_part_summed_in_their_order_are_the_energy_exactly() {
-    for results in runs() {
+    for results in RUNS.iter() {
         let summary = results.summary();
         let mut sums_j = vec![0.0; Part::ALL.len()];
         for frame in summary["frames"].as_array().into_iter().flatten() {
@@ -91,7 +96,7 @@ fn joules_by_part_summed_in_their_order_are_the_energy_exactly() {
 fn joules_by_part_follow_from_counts_and_times() {
     let table = EnergyTable::builtin("28nm").expect("a built-in table").joules(Bound::Nominal);
     let platform = Platform::builtin("reference").expect("a built-in platform");
-    for results in runs() {
+    for results in RUNS.iter() {
         let summary = results.summary();
         for unit in Unit::ALL {
             let events = Event::ALL.into_iter().filter(|event| event.unit() == unit);
@@ -117,7 +122,7 @@ fn joules_by_part_follow_from_counts_and_times() {
 
 #[test]
 fn a_trace_without_noise_is_the_curve_within_the_quantization() {
-    for results in runs() {
+    for results in RUNS.iter() {
         let checks = &results.summary()["checks"];
         let off_j = number(checks, "/noise_free_trace_minus_curve_j").abs();
         let bound_j = number(checks, "/quantization_bound_j");
@@ -131,11 +136,11 @@ fn a_trace_without_noise_is_the_curve_within_the_quantization() {
 /// The recorded trace is noisy; over a run the noise averages out.
 #[test]
 fn the_recording_holds_the_energy_that_was_spent() {
-    for results in runs() {
+    for results in RUNS.iter() {
         let summary = results.summary();
         let first = number(&summary, "/frames/0/start_s");
         let truth_j = number(&summary, "/truth/total_j");
-        let recorded_j = integral_j(&results, first, end_mark_s(&results));
+        let recorded_j = integral_j(results, first, end_mark_s(results));
         assert!((recorded_j / truth_j - 1.0).abs() < 5e-3, "{recorded_j} J recorded, {truth_j} J spent");
     }
 }

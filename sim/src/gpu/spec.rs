@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::Rates;
 
-/// A GPU. `docs/src/gpu.md` documents every field.
+/// A GPU. `docs/gpu.md` documents every field.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GpuSpec {

@@ -12,10 +12,12 @@ use crate::output::image::LinearImage;
 use crate::output::progress::Progress;
 use crate::timing::{PacketClock, Recorder};
 
-/// Bins of a frame's timeline: a microsecond each, twenty to a sample of a 50 kHz recorder, until a frame is so long that
-/// memory matters.
+/// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
 const BIN_PS: u64 = 1_000_000;
-const MOST_BINS: usize = 65_536;
+/// Most bins of all frames that are kept, about 200 bytes each; where there would be more they are made longer.
+const MOST_BINS: usize = 8_000_000;
+/// Fewest bins of a frame, however many frames there are.
+const FEWEST_BINS: usize = 1024;
 
 /// One frame as the simulator knows it.
 pub struct SimulatedFrame {
@@ -70,11 +72,12 @@ pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result
         if plan.scene.is_animated() { range.clone().collect() } else { vec![range.start] };
     let middle = numbers[numbers.len() / 2];
     let shown = [middle, numbers[0], numbers[numbers.len() - 1]];
+    let most_bins = (MOST_BINS / numbers.len()).max(FEWEST_BINS);
     let bar = progress.bar("frames", numbers.len() as u64);
     let done: Vec<_> = numbers
         .par_iter()
         .map(|&number| {
-            let (frame, image) = simulate_frame(plan, number)?;
+            let (frame, image) = simulate_frame(plan, number, most_bins)?;
             write_image(plan, dir, number, &image)?;
             bar.inc();
             Ok((frame, shown.contains(&number).then_some((number, image))))
@@ -86,7 +89,11 @@ pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result
     Ok(Simulated { distinct, frames, pictures: pictures.into_iter().flatten().collect() })
 }
 
-fn simulate_frame(plan: &Plan, number: u32) -> Result<(SimulatedFrame, Vec<Vec3>), RunError> {
+fn simulate_frame(
+    plan: &Plan,
+    number: u32,
+    most_bins: usize,
+) -> Result<(SimulatedFrame, Vec<Vec3>), RunError> {
     let frame = plan.scene.frame(number)?;
     let settings = pipeline::Settings {
         spec: &plan.gpu.pipeline,
@@ -95,7 +102,7 @@ fn simulate_frame(plan: &Plan, number: u32) -> Result<(SimulatedFrame, Vec<Vec3>
         background: plan.scene.background(),
     };
     let draws = frame.draws(&plan.scene)?;
-    let mut clock = PacketClock::new(&plan.gpu, Recorder::new(BIN_PS, MOST_BINS));
+    let mut clock = PacketClock::new(&plan.gpu, Recorder::new(BIN_PS, most_bins));
     let rendered = pipeline::render(&frame.camera, &draws, &settings, |packet| clock.push(packet))
         .map_err(|error| RunError::Setting(error.to_string()))?;
     let timeline = clock.finish();

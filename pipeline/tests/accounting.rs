@@ -1,0 +1,332 @@
+//! Accounting: the counters add up, agree with each other and with a scene small enough to count by hand.
+
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod common;
+
+use activity::{Counts, Event, Packet, PacketKind, Unit};
+use common::*;
+use glam::{Vec2, Vec3, Vec4};
+use pipeline::frame::visibility;
+use pipeline::*;
+use proptest::prelude::*;
+
+struct Checkered(Texture);
+
+impl Shader for Checkered {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
+    }
+
+    fn texture(&self) -> Option<&Texture> {
+        Some(&self.0)
+    }
+
+    fn shade(&self, _at: &ShadingPoint, texel: Vec4) -> Vec3 {
+        texel.truncate()
+    }
+}
+
+/// Every way to switch the tests on and off.
+fn switches() -> Vec<Features> {
+    let on = |bits: u8, bit: u8| bits & (1 << bit) != 0;
+    (0..8)
+        .flat_map(|bits| {
+            let features = Features { side_planes: on(bits, 0), edges: on(bits, 1), z_max: on(bits, 2), ..Features::ALL };
+            let screenless = Features { side_planes: on(bits, 0), edges: on(bits, 1), z_max: on(bits, 2), ..Features::NONE };
+            if features == screenless { vec![features] } else { vec![features, screenless] }
+        })
+        .collect()
+}
+
+/// A frame's packets and counts, and how many of its samples see anything.
+struct Frame {
+    packets: Vec<Packet>,
+    counts: Counts,
+    visible: u64,
+    samples: u64,
+    pixels: u64,
+}
+
+fn frame(draws: &[Draw<'_>], lens: bool, features: Features) -> Frame {
+    let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+    let spec = spec(features);
+    let viewport = Viewport::new(70, 50).unwrap();
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    let mut packets = Vec::new();
+    let rendered = render(&camera(lens), draws, &settings, |packet| packets.push(*packet)).unwrap();
+    let seen = visibility(&camera(lens), draws, &settings).unwrap();
+    Frame {
+        packets,
+        counts: rendered.counts,
+        visible: seen.iter().filter(|(id, _)| *id != u32::MAX).count() as u64,
+        samples: seen.len() as u64,
+        pixels: 3500,
+    }
+}
+
+fn kinds() -> impl Strategy<Value = Kind> {
+    prop_oneof![
+        Just(Kind::Still),
+        Just(Kind::Moving),
+        Just(Kind::Crossing),
+        Just(Kind::Slivers),
+        Just(Kind::Grid),
+        Just(Kind::Layers)
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn the_counters_of_a_frame_agree_with_each_other(
+        kind in kinds(), lens: bool, front: bool, textured: bool, count in 1..150_u32, switch: prop::sample::Index, seed: u64,
+    ) {
+        let (soup, other) = (Soup::new(kind, count, seed), Soup::new(Kind::Still, 20, seed));
+        let uvs: Vec<_> = soup.open.iter().map(|p| Vec2::new(p.x, p.y)).collect();
+        let texels = (0..256_u32).map(|i| [i as u8, 255 - i as u8, 7, 255]).collect();
+        let checkered = Checkered(Texture::from_srgb8(16, 16, texels, [Wrap::Repeat; 2]).unwrap());
+        let cull = if front { Cull::Back } else { Cull::None };
+        let mut first = soup.draw(if textured { &checkered } else { &Plain }, cull);
+        first.geometry = first.geometry.with_uvs(&uvs).unwrap();
+        let features = *switch.get(&switches());
+        let frame = frame(&[first, other.draw(&Plain, Cull::Front)], lens, features);
+        agree(&frame);
+        prop_assert_eq!(frame.counts[Event::Draws], 2);
+        prop_assert_eq!(frame.counts[Event::TrianglesIn], u64::from(count) + 20);
+        prop_assert_eq!(frame.counts.uses(Unit::Texture), textured && frame.packets.iter().any(
+            |p| p.kind == PacketKind::Tile && p.triangle < count && p.counts[Event::QuadsShaded] > 0));
+        let moving = kind != Kind::Still && frame.counts[Event::SamplesTested] > 0;
+        let (least, most) = (sample_madds(false, lens), sample_madds(moving, lens));
+        let (tested, madds) = (frame.counts[Event::SamplesTested], frame.counts[Event::SampleMadds]);
+        prop_assert!((least * tested..=most * tested).contains(&madds), "{} {}", madds, tested);
+    }
+
+    /// Tests save work and change nothing: what is left to do with one more of them is no more, and what is written is the same.
+    #[test]
+    fn switching_a_test_off_saves_no_sample(kind in kinds(), lens: bool, count in 1..100_u32, seed: u64) {
+        let soup = Soup::new(kind, count, seed);
+        let all = switches();
+        let frames: Vec<_> = all.iter().map(|&f| frame(&[soup.draw(&Plain, Cull::None)], lens, f).counts).collect();
+        for (more, a) in all.iter().zip(&frames) {
+            for (less, b) in all.iter().zip(&frames) {
+                if is_with(more, less) {
+                    prop_assert!(a[Event::SamplesTested] <= b[Event::SamplesTested], "{:?} {:?}", more, less);
+                }
+                prop_assert_eq!(a[Event::DepthWrites], b[Event::DepthWrites], "{:?} {:?}", more, less);
+                if !more.z_max && !less.z_max {
+                    prop_assert_eq!(a[Event::SamplesHit], b[Event::SamplesHit], "{:?} {:?}", more, less);
+                }
+            }
+        }
+    }
+}
+
+/// Whether every test of `less` is on in `more`; told from the text, which holds for tests to come, too.
+fn is_with(more: &Features, less: &Features) -> bool {
+    let on = |features: &Features| -> Vec<bool> {
+        format!("{features:?}").split(&[' ', ',', '}']).filter_map(|word| word.parse().ok()).collect()
+    };
+    on(more).into_iter().zip(on(less)).all(|(more, less)| more | !less)
+}
+
+/// Multiply-adds of one sample test as the design counts them: two for each vertex to bring it to the sample, three more to
+/// move it, two more to shear it; two for each edge; six for the depth.
+fn sample_madds(moving: bool, lens: bool) -> u64 {
+    3 * (2 + 3 * u64::from(moving) + 2 * u64::from(lens)) + 3 * 2 + 6
+}
+
+/// What holds for every frame.
+fn agree(frame: &Frame) {
+    let mut sum = Counts::default();
+    frame.packets.iter().for_each(|packet| sum += &packet.counts);
+    assert_eq!(sum, frame.counts, "packets add up to the counts");
+    let n = |event: Event| frame.counts[event];
+    use Event as E;
+    let equal = [
+        ("every hit is compared", n(E::DepthReads), n(E::SamplesHit)),
+        ("every nearer hit has a colour", n(E::ColourWrites), n(E::DepthWrites)),
+        ("and asks for it", n(E::ShadingLookups), n(E::DepthWrites)),
+        ("a look-up hits or shades", n(E::ShadingHits) + n(E::QuadsShaded), n(E::ShadingLookups)),
+        ("a quad has four lanes", n(E::PixelInvocations), 4 * n(E::QuadsShaded)),
+        ("three indices a triangle", n(E::Indices), 3 * n(E::TrianglesIn)),
+        ("what is fetched is shaded", n(E::VertexInvocations), n(E::VerticesFetched)),
+        (
+            "a triangle goes on or is dropped for one reason",
+            n(E::TrianglesIn),
+            n(E::TrianglesSetUp) + n(E::TrianglesDegenerate) + n(E::TrianglesOutside) + n(E::TrianglesFaceCulled),
+        ),
+        ("every pixel is resolved", n(E::PixelsResolved), frame.pixels),
+        ("a line is 64 bytes", n(E::DramReadBytes) % 64 + n(E::DramWriteBytes) % 64, 0),
+    ];
+    for (what, left, right) in equal {
+        assert_eq!(left, right, "{what}");
+    }
+    let at_most = [
+        ("hits are among the tested", n(E::SamplesHit), n(E::SamplesTested)),
+        ("writes are among the hits", n(E::DepthWrites), n(E::SamplesHit)),
+        ("what is visible was written", frame.visible, n(E::DepthWrites)),
+        ("culled tiles are among the visited", n(E::TilesCulledSides) + n(E::TilesCulledEdges), n(E::CoarseTilesVisited) + n(E::TilesVisited)),
+        ("what is hidden was tested for it", n(E::TilesCulledZMax), n(E::ZCullTests)),
+        ("and visited", n(E::ZCullTests), n(E::TilesVisited)),
+        ("a tile is renewed for a test", n(E::ZMaxUpdates), n(E::ZCullTests)),
+        ("a quad has a lane that was asked for", n(E::HelperInvocations), 3 * n(E::QuadsShaded)),
+        ("vertices are fetched for indices", n(E::VerticesFetched), n(E::Indices)),
+        ("a miss is an access", n(E::DepthMisses), n(E::DepthLines)),
+        ("a miss is an access", n(E::ColourMisses), n(E::ColourLines)),
+        ("a miss is an access", n(E::TextureMisses), n(E::TextureLines)),
+        ("a miss is an access", n(E::L2Misses), n(E::L2Reads) + n(E::L2Writes)),
+        ("a fetch has four texels", n(E::TextureLines), 4 * n(E::TextureFetches)),
+        ("each read of memory is a miss", n(E::DramReadBytes), 64 * n(E::L2Misses)),
+        ("samples resolved are those there are", n(E::SamplesResolved), frame.samples),
+        ("what is seen is resolved", frame.visible, n(E::SamplesResolved)),
+        ("a line read holds a sample", n(E::DepthLines), n(E::DepthReads)),
+    ];
+    for (what, less, more) in at_most {
+        assert!(less <= more, "{what}: {less} of {more}");
+    }
+    frame.packets.iter().for_each(stays_in_its_units);
+}
+
+/// A packet causes something, and in the units it passes through only.
+fn stays_in_its_units(packet: &Packet) {
+    use Unit as U;
+    let units: &[Unit] = match packet.kind {
+        PacketKind::Draw => &[U::Command],
+        PacketKind::Vertices => &[U::Command, U::Shader, U::Setup, U::L2, U::Dram],
+        PacketKind::Tile => {
+            &[U::Traversal, U::ZCull, U::SampleTest, U::Depth, U::ShadingCache, U::Shader, U::Texture, U::Colour, U::L2, U::Dram]
+        }
+        PacketKind::Resolve => &[U::Colour, U::L2, U::Dram],
+    };
+    assert!(Unit::ALL.iter().all(|unit| !packet.counts.uses(*unit) || units.contains(unit)), "{packet:?}");
+    assert!(Unit::ALL.iter().any(|unit| packet.counts.uses(*unit)), "nothing happens in {packet:?}");
+    let [hit, tested] = [Event::SamplesHit, Event::SamplesTested].map(|event| packet.counts[event]);
+    assert!(hit <= tested && tested <= 64 * 4, "{packet:?}");
+}
+
+/// A quad over an image of 32x32 pixels, 8 samples each: its diagonal runs through the corners of the diagonal tiles.
+fn two_triangles(features: Features) -> Frame {
+    let viewport = Viewport::new(32, 32).unwrap();
+    let corners = rectangle([-20.0, 20.0], [-20.0, 20.0], 2.0);
+    let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap();
+    let draws = [Draw { geometry, shader: &Flat(Vec3::ONE), cull: Cull::None }];
+    let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
+    let spec = spec(features);
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    let mut packets = Vec::new();
+    let counts = render(&pixel_camera(viewport, 0.25), &draws, &settings, |p| packets.push(*p)).unwrap().counts;
+    Frame { packets, counts, visible: 8192, samples: 8192, pixels: 1024 }
+}
+
+fn expect(counts: &Counts, expected: &[(Event, u64)]) {
+    for &(event, count) in expected {
+        assert_eq!(counts[event], count, "{}", event.name());
+    }
+}
+
+/// What does not depend on which tests are on.
+const BY_HAND: [(Event, u64); 25] = [
+    (Event::Draws, 1),
+    (Event::Indices, 6),
+    (Event::VerticesFetched, 4),
+    (Event::VertexBytes, 4 * 12),
+    (Event::VertexInvocations, 4),
+    (Event::TrianglesIn, 2),
+    (Event::TrianglesSetUp, 2),
+    (Event::SetupMadds, 0),
+    (Event::CoarseTilesVisited, 2),
+    (Event::TilesVisited, 2 * 16),
+    (Event::SamplesHit, 8192),
+    (Event::DepthWrites, 8192),
+    // Each triangle has its own quads, and those on the diagonal are asked for by both.
+    (Event::QuadsShaded, 256 + 16),
+    (Event::PixelInvocations, 4 * (256 + 16)),
+    // On the diagonal each triangle wants three lanes: every pixel of it has samples on either side.
+    (Event::HelperInvocations, 2 * 16),
+    (Event::ShaderOps, 4 * 20 + 4 * (256 + 16) * 10),
+    // Two pixels a line: 32 lines of each of the 12 tiles off the diagonal, 20 for each triangle of each of the 4 on it.
+    (Event::DepthLines, 12 * 32 + 4 * 2 * 20),
+    // The same written, then read with the 4 lines of each tile of the image to resolve.
+    (Event::ColourLines, 12 * 32 + 4 * 2 * 20 + 16 * (32 + 4)),
+    (Event::SamplesResolved, 8192),
+    (Event::PixelsResolved, 1024),
+    // The vertices fill one line; cleared lines are not read, and of the frame the image alone is kept.
+    (Event::DramReadBytes, 64),
+    (Event::DramWriteBytes, 4 * 1024),
+    (Event::TextureFetches, 0),
+    (Event::TextureLines, 0),
+    (Event::TilesCulledZMax, 0),
+];
+
+#[test]
+fn two_triangles_counted_by_hand() {
+    let bare = two_triangles(Features::NONE);
+    agree_by_hand(&bare);
+    expect(&bare.counts, &BY_HAND);
+    expect(&bare.counts, &[
+        (Event::SamplesTested, 2 * 8192),
+        (Event::SampleMadds, 2 * 8192 * 18),
+        (Event::TileMadds, 0),
+        (Event::TilesCulledSides, 0),
+        (Event::TilesCulledEdges, 0),
+        (Event::ZCullTests, 0),
+        (Event::DepthIntervalMadds, 0),
+    ]);
+    // Edges alone: a tile whose corner touches the diagonal is kept, so each triangle loses three of its six.
+    let edges = two_triangles(Features { edges: true, ..Features::NONE });
+    agree_by_hand(&edges);
+    expect(&edges.counts, &BY_HAND);
+    expect(&edges.counts, &[
+        (Event::TilesCulledEdges, 2 * 3),
+        (Event::SamplesTested, 2 * 13 * 64 * 8),
+        (Event::SampleMadds, 2 * 13 * 64 * 8 * 18),
+    ]);
+    let depth = two_triangles(Features { z_max: true, ..Features::NONE });
+    agree_by_hand(&depth);
+    expect(&depth.counts, &BY_HAND);
+    // Each triangle asks in each tile; the farthest depth is found anew where the first one wrote: 10 tiles.
+    expect(&depth.counts, &[(Event::ZCullTests, 32), (Event::ZMaxUpdates, 10)]);
+}
+
+/// [`agree`] but for the samples a packet may hold, of which this scene has more.
+fn agree_by_hand(frame: &Frame) {
+    let kinds = |kind| frame.packets.iter().filter(|packet| packet.kind == kind).count();
+    assert_eq!([kinds(PacketKind::Draw), kinds(PacketKind::Vertices)], [1, 1]);
+    let mut sum = Counts::default();
+    frame.packets.iter().for_each(|packet| sum += &packet.counts);
+    assert_eq!(sum, frame.counts);
+}
+
+#[test]
+fn what_a_still_pinhole_scene_does_not_need_it_does_not_use() {
+    let frame = two_triangles(Features { edges: false, ..Features::ALL });
+    assert!(!frame.counts.uses(Unit::Texture));
+    // Still, in focus and in front of the camera: no side plane, no depth interval, no time and no lens.
+    let idle = [Event::SetupMadds, Event::DepthIntervalMadds, Event::TilesCulledSides];
+    expect(&frame.counts, &idle.map(|event| (event, 0)));
+    assert_eq!(frame.counts[Event::SampleMadds], 18 * frame.counts[Event::SamplesTested]);
+}
+
+#[test]
+fn an_empty_frame_is_resolved_and_nothing_else() {
+    let frame = frame(&[], false, Features::ALL);
+    for (event, count) in frame.counts.iter().filter(|(_, count)| *count > 0) {
+        assert!([Unit::Colour, Unit::L2, Unit::Dram].contains(&event.unit()), "{}: {count}", event.name());
+    }
+    assert_eq!(frame.counts[Event::PixelsResolved], 3500);
+    assert_eq!(frame.counts[Event::SamplesResolved], 0);
+}
+
+/// A vertex is fetched again once enough others came in between.
+#[test]
+fn vertices_are_reused_first_in_first_out() {
+    let corners: Vec<_> = (0..40).map(|i| Vec3::new((i % 7) as f32, (i % 5) as f32 * 0.9, 4.0 + i as f32)).collect();
+    let strip: Vec<_> = (0..38).map(|i| [i, i + 1, i + 2]).collect();
+    let back_to_the_start = [strip.clone(), vec![[0, 39, 1]]].concat();
+    for (triangles, fetched) in [(strip, 40), (back_to_the_start, 42)] {
+        let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
+        let counts = frame(&[Draw { geometry, shader: &Plain, cull: Cull::None }], false, Features::ALL).counts;
+        assert_eq!(counts[Event::VerticesFetched], fetched);
+    }
+}
