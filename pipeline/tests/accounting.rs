@@ -32,8 +32,18 @@ fn switches() -> Vec<Features> {
     let on = |bits: u8, bit: u8| bits & (1 << bit) != 0;
     (0..8)
         .flat_map(|bits| {
-            let features = Features { side_planes: on(bits, 0), edges: on(bits, 1), z_max: on(bits, 2), ..Features::ALL };
-            let screenless = Features { side_planes: on(bits, 0), edges: on(bits, 1), z_max: on(bits, 2), ..Features::NONE };
+            let features = Features {
+                side_planes: on(bits, 0),
+                edges: on(bits, 1),
+                z_max: on(bits, 2),
+                ..Features::ALL
+            };
+            let screenless = Features {
+                side_planes: on(bits, 0),
+                edges: on(bits, 1),
+                z_max: on(bits, 2),
+                ..Features::NONE
+            };
             if features == screenless { vec![features] } else { vec![features, screenless] }
         })
         .collect()
@@ -154,7 +164,10 @@ fn agree(frame: &Frame) {
         (
             "a triangle goes on or is dropped for one reason",
             n(E::TrianglesIn),
-            n(E::TrianglesSetUp) + n(E::TrianglesDegenerate) + n(E::TrianglesOutside) + n(E::TrianglesFaceCulled),
+            n(E::TrianglesSetUp)
+                + n(E::TrianglesDegenerate)
+                + n(E::TrianglesOutside)
+                + n(E::TrianglesFaceCulled),
         ),
         ("every pixel is resolved", n(E::PixelsResolved), frame.pixels),
         ("a line is 64 bytes", n(E::DramReadBytes) % 64 + n(E::DramWriteBytes) % 64, 0),
@@ -166,7 +179,11 @@ fn agree(frame: &Frame) {
         ("hits are among the tested", n(E::SamplesHit), n(E::SamplesTested)),
         ("writes are among the hits", n(E::DepthWrites), n(E::SamplesHit)),
         ("what is visible was written", frame.visible, n(E::DepthWrites)),
-        ("culled tiles are among the visited", n(E::TilesCulledSides) + n(E::TilesCulledEdges), n(E::CoarseTilesVisited) + n(E::TilesVisited)),
+        (
+            "culled tiles are among the visited",
+            n(E::TilesCulledSides) + n(E::TilesCulledEdges),
+            n(E::CoarseTilesVisited) + n(E::TilesVisited),
+        ),
         ("what is hidden was tested for it", n(E::TilesCulledZMax), n(E::ZCullTests)),
         ("and visited", n(E::ZCullTests), n(E::TilesVisited)),
         ("a tile is renewed for a test", n(E::ZMaxUpdates), n(E::ZCullTests)),
@@ -194,9 +211,18 @@ fn stays_in_its_units(packet: &Packet) {
     let units: &[Unit] = match packet.kind {
         PacketKind::Draw => &[U::Command],
         PacketKind::Vertices => &[U::Command, U::Shader, U::Setup, U::L2, U::Dram],
-        PacketKind::Tile => {
-            &[U::Traversal, U::ZCull, U::SampleTest, U::Depth, U::ShadingCache, U::Shader, U::Texture, U::Colour, U::L2, U::Dram]
-        }
+        PacketKind::Tile => &[
+            U::Traversal,
+            U::ZCull,
+            U::SampleTest,
+            U::Depth,
+            U::ShadingCache,
+            U::Shader,
+            U::Texture,
+            U::Colour,
+            U::L2,
+            U::Dram,
+        ],
         PacketKind::Resolve => &[U::Colour, U::L2, U::Dram],
     };
     assert!(Unit::ALL.iter().all(|unit| !packet.counts.uses(*unit) || units.contains(unit)), "{packet:?}");
@@ -215,7 +241,8 @@ fn two_triangles(features: Features) -> Frame {
     let spec = spec(features);
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
     let mut packets = Vec::new();
-    let counts = render(&pixel_camera(viewport, 0.25), &draws, &settings, |p| packets.push(*p)).unwrap().counts;
+    let counts =
+        render(&pixel_camera(viewport, 0.25), &draws, &settings, |p| packets.push(*p)).unwrap().counts;
     Frame { packets, counts, visible: 8192, samples: 8192, pixels: 1024 }
 }
 
@@ -264,24 +291,30 @@ fn two_triangles_counted_by_hand() {
     let bare = two_triangles(Features::NONE);
     agree_by_hand(&bare);
     expect(&bare.counts, &BY_HAND);
-    expect(&bare.counts, &[
-        (Event::SamplesTested, 2 * 8192),
-        (Event::SampleMadds, 2 * 8192 * 18),
-        (Event::TileMadds, 0),
-        (Event::TilesCulledSides, 0),
-        (Event::TilesCulledEdges, 0),
-        (Event::ZCullTests, 0),
-        (Event::DepthIntervalMadds, 0),
-    ]);
+    expect(
+        &bare.counts,
+        &[
+            (Event::SamplesTested, 2 * 8192),
+            (Event::SampleMadds, 2 * 8192 * 18),
+            (Event::TileMadds, 0),
+            (Event::TilesCulledSides, 0),
+            (Event::TilesCulledEdges, 0),
+            (Event::ZCullTests, 0),
+            (Event::DepthIntervalMadds, 0),
+        ],
+    );
     // Edges alone: a tile whose corner touches the diagonal is kept, so each triangle loses three of its six.
     let edges = two_triangles(Features { edges: true, ..Features::NONE });
     agree_by_hand(&edges);
     expect(&edges.counts, &BY_HAND);
-    expect(&edges.counts, &[
-        (Event::TilesCulledEdges, 2 * 3),
-        (Event::SamplesTested, 2 * 13 * 64 * 8),
-        (Event::SampleMadds, 2 * 13 * 64 * 8 * 18),
-    ]);
+    expect(
+        &edges.counts,
+        &[
+            (Event::TilesCulledEdges, 2 * 3),
+            (Event::SamplesTested, 2 * 13 * 64 * 8),
+            (Event::SampleMadds, 2 * 13 * 64 * 8 * 18),
+        ],
+    );
     let depth = two_triangles(Features { z_max: true, ..Features::NONE });
     agree_by_hand(&depth);
     expect(&depth.counts, &BY_HAND);
@@ -321,12 +354,14 @@ fn an_empty_frame_is_resolved_and_nothing_else() {
 /// A vertex is fetched again once enough others came in between.
 #[test]
 fn vertices_are_reused_first_in_first_out() {
-    let corners: Vec<_> = (0..40).map(|i| Vec3::new((i % 7) as f32, (i % 5) as f32 * 0.9, 4.0 + i as f32)).collect();
+    let corners: Vec<_> =
+        (0..40).map(|i| Vec3::new((i % 7) as f32, (i % 5) as f32 * 0.9, 4.0 + i as f32)).collect();
     let strip: Vec<_> = (0..38).map(|i| [i, i + 1, i + 2]).collect();
     let back_to_the_start = [strip.clone(), vec![[0, 39, 1]]].concat();
     for (triangles, fetched) in [(strip, 40), (back_to_the_start, 42)] {
         let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
-        let counts = frame(&[Draw { geometry, shader: &Plain, cull: Cull::None }], false, Features::ALL).counts;
+        let counts =
+            frame(&[Draw { geometry, shader: &Plain, cull: Cull::None }], false, Features::ALL).counts;
         assert_eq!(counts[Event::VerticesFetched], fetched);
     }
 }

@@ -120,7 +120,9 @@ fn motion_is_a_linear_ramp_of_coverage() {
         let image = stage.draw(&[quad(&open, &close, &RED)]);
         for k in 0..way {
             let expected = 1.0 - (f64::from(k) + 0.5) / f64::from(way);
-            let mean = |column: u32| (4..36).map(|y| f64::from(stage.pixel(&image, column, y).x)).sum::<f64>() / 32.0;
+            let mean = |column: u32| {
+                (4..36).map(|y| f64::from(stage.pixel(&image, column, y).x)).sum::<f64>() / 32.0
+            };
             let (leading, trailing) = (mean(28 + k), mean(12 + k));
             let bound = four_sigma(expected, 32.0 * 64.0);
             assert!((leading - expected).abs() < bound, "pixel {k} of {way}: {leading} for {expected}");
@@ -185,7 +187,9 @@ fn a_sample_sees_what_its_place_on_the_lens_shows() {
         // x' = x + u (s / F - s / w), to the right and upwards.
         let moved = lens.map(|c| c * (64.0 / 8.0 - 64.0 / depth));
         let lit: Vec<_> = (0..1600_u32).filter(|&i| image[i as usize].x > 0.0).collect();
-        let mean = |part: &dyn Fn(u32) -> u32| lit.iter().map(|&i| f64::from(part(i)) + 0.5).sum::<f64>() / lit.len() as f64;
+        let mean = |part: &dyn Fn(u32) -> u32| {
+            lit.iter().map(|&i| f64::from(part(i)) + 0.5).sum::<f64>() / lit.len() as f64
+        };
         assert_eq!(lit.len(), 16, "depth {depth}");
         assert_eq!(mean(&|i| i % 40), 20.0 + f64::from(moved[0]), "depth {depth}");
         assert_eq!(mean(&|i| i / 40), 20.0 - f64::from(moved[1]), "depth {depth}");
@@ -198,10 +202,17 @@ fn of_two_crossing_surfaces_the_nearer_is_seen() {
     let stage = Stage::sampled(64, 32, 8);
     let slope = |left: f32, right: f32| {
         let corner = |x: f32, y: f32, w: f32| Vec3::new(x * w, y * w, w);
-        [corner(-40.0, -20.0, left), corner(40.0, -20.0, right), corner(40.0, 20.0, right), corner(-40.0, 20.0, left)]
+        [
+            corner(-40.0, -20.0, left),
+            corner(40.0, -20.0, right),
+            corner(40.0, 20.0, right),
+            corner(-40.0, 20.0, left),
+        ]
     };
     let (falling, rising) = (slope(2.0, 6.0), slope(6.0, 2.0));
-    for draws in [[still(&falling, &RED), still(&rising, &BLUE)], [still(&rising, &BLUE), still(&falling, &RED)]] {
+    for draws in
+        [[still(&falling, &RED), still(&rising, &BLUE)], [still(&rising, &BLUE), still(&falling, &RED)]]
+    {
         let image = stage.draw(&draws);
         for (i, &pixel) in (0..).zip(&image) {
             assert_eq!(pixel, if i % 64 < 32 { RED.0 } else { BLUE.0 }, "pixel {i}");
@@ -283,7 +294,9 @@ fn an_off_centre_frustum_moves_the_image_by_whole_pixels() {
         let shift = Vec2::new(right as f32, down as f32) / 40.0;
         stage.camera = stage.camera.with_shift(shift).unwrap();
         let moved = stage.see(&draws);
-        let key = |&([x, y], s, ..): &([u32; 2], Sample, u32, f32)| (y, x, s.t.to_bits(), s.x.to_bits(), s.y.to_bits());
+        let key = |&([x, y], s, ..): &([u32; 2], Sample, u32, f32)| {
+            (y, x, s.t.to_bits(), s.x.to_bits(), s.y.to_bits())
+        };
         let mut compared = 0;
         for from in &centred {
             let [x, y] = [from.0[0] as i32 + right, from.0[1] as i32 + down];
@@ -301,7 +314,9 @@ fn an_off_centre_frustum_moves_the_image_by_whole_pixels() {
 #[test]
 fn a_moving_camera_is_a_scene_that_moves_the_other_way() {
     let (corners, triangles, stage) = dyadic(6);
-    for (way, lens) in [(Vec3::new(1.5, -0.75, 0.0), None), (Vec3::new(-0.5, 2.0, 0.25), Lens::new(8.0, 2.0).ok())] {
+    for (way, lens) in
+        [(Vec3::new(1.5, -0.75, 0.0), None), (Vec3::new(-0.5, 2.0, 0.25), Lens::new(8.0, 2.0).ok())]
+    {
         let mut fixed = Stage { camera: stage.camera.with_lens(lens), ..dyadic(6).2 };
         let close: Vec<_> = corners.iter().map(|&p| p + way).collect();
         let scene = Geometry::new(&corners, &close, &triangles).unwrap();
@@ -340,7 +355,8 @@ fn the_near_depth_cuts() {
 #[test]
 fn what_comes_through_the_near_plane_vanishes_in_time() {
     let stage = Stage::sampled(16, 16, 16);
-    let (open, close) = (rectangle([-99.0, 99.0], [-99.0, 99.0], 1.0), rectangle([-99.0, 99.0], [-99.0, 99.0], -0.5));
+    let (open, close) =
+        (rectangle([-99.0, 99.0], [-99.0, 99.0], 1.0), rectangle([-99.0, 99.0], [-99.0, 99.0], -0.5));
     // The depth is 1 - 3/2 t, at the near depth of 1/4 when t is 1/2; the corners pass through the lens later.
     for (_, s, id, _) in stage.see(&[quad(&open, &close, &RED)]) {
         if (s.t - 0.5).abs() > 1e-5 {
@@ -355,12 +371,15 @@ fn at_equal_depth_the_lowest_triangle_wins() {
     let corners = rectangle([-16.0, 16.0], [-16.0, 16.0], 2.0);
     let moved = corners.map(|p| p + Vec3::X * 4.0);
     // The same plane through other corners, still and moving.
-    for (other, close) in [(corners, corners), (corners.map(|p| p - Vec3::Y * 2.0), corners), (corners, moved)] {
+    for (other, close) in
+        [(corners, corners), (corners.map(|p| p - Vec3::Y * 2.0), corners), (corners, moved)]
+    {
         let first = stage.draw(&[still(&corners, &RED), quad(&other, &close, &BLUE)]);
         assert!(first.iter().all(|&pixel| pixel == RED.0));
         let swapped = stage.see(&[quad(&other, &close, &BLUE), still(&corners, &RED)]);
         let hidden = swapped.iter().filter(|seen| seen.2 >= 2).count();
-        let alone = stage.see(&[quad(&other, &close, &BLUE)]).iter().filter(|seen| seen.2 == u32::MAX).count();
+        let alone =
+            stage.see(&[quad(&other, &close, &BLUE)]).iter().filter(|seen| seen.2 == u32::MAX).count();
         assert_eq!(hidden, alone, "blue comes first wherever it is");
     }
 }
@@ -371,7 +390,9 @@ fn who_hides_whom_changes_with_time() {
     let stage = Stage::sampled(24, 24, 16);
     let wall = rectangle([-99.0, 99.0], [-99.0, 99.0], 4.0);
     let [open, close] = [6.0, 2.0].map(|z| rectangle([-99.0, 99.0], [-99.0, 99.0], z));
-    for draws in [[still(&wall, &RED), quad(&open, &close, &BLUE)], [quad(&open, &close, &BLUE), still(&wall, &RED)]] {
+    for draws in
+        [[still(&wall, &RED), quad(&open, &close, &BLUE)], [quad(&open, &close, &BLUE), still(&wall, &RED)]]
+    {
         let wall_first = draws[0].geometry.open()[0] == wall[0];
         for (_, s, id, depth) in stage.see(&draws) {
             if (s.t - 0.5).abs() > 1e-5 {

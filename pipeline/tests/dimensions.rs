@@ -138,7 +138,8 @@ fn a_triangle_that_moves_late_starts_like_a_still_one() {
     let mut r = Uniform::new(9);
     let block: Vec<_> =
         (0..64).map(|_| Sample { x: r.next(), y: r.next(), u: 0.0, v: 0.0, t: 0.0 }).collect();
-    let probe = Probe::new(&repeated(1, &block), Viewport::new(8, 8).unwrap(), Shear::default(), [0, 0], 0.25);
+    let probe =
+        Probe::new(&repeated(1, &block), Viewport::new(8, 8).unwrap(), Shear::default(), [0, 0], 0.25);
     let mut hits = 0;
     for _ in 0..500 {
         let still = random_triangle(&mut r, false);

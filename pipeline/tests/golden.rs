@@ -40,7 +40,11 @@ impl Shader for Lit {
 fn checker() -> Texture {
     let texel = |i: u32| {
         let (x, y) = (i % 16, i / 16);
-        if (x / 4 + y / 4) % 2 == 0 { [230, 120 + 8 * x as u8, 40, 255] } else { [30, 60, 90 + 10 * y as u8, 255] }
+        if (x / 4 + y / 4) % 2 == 0 {
+            [230, 120 + 8 * x as u8, 40, 255]
+        } else {
+            [30, 60, 90 + 10 * y as u8, 255]
+        }
     };
     Texture::from_srgb8(16, 16, (0..256).map(texel).collect(), [Wrap::Repeat; 2]).unwrap()
 }
@@ -106,7 +110,8 @@ fn check(name: &str, found: &str) {
         std::fs::write(&path, found).unwrap();
     }
     let mend = "QUINTILE_BLESS=1 cargo test -p pipeline --test golden writes it anew";
-    let stored = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}; {mend}", path.display()));
+    let stored =
+        std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}; {mend}", path.display()));
     let differ: Vec<_> = stored.lines().zip(found.lines()).enumerate().filter(|(_, (a, b))| a != b).collect();
     let Some((line, (old, new))) = differ.iter().find(|(line, _)| *line > 2).or(differ.first()) else {
         assert_eq!(stored.lines().count(), found.lines().count(), "{}", path.display());
@@ -117,7 +122,10 @@ fn check(name: &str, found: &str) {
         Some(pixel) => format!("first at pixel {}, {}", pixel % SIDE_PX as usize, pixel / SIDE_PX as usize),
         None => "in bits too small to see".to_owned(),
     };
-    panic!("{}: {pixels} pixels differ, {place}: stored `{old}`, found `{new}`; if that is wanted, {mend}", path.display());
+    panic!(
+        "{}: {pixels} pixels differ, {place}: stored `{old}`, found `{new}`; if that is wanted, {mend}",
+        path.display()
+    );
 }
 
 #[test]

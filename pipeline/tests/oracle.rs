@@ -138,7 +138,14 @@ struct Case {
 
 fn cases() -> impl Strategy<Value = Case> {
     let flags = (any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>(), -20..20_i32);
-    flags.prop_map(|(moving, lens, behind, far, sliver, scale)| Case { moving, lens, behind, far, sliver, scale })
+    flags.prop_map(|(moving, lens, behind, far, sliver, scale)| Case {
+        moving,
+        lens,
+        behind,
+        far,
+        sliver,
+        scale,
+    })
 }
 
 const NEAR: f32 = 0.25;
@@ -317,15 +324,25 @@ fn nothing_disagrees_where_nothing_rounds() {
         for (slot, seen) in probe.see(triangle, Cull::None).into_iter().enumerate() {
             let points = triangle.map(|vertex| ideal(&vertex, &probe.shear, &probe.at(slot)));
             let p = points.map(|point| point.p);
-            let e = [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| p[i][0] * p[j][1] - p[j][0] * p[i][1]);
+            let e =
+                [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| p[i][0] * p[j][1] - p[j][0] * p[i][1]);
             if e.contains(&0.0) {
                 ties += 1;
                 continue;
             }
             let verdict = judge(&points);
-            assert_eq!(seen.is_some(), verdict.inside && verdict.depth > 0.25, "{triangle:?} {:?}", probe.at(slot));
+            assert_eq!(
+                seen.is_some(),
+                verdict.inside && verdict.depth > 0.25,
+                "{triangle:?} {:?}",
+                probe.at(slot)
+            );
             if let Some(depth) = seen {
-                assert!((f64::from(depth) / verdict.depth - 1.0).abs() < 1e-5, "{depth} for {}", verdict.depth);
+                assert!(
+                    (f64::from(depth) / verdict.depth - 1.0).abs() < 1e-5,
+                    "{depth} for {}",
+                    verdict.depth
+                );
                 hits += 1;
             }
         }

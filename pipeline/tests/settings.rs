@@ -152,7 +152,10 @@ fn values_that_are_not_finite_are_told_by_their_vertex() {
             (Geometry::new(&corners, &corners, &FACE).unwrap_err(), "position at the opening"),
             (Geometry::new(&CORNERS, &corners, &FACE).unwrap_err(), "position at the closing"),
             (geometry.with_normals(&corners).unwrap_err(), "normal"),
-            (geometry.with_uvs(&[Vec2::ZERO, Vec2::ZERO, Vec2::new(bad, 0.0)]).unwrap_err(), "texture coordinate"),
+            (
+                geometry.with_uvs(&[Vec2::ZERO, Vec2::ZERO, Vec2::new(bad, 0.0)]).unwrap_err(),
+                "texture coordinate",
+            ),
         ] {
             assert_eq!(error, DrawError::NotFinite { what: named, vertex: 2 });
             assert!(error.to_string().contains("vertex 2"), "{error}");

@@ -416,7 +416,14 @@ fn the_bodies_are_crossed_at_all() {
 #[ignore = "set_up drops triangles whose corners lie on one line; only those with two equal corners are never hit"]
 fn dropping_triangles_of_no_area_leaves_a_closed_surface_closed() {
     let still = |[x, y, w]: [f32; 3]| MovingVertex { open: [w * x, w * y, w], close: [w * x, w * y, w] };
-    let at = [[-1.0, -3.0, 4.0], [0.0, 0.0, 4.0], [1.0, 3.0, 4.0], [-3.0, 1.0, 4.0], [3.0, -1.0, 4.0], [0.25, 0.5, 8.0]];
+    let at = [
+        [-1.0, -3.0, 4.0],
+        [0.0, 0.0, 4.0],
+        [1.0, 3.0, 4.0],
+        [-3.0, 1.0, 4.0],
+        [3.0, -1.0, 4.0],
+        [0.25, 0.5, 8.0],
+    ];
     let [a, m, b, l, r, tip] = [0, 1, 2, 3, 4, 5];
     let triangles =
         vec![[a, m, l], [m, b, l], [a, b, m], [b, a, r], [a, l, tip], [l, b, tip], [r, a, tip], [b, r, tip]];
@@ -426,6 +433,7 @@ fn dropping_triangles_of_no_area_leaves_a_closed_surface_closed() {
     let viewport = Viewport::new(8, 8).unwrap();
     let probe = Probe::new(&repeated(1, &block), viewport, Shear::default(), [0, 0], 0.25);
     let slot = (0..64).find(|&slot| (probe.at(slot).x, probe.at(slot).y) == (0.0, f64::from(f32::EPSILON)));
-    let crossed = |cull| (0..8).filter(|&k| probe.see(mesh.corners(k), cull)[slot.unwrap()].is_some()).count();
+    let crossed =
+        |cull| (0..8).filter(|&k| probe.see(mesh.corners(k), cull)[slot.unwrap()].is_some()).count();
     assert_eq!(crossed(Cull::Back), crossed(Cull::Front));
 }

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::geometry::Viewport;
 use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
-use crate::sampling::SampleTable;
+use crate::sampling::SampleSource;
 
 /// The functional side of the hardware: sizes that decide *what* happens. How fast is the business of a timing model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -110,7 +110,7 @@ pub struct Settings<'a> {
     /// Size of the image.
     pub viewport: Viewport,
     /// Where and when each pixel looks.
-    pub samples: &'a SampleTable,
+    pub samples: &'a dyn SampleSource,
     /// Linear RGB radiance where nothing is hit.
     pub background: Vec3,
 }

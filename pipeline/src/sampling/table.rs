@@ -1,8 +1,8 @@
 //! A programmable table of samples, tiled over the image.
 
-use super::LensShape;
 use super::hash::word;
 use super::sobol::{owen, sobol};
+use super::{LensShape, SampleSource};
 
 /// One sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -122,15 +122,6 @@ impl SampleTable {
         sorted
     }
 
-    /// The samples of the block of [`Self::TURN_PX`] pixels squared that starts at pixel (`px`, `py`), by time, each as
-    /// pixel in the block times `per_pixel` plus index in the pixel.
-    pub(super) fn block_by_time(&self, px: u32, py: u32) -> &[u16] {
-        let (x, y) = self.place(px, py);
-        let block = y / Self::TURN_PX * (Self::SIDE_PX / Self::TURN_PX) + x / Self::TURN_PX;
-        let per_block = (Self::TURN_PX * Self::TURN_PX * self.per_pixel) as usize;
-        &self.by_time[block as usize * per_block..][..per_block]
-    }
-
     /// Samples in each pixel.
     pub fn per_pixel(&self) -> u32 {
         self.per_pixel
@@ -138,17 +129,13 @@ impl SampleTable {
 
     /// The samples of pixel (`px`, `py`), in table order.
     pub fn pixel(&self, px: u32, py: u32) -> &[Sample] {
-        self.block(px, py).pixel(0, 0)
-    }
-
-    /// The samples of pixel (`px`, `py`) and of those after it in the same tile.
-    pub(super) fn block(&self, px: u32, py: u32) -> Block<'_> {
         let (x, y) = self.place(px, py);
-        Block { table: self, first: y * Self::SIDE_PX + x }
+        let first = ((y * Self::SIDE_PX + x) * self.per_pixel) as usize;
+        &self.samples[first..first + self.per_pixel as usize]
     }
 
     /// Where in the block pixel (`px`, `py`) looks.
-    pub(super) fn place(&self, px: u32, py: u32) -> (u32, u32) {
+    fn place(&self, px: u32, py: u32) -> (u32, u32) {
         let copy = word(self.seed, u64::from(px / Self::SIDE_PX), u64::from(py / Self::SIDE_PX));
         let turn = |bits: u64, at: u32| {
             (at + bits as u32 % Self::SIDE_PX / Self::TURN_PX * Self::TURN_PX) % Self::SIDE_PX
@@ -157,19 +144,20 @@ impl SampleTable {
     }
 }
 
-/// Samples from one pixel on; a tile never wraps around the table.
-#[derive(Clone, Copy)]
-pub(super) struct Block<'a> {
-    table: &'a SampleTable,
-    first: u32,
-}
+impl SampleSource for SampleTable {
+    fn per_pixel(&self) -> u32 {
+        self.per_pixel
+    }
 
-impl<'a> Block<'a> {
-    /// The samples of the pixel `dx` columns and `dy` rows on.
-    pub fn pixel(&self, dx: u32, dy: u32) -> &'a [Sample] {
-        let per_pixel = self.table.per_pixel as usize;
-        let first = (self.first + dy * SampleTable::SIDE_PX + dx) as usize * per_pixel;
-        &self.table.samples[first..first + per_pixel]
+    fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]) {
+        into.copy_from_slice(self.pixel(px, py));
+    }
+
+    fn block_by_time(&self, px: u32, py: u32) -> Option<&[u16]> {
+        let (x, y) = self.place(px, py);
+        let block = y / Self::TURN_PX * (Self::SIDE_PX / Self::TURN_PX) + x / Self::TURN_PX;
+        let per_block = (Self::TURN_PX * Self::TURN_PX * self.per_pixel) as usize;
+        self.by_time.chunks_exact(per_block).nth(block as usize)
     }
 }
 

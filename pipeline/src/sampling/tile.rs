@@ -1,6 +1,6 @@
 //! The samples of one tile, laid out for the sample test.
 
-use super::SampleTable;
+use super::{Sample, SampleSource, SampleTable};
 use crate::geometry::{Shear, Viewport};
 
 /// Samples of one tile as arrays, sorted by time so that a time interval is a run of them. Arrays are padded to
@@ -26,6 +26,7 @@ pub struct TileSamples {
     /// The pixel within the tile, row by row.
     pub pixel: Vec<u8>,
     order: Vec<u16>,
+    gathered: Vec<Sample>,
 }
 
 impl TileSamples {
@@ -38,24 +39,23 @@ impl TileSamples {
     /// the viewport get no samples.
     pub fn fill(
         &mut self,
-        table: &SampleTable,
+        source: &dyn SampleSource,
         viewport: Viewport,
         shear: &Shear,
         [px, py]: [u32; 2],
         side_px: u32,
     ) {
-        self.sort_by_time(table, viewport, [px, py], side_px);
+        let per_pixel = source.per_pixel();
+        let inside = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
+        self.gather(source, [px, py], inside, side_px);
+        self.sort_by_time(source, [px, py], inside, side_px);
         self.len = self.order.len();
         self.resize(self.len.next_multiple_of(Self::LANES));
-        let per_pixel = table.per_pixel();
-        let block = table.block(px, py);
         for slot in 0..self.len {
             let index = u32::from(self.order[slot]);
-            let (pixel, sample) = (index / per_pixel, (index % per_pixel) as usize);
-            let (column, row) = (px + pixel % side_px, py + pixel / side_px);
-            let s = block.pixel(pixel % side_px, pixel / side_px)[sample];
-            let x = Viewport::edge(column, viewport.width()) + s.x;
-            let y = Viewport::edge(row, viewport.height()) + s.y;
+            let (pixel, s) = (index / per_pixel, self.gathered[index as usize]);
+            let x = Viewport::edge(px + pixel % side_px, viewport.width()) + s.x;
+            let y = Viewport::edge(py + pixel / side_px, viewport.height()) + s.y;
             (self.x[slot], self.y[slot]) = (x, y);
             (self.u[slot], self.v[slot], self.t[slot]) = (s.u, s.v, s.t);
             (self.lens[0][slot], self.lens[1][slot]) = (s.u * shear.s[0], s.v * shear.s[1]);
@@ -64,24 +64,53 @@ impl TileSamples {
         }
     }
 
-    fn sort_by_time(&mut self, table: &SampleTable, viewport: Viewport, [px, py]: [u32; 2], side_px: u32) {
-        self.order.clear();
-        let [columns, rows] = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
-        if [side_px, columns, rows] == [SampleTable::TURN_PX; 3] {
-            self.order.extend(table.block_by_time(px, py));
-            return;
-        }
-        let per_pixel = table.per_pixel();
+    /// The samples of the tile's pixels that lie in the image, each at its pixel times `per_pixel` plus its index.
+    fn gather(
+        &mut self,
+        source: &dyn SampleSource,
+        [px, py]: [u32; 2],
+        [columns, rows]: [u32; 2],
+        side_px: u32,
+    ) {
+        let per_pixel = source.per_pixel() as usize;
+        self.gathered.resize((side_px * side_px) as usize * per_pixel, Sample::default());
         for row in 0..rows {
             for column in 0..columns {
+                let first = (row * side_px + column) as usize * per_pixel;
+                source.pixel_into(px + column, py + row, &mut self.gathered[first..first + per_pixel]);
+            }
+        }
+    }
+
+    fn sort_by_time(
+        &mut self,
+        source: &dyn SampleSource,
+        [px, py]: [u32; 2],
+        inside: [u32; 2],
+        side_px: u32,
+    ) {
+        self.order.clear();
+        if [side_px; 2] == inside
+            && side_px == SampleTable::TURN_PX
+            && let Some(order) = source.block_by_time(px, py)
+        {
+            self.order.extend(order);
+            return;
+        }
+        let per_pixel = source.per_pixel();
+        for row in 0..inside[1] {
+            for column in 0..inside[0] {
                 let first = (row * side_px + column) * per_pixel;
                 self.order.extend((first..first + per_pixel).map(|index| index as u16));
             }
         }
-        self.order.sort_by_key(|&index| {
-            let (pixel, sample) = (u32::from(index) / per_pixel, u32::from(index) % per_pixel);
-            table.pixel(px + pixel % side_px, py + pixel / side_px)[sample as usize].t.to_bits()
-        });
+        // Times are not negative, so their bits sort as they do; the sort is stable, so the index breaks ties.
+        self.order.sort_by_key(|&index| self.gathered[index as usize].t.to_bits());
+    }
+
+    /// The pixel in the tile (row by row) times `per_pixel` plus the index in the pixel of the sample in `slot`.
+    pub fn index(&self, slot: usize) -> u32 {
+        u32::from(self.order[slot])
     }
 
     fn resize(&mut self, padded: usize) {
