@@ -7,69 +7,11 @@
 
 mod common;
 
+use common::stage::*;
 use common::*;
 use glam::{Affine3A, Vec2, Vec3};
-use pipeline::frame::visibility;
 use pipeline::sampling::Sample;
 use pipeline::*;
-
-const RED: Flat = Flat(Vec3::new(1.0, 0.0, 0.0));
-const BLUE: Flat = Flat(Vec3::new(0.0, 0.0, 1.0));
-const NEAR: f32 = 0.25;
-
-struct Stage {
-    viewport: Viewport,
-    table: SampleTable,
-    camera: Camera,
-}
-
-impl Stage {
-    fn new(width: u32, height: u32, table: SampleTable) -> Self {
-        let viewport = Viewport::new(width, height).unwrap();
-        Self { viewport, table, camera: pixel_camera(viewport, NEAR) }
-    }
-
-    /// With the default table.
-    fn sampled(width: u32, height: u32, per_pixel: u32) -> Self {
-        Self::new(width, height, SampleTable::low_discrepancy(per_pixel, 1, LensShape::Disk).unwrap())
-    }
-
-    fn draw(&self, draws: &[Draw<'_>]) -> Vec<Vec3> {
-        let spec = spec(Features::ALL);
-        let settings =
-            Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
-        render(&self.camera, draws, &settings, |_| ()).unwrap().image
-    }
-
-    /// For each sample its pixel, itself, the triangle it sees and its depth.
-    fn see(&self, draws: &[Draw<'_>]) -> Vec<([u32; 2], Sample, u32, f32)> {
-        let spec = spec(Features::ALL);
-        let settings =
-            Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
-        let seen = visibility(&self.camera, draws, &settings).unwrap();
-        let looks = looks(&self.table, self.viewport, spec.tile_px);
-        assert_eq!(seen.len(), looks.len());
-        looks.into_iter().zip(seen).map(|((px, s), (id, depth))| (px, s, id, f32::from_bits(depth))).collect()
-    }
-
-    fn pixel(&self, image: &[Vec3], x: u32, y: u32) -> Vec3 {
-        image[(y * self.viewport.width() + x) as usize]
-    }
-
-    /// Position of a sample in pixels from the centre of the image, `y` upwards.
-    fn at(&self, px: [u32; 2], s: &Sample) -> [f32; 2] {
-        let half = [self.viewport.width(), self.viewport.height()].map(|side| 0.5 * side as f32);
-        [px[0] as f32 + s.x - half[0], half[1] - (px[1] as f32 + s.y)]
-    }
-}
-
-fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {
-    Draw { geometry: Geometry::new(open, close, &QUAD).unwrap(), shader, cull: Cull::None }
-}
-
-fn still<'a>(corners: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {
-    quad(corners, corners, shader)
-}
 
 /// Four times the error of `n` independent samples of which a share `p` hits.
 fn four_sigma(p: f64, n: f64) -> f64 {
@@ -196,70 +138,6 @@ fn a_sample_sees_what_its_place_on_the_lens_shows() {
     }
 }
 
-/// Two planes that cross in the middle of the image: each is seen where it is nearer.
-#[test]
-fn of_two_crossing_surfaces_the_nearer_is_seen() {
-    let stage = Stage::sampled(64, 32, 8);
-    let slope = |left: f32, right: f32| {
-        let corner = |x: f32, y: f32, w: f32| Vec3::new(x * w, y * w, w);
-        [
-            corner(-40.0, -20.0, left),
-            corner(40.0, -20.0, right),
-            corner(40.0, 20.0, right),
-            corner(-40.0, 20.0, left),
-        ]
-    };
-    let (falling, rising) = (slope(2.0, 6.0), slope(6.0, 2.0));
-    for draws in
-        [[still(&falling, &RED), still(&rising, &BLUE)], [still(&rising, &BLUE), still(&falling, &RED)]]
-    {
-        let image = stage.draw(&draws);
-        for (i, &pixel) in (0..).zip(&image) {
-            assert_eq!(pixel, if i % 64 < 32 { RED.0 } else { BLUE.0 }, "pixel {i}");
-        }
-    }
-}
-
-#[test]
-fn a_front_face_is_counter_clockwise_and_the_other_is_culled() {
-    let stage = Stage::sampled(16, 16, 4);
-    let front = rectangle([-8.0, 8.0], [-8.0, 8.0], 2.0);
-    let mut back = front;
-    back.swap(1, 3);
-    for (corners, cull, seen) in [
-        (front, Cull::None, true),
-        (back, Cull::None, true),
-        (front, Cull::Back, true),
-        (back, Cull::Back, false),
-        (front, Cull::Front, false),
-        (back, Cull::Front, true),
-    ] {
-        let lifted = corners.map(|p| p * 1.5);
-        for close in [&corners, &lifted] {
-            let image = stage.draw(&[Draw { cull, ..quad(&corners, close, &RED) }]);
-            assert!(image.iter().all(|&pixel| (pixel == RED.0) == seen), "{cull:?} {corners:?}");
-        }
-    }
-}
-
-/// A card that turns over in mid-shutter shows its front before and its back after.
-#[test]
-fn a_card_that_turns_over_is_culled_for_half_the_shutter() {
-    let stage = Stage::sampled(32, 32, 16);
-    let open = rectangle([-8.0, 8.0], [-8.0, 8.0], 2.0);
-    let close = open.map(|p| Vec3::new(-p.x, p.y, p.z));
-    for (cull, early) in [(Cull::Back, true), (Cull::Front, false)] {
-        let mut seen = [0; 2];
-        for (_, s, id, _) in stage.see(&[Draw { cull, ..quad(&open, &close, &RED) }]) {
-            if id < 2 {
-                assert_eq!(s.t < 0.5, early, "{cull:?} {s:?}");
-                seen[usize::from(s.t < 0.5)] += 1;
-            }
-        }
-        assert!(seen[usize::from(early)] > 500, "{seen:?}");
-    }
-}
-
 /// A dyadic scene of many quads and a table that is the same in every pixel: nothing rounds.
 fn dyadic(seed: u64) -> (Vec<Vec3>, Vec<[u32; 3]>, Stage) {
     let mut r = Uniform::new(seed);
@@ -327,82 +205,5 @@ fn a_moving_camera_is_a_scene_that_moves_the_other_way() {
         let moving_camera = fixed.see(&[Draw { geometry: still, shader: &Plain, cull: Cull::None }]);
         assert!(moving_scene == moving_camera);
         assert!(moving_scene.iter().filter(|seen| seen.2 != u32::MAX).count() > 1000);
-    }
-}
-
-/// A floor that runs through the near plane and on behind the camera: seen beyond the near depth and not before it.
-#[test]
-fn the_near_depth_cuts() {
-    let stage = Stage::sampled(40, 40, 8);
-    // y = -1/4 throughout; depth at image row Y below the horizon is 1 / (4 |Y|) pixels.
-    let floor = [(-50.0, -8.0), (50.0, -8.0), (50.0, 8.0), (-50.0, 8.0)].map(|(x, z)| Vec3::new(x, -2.0, z));
-    let mut seen = 0;
-    for (px, s, id, depth) in stage.see(&[still(&floor, &RED)]) {
-        let [x, y] = stage.at(px, &s);
-        let ideal = -2.0 / y;
-        let inside = y < 0.0 && ideal < 8.0 && (x * ideal).abs() < 50.0;
-        if (ideal - NEAR).abs() > 1e-4 && (ideal - 8.0).abs() > 1e-3 {
-            assert_eq!(id < 2, inside && ideal > NEAR, "{px:?} {s:?} {ideal}");
-            if id < 2 {
-                assert!((depth - ideal).abs() < 1e-5 * ideal, "{depth} for {ideal}");
-                seen += 1;
-            }
-        }
-    }
-    assert!(seen > 1000, "{seen}");
-}
-
-#[test]
-fn what_comes_through_the_near_plane_vanishes_in_time() {
-    let stage = Stage::sampled(16, 16, 16);
-    let (open, close) =
-        (rectangle([-99.0, 99.0], [-99.0, 99.0], 1.0), rectangle([-99.0, 99.0], [-99.0, 99.0], -0.5));
-    // The depth is 1 - 3/2 t, at the near depth of 1/4 when t is 1/2; the corners pass through the lens later.
-    for (_, s, id, _) in stage.see(&[quad(&open, &close, &RED)]) {
-        if (s.t - 0.5).abs() > 1e-5 {
-            assert_eq!(id < 2, s.t < 0.5, "{s:?}");
-        }
-    }
-}
-
-#[test]
-fn at_equal_depth_the_lowest_triangle_wins() {
-    let stage = Stage::sampled(32, 32, 4);
-    let corners = rectangle([-16.0, 16.0], [-16.0, 16.0], 2.0);
-    let moved = corners.map(|p| p + Vec3::X * 4.0);
-    // The same plane through other corners, still and moving.
-    for (other, close) in
-        [(corners, corners), (corners.map(|p| p - Vec3::Y * 2.0), corners), (corners, moved)]
-    {
-        let first = stage.draw(&[still(&corners, &RED), quad(&other, &close, &BLUE)]);
-        assert!(first.iter().all(|&pixel| pixel == RED.0));
-        let swapped = stage.see(&[quad(&other, &close, &BLUE), still(&corners, &RED)]);
-        let hidden = swapped.iter().filter(|seen| seen.2 >= 2).count();
-        let alone =
-            stage.see(&[quad(&other, &close, &BLUE)]).iter().filter(|seen| seen.2 == u32::MAX).count();
-        assert_eq!(hidden, alone, "blue comes first wherever it is");
-    }
-}
-
-/// A curtain comes through a wall in mid-shutter.
-#[test]
-fn who_hides_whom_changes_with_time() {
-    let stage = Stage::sampled(24, 24, 16);
-    let wall = rectangle([-99.0, 99.0], [-99.0, 99.0], 4.0);
-    let [open, close] = [6.0, 2.0].map(|z| rectangle([-99.0, 99.0], [-99.0, 99.0], z));
-    for draws in
-        [[still(&wall, &RED), quad(&open, &close, &BLUE)], [quad(&open, &close, &BLUE), still(&wall, &RED)]]
-    {
-        let wall_first = draws[0].geometry.open()[0] == wall[0];
-        for (_, s, id, depth) in stage.see(&draws) {
-            if (s.t - 0.5).abs() > 1e-5 {
-                assert_eq!((id < 2) == wall_first, s.t < 0.5, "{s:?}");
-                assert!((depth - (6.0 - 4.0 * s.t).min(4.0)).abs() < 1e-5, "{s:?} {depth}");
-            }
-        }
-        let image = stage.draw(&draws);
-        let red = image.iter().map(|pixel| f64::from(pixel.x)).sum::<f64>() / 576.0;
-        // Time is stratified in every pixel.
-        assert_eq!(red, 0.5);
     }
 }

@@ -33,7 +33,7 @@ fn ready(probe: &Probe, vertices: [MovingVertex; 3]) -> Option<Triangle> {
 }
 
 fn probe(r: &mut Uniform, lens: bool, seed: u64) -> Probe {
-    let table = if seed % 2 == 0 {
+    let table = if seed.is_multiple_of(2) {
         border_table(seed)
     } else {
         SampleTable::low_discrepancy(5, seed, LensShape::Disk).unwrap()
@@ -104,7 +104,7 @@ proptest! {
         for power in [-down, up] {
             let scale = libm::exp2f(power as f32);
             let shear = Shear { s: one.shear.s.map(|s| s * scale), a: one.shear.a };
-            let table = if seed % 2 == 0 { border_table(seed) } else { SampleTable::low_discrepancy(5, seed, LensShape::Disk).unwrap() };
+            let table = if seed.is_multiple_of(2) { border_table(seed) } else { SampleTable::low_discrepancy(5, seed, LensShape::Disk).unwrap() };
             let other = Probe::new(&table, Viewport::new(20, 20).unwrap(), shear, [8, 8], 0.25 * scale);
             let scaled = vertices.map(|v| MovingVertex { open: v.open.map(|c| c * scale), close: v.close.map(|c| c * scale) });
             let seen = one.see(vertices, Cull::None);

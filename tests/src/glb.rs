@@ -83,7 +83,10 @@ impl Glb {
         let offset = self.binary.len();
         self.binary.extend(bytes);
         self.json["buffers"][0]["byteLength"] = json!(self.binary.len());
-        let view = push(&mut self.json["bufferViews"], json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}));
+        let view = push(
+            &mut self.json["bufferViews"],
+            json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}),
+        );
         let described = json!({"bufferView": view, "componentType": component, "count": count, "type": kind});
         push(&mut self.json["accessors"], described)
     }

@@ -28,10 +28,7 @@ pub fn lit_bounds(image: &RgbImage, lit: impl Fn(&Rgb<u8>) -> bool) -> Option<Bo
     let places = image.enumerate_pixels().filter(|(.., pixel)| lit(pixel)).map(|(x, y, _)| (x, y));
     places.fold(None, |bounds: Option<Bounds>, (x, y)| {
         let old = bounds.unwrap_or(Bounds { x: [x, x + 1], y: [y, y + 1] });
-        Some(Bounds {
-            x: [old.x[0].min(x), old.x[1].max(x + 1)],
-            y: [old.y[0].min(y), old.y[1].max(y + 1)],
-        })
+        Some(Bounds { x: [old.x[0].min(x), old.x[1].max(x + 1)], y: [old.y[0].min(y), old.y[1].max(y + 1)] })
     })
 }
 

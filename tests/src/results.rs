@@ -37,6 +37,11 @@ impl Results {
         Self { folder, _temporary: temporary, ended }
     }
 
+    /// The folder of the results.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// The file `relative` of the results.
     pub fn path(&self, relative: &str) -> PathBuf {
         self.folder.join(relative)
@@ -118,7 +123,7 @@ impl Results {
     /// If one cannot be read.
     pub fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let mut files = BTreeMap::new();
-        collect(&self.path(""), Path::new(""), &mut files);
+        collect(&self.folder, Path::new(""), &mut files);
         files
     }
 }

@@ -8,10 +8,41 @@ use serde_json::json;
 use tests::{Ended, Glb, Inputs, quintile, real_scenes};
 
 /// What a mend begins with: a message has to say what to do, not only what is wrong.
-const MENDS: [&str; 29] = [
-    "--help", "above zero", "add ", "ask for", "at least", "built in:", "check ", "did you mean", "due", "export it again",
-    "finite", "from ", "get it again", "get the file again", "give ", "has to be", "have to be", "known here", "leave it out",
-    "mend ", "name another", "needs", "put ", "remove ", "takes", "to 256", "with anything in it", "write it as", "move one",
+const MENDS: [&str; 34] = [
+    "--help",
+    "0 to 1",
+    "; up to ",
+    "above zero",
+    "add ",
+    "ask for",
+    "at least",
+    "built in:",
+    "check ",
+    "did you mean",
+    "due",
+    "end of RON",
+    "Expected ",
+    "export it",
+    "finite",
+    "from ",
+    "get it again",
+    "get the file again",
+    "give ",
+    "go up to",
+    "has to",
+    "have to",
+    "known here",
+    "leave it out",
+    "mend ",
+    "move one",
+    "name another",
+    "needs",
+    "put ",
+    "remove ",
+    "takes",
+    "to 256",
+    "with anything in it",
+    "write it as",
 ];
 
 /// What is wrong with the refusals seen, all of them, so that one bad message does not hide the next.
@@ -248,8 +279,8 @@ fn scene_files_with_mistakes() {
         ("(objects: [(shape: Spere(radius: 1))])".to_owned(), ":1:", "did you mean `Sphere`?"),
         ("(objects: [(shape: Sphere(radius: NaN))])".to_owned(), "objects[0]", "above zero"),
         (format!("(camera: (position: (0, 0, 0), target: (0, 0, 0)), {sphere})"), "camera", "move one"),
-        ("(".to_owned(), ":1:", "due"),
-        (String::new(), ":1:", "due"),
+        ("(".to_owned(), ":1:", "end of RON"),
+        (String::new(), ":1:", "Expected opening `(`"),
     ];
     for (text, place, mend) in cases {
         refusals.file("scene.ron", text, 2, &[place, mend]);
@@ -299,9 +330,13 @@ fn results_that_cannot_be_written() {
 #[test]
 fn a_run_that_dies_on_the_way_does_not_look_whole() {
     let mut refusals = Refusals::default();
-    for (name, is_folder) in
-        [("images", false), ("plots", false), ("trace.parquet", true), ("frames.csv", true), ("report.html", true)]
-    {
+    for (name, is_folder) in [
+        ("images", false),
+        ("plots", false),
+        ("trace.parquet", true),
+        ("frames.csv", true),
+        ("report.html", true),
+    ] {
         let inputs = Inputs::new();
         let out = inputs.path("out");
         let arguments = ["run", "tiny", "--out", &out];
@@ -337,7 +372,7 @@ fn block(path: &Path, with_folder: bool) {
 fn a_mistake_in_the_call_leaves_old_results_alone() {
     let mut refusals = Refusals::default();
     let results = quintile!().run("tiny", &[]);
-    let out = results.path("").display().to_string();
+    let out = results.folder().display().to_string();
     let before = results.files();
     let ended = quintile!().call(["run", "tiny", "--samples", "0", "--out", &out]);
     refusals.check(&ended, 2, &["samples"]);
@@ -351,7 +386,8 @@ fn a_mistake_in_the_call_leaves_old_results_alone() {
 fn runs_beyond_all_memory() {
     let mut refusals = Refusals::default();
     let inputs = Inputs::new();
-    let still = inputs.put("still.ron", "(settings: (width: 16, height: 16), objects: [(shape: Sphere(radius: 1))])");
+    let still =
+        inputs.put("still.ron", "(settings: (width: 16, height: 16), objects: [(shape: Sphere(radius: 1))])");
     let cases: [(&[&str], &str); 3] = [
         (&[&still, "--frames", "0..10000000"], "frames"),
         (&[&still, "--size", "16384x16384", "--samples", "256"], "size"),

@@ -61,7 +61,7 @@ fn images_have_the_size_asked_for_and_a_picture_in_them() {
 #[test]
 fn a_shorter_run_leaves_no_images_of_a_longer_one() {
     let results = tiny(&[]);
-    let out = results.path("").display().to_string();
+    let out = results.folder().display().to_string();
     let again = quintile!().call(["run", "tiny", "--frames", "0..1", "--out", &out]);
     assert_eq!(again.code, Some(0), "{}", again.stderr);
     let images: Vec<_> = results.files().into_keys().filter(|path| path.starts_with("images")).collect();
@@ -116,7 +116,9 @@ fn the_summary_says_what_was_run() {
 fn the_report_needs_no_network_and_nothing_beside_it() {
     let results = tiny(&[]);
     let report = results.text("report.html");
-    for tag in ["<link", "<iframe", "<object", "<embed", "@import", "<base", "fetch(", "XMLHttpRequest", "import("] {
+    for tag in
+        ["<link", "<iframe", "<object", "<embed", "@import", "<base", "fetch(", "XMLHttpRequest", "import("]
+    {
         assert!(!report.contains(tag), "{tag}");
     }
     for part in report.split("src=\"").skip(1) {
@@ -124,7 +126,11 @@ fn the_report_needs_no_network_and_nothing_beside_it() {
     }
     for part in report.split("url(").skip(1) {
         let target = part.trim_start_matches(['"', '\'']);
-        assert!(target.starts_with("data:") || target.starts_with('#'), "url({}", &part[..part.len().min(60)]);
+        assert!(
+            target.starts_with("data:") || target.starts_with('#'),
+            "url({}",
+            &part[..part.len().min(60)]
+        );
     }
     assert!(!report.contains("<script src"), "a script of its own file");
 }
@@ -152,7 +158,7 @@ fn json_alone_goes_to_standard_output() {
     let printed: Value = serde_json::from_str(&results.ended.stdout).expect("nothing but JSON");
     assert_eq!(results.ended.stderr, "");
     let mut expected = results.summary();
-    expected["out"] = results.path("").display().to_string().into();
+    expected["out"] = results.folder().display().to_string().into();
     for (key, value) in expected.as_object().into_iter().flatten() {
         assert_eq!(&printed[key], value, "{key}");
     }
@@ -196,7 +202,18 @@ fn help_shows_how_it_is_called() {
     assert!(help.stdout.contains("run") && help.stdout.contains("list"));
     let help = quintile!().call(["run", "--help"]);
     assert_eq!(help.code, Some(0));
-    let flags = ["--out", "--frames", "--samples", "--size", "--lens", "--focus", "--shutter", "--gpu", "--threads", "--json"];
+    let flags = [
+        "--out",
+        "--frames",
+        "--samples",
+        "--size",
+        "--lens",
+        "--focus",
+        "--shutter",
+        "--gpu",
+        "--threads",
+        "--json",
+    ];
     for part in flags.into_iter().chain(["Example:", "[default: out]", "[default: default]"]) {
         assert!(help.stdout.contains(part), "no {part}");
     }

@@ -4,7 +4,8 @@ use tests::{Results, quintile};
 
 fn assert_same(one: &Results, other: &Results, what: &str) {
     let (one, other) = (one.files(), other.files());
-    let names = |files: &std::collections::BTreeMap<_, _>| files.keys().cloned().collect::<Vec<std::path::PathBuf>>();
+    let names =
+        |files: &std::collections::BTreeMap<_, _>| files.keys().cloned().collect::<Vec<std::path::PathBuf>>();
     assert_eq!(names(&one), names(&other), "{what}: other files");
     for (name, bytes) in &one {
         assert!(bytes == &other[name], "{what}: {} differs", name.display());

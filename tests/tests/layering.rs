@@ -50,7 +50,12 @@ fn no_crate_uses_another_against_the_arrows() {
 #[test]
 fn the_arrows_that_the_design_draws_are_there() {
     let arrows = arrows();
-    let drawn = [("workloads", "pipeline"), ("pipeline", "activity"), ("power-model", "activity"), ("power-model", "traces")];
+    let drawn = [
+        ("workloads", "pipeline"),
+        ("pipeline", "activity"),
+        ("power-model", "activity"),
+        ("power-model", "traces"),
+    ];
     let of_sim = ARROWS[5].1.iter().map(|used| ("sim", *used));
     for (name, used) in drawn.into_iter().chain(of_sim) {
         assert!(arrows[name].contains(used), "{name} is to use {used}");
@@ -70,7 +75,9 @@ fn every_crate_takes_the_lints_of_the_workspace() {
 #[test]
 fn only_sim_ends_the_process() {
     let ways = ["process::exit", "process::abort", "ExitCode"];
-    for package in workspace().workspace_packages().into_iter().filter(|package| package.name.as_str() != "sim") {
+    for package in
+        workspace().workspace_packages().into_iter().filter(|package| package.name.as_str() != "sim")
+    {
         let sources = package.manifest_path.as_std_path().with_file_name("src");
         for file in rust_files(&sources) {
             let text = fs::read_to_string(&file).expect("a source file");

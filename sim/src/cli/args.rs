@@ -41,13 +41,13 @@ pub struct RunArgs {
     #[arg(long, value_name = "A..B", value_parser = frames)]
     pub frames: Option<Range<u32>>,
     /// Samples in a pixel, 1 to 256
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub samples: Option<u32>,
     /// Size of the image in pixels
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
     /// Frames in a second of the scene's time, and ticks of the display
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Radius of the lens in scene units, 0 for a pinhole
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
@@ -80,13 +80,13 @@ pub struct RunArgs {
     #[arg(long, value_name = "HZ", default_value_t = 50e3, allow_negative_numbers = true)]
     pub trace_rate: f64,
     /// Seed of samples and noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     pub seed: u64,
     /// Write every frame as EXR, too (linear light)
     #[arg(long)]
     pub exr: bool,
     /// Worker threads; all cores without it. The results do not depend on it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print summary.json to standard output and nothing else
     #[arg(long)]

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use power_model::Bound;
+use serde::Serialize;
 use workloads::Overrides;
 
 use super::Failure;
@@ -10,7 +11,7 @@ use super::args::{BoundArg, PacingArg, RunArgs};
 use crate::output::MeanSd;
 use crate::output::progress::Progress;
 use crate::output::table::{Table, si, si_mean_sd};
-use crate::run::{Outcome, PacingChoice, RunError, RunOptions};
+use crate::run::{Outcome, PacingChoice, RunError, RunOptions, Summary};
 
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
@@ -66,11 +67,17 @@ fn options(args: &RunArgs) -> RunOptions {
 }
 
 /// The summary with the folder it was written to.
+#[derive(Serialize)]
+struct Printed<'a> {
+    out: String,
+    #[serde(flatten)]
+    summary: &'a Summary,
+}
+
 fn print_json(args: &RunArgs, outcome: &Outcome) -> Result<(), Failure> {
     let failed = |error: serde_json::Error| Failure { message: format!("printing JSON: {error}"), code: 1 };
-    let mut summary = serde_json::to_value(&outcome.summary).map_err(failed)?;
-    summary["out"] = args.out.display().to_string().into();
-    println!("{}", serde_json::to_string_pretty(&summary).map_err(failed)?);
+    let printed = Printed { out: args.out.display().to_string(), summary: &outcome.summary };
+    println!("{}", serde_json::to_string_pretty(&printed).map_err(failed)?);
     Ok(())
 }
 

@@ -105,7 +105,7 @@ pub enum GpuError {
         message: String,
     },
     /// No GPU has this name.
-    #[error("no GPU called `{name}`: {suggestion} Or name a .ron file")]
+    #[error("no GPU called `{name}`; {suggestion}; or name a .ron file")]
     Unknown {
         /// What was asked for.
         name: String,

@@ -25,7 +25,9 @@ pub enum OutputError {
         source: io::Error,
     },
     /// A file could not be written.
-    #[error("{path}: cannot write it: {source}")]
+    #[error(
+        "{path}: cannot write it: {source}; make room or check the permissions, or name another folder with --out"
+    )]
     Write {
         /// The file, below the folder as it was named.
         path: String,

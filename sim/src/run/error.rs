@@ -56,6 +56,7 @@ impl RunError {
             Self::Gpu(GpuError::Spec(activity::spec::SpecError::Read { .. })) => false,
             Self::Platform(error) => !is_unreadable(error),
             Self::Table(error) => !is_unreadable(error),
+            Self::Pacing(power_model::PacingError::Rate(_)) => true,
             Self::Gpu(_) | Self::Samples(_) | Self::Device(_) | Self::Model(_) | Self::Setting(_) => true,
             _ => false,
         }

@@ -146,6 +146,10 @@ pub struct FrameRow {
     pub energy_nj_per_pixel: f64,
     /// True mean power in watts.
     pub power_w: f64,
+    /// True energy by part in joules; summed in this order it is the frame's, exactly.
+    pub energy_by_part_j: Energy,
+    /// True energy in joules.
+    pub energy_j: f64,
     /// Energy as measured in the trace, in millijoules, where the frame was found.
     pub measured_energy_mj: Option<f64>,
     /// Error of the found start in seconds.
@@ -288,6 +292,8 @@ fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Fr
                 busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
                 duration_ms: duration_s * 1e3,
                 energy_mj: energy_j * 1e3,
+                energy_by_part_j: paced.energy,
+                energy_j,
                 energy_nj_per_pixel: energy_j * 1e9 / plan.pixels() as f64,
                 power_w: energy_j / duration_s,
                 measured_energy_mj: measured.map(|m| m.energy_j * 1e3),

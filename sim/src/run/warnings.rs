@@ -1,6 +1,6 @@
 //! Regimes in which the methods of a run are known to be bad.
 
-use activity::{Event, Warning};
+use activity::{Counts, Event, Warning};
 use traces::frames::Flag;
 
 use super::{Measurement, Plan, Simulated};
@@ -27,13 +27,18 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
 }
 
 fn degenerate(simulated: &Simulated) -> Option<Warning> {
-    let worst = simulated.distinct.iter().max_by_key(|frame| frame.counts[Event::TrianglesDegenerate])?;
-    let dropped = worst.counts[Event::TrianglesDegenerate];
-    (dropped > 0).then(|| {
-        let (of, frame) = (worst.counts[Event::TrianglesIn], worst.index);
+    let without_area = |counts: &Counts| counts[Event::TrianglesDegenerate] + counts[Event::TrianglesFlat];
+    let worst = simulated.distinct.iter().max_by_key(|frame| without_area(&frame.counts))?;
+    let (dropped, flat) = (worst.counts[Event::TrianglesDegenerate], worst.counts[Event::TrianglesFlat]);
+    (dropped + flat > 0).then(|| {
+        let (all, of, frame) = (dropped + flat, worst.counts[Event::TrianglesIn], worst.index);
         Warning::new(
             "degenerate-triangle",
-            format!("{dropped} of {of} triangles have no area at any time and were dropped (frame {frame})"),
+            format!(
+                "{all} of {of} triangles have no area at any time (frame {frame}): {dropped} with two equal corners were \
+                 dropped, {flat} with their corners on one line were kept, so that closed surfaces stay closed; clean the \
+                 mesh where it was made"
+            ),
         )
     })
 }

@@ -39,6 +39,8 @@ pub struct PacketClock {
     service: Service,
     recorder: Recorder,
     batches: Batches,
+    /// When the last packet so far was done.
+    end_ps: u64,
     /// When each unit lets go of its last packet.
     free_ps: [u64; Unit::COUNT],
     /// When each of the packets last seen by a unit started there, at most as many as its queue is deep.
@@ -52,6 +54,7 @@ impl PacketClock {
             service: Service::new(gpu),
             recorder,
             batches: Batches::new(gpu.pipeline.batch_triangles),
+            end_ps: 0,
             free_ps: [0; Unit::COUNT],
             starts_ps: std::array::from_fn(|_| VecDeque::new()),
         }
@@ -84,6 +87,11 @@ impl PacketClock {
             self.free_ps[unit as usize] = leave;
             arrive = leave + self.service.latency_ps(unit);
         }
+        if count == 0 {
+            // Lines that leave the caches at the end of a frame pass through no unit but memory.
+            arrive = self.reserve_memory(packet, arrive.max(self.end_ps));
+        }
+        self.end_ps = self.end_ps.max(arrive);
         self.batches.finished(packet, arrive);
     }
 
@@ -241,6 +249,18 @@ mod tests {
         // 6.4 MB at 32 bytes a cycle of 2.5 ns.
         let (duration, at_least) = (clock.finish().duration_ps, 500_000_000);
         assert!((at_least..at_least + 200_000).contains(&duration), "{duration}");
+    }
+
+    #[test]
+    fn a_packet_that_touches_memory_alone_is_not_lost() {
+        let mut clock = clock(4);
+        clock.push(&tile(3, 0));
+        let mut last = Packet::new(PacketKind::Resolve, 0, 0, u32::MAX);
+        last.counts[Event::L2Writes] = 10;
+        last.counts[Event::DramWriteBytes] = 640;
+        clock.push(&last);
+        let total = clock.finish().total();
+        assert_eq!((total[Event::L2Writes], total[Event::DramWriteBytes]), (10, 640));
     }
 
     #[test]

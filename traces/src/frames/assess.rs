@@ -116,7 +116,7 @@ fn only_marks(found: &Found) -> Option<Warning> {
 
 fn weak_separation(found: &Found) -> Option<Warning> {
     let threshold = &found.threshold;
-    let split = matches!(threshold.rule, Rule::Otsu | Rule::OtsuRegular);
+    let split = matches!(threshold.rule, Rule::Otsu | Rule::OtsuRegular | Rule::OtsuDistinct);
     (split && threshold.clarity() < 1.0).then(|| {
         Warning::new("weak-separation", format!(
             "frame starts and other minima are not distinct (separation {:.2}, clear above {DISTINCT}; {:.0} % evenly \

@@ -106,7 +106,9 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let noise_w2 = 2.0 * placement.samples as f64 * noise_variance(&power);
     let background_w2 = median(profile.iter().copied(), profile.len());
     let threshold =
-        choose(&distances, background_w2, noise_w2, |value_w2| evenness(&candidates, &placement, value_w2));
+        choose(&distances, background_w2, noise_w2, misalignment_w2(&power, &placement), |value_w2| {
+            evenness(&candidates, &placement, value_w2)
+        });
 
     let mut starts = marked_starts(&placement, &profile);
     let view = View { trace, power: &power, placement: &placement, threshold: &threshold };
@@ -180,6 +182,14 @@ fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<FrameStart> {
         marked: true,
     };
     placement.marks.iter().map(start).collect()
+}
+
+/// The largest distance of a marked window to itself half a sample on, W^2, in between taken to be linear.
+fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
+    let windows = placement.marks.iter().map(|mark| &power[mark.first..mark.first + placement.samples]);
+    let half_steps =
+        windows.map(|window| window.windows(2).map(|pair| 0.25 * (pair[1] - pair[0]).powi(2)).sum());
+    half_steps.fold(0.0, f64::max)
 }
 
 /// Variance of the sensor noise, W^2, from the median step between neighbours: `median |p[i+1] - p[i]|` is

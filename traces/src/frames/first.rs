@@ -7,6 +7,8 @@ use super::refine::align;
 
 /// How far before the first found start, in median distances of starts, the first frame may begin.
 const REACH_BACK: f64 = 1.6;
+/// A match leaves less than this share of what tells the template from steady power.
+const ALIKE: f64 = 0.5;
 
 impl View<'_> {
     /// One more start before the first one found, matched only by what follows the mark, with the threshold (and the
@@ -26,7 +28,8 @@ impl View<'_> {
             let offset = align(self.power, template, from + near, REACH) - (mark.first + lead(mark)) as f64;
             let time_s = mark.mark_s + offset * self.trace.period_s();
             let inside = near > 0 && near + 1 < profile.len();
-            (inside && distance_w2 < self.threshold.value_w2).then_some((time_s, distance_w2))
+            let stands_out = distance < ALIKE * self.contrast_w2(mark.first, lead(mark), template);
+            (inside && stands_out && distance_w2 < self.threshold.value_w2).then_some((time_s, distance_w2))
         });
         let (time_s, distance_w2) = found.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(FrameStart {
@@ -35,6 +38,16 @@ impl View<'_> {
             confidence: confidence(distance_w2, self.threshold),
             marked: false,
         })
+    }
+
+    /// How much what follows the mark differs from the steady power before it, W^2: where that is nothing, idle alone
+    /// resembles it. Unbounded where the window has nothing before the mark.
+    fn contrast_w2(&self, first: usize, lead: usize, template: &[f64]) -> f64 {
+        if lead == 0 {
+            return f64::INFINITY;
+        }
+        let before = self.power[first..first + lead].iter().sum::<f64>() / lead as f64;
+        template.iter().map(|power| (power - before) * (power - before)).sum()
     }
 }
 

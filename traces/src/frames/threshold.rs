@@ -1,6 +1,6 @@
 //! Which minima are frame starts: a threshold taken from the minima themselves, with its reason as data.
 
-use super::split::{Split, moments, otsu_tree};
+use super::split::{Moments, Split, moments, otsu_tree};
 use serde::Serialize;
 
 /// Excess distances below this share of the background are not told apart: how well a good match matches says nothing.
@@ -14,12 +14,19 @@ pub(super) const DISTINCT: f64 = 2.0;
 const EVEN: f64 = 0.8;
 /// A match leaves less than this share of the background's excess distance.
 const ALIKE: f64 = 0.5;
+/// From this many matches on their spacing says more than their likeness, which clock steps and new content lessen.
+const MANY: usize = 8;
+/// Least deviation of logarithms within a population when its distinctness is judged.
+const REPEATS: f64 = 0.15;
 /// How often sides are split again.
 const DEPTH: usize = 3;
 /// How much more regular a further split must make the spacing to be preferred to the first one.
 const MORE_REGULAR: f64 = 0.05;
 /// A single population this far below the background consists of matches.
 const FAR_BELOW: f64 = 0.1;
+/// Where they are few and not evenly spaced, matches have to leave less than this share of the background: a steady
+/// stretch within a frame is nearer to a busy window than idle is, and resembles it all the same.
+const SURELY_ALIKE: f64 = 0.2;
 
 /// How the threshold was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -30,6 +37,9 @@ pub enum Rule {
     /// Of the splits of these two sides, and of theirs, the one that makes the starts most evenly spaced: minima can form
     /// more than two populations (starts, look-alikes within the frame, idle).
     OtsuRegular,
+    /// Of the same splits, the one whose sides are most distinct: with few frames the spacing says little, and matches
+    /// among many other minima are too few to sway Otsu's criterion.
+    OtsuDistinct,
     /// The minima form one population far below the background: all are frame starts.
     AllAlike,
     /// No minimum is distinctly below the background: only the marks are kept.
@@ -65,6 +75,8 @@ pub struct Threshold {
     pub background_w2: f64,
     /// What sensor noise leaves of a perfect match, W^2: `2 m sigma^2`, or the lowest minimum if that is less.
     pub noise_w2: f64,
+    /// What a match half a sample off leaves, W^2: starts fall between samples, and steep edges make that count.
+    pub alignment_w2: f64,
     /// Difference of the populations' mean logarithms over the sum of their standard deviations; above 2 is clear.
     pub separation: f64,
     /// Share of the trace, from the first to the last minimum, that the starts divide evenly (gaps of 0.6 to 1.6 median
@@ -80,21 +92,24 @@ impl Threshold {
 
     /// The part of a distance that noise does not explain, W^2; at least what can be told apart.
     pub(super) fn excess_w2(&self, distance_w2: f64) -> f64 {
-        let floor_w2 = (FLOOR * self.background_w2).max(NOISE_SPREAD * self.noise_w2).max(f64::MIN_POSITIVE);
+        let floor_w2 = (FLOOR * self.background_w2).max(NOISE_SPREAD * self.noise_w2);
+        let floor_w2 =
+            floor_w2.max(self.alignment_w2.min(FAR_BELOW * self.background_w2)).max(f64::MIN_POSITIVE);
         (distance_w2 - self.noise_w2).max(floor_w2)
     }
 }
 
 /// Chooses the threshold. `distances` are those of the spaced minima, the marks left out; `background_w2` is the
 /// median distance over all offsets, `noise_w2` what the trace's noise is estimated to leave of a perfect match,
-/// `regularity` how evenly (0 to 1) the starts below a threshold are spaced.
+/// `alignment_w2` what half a sample of misalignment does, `regularity` how evenly (0 to 1) the starts below a threshold are spaced.
 pub(super) fn choose(
     distances: &[f64],
     background_w2: f64,
     noise_w2: f64,
+    alignment_w2: f64,
     regularity: impl Fn(f64) -> f64,
 ) -> Threshold {
-    let none = nothing(distances, background_w2, noise_w2);
+    let none = Threshold { alignment_w2, ..nothing(distances, background_w2, noise_w2) };
     let mut logs: Vec<f64> =
         distances.iter().map(|&distance_w2| libm::log(none.excess_w2(distance_w2))).collect();
     logs.sort_by(f64::total_cmp);
@@ -104,10 +119,19 @@ pub(super) fn choose(
     // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by that.
     // The first split stands on Otsu's criterion alone and is spared.
     let alike = |split: &Split| between(split) - none.noise_w2 < ALIKE * none.background_w2;
-    let best = most_regular(&splits, alike, |split| regularity(between(split)));
+    let regular = most_regular(&splits, alike, |split| regularity(between(split)));
+    let even =
+        splits.get(regular).is_some_and(|split| split.count >= MANY || regularity(between(split)) >= EVEN);
+    let surely = |split: &Split| libm::exp(split.low.mean) < SURELY_ALIKE * none.background_w2;
+    let best = if even { regular } else { most_distinct(&splits, regular, surely) };
     let chosen = match (splits.get(best), logs.last()) {
+        (Some(split), _) if !even && best == regular && !surely(split) => none_alike(&logs, none),
         (Some(split), _) => {
-            let rule = if best == 0 { Rule::Otsu } else { Rule::OtsuRegular };
+            let rule = match best {
+                0 => Rule::Otsu,
+                _ if best == regular => Rule::OtsuRegular,
+                _ => Rule::OtsuDistinct,
+            };
             judge(split, &logs, Threshold { value_w2: between(split), rule, ..none })
         }
         (None, Some(&log)) if libm::exp(log) < FAR_BELOW * none.background_w2 => all_alike(&logs, none),
@@ -128,6 +152,7 @@ fn nothing(distances: &[f64], background_w2: f64, noise_w2: f64) -> Threshold {
         rest: Population::default(),
         background_w2: (background_w2 - noise_w2).max(0.0),
         noise_w2,
+        alignment_w2: 0.0,
         separation: 0.0,
         regularity: 0.0,
     }
@@ -149,10 +174,33 @@ fn most_regular(
     best.0
 }
 
+/// The split `otherwise`, unless it is not distinct and another eligible one is, more than any else.
+fn most_distinct(splits: &[Split], otherwise: usize, eligible: impl Fn(&Split) -> bool) -> usize {
+    let mut best = (otherwise, splits.get(otherwise).map_or(0.0, distinctness).max(DISTINCT));
+    for (index, split) in splits.iter().enumerate().filter(|(_, split)| eligible(split)) {
+        if distinctness(split) > best.1 {
+            best = (index, distinctness(split));
+        }
+    }
+    best.0
+}
+
+/// The separation of two sides whose distances vary by some share at least, so that frames that repeat to the last bit do not
+/// come apart by where they fall between samples.
+fn distinctness(split: &Split) -> f64 {
+    let deviation = |side: &Moments| side.deviation.max(REPEATS);
+    ratio(split.high.mean - split.low.mean, deviation(&split.low) + deviation(&split.high))
+}
+
+/// Difference of the mean logarithms of the two sides over the sum of their standard deviations.
+fn separation(split: &Split) -> f64 {
+    ratio(split.high.mean - split.low.mean, split.low.deviation + split.high.deviation)
+}
+
 /// Whether a split tells matches from the rest.
 fn judge(split: &Split, logs: &[f64], chosen: Threshold) -> Threshold {
     let [matched_w2, rest_w2] = [split.low.mean, split.high.mean].map(libm::exp);
-    let separation = ratio(split.high.mean - split.low.mean, split.low.deviation + split.high.deviation);
+    let separation = separation(split);
     if chosen.rule == Rule::Otsu && separation < DISTINCT && rest_w2 < FAR_BELOW * chosen.background_w2 {
         return all_alike(logs, chosen);
     }
@@ -199,21 +247,46 @@ mod tests {
     fn two_clear_populations_are_split_between_them() {
         let distances: Vec<f64> =
             (0..20).map(|i| 0.5 + 0.01 * f64::from(i)).chain((0..90).map(|i| 50.0 + f64::from(i))).collect();
-        let threshold = choose(&distances, 100.0, 0.4, |_| 1.0);
+        let threshold = choose(&distances, 100.0, 0.4, 0.0, |_| 1.0);
         assert_eq!((threshold.rule, threshold.matched.count, threshold.rest.count), (Rule::Otsu, 20, 90));
         assert!(threshold.value_w2 > 0.7 && threshold.value_w2 < 50.0 && threshold.separation > 5.0);
     }
 
     #[test]
+    fn a_few_matches_are_told_from_look_alikes_by_distance() {
+        // A run of four equal frames: three matches, and in each frame a stretch that resembles the marked window a little.
+        let rest = (0..65).map(|i| 145.0 + 8.0 * f64::from(i));
+        let distances: Vec<f64> = [6.27, 7.25, 7.28, 143.4, 143.4, 144.0].into_iter().chain(rest).collect();
+        let threshold = choose(&distances, 713.0, 0.003, 5.0, |_| 0.07);
+        assert_eq!((threshold.rule, threshold.matched.count), (Rule::OtsuDistinct, 3));
+    }
+
+    #[test]
+    fn a_lone_frame_resembles_nothing_else() {
+        // One frame in a trace of idle: two stretches within it are nearer to its start than idle is.
+        let distances: Vec<f64> =
+            [121.9, 127.2].into_iter().chain((0..66).map(|i| 342.0 + 0.02 * f64::from(i))).collect();
+        assert_eq!(choose(&distances, 343.0, 0.002, 5.0, |_| 0.0).rule, Rule::NoneAlike);
+    }
+
+    #[test]
+    fn frames_that_repeat_to_the_last_bit_stay_together() {
+        // Starts fall on thirds of a sample, so matches come in two groups of equal distances.
+        let distances: Vec<f64> =
+            [6.27, 7.25, 7.28, 6.27, 7.25].into_iter().chain((0..60).map(|i| 400.0 + f64::from(i))).collect();
+        assert_eq!(choose(&distances, 713.0, 0.003, 5.0, |_| 0.1).matched.count, 5);
+    }
+
+    #[test]
     fn one_low_population_is_all_frames_and_one_high_population_is_none() {
         let spread = |centre: f64| (0..50).map(move |i| centre * (1.0 + 0.01 * f64::from(i)));
-        let low = choose(&spread(1.0).collect::<Vec<_>>(), 100.0, 0.5, |_| 1.0);
+        let low = choose(&spread(1.0).collect::<Vec<_>>(), 100.0, 0.5, 0.0, |_| 1.0);
         assert_eq!((low.rule, low.matched.count), (Rule::AllAlike, 50));
         assert!(low.value_w2 > 1.5);
-        let high = choose(&spread(80.0).collect::<Vec<_>>(), 100.0, 0.5, |_| 1.0);
+        let high = choose(&spread(80.0).collect::<Vec<_>>(), 100.0, 0.5, 0.0, |_| 1.0);
         assert_eq!((high.rule, high.value_w2), (Rule::NoneAlike, 0.0));
-        assert_eq!(choose(&[], 100.0, 0.5, |_| 1.0).rule, Rule::NoCandidates);
-        assert_eq!(choose(&[1.0, 1.0], 100.0, 0.5, |_| 1.0).rule, Rule::AllAlike);
-        assert_eq!(choose(&[99.0, 99.0], 100.0, 0.5, |_| 1.0).rule, Rule::NoneAlike);
+        assert_eq!(choose(&[], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::NoCandidates);
+        assert_eq!(choose(&[1.0, 1.0], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::AllAlike);
+        assert_eq!(choose(&[99.0, 99.0], 100.0, 0.5, 0.0, |_| 1.0).rule, Rule::NoneAlike);
     }
 }

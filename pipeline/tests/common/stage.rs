@@ -1,0 +1,66 @@
+//! A camera, a table and an image to draw on.
+
+use glam::Vec3;
+use pipeline::frame::visibility;
+use pipeline::sampling::Sample;
+use pipeline::*;
+
+use super::{Flat, QUAD, looks, pixel_camera, spec};
+
+pub const RED: Flat = Flat(Vec3::new(1.0, 0.0, 0.0));
+pub const BLUE: Flat = Flat(Vec3::new(0.0, 0.0, 1.0));
+pub const NEAR: f32 = 0.25;
+
+pub struct Stage {
+    pub viewport: Viewport,
+    pub table: SampleTable,
+    pub camera: Camera,
+}
+
+impl Stage {
+    pub fn new(width: u32, height: u32, table: SampleTable) -> Self {
+        let viewport = Viewport::new(width, height).unwrap();
+        Self { viewport, table, camera: pixel_camera(viewport, NEAR) }
+    }
+
+    /// With the default table.
+    pub fn sampled(width: u32, height: u32, per_pixel: u32) -> Self {
+        Self::new(width, height, SampleTable::low_discrepancy(per_pixel, 1, LensShape::Disk).unwrap())
+    }
+
+    pub fn draw(&self, draws: &[Draw<'_>]) -> Vec<Vec3> {
+        let spec = spec(Features::ALL);
+        let settings =
+            Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
+        render(&self.camera, draws, &settings, |_| ()).unwrap().image
+    }
+
+    /// For each sample its pixel, itself, the triangle it sees and its depth.
+    pub fn see(&self, draws: &[Draw<'_>]) -> Vec<([u32; 2], Sample, u32, f32)> {
+        let spec = spec(Features::ALL);
+        let settings =
+            Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
+        let seen = visibility(&self.camera, draws, &settings).unwrap();
+        let looks = looks(&self.table, self.viewport, spec.tile_px);
+        assert_eq!(seen.len(), looks.len());
+        looks.into_iter().zip(seen).map(|((px, s), (id, depth))| (px, s, id, f32::from_bits(depth))).collect()
+    }
+
+    pub fn pixel(&self, image: &[Vec3], x: u32, y: u32) -> Vec3 {
+        image[(y * self.viewport.width() + x) as usize]
+    }
+
+    /// Position of a sample in pixels from the centre of the image, `y` upwards.
+    pub fn at(&self, px: [u32; 2], s: &Sample) -> [f32; 2] {
+        let half = [self.viewport.width(), self.viewport.height()].map(|side| 0.5 * side as f32);
+        [px[0] as f32 + s.x - half[0], half[1] - (px[1] as f32 + s.y)]
+    }
+}
+
+pub fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {
+    Draw { geometry: Geometry::new(open, close, &QUAD).unwrap(), shader, cull: Cull::None }
+}
+
+pub fn still<'a>(corners: &'a [Vec3], shader: &'a Flat) -> Draw<'a> {
+    quad(corners, corners, shader)
+}

@@ -1,0 +1,284 @@
+//! Every coded warning that a run can be brought to give is given: in `summary.json`, on the terminal and in the report.
+//! A list of all codes, read from the sources, keeps this complete.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use serde_json::json;
+use tests::{Glb, Inputs, Results, quintile, root};
+
+/// Codes that no test here brings about, and why.
+const NOT_PROVOKED: [(&str, &str); 1] = [(
+    "clipped-samples",
+    "the recorder of a run is chosen so that its range holds the peak; only a recorder set by hand could clip",
+)];
+
+/// Codes brought about by the tests below.
+const PROVOKED: [&str; 21] = [
+    "alpha-ignored",
+    "camera-ignored",
+    "degenerate-triangle",
+    "empty-frame",
+    "few-samples",
+    "focus-of-fitted-camera",
+    "frames-missed",
+    "irregular-spacing",
+    "lens-leaves-view",
+    "light-ignored",
+    "missing-image",
+    "missing-texcoord",
+    "missed-vsync",
+    "obj-materials-ignored",
+    "only-mark",
+    "primitive-dropped",
+    "short-frame",
+    "vertex-colors-ignored",
+    "weak-separation",
+    "window-cut",
+    "window-longer-than-frame",
+];
+
+/// Asserts that the run warns with `code` in all three places, in the same words.
+fn assert_warns(results: &Results, code: &str) {
+    assert!(PROVOKED.contains(&code), "{code} is missing in the list");
+    let summary = results.summary();
+    let mut warnings = summary["warnings"].as_array().into_iter().flatten();
+    let warning = warnings.find(|warning| warning["code"] == code);
+    let warning = warning.unwrap_or_else(|| panic!("no {code} in {:?}", results.warning_codes()));
+    let message = warning["message"].as_str().unwrap_or_default();
+    assert!(message.len() > 20, "{code} says too little: {message}");
+    let line = format!("warning: [{code}] {message}");
+    assert!(results.ended.stdout.lines().any(|printed| printed == line), "{}", results.ended.stdout);
+    let report = results.text("report.html");
+    assert!(report.contains(code), "{code} is not in the report");
+    let word = message.split_whitespace().max_by_key(|word| word.len()).unwrap_or_default();
+    assert!(report.contains(escaped(word).as_str()), "`{word}` of {code} is not in the report");
+}
+
+/// Text as the report has it.
+fn escaped(text: &str) -> String {
+    let pairs =
+        [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;"), ('\'', "&#x27;"), ('/', "&#x2f;")];
+    let escape = |letter: char| {
+        pairs
+            .iter()
+            .find(|(raw, _)| *raw == letter)
+            .map_or(letter.to_string(), |(_, text)| (*text).to_owned())
+    };
+    text.chars().map(escape).collect()
+}
+
+fn run_file(name: &str, bytes: impl AsRef<[u8]>, args: &[&str]) -> Results {
+    let inputs = Inputs::new();
+    let small = ["--size", "48x32", "--frames", "0..2", "--samples", "2"];
+    quintile!().run(&inputs.put(name, bytes), &[&small, args].concat())
+}
+
+const SPHERE: &str = "(shape: Sphere(radius: 1, segments: 12))";
+
+#[test]
+fn frames_too_short_for_the_recorder() {
+    let results = quintile!().run("tiny", &[]);
+    assert_warns(&results, "short-frame");
+}
+
+#[test]
+fn frames_that_are_not_found() {
+    let results = quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20"]);
+    assert_warns(&results, "frames-missed");
+    assert_warns(&results, "few-samples");
+}
+
+/// A torus that is there for some frames and far away for the others; `keys` say when.
+fn flashing(frames: u32, keys: &str) -> String {
+    format!(
+        "(settings: (width: 320, height: 180, samples: 16, frames: (0, {frames}), shutter: 0), \
+         camera: (position: (0, 0, 5), target: (0, 0, 0)), \
+         objects: [(shape: Sphere(radius: 0.02, segments: 8)), \
+         (shape: Torus(ring: 1, tube: 0.5, segments: 256), interpolation: Step, repeat: true, keyframes: [{keys}])])"
+    )
+}
+
+#[test]
+fn a_marked_frame_like_no_other() {
+    let once = "(time_s: 0, position: (0, 0, 99)), (time_s: 0.0666, position: (0, 0, 0)), \
+                (time_s: 0.0832, position: (0, 0, 99)), (time_s: 9, position: (0, 0, 99))";
+    let inputs = Inputs::new();
+    let results = quintile!().run(&inputs.put("once.ron", flashing(9, once)), &[]);
+    assert_warns(&results, "only-mark");
+    assert_warns(&results, "frames-missed");
+}
+
+#[test]
+fn starts_of_frames_no_longer_than_a_sample() {
+    let results = quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20"]);
+    assert_warns(&results, "irregular-spacing");
+}
+
+/// Whether chance makes starts and noise look alike depends on the frames' length: one of these has to be such a case.
+#[test]
+fn starts_that_drown_in_noise() {
+    let runs = [("0..1", "100"), ("0..3", "200"), ("0..12", "200"), ("0..3", "300"), ("0..20", "500")];
+    let run = |(frames, rate)| quintile!().run("tiny", &["--frames", frames, "--trace-rate", rate]);
+    let found =
+        runs.into_iter().map(run).find(|run| run.warning_codes().contains(&"weak-separation".to_owned()));
+    assert_warns(&found.expect("no run of these warns of weak separation"), "weak-separation");
+}
+
+/// Frames that grow from almost nothing, free-running: the window is as long as the rate of the recorder allows, and
+/// longer than most of them.
+#[test]
+fn a_window_longer_than_most_frames() {
+    let zoom = "(settings: (width: 320, height: 180, samples: 16, frames: (0, 24)), \
+                camera: (position: (0, 0, 25), target: (0, 0, 0), end_position: (0, 0, 2)), \
+                objects: [(shape: Torus(ring: 1, tube: 0.5, segments: 128))])";
+    let inputs = Inputs::new();
+    let args = ["--pacing", "free", "--trace-rate", "2000"];
+    let results = quintile!().run(&inputs.put("zoom.ron", zoom), &args);
+    assert_warns(&results, "window-longer-than-frame");
+}
+
+#[test]
+fn frames_longer_than_the_display_waits() {
+    let results = quintile!().run("tiny", &["--rate", "100000"]);
+    assert_warns(&results, "missed-vsync");
+}
+
+#[test]
+fn a_triangle_without_area() {
+    let flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\nf 1 2 4\n";
+    assert_warns(&run_file("flat.obj", flat, &[]), "degenerate-triangle");
+}
+
+#[test]
+fn a_camera_that_sees_nothing() {
+    let away = format!("(camera: (position: (0, 0, 5), target: (0, 0, 9)), objects: [{SPHERE}])");
+    assert_warns(&run_file("away.ron", away, &[]), "empty-frame");
+}
+
+#[test]
+fn images_that_are_not_there() {
+    let object = "(shape: Plane(size: 2), material: (texture: Image(file: \"gone.png\")))";
+    assert_warns(&run_file("a.ron", format!("(objects: [{object}])"), &[]), "missing-image");
+    let mut glb = Glb::square();
+    glb.texture_coordinates();
+    glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    glb.json["textures"] = json!([{"source": 0}]);
+    glb.json["images"] = json!([{"uri": "gone.png"}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "missing-image");
+}
+
+#[test]
+fn materials_that_are_not_drawn_as_they_ask() {
+    let mut glb = Glb::square();
+    glb.material(json!({"alphaMode": "BLEND"}));
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "alpha-ignored");
+    let mut glb = Glb::square();
+    let colors = glb.floats(&[1.0; 12], 3);
+    glb.primitive()["attributes"]["COLOR_0"] = json!(colors);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "vertex-colors-ignored");
+    let mut glb = Glb::square();
+    glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    glb.json["textures"] = json!([{"source": 0}]);
+    glb.json["images"] = json!([{"uri": format!("data:image/png;base64,{PIXEL}")}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "missing-texcoord");
+    let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    let inputs = Inputs::new();
+    inputs.put("a.mtl", "newmtl red\nKd 1 0 0\n");
+    let scene = inputs.put("a.obj", obj);
+    let results = quintile!().run(&scene, &["--size", "32x32", "--frames", "0..1"]);
+    assert_warns(&results, "obj-materials-ignored");
+}
+
+/// A PNG of one grey pixel.
+const PIXEL: &str =
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNoAAAAggCBd81ytgAAAABJRU5ErkJggg==";
+
+#[test]
+fn parts_of_a_gltf_scene_that_are_left_out() {
+    let mut glb = Glb::square();
+    let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
+    glb.json["meshes"][0]["primitives"] = json!([glb.json["meshes"][0]["primitives"][0], points]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "primitive-dropped");
+    let mut glb = Glb::square();
+    let lens = json!({"xmag": 1.0, "ymag": 1.0, "zfar": 10.0, "znear": 0.1});
+    glb.json["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
+    glb.json["nodes"] = json!([{"mesh": 0, "children": [1]}, {"camera": 0, "translation": [0.5, 0.5, 3.0]}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "camera-ignored");
+    let mut glb = Glb::square();
+    glb.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    glb.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point"}]}});
+    let lamp = json!({"extensions": {"KHR_lights_punctual": {"light": 0}}});
+    glb.json["nodes"] = json!([{"mesh": 0, "children": [1]}, lamp]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "light-ignored");
+}
+
+#[test]
+fn a_lens_for_a_camera_placed_by_itself() {
+    let focus = format!("(settings: (lens_radius: 0.1, focus: 3), objects: [{SPHERE}])");
+    assert_warns(&run_file("a.ron", focus, &[]), "focus-of-fitted-camera");
+    let wide = format!("(objects: [{SPHERE}])");
+    assert_warns(&run_file("a.ron", wide, &["--lens", "1", "--focus", "1"]), "lens-leaves-view");
+}
+
+/// The reference platform with less time recorded before the first frame and after the last.
+fn without_margins(inputs: &Inputs) -> String {
+    let path = root().join("power-model/platforms/reference.ron");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let short = text
+        .replace("lead_in_s: Assumed(0.25", "lead_in_s: Assumed(0")
+        .replace("tail_s: Assumed(0.25", "tail_s: Assumed(0");
+    assert_ne!(text, short, "the platform has other margins now");
+    inputs.put("short.ron", short)
+}
+
+#[test]
+fn a_mark_at_the_edge_of_the_recording() {
+    let inputs = Inputs::new();
+    let platform = without_margins(&inputs);
+    let args = ["--size", "160x90", "--frames", "0..1", "--platform", &platform];
+    assert_warns(&quintile!().run("default", &args), "window-cut");
+}
+
+/// Every code in the sources is in one of the two lists here and in the book, and no code here is made up.
+#[test]
+fn every_code_is_accounted_for() {
+    let mut found = BTreeSet::new();
+    for folder in ["pipeline", "pipeline/activity", "workloads", "power-model", "traces", "sim"] {
+        collect_codes(&root().join(folder).join("src"), &mut found);
+    }
+    let listed = PROVOKED.into_iter().chain(NOT_PROVOKED.map(|(code, _)| code));
+    let listed: BTreeSet<String> = listed.map(str::to_owned).collect();
+    assert_eq!(found, listed);
+    let chapter =
+        fs::read_to_string(root().join("docs/warnings.md")).expect("the book's chapter on warnings");
+    let unexplained: Vec<_> = found.iter().filter(|code| !chapter.contains(&format!("`{code}`"))).collect();
+    assert!(unexplained.is_empty(), "the book does not explain {unexplained:?}");
+}
+
+/// The codes that stand in `Warning::new("code"`, or in a constant of the same file that stands there.
+fn collect_codes(folder: &Path, codes: &mut BTreeSet<String>) {
+    for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.expect("an entry of a source folder").path();
+        if path.is_dir() {
+            collect_codes(&path, codes);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(&path).expect("a source file");
+            let product = text.split("#[cfg(test)]").next().unwrap_or_default();
+            let made = product.split("Warning::new(").skip(1);
+            codes.extend(made.filter_map(|rest| code_of(rest.trim_start(), product)));
+        }
+    }
+}
+
+fn code_of(argument: &str, file: &str) -> Option<String> {
+    let quoted = |text: &str| text.split('"').nth(1).map(str::to_owned);
+    if argument.starts_with('"') {
+        return quoted(argument);
+    }
+    let name = argument.split(',').next()?;
+    let constant = format!("const {name}: &str =");
+    let (_, rest) = file.split_once(&constant)?;
+    quoted(rest)
+}

@@ -1,0 +1,68 @@
+//! Reading packed little-endian files without trusting their lengths.
+
+use std::path::Path;
+
+use crate::error::{LoadError, Source};
+
+/// A file being read from its start.
+pub(super) struct Bytes<'a> {
+    source: Source<'a>,
+    data: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Bytes<'a> {
+    /// The bytes of a file that starts with `magic`.
+    pub fn new(path: &'a Path, data: &'a [u8], magic: &[u8; 8]) -> Result<Self, LoadError> {
+        let mut bytes = Self { source: Source { path }, data, at: 0 };
+        if bytes.take::<8>()? != *magic {
+            let name = String::from_utf8_lossy(&magic[..7]).into_owned();
+            return Err(bytes.wrong(format!("it does not start with `{name}`; is it another kind of file?")));
+        }
+        Ok(bytes)
+    }
+
+    /// The next `N` bytes.
+    pub fn take<const N: usize>(&mut self) -> Result<[u8; N], LoadError> {
+        let found = self.data.get(self.at..).and_then(|rest| rest.first_chunk());
+        let found = found
+            .ok_or_else(|| self.wrong("the file ends here; it is truncated, copy it again".to_owned()))?;
+        self.at += N;
+        Ok(*found)
+    }
+
+    pub fn u32(&mut self) -> Result<u32, LoadError> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self) -> Result<u64, LoadError> {
+        self.take().map(u64::from_le_bytes)
+    }
+
+    pub fn f64(&mut self) -> Result<f64, LoadError> {
+        self.take().map(f64::from_le_bytes)
+    }
+
+    /// The next number, which has to be finite.
+    pub fn f32(&mut self) -> Result<f32, LoadError> {
+        let value = self.take().map(f32::from_le_bytes)?;
+        if value.is_finite() { Ok(value) } else { Err(self.wrong(format!("{value} is not a finite number"))) }
+    }
+
+    /// That `count` records of `size` bytes and nothing else follow.
+    pub fn expect_records(&self, count: u64, size: u64) -> Result<(), LoadError> {
+        let left = (self.data.len() - self.at) as u64;
+        match count.checked_mul(size) {
+            Some(needed) if needed == left => Ok(()),
+            _ => {
+                Err(self
+                    .wrong(format!("{count} records of {size} bytes are announced, but {left} bytes follow")))
+            }
+        }
+    }
+
+    /// What is wrong at the place reached.
+    pub fn wrong(&self, message: String) -> LoadError {
+        self.source.broken(format!("byte {}", self.at), message)
+    }
+}

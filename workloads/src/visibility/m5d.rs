@@ -1,0 +1,144 @@
+//! `.m5d`: moving triangles with their camera.
+
+use std::path::Path;
+
+use glam::{Affine3A, Vec3};
+use pipeline::sampling::HashedSamples;
+use pipeline::{Camera, Lens, LensShape, Viewport};
+
+use super::bytes::Bytes;
+use crate::error::{LoadError, Source};
+
+/// Moving triangles in camera space (x right, y up, z forward) with the camera and sampling they are to be seen by.
+#[derive(Clone, Debug)]
+pub struct M5d {
+    /// Size of the image.
+    pub viewport: Viewport,
+    /// Samples in each pixel.
+    pub per_pixel: u32,
+    /// Seed of hashed samples.
+    pub seed: u64,
+    /// The camera, a pinhole where the lens radius is zero.
+    pub camera: Camera,
+    /// Shape of the aperture.
+    pub shape: LensShape,
+    /// Corners when the shutter opens, three for each triangle.
+    pub open: Vec<Vec3>,
+    /// Corners when it closes.
+    pub close: Vec<Vec3>,
+    /// The corners of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+const TRIANGLE_BYTES: u64 = 18 * 4;
+
+impl M5d {
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read, is truncated, or holds values that make no camera or image.
+    pub fn load(path: &Path) -> Result<Self, LoadError> {
+        let data = Source { path }.read()?;
+        Self::parse(path, &data)
+    }
+
+    /// Reads `data`; `path` names it in messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(path: &Path, data: &[u8]) -> Result<Self, LoadError> {
+        let mut bytes = Bytes::new(path, data, b"M5DSCN1\0")?;
+        let triangles = bytes.u32()?;
+        let _flags = bytes.u32()?;
+        let (width, height, per_pixel, shape) = (bytes.u32()?, bytes.u32()?, bytes.u32()?, bytes.u32()?);
+        let seed = bytes.u64()?;
+        let [_vertical_fov, tan_half, radius, focus, near] =
+            [bytes.f64()?, bytes.f64()?, bytes.f64()?, bytes.f64()?, bytes.f64()?];
+        let viewport = Viewport::new(width, height)
+            .ok_or_else(|| bytes.wrong(format!("{width}x{height}: each side has to be 1 to 16384 pixels")))?;
+        let shape = match shape {
+            0 => LensShape::Disk,
+            1 => LensShape::Square,
+            other => {
+                return Err(bytes.wrong(format!("lens shape {other}; it is 0 for a disk or 1 for a square")));
+            }
+        };
+        let camera = camera([tan_half, radius, focus, near]).map_err(|message| bytes.wrong(message))?;
+        bytes.expect_records(u64::from(triangles), TRIANGLE_BYTES)?;
+        let (mut open, mut close) = (Vec::new(), Vec::new());
+        for _ in 0..triangles {
+            for corners in [&mut open, &mut close] {
+                for _ in 0..3 {
+                    corners.push(Vec3::new(bytes.f32()?, bytes.f32()?, bytes.f32()?));
+                }
+            }
+        }
+        let triangles = (0..triangles).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        Ok(Self { viewport, per_pixel, seed, camera, shape, open, close, triangles })
+    }
+
+    /// The hashed samples that the file names, or `None` when their number is out of range.
+    pub fn hashed_samples(&self) -> Option<HashedSamples> {
+        HashedSamples::new(self.seed, self.viewport.width(), self.per_pixel, self.shape)
+    }
+}
+
+fn camera([tan_half, radius, focus, near]: [f64; 4]) -> Result<Camera, String> {
+    let camera =
+        Camera::new(Affine3A::IDENTITY, tan_half as f32, near as f32).map_err(|error| error.to_string())?;
+    if radius == 0.0 {
+        return Ok(camera);
+    }
+    let lens = Lens::new(radius as f32, focus as f32).map_err(|error| error.to_string())?;
+    Ok(camera.with_lens(Some(lens)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file() -> Vec<u8> {
+        let mut data = b"M5DSCN1\0".to_vec();
+        for word in [1_u32, 0, 64, 48, 4, 0] {
+            data.extend(word.to_le_bytes());
+        }
+        data.extend(7_u64.to_le_bytes());
+        for number in [60.0_f64, 0.577, 0.25, 8.0, 0.1] {
+            data.extend(number.to_le_bytes());
+        }
+        for corner in 0..18 {
+            data.extend((corner as f32).to_le_bytes());
+        }
+        data
+    }
+
+    fn message(data: &[u8]) -> String {
+        M5d::parse(Path::new("a.m5d"), data).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_file_is_read_as_written() {
+        let scene = M5d::parse(Path::new("a.m5d"), &file()).unwrap();
+        assert_eq!(
+            (scene.viewport.width(), scene.viewport.height(), scene.per_pixel, scene.seed),
+            (64, 48, 4, 7)
+        );
+        assert_eq!(scene.open[2], Vec3::new(6.0, 7.0, 8.0));
+        assert_eq!(scene.close[0], Vec3::new(9.0, 10.0, 11.0));
+        assert!(scene.camera.lens().is_some());
+    }
+
+    #[test]
+    fn broken_files_say_where() {
+        let good = file();
+        assert!(message(&good[..40]).contains("truncated"));
+        assert!(message(&good[..good.len() - 4]).contains("68 bytes follow"));
+        assert!(message(b"M5DSMP1\0").contains("M5DSCN1"));
+        let mut huge = good.clone();
+        huge[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert!(message(&huge).contains("announced"));
+        let mut nan = good.clone();
+        nan[80..84].copy_from_slice(&f32::NAN.to_le_bytes());
+        assert!(message(&nan).contains("byte 84"), "{}", message(&nan));
+    }
+}

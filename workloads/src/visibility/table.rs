@@ -1,0 +1,103 @@
+//! Sample tables in files.
+
+use std::path::Path;
+
+use pipeline::sampling::{Sample, SampleSource};
+
+use super::bytes::Bytes;
+use crate::error::{LoadError, Source};
+
+/// A table of samples for a block of pixels of any size, tiled over the image.
+#[derive(Clone, Debug)]
+pub struct FixedSamples {
+    width: u32,
+    height: u32,
+    per_pixel: u32,
+    samples: Vec<Sample>,
+}
+
+const SAMPLE_BYTES: u64 = 5 * 4;
+
+impl FixedSamples {
+    /// Reads the table at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read, is truncated, or holds samples out of range.
+    pub fn load(path: &Path) -> Result<Self, LoadError> {
+        let data = Source { path }.read()?;
+        Self::parse(path, &data)
+    }
+
+    /// Reads `data`; `path` names it in messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(path: &Path, data: &[u8]) -> Result<Self, LoadError> {
+        let mut bytes = Bytes::new(path, data, b"M5DSMP1\0")?;
+        let (width, height, per_pixel, _) = (bytes.u32()?, bytes.u32()?, bytes.u32()?, bytes.u32()?);
+        if width == 0 || height == 0 || !(1..=256).contains(&per_pixel) {
+            return Err(bytes.wrong(format!(
+                "{width}x{height} pixels of {per_pixel} samples; sides start at 1, and a pixel takes 1 to 256"
+            )));
+        }
+        let count = u64::from(width) * u64::from(height) * u64::from(per_pixel);
+        bytes.expect_records(count, SAMPLE_BYTES)?;
+        let mut samples = Vec::new();
+        for index in 0..count {
+            let sample = Sample {
+                x: bytes.f32()?,
+                y: bytes.f32()?,
+                u: bytes.f32()?,
+                v: bytes.f32()?,
+                t: bytes.f32()?,
+            };
+            if !sample.is_in_range() {
+                return Err(bytes.wrong(format!(
+                    "sample {index} lies outside [0, 1) in x, y or t, or outside [-1, 1] on the lens"
+                )));
+            }
+            samples.push(sample);
+        }
+        Ok(Self { width, height, per_pixel, samples })
+    }
+}
+
+impl SampleSource for FixedSamples {
+    fn per_pixel(&self) -> u32 {
+        self.per_pixel
+    }
+
+    fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]) {
+        let place = (py % self.height) as usize * self.width as usize + (px % self.width) as usize;
+        let first = place * self.per_pixel as usize;
+        into.copy_from_slice(&self.samples[first..first + self.per_pixel as usize]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(x: f32) -> Vec<u8> {
+        let mut data = b"M5DSMP1\0".to_vec();
+        [2_u32, 1, 1, 0].iter().for_each(|word| data.extend(word.to_le_bytes()));
+        for number in [0.25, 0.5, -1.0, 1.0, 0.0, x, 0.5, 0.0, 0.0, 0.75] {
+            data.extend((number as f32).to_le_bytes());
+        }
+        data
+    }
+
+    #[test]
+    fn a_table_is_tiled_over_the_image() {
+        let table = FixedSamples::parse(Path::new("a.smp"), &file(0.125)).unwrap();
+        let mut found = [Sample::default()];
+        table.pixel_into(7, 9, &mut found);
+        assert_eq!(found[0], Sample { x: 0.125, y: 0.5, u: 0.0, v: 0.0, t: 0.75 });
+    }
+
+    #[test]
+    fn a_sample_out_of_range_is_named() {
+        let error = FixedSamples::parse(Path::new("a.smp"), &file(1.0)).unwrap_err().to_string();
+        assert!(error.contains("a.smp") && error.contains("sample 1"), "{error}");
+    }
+}
