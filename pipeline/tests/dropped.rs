@@ -53,7 +53,7 @@ fn set_up_drops_nothing_seen_close_to_the_camera_plane() {
     let mut r = Uniform::new(3);
     let table = SampleTable::low_discrepancy(4, 1, LensShape::Disk).unwrap();
     let mut dropped = 0;
-    for _ in 0..8_000 {
+    for _ in 0..12_000 {
         let depth = libm::exp2f(r.within(-14.0, 0.0));
         let probe = Probe::new(&table, Viewport::new(8, 8).unwrap(), Shear::default(), [0, 0], 0.5 * depth);
         let look = probe.at((r.next() * probe.samples.len as f32) as usize);

@@ -5,10 +5,10 @@
 //! all of them give the same bytes.
 
 use std::ops::Range;
-use std::sync::LazyLock;
 
 use super::exact;
 use super::lanes::{LANES, View, any, block_of, lanes};
+use super::width::{Vectors, Width};
 use crate::sampling::TileSamples;
 use crate::setup::Triangle;
 use crate::traversal::{Box5, Screen};
@@ -68,38 +68,21 @@ pub fn test_screened(
     target: &mut Target<'_>,
     hits: &mut Hits,
 ) {
-    let run = if triangle.moving { samples.between(within.t[0], within.t[1]) } else { 0..samples.len };
-    let mut job = Job { triangle, samples, within, screen, near, target, hits };
-    match (triangle.moving, within.lens) {
-        (false, false) => job.dispatch::<false, false>(run),
-        (true, false) => job.dispatch::<true, false>(run),
-        (false, true) => job.dispatch::<false, true>(run),
-        (true, true) => job.dispatch::<true, true>(run),
-    }
+    Job { triangle, samples, within, screen, near, target, hits, width: Width::widest() }.start();
 }
 
-/// The widest vector instructions of this machine that the kernel is compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Width {
-    Plain,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
+/// The same as [`test_run`] with vectors of a given width, to show that all give the same bytes.
+pub fn test_run_at(
+    width: Width,
+    triangle: &Triangle,
+    samples: &TileSamples,
+    within: &Box5,
+    near: f32,
+    target: &mut Target<'_>,
+    hits: &mut Hits,
+) {
+    Job { triangle, samples, within, screen: None, near, target, hits, width }.start();
 }
-
-static WIDTH: LazyLock<Width> = LazyLock::new(|| {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            return Width::Avx512;
-        }
-        if is_x86_feature_detected!("avx2") {
-            return Width::Avx2;
-        }
-    }
-    Width::Plain
-});
 
 struct Job<'a, 'b> {
     triangle: &'a Triangle,
@@ -109,6 +92,7 @@ struct Job<'a, 'b> {
     near: f32,
     target: &'a mut Target<'b>,
     hits: &'a mut Hits,
+    width: Width,
 }
 
 /// What one block of lanes found: bit masks by lane, and the depth of each.
@@ -120,14 +104,28 @@ struct Block {
 }
 
 impl Job<'_, '_> {
+    fn start(&mut self) {
+        let run = if self.triangle.moving {
+            self.samples.between(self.within.t[0], self.within.t[1])
+        } else {
+            0..self.samples.len
+        };
+        match (self.triangle.moving, self.within.lens) {
+            (false, false) => self.dispatch::<false, false>(run),
+            (true, false) => self.dispatch::<true, false>(run),
+            (false, true) => self.dispatch::<false, true>(run),
+            (true, true) => self.dispatch::<true, true>(run),
+        }
+    }
+
     fn dispatch<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
-        match *WIDTH {
-            Width::Plain => self.run::<MOTION, LENS>(run),
-            // SAFETY: `WIDTH` names a width only where the machine has it.
+        match self.width.0 {
+            Vectors::Plain => self.run::<MOTION, LENS>(run),
+            // SAFETY: a `Width` other than the plain one exists only where the machine has it.
             #[cfg(target_arch = "x86_64")]
-            Width::Avx2 => unsafe { self.run_avx2::<MOTION, LENS>(run) },
+            Vectors::Avx2 => unsafe { self.run_avx2::<MOTION, LENS>(run) },
             #[cfg(target_arch = "x86_64")]
-            Width::Avx512 => unsafe { self.run_avx512::<MOTION, LENS>(run) },
+            Vectors::Avx512 => unsafe { self.run_avx512::<MOTION, LENS>(run) },
         }
     }
 

@@ -21,6 +21,8 @@ pub mod exact;
 mod kernel;
 mod lanes;
 mod madds;
+mod width;
 
-pub use kernel::{Hits, Target, test_run, test_screened};
+pub use kernel::{Hits, Target, test_run, test_run_at, test_screened};
 pub use madds::madds;
+pub use width::Width;

@@ -7,6 +7,7 @@
 mod checks;
 mod error;
 mod facts;
+mod limits;
 mod measure;
 mod modelled;
 mod options;

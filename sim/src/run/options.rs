@@ -7,6 +7,7 @@ use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
 use workloads::{Overrides, Scene};
 
 use super::RunError;
+use super::limits::Size;
 use crate::gpu::GpuSpec;
 
 /// When the next frame starts.
@@ -99,15 +100,24 @@ impl Plan {
         let settings = scene.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
-        let samples = SampleTable::low_discrepancy(settings.samples, options.seed, LensShape::Disk)?;
-        let gpu = GpuSpec::load(&options.gpu)?;
-        let platform = file_or_name(&options.platform, Platform::load, Platform::builtin)?;
-        let table = file_or_name(&options.energy, EnergyTable::load, EnergyTable::builtin)?;
-        let model = PowerModel::at(&table, &platform, options.bound)?;
         let pacing = match options.pacing {
             PacingChoice::Vsync => Pacing::vsync(settings.frame_rate_hz)?,
             PacingChoice::Free => Pacing::FreeRunning,
         };
+        let platform = file_or_name(&options.platform, Platform::load, Platform::builtin)?;
+        Size {
+            pixels: viewport.pixels() as u64,
+            samples: settings.samples,
+            frames: settings.frames.end - settings.frames.start,
+            pacing,
+            trace_rate_hz: options.trace_rate_hz,
+            idle_s: platform.lead_in_s.value() + platform.tail_s.value(),
+        }
+        .check()?;
+        let samples = SampleTable::low_discrepancy(settings.samples, options.seed, LensShape::Disk)?;
+        let gpu = GpuSpec::load(&options.gpu)?;
+        let table = file_or_name(&options.energy, EnergyTable::load, EnergyTable::builtin)?;
+        let model = PowerModel::at(&table, &platform, options.bound)?;
         Ok(Self { scene, viewport, samples, gpu, platform, table, model, pacing, options })
     }
 

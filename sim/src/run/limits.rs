@@ -1,0 +1,83 @@
+//! How large a run may be, checked before any of it is made.
+
+use super::RunError;
+use power_model::Pacing;
+
+/// Bytes of memory that the samples of one image may take.
+const SAMPLE_BYTES_LIMIT: u64 = 8 << 30;
+/// Bytes of one stored sample: its depth, its triangle, and what is logged and resolved of it.
+const BYTES_PER_SAMPLE: u64 = 16;
+/// Samples of the trace.
+const TRACE_LIMIT: f64 = 1e8;
+/// Frames of one run.
+const FRAMES_LIMIT: u32 = 100_000;
+
+/// What decides the size of a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    pub pixels: u64,
+    pub samples: u32,
+    pub frames: u32,
+    pub pacing: Pacing,
+    pub trace_rate_hz: f64,
+    pub idle_s: f64,
+}
+
+impl Size {
+    /// Refuses what would not fit.
+    pub fn check(&self) -> Result<(), RunError> {
+        let refuse = |message| Err(RunError::Setting(message));
+        let bytes = self.pixels * u64::from(self.samples) * BYTES_PER_SAMPLE;
+        if bytes > SAMPLE_BYTES_LIMIT {
+            let (needed, limit) = (bytes >> 30, SAMPLE_BYTES_LIMIT >> 30);
+            return refuse(format!(
+                "size and samples: {} pixels of {} samples take {needed} GiB, more than {limit} GiB; ask for fewer",
+                self.pixels, self.samples
+            ));
+        }
+        if self.frames > FRAMES_LIMIT {
+            return refuse(format!(
+                "frames: {} in one run; at most {FRAMES_LIMIT}, ask for fewer",
+                self.frames
+            ));
+        }
+        let Pacing::Vsync { rate } = self.pacing else { return Ok(()) };
+        let length_s = f64::from(self.frames) / rate.value() + self.idle_s;
+        let trace = length_s * self.trace_rate_hz;
+        if trace > TRACE_LIMIT {
+            return refuse(format!(
+                "trace rate: {length_s:.0} s at {} samples a second are {trace:.1e} samples, more than {TRACE_LIMIT:.0e}; ask \
+                 for fewer frames, a lower --trace-rate or a higher --rate",
+                self.trace_rate_hz
+            ));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size() -> Size {
+        let pacing = Pacing::vsync(60.0).unwrap();
+        Size { pixels: 921_600, samples: 8, frames: 36, pacing, trace_rate_hz: 50e3, idle_s: 0.5 }
+    }
+
+    fn message(size: Size) -> String {
+        size.check().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn ordinary_runs_fit() {
+        assert!(size().check().is_ok());
+        assert!(Size { pixels: 3840 * 2160, samples: 64, frames: 3000, ..size() }.check().is_ok());
+    }
+
+    #[test]
+    fn what_does_not_fit_says_what_to_change() {
+        assert!(message(Size { pixels: 1 << 28, samples: 256, ..size() }).contains("ask for fewer"));
+        assert!(message(Size { frames: 10_000_000, ..size() }).contains("at most 100000"));
+        assert!(message(Size { trace_rate_hz: 1e7, frames: 6000, ..size() }).contains("--trace-rate"));
+    }
+}
