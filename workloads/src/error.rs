@@ -1,5 +1,6 @@
 //! Why a scene could not be loaded.
 
+use std::io;
 use std::path::Path;
 
 use activity::spec::SpecError;
@@ -40,12 +41,12 @@ pub enum LoadError {
         message: String,
     },
     /// A file that cannot be read at all.
-    #[error("{file}: cannot read it: {source}")]
+    #[error("{file}: cannot read it: {source}; {}", mend(.source))]
     Read {
         /// The file.
         file: String,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// A file whose contents are broken or not supported.
     #[error("{file}: {place}: {message}")]
@@ -59,6 +60,18 @@ pub enum LoadError {
     },
 }
 
+/// What to do about a file that cannot be read.
+fn mend(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "check the path",
+        io::ErrorKind::IsADirectory => {
+            "it is a folder: give the path of a .ron, .gltf, .glb, .ply or .obj file in it"
+        }
+        io::ErrorKind::PermissionDenied => "give yourself the right to read it",
+        _ => "check the path and what it leads to",
+    }
+}
+
 impl LoadError {
     /// Whether the mistake is the caller's (an unknown scene name, a bad setting, a bad RON scene): exit code
     /// 2. The others (files that are missing, unreadable, truncated, corrupt or not supported) are exit
@@ -68,6 +81,16 @@ impl LoadError {
             Self::Unknown { .. } | Self::Setting { .. } | Self::Description { .. } => true,
             Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
             Self::Read { .. } | Self::Broken { .. } => false,
+        }
+    }
+}
+
+impl LoadError {
+    /// The same error of a scene that may have a name of its own, told of the file it came from.
+    pub(crate) fn in_file(self, path: &str) -> Self {
+        match self {
+            Self::Broken { place, message, .. } => Self::Broken { file: path.to_owned(), place, message },
+            error => error,
         }
     }
 }
@@ -84,7 +107,7 @@ impl Source<'_> {
         LoadError::Broken { file, place: place.into(), message: message.into() }
     }
 
-    pub fn unreadable(self, source: std::io::Error) -> LoadError {
+    pub fn unreadable(self, source: io::Error) -> LoadError {
         LoadError::Read { file: self.path.display().to_string(), source }
     }
 

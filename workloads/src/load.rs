@@ -19,7 +19,8 @@ pub fn load(name_or_path: &str) -> Result<Scene, LoadError> {
         return scene;
     }
     match import::Format::of(Path::new(name_or_path)) {
-        Some(format) => Scene::new(import::import(Path::new(name_or_path), format)?),
+        Some(format) => Scene::new(import::import(Path::new(name_or_path), format)?)
+            .map_err(|error| error.in_file(name_or_path)),
         None => Err(unknown(name_or_path)),
     }
 }

@@ -54,8 +54,8 @@ pub fn render(
     Ok(Rendered { image: resolve::resolve(&pass, &bins), counts })
 }
 
-/// The triangle each sample sees (`u32::MAX` for none) and the bits of its depth, for tests and comparisons: tile by tile
-/// in rows, the samples of a tile by time.
+/// The triangle each sample sees (`u32::MAX` for none) and the bits of its depth (infinite for none), in the order
+/// `(y width + x) per_pixel + index`.
 ///
 /// # Errors
 /// When a cache of the settings cannot be built.

@@ -29,21 +29,20 @@ pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec3> {
     image
 }
 
-/// The triangle each sample sees and the bits of its depth, tile by tile in rows.
+/// The triangle each sample sees and the bits of its depth, pixel by pixel in rows.
 pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
-    let per_pixel = pass.settings.samples.per_pixel();
-    let mut tiles: Vec<_> =
-        bins.iter().flat_map(|bin| bin.inside(pass).zip(std::iter::repeat(bin))).collect();
-    tiles.sort_by_key(|((number, ..), _)| *number);
-    let mut seen = Vec::new();
-    for ((_, place, pixels, _), bin) in tiles {
-        match &bin.tiles[place] {
-            Some(tile) => {
-                seen.extend(tile.triangle.iter().copied().zip(tile.depth.iter().map(|d| d.to_bits())))
-            }
-            None => {
-                let samples = (pixels.count_ones() * per_pixel) as usize;
-                seen.extend(std::iter::repeat_n((DepthTile::NOTHING, f32::INFINITY.to_bits()), samples));
+    let (viewport, per_pixel) = (pass.settings.viewport, pass.settings.samples.per_pixel());
+    let mut seen =
+        vec![(DepthTile::NOTHING, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel as usize];
+    let mut samples = TileSamples::default();
+    for bin in bins {
+        for (place, tile) in bin.tiles.iter().enumerate() {
+            let Some(tile) = tile else { continue };
+            let (origin, side) = (bin.tile_origin(pass, place), pass.settings.spec.tile_px);
+            samples.fill(pass.settings.samples, viewport, &pass.projection.shear, origin, side);
+            for slot in 0..samples.len {
+                let index = samples.in_image(slot, origin, side, viewport, per_pixel);
+                seen[index] = (tile.triangle[slot], tile.depth[slot].to_bits());
             }
         }
     }

@@ -108,9 +108,20 @@ impl TileSamples {
         self.order.sort_by_key(|&index| self.gathered[index as usize].t.to_bits());
     }
 
-    /// The pixel in the tile (row by row) times `per_pixel` plus the index in the pixel of the sample in `slot`.
-    pub fn index(&self, slot: usize) -> u32 {
-        u32::from(self.order[slot])
+    /// The place in the whole image of the sample in `slot` of the tile of `side_px` pixels whose first pixel is
+    /// `(px, py)`: `(y width + x) per_pixel + index`.
+    pub fn in_image(
+        &self,
+        slot: usize,
+        [px, py]: [u32; 2],
+        side_px: u32,
+        viewport: Viewport,
+        per_pixel: u32,
+    ) -> usize {
+        let index = u32::from(self.order[slot]);
+        let (pixel, sample) = (index / per_pixel, index % per_pixel);
+        let [x, y] = [px + pixel % side_px, py + pixel / side_px].map(|c| c as usize);
+        (y * viewport.width() as usize + x) * per_pixel as usize + sample as usize
     }
 
     fn resize(&mut self, padded: usize) {

@@ -152,7 +152,7 @@ pub fn camera(lens: bool) -> Camera {
     camera.with_lens(lens.then(|| Lens::new(0.3, 6.0).unwrap()))
 }
 
-/// For every pixel and sample, in table order: triangle (`u32::MAX` for none) and depth, from all triangles against all
+/// For every pixel and sample, pixel by pixel in rows: triangle (`u32::MAX` for none) and depth, from all triangles against all
 /// samples.
 pub fn brute_force(
     soup: &Soup,
@@ -174,7 +174,8 @@ pub fn brute_force(
     };
     let vertex =
         |i: u32| MovingVertex { open: image(soup.open[i as usize]), close: image(soup.close[i as usize]) };
-    let mut seen = Vec::new();
+    let per_pixel = table.per_pixel() as usize;
+    let mut seen = vec![(u32::MAX, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel];
     let mut samples = TileSamples::default();
     for py in (0..viewport.height()).step_by(8) {
         for px in (0..viewport.width()).step_by(8) {
@@ -195,7 +196,10 @@ pub fn brute_force(
                 let mut target = Target { depth: &mut depth, triangle: &mut triangle };
                 test_run(&ready, &samples, &within, 0.25, &mut target, &mut Hits::default());
             }
-            seen.extend(depth.into_iter().zip(triangle).map(|(d, t)| (t, d.to_bits())));
+            for slot in 0..samples.len {
+                let index = samples.in_image(slot, [px, py], 8, viewport, table.per_pixel());
+                seen[index] = (triangle[slot], depth[slot].to_bits());
+            }
         }
     }
     seen

@@ -119,21 +119,8 @@ pub fn repeated(per_pixel: u32, block: &[Sample]) -> SampleTable {
     SampleTable::programmed(per_pixel, 0, samples).unwrap()
 }
 
-/// The samples of an image in the order of [`visibility`](pipeline::frame::visibility): pixel and sample, tile by tile in
-/// rows, those of a tile by time.
-pub fn looks(table: &SampleTable, viewport: Viewport, tile_px: u32) -> Vec<([u32; 2], Sample)> {
-    let mut all = Vec::new();
-    for y0 in (0..viewport.height()).step_by(tile_px as usize) {
-        for x0 in (0..viewport.width()).step_by(tile_px as usize) {
-            let mut tile = Vec::new();
-            for y in y0..(y0 + tile_px).min(viewport.height()) {
-                for x in x0..(x0 + tile_px).min(viewport.width()) {
-                    tile.extend(table.pixel(x, y).iter().map(|&sample| ([x, y], sample)));
-                }
-            }
-            tile.sort_by(|a, b| a.1.t.total_cmp(&b.1.t));
-            all.extend(tile);
-        }
-    }
-    all
+/// The samples of an image in the order of [`visibility`](pipeline::frame::visibility): pixel by pixel in rows.
+pub fn looks(table: &SampleTable, viewport: Viewport) -> Vec<([u32; 2], Sample)> {
+    let pixels = (0..viewport.height()).flat_map(|y| (0..viewport.width()).map(move |x| [x, y]));
+    pixels.flat_map(|[x, y]| table.pixel(x, y).iter().map(move |&sample| ([x, y], sample))).collect()
 }

@@ -41,7 +41,7 @@ impl Stage {
         let settings =
             Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
         let seen = visibility(&self.camera, draws, &settings).unwrap();
-        let looks = looks(&self.table, self.viewport, spec.tile_px);
+        let looks = looks(&self.table, self.viewport);
         assert_eq!(seen.len(), looks.len());
         looks.into_iter().zip(seen).map(|((px, s), (id, depth))| (px, s, id, f32::from_bits(depth))).collect()
     }

@@ -7,6 +7,7 @@ mod ply;
 mod reader;
 mod ron;
 mod soup;
+mod statements;
 
 use std::path::Path;
 

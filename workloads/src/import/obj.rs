@@ -1,5 +1,6 @@
 //! OBJ files: positions, normals, texture coordinates and polygons. Materials are not read.
 
+use std::io::BufReader;
 use std::path::Path;
 
 use activity::Warning;
@@ -8,12 +9,13 @@ use tobj::{LoadOptions, Mesh};
 
 use super::reader;
 use super::soup::Soup;
+use super::statements::Statements;
 use crate::error::{LoadError, Source};
 
 /// Reads the OBJ file at `path`, gzipped or not.
 pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let source = Source { path };
-    let mut input = reader::open(path)?;
+    let mut input = BufReader::new(Statements::new(reader::open(path)?));
     // Points and lines are no surfaces; every other face becomes a fan.
     let options =
         LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
@@ -27,7 +29,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     for model in &models {
         append(&mut soup, &model.mesh, normals, uvs);
     }
-    if models.iter().any(|model| model.mesh.material_id.is_some()) {
+    if input.get_ref().names_materials() {
         let message =
             format!("{}: the materials of OBJ files are not read; the object's own is used", path.display());
         soup.warnings.push(Warning::new("obj-materials-ignored", message));

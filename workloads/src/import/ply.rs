@@ -11,6 +11,9 @@ use super::reader;
 use super::soup::Soup;
 use crate::error::{LoadError, Source};
 
+/// What to do about a header that cannot be used.
+const MEND: &str = "export it again as a PLY file of vertices and faces";
+
 /// Most elements of one kind: a header that asks for more is broken.
 const MOST: usize = 100_000_000;
 
@@ -86,7 +89,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let mut input = Reader::new(reader::open(path)?);
     let header = Parser::<Skipped>::new().read_header(&mut input);
     let header = header
-        .map_err(|error| source.broken("header", format!("not a PLY file: {}", in_one_line(&error))))?;
+        .map_err(|error| source.broken("header", format!("not a PLY file: {}; {MEND}", in_one_line(&error))))?;
     check(&header).map_err(|message| source.broken("header", message))?;
     let mut soup = Soup::default();
     for element in header.elements.values() {
@@ -137,22 +140,22 @@ fn take_vertices(soup: &mut Soup, element: &ElementDef, vertices: Vec<Vertex>) {
 
 fn check(header: &Header) -> Result<(), String> {
     let element = |name: &str| {
-        let missing = || format!("it has no element `{name}`: the file holds no triangles");
+        let missing = || format!("it has no element `{name}`: the file holds no triangles; {MEND}");
         header.elements.get(name).ok_or_else(missing)
     };
     let vertex = element("vertex")?;
     if let Some(missing) = ["x", "y", "z"].iter().find(|name| !vertex.properties.contains_key(**name)) {
-        return Err(format!("its vertices have no property `{missing}`"));
+        return Err(format!("its vertices have no property `{missing}`; {MEND}"));
     }
     if !element("face")?.properties.values().any(|property| is_corners(&property.name)) {
-        return Err("its faces have no property `vertex_indices`".to_owned());
+        return Err(format!("its faces have no property `vertex_indices`; {MEND}"));
     }
     for element in header.elements.values() {
         if element.count > MOST {
             return Err(format!("{} {} elements; up to {MOST} are taken", element.count, element.name));
         }
         if element.properties.values().next().is_none() && element.count > 0 {
-            return Err(format!("element `{}` has no properties", element.name));
+            return Err(format!("element `{}` has no properties; {MEND}", element.name));
         }
     }
     Ok(())

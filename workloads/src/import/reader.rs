@@ -1,7 +1,7 @@
 //! Opening files that may be gzipped, with a limit on what a small file can unpack to.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
@@ -17,7 +17,7 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn BufRead>, LoadError> {
     let file = File::open(path).map_err(|error| source.unreadable(error))?;
     // Opening a folder succeeds on Unix; only reading it fails.
     if file.metadata().is_ok_and(|data| data.is_dir()) {
-        return Err(source.unreadable(std::io::Error::other("it is a folder")));
+        return Err(source.unreadable(ErrorKind::IsADirectory.into()));
     }
     let zipped = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
     Ok(if zipped {

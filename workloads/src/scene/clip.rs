@@ -35,7 +35,7 @@ pub(crate) fn find(clips: &[Clip], wanted: &str) -> Result<usize, LoadError> {
     by_name.or_else(by_number).ok_or_else(|| {
         let names: Vec<&str> = clips.iter().map(|clip| clip.name.as_str()).collect();
         let known = if names.is_empty() {
-            "the scene has no animation clips".to_owned()
+            "the scene has no animation clips; leave it out".to_owned()
         } else {
             activity::spec::suggestion(wanted, &names)
         };

@@ -13,6 +13,15 @@ use super::camera::Stand;
 /// The part of the image's half width and half height that a fitted scene fills.
 const FILL: f64 = 0.92;
 
+/// Steps back that are tried for a lens.
+const STEPS: u32 = 64;
+
+/// How much more room than is left a lens may need: well within what [`FILL`] leaves over.
+const SLACK: f64 = 1.001;
+
+/// How many times as far as for a pinhole a camera may stand to hold a lens: farther away a scene is a dot.
+const FARTHEST: f64 = 32.0;
+
 /// From the scene towards the camera: the front (glTF's +z), a little to the right and above.
 const TOWARD_EYE: DVec3 = DVec3::new(0.55, 0.42, 1.0);
 
@@ -64,23 +73,30 @@ impl Extent {
     }
 
     /// The nearest camera that sees all points; `lens` is its radius and, where given, its focus depth.
-    /// `None` without points.
+    /// `None` without points. Where the lens is so large that not all of them stay in view from all over it, or
+    /// only as a dot, the camera stands where a pinhole's would.
     pub fn fit(&self, lens: Option<(f64, Option<f64>)>) -> Option<Fit> {
         if !(self.low.is_finite() && self.high.is_finite()) {
             return None;
         }
         let mut fit = self.place(0.0);
         let Some((radius, focus)) = lens else { return Some(fit) };
+        let pinhole = fit;
         let mut room = 0.0;
-        for _ in 0..64 {
+        for _ in 0..STEPS {
             let needed = self.blur(&fit, radius, focus);
-            if needed <= room {
+            if needed <= SLACK * room {
                 return Some(fit);
             }
             room = needed;
             fit = self.place(room);
+            // A step back spreads what lies beyond a fixed focus depth further, and never catches up where
+            // the lens is wider than the view at that depth.
+            if fit.focus > FARTHEST * pinhole.focus {
+                break;
+            }
         }
-        Some(Fit { holds_lens: false, ..fit })
+        Some(Fit { holds_lens: false, ..pinhole })
     }
 
     /// How far the lens moves any point across the view, in scene units.

@@ -51,7 +51,7 @@ pub struct FrameMesh {
 pub enum FrameError {
     /// A vertex leaves the range of numbers.
     #[error(
-        "frame {frame}: mesh `{mesh}`: the position of vertex {vertex} is not finite: a transform or an animation overflows"
+        "frame {frame}: mesh `{mesh}`: the position of vertex {vertex} is not finite, because a transform or an animation overflows: mend its scale or its keys"
     )]
     NotFinite {
         /// The frame.

@@ -95,7 +95,7 @@ impl Scene {
     fn check_size(&self) -> Result<(), LoadError> {
         let (vertices, triangles) = (self.graph.vertex_count(), self.graph.triangle_count());
         if triangles == 0 {
-            return Err(self.broken("it has no triangles: there is nothing to draw"));
+            return Err(self.broken("it has no triangles, so there is nothing to draw: name another file, or export it with its surfaces as triangles"));
         }
         if vertices > MOST || triangles > MOST {
             let message =
@@ -189,7 +189,7 @@ impl Scene {
         let [open_at, _, close_at] = self.instants(interval.frame);
         let ends = [(&interval.open, open_at), (&interval.close, close_at)];
         let [Some(open), Some(close)] = ends.map(|(pose, at)| self.camera.stand(pose, at)) else {
-            let message = "it looks nowhere: position and target coincide, or are not finite".to_owned();
+            let message = "it looks nowhere, because position and target coincide or are not finite: move one of them".to_owned();
             return Err(FrameError::Camera { frame: interval.frame, message });
         };
         let subject = self.camera.subject_depth(&open, open_at, self.centre);

@@ -82,7 +82,7 @@ mod tests {
         let mut data = b"M5DSMP1\0".to_vec();
         [2_u32, 1, 1, 0].iter().for_each(|word| data.extend(word.to_le_bytes()));
         for number in [0.25, 0.5, -1.0, 1.0, 0.0, x, 0.5, 0.0, 0.0, 0.75] {
-            data.extend((number as f32).to_le_bytes());
+            data.extend(number.to_le_bytes());
         }
         data
     }

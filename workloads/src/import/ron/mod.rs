@@ -15,6 +15,10 @@ use spec::{CameraSpec, LightSpec, SceneSpec, SettingsSpec};
 
 /// Reads the scene at `path`.
 pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
+    // A folder is told from a file that is no text: what to do about it is not the same.
+    if path.is_dir() {
+        return Err(Source { path }.unreadable(std::io::ErrorKind::IsADirectory.into()));
+    }
     let spec: SceneSpec = activity::spec::load(path)?;
     build(spec, path)
 }
@@ -93,7 +97,7 @@ fn vector(context: Context, place: &str, value: [f64; 3]) -> Result<DVec3, LoadE
     if value.is_finite() {
         Ok(value)
     } else {
-        Err(context.wrong(place, "it has a value that is NaN or infinite"))
+        Err(context.wrong(place, "it has a value that is NaN or infinite: give three finite numbers"))
     }
 }
 
