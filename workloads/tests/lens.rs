@@ -117,7 +117,6 @@ fn something_is_seen_through_a_very_large_lens() {
         (0.3, Some(1.0)),
     ] {
         let hit = pixels_hit(&sphere(optics));
-        println!("{optics:?}: {hit}");
         assert!(hit > 50, "{optics:?}: {hit} pixels");
     }
 }

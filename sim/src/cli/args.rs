@@ -19,6 +19,8 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene, time it, turn it into watts, record a trace and find the energy of every frame in it
     Run(Box<RunArgs>),
+    /// Find the triangle each sample sees and its depth, to be held against another program sample by sample
+    Visibility(VisibilityArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
     List(ListArgs),
 }
@@ -89,6 +91,29 @@ pub struct RunArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print summary.json to standard output and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `visibility`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n\n\
+    The layouts of .m5d, of sample tables, of the hashed samples and of the result are those of\n\
+    shared/peers/embree5d/README.md.")]
+pub struct VisibilityArgs {
+    /// Moving triangles with their camera, a .m5d file
+    #[arg(value_name = "FILE")]
+    pub scene: String,
+    /// `hash` (of the seed in the file), `table` (the built-in one) or a sample table in a file
+    #[arg(long, value_name = "SAMPLES", default_value = "hash")]
+    pub samples: String,
+    /// File for the triangle and depth of every sample
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Worker threads; all cores without it. The results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print what was found as one line of JSON
     #[arg(long)]
     pub json: bool,
 }

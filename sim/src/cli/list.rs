@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::Failure;
 use super::args::ListArgs;
+use super::terminal::{print, print_json};
 use crate::gpu::GpuSpec;
 
 /// Everything that can be named, each with a line that says what it is.
@@ -32,10 +33,7 @@ impl Entry {
 pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
     let listing = listing();
     if args.json {
-        let failed =
-            |error: serde_json::Error| Failure { message: format!("printing JSON: {error}"), code: 1 };
-        println!("{}", serde_json::to_string_pretty(&listing).map_err(failed)?);
-        return Ok(());
+        return print_json(&listing, true);
     }
     let groups = [
         ("scenes", &listing.scenes),
@@ -45,16 +43,12 @@ pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
         ("workloads", &listing.workloads),
         ("figures", &listing.figures),
     ];
+    let mut lines = Vec::new();
     for (title, entries) in groups {
-        println!("{title}:");
-        if entries.is_empty() {
-            println!("  none yet");
-        }
-        for entry in entries {
-            println!("  {:<18} {}", entry.name, entry.what);
-        }
+        lines.push(format!("{title}:"));
+        lines.extend(entries.iter().map(|entry| format!("  {:<18} {}", entry.name, entry.what)));
     }
-    Ok(())
+    print(&lines.join("\n"))
 }
 
 fn listing() -> Listing {

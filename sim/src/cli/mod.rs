@@ -3,10 +3,14 @@
 mod args;
 mod list;
 mod run;
+mod terminal;
+mod visibility;
 
 use std::process::ExitCode;
 
 use clap::Parser;
+
+use crate::run::RunError;
 
 pub use args::{Cli, Command};
 
@@ -19,13 +23,15 @@ pub fn main() -> ExitCode {
     match std::panic::catch_unwind(|| dispatch(&cli)) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(failure)) => {
-            eprintln!("quintile: {}", failure.message);
+            terminal::complain(&failure.message);
             ExitCode::from(failure.code)
         }
         Err(panic) => {
             let message = panic.downcast_ref::<String>().map(String::as_str);
             let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-            eprintln!("quintile: a fault of the program, please report it with the command line: {message}");
+            terminal::complain(&format!(
+                "a fault of the program, please report it with the command line: {message}"
+            ));
             ExitCode::FAILURE
         }
     }
@@ -37,9 +43,28 @@ struct Failure {
     code: u8,
 }
 
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
+    }
+}
+
+impl From<workloads::LoadError> for Failure {
+    fn from(error: workloads::LoadError) -> Self {
+        RunError::from(error).into()
+    }
+}
+
+/// Worker threads as asked for, all cores where nothing was.
+fn threads(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(asked.unwrap_or(0))).build();
+    pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
+}
+
 fn dispatch(cli: &Cli) -> Result<(), Failure> {
     match &cli.command {
         Command::Run(args) => run::run(args),
         Command::List(args) => list::list(args),
+        Command::Visibility(args) => visibility::run(args),
     }
 }

@@ -8,31 +8,22 @@ use workloads::Overrides;
 
 use super::Failure;
 use super::args::{BoundArg, PacingArg, RunArgs};
+use super::terminal::{print, print_json};
 use crate::output::MeanSd;
 use crate::output::progress::Progress;
 use crate::output::table::{Table, si, si_mean_sd};
-use crate::run::{Outcome, PacingChoice, RunError, RunOptions, Summary};
-
-impl From<RunError> for Failure {
-    fn from(error: RunError) -> Self {
-        Self { message: error.to_string(), code: if error.is_usage() { 2 } else { 1 } }
-    }
-}
+use crate::run::{Detection, Outcome, PacingChoice, RunOptions, Summary};
 
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let started = Instant::now();
     let progress = Progress::new(args.json);
-    let threads = usize::from(args.threads.unwrap_or(0));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool =
-        pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })?;
+    let pool = super::threads(args.threads)?;
     let outcome = pool.install(|| crate::run::run(options(args), &args.out, &progress))?;
     if args.json {
-        return print_json(args, &outcome);
+        let printed = Printed { out: args.out.display().to_string(), summary: &outcome.summary };
+        return print_json(&printed, true);
     }
-    print_text(args, &outcome);
-    println!("took {:.1} s", started.elapsed().as_secs_f64());
-    Ok(())
+    print(&format!("{}took {:.1} s", text(args, &outcome), started.elapsed().as_secs_f64()))
 }
 
 fn options(args: &RunArgs) -> RunOptions {
@@ -74,46 +65,41 @@ struct Printed<'a> {
     summary: &'a Summary,
 }
 
-fn print_json(args: &RunArgs, outcome: &Outcome) -> Result<(), Failure> {
-    let failed = |error: serde_json::Error| Failure { message: format!("printing JSON: {error}"), code: 1 };
-    let printed = Printed { out: args.out.display().to_string(), summary: &outcome.summary };
-    println!("{}", serde_json::to_string_pretty(&printed).map_err(failed)?);
-    Ok(())
+/// What a run says on a terminal.
+fn text(args: &RunArgs, outcome: &Outcome) -> String {
+    let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
+    let mut lines = vec![
+        format!(
+            "{} on {}, {}x{}, {} samples per pixel, {} frames, {} triangles",
+            summary.scene,
+            summary.gpu,
+            settings.width,
+            settings.height,
+            settings.samples,
+            settings.frames,
+            settings.triangles
+        ),
+        format!("modelled: {}\n", summary.modelled.line()),
+        figures(outcome).to_string(),
+        found(&summary.detection),
+    ];
+    if let Some(efficiency) = summary.sample_test_efficiency {
+        lines.push(format!("sample test efficiency {:.1} %", efficiency * 100.0));
+    }
+    lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.push(format!("results: {}", args.out.display()));
+    lines.push(format!("report:  {}\n", args.out.join("report.html").display()));
+    lines.join("\n")
 }
 
-fn print_text(args: &RunArgs, outcome: &Outcome) {
-    let summary = &outcome.summary;
-    let settings = &summary.settings;
-    println!(
-        "{} on {}, {}x{}, {} samples per pixel, {} frames, {} triangles",
-        summary.scene,
-        summary.gpu,
-        settings.width,
-        settings.height,
-        settings.samples,
-        settings.frames,
-        settings.triangles
-    );
-    println!("modelled: {}", summary.modelled.line());
-    println!();
-    print!("{}", figures(outcome));
-    println!();
-    let detection = &summary.detection;
-    println!(
+fn found(detection: &Detection) -> String {
+    format!(
         "{} of {} frame starts found in the trace ({} false), worst timing error {}",
         detection.matched_frames,
         detection.true_frames,
         detection.found_frames - detection.matched_frames,
         detection.worst_timing_error_s.map_or("-".to_owned(), |error| si(error, "s")),
-    );
-    if let Some(efficiency) = summary.sample_test_efficiency {
-        println!("sample test efficiency {:.1} %", efficiency * 100.0);
-    }
-    for warning in &summary.warnings {
-        println!("warning: {warning}");
-    }
-    println!("results: {}", args.out.display());
-    println!("report:  {}", args.out.join("report.html").display());
+    )
 }
 
 /// Measured beside true, a row for each quantity.

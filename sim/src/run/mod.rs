@@ -30,7 +30,7 @@ pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};
 pub use simulate::{Simulated, SimulatedFrame};
-pub use summary::{Figures, Summary};
+pub use summary::{Detection, Figures, Summary};
 
 /// Everything a run found out.
 pub struct Outcome {

@@ -88,8 +88,9 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let source = Source { path };
     let mut input = Reader::new(reader::open(path)?);
     let header = Parser::<Skipped>::new().read_header(&mut input);
-    let header = header
-        .map_err(|error| source.broken("header", format!("not a PLY file: {}; {MEND}", in_one_line(&error))))?;
+    let header = header.map_err(|error| {
+        source.broken("header", format!("not a PLY file: {}; {MEND}", in_one_line(&error)))
+    })?;
     check(&header).map_err(|message| source.broken("header", message))?;
     let mut soup = Soup::default();
     for element in header.elements.values() {

@@ -76,10 +76,14 @@ mod tests {
 
     #[test]
     fn only_the_first_word_of_a_line_is_a_statement() {
-        for text in ["mtllib a.mtl", "v 0 0 0\nusemtl red\n", "\r\n\t mtllib\ta", "usemtl", "g a\r\nusemtl a\r\n"] {
+        for text in
+            ["mtllib a.mtl", "v 0 0 0\nusemtl red\n", "\r\n\t mtllib\ta", "usemtl", "g a\r\nusemtl a\r\n"]
+        {
             assert!(names(text), "{text:?}");
         }
-        for text in ["", "# mtllib a.mtl\n", "g usemtl\n", "usemtls a\n", "usemt\nl a\n", "o x mtllib\n  # usemtl"] {
+        for text in
+            ["", "# mtllib a.mtl\n", "g usemtl\n", "usemtls a\n", "usemt\nl a\n", "o x mtllib\n  # usemtl"]
+        {
             assert!(!names(text), "{text:?}");
         }
     }

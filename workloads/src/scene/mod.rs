@@ -189,7 +189,9 @@ impl Scene {
         let [open_at, _, close_at] = self.instants(interval.frame);
         let ends = [(&interval.open, open_at), (&interval.close, close_at)];
         let [Some(open), Some(close)] = ends.map(|(pose, at)| self.camera.stand(pose, at)) else {
-            let message = "it looks nowhere, because position and target coincide or are not finite: move one of them".to_owned();
+            let message =
+                "it looks nowhere, because position and target coincide or are not finite: move one of them"
+                    .to_owned();
             return Err(FrameError::Camera { frame: interval.frame, message });
         };
         let subject = self.camera.subject_depth(&open, open_at, self.centre);

@@ -1,0 +1,97 @@
+//! Messages say which file, where in it, what is wrong and what to do; warnings come when they are due.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::Files;
+use workloads::{LoadError, Overrides, load};
+
+fn failure(error: LoadError) -> String {
+    assert!(!error.is_usage(), "{error}");
+    error.to_string()
+}
+
+fn expect(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "`{part}` is not in: {text}");
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read_say_what_to_do() {
+    let files = Files::new();
+    let at = files.put("here", "");
+    for kind in ["ron", "gltf", "glb", "ply", "ply.gz", "obj", "obj.gz"] {
+        let path = format!("{at}-gone.{kind}");
+        let text = failure(load(&path).unwrap_err());
+        expect(&text, &[&path, "cannot read it: No such file", "; check the path"]);
+        let folder = format!("{at}.{kind}");
+        std::fs::create_dir(&folder).unwrap();
+        let text = failure(load(&folder).unwrap_err());
+        expect(
+            &text,
+            &[&folder, "is a folder: give the path of a .ron, .gltf, .glb, .ply or .obj file in it"],
+        );
+        expect(&text.to_lowercase(), &["directory"]);
+    }
+    let text = failure(load(&files.put("a.ron", b"(\xff)")).unwrap_err());
+    expect(&text, &["a.ron", "UTF-8", "check "]);
+}
+
+#[test]
+fn a_ply_header_that_cannot_be_used_says_what_to_do() {
+    let files = Files::new();
+    let vertex = "element vertex 1\nproperty float x\nproperty float y\n";
+    let whole = format!("{vertex}property float z\n");
+    for (header, wrong) in [
+        (String::new(), "no element `vertex`"),
+        (whole.clone(), "no element `face`"),
+        (format!("{vertex}element face 0\nproperty list uchar int vertex_indices\n"), "no property `z`"),
+        (format!("{whole}element face 0\nproperty float area\n"), "no property `vertex_indices`"),
+    ] {
+        let text = format!("ply\nformat ascii 1.0\n{header}end_header\n");
+        let text = failure(load(&files.put("a.ply", text)).unwrap_err());
+        expect(&text, &["a.ply: header: ", wrong, "; export it again as a PLY file"]);
+    }
+    for bytes in [&b""[..], b"solid", b"\x89PNG\r\n\x1a\n\0\0\xff\xfe"] {
+        for name in ["a.ply", "a.ply.gz"] {
+            let text = failure(load(&files.put(name, bytes)).unwrap_err());
+            expect(&text, &[name, ": header: not a PLY file: ", "; export it again as a PLY file"]);
+            assert!(!text.contains('\n'), "{text}");
+        }
+    }
+}
+
+#[test]
+fn nothing_to_draw_names_the_file_even_of_a_scene_with_a_name() {
+    let files = Files::new();
+    files.put("empty.obj", "v 0 0 0\n");
+    let scene = files.put("s.ron", "(name: \"nice\", objects: [(file: \"empty.obj\")])");
+    for path in [scene, files.put("a.obj", "v 0 0 0\n"), files.put("b.obj", "")] {
+        let text = failure(load(&path).unwrap_err());
+        expect(&text, &[&path, ": scene: it has no triangles", "name another file, or export it"]);
+    }
+}
+
+#[test]
+fn a_clip_of_a_scene_without_any_is_to_be_left_out() {
+    let overrides = Overrides { clip: Some("Run".to_owned()), ..Overrides::default() };
+    let error = load("tiny").unwrap().with_overrides(&overrides).unwrap_err();
+    assert!(error.is_usage());
+    expect(&error.to_string(), &["there is no clip `Run`", "no animation clips; leave it out"]);
+}
+
+#[test]
+fn materials_named_in_an_obj_file_are_a_warning() {
+    let files = Files::new();
+    let faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\ng usemtl\n# mtllib a.mtl\n";
+    for (statement, warned) in [("mtllib a.mtl\n", true), ("usemtl red\n", true), ("", false)] {
+        let path = files.put("a.obj", format!("{faces}{statement}f 1 2 3\n"));
+        let object = files.put("s.ron", "(objects: [(file: \"a.obj\")])");
+        for scene in [&path, &object].map(|path| load(path).unwrap()) {
+            let codes: Vec<_> = scene.warnings().iter().map(|warning| warning.code).collect();
+            assert_eq!(codes == ["obj-materials-ignored"], warned, "{statement:?}: {codes:?}");
+            assert!(warned || codes.is_empty(), "{codes:?}");
+        }
+    }
+}
