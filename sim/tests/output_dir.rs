@@ -106,3 +106,28 @@ fn only_stale_files_of_the_kind_asked_for_go() {
     dir.remove_stale("images", "frame_", &["png", "exr"]).unwrap();
     assert_eq!(names(&temp.path().join("images")), ["frame_0.txt", "mine.png"]);
 }
+
+#[test]
+fn temporaries_of_a_run_that_was_killed_go_and_those_of_a_living_one_stay() {
+    let root = tempfile::tempdir().unwrap();
+    let living = format!(".trace.csv.{}.tmp", std::process::id());
+    // No process has this number: Linux ends at 2^22.
+    for name in [".trace.csv.4999999.tmp", living.as_str(), "mine.tmp", ".hidden"] {
+        fs::write(root.path().join(name), "x").unwrap();
+    }
+    OutDir::create(root.path()).unwrap();
+    let left = |name: &str| root.path().join(name).exists();
+    assert!(left(&living) && left("mine.tmp") && left(".hidden"));
+    assert_eq!(left(".trace.csv.4999999.tmp"), !Path::new("/proc/self").exists());
+}
+
+#[test]
+fn stale_files_of_the_root_go_by_name() {
+    let root = tempfile::tempdir().unwrap();
+    for name in ["report.html", "reports.html", "frames.csv"] {
+        fs::write(root.path().join(name), "x").unwrap();
+    }
+    OutDir::create(root.path()).unwrap().remove_stale("", "report.", &["html"]).unwrap();
+    let left = |name: &str| root.path().join(name).exists();
+    assert!(!left("report.html") && left("reports.html") && left("frames.csv"));
+}

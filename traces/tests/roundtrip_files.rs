@@ -90,7 +90,9 @@ fn golden_csv_of_three_samples_at_50_khz() {
     csv::write(&trace, &mut out).unwrap();
     assert_eq!(
         String::from_utf8(out).unwrap(),
-        "time_s,voltage_V,current_A\n-0.00002,3.85,0.1\n0.0,3.845215,-0.25\n0.00002,0,0.0000001\n"
+        // The digits of the f32 in f64, so that either reads back the same.
+        "time_s,voltage_V,current_A\n-0.00002,3.8499999046325684,0.10000000149011612\n\
+         0.0,3.845215082168579,-0.25\n0.00002,0,0.00000010000000116860974\n"
     );
 }
 

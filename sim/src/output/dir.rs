@@ -52,6 +52,18 @@ pub enum OutputError {
     },
 }
 
+/// Whether a name is `.something.PID.tmp` of a process that does not run. Where the system does not tell, no file is taken
+/// to be abandoned.
+fn is_abandoned(name: &str) -> bool {
+    let Some((_, pid)) =
+        name.strip_suffix(".tmp").filter(|_| name.starts_with('.')).and_then(|n| n.rsplit_once('.'))
+    else {
+        return false;
+    };
+    let processes = Path::new("/proc");
+    pid.parse::<u32>().is_ok() && processes.join("self").exists() && !processes.join(pid).exists()
+}
+
 /// The folder that a run writes into.
 #[derive(Debug)]
 pub struct OutDir {
@@ -74,7 +86,21 @@ impl OutDir {
         drop(probe);
         let dir = Self { root: path.to_owned() };
         dir.remove(&path.join(SUMMARY))?;
+        dir.remove_abandoned()?;
         Ok(dir)
+    }
+
+    /// Removes temporary files of runs that were killed: those whose process is gone.
+    fn remove_abandoned(&self) -> Result<(), OutputError> {
+        for folder in ["", "images", "plots"] {
+            let Ok(entries) = fs::read_dir(self.root.join(folder)) else { continue };
+            for path in entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file()) {
+                if path.file_name().and_then(|name| name.to_str()).is_some_and(is_abandoned) {
+                    self.remove(&path)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The folder as it was named.
@@ -82,13 +108,14 @@ impl OutDir {
         &self.root
     }
 
-    /// Removes files directly in `folder` (relative, may be absent) whose name begins with `prefix` and ends with one
+    /// Removes files directly in `folder` (relative, may be absent; empty for the root) whose name begins with `prefix` and ends with one
     /// of `extensions` (without the dot): what an earlier, longer run left there.
     ///
     /// # Errors
     /// [`OutputError::Stale`] with the file that could not be removed.
     pub fn remove_stale(&self, folder: &str, prefix: &str, extensions: &[&str]) -> Result<(), OutputError> {
-        let Ok(entries) = fs::read_dir(self.resolve(folder)?) else { return Ok(()) };
+        let folder = if folder.is_empty() { self.root.clone() } else { self.resolve(folder)? };
+        let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
         for path in entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file()) {
             let named =
                 path.file_name().and_then(|name| name.to_str()).is_some_and(|n| n.starts_with(prefix));

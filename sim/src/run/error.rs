@@ -57,7 +57,12 @@ impl RunError {
             Self::Platform(error) => !is_unreadable(error),
             Self::Table(error) => !is_unreadable(error),
             Self::Pacing(power_model::PacingError::Rate(_)) => true,
-            Self::Gpu(_) | Self::Samples(_) | Self::Device(_) | Self::Model(_) | Self::Setting(_) => true,
+            Self::Gpu(_)
+            | Self::Marks(_)
+            | Self::Samples(_)
+            | Self::Device(_)
+            | Self::Model(_)
+            | Self::Setting(_) => true,
             _ => false,
         }
     }

@@ -54,7 +54,7 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     let device = Device::new(device_spec(plan, &powers))?;
     let Sampled { mut trace, clipped_currents, clipped_voltages } =
         device.sample(&run.curve, 0.0, run.curve.end_s())?;
-    let marks = marks(&run, trace.rate_hz());
+    let marks = marks(&run, &trace);
     trace.metadata = metadata(plan, &device, &marks);
     let found = find(&trace, &marks)?;
     let integral = PowerIntegral::new(&trace);
@@ -92,11 +92,12 @@ fn device_spec(plan: &Plan, powers: &[&FramePower]) -> DeviceSpec {
     }
 }
 
-/// The middle frame is marked, as an analyst would pick one from the steady part; its end is the end of the run.
-fn marks(run: &Run, rate_hz: f64) -> Marks {
+/// The middle frame is marked, as an analyst would pick one from the steady part. The last frame ends at the end of the run,
+/// or of the trace where a recording without a tail ends with a part of a sample.
+fn marks(run: &Run, trace: &Trace) -> Marks {
     let middle = &run.frames[run.frames.len() / 2];
     let shortest = run.frames.iter().map(|frame| frame.end_s - frame.start_s).fold(f64::INFINITY, f64::min);
-    Marks::one(middle.start_s, default_window(shortest, rate_hz), run.end_s)
+    Marks::one(middle.start_s, default_window(shortest, trace.rate_hz()), run.end_s.min(trace.end_s()))
 }
 
 fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {

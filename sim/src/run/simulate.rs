@@ -66,7 +66,7 @@ impl Simulated {
 
 /// Simulates every frame that differs, writing its image as soon as it is done.
 pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result<Simulated, RunError> {
-    dir.remove_stale("images", "frame_", &["png", "exr"])?;
+    remove_stale(dir)?;
     let range = plan.scene.settings().frames.clone();
     let numbers: Vec<u32> =
         if plan.scene.is_animated() { range.clone().collect() } else { vec![range.start] };
@@ -78,7 +78,9 @@ pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result
         .par_iter()
         .map(|&number| {
             let (frame, image) = simulate_frame(plan, number, most_bins)?;
-            write_image(plan, dir, number, &image)?;
+            // A still scene is simulated once; every frame of the run has its image all the same.
+            let mut shown_as = if numbers.len() == 1 { range.clone() } else { number..number + 1 };
+            shown_as.try_for_each(|frame| write_image(plan, dir, frame, &image))?;
             bar.inc();
             Ok((frame, shown.contains(&number).then_some((number, image))))
         })
@@ -87,6 +89,19 @@ pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result
     let frames =
         range.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
     Ok(Simulated { distinct, frames, pictures: pictures.into_iter().flatten().collect() })
+}
+
+/// What an earlier run left: should this one die on the way, nothing old may stand in for it.
+fn remove_stale(dir: &OutDir) -> Result<(), RunError> {
+    dir.remove_stale("images", "frame_", &["png", "exr"])?;
+    dir.remove_stale("", "report.", &["html"])?;
+    dir.remove_stale("", "frames.", &["csv"])?;
+    dir.remove_stale("", "trace.", &["csv", "json", "parquet"])?;
+    dir.remove_stale("", "timeline.", &["perfetto-trace"])?;
+    for (figure, _) in super::FIGURES {
+        dir.remove_stale("plots", figure, &["svg", "png"])?;
+    }
+    Ok(())
 }
 
 fn simulate_frame(

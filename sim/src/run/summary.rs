@@ -201,7 +201,7 @@ impl Summary {
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
             counts_hash: format!("{:016x}", hash(simulated)),
-            frames: rows(plan, simulated, measurement),
+            frames: rows(plan, measurement),
         }
     }
 }
@@ -274,20 +274,19 @@ fn hash(simulated: &Simulated) -> u64 {
     })
 }
 
-fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
+fn rows(plan: &Plan, measurement: &Measurement) -> Vec<FrameRow> {
     let first = plan.scene.settings().frames.start;
     measurement
         .run
         .frames
         .iter()
-        .zip(simulated.in_order())
         .zip(measurement.by_true_frame())
         .zip(first..)
-        .map(|(((paced, simulated), measured), frame)| {
+        .map(|((paced, measured), frame)| {
             let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
             FrameRow {
                 frame,
-                image: format!("{}.png", image_name(simulated.index)),
+                image: format!("{}.png", image_name(frame)),
                 start_s: paced.start_s,
                 busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
                 duration_ms: duration_s * 1e3,

@@ -254,11 +254,14 @@ mod tests {
 
     #[test]
     fn a_few_matches_are_told_from_look_alikes_by_distance() {
-        // A run of four equal frames: three matches, and in each frame a stretch that resembles the marked window a little.
-        let rest = (0..65).map(|i| 145.0 + 8.0 * f64::from(i));
-        let distances: Vec<f64> = [6.27, 7.25, 7.28, 143.4, 143.4, 144.0].into_iter().chain(rest).collect();
-        let threshold = choose(&distances, 713.0, 0.003, 5.0, |_| 0.07);
-        assert_eq!((threshold.rule, threshold.matched.count), (Rule::OtsuDistinct, 3));
+        // A run of four equal frames: three matches, stretches within frames that resemble the marked window a little, and
+        // the rest. A threshold among the look-alikes happens to space the starts a little more evenly.
+        let look_alikes =
+            [143.4, 143.44, 143.99].into_iter().chain((0..30).map(|i| 144.86 + 0.001 * f64::from(i)));
+        let rest = (0..35).map(|i| 700.0 + 20.0 * f64::from(i));
+        let distances: Vec<f64> = [6.27, 7.25, 7.28].into_iter().chain(look_alikes).chain(rest).collect();
+        let evenness = |value_w2: f64| if (144.0..144.8).contains(&value_w2) { 0.07 } else { 0.0 };
+        assert_eq!(choose(&distances, 713.0, 0.003, 5.0, evenness).matched.count, 3);
     }
 
     #[test]

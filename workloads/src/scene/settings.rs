@@ -99,8 +99,8 @@ impl Settings {
             format!("{}: a pixel takes 1 to 256 samples", self.samples)
         })?;
         let rate = self.frame_rate_hz;
-        ensure(rate.is_finite() && rate > 0.0, "frame_rate_hz", || {
-            format!("{rate}: the frame rate has to be a finite number above zero, in frames per second")
+        ensure((1e-3..=1e6).contains(&rate), "frame_rate_hz", || {
+            format!("{rate:e}: the frame rate has to be 0.001 to 1000000 frames per second")
         })?;
         ensure((0.0..=1.0).contains(&self.shutter), "shutter", || {
             format!("{}: the shutter is open for a fraction of the frame, 0 to 1", self.shutter)

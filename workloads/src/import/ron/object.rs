@@ -1,5 +1,6 @@
 //! Objects of a RON scene.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -135,8 +136,17 @@ fn solid(shape: &ShapeSpec, material: usize) -> Result<Mesh, String> {
             Err(format!("{what}: every length has to be a finite number above zero"))
         }
     };
+    let within = |what: &str, value: u32, range: RangeInclusive<u32>| {
+        let (low, high) = (range.start(), range.end());
+        if range.contains(&value) {
+            Ok(())
+        } else {
+            Err(format!("{what} is {value}; it has to be {low} to {high}"))
+        }
+    };
     Ok(match *shape {
         ShapeSpec::Sphere { radius, segments } => {
+            within("Sphere: segments", segments, 3..=4096)?;
             positive("Sphere", &[radius])?;
             shapes::sphere(radius, segments, material)
         }
@@ -145,18 +155,22 @@ fn solid(shape: &ShapeSpec, material: usize) -> Result<Mesh, String> {
             shapes::cuboid(DVec3::from_array(size).as_vec3(), material)
         }
         ShapeSpec::Plane { size, cells, tiles } => {
+            within("Plane: cells", cells, 1..=2048)?;
             positive("Plane", &[size, tiles])?;
             shapes::plane(size, cells, tiles, material)
         }
         ShapeSpec::Torus { ring, tube, segments } => {
+            within("Torus: segments", segments, 3..=4096)?;
             positive("Torus", &[ring, tube])?;
             shapes::torus(ring, tube, segments, material)
         }
         ShapeSpec::Gear { teeth, radius, thickness } => {
+            within("Gear: teeth", teeth, 3..=1024)?;
             positive("Gear", &[radius, thickness])?;
             shapes::gear(teeth, radius, thickness, material)
         }
         ShapeSpec::Propeller { blades, radius } => {
+            within("Propeller: blades", blades, 1..=64)?;
             positive("Propeller", &[radius])?;
             shapes::propeller(blades, radius, material)
         }
