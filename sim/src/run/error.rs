@@ -59,6 +59,7 @@ impl RunError {
             Self::Pacing(power_model::PacingError::Rate(_)) => true,
             Self::Gpu(_)
             | Self::Marks(_)
+            | Self::Sample(_)
             | Self::Samples(_)
             | Self::Device(_)
             | Self::Model(_)

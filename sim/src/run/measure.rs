@@ -3,7 +3,7 @@
 use power_model::{FramePower, PARTS, Run, pace};
 use traces::device::{Device, DeviceSpec, Sampled};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
-use traces::frames::{Found, Marks, default_window, find};
+use traces::frames::{Found, Marks, default_window, find, marked_only};
 use traces::score::{self, Score, TOLERANCE_S};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
@@ -56,7 +56,9 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
         device.sample(&run.curve, 0.0, run.curve.end_s())?;
     let marks = marks(&run, &trace);
     trace.metadata = metadata(plan, &device, &marks);
-    let found = find(&trace, &marks)?;
+    // A run of one frame has no other to be found, and any that is would be false.
+    let search = if run.frames.len() == 1 { marked_only } else { find };
+    let found = search(&trace, &marks)?;
     let integral = PowerIntegral::new(&trace);
     let frames = integral.frames(&found);
     let truth: Vec<_> =

@@ -125,6 +125,16 @@ pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     Ok(assess::conclude(trace, marks, &placement, starts, threshold))
 }
 
+/// The marked frames alone, nothing searched for: for a recording that is known to hold no others.
+///
+/// # Errors
+/// [`MarkError`] if the marks do not fit the trace.
+pub fn marked_only(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+    let placement = marks.place(trace)?;
+    let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
+    Ok(assess::conclude(trace, marks, &placement, marked_starts(&placement, &[]), nothing))
+}
+
 /// The minima that could be starts, the marks and their surroundings left out.
 fn candidates(profile: &[f64], placement: &Placement, spacing: usize) -> Vec<Candidate> {
     let beside_marks =

@@ -14,7 +14,7 @@ mod regularity;
 mod split;
 mod threshold;
 
-pub use find::{Found, FrameSpan, FrameStart, find};
+pub use find::{Found, FrameSpan, FrameStart, find, marked_only};
 pub use flags::{Flag, Flags};
 pub use marks::{MarkError, Marks, Window, default_window};
 pub use threshold::{Population, Rule, Threshold};
