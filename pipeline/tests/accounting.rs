@@ -75,17 +75,6 @@ fn frame(draws: &[Draw<'_>], lens: bool, features: Features) -> Frame {
     }
 }
 
-fn kinds() -> impl Strategy<Value = Kind> {
-    prop_oneof![
-        Just(Kind::Still),
-        Just(Kind::Moving),
-        Just(Kind::Crossing),
-        Just(Kind::Slivers),
-        Just(Kind::Grid),
-        Just(Kind::Layers)
-    ]
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]

@@ -11,17 +11,6 @@ use pipeline::frame::visibility;
 use pipeline::*;
 use proptest::prelude::*;
 
-fn kinds() -> impl Strategy<Value = Kind> {
-    prop_oneof![
-        Just(Kind::Still),
-        Just(Kind::Moving),
-        Just(Kind::Crossing),
-        Just(Kind::Slivers),
-        Just(Kind::Grid),
-        Just(Kind::Layers)
-    ]
-}
-
 fn culls() -> impl Strategy<Value = Cull> {
     prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
 }

@@ -3,26 +3,15 @@
 
 mod common;
 
-use common::{Builder, Files, load_glb};
+use common::{Builder, Files, expect, failure, load_glb};
 use serde_json::json;
-use workloads::{LoadError, load};
+use workloads::load;
 
 /// The error of a file made broken, checked to be a failure (not a mistake of usage) that names the file.
 fn broken(change: impl FnOnce(&mut Builder)) -> String {
     let mut file = Builder::triangle();
     change(&mut file);
     failure(load_glb(&file.bytes()).unwrap_err())
-}
-
-fn failure(error: LoadError) -> String {
-    assert!(!error.is_usage(), "{error}");
-    error.to_string()
-}
-
-fn expect(text: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(text.contains(part), "`{part}` is not in: {text}");
-    }
 }
 
 #[test]

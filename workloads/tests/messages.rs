@@ -3,19 +3,8 @@
 
 mod common;
 
-use common::Files;
-use workloads::{LoadError, Overrides, load};
-
-fn failure(error: LoadError) -> String {
-    assert!(!error.is_usage(), "{error}");
-    error.to_string()
-}
-
-fn expect(text: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(text.contains(part), "`{part}` is not in: {text}");
-    }
-}
+use common::{Files, expect, failure};
+use workloads::{Overrides, load};
 
 #[test]
 fn files_that_cannot_be_read_say_what_to_do() {

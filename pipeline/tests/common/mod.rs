@@ -13,6 +13,7 @@ use pipeline::setup::{Outcome, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 pub use probe::{Look, Probe, looks, repeated};
+use proptest::prelude::*;
 
 /// Counter-based uniform numbers in [0, 1).
 pub struct Uniform(u64, u64);
@@ -65,6 +66,18 @@ pub enum Kind {
     Grid,
     /// Large layers, each a hair nearer than the one before, so that depth culling decides.
     Layers,
+}
+
+/// Every kind, each as likely.
+pub fn kinds() -> impl Strategy<Value = Kind> {
+    prop_oneof![
+        Just(Kind::Still),
+        Just(Kind::Moving),
+        Just(Kind::Crossing),
+        Just(Kind::Slivers),
+        Just(Kind::Grid),
+        Just(Kind::Layers)
+    ]
 }
 
 impl Soup {

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
+use workloads::LoadError;
 
 /// A `.glb` of JSON and a binary chunk.
 pub fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
@@ -120,7 +121,7 @@ impl Files {
 }
 
 /// Loads bytes as a `.glb`.
-pub fn load_glb(bytes: &[u8]) -> Result<workloads::Scene, workloads::LoadError> {
+pub fn load_glb(bytes: &[u8]) -> Result<workloads::Scene, LoadError> {
     workloads::load(&Files::new().put("scene.glb", bytes))
 }
 
@@ -131,4 +132,17 @@ pub fn real_scenes() -> Option<PathBuf> {
         eprintln!("skipped: QUINTILE_SCENES is not set, so the real scenes are not there to be read");
     }
     folder
+}
+
+/// The message of an error that has to be a failure, not a mistake of usage.
+pub fn failure(error: LoadError) -> String {
+    assert!(!error.is_usage(), "{error}");
+    error.to_string()
+}
+
+/// That `text` holds every part.
+pub fn expect(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "`{part}` is not in: {text}");
+    }
 }
