@@ -32,8 +32,10 @@ pub mod sample_test;
 pub mod sampling;
 pub mod setup;
 pub mod shading;
+pub mod simd;
 pub mod texture;
 pub mod traversal;
+pub mod visibility;
 
 pub use frame::{Features, PipelineSpec, Rendered, Settings, render};
 pub use geometry::{

@@ -31,7 +31,7 @@ impl<'a> Grid<'a> {
         if self.plain {
             return own;
         }
-        let seen = exact::seen(self.corners, samples, slot);
+        let seen = exact::seen_in_tile(self.corners, samples, slot);
         let edge = |i: usize, j: usize| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
         let e = [edge(1, 2), edge(2, 0), edge(0, 1)];
         let sum = (e[0] + e[1]) + e[2];

@@ -1,21 +1,36 @@
 //! The sample test where rounded products tie, and the weights of a hit.
 
+use super::block::SampleRows;
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
+use crate::simd::LANES;
 
 /// A vertex seen from a sample: `[x', y', w]`.
 pub type Seen = [f32; 3];
 
-/// The vertices of a triangle as the sample in `slot` sees them, with the operations of the kernel in their order.
-pub fn seen(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> [Seen; 3] {
-    corners.map(|corner| {
-        let [x, y, w] = corner.at(samples.t[slot]);
-        [
-            (x - samples.lens[0][slot]) - samples.slope[0][slot] * w,
-            (y - samples.lens[1][slot]) - samples.slope[1][slot] * w,
-            w,
-        ]
-    })
+/// The vertices of a triangle as the sample in `slot` of a tile sees them.
+pub fn seen_in_tile(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> [Seen; 3] {
+    let [slope, lens] = [&samples.slope, &samples.lens].map(|axes| [axes[0][slot], axes[1][slot]]);
+    corners.map(|corner| see(&corner, slope, lens, samples.t[slot]))
+}
+
+/// The vertices of a triangle as one of sixteen samples sees them.
+pub(crate) fn seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) -> [Seen; 3] {
+    let [slope, lens] =
+        [&rows.slope, &rows.lens].map(|axes: &[&[f32; LANES]; 2]| [axes[0][lane], axes[1][lane]]);
+    corners.map(|corner| see(&corner, slope, lens, rows.t[lane]))
+}
+
+/// One vertex, with the operations of the kernel in their order.
+fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
+    let [x, y, w] = corner.at(t);
+    [(x - lens[0]) - slope[0] * w, (y - lens[1]) - slope[1] * w, w]
+}
+
+/// The depth at which a sample hits a triangle of which the given faces are drawn.
+pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<f32> {
+    let (weights, counter_clockwise) = weights(seen)?;
+    faces[usize::from(counter_clockwise)].then(|| depth(seen, &weights))
 }
 
 /// Barycentric weights of the origin in the triangle, or `None` when it is outside. They add up to one and are not

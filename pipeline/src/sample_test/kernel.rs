@@ -1,16 +1,15 @@
-//! The sample test over a run of samples, sixteen at a time.
+//! The sample test over a run of samples of a tile, sixteen at a time.
 //!
-//! One source serves every combination of dimensions (by const generics) and every vector width (the compiler turns
-//! the lane loop into the widest instructions of the function it is inlined into). No operation is contracted, so
-//! all of them give the same bytes.
+//! One source serves every combination of dimensions and every vector width, by generics. No operation is contracted,
+//! so all of them give the same bytes.
 
 use std::ops::Range;
 
+use super::block::{Crossing, SampleRows, View};
 use super::exact;
-use super::lanes::{LANES, View, any, block_of, lanes};
-use super::width::{Vectors, Width};
 use crate::sampling::TileSamples;
 use crate::setup::Triangle;
+use crate::simd::{Kernel, LANES, Lanes, Mask, Width, dispatch};
 use crate::traversal::{Box5, Screen};
 
 /// The stored samples of a tile, in the order of its [`TileSamples`].
@@ -68,7 +67,7 @@ pub fn test_screened(
     target: &mut Target<'_>,
     hits: &mut Hits,
 ) {
-    Job { triangle, samples, within, screen, near, target, hits, width: Width::widest() }.start();
+    start(Width::widest(), Job { triangle, samples, within, screen, near, target, hits });
 }
 
 /// The same as [`test_run`] with vectors of a given width, to show that all give the same bytes.
@@ -81,7 +80,7 @@ pub fn test_run_at(
     target: &mut Target<'_>,
     hits: &mut Hits,
 ) {
-    Job { triangle, samples, within, screen: None, near, target, hits, width }.start();
+    start(width, Job { triangle, samples, within, screen: None, near, target, hits });
 }
 
 struct Job<'a, 'b> {
@@ -92,176 +91,118 @@ struct Job<'a, 'b> {
     near: f32,
     target: &'a mut Target<'b>,
     hits: &'a mut Hits,
-    width: Width,
 }
 
-/// What one block of lanes found: bit masks by lane, and the depth of each.
-struct Block {
-    clockwise: u32,
-    counter_clockwise: u32,
-    tie: u32,
-    depth: [f32; LANES],
+/// A job in the dimensions it needs.
+struct Run<'a, 'b, const MOTION: bool, const LENS: bool>(Job<'a, 'b>);
+
+fn start(width: Width, job: Job<'_, '_>) {
+    match (job.triangle.moving, job.within.lens) {
+        (false, false) => dispatch(width, Run::<false, false>(job)),
+        (true, false) => dispatch(width, Run::<true, false>(job)),
+        (false, true) => dispatch(width, Run::<false, true>(job)),
+        (true, true) => dispatch(width, Run::<true, true>(job)),
+    }
+}
+
+impl<const MOTION: bool, const LENS: bool> Kernel for Run<'_, '_, MOTION, LENS> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let mut job = self.0;
+        let within = job.within;
+        let run = if MOTION { job.samples.between(within.t[0], within.t[1]) } else { 0..job.samples.len };
+        let mut base = run.start / LANES * LANES;
+        while base < run.end {
+            let mut active = lanes(&run, base) & if LENS { job.in_lens_box::<V>(base) } else { Mask::MAX };
+            if active != 0
+                && let Some(screen) = job.screen
+            {
+                job.hits.screened += active.count_ones();
+                active &= job.pass::<V, MOTION, LENS>(screen, base);
+            }
+            if active != 0 {
+                job.hits.tested += active.count_ones();
+                let view = View::<V, MOTION, LENS>::load(&job.rows(base));
+                job.store(base, &Crossing::new(&job.triangle.corners, &view), active);
+            }
+            base += LANES;
+        }
+    }
 }
 
 impl Job<'_, '_> {
-    fn start(&mut self) {
-        let run = if self.triangle.moving {
-            self.samples.between(self.within.t[0], self.within.t[1])
-        } else {
-            0..self.samples.len
-        };
-        match (self.triangle.moving, self.within.lens) {
-            (false, false) => self.dispatch::<false, false>(run),
-            (true, false) => self.dispatch::<true, false>(run),
-            (false, true) => self.dispatch::<false, true>(run),
-            (true, true) => self.dispatch::<true, true>(run),
-        }
-    }
-
-    fn dispatch<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
-        match self.width.0 {
-            Vectors::Plain => self.run::<MOTION, LENS>(run),
-            // SAFETY: a `Width` other than the plain one exists only where the machine has it.
-            #[cfg(target_arch = "x86_64")]
-            Vectors::Avx2 => unsafe { self.run_avx2::<MOTION, LENS>(run) },
-            #[cfg(target_arch = "x86_64")]
-            Vectors::Avx512 => unsafe { self.run_avx512::<MOTION, LENS>(run) },
-        }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn run_avx2<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
-        self.run::<MOTION, LENS>(run);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    fn run_avx512<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
-        self.run::<MOTION, LENS>(run);
-    }
-
     #[inline(always)]
-    fn run<const MOTION: bool, const LENS: bool>(&mut self, run: Range<usize>) {
-        let mut base = run.start / LANES * LANES;
-        while base < run.end {
-            let mut active = lanes(&run, base) & if LENS { self.in_lens_box(base) } else { u32::MAX };
-            if active != 0
-                && let Some(screen) = self.screen
-            {
-                self.hits.screened += active.count_ones();
-                active &= self.pass::<MOTION, LENS>(screen, base);
-            }
-            if active != 0 {
-                self.hits.tested += active.count_ones();
-                let block = self.block::<MOTION, LENS>(base);
-                self.store(base, &block, active);
-            }
-            base += LANES;
+    fn rows(&self, base: usize) -> SampleRows<'_> {
+        let samples = self.samples;
+        SampleRows {
+            slope: [block_of(&samples.slope[0], base), block_of(&samples.slope[1], base)],
+            lens: [block_of(&samples.lens[0], base), block_of(&samples.lens[1], base)],
+            t: block_of(&samples.t, base),
         }
     }
 
     /// Lanes whose place on the lens lies in the box.
     #[inline(always)]
-    fn in_lens_box(&self, base: usize) -> u32 {
-        let ([u_lo, u_hi], [v_lo, v_hi]) = (self.within.u, self.within.v);
-        let (u, v) = (block_of(&self.samples.u, base), block_of(&self.samples.v, base));
-        let mut inside = [0; LANES];
-        for lane in 0..LANES {
-            let within = (u[lane] >= u_lo) & (u[lane] <= u_hi) & (v[lane] >= v_lo) & (v[lane] <= v_hi);
-            inside[lane] = u16::from(within) << lane;
-        }
-        any(&inside)
+    fn in_lens_box<V: Lanes>(&self, base: usize) -> Mask {
+        let within = |place: V, [lo, hi]: [f32; 2]| place.ge(V::splat(lo)) & V::splat(hi).ge(place);
+        let (u, v) = (V::load(block_of(&self.samples.u, base)), V::load(block_of(&self.samples.v, base)));
+        within(u, self.within.u) & within(v, self.within.v)
     }
 
     /// Lanes that no pair of linearized edges tells to lie outside.
     #[inline(always)]
-    fn pass<const MOTION: bool, const LENS: bool>(&self, screen: &Screen, base: usize) -> u32 {
-        let (x, y) = (block_of(&self.samples.x, base), block_of(&self.samples.y, base));
-        let (u, v) = (block_of(&self.samples.u, base), block_of(&self.samples.v, base));
-        let t = block_of(&self.samples.t, base);
-        let [middle_x, middle_y, middle_u, middle_v, middle_t] = screen.middle;
-        let mut passing = [0; LANES];
-        for lane in 0..LANES {
-            let (mut below, mut above) = (false, false);
-            for edge in 0..3 {
-                let [slope_x, slope_y, slope_u, slope_v, slope_t] = screen.gradient[edge];
-                let mut value =
-                    screen.value[edge] + slope_x * (x[lane] - middle_x) + slope_y * (y[lane] - middle_y);
-                if LENS {
-                    value += slope_u * (u[lane] - middle_u) + slope_v * (v[lane] - middle_v);
-                }
-                if MOTION {
-                    value += slope_t * (t[lane] - middle_t);
-                }
-                below |= value < -screen.margin[edge];
-                above |= value > screen.margin[edge];
+    fn pass<V: Lanes, const MOTION: bool, const LENS: bool>(&self, screen: &Screen, base: usize) -> Mask {
+        let samples = self.samples;
+        let from = [&samples.x, &samples.y, &samples.u, &samples.v, &samples.t];
+        let mut offset = [V::splat(0.0); 5];
+        for axis in 0..5 {
+            if axis < 2 || (axis < 4 && LENS) || (axis == 4 && MOTION) {
+                offset[axis] = V::load(block_of(from[axis], base)) - V::splat(screen.middle[axis]);
             }
-            passing[lane] = u16::from(!(below & above)) << lane;
         }
-        any(&passing)
-    }
-
-    #[inline(always)]
-    fn block<const MOTION: bool, const LENS: bool>(&self, base: usize) -> Block {
-        let view = View::<MOTION, LENS>::at(self.samples, base);
-        let [corner_a, corner_b, corner_c] = &self.triangle.corners;
-        let mut depth = [0.0; LANES];
-        let (mut clockwise, mut counter_clockwise, mut tie) =
-            ([0_u16; LANES], [0_u16; LANES], [0_u16; LANES]);
-        for lane in 0..LANES {
-            let (a, b, c) = (view.see(corner_a, lane), view.see(corner_b, lane), view.see(corner_c, lane));
-            let e0 = b.x * c.y - c.x * b.y;
-            let e1 = c.x * a.y - a.x * c.y;
-            let e2 = a.x * b.y - b.x * a.y;
-            let (above, below) = ((e0 > 0.0) | (e1 > 0.0) | (e2 > 0.0), (e0 < 0.0) | (e1 < 0.0) | (e2 < 0.0));
-            clockwise[lane] = u16::from((e0 > 0.0) & (e1 > 0.0) & (e2 > 0.0)) << lane;
-            counter_clockwise[lane] = u16::from((e0 < 0.0) & (e1 < 0.0) & (e2 < 0.0)) << lane;
-            tie[lane] = u16::from(((e0 == 0.0) | (e1 == 0.0) | (e2 == 0.0)) & !(above & below)) << lane;
-            let quotient = ((e0 * a.w + e1 * b.w) + e2 * c.w) / ((e0 + e1) + e2);
-            // The quotient may leave the range of the vertices by a rounding; depth culling relies on it.
-            depth[lane] = quotient.max(a.w.min(b.w).min(c.w)).min(a.w.max(b.w).max(c.w));
+        let (mut below, mut above) = (0, 0);
+        for edge in 0..3 {
+            let slope = &screen.gradient[edge];
+            let mut value = (V::splat(screen.value[edge]) + V::splat(slope[0]) * offset[0])
+                + V::splat(slope[1]) * offset[1];
+            if LENS {
+                value = value + (V::splat(slope[2]) * offset[2] + V::splat(slope[3]) * offset[3]);
+            }
+            if MOTION {
+                value = value + V::splat(slope[4]) * offset[4];
+            }
+            below |= V::splat(-screen.margin[edge]).gt(value);
+            above |= value.gt(V::splat(screen.margin[edge]));
         }
-        Block {
-            clockwise: any(&clockwise),
-            counter_clockwise: any(&counter_clockwise),
-            tie: any(&tie),
-            depth,
-        }
+        !(below & above)
     }
 
     /// Resolves ties, applies facing and the near depth, and keeps what is nearest.
     #[inline(always)]
-    fn store(&mut self, base: usize, block: &Block, active: u32) {
-        let [clockwise, counter_clockwise] = self.triangle.faces;
-        let mut inside = 0;
-        if clockwise {
-            inside |= block.clockwise;
+    fn store<V: Lanes>(&mut self, base: usize, crossing: &Crossing<V>, active: Mask) {
+        let mut inside = crossing.shown(self.triangle.faces) & active;
+        if inside != 0 {
+            let mut depth = [0.0; LANES];
+            crossing.depth().store(&mut depth);
+            while inside != 0 {
+                let lane = inside.trailing_zeros() as usize;
+                inside &= inside - 1;
+                self.keep(base + lane, depth[lane]);
+            }
         }
-        if counter_clockwise {
-            inside |= block.counter_clockwise;
-        }
-        inside &= active;
-        while inside != 0 {
-            let lane = inside.trailing_zeros() as usize;
-            inside &= inside - 1;
-            self.keep(base + lane, block.depth[lane]);
-        }
-        let mut tie = block.tie & active;
+        let mut tie = crossing.tie & active;
         while tie != 0 {
             let lane = tie.trailing_zeros() as usize;
             tie &= tie - 1;
-            self.keep_exact(base + lane);
+            self.keep_exact(base, lane);
         }
     }
 
     #[cold]
-    fn keep_exact(&mut self, slot: usize) {
-        let seen = exact::seen(&self.triangle.corners, self.samples, slot);
-        if let Some((weights, counter_clockwise)) = exact::weights(&seen)
-            && self.triangle.faces[usize::from(counter_clockwise)]
-        {
-            self.keep(slot, exact::depth(&seen, &weights));
+    fn keep_exact(&mut self, base: usize, lane: usize) {
+        let seen = exact::seen(&self.triangle.corners, &self.rows(base), lane);
+        if let Some(depth) = exact::hit(&seen, self.triangle.faces) {
+            self.keep(base + lane, depth);
         }
     }
 
@@ -280,5 +221,31 @@ impl Job<'_, '_> {
             self.hits.written.push(slot as u16);
             self.hits.written_pixels |= pixel;
         }
+    }
+}
+
+#[inline(always)]
+fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
+    // Arrays are padded to whole blocks, so the fallback is never taken.
+    array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
+}
+
+/// The lanes of the block at `base` that belong to `run`.
+fn lanes(run: &Range<usize>, base: usize) -> Mask {
+    let first = run.start.saturating_sub(base);
+    let last = (run.end - base).min(LANES);
+    (((1_u32 << last) - 1) & !((1_u32 << first) - 1)) as Mask
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_of_a_run() {
+        assert_eq!(lanes(&(0..16), 0), 0xFFFF);
+        assert_eq!(lanes(&(3..40), 0), 0xFFF8);
+        assert_eq!(lanes(&(3..40), 16), 0xFFFF);
+        assert_eq!(lanes(&(3..40), 32), 0x00FF);
     }
 }

@@ -17,12 +17,11 @@
 //! test is therefore *exact* for the rounded points `(x', y')`, which is what makes it watertight and lets culling
 //! be proved to change nothing: points that lie on one side of a line through the sample cannot surround it.
 
+pub(crate) mod block;
 pub mod exact;
 mod kernel;
-mod lanes;
 mod madds;
-mod width;
 
+pub use crate::simd::Width;
 pub use kernel::{Hits, Target, test_run, test_run_at, test_screened};
 pub use madds::madds;
-pub use width::Width;

@@ -1,0 +1,112 @@
+//! Sixteen samples against one triangle.
+
+use crate::setup::Corner;
+use crate::simd::{LANES, Lanes, Mask};
+
+/// Sixteen samples in memory, as far as the sample test asks for them.
+#[derive(Clone, Copy)]
+pub(crate) struct SampleRows<'a> {
+    /// `x - u a.x` and `y - v a.y`: what multiplies the depth of a vertex.
+    pub slope: [&'a [f32; LANES]; 2],
+    /// `u s.x` and `v s.y`: the part of the lens shear that does not depend on depth; read where there is a lens.
+    pub lens: [&'a [f32; LANES]; 2],
+    /// Time; read where something moves.
+    pub t: &'a [f32; LANES],
+}
+
+/// The same in registers.
+#[derive(Clone, Copy)]
+pub(crate) struct View<V, const MOTION: bool, const LENS: bool> {
+    pub slope: [V; 2],
+    pub lens: [V; 2],
+    pub t: V,
+}
+
+/// A vertex as samples see it.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<V> {
+    pub x: V,
+    pub y: V,
+    pub w: V,
+}
+
+impl<V: Lanes, const MOTION: bool, const LENS: bool> View<V, MOTION, LENS> {
+    #[inline(always)]
+    pub fn load(rows: &SampleRows<'_>) -> Self {
+        let zero = V::splat(0.0);
+        Self {
+            slope: [V::load(rows.slope[0]), V::load(rows.slope[1])],
+            lens: if LENS { [V::load(rows.lens[0]), V::load(rows.lens[1])] } else { [zero; 2] },
+            t: if MOTION { V::load(rows.t) } else { zero },
+        }
+    }
+
+    #[inline(always)]
+    pub fn see(&self, corner: &Corner) -> Seen<V> {
+        let [mut x, mut y, mut w] =
+            [V::splat(corner.open[0]), V::splat(corner.open[1]), V::splat(corner.open[2])];
+        if MOTION {
+            x = x + self.t * V::splat(corner.delta[0]);
+            y = y + self.t * V::splat(corner.delta[1]);
+            w = w + self.t * V::splat(corner.delta[2]);
+        }
+        if LENS {
+            x = x - self.lens[0];
+            y = y - self.lens[1];
+        }
+        Seen { x: x - self.slope[0] * w, y: y - self.slope[1] * w, w }
+    }
+}
+
+/// The edge functions of a triangle at sixteen samples, and what their signs say.
+pub(crate) struct Crossing<V> {
+    edges: [V; 3],
+    depths: [V; 3],
+    /// Lanes inside a triangle that turns clockwise on the screen, and counter-clockwise.
+    pub inside: [Mask; 2],
+    /// Lanes on an edge or a vertex, and outside of no other edge, for [`super::exact`] to decide.
+    pub tie: Mask,
+}
+
+impl<V: Lanes> Crossing<V> {
+    #[inline(always)]
+    pub fn new<const MOTION: bool, const LENS: bool>(
+        corners: &[Corner; 3],
+        view: &View<V, MOTION, LENS>,
+    ) -> Self {
+        let (a, b, c) = (view.see(&corners[0]), view.see(&corners[1]), view.see(&corners[2]));
+        let e0 = b.x * c.y - c.x * b.y;
+        let e1 = c.x * a.y - a.x * c.y;
+        let e2 = a.x * b.y - b.x * a.y;
+        let (least, most) = (e0.min(e1).min(e2), e0.max(e1).max(e2));
+        let zero = V::splat(0.0);
+        let inside = [least.gt(zero), zero.gt(most)];
+        Self {
+            edges: [e0, e1, e2],
+            depths: [a.w, b.w, c.w],
+            inside,
+            tie: least.equal(zero) | most.equal(zero),
+        }
+    }
+
+    /// Lanes inside that show a face to be drawn.
+    #[inline(always)]
+    pub fn shown(&self, faces: [bool; 2]) -> Mask {
+        self.inside[0] & face_mask(faces[0]) | self.inside[1] & face_mask(faces[1])
+    }
+
+    /// The depth of the lanes inside.
+    #[inline(always)]
+    pub fn depth(&self) -> V {
+        let ([e0, e1, e2], [a, b, c]) = (self.edges, self.depths);
+        let quotient = ((e0 * a + e1 * b) + e2 * c) / ((e0 + e1) + e2);
+        // The quotient may leave the range of the vertices by a rounding; depth culling relies on it.
+        quotient.max(a.min(b).min(c)).min(a.max(b).max(c))
+    }
+}
+
+/// All lanes where a face is drawn, none where it is not.
+#[inline(always)]
+fn face_mask(drawn: bool) -> Mask {
+    Mask::from(drawn).wrapping_neg()
+}

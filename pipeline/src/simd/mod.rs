@@ -1,0 +1,178 @@
+//! Sixteen numbers side by side, in the vectors this machine has.
+//!
+//! Kernels are written once over [`Lanes`] and entered through [`dispatch`], which picks the widest vectors when
+//! the program runs. Every operation rounds as IEEE 754 asks and none is contracted, so all widths give the same bytes.
+
+mod plain;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::ops::{Add, Div, Mul, Sub};
+use std::sync::LazyLock;
+
+pub(crate) use plain::Plain;
+
+/// Numbers worked on together.
+pub const LANES: usize = 16;
+
+/// Sixteen numbers in memory, aligned to the widest vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub struct Row(pub [f32; LANES]);
+
+impl Row {
+    /// The same number sixteen times.
+    pub const fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+}
+
+/// One bit for each lane.
+pub(crate) type Mask = u16;
+
+/// Sixteen `f32` in registers. Comparisons with NaN are false.
+pub(crate) trait Lanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    fn splat(value: f32) -> Self;
+    fn load(from: &[f32; LANES]) -> Self;
+    fn store(self, to: &mut [f32; LANES]);
+    /// The smaller of each pair; `other` where either is NaN.
+    fn min(self, other: Self) -> Self;
+    /// The larger of each pair; `other` where either is NaN.
+    fn max(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// `self * by + plus`, rounded once. For bounds only: what decides is written as products and sums.
+    fn times_plus(self, by: Self, plus: Self) -> Self;
+    fn gt(self, other: Self) -> Mask;
+    fn ge(self, other: Self) -> Mask;
+    fn equal(self, other: Self) -> Mask;
+    /// Writes the lanes of the mask only.
+    fn store_masked(self, mask: Mask, to: &mut [f32; LANES]);
+    /// Writes `value` to the lanes of the mask only.
+    fn put(mask: Mask, value: u32, to: &mut [u32; LANES]);
+    /// The lanes of the mask from `self`, the others from `other`.
+    fn or_else(self, mask: Mask, other: Self) -> Self;
+    /// The largest of the sixteen, none of them NaN.
+    fn largest(self) -> f32;
+}
+
+/// A width of vectors that this machine has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Width(Vectors);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Vectors {
+    Plain,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+static WIDEST: LazyLock<Width> = LazyLock::new(|| Width::available().last().unwrap_or(Width(Vectors::Plain)));
+
+impl Width {
+    /// Every width of this machine, the widest last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        let mut widths = vec![Self(Vectors::Plain)];
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                widths.push(Self(Vectors::Avx2));
+            }
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+                widths.push(Self(Vectors::Avx512));
+            }
+        }
+        widths.into_iter()
+    }
+
+    /// The widest one of this machine.
+    pub fn widest() -> Self {
+        *WIDEST
+    }
+}
+
+/// A job that runs with whatever vectors there are. Its `run` has to be `#[inline(always)]`, and so has everything it
+/// calls that works on lanes, to be compiled for the vectors it is entered with.
+pub(crate) trait Kernel {
+    fn run<V: Lanes>(self);
+}
+
+/// Runs a kernel with vectors of the given width.
+pub(crate) fn dispatch(width: Width, kernel: impl Kernel) {
+    match width.0 {
+        Vectors::Plain => kernel.run::<Plain>(),
+        // SAFETY: a `Width` other than the plain one exists only where the machine has it.
+        #[cfg(target_arch = "x86_64")]
+        Vectors::Avx2 => unsafe { x86::avx2(kernel) },
+        #[cfg(target_arch = "x86_64")]
+        Vectors::Avx512 => unsafe { x86::avx512(kernel) },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every operation on a few hundred awkward numbers, as bits.
+    struct Everything<'a>(&'a mut Vec<u32>);
+
+    fn awkward(seed: u32) -> [f32; LANES] {
+        let special = [0.0, -0.0, 1.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, 3.4e38];
+        std::array::from_fn(|lane| {
+            let bits = (seed + lane as u32).wrapping_mul(0x9E37_79B9);
+            if bits.is_multiple_of(3) { special[bits as usize % special.len()] } else { f32::from_bits(bits) }
+        })
+    }
+
+    impl Kernel for Everything<'_> {
+        #[inline(always)]
+        fn run<V: Lanes>(self) {
+            for seed in 0..200 {
+                let (from_a, from_b) = (awkward(seed), awkward(7 * seed + 3));
+                let (a, b) = (V::load(&from_a), V::load(&from_b));
+                let masks = [a.gt(b), a.ge(b), a.equal(b)];
+                let mut stored = [1.5; LANES];
+                b.store_masked(masks[0], &mut stored);
+                let mut put = [7; LANES];
+                V::put(masks[1], seed, &mut put);
+                let results = [
+                    a + b,
+                    a - b,
+                    a * b,
+                    a / b,
+                    a.min(b),
+                    a.max(b),
+                    a.abs(),
+                    a.times_plus(b, a),
+                    a.or_else(masks[0], b),
+                    V::splat(2.0),
+                ];
+                for result in results {
+                    let mut out = [0.0; LANES];
+                    result.store(&mut out);
+                    // The sign and payload of a NaN that arithmetic makes are nobody's business.
+                    self.0.extend(out.map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }));
+                }
+                self.0.extend(masks.map(u32::from));
+                self.0.push(a.abs().min(V::splat(f32::MAX)).largest().to_bits());
+                self.0.extend(put);
+                self.0.extend(stored.map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }));
+            }
+        }
+    }
+
+    #[test]
+    fn all_widths_give_the_same_bytes() {
+        let at = |width| {
+            let mut bits = Vec::new();
+            dispatch(width, Everything(&mut bits));
+            bits
+        };
+        let plain = at(Width(Vectors::Plain));
+        assert!(plain.len() > 200 * 160);
+        assert!(Width::available().all(|width| at(width) == plain));
+    }
+}
