@@ -11,7 +11,7 @@ use flate2::{Compression, write::GzEncoder};
 use glam::Vec3;
 use proptest::prelude::*;
 use workloads::LoadError;
-use workloads::visibility::{VisibilityScene, load, parse_m5d, parse_mts};
+use workloads::visibility::{CameraSpec, VisibilityScene, load, parse_m5d, parse_mts};
 
 const SQUARE: [[f32; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
 const HALVES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
@@ -104,6 +104,19 @@ fn every_kind_of_file_becomes_the_same_scene() {
 }
 
 #[test]
+fn objects_of_an_mts_follow_each_other() {
+    let files = Files::new();
+    let one = mts(&SQUARE, &moved(), &HALVES);
+    let (sizes, body) = one[16..].split_at(8);
+    let header = &[one[..8].to_vec(), 2_u32.to_le_bytes().to_vec(), vec![0; 4]].concat();
+    let two = [header, sizes, sizes, body, body].concat();
+    let scene = load(&[files.put("a.mts", two)], None).unwrap();
+    assert_eq!(scene.objects, [0..2, 2..4]);
+    assert_eq!(scene.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+    assert_eq!((&scene.open[..4], &scene.close[..4]), (&scene.open[4..], &scene.close[4..]));
+}
+
+#[test]
 fn one_file_stays_still_and_an_end_of_the_camera_moves_it() {
     let files = Files::new();
     let mesh = files.put("a.ply", ply(&SQUARE, &HALVES));
@@ -117,6 +130,10 @@ fn one_file_stays_still_and_an_end_of_the_camera_moves_it() {
     let passing = load(&[&mesh], Some(Path::new(&camera))).unwrap();
     let step = passing.open.iter().zip(&passing.close).map(|(open, close)| *open - *close);
     assert!(step.into_iter().all(|step| step == Vec3::X));
+    let camera = files.put("c.ron", "(position: (0, 0, 5), target: (0, 0, 0), end_up: (1, 0, 0))");
+    let rolling = load(&[&mesh], Some(Path::new(&camera))).unwrap();
+    let rolled = rolling.open.iter().map(|open| Vec3::new(-open.y, open.x, open.z));
+    assert_eq!(rolling.close, rolled.collect::<Vec<_>>());
 }
 
 #[test]
@@ -278,7 +295,7 @@ proptest! {
             }
         }
         if let Ok(text) = String::from_utf8(damaged(CAMERA.as_bytes(), &flips, cut)) {
-            let _ = workloads::visibility::CameraSpec::parse(&text, "c.ron");
+            let _ = CameraSpec::parse(&text, "c.ron");
         }
     }
 }
@@ -299,4 +316,13 @@ proptest! {
         let _ = load(&[files.put("a.obj", damaged(obj(&SQUARE, &HALVES).as_bytes(), &flips, cut)), end], None);
         let _ = load(&[files.put("a.m5d", damaged(&m5d(), &flips, cut))], None);
     }
+}
+
+#[test]
+fn the_camera_in_the_book_is_one() {
+    let book =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/visibility.md"))
+            .unwrap();
+    let example = book.split("```ron\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    assert!(CameraSpec::parse(example, "visibility.md").unwrap().is_placed());
 }
