@@ -208,7 +208,7 @@ mod tests {
                 ["c.ron: end_target:", "move one"],
             ),
             ("(position: (0, 0, 1e-60), target: (0, 0, 0))", ["c.ron: near:", "above zero"]),
-            ("(width: 3", ["c.ron:1:", "end of RON"]),
+            ("(width: 3", ["c.ron:1:", "Expected comma"]),
         ] {
             let error = parse(text).unwrap_err();
             assert!(error.is_usage(), "{error}");
