@@ -19,6 +19,14 @@ pub enum LoadError {
         /// What there is, with a suggestion where one is near.
         known: String,
     },
+    /// A file that is there, but of a kind that cannot be used for what was asked.
+    #[error("{file}: it cannot be told what kind of file this is; known here: {known}")]
+    Kind {
+        /// The file.
+        file: String,
+        /// What there could be instead.
+        known: &'static str,
+    },
     /// A setting, from a command line or a scene file, that makes no sense.
     #[error("{setting}: {message}")]
     Setting {
@@ -73,12 +81,14 @@ fn mend(error: &io::Error) -> &'static str {
 }
 
 impl LoadError {
-    /// Whether the mistake is the caller's (an unknown scene name, a bad setting, a bad RON scene): exit code
+    /// Whether the mistake is the caller's (an unknown scene name or kind of file, a bad setting, a bad RON scene): exit code
     /// 2. The others (files that are missing, unreadable, truncated, corrupt or not supported) are exit
     /// code 1. A RON file that cannot be read counts as unreadable.
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Unknown { .. } | Self::Setting { .. } | Self::Description { .. } => true,
+            Self::Unknown { .. } | Self::Kind { .. } | Self::Setting { .. } | Self::Description { .. } => {
+                true
+            }
             Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
             Self::Read { .. } | Self::Broken { .. } => false,
         }

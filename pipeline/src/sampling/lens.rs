@@ -1,9 +1,9 @@
 //! Shapes of the aperture.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The shape of the aperture, inscribed in the square [-1, 1]^2 of lens coordinates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LensShape {
     /// A round aperture.
     #[default]

@@ -97,14 +97,22 @@ pub struct RunArgs {
 
 /// Arguments of `visibility`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n\n\
+#[command(after_help = "Examples:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n  \
+    quintile visibility start.ply end.ply --camera camera.ron --json\n  \
+    quintile visibility cloth-ball.mts.gz --print-camera > camera.ron\n\n\
     The layouts of .m5d, of sample tables, of the hashed samples and of the result are those of\n\
-    shared/peers/embree5d/README.md.")]
+    shared/peers/embree5d/README.md, that of .mts is in shared/ccd/README.md.")]
 pub struct VisibilityArgs {
-    /// Moving triangles with their camera, a .m5d file
-    #[arg(value_name = "FILE")]
-    pub scene: String,
-    /// `hash` (of the seed in the file), `table` (the built-in one) or a sample table in a file
+    /// A moving mesh: an .m5d or .mts file, or two .ply or .obj files of equal topology as the ends of the shutter
+    #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
+    pub files: Vec<PathBuf>,
+    /// A camera in RON; without it an .m5d is seen by its own, other files by one that is fitted to them
+    #[arg(long, value_name = "CAM.ron")]
+    pub camera: Option<PathBuf>,
+    /// Print the camera that was fitted as RON, and do no more
+    #[arg(long, conflicts_with_all = ["camera", "json", "out"])]
+    pub print_camera: bool,
+    /// `hash` (of the seed of the camera), `table` (the built-in one) or a sample table in a file
     #[arg(long, value_name = "SAMPLES", default_value = "hash")]
     pub samples: String,
     /// File for the triangle and depth of every sample

@@ -4,15 +4,15 @@ mod gltf;
 mod image;
 mod obj;
 mod ply;
-mod reader;
-mod ron;
+pub(crate) mod reader;
+pub(crate) mod ron;
 mod soup;
 mod statements;
 
 use std::path::Path;
 
 use crate::error::LoadError;
-use crate::scene::{Local, Node, Parts, Trs};
+use crate::scene::{Local, Mesh, Node, Parts, Trs};
 use soup::Soup;
 
 /// File formats, told by the end of the name.
@@ -61,6 +61,12 @@ pub(crate) fn import(path: &Path, format: Format) -> Result<Parts, LoadError> {
 /// The triangles of a PLY or OBJ file.
 fn soup(path: &Path, format: Format) -> Result<Soup, LoadError> {
     if format == Format::Ply { ply::read(path) } else { obj::read(path) }
+}
+
+/// The positions and triangles of a PLY or OBJ file.
+pub(crate) fn surface(path: &Path, format: Format) -> Result<Mesh, LoadError> {
+    let soup = soup(path, format)?;
+    Soup { positions: soup.positions, triangles: soup.triangles, ..Soup::default() }.into_mesh(path, 0)
 }
 
 fn solid(path: &Path, soup: Soup) -> Result<Parts, LoadError> {

@@ -85,7 +85,7 @@ impl Default for SceneCamera {
 
 /// Where a camera is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stand {
+pub(crate) struct Stand {
     pub eye: DVec3,
     pub right: DVec3,
     pub up: DVec3,
@@ -112,6 +112,12 @@ impl Stand {
     /// Depth of a point in front of the camera, in scene units.
     pub fn depth(&self, point: DVec3) -> f64 {
         (point - self.eye).dot(self.forward)
+    }
+
+    /// A point of the world in camera space: x right, y up, z forward.
+    pub fn view(&self, point: DVec3) -> DVec3 {
+        let from = point - self.eye;
+        DVec3::new(from.dot(self.right), from.dot(self.up), from.dot(self.forward))
     }
 
     /// World to camera: x right, y up, z forward.

@@ -27,7 +27,7 @@ const TOWARD_EYE: DVec3 = DVec3::new(0.55, 0.42, 1.0);
 
 /// What a fit needs to know of all the points.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Extent {
+pub(crate) struct Extent {
     axes: Stand,
     slopes: [f64; 2],
     /// Largest `a - tan_x c`, `-a - tan_x c`, and the same for `b`.
@@ -38,7 +38,7 @@ pub(super) struct Extent {
 
 /// Where the camera goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Fit {
+pub(crate) struct Fit {
     pub stand: Stand,
     /// A depth before the nearest point.
     pub near: f64,

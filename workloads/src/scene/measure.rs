@@ -13,6 +13,12 @@ use super::frame::FrameError;
 /// Code of the warning that a fitted camera cannot hold a scene for the whole lens.
 pub(super) const LENS_LEAVES_VIEW: &str = "lens-leaves-view";
 
+/// The warning itself.
+pub(crate) fn lens_leaves_view() -> Warning {
+    let message = "the lens is so large for its focus depth that parts of the scene leave the view: the fitted camera only holds them for the centre of the lens";
+    Warning::new(LENS_LEAVES_VIEW, message)
+}
+
 /// Frames looked at when a camera is fitted; longer runs are sampled evenly.
 const FITTED_FRAMES: u32 = 256;
 
@@ -38,8 +44,7 @@ impl Scene {
         let radius = f64::from(self.settings.lens_radius);
         let fit = extent.fit((radius > 0.0).then(|| (radius, self.settings.focus.map(f64::from))));
         if fit.is_some_and(|fit| !fit.holds_lens) {
-            let message = "the lens is so large for its focus depth that parts of the scene leave the view: the fitted camera only holds them for the centre of the lens";
-            self.warnings.push(Warning::new(LENS_LEAVES_VIEW, message));
+            self.warnings.push(lens_leaves_view());
         }
         Ok((centre, fit))
     }

@@ -1,13 +1,13 @@
 //! A scene: what there is, how it moves, and what of it one frame's shutter sees.
 
-mod camera;
+pub(crate) mod camera;
 pub(crate) mod clip;
 mod deform;
-mod fit;
+pub(crate) mod fit;
 mod frame;
 mod graph;
 mod light;
-mod measure;
+pub(crate) mod measure;
 mod mesh;
 mod node;
 mod parts;

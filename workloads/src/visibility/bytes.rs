@@ -13,10 +13,10 @@ pub(super) struct Bytes<'a> {
 
 impl<'a> Bytes<'a> {
     /// The bytes of a file that starts with `magic`.
-    pub fn new(path: &'a Path, data: &'a [u8], magic: &[u8; 8]) -> Result<Self, LoadError> {
+    pub fn new<const N: usize>(path: &'a Path, data: &'a [u8], magic: &[u8; N]) -> Result<Self, LoadError> {
         let mut bytes = Self { source: Source { path }, data, at: 0 };
-        if bytes.take::<8>()? != *magic {
-            let name = String::from_utf8_lossy(&magic[..7]).into_owned();
+        if bytes.take::<N>()? != *magic {
+            let name = String::from_utf8_lossy(magic).trim_end_matches('\0').to_owned();
             return Err(bytes.wrong(format!("it does not start with `{name}`; is it another kind of file?")));
         }
         Ok(bytes)
@@ -49,9 +49,14 @@ impl<'a> Bytes<'a> {
         if value.is_finite() { Ok(value) } else { Err(self.wrong(format!("{value} is not a finite number"))) }
     }
 
+    /// How many bytes follow.
+    pub fn left(&self) -> u64 {
+        (self.data.len() - self.at) as u64
+    }
+
     /// That `count` records of `size` bytes and nothing else follow.
     pub fn expect_records(&self, count: u64, size: u64) -> Result<(), LoadError> {
-        let left = (self.data.len() - self.at) as u64;
+        let left = self.left();
         match count.checked_mul(size) {
             Some(needed) if needed == left => Ok(()),
             _ => {
@@ -63,6 +68,11 @@ impl<'a> Bytes<'a> {
 
     /// What is wrong at the place reached.
     pub fn wrong(&self, message: String) -> LoadError {
-        self.source.broken(format!("byte {}", self.at), message)
+        self.wrong_in(format!("byte {}", self.at), message)
+    }
+
+    /// What is wrong in a part that has a name.
+    pub fn wrong_in(&self, place: impl Into<String>, message: String) -> LoadError {
+        self.source.broken(place, message)
     }
 }

@@ -1,86 +1,86 @@
 //! `.m5d`: moving triangles with their camera.
 
+use std::iter;
 use std::path::Path;
 
-use glam::{Affine3A, Vec3};
-use pipeline::sampling::HashedSamples;
+use glam::{Affine3A, DVec3, Vec3};
 use pipeline::{Camera, Lens, LensShape, Viewport};
 
 use super::bytes::Bytes;
-use crate::error::{LoadError, Source};
+use super::mesh::MovingMesh;
+use super::scene::VisibilityScene;
+use crate::error::LoadError;
+use crate::import::reader;
 
-/// Moving triangles in camera space (x right, y up, z forward) with the camera and sampling they are to be seen by.
-#[derive(Clone, Debug)]
-pub struct M5d {
-    /// Size of the image.
-    pub viewport: Viewport,
-    /// Samples in each pixel.
-    pub per_pixel: u32,
-    /// Seed of hashed samples.
-    pub seed: u64,
-    /// The camera, a pinhole where the lens radius is zero.
-    pub camera: Camera,
-    /// Shape of the aperture.
-    pub shape: LensShape,
-    /// Corners when the shutter opens, three for each triangle.
-    pub open: Vec<Vec3>,
-    /// Corners when it closes.
-    pub close: Vec<Vec3>,
-    /// The corners of each triangle.
-    pub triangles: Vec<[u32; 3]>,
-}
+/// How the file begins.
+pub(super) const MAGIC: &[u8; 8] = b"M5DSCN1\0";
 
 const TRIANGLE_BYTES: u64 = 18 * 4;
 
-impl M5d {
-    /// Reads the file at `path`.
-    ///
-    /// # Errors
-    /// When it cannot be read, is truncated, or holds values that make no camera or image.
-    pub fn load(path: &Path) -> Result<Self, LoadError> {
-        let data = Source { path }.read()?;
-        Self::parse(path, &data)
-    }
+/// Reads the `.m5d` file at `path`, gzipped or not.
+pub(super) fn load(path: &Path) -> Result<VisibilityScene, LoadError> {
+    parse(path, &reader::contents(path)?)
+}
 
-    /// Reads `data`; `path` names it in messages.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
-    pub fn parse(path: &Path, data: &[u8]) -> Result<Self, LoadError> {
-        let mut bytes = Bytes::new(path, data, b"M5DSCN1\0")?;
-        let triangles = bytes.u32()?;
-        let _flags = bytes.u32()?;
-        let (width, height, per_pixel, shape) = (bytes.u32()?, bytes.u32()?, bytes.u32()?, bytes.u32()?);
-        let seed = bytes.u64()?;
-        let [_vertical_fov, tan_half, radius, focus, near] =
-            [bytes.f64()?, bytes.f64()?, bytes.f64()?, bytes.f64()?, bytes.f64()?];
-        let viewport = Viewport::new(width, height)
-            .ok_or_else(|| bytes.wrong(format!("{width}x{height}: each side has to be 1 to 16384 pixels")))?;
-        let shape = match shape {
-            0 => LensShape::Disk,
-            1 => LensShape::Square,
-            other => {
-                return Err(bytes.wrong(format!("lens shape {other}; it is 0 for a disk or 1 for a square")));
-            }
-        };
-        let camera = camera([tan_half, radius, focus, near]).map_err(|message| bytes.wrong(message))?;
-        bytes.expect_records(u64::from(triangles), TRIANGLE_BYTES)?;
-        let (mut open, mut close) = (Vec::new(), Vec::new());
-        for _ in 0..triangles {
-            for corners in [&mut open, &mut close] {
-                for _ in 0..3 {
-                    corners.push(Vec3::new(bytes.f32()?, bytes.f32()?, bytes.f32()?));
-                }
+/// Reads `data`, which is an `.m5d` file that is not gzipped; `path` names it in messages.
+///
+/// # Errors
+/// When it is truncated, or holds values that make no camera or image.
+pub fn parse(path: &Path, data: &[u8]) -> Result<VisibilityScene, LoadError> {
+    let mut bytes = Bytes::new(path, data, MAGIC)?;
+    let (count, _flags) = (bytes.u32()?, bytes.u32()?);
+    let (width, height, per_pixel, shape) = (bytes.u32()?, bytes.u32()?, bytes.u32()?, bytes.u32()?);
+    let seed = bytes.u64()?;
+    let [_vertical_fov, tan_half, radius, focus, near] =
+        [bytes.f64()?, bytes.f64()?, bytes.f64()?, bytes.f64()?, bytes.f64()?];
+    let viewport = Viewport::new(width, height)
+        .ok_or_else(|| bytes.wrong(format!("{width}x{height}: each side has to be 1 to 16384 pixels")))?;
+    let shape = match shape {
+        0 => LensShape::Disk,
+        1 => LensShape::Square,
+        other => return Err(bytes.wrong(format!("lens shape {other}; it is 0 for a disk or 1 for a square"))),
+    };
+    let camera = camera([tan_half, radius, focus, near]).map_err(|message| bytes.wrong(message))?;
+    let [open, close] = corners(&mut bytes, count)?;
+    let triangles = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let objects = iter::once(0..count).collect();
+    let (fitted, warnings) = (None, Vec::new());
+    Ok(VisibilityScene {
+        viewport,
+        per_pixel,
+        seed,
+        camera,
+        shape,
+        open,
+        close,
+        triangles,
+        objects,
+        fitted,
+        warnings,
+    })
+}
+
+/// The corners of the triangles at both ends.
+fn corners(bytes: &mut Bytes<'_>, count: u32) -> Result<[Vec<Vec3>; 2], LoadError> {
+    bytes.expect_records(u64::from(count), TRIANGLE_BYTES)?;
+    let [mut open, mut close] = [0; 2].map(|_| Vec::with_capacity(3 * count as usize));
+    for _ in 0..count {
+        for corners in [&mut open, &mut close] {
+            for _ in 0..3 {
+                corners.push(Vec3::new(bytes.f32()?, bytes.f32()?, bytes.f32()?));
             }
         }
-        let triangles = (0..triangles).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-        Ok(Self { viewport, per_pixel, seed, camera, shape, open, close, triangles })
     }
+    Ok([open, close])
+}
 
-    /// The hashed samples that the file names, or `None` when their number is out of range.
-    pub fn hashed_samples(&self) -> Option<HashedSamples> {
-        HashedSamples::new(self.seed, self.viewport.width(), self.per_pixel, self.shape)
-    }
+/// The triangles in a right-handed world, for another camera: that of the file stands at the origin and looks at
+/// (0, 0, -1).
+pub(super) fn world(scene: &VisibilityScene) -> MovingMesh {
+    let turned = |points: &[Vec3]| {
+        points.iter().map(|p| (*p * Vec3::new(1.0, 1.0, -1.0)).as_dvec3()).collect::<Vec<DVec3>>()
+    };
+    MovingMesh { open: turned(&scene.open), close: turned(&scene.close), triangles: scene.triangles.clone() }
 }
 
 fn camera([tan_half, radius, focus, near]: [f64; 4]) -> Result<Camera, String> {
@@ -113,12 +113,12 @@ mod tests {
     }
 
     fn message(data: &[u8]) -> String {
-        M5d::parse(Path::new("a.m5d"), data).unwrap_err().to_string()
+        parse(Path::new("a.m5d"), data).unwrap_err().to_string()
     }
 
     #[test]
     fn a_file_is_read_as_written() {
-        let scene = M5d::parse(Path::new("a.m5d"), &file()).unwrap();
+        let scene = parse(Path::new("a.m5d"), &file()).unwrap();
         assert_eq!(
             (scene.viewport.width(), scene.viewport.height(), scene.per_pixel, scene.seed),
             (64, 48, 4, 7)

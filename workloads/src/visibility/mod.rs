@@ -1,13 +1,25 @@
 //! Visibility as a tool: moving triangles with a camera and samples in, the triangle each sample sees and its depth out.
 //!
-//! The files are those of the ray-casting peer (`shared/peers/embree5d/README.md`), little endian and packed, so that
-//! both programs can be held against each other sample by sample.
+//! [`load`] reads any of the files that hold a moving mesh into a [`VisibilityScene`]. The layouts of `.m5d`, of sample
+//! tables and of results are those of the ray-casting peer (`shared/peers/embree5d/README.md`), little endian and packed,
+//! so that both programs can be held against each other sample by sample. `.mts` is read by [`load_mts`] for others, too.
 
 mod bytes;
+mod camera;
 mod hits;
+mod load;
 mod m5d;
+mod mesh;
+mod mts;
+mod pair;
+mod scene;
 mod table;
 
+pub use camera::CameraSpec;
 pub use hits::write_hits;
-pub use m5d::M5d;
+pub use load::load;
+pub use m5d::parse as parse_m5d;
+pub use mesh::MovingMesh;
+pub use mts::{load_mts, parse_mts};
+pub use scene::VisibilityScene;
 pub use table::FixedSamples;

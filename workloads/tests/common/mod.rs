@@ -1,6 +1,8 @@
 //! Small files made for tests.
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod meshes;
+
 use std::path::PathBuf;
 
 use serde_json::{Value, json};

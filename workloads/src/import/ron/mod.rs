@@ -1,6 +1,6 @@
 //! RON scene files: what is in them ([`spec`]), and scenes made from that.
 
-mod bounded;
+pub(crate) mod bounded;
 mod object;
 mod spec;
 

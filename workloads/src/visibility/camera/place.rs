@@ -1,0 +1,166 @@
+//! From a description to a camera that stands somewhere.
+
+use glam::{Affine3A, DVec2, DVec3};
+use pipeline::{Camera, CameraError, Lens, Viewport};
+
+use super::{CameraSpec, Wrong};
+use crate::scene::camera::Stand;
+use crate::scene::fit::Extent;
+use crate::scene::tan_half;
+use crate::visibility::mesh::MovingMesh;
+
+/// The nearest thing seen, in parts of the depth of the target.
+const NEAR: f64 = 1e-3;
+
+/// A camera in its place.
+pub(in crate::visibility) struct View {
+    /// Where it stands when the shutter opens and when it closes.
+    pub stands: [Stand; 2],
+    /// What it is in its own space.
+    pub camera: Camera,
+    /// The image.
+    pub viewport: Viewport,
+}
+
+impl CameraSpec {
+    /// The same camera with every default written out.
+    pub(in crate::visibility) fn completed(&self) -> Self {
+        let [width, height] = self.size();
+        let depth = self.target_depth();
+        let focus = if self.radius() > 0.0 { self.focus.or(depth.map(|depth| depth as f32)) } else { None };
+        Self {
+            width: Some(width),
+            height: Some(height),
+            samples: Some(self.samples()),
+            seed: Some(self.seed()),
+            fov_deg: Some(self.field_of_view()),
+            up: self.up.or(Some(DVec3::Y.to_array())),
+            lens_radius: Some(self.radius()),
+            focus,
+            shift: self.shift.or(Some([0.0; 2])),
+            near: self.near.or(depth.map(|depth| (NEAR * depth) as f32)),
+            ..self.clone()
+        }
+    }
+
+    /// The camera in its place.
+    ///
+    /// # Errors
+    /// What is wrong with it: it is not placed, looks nowhere, or has a value out of the range of `f32`.
+    pub(in crate::visibility) fn view(&self) -> Result<View, Wrong> {
+        let stands = [
+            stand("target", self.position, self.target, self.up)?,
+            stand(
+                "end_target",
+                self.end_position.or(self.position),
+                self.end_target.or(self.target),
+                self.end_up.or(self.up),
+            )?,
+        ];
+        let [width, height] = self.size();
+        let wrong = || ("width", format!("{width}x{height}: each side has to be 1 to 16384 pixels"));
+        Ok(View { stands, camera: self.camera()?, viewport: Viewport::new(width, height).ok_or_else(wrong)? })
+    }
+
+    /// What the camera is in its own space.
+    fn camera(&self) -> Result<Camera, Wrong> {
+        let out_of = |place| move |error: CameraError| (place, error.to_string());
+        let near = self.near.unwrap_or(0.0);
+        let camera = Camera::new(Affine3A::IDENTITY, tan_half(self.field_of_view()) as f32, near);
+        let camera = camera.map_err(out_of("near"))?;
+        let camera = camera
+            .with_shift(DVec2::from_array(self.shift.unwrap_or_default()).as_vec2())
+            .map_err(out_of("shift"))?;
+        if self.radius() == 0.0 {
+            return Ok(camera);
+        }
+        let lens = Lens::new(self.radius(), self.focus.unwrap_or(0.0)).map_err(out_of("focus"))?;
+        Ok(camera.with_lens(Some(lens)))
+    }
+
+    fn target_depth(&self) -> Option<f64> {
+        Some(DVec3::from(self.position?).distance(DVec3::from(self.target?)))
+    }
+}
+
+fn stand(
+    place: &'static str,
+    position: Option<[f64; 3]>,
+    target: Option<[f64; 3]>,
+    up: Option<[f64; 3]>,
+) -> Result<Stand, Wrong> {
+    let [eye, target] = [position, target].map(|point| DVec3::from(point.unwrap_or([f64::NAN; 3])));
+    let up = up.map_or(DVec3::Y, DVec3::from);
+    let message = "the camera looks nowhere, because it coincides with its target or is too far from it: move one of them";
+    Stand::new(eye, target - eye, up).ok_or_else(|| (place, message.to_owned()))
+}
+
+/// The camera placed so that all of `mesh` is in view while the shutter is open, and whether it is so from all over the
+/// lens; `None` for a mesh without triangles or beyond the range of numbers.
+pub(in crate::visibility) fn fit(spec: &CameraSpec, mesh: &MovingMesh) -> Option<(CameraSpec, bool)> {
+    let [width, height] = spec.size().map(f64::from);
+    let tan = tan_half(spec.field_of_view());
+    let mut extent = Extent::new(tan * width / height, tan)?;
+    mesh.corners().flatten().for_each(|point| extent.add(point));
+    let radius = f64::from(spec.radius());
+    let fit = extent.fit((radius > 0.0).then(|| (radius, spec.focus.map(f64::from))))?;
+    let stand = fit.stand;
+    let placed = CameraSpec {
+        position: Some(stand.eye.to_array()),
+        target: Some((stand.eye + fit.focus * stand.forward).to_array()),
+        up: Some(stand.up.to_array()),
+        near: spec.near.or(Some(fit.near as f32)),
+        ..spec.clone()
+    };
+    let finite = stand.eye.is_finite() && fit.focus.is_finite();
+    finite.then(|| (placed.completed(), fit.holds_lens))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(text: &str) -> View {
+        CameraSpec::parse(text, "c.ron").unwrap().completed().view().unwrap()
+    }
+
+    #[test]
+    fn camera_space_is_right_up_forward_at_both_ends() {
+        let view = view("(position: (0, 0, 5), target: (0, 0, 0), end_position: (5, 0, 0))");
+        let point = DVec3::new(1.0, 2.0, 3.0);
+        assert_eq!(view.stands[0].view(point), DVec3::new(1.0, 2.0, 2.0));
+        assert_eq!(view.stands[1].view(point), DVec3::new(-3.0, 2.0, 4.0));
+    }
+
+    #[test]
+    fn lens_and_near_follow_the_target_unless_told() {
+        let told = view(
+            "(position: (0, 0, 5), target: (0, 0, 0), lens_radius: 0.5, focus: 3, near: 0.25, fov_deg: 90)",
+        );
+        assert_eq!(told.camera.lens(), Some(Lens::new(0.5, 3.0).unwrap()));
+        assert_eq!((told.camera.near(), told.camera.tan_half_height()), (0.25, 1.0));
+        let plain = view("(position: (0, 0, 5), target: (0, 0, 0), lens_radius: 0.5)");
+        assert_eq!(plain.camera.lens(), Some(Lens::new(0.5, 5.0).unwrap()));
+        assert_eq!(plain.camera.near(), 0.005);
+        assert_eq!(view("(position: (0, 0, 5), target: (0, 0, 0))").camera.lens(), None);
+    }
+
+    #[test]
+    fn a_fitted_camera_holds_a_moving_triangle() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let mesh = MovingMesh {
+            open: corners.to_vec(),
+            close: corners.iter().map(|corner| *corner * 3.0 + DVec3::Z).collect(),
+            triangles: vec![[0, 1, 2]],
+        };
+        let (spec, holds_lens) = fit(&CameraSpec::default(), &mesh).unwrap();
+        assert!(holds_lens && spec.is_placed());
+        let view = spec.view().unwrap();
+        for point in mesh.corners().flatten().map(|corner| view.stands[0].view(corner)) {
+            let tan = f64::from(view.camera.tan_half_height());
+            assert!(point.z > f64::from(view.camera.near()));
+            assert!((point.x / point.z).abs() < tan && (point.y / point.z).abs() < tan, "{point}");
+        }
+        assert!(fit(&spec, &MovingMesh::default()).is_none());
+    }
+}

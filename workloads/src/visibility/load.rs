@@ -1,0 +1,90 @@
+//! Any of the files that hold a moving mesh.
+
+use std::path::Path;
+
+use super::camera::CameraSpec;
+use super::scene::{Subject, VisibilityScene};
+use super::{m5d, mts, pair};
+use crate::error::LoadError;
+use crate::import::{Format, reader};
+
+/// What can be loaded, for messages.
+const KNOWN: &str = ".m5d, .mts, and .ply or .obj, alone or as a pair (each also gzipped)";
+
+/// Kinds of files that hold a mesh or half of one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    M5d,
+    Mts,
+    Surface(Format),
+}
+
+impl Kind {
+    /// What the file at `path` begins as or, where that says nothing, what its name ends in.
+    fn of(path: &Path) -> Result<Self, LoadError> {
+        let head = reader::head::<8>(path)?;
+        let begins = |magic: &[u8]| head.starts_with(magic);
+        if begins(m5d::MAGIC) {
+            return Ok(Self::M5d);
+        }
+        if begins(mts::MAGIC) {
+            return Ok(Self::Mts);
+        }
+        if begins(b"ply\n") || begins(b"ply\r") {
+            return Ok(Self::Surface(Format::Ply));
+        }
+        let named = Self::named(path);
+        named.ok_or_else(|| LoadError::Kind { file: path.display().to_string(), known: KNOWN })
+    }
+
+    fn named(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let bare = name.strip_suffix(".gz").unwrap_or(&name);
+        match (bare.rsplit_once('.')?.1, Format::of(path)) {
+            ("m5d", _) => Some(Self::M5d),
+            ("mts", _) => Some(Self::Mts),
+            (_, Some(format @ (Format::Ply | Format::Obj))) => Some(Self::Surface(format)),
+            _ => None,
+        }
+    }
+}
+
+/// Loads the moving mesh in `files`: an `.m5d` or `.mts`, a PLY or OBJ file that stays still, or two of them as the two
+/// ends of the shutter. `camera` is a camera in RON; without it an `.m5d` is seen by its own and the others by one that
+/// is fitted to them.
+///
+/// # Errors
+/// [`LoadError`]: [`LoadError::is_usage`] for files that do not go together or are of no known kind and for mistakes in
+/// the camera; else what is broken, and where.
+pub fn load(files: &[impl AsRef<Path>], camera: Option<&Path>) -> Result<VisibilityScene, LoadError> {
+    let spec = camera.map(CameraSpec::load).transpose()?;
+    let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
+    let kinds = files.iter().map(|path| Kind::of(path)).collect::<Result<Vec<_>, _>>()?;
+    let (path, objects) = match (&files[..], &kinds[..]) {
+        ([file], [Kind::M5d]) => match &spec {
+            None => return m5d::load(file),
+            Some(_) => (*file, vec![m5d::world(&m5d::load(file)?)]),
+        },
+        ([file], [Kind::Mts]) => (*file, mts::load_mts(file)?),
+        ([file], [Kind::Surface(format)]) => (*file, vec![pair::still((file, *format))?]),
+        ([start, end], [Kind::Surface(one), Kind::Surface(other)]) => {
+            (*start, vec![pair::moving((start, *one), (end, *other))?])
+        }
+        _ => return Err(wrong_number(&files, &kinds)),
+    };
+    VisibilityScene::seen(Subject { path, objects }, &spec.unwrap_or_default())
+}
+
+fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {
+    let whole = files.iter().zip(kinds).find(|(_, kind)| !matches!(kind, Kind::Surface(_)));
+    let message = match whole {
+        Some((file, _)) if files.len() > 1 => {
+            format!("{} holds both ends of the shutter: give it alone", file.display())
+        }
+        _ => format!(
+            "{} were given: give one, or two PLY or OBJ files as the ends of the shutter",
+            files.len()
+        ),
+    };
+    LoadError::Setting { setting: "files", message }
+}

@@ -1,0 +1,224 @@
+//! `.mts`: two instants of a moving scene of many objects, the format of public data for collision detection.
+//!
+//! Little endian (`shared/ccd/README.md`): `MTS1`, the bytes of a scalar (4 or 8), the number of objects, zero; for each
+//! object its vertices and triangles; then, object after object, positions at time zero, positions at time one, indices.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::bytes::Bytes;
+use super::mesh::MovingMesh;
+use crate::error::LoadError;
+use crate::import::reader;
+
+/// How the file begins.
+pub(super) const MAGIC: &[u8; 4] = b"MTS1";
+
+/// Bytes of the sizes of one object, and of the indices of one triangle.
+const ENTRY_BYTES: u64 = 8;
+const TRIANGLE_BYTES: u64 = 12;
+
+/// Vertices and triangles of one object.
+type Size = [u32; 2];
+
+/// Reads the objects of the `.mts` file at `path`, gzipped or not. Their values are those of the file: `f64` holds
+/// every `f32`.
+///
+/// # Errors
+/// When it cannot be read, is damaged or truncated, or holds numbers that are not finite or indices out of range.
+pub fn load_mts(path: &Path) -> Result<Vec<MovingMesh>, LoadError> {
+    parse_mts(path, &reader::contents(path)?)
+}
+
+/// Reads `data`, which is not gzipped; `path` names it in messages. Takes memory for what `data` holds, whatever its
+/// header announces.
+///
+/// # Errors
+/// As [`load_mts`].
+pub fn parse_mts(path: &Path, data: &[u8]) -> Result<Vec<MovingMesh>, LoadError> {
+    let mut bytes = Bytes::new(path, data, MAGIC)?;
+    let (scalar_bytes, objects, reserved) = (bytes.u32()?, bytes.u32()?, bytes.u32()?);
+    let scalar: Scalar = match scalar_bytes {
+        4 => |bytes| bytes.take().map(|raw| f64::from(f32::from_le_bytes(raw))),
+        8 => |bytes| bytes.take().map(f64::from_le_bytes),
+        other => {
+            return Err(bytes.wrong_in("byte 4", format!("scalars of {other} bytes; they have to be 4 or 8")));
+        }
+    };
+    if reserved != 0 {
+        return Err(
+            bytes.wrong_in("byte 12", format!("{reserved}, where a zero has to be; is it another version?"))
+        );
+    }
+    let sizes = sizes(&mut bytes, objects)?;
+    expect(&bytes, &sizes, scalar_bytes)?;
+    sizes.iter().enumerate().map(|(object, size)| read_object(&mut bytes, object, *size, scalar)).collect()
+}
+
+/// Reads one number of a position.
+type Scalar = fn(&mut Bytes<'_>) -> Result<f64, LoadError>;
+
+fn sizes(bytes: &mut Bytes<'_>, objects: u32) -> Result<Vec<Size>, LoadError> {
+    if u64::from(objects) * ENTRY_BYTES > bytes.left() {
+        let left = bytes.left();
+        let message =
+            format!("{objects} objects are announced, but only {left} bytes follow; get the file again");
+        return Err(bytes.wrong_in("byte 8", message));
+    }
+    (0..objects).map(|_| Ok([bytes.u32()?, bytes.u32()?])).collect()
+}
+
+/// That what the sizes announce follows and nothing else.
+fn expect(bytes: &Bytes<'_>, sizes: &[Size], scalar_bytes: u32) -> Result<(), LoadError> {
+    let vertex_bytes = 2 * 3 * u128::from(scalar_bytes);
+    let mut needed = 0;
+    let left = u128::from(bytes.left());
+    for (object, [vertices, triangles]) in sizes.iter().enumerate() {
+        needed += u128::from(*vertices) * vertex_bytes + u128::from(*triangles) * u128::from(TRIANGLE_BYTES);
+        if needed > left {
+            let message = format!(
+                "its {vertices} vertices and {triangles} triangles end at byte {needed} after the header, \
+                 but only {left} follow; the file is truncated: get it again"
+            );
+            return Err(bytes.wrong_in(format!("object {object}"), message));
+        }
+    }
+    if needed == left {
+        return Ok(());
+    }
+    let message =
+        format!("{left} bytes follow the header, but its objects have {needed}; get the file again");
+    Err(bytes.wrong(message))
+}
+
+fn read_object(
+    bytes: &mut Bytes<'_>,
+    object: usize,
+    size: Size,
+    scalar: Scalar,
+) -> Result<MovingMesh, LoadError> {
+    let [vertices, triangles] = size;
+    let mut positions = |when: &str| {
+        (0..vertices)
+            .map(|vertex| {
+                let position = DVec3::new(scalar(bytes)?, scalar(bytes)?, scalar(bytes)?);
+                if position.is_finite() {
+                    return Ok(position);
+                }
+                let message = format!(
+                    "vertex {vertex} at time {when} is {position}, which is not finite; mend the file"
+                );
+                Err(bytes.wrong_in(format!("object {object}"), message))
+            })
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let (open, close) = (positions("0")?, positions("1")?);
+    let triangles = (0..triangles).map(|triangle| corners(bytes, object, triangle, vertices));
+    let triangles = triangles.collect::<Result<_, _>>()?;
+    Ok(MovingMesh { open, close, triangles })
+}
+
+fn corners(
+    bytes: &mut Bytes<'_>,
+    object: usize,
+    triangle: u32,
+    vertices: u32,
+) -> Result<[u32; 3], LoadError> {
+    let corners = [bytes.u32()?, bytes.u32()?, bytes.u32()?];
+    match corners.iter().find(|&&vertex| vertex >= vertices) {
+        None => Ok(corners),
+        Some(vertex) => {
+            let message = format!(
+                "triangle {triangle} uses vertex {vertex}, but there are only {vertices}; mend the file"
+            );
+            Err(bytes.wrong_in(format!("object {object}"), message))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Objects of one triangle each, object `i` shifted by `i` and moving by one along y.
+    fn file(objects: u32, scalar_bytes: u32) -> Vec<u8> {
+        let mut data = MAGIC.to_vec();
+        [scalar_bytes, objects, 0].iter().for_each(|word| data.extend(word.to_le_bytes()));
+        (0..objects).for_each(|_| [3_u32, 1].iter().for_each(|word| data.extend(word.to_le_bytes())));
+        for object in 0..objects {
+            for end in [0.0, 1.0] {
+                for [x, y] in [[0.1, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+                    for number in [x + f64::from(object), y + end, 0.0] {
+                        match scalar_bytes {
+                            4 => data.extend((number as f32).to_le_bytes()),
+                            _ => data.extend(number.to_le_bytes()),
+                        }
+                    }
+                }
+            }
+            [0_u32, 1, 2].iter().for_each(|word| data.extend(word.to_le_bytes()));
+        }
+        data
+    }
+
+    fn parse(data: &[u8]) -> Result<Vec<MovingMesh>, LoadError> {
+        parse_mts(Path::new("a.mts"), data)
+    }
+
+    fn says(data: &[u8], parts: &[&str]) {
+        let error = parse(data).unwrap_err();
+        assert!(!error.is_usage());
+        let text = error.to_string();
+        for part in ["a.mts: "].iter().chain(parts) {
+            assert!(text.contains(part), "`{part}` is not in: {text}");
+        }
+    }
+
+    #[test]
+    fn objects_are_read_as_written_in_either_precision() {
+        for (scalar_bytes, tenth) in [(4, f64::from(0.1_f32)), (8, 0.1)] {
+            let objects = parse(&file(2, scalar_bytes)).unwrap();
+            assert_eq!(objects.len(), 2);
+            assert_eq!(objects[0].open[0], DVec3::new(tenth, 0.0, 0.0));
+            assert_eq!(objects[1].open[1], DVec3::new(2.0, 0.0, 0.0));
+            assert_eq!(objects[1].close[2], DVec3::new(1.0, 2.0, 0.0));
+            assert_eq!(objects[1].triangles, [[0, 1, 2]]);
+        }
+        assert_eq!(parse(&file(0, 8)).unwrap(), []);
+    }
+
+    #[test]
+    fn broken_headers_say_where() {
+        let good = file(2, 8);
+        says(b"MTS", &["truncated"]);
+        says(b"MTS2....", &["does not start with `MTS1`"]);
+        says(&good[..10], &["byte 8", "truncated"]);
+        for (at, word, parts) in [
+            (4, 2, ["byte 4: scalars of 2 bytes", "4 or 8"]),
+            (8, u32::MAX, ["byte 8: 4294967295 objects", "328 bytes follow"]),
+            (12, 7, ["byte 12: 7", "zero"]),
+            (16, u32::MAX, ["object 0: its 4294967295 vertices", "truncated"]),
+            (28, u32::MAX, ["object 1: its 3 vertices and 4294967295 triangles", "truncated"]),
+            (8, 1, ["byte 24: 320 bytes follow", "have 156"]),
+        ] {
+            let mut data = good.clone();
+            data[at..at + 4].copy_from_slice(&u32::to_le_bytes(word));
+            says(&data, &parts);
+        }
+    }
+
+    #[test]
+    fn broken_bodies_say_where() {
+        let good = file(2, 8);
+        says(&good[..good.len() - 1], &["object 1", "only 311 follow", "get it again"]);
+        says(&[good.as_slice(), &[0]].concat(), &["313 bytes follow", "have 312"]);
+        let (first, second) = (32, 32 + 156);
+        let mut nan = good.clone();
+        nan[second + 72 + 24..second + 72 + 32].copy_from_slice(&f64::NAN.to_le_bytes());
+        says(&nan, &["object 1: vertex 1 at time 1 is [NaN, 1, 0]", "mend"]);
+        let mut index = good;
+        index[first + 144 + 8..first + 144 + 12].copy_from_slice(&3_u32.to_le_bytes());
+        says(&index, &["object 0: triangle 0 uses vertex 3, but there are only 3", "mend"]);
+    }
+}

@@ -1,0 +1,99 @@
+//! Two PLY or OBJ files as the two ends of the shutter.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::mesh::MovingMesh;
+use crate::error::{LoadError, Source};
+use crate::import::{Format, surface};
+use crate::scene::Mesh;
+
+/// What to do about files that do not go together.
+const MEND: &str = "both ends of the shutter need equal topology: export both from the same mesh";
+
+/// A file and its format.
+pub(super) type File<'a> = (&'a Path, Format);
+
+/// The mesh of one file, at rest.
+pub(super) fn still((path, format): File<'_>) -> Result<MovingMesh, LoadError> {
+    let mesh = surface(path, format)?;
+    let open: Vec<_> = mesh.positions.iter().map(|point| point.as_dvec3()).collect();
+    Ok(MovingMesh { close: open.clone(), open, triangles: mesh.triangles.to_vec() })
+}
+
+/// The mesh that is in one file when the shutter opens and in the other when it closes.
+pub(super) fn moving(start: File<'_>, end: File<'_>) -> Result<MovingMesh, LoadError> {
+    let [open, close] = [surface(start.0, start.1)?, surface(end.0, end.1)?];
+    let pair = Pair { paths: [start.0, end.0], open: &open, close: &close };
+    let close = match (start.1, end.1) {
+        (Format::Ply, Format::Ply) => pair.by_index()?,
+        _ => pair.by_corner()?,
+    };
+    let widen = |points: &[Vec3]| points.iter().map(|point| point.as_dvec3()).collect();
+    Ok(MovingMesh { open: widen(&open.positions), close: widen(&close), triangles: open.triangles.to_vec() })
+}
+
+/// Two meshes being matched.
+struct Pair<'a> {
+    paths: [&'a Path; 2],
+    open: &'a Mesh,
+    close: &'a Mesh,
+}
+
+impl Pair<'_> {
+    /// Where the vertices of the first mesh go, when both files number them alike.
+    fn by_index(&self) -> Result<Vec<Vec3>, LoadError> {
+        self.same_count("triangles", self.open.triangles.len(), self.close.triangles.len())?;
+        self.same_count("vertices", self.open.positions.len(), self.close.positions.len())?;
+        let both = self.open.triangles.iter().zip(self.close.triangles.iter());
+        match both.enumerate().find(|(_, (from, to))| from != to) {
+            None => Ok(self.close.positions.clone()),
+            Some((triangle, (from, to))) => {
+                let start = self.paths[0].display();
+                let message = format!("its corners are {to:?}, those in {start} are {from:?}; {MEND}");
+                Err(self.wrong(format!("triangle {triangle}"), message))
+            }
+        }
+    }
+
+    /// Where the vertices of the first mesh go, found by the corners of the triangles. The numbers of vertices in OBJ
+    /// files say nothing: one is split where its normals differ, and that changes as a mesh moves.
+    fn by_corner(&self) -> Result<Vec<Vec3>, LoadError> {
+        self.same_count("triangles", self.open.triangles.len(), self.close.triangles.len())?;
+        self.matched([self.close, self.open], 1)?;
+        self.matched([self.open, self.close], 0)
+    }
+
+    /// The place in `to` of each vertex of `from`, which has to be one place; `which` of the paths is that of `from`.
+    fn matched(&self, [from, to]: [&Mesh; 2], which: usize) -> Result<Vec<Vec3>, LoadError> {
+        let mut places: Vec<Option<Vec3>> = vec![None; from.positions.len()];
+        let corners = from.triangles.as_flattened().iter().zip(to.triangles.as_flattened());
+        for (corner, (vertex, goal)) in corners.enumerate() {
+            let place = to.positions[*goal as usize];
+            let known = places[*vertex as usize].get_or_insert(place);
+            if *known != place {
+                let message = format!(
+                    "one vertex of {} is at {known} and at {place} of {}; {MEND}",
+                    self.paths[which].display(),
+                    self.paths[1 - which].display()
+                );
+                return Err(self.wrong(format!("triangle {}", corner / 3), message));
+            }
+        }
+        // A vertex that no triangle uses stays.
+        Ok(places.iter().zip(&from.positions).map(|(place, own)| place.unwrap_or(*own)).collect())
+    }
+
+    fn same_count(&self, what: &str, open: usize, close: usize) -> Result<(), LoadError> {
+        if open == close {
+            return Ok(());
+        }
+        let message = format!("it has {close} {what}, but {} has {open}; {MEND}", self.paths[0].display());
+        Err(self.wrong(what, message))
+    }
+
+    fn wrong(&self, place: impl Into<String>, message: String) -> LoadError {
+        Source { path: self.paths[1] }.broken(place, message)
+    }
+}

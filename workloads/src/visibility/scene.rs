@@ -1,0 +1,122 @@
+//! What a visibility run is given, whichever files it came from.
+
+use std::ops::Range;
+use std::path::Path;
+
+use activity::Warning;
+use glam::Vec3;
+use pipeline::sampling::HashedSamples;
+use pipeline::{Camera, LensShape, Viewport};
+
+use super::camera::{CameraSpec, View, Wrong, fit};
+use super::mesh::MovingMesh;
+use crate::error::{LoadError, Source};
+use crate::scene::measure::lens_leaves_view;
+
+/// Moving triangles in camera space (x right, y up, z forward) with the camera and sampling they are to be seen by.
+#[derive(Clone, Debug)]
+pub struct VisibilityScene {
+    /// Size of the image.
+    pub viewport: Viewport,
+    /// Samples in each pixel.
+    pub per_pixel: u32,
+    /// Seed of hashed samples.
+    pub seed: u64,
+    /// The camera, standing at the origin of its own space; a pinhole where the lens radius is zero.
+    pub camera: Camera,
+    /// Shape of the aperture.
+    pub shape: LensShape,
+    /// Vertices when the shutter opens.
+    pub open: Vec<Vec3>,
+    /// Vertices when it closes.
+    pub close: Vec<Vec3>,
+    /// Vertex indices of each triangle, all in range.
+    pub triangles: Vec<[u32; 3]>,
+    /// The triangles of each object, in order; one object for files that know of none.
+    pub objects: Vec<Range<u32>>,
+    /// The camera that was fitted, as a file, where none was given.
+    pub fitted: Option<CameraSpec>,
+    /// What there is to say of the scene, with stable codes.
+    pub warnings: Vec<Warning>,
+}
+
+/// Meshes to be looked at, and the files that messages are about.
+pub(super) struct Subject<'a> {
+    /// The file of the meshes.
+    pub path: &'a Path,
+    /// An object each.
+    pub objects: Vec<MovingMesh>,
+}
+
+impl VisibilityScene {
+    /// The hashed samples of the scene's seed, or `None` when their number is out of range.
+    pub fn hashed_samples(&self) -> Option<HashedSamples> {
+        HashedSamples::new(self.seed, self.viewport.width(), self.per_pixel, self.shape)
+    }
+
+    /// `subject` as the camera described sees it, fitted where it has no place.
+    pub(super) fn seen(subject: Subject<'_>, spec: &CameraSpec) -> Result<Self, LoadError> {
+        let source = Source { path: subject.path };
+        let (mesh, objects) =
+            joined(subject.objects).map_err(|message| source.broken("triangles", message))?;
+        let (placed, warnings) = if spec.is_placed() {
+            (spec.completed(), Vec::new())
+        } else {
+            let message = "there are no triangles of usable size to fit a camera to: give one with --camera";
+            let (placed, holds_lens) = fit(spec, &mesh).ok_or_else(|| source.broken("triangles", message))?;
+            (placed, if holds_lens { Vec::new() } else { vec![lens_leaves_view()] })
+        };
+        let unusable = |(place, message): Wrong| source.broken(format!("camera: {place}"), message);
+        let view = placed.view().map_err(unusable)?;
+        let [open, close] =
+            in_camera_space(&view, &mesh).map_err(|message| source.broken("vertices", message))?;
+        Ok(Self {
+            viewport: view.viewport,
+            per_pixel: placed.samples(),
+            seed: placed.seed(),
+            camera: view.camera,
+            shape: placed.shape(),
+            open,
+            close,
+            triangles: mesh.triangles,
+            objects,
+            fitted: (!spec.is_placed()).then_some(placed),
+            warnings,
+        })
+    }
+}
+
+/// All objects as one mesh, and the triangles of each.
+fn joined(objects: Vec<MovingMesh>) -> Result<(MovingMesh, Vec<Range<u32>>), String> {
+    let mut ranges = Vec::with_capacity(objects.len());
+    let count = |length: usize| {
+        u32::try_from(length)
+            .map_err(|_| "there are more than 2^32 in all objects; make fewer of them".to_owned())
+    };
+    let mut whole = MovingMesh::default();
+    for object in objects {
+        let (first, start) = (count(whole.open.len())?, count(whole.triangles.len())?);
+        count(whole.open.len() + object.open.len())?;
+        whole.open.extend(object.open);
+        whole.close.extend(object.close);
+        whole.triangles.extend(object.triangles.iter().map(|corners| corners.map(|vertex| first + vertex)));
+        ranges.push(start..count(whole.triangles.len())?);
+    }
+    Ok((whole, ranges))
+}
+
+/// The vertices at both ends as the camera sees them, rounded once from what the file says. A still vertex before a
+/// still camera stays still to the last bit.
+fn in_camera_space(view: &View, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], String> {
+    let [open, close] = &view.stands;
+    let see = |(stand, points): (&crate::scene::camera::Stand, &[glam::DVec3])| {
+        let seen = points.iter().enumerate().map(|(vertex, point)| {
+            let seen = stand.view(*point).as_vec3();
+            let far =
+                || format!("vertex {vertex} at {point} is out of the range of numbers here: scale the mesh");
+            if seen.is_finite() { Ok(seen) } else { Err(far()) }
+        });
+        seen.collect::<Result<Vec<_>, _>>()
+    };
+    Ok([see((open, &mesh.open))?, see((close, &mesh.close))?])
+}
