@@ -37,7 +37,7 @@ pub mod traversal;
 
 pub use frame::{Features, PipelineSpec, Rendered, Settings, render};
 pub use geometry::{
-    Camera, CameraError, Cull, Draw, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
+    Camera, CameraError, Clip, Cull, Draw, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
 };
 pub use memory::{CacheSpec, MemorySpec};
 pub use sampling::{LensShape, SampleTable};

@@ -29,24 +29,7 @@ impl Shader for Checkered {
 
 /// Every way to switch the tests on and off.
 fn switches() -> Vec<Features> {
-    let on = |bits: u8, bit: u8| bits & (1 << bit) != 0;
-    (0..8)
-        .flat_map(|bits| {
-            let features = Features {
-                side_planes: on(bits, 0),
-                edges: on(bits, 1),
-                z_max: on(bits, 2),
-                ..Features::ALL
-            };
-            let screenless = Features {
-                side_planes: on(bits, 0),
-                edges: on(bits, 1),
-                z_max: on(bits, 2),
-                ..Features::NONE
-            };
-            if features == screenless { vec![features] } else { vec![features, screenless] }
-        })
-        .collect()
+    (0..SWITCHES).map(switched).collect()
 }
 
 /// A frame's packets and counts, and how many of its samples see anything.

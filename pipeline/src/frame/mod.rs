@@ -7,6 +7,7 @@ mod replay;
 mod resolve;
 mod settings;
 mod surface;
+mod tile_tests;
 mod vertices;
 mod worker;
 
