@@ -47,3 +47,59 @@ pub fn at_rest(vertex: &MovingVertex) -> MovingVertex {
     let middle = [0, 1, 2].map(|axis| vertex.open[axis] + 0.5 * (vertex.close[axis] - vertex.open[axis]));
     MovingVertex { open: middle, close: middle }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, cases};
+    use super::*;
+
+    fn vertices(case: &super::super::testing::Case) -> [MovingVertex; 3] {
+        case.triangle.corners.map(|corner| MovingVertex {
+            open: corner.open,
+            close: [0, 1, 2].map(|k| corner.open[k] + corner.delta[k]),
+        })
+    }
+
+    #[test]
+    fn no_vertex_is_farther_than_said_and_some_is_as_far() {
+        let (mut r, mut finite) = (Uniform::new(12), 0);
+        for (seed, case) in cases(200) {
+            let v = vertices(&case);
+            let (motion, blur) = (motion_px(v.each_ref(), &case.shear), blur_px(v.each_ref(), &case.shear));
+            if motion.is_infinite() {
+                assert!(
+                    blur.is_infinite()
+                        && case.triangle.corners.iter().any(|c| c.at(0.0)[2] <= 0.0 || c.at(1.0)[2] <= 0.0)
+                );
+                continue;
+            }
+            finite += 1;
+            let at_centre =
+                |t: f64, [u, v]: [f64; 2]| case.seen([0.0, 0.0, u, v, t]).map(|[x, y, w]| [x / w, y / w]);
+            let far = |a: [[f64; 2]; 3], b: [[f64; 2]; 3]| {
+                (0..3).map(|i| (a[i][0] - b[i][0]).hypot(a[i][1] - b[i][1])).fold(0.0, f64::max)
+            };
+            for _ in 0..40 {
+                let angle = f64::from(r.within(0.0, 7.0));
+                let lens = if case.within.lens { [angle.cos(), angle.sin()] } else { [0.0; 2] };
+                let t = f64::from(r.within(0.0, 1.0));
+                let moved = far(at_centre(t, lens), at_centre(0.5, lens));
+                assert!(moved <= motion * (1.0 + 1e-9) + 1e-4, "{seed}: {moved} > {motion}");
+                let blurred = far(at_centre(t, lens), at_centre(t, [0.0; 2]));
+                assert!(blurred <= blur * (1.0 + 1e-9) + 1e-4, "{seed}: {blurred} > {blur}");
+            }
+            if !case.within.lens {
+                let most = [0.0, 1.0].map(|t| far(at_centre(t, [0.0; 2]), at_centre(0.5, [0.0; 2])));
+                assert!((most[0].max(most[1]) - motion).abs() <= 1e-4 * (1.0 + motion), "{seed}");
+                assert_eq!(blur, 0.0);
+            }
+        }
+        assert!(finite > 300, "{finite}");
+    }
+
+    #[test]
+    fn at_rest_is_where_it_is_in_mid_shutter() {
+        let vertex = MovingVertex { open: [1.0, -2.0, 4.0], close: [3.0, 2.0, 2.0] };
+        assert_eq!(at_rest(&vertex), MovingVertex { open: [2.0, 0.0, 3.0], close: [2.0, 0.0, 3.0] });
+    }
+}

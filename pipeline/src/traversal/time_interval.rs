@@ -112,3 +112,117 @@ pub fn time_interval_over(triangle: &Triangle, rect: &TileRect) -> [TimeInterval
 fn inside(edges: [Quadratic; 3]) -> TimeIntervals {
     edges.iter().fold(TimeIntervals::WHOLE, |left, edge| left.intersect(edge.above()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, cases};
+    use super::*;
+    use crate::setup::Corner;
+
+    /// The three edges at a point and the time `k / 64`, exactly, for vertices with small whole coordinates.
+    fn exact(corners: &[Corner; 3], at: [i128; 2], k: i128) -> [i128; 3] {
+        let seen = corners.map(|corner| {
+            let p = [0, 1, 2].map(|axis| corner.open[axis] as i128 * 64 + k * corner.delta[axis] as i128);
+            [p[0] - at[0] * p[2], p[1] - at[1] * p[2]]
+        });
+        [(1, 2), (2, 0), (0, 1)]
+            .map(|(i, j): (usize, usize)| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1])
+    }
+
+    fn whole_number_triangle(r: &mut Uniform) -> Triangle {
+        let (_, case) = cases(1).nth(1).unwrap();
+        let mut number = |lo: f32, hi: f32| r.within(lo, hi).round();
+        let corners = [0; 3].map(|_| {
+            let open = [number(-9.0, 9.0), number(-9.0, 9.0), number(1.0, 4.0)];
+            Corner { open, delta: [number(-9.0, 9.0), number(-9.0, 9.0), number(-5.0, 3.0)] }
+        });
+        Triangle { corners, moving: true, ..case.triangle }
+    }
+
+    #[test]
+    fn every_time_is_in_or_out_as_whole_numbers_say() {
+        let (mut r, mut found, mut several) = (Uniform::new(9), [0; 2], 0);
+        for _ in 0..20_000 {
+            let triangle = whole_number_triangle(&mut r);
+            let at = [0; 2].map(|_| r.within(-4.0, 4.0).round());
+            let sets = time_interval(&triangle, f64::from(at[0]), f64::from(at[1]));
+            several += usize::from(sets.iter().any(|set| set.as_slice().len() > 1));
+            for k in 0..=64 {
+                let e = exact(&triangle.corners, at.map(|c| c as i128), k);
+                let t = k as f64 / 64.0;
+                let inside = [e.iter().all(|&e| e >= 0), e.iter().all(|&e| e <= 0)];
+                for face in [0, 1] {
+                    found[face] += u32::from(inside[face]);
+                    // Away from the roots both say the same; on a root and nowhere else they may differ by rounding.
+                    let on_a_root = e.contains(&0);
+                    let says = sets[face].contains(t);
+                    assert!(says == inside[face] || (on_a_root && says), "{face} {t} {e:?} {sets:?}");
+                }
+            }
+        }
+        assert!(found[0] > 10_000 && found[1] > 10_000 && several > 20, "{found:?} {several}");
+    }
+
+    #[test]
+    fn dense_sampling_finds_no_other_time_and_the_intervals_are_no_wider() {
+        let mut r = Uniform::new(10);
+        for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
+            let place = case.place(&mut r);
+            let sets = time_interval(&case.triangle, place[0], place[1]);
+            let mut lasted = [0.0; 2];
+            for step in 0..=4000 {
+                let t = f64::from(step) / 4000.0;
+                let e = case.edges([place[0], place[1], 0.0, 0.0, t]);
+                for face in [0, 1] {
+                    let sign = if face == 0 { 1.0 } else { -1.0 };
+                    let inside = e.iter().all(|&e| sign * e >= 0.0);
+                    assert!(!inside || sets[face].contains(t), "{seed}: {t} {e:?} {sets:?}");
+                    lasted[face] += if inside { 1.0 / 4000.0 } else { 0.0 };
+                }
+            }
+            for face in [0, 1] {
+                assert!((sets[face].length() - lasted[face]).abs() < 3e-3, "{seed}: {lasted:?} {sets:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn over_a_rectangle_every_time_of_every_point_is_there() {
+        let (mut r, mut short) = (Uniform::new(11), 0);
+        for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
+            let over = time_interval_over(&case.triangle, &case.tile);
+            short += u32::from(over.iter().any(|set| set.length() < 0.9));
+            for _ in 0..40 {
+                let place = case.place(&mut r);
+                let point = time_interval(&case.triangle, place[0], place[1]);
+                for face in [0, 1] {
+                    for [lo, hi] in point[face].as_slice() {
+                        for t in [*lo, 0.5 * (lo + hi), *hi] {
+                            assert!(over[face].contains(t), "{seed}: {t} {over:?} {point:?}");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(short > 100, "{short}");
+    }
+
+    #[test]
+    fn a_triangle_that_flies_past_is_there_while_it_covers_the_point() {
+        // 4 wide, moving 16 to the right: its edges x = t 16 - 8 and x = t 16 - 4 pass the origin at 1/4 and 1/2.
+        let corner = |x: f32, y: f32| Corner { open: [x, y, 1.0], delta: [16.0, 0.0, 0.0] };
+        let (_, case) = cases(1).nth(1).unwrap();
+        let triangle = Triangle {
+            corners: [corner(-8.0, -9.0), corner(-4.0, 0.0), corner(-8.0, 9.0)],
+            moving: true,
+            ..case.triangle
+        };
+        let sets = time_interval(&triangle, 0.0, 0.0);
+        assert!(sets[1].as_slice().is_empty(), "{sets:?}");
+        let [[lo, hi]] = sets[0].as_slice() else { panic!("{sets:?}") };
+        assert!(
+            (lo - 0.25).abs() < 1e-12 && *lo <= 0.25 && (hi - 0.5).abs() < 1e-12 && *hi >= 0.5,
+            "{sets:?}"
+        );
+    }
+}
