@@ -2,6 +2,7 @@
 
 mod bin;
 mod counters;
+mod judge;
 mod pass;
 mod replay;
 mod resolve;

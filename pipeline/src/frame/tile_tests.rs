@@ -1,8 +1,10 @@
 //! The tile tests that are switched on, in order of price: what of lens and time one triangle leaves over one tile.
 
 use super::counters::TileWork;
+use super::judge::{Judge, Test};
 use super::settings::Features;
 use crate::geometry::Shear;
+use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
     self, Box5, Edges, Facing, LensLines, Piece, Screen, TileRect, Timeline, View, narrow,
@@ -14,6 +16,23 @@ pub(super) struct Subject<'a> {
     pub triangle: &'a Triangle,
     pub lines: Option<&'a LensLines>,
     pub shear: &'a Shear,
+}
+
+/// A tile, with how much there is to do on it.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub rect: TileRect,
+    /// Whether it holds finer tiles, and how many of them are visited.
+    pub tiles: Option<u32>,
+    /// Samples in those.
+    pub samples: u32,
+}
+
+/// Which tests to run, what they have done so far and what was learnt from it.
+pub(super) struct Run<'a> {
+    pub features: &'a Features,
+    pub work: &'a mut TileWork,
+    pub judge: &'a mut Judge,
 }
 
 /// Where in lens and time the triangle may still be seen, and which faces when.
@@ -30,56 +49,115 @@ impl Left {
         Self { within, times: Timeline::one(Piece { t: within.t, faces: [true; 2] }), edges: None }
     }
 
-    /// The same in the box `within`.
-    fn within(&self, within: Box5) -> Self {
+    /// The same in the box `within`, or `None` where nothing is left.
+    fn narrowed(&self, within: Box5) -> Option<Self> {
         let times = self.times.meet(&Timeline::one(Piece { t: within.t, faces: [true; 2] }));
-        Self { within, times, edges: None }
+        Some(Self { within: Box5 { t: times.hull()?, ..within }, times, edges: None })
+    }
+
+    /// The share of all of lens and time that is left; samples are spread evenly over them.
+    fn volume(&self, moving: bool) -> f64 {
+        let length = |[lo, hi]: [f32; 2]| f64::from((hi - lo).max(0.0));
+        let time: f64 = self.times.pieces().iter().map(|piece| length(piece.t)).sum();
+        let lens = if self.within.lens { 0.25 * length(self.within.u) * length(self.within.v) } else { 1.0 };
+        lens * if moving { time } else { 1.0 }
     }
 }
 
 impl Subject<'_> {
-    /// What is left over the tile `rect` of what was `left` before, or `None` where the triangle is not seen there. `edges` says whether
-    /// facing and edges have a say.
-    pub fn test(
-        &self,
-        rect: &TileRect,
-        left: &Left,
-        run: &Features,
-        edges: bool,
-        work: &mut TileWork,
-    ) -> Option<Left> {
-        let within = self.lens_lines(rect, left.within, run, work)?;
-        let within = self.side_planes(rect, within, run, work)?;
-        let mut left = left.within(within);
-        left.within.t = left.times.hull()?;
-        if edges && run.facing {
-            self.facing(rect, &mut left, run.facing_splits, work)?;
+    /// What is left at `place` of what was `left` before, or `None` where the triangle is not seen there.
+    pub fn test(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> Option<Left> {
+        let Features { side_planes, facing, edges, coarse, lens_lines, .. } = *run.features;
+        let (moving, lens) = (self.triangle.moving, left.within.lens);
+        let mut left = *left;
+        let lines = self.lines.filter(|_| lens_lines && lens);
+        if let Some(lines) = lines {
+            let price = traversal::lens_line_madds(0);
+            left = self.judged(Test::LensLines, price, place, left, run, |left, work| {
+                left.narrowed(lens_lines_over(lines, &place.rect, left.within, work)?)
+            })?;
         }
-        if edges && run.edges {
-            self.edge_bounds(rect, &mut left, work)?;
+        if side_planes && (moving || lens || self.triangle.behind) {
+            let price = traversal::madds(moving, lens);
+            left = self.judged(Test::SidePlanes, price, place, left, run, |left, work| {
+                left.narrowed(self.side_planes(&place.rect, left.within, work)?)
+            })?;
+        }
+        if (facing || edges) && (coarse || place.tiles.is_none()) {
+            let (splits, price) = (run.features.facing_splits, self.edge_price(place, &left, run));
+            left = self.judged(Test::Edges, price, place, left, run, |mut left, work| {
+                if facing {
+                    self.facing(&place.rect, &mut left, splits, work)?;
+                }
+                if edges {
+                    self.edge_bounds(&place.rect, &mut left, work)?;
+                }
+                Some(left)
+            })?;
         }
         Some(left)
     }
 
-    fn lens_lines(&self, rect: &TileRect, within: Box5, run: &Features, work: &mut TileWork) -> Option<Box5> {
-        let Some(lines) = self.lines.filter(|_| run.lens_lines && within.lens) else { return Some(within) };
-        let (next, crossings) = lines.narrow(rect, &within);
-        work.lens_line_madds += traversal::lens_line_madds(crossings);
-        work.culled_lens += u32::from(next.is_none());
-        next
+    /// Runs a test, under `auto` only where it is wanted.
+    fn judged(
+        &self,
+        test: Test,
+        price: u32,
+        place: &Place,
+        left: Left,
+        run: &mut Run<'_>,
+        kernel: impl FnOnce(Left, &mut TileWork) -> Option<Left>,
+    ) -> Option<Left> {
+        if !run.features.auto {
+            return kernel(left, run.work);
+        }
+        let at_stake = self.at_stake(place, &left, run);
+        if !run.judge.wants(test, place.tiles.is_some(), price, at_stake) {
+            return Some(left);
+        }
+        let before = left.volume(self.triangle.moving);
+        let after = kernel(left, run.work);
+        let share = after.map_or(0.0, |left| left.volume(self.triangle.moving) / before);
+        run.judge.learn(test, place.tiles.is_some(), if share.is_finite() { 1.0 - share } else { 0.0 });
+        after
     }
 
-    fn side_planes(
-        &self,
-        rect: &TileRect,
-        within: Box5,
-        run: &Features,
-        work: &mut TileWork,
-    ) -> Option<Box5> {
-        let plain = !self.triangle.moving && !within.lens && !self.triangle.behind;
-        if plain || !run.side_planes {
-            return Some(within);
-        }
+    /// The multiply-adds to be expected at `place` for what is `left`.
+    fn at_stake(&self, place: &Place, left: &Left, run: &Run<'_>) -> f64 {
+        let (moving, lens) = (self.triangle.moving, left.within.lens);
+        let full = f64::from(sample_test::madds(moving, lens));
+        let screened =
+            f64::from(traversal::screen_madds(moving, lens)) + (1.0 - run.judge.share(Test::Screen)) * full;
+        let price = if run.features.screen { screened.min(full) } else { full };
+        let samples = f64::from(place.samples) * left.volume(moving);
+        let tiles = place.tiles.map_or(0.0, |tiles| {
+            f64::from(tiles * (traversal::madds(moving, lens) + traversal::edge_madds(moving, lens)))
+        });
+        // A finer tile costs no more than testing all its samples.
+        samples * price + tiles.min(samples * full)
+    }
+
+    /// The price of facing and edge bounds; where a screen follows, the edges are found anyway.
+    fn edge_price(&self, place: &Place, left: &Left, run: &Run<'_>) -> u32 {
+        let (moving, lens) = (self.triangle.moving, left.within.lens);
+        let facing = if run.features.facing { traversal::facing_madds(moving, lens, 0) } else { 0 };
+        let bounds = if run.features.edges { traversal::edge_bound_madds(moving, lens) } else { 0 };
+        let found = traversal::edge_madds(moving, lens);
+        let screen = f64::from(found + traversal::screen_setup_madds(moving, lens, true));
+        let shared =
+            run.features.screen && place.tiles.is_none() && self.saved_by_screen(place, left, run) > screen;
+        facing + bounds + if shared { 0 } else { found }
+    }
+
+    /// The multiply-adds a screen saves as a rule, but for its set-up.
+    fn saved_by_screen(&self, place: &Place, left: &Left, run: &Run<'_>) -> f64 {
+        let (moving, lens) = (self.triangle.moving, left.within.lens);
+        let (full, screen) = (sample_test::madds(moving, lens), traversal::screen_madds(moving, lens));
+        let each = run.judge.share(Test::Screen) * f64::from(full) - f64::from(screen);
+        f64::from(place.samples) * left.volume(moving) * each
+    }
+
+    fn side_planes(&self, rect: &TileRect, within: Box5, work: &mut TileWork) -> Option<Box5> {
         work.side_plane_madds += traversal::madds(self.triangle.moving, within.lens);
         let next = narrow(self.triangle, self.shear, rect, &within);
         work.culled_sides += u32::from(next.is_none());
@@ -111,6 +189,22 @@ impl Subject<'_> {
         Some(())
     }
 
+    /// Whether to screen the samples of what is left on a fine tile.
+    pub fn wants_screen(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> bool {
+        if !run.features.auto || !run.features.screen {
+            return run.features.screen;
+        }
+        let (moving, lens) = (self.triangle.moving, left.within.lens);
+        let found = if left.edges.is_some() { 0 } else { traversal::edge_madds(moving, lens) };
+        let screened =
+            f64::from(place.samples) * left.volume(moving) * f64::from(traversal::screen_madds(moving, lens));
+        let full =
+            f64::from(place.samples) * left.volume(moving) * f64::from(sample_test::madds(moving, lens));
+        let pieces = left.times.pieces().len() as u32;
+        let set_up = found + pieces * traversal::screen_setup_madds(moving, lens, pieces == 1);
+        run.judge.wants(Test::Screen, false, set_up + screened as u32, full)
+    }
+
     /// The screen for the samples of a piece of the time that is left.
     pub fn screen(&self, rect: &TileRect, left: &mut Left, piece: &Piece, work: &mut TileWork) -> Screen {
         let edges = self.edges(rect, left, work);
@@ -128,4 +222,11 @@ impl Subject<'_> {
             Edges::new(View::new(self.triangle, self.shear, rect, &within))
         })
     }
+}
+
+fn lens_lines_over(lines: &LensLines, rect: &TileRect, within: Box5, work: &mut TileWork) -> Option<Box5> {
+    let (next, crossings) = lines.narrow(rect, &within);
+    work.lens_line_madds += traversal::lens_line_madds(crossings);
+    work.culled_lens += u32::from(next.is_none());
+    next
 }

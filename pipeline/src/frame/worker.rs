@@ -2,9 +2,10 @@
 
 use super::bin::Bin;
 use super::counters::{BinLog, TileWork, Work};
+use super::judge::Test;
 use super::pass::Pass;
 use super::surface::Grid;
-use super::tile_tests::{Left, Subject};
+use super::tile_tests::{Left, Place, Run, Subject};
 use super::vertices::Ready;
 use crate::depth::{DepthTile, interval_madds, nearest};
 use crate::geometry::Shear;
@@ -50,24 +51,34 @@ impl<'a, 'p> Worker<'a, 'p> {
 
     /// One triangle through the tiles of the bin.
     pub fn triangle(&mut self, ready: &Ready) {
-        let features = &self.pass.settings.spec.features;
         let (side, coarse) = (self.pass.settings.spec.tile_px, self.pass.settings.spec.coarse_tile_px);
         let subject = self.subject(ready);
-        self.tests.coarse_visited += 1;
-        let rect = TileRect::new(self.pass.settings.viewport, self.bin.origin, coarse);
-        let all = Left::all(ready.within);
-        let Some(left) = subject.test(&rect, &all, features, features.coarse, &mut self.tests) else {
-            return;
-        };
         let [x0, y0] = self.bin.origin;
         let here = ready.pixels.intersection(&PixelRect { x0, y0, x1: x0 + coarse, y1: y0 + coarse });
         let tiles = here.tiles(side);
+        self.tests.coarse_visited += 1;
+        let count = (tiles.x1 - tiles.x0) * (tiles.y1 - tiles.y0);
+        let place = Place {
+            rect: TileRect::new(self.pass.settings.viewport, self.bin.origin, coarse),
+            tiles: Some(count),
+            samples: count * self.samples_of_a_tile(),
+        };
+        let Some(left) = subject.test(&place, &Left::all(ready.within), &mut self.run()) else { return };
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
                 self.tests.visited += 1;
                 self.tile(&subject, &left, [column * side, row * side]);
             }
         }
+    }
+
+    fn samples_of_a_tile(&self) -> u32 {
+        self.pass.settings.spec.tile_px.pow(2) * self.pass.settings.samples.per_pixel()
+    }
+
+    fn run(&mut self) -> Run<'_> {
+        let features = &self.pass.settings.spec.features;
+        Run { features, work: &mut self.tests, judge: &mut self.bin.judge }
     }
 
     fn subject<'r>(&self, ready: &'r Ready) -> Subject<'r>
@@ -80,13 +91,13 @@ impl<'a, 'p> Worker<'a, 'p> {
 
     /// One triangle in one tile, as far as the tests let it.
     fn tile(&mut self, subject: &Subject<'_>, left: &Left, origin: [u32; 2]) {
-        let features = &self.pass.settings.spec.features;
         let rect = TileRect::new(self.pass.settings.viewport, origin, self.pass.settings.spec.tile_px);
-        let Some(mut left) = subject.test(&rect, left, features, true, &mut self.tests) else { return };
+        let tile = Place { rect, tiles: None, samples: self.samples_of_a_tile() };
+        let Some(mut left) = subject.test(&tile, left, &mut self.run()) else { return };
         let place = self.place(origin);
         self.fill(place, origin, left.within.lens);
         if !self.behind_all(subject.triangle, &left.within, place) {
-            let tested = self.samples(subject, &rect, &mut left, place);
+            let tested = self.samples(subject, &tile, &mut left, place);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
                 self.ask_for_quads(subject.triangle, place, origin);
                 self.record(subject.triangle.id, tested, origin);
@@ -110,13 +121,8 @@ impl<'a, 'p> Worker<'a, 'p> {
     }
 
     /// The samples of a tile in each piece of the time that is left. Says in which dimensions they were tested.
-    fn samples(
-        &mut self,
-        subject: &Subject<'_>,
-        rect: &TileRect,
-        left: &mut Left,
-        place: usize,
-    ) -> [bool; 2] {
+    fn samples(&mut self, subject: &Subject<'_>, tile: &Place, left: &mut Left, place: usize) -> [bool; 2] {
+        let screened = subject.wants_screen(tile, left, &mut self.run());
         let Scratch { samples, sharp, hits, .. } = &mut *self.scratch;
         let drawn_sharp = self.pass.lens && !left.within.lens;
         let samples = if drawn_sharp { &sharp[place] } else { &samples[place] };
@@ -127,17 +133,15 @@ impl<'a, 'p> Worker<'a, 'p> {
         let (triangle, within) = unclipped(subject.triangle, left.within);
         for piece in times.pieces() {
             let within = Box5 { t: piece.t, ..within };
-            let screen = self
-                .pass
-                .settings
-                .spec
-                .features
-                .screen
-                .then(|| subject.screen(rect, left, piece, &mut self.tests));
+            let screen = screened.then(|| subject.screen(&tile.rect, left, piece, &mut self.tests));
             test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
         }
         if !hits.written.is_empty() {
             stored.touch();
+        }
+        if hits.screened > 0 {
+            let passed = f64::from(hits.tested) / f64::from(hits.screened);
+            self.bin.judge.learn(Test::Screen, false, 1.0 - passed);
         }
         [triangle.moving, within.lens]
     }
