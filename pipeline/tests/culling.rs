@@ -55,10 +55,10 @@ proptest! {
     #[test]
     fn culling_changes_nothing(
         kind in kinds(), cull in culls(), lens: bool, switches in 0..SWITCHES, splits in 0..4_u32, borders: bool,
-        sizes in 0..4_usize, count in 1..160_u32, seed: u64,
+        sizes in 0..4_usize, auto: bool, count in 1..160_u32, seed: u64,
     ) {
         let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (1, 8), (2, 64)][sizes];
-        let features = Features { facing_splits: splits, ..switched(switches) };
+        let features = Features { facing_splits: splits, auto, ..switched(switches) };
         let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(features) };
         Scene::new(kind, cull, lens, borders, count, seed).check(&spec);
     }
@@ -72,6 +72,9 @@ fn every_combination_on_one_scene_of_each_kind() {
             let scene = Scene::new(kind, cull, lens, borders, 60, 11);
             for switches in 0..SWITCHES {
                 scene.check(&spec(switched(switches)));
+            }
+            for switches in (0..SWITCHES).step_by(7).chain([SWITCHES - 1]) {
+                scene.check(&spec(Features { auto: true, ..switched(switches) }));
             }
         }
     }

@@ -69,7 +69,8 @@ impl Subject<'_> {
     pub fn test(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> Option<Left> {
         let Features { side_planes, facing, edges, coarse, lens_lines, .. } = *run.features;
         let (moving, lens) = (self.triangle.moving, left.within.lens);
-        let mut left = *left;
+        // Edges found over a coarser tile are those of that tile.
+        let mut left = Left { edges: None, ..*left };
         let lines = self.lines.filter(|_| lens_lines && lens);
         if let Some(lines) = lines {
             let price = traversal::lens_line_madds(0);
