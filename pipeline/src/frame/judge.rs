@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn what_takes_nothing_away_is_soon_tried_seldom_and_found_again_when_it_does() {
         let mut judge = Judge::new();
-        let mut runs = |judge: &mut Judge, share: f64| {
+        let runs = |judge: &mut Judge, share: f64| {
             (0..1000)
                 .filter(|_| {
                     let runs = judge.wants(Test::Screen, false, 100, 1000.0);

@@ -7,7 +7,7 @@ use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
-    self, Box5, Edges, Facing, LensLines, Piece, Screen, TileRect, Timeline, View, narrow,
+    self, Box5, Edges, Facing, LensLines, Piece, Screen, TileRect, Timeline, View, narrow_counted,
 };
 
 /// A triangle with what set-up found for its tile tests.
@@ -79,7 +79,7 @@ impl Subject<'_> {
             })?;
         }
         if side_planes && (moving || lens || self.triangle.behind) {
-            let price = traversal::madds(moving, lens);
+            let price = 4 * traversal::side_madds(moving, lens, self.triangle.behind);
             left = self.judged(Test::SidePlanes, price, place, left, run, |left, work| {
                 left.narrowed(self.side_planes(&place.rect, left.within, work)?)
             })?;
@@ -132,7 +132,10 @@ impl Subject<'_> {
         let price = if run.features.screen { screened.min(full) } else { full };
         let samples = f64::from(place.samples) * left.volume(moving);
         let tiles = place.tiles.map_or(0.0, |tiles| {
-            f64::from(tiles * (traversal::madds(moving, lens) + traversal::edge_madds(moving, lens)))
+            f64::from(
+                tiles
+                    * (4 * traversal::side_madds(moving, lens, false) + traversal::edge_madds(moving, lens)),
+            )
         });
         // A finer tile costs no more than testing all its samples.
         samples * price + tiles.min(samples * full)
@@ -159,8 +162,8 @@ impl Subject<'_> {
     }
 
     fn side_planes(&self, rect: &TileRect, within: Box5, work: &mut TileWork) -> Option<Box5> {
-        work.side_plane_madds += traversal::madds(self.triangle.moving, within.lens);
-        let next = narrow(self.triangle, self.shear, rect, &within);
+        let (next, madds) = narrow_counted::<f64>(self.triangle, self.shear, rect, &within);
+        work.side_plane_madds += madds;
         work.culled_sides += u32::from(next.is_none());
         next
     }

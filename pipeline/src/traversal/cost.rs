@@ -7,6 +7,14 @@ pub const ROOT: u32 = 8;
 /// Finding the place of a time in the interval of a box.
 pub const PHASE: u32 = 3;
 
+/// Finding where a distance to a side is nothing, and mapping that to a range.
+pub const SIDE_ROOT: u32 = 4;
+
+/// Holding a triangle against one side of a tile, roots apart.
+pub const fn side_madds(moving: bool, lens: bool, behind: bool) -> u32 {
+    by(moving, lens, [6, 24, 18, 48]) * if behind { 2 } else { 1 }
+}
+
 /// Picks by dimensions in use: 2D, with time, with lens, both.
 const fn by(moving: bool, lens: bool, madds: [u32; 4]) -> u32 {
     madds[moving as usize + 2 * lens as usize]
@@ -95,6 +103,23 @@ mod tests {
             let (madds, _) = count(|| edges.screen([0.25, 0.5], [true; 2]));
             println!("screen part {moving} {lens} {madds}");
             assert_eq!(madds, screen_setup_madds(moving, lens, !moving), "part {moving} {lens}");
+        }
+    }
+
+    #[test]
+    fn side_planes_cost_what_their_kernel_counts() {
+        for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
+            let shear = if lens { SHEAR } else { Shear::default() };
+            for behind in [false, true] {
+                let triangle = Triangle { behind, ..triangle(moving, &shear) };
+                for x in [-60.0, -20.0, 0.0, 40.0, 70.0, 300.0] {
+                    let tile = TileRect { x: [x, x + 8.0], y: [16.0, 24.0] };
+                    let within = Box5 { t: [0.25, 0.75], ..Box5::whole(lens) };
+                    let (madds, (_, told)) =
+                        count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
+                    assert_eq!(madds, told, "{moving} {lens} {behind} {x}");
+                }
+            }
         }
     }
 

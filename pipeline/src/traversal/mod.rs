@@ -21,6 +21,7 @@ mod view;
 pub use box5::{Box5, TileRect};
 pub use cost::{
     edge_bound_madds, edge_madds, facing_madds, lens_line_madds, lens_line_setup_madds, screen_setup_madds,
+    side_madds,
 };
 pub use edges::{EdgeBounds, Edges, Faces};
 pub use facing::{Facing, Piece, Timeline};
@@ -28,6 +29,6 @@ pub use lens_lines::LensLines;
 pub use number::Number;
 pub use quadratic::{Pieces, Quadratic};
 pub use screen::{Screen, screen_madds};
-pub use side_planes::{madds, narrow};
+pub use side_planes::{narrow, narrow_counted};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
 pub use view::View;
