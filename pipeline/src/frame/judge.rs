@@ -20,6 +20,10 @@ pub(super) enum Test {
 struct Record {
     /// Running mean of the share of samples it took away. It begins high, so that every test is tried.
     share: f64,
+    /// Running mean of what it took over its nominal price: roots come on top, and what is culled early takes less.
+    dearer: f64,
+    /// How often it was run, with what the first guess counts for.
+    runs: f64,
     skipped: u32,
 }
 
@@ -30,19 +34,20 @@ pub(super) struct Judge {
 }
 
 /// Of so many times that a test does not seem to pay it is run once.
-const PROBE: u32 = 48;
-/// The weight of the last time in the mean.
-const LAST: f64 = 1.0 / 16.0;
+const PROBE: u32 = 64;
+/// So many times make the mean; before that it is the plain one.
+const MEMORY: f64 = 32.0;
 
 impl Judge {
     /// Nothing learnt yet.
     pub fn new() -> Self {
-        Self { records: [[Record { share: 0.75, skipped: 0 }; 4]; 2] }
+        Self { records: [[Record { share: 0.75, dearer: 1.0, runs: 3.0, skipped: 0 }; 4]; 2] }
     }
 
     /// Whether to run `test` for a price of `madds` where `at_stake` multiply-adds follow if it takes nothing away.
     pub fn wants(&mut self, test: Test, coarse: bool, madds: u32, at_stake: f64) -> bool {
-        let (record, price) = (&mut self.records[usize::from(coarse)][test as usize], f64::from(madds));
+        let record = &mut self.records[usize::from(coarse)][test as usize];
+        let price = f64::from(madds) * record.dearer;
         if price >= at_stake {
             return false;
         }
@@ -53,10 +58,12 @@ impl Judge {
         record.skipped.is_multiple_of(PROBE)
     }
 
-    /// Notes the share of samples that `test` took away.
-    pub fn learn(&mut self, test: Test, coarse: bool, share: f64) {
+    /// Notes the share of samples that `test` took away, and how many times its nominal price that took.
+    pub fn learn(&mut self, test: Test, coarse: bool, share: f64, dearer: f64) {
         let record = &mut self.records[usize::from(coarse)][test as usize];
-        record.share += (share - record.share) * LAST;
+        record.runs = (record.runs + 1.0).min(MEMORY);
+        record.share += (share - record.share) / record.runs;
+        record.dearer += (dearer - record.dearer) / record.runs;
     }
 
     /// The share of samples that `test` takes away from fine tiles as a rule.
@@ -84,15 +91,15 @@ mod tests {
                 .filter(|_| {
                     let runs = judge.wants(Test::Screen, false, 100, 1000.0);
                     if runs {
-                        judge.learn(Test::Screen, false, share);
+                        judge.learn(Test::Screen, false, share, 1.0);
                     }
                     runs
                 })
                 .count()
         };
         let (first, later) = (runs(&mut judge, 0.0), runs(&mut judge, 0.0));
-        assert!(first < 80 && (15..=25).contains(&later), "{first} {later}");
-        assert!(runs(&mut judge, 0.9) > 800);
+        assert!(first < 80 && (10..=20).contains(&later), "{first} {later}");
+        assert!(runs(&mut judge, 0.9) > 700);
         assert!(runs(&mut judge, 0.9) == 1000);
     }
 }

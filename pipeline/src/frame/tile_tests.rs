@@ -116,10 +116,12 @@ impl Subject<'_> {
         if !run.judge.wants(test, place.tiles.is_some(), price, at_stake) {
             return Some(left);
         }
-        let before = left.volume(self.triangle.moving);
+        let before = (left.volume(self.triangle.moving), run.work.tile_madds());
         let after = kernel(left, run.work);
-        let share = after.map_or(0.0, |left| left.volume(self.triangle.moving) / before);
-        run.judge.learn(test, place.tiles.is_some(), if share.is_finite() { 1.0 - share } else { 0.0 });
+        let left = after.map_or(0.0, |left| left.volume(self.triangle.moving) / before.0);
+        let share = if left.is_finite() { 1.0 - left } else { 0.0 };
+        let dearer = f64::from(run.work.tile_madds() - before.1) / f64::from(price);
+        run.judge.learn(test, place.tiles.is_some(), share, dearer);
         after
     }
 

@@ -141,7 +141,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
         if hits.screened > 0 {
             let passed = f64::from(hits.tested) / f64::from(hits.screened);
-            self.bin.judge.learn(Test::Screen, false, 1.0 - passed);
+            self.bin.judge.learn(Test::Screen, false, 1.0 - passed, 1.0);
         }
         [triangle.moving, within.lens]
     }
