@@ -116,12 +116,12 @@ impl<N: Number> Facing<N> {
         let view = &edges.view;
         let third = N::constant(1.0 / 3.0);
         let count = if view.moving { 4 } else { 1 };
-        let mut range = [[N::zero(); 4]; 2];
+        let [mut lowest, mut highest] = [[N::zero(); 4]; 2];
         let sums: [[N; 3]; 2] = [0, 1].map(|axis| {
             let [a, b, c] = edges.edges.map(|edge| edge.slopes[axis]);
             if view.lens { a.zip(&b, |a, b| a + b).zip(&c, |a, b| a + b).0 } else { [N::zero(); 3] }
         });
-        for k in 0..count {
+        for (k, (low, high)) in lowest.iter_mut().zip(&mut highest).take(count).enumerate() {
             let middle = determinant(edges, k);
             let middle = if k == 1 || k == 2 { middle * third } else { middle };
             let mut extent = N::zero();
@@ -131,8 +131,9 @@ impl<N: Number> Facing<N> {
                         extent + elevated(sum, k, third).abs() * view.s[axis].abs() * view.half[2 + axis];
                 }
             }
-            (range[0][k], range[1][k]) = (middle - extent, middle + extent);
+            (*low, *high) = (middle - extent, middle + extent);
         }
+        let mut range = [lowest, highest];
         if !view.moving {
             range = range.map(|[first, ..]| [first; 4]);
         }

@@ -165,7 +165,7 @@ mod tests {
                 for (axis, place, lens) in [(0, x / w, u), (1, y / w, v)] {
                     let at = |line: [f64; 2]| line[0] + 0.5 * (lens + 1.0) * (line[1] - line[0]);
                     let [low, high] = lines.axes[axis];
-                    let inside = !(place < at(low)) && !(place > -at(high));
+                    let inside = at(low) <= place && place <= -at(high);
                     assert!(inside, "{seed}: {place} {low:?} {high:?} {lens}");
                 }
             }
@@ -189,7 +189,7 @@ mod tests {
                 let [u, v] = [place[2] as f32, place[3] as f32];
                 let kept =
                     left.is_some_and(|b| (b.u[0]..=b.u[1]).contains(&u) && (b.v[0]..=b.v[1]).contains(&v));
-                assert!(kept || !inside || !(depth > f64::from(NEAR)), "{seed}: {place:?}");
+                assert!(kept || !inside || depth <= f64::from(NEAR), "{seed}: {place:?}");
             }
         }
         assert!(culled > 200 && narrowed > 40, "{culled} {narrowed}");

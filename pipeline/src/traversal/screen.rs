@@ -159,7 +159,7 @@ mod tests {
                     if kind == 0 {
                         for (k, value) in e.into_iter().enumerate() {
                             assert!(
-                                !(signs[k].0 && value > -room) && !(signs[k].1 && value < room),
+                                !(signs[k].0 && value > -room || signs[k].1 && value < room),
                                 "{seed}: {value}"
                             );
                         }

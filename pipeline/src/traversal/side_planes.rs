@@ -72,8 +72,9 @@ impl<N: Number> Side<'_, N> {
                     times = union(times, above(within.t, *opening, *closing, &mut roots));
                 }
                 if within.lens {
-                    for end in 0..if self.triangle.moving { 2 } else { 1 } {
-                        places = union(places, above(lens, d[0][end], d[1][end], &mut roots));
+                    let ends = if self.triangle.moving { 2 } else { 1 };
+                    for (left, right) in d[0].iter().zip(&d[1]).take(ends) {
+                        places = union(places, above(lens, *left, *right, &mut roots));
                     }
                 }
             }
