@@ -163,7 +163,14 @@ mod tests {
                     continue;
                 }
                 for (axis, place, lens) in [(0, x / w, u), (1, y / w, v)] {
-                    let at = |line: [f64; 2]| line[0] + 0.5 * (lens + 1.0) * (line[1] - line[0]);
+                    let at = |line: [f64; 2]| {
+                        let bounded = line.iter().all(|end| end.is_finite());
+                        if bounded {
+                            line[0] + 0.5 * (lens + 1.0) * (line[1] - line[0])
+                        } else {
+                            f64::NEG_INFINITY
+                        }
+                    };
                     let [low, high] = lines.axes[axis];
                     let inside = at(low) <= place && place <= -at(high);
                     assert!(inside, "{seed}: {place} {low:?} {high:?} {lens}");
