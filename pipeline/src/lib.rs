@@ -39,7 +39,7 @@ pub mod visibility;
 
 pub use frame::{Features, PipelineSpec, Rendered, Settings, render};
 pub use geometry::{
-    Camera, CameraError, Cull, Draw, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
+    Camera, CameraError, Clip, Cull, Draw, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
 };
 pub use memory::{CacheSpec, MemorySpec};
 pub use sampling::{LensShape, SampleTable};

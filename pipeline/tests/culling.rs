@@ -15,48 +15,66 @@ fn culls() -> impl Strategy<Value = Cull> {
     prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
 }
 
-fn check(kind: Kind, cull: Cull, lens: bool, features: Features, borders: bool, count: u32, seed: u64) {
-    let soup = Soup::new(kind, count, seed);
-    let viewport = Viewport::new(72, 50).unwrap();
-    let table = if borders {
-        border_table(seed)
-    } else {
-        SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap()
-    };
-    let spec = spec(features);
-    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-    let ours = visibility(&camera(lens), &[soup.draw(&Plain, cull)], &settings).unwrap();
-    let theirs = brute_force(&soup, cull, lens, viewport, &table);
-    assert_eq!(ours.len(), theirs.len());
-    let differ = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
-    assert_eq!(
-        differ,
-        0,
-        "{differ} of {} samples differ: {kind:?} {cull:?} lens {lens} {features:?}",
-        ours.len()
-    );
+/// A scene with the visible triangle and depth of every sample, by testing every sample against every triangle.
+struct Scene {
+    soup: Soup,
+    cull: Cull,
+    lens: bool,
+    table: SampleTable,
+    truth: Vec<(u32, u32)>,
+}
+
+impl Scene {
+    fn new(kind: Kind, cull: Cull, lens: bool, borders: bool, count: u32, seed: u64) -> Self {
+        let soup = Soup::new(kind, count, seed);
+        let table = if borders {
+            border_table(seed)
+        } else {
+            SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap()
+        };
+        let truth = brute_force(&soup, cull, lens, viewport(), &table);
+        Self { soup, cull, lens, table, truth }
+    }
+
+    fn check(&self, spec: &PipelineSpec) {
+        let settings = Settings { spec, viewport: viewport(), samples: &self.table, background: Vec3::ZERO };
+        let ours = visibility(&camera(self.lens), &[self.soup.draw(&Plain, self.cull)], &settings).unwrap();
+        assert_eq!(ours.len(), self.truth.len());
+        let differ = ours.iter().zip(&self.truth).filter(|(a, b)| a != b).count();
+        let of = ours.len();
+        assert_eq!(differ, 0, "{differ} of {of} samples differ: {:?} lens {} {spec:?}", self.cull, self.lens);
+    }
+}
+
+fn viewport() -> Viewport {
+    Viewport::new(72, 50).unwrap()
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 160, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn culling_changes_nothing(
-        kind in kinds(), cull in culls(), lens: bool, switches in 0..16_u8, borders: bool, count in 1..160_u32, seed: u64,
+        kind in kinds(), cull in culls(), lens: bool, switches in 0..SWITCHES, splits in 0..4_u32, borders: bool,
+        sizes in 0..4_usize, auto: bool, count in 1..160_u32, seed: u64,
     ) {
-        let on = |bit: u8| switches & (1 << bit) != 0;
-        check(kind, cull, lens, Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3) }, borders, count, seed);
+        let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (1, 8), (2, 64)][sizes];
+        let features = Features { facing_splits: splits, auto, ..switched(switches) };
+        let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(features) };
+        Scene::new(kind, cull, lens, borders, count, seed).check(&spec);
     }
 }
 
 #[test]
 fn every_combination_on_one_scene_of_each_kind() {
     for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid, Kind::Layers] {
-        for lens in [false, true] {
-            for switches in 0..16_u8 {
-                let on = |bit: u8| switches & (1 << bit) != 0;
-                let features = Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3) };
-                check(kind, Cull::None, lens, features, false, 90, 11);
-                check(kind, Cull::None, lens, features, true, 90, 11);
+        for (lens, borders) in [(false, false), (false, true), (true, false), (true, true)] {
+            let cull = if borders { Cull::Back } else { Cull::None };
+            let scene = Scene::new(kind, cull, lens, borders, 60, 11);
+            for switches in 0..SWITCHES {
+                scene.check(&spec(switched(switches)));
+            }
+            for switches in (0..SWITCHES).step_by(7).chain([SWITCHES - 1]) {
+                scene.check(&spec(Features { auto: true, ..switched(switches) }));
             }
         }
     }

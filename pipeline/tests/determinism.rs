@@ -82,7 +82,7 @@ fn frame(threads: usize, lens: bool, features: Features, batch_triangles: u32) -
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     for lens in [false, true] {
-        for features in [Features::ALL, Features::NONE] {
+        for features in [Features::ALL, Features::NONE, Features { auto: true, ..Features::ALL }] {
             let one = frame(1, lens, features, 64);
             assert!(one.2.packets > 500, "{:?}", one.2);
             for threads in [2, 3, 16] {

@@ -79,8 +79,16 @@ activity! {
         CoarseTilesVisited "coarse_tiles_visited" "A coarse tile tested."
         TilesVisited "tiles_visited" "A fine tile tested."
         TilesCulledSides "tiles_culled_sides" "A tile, coarse or fine, culled by the side planes over u, v and t."
+        TilesCulledLens "tiles_culled_lens" "A tile, coarse or fine, culled by the dual-space lens lines."
+        TilesCulledFacing "tiles_culled_facing" "A tile, coarse or fine, culled because no face that is drawn can be seen."
         TilesCulledEdges "tiles_culled_edges" "A tile, coarse or fine, culled by the edges."
-        TileMadds "tile_madds" "A multiply-add of a tile test."
+        TileMadds "tile_madds" "A multiply-add of a tile test, of whichever kind."
+        LensLineMadds "lens_line_madds" "Of these: a multiply-add of the dual-space lens lines."
+        SidePlaneMadds "side_plane_madds" "Of these: a multiply-add of the side planes."
+        EdgeMadds "edge_madds" "Of these: a multiply-add of bringing the edges to a tile, shared by facing, edge bounds and screens."
+        FacingMadds "facing_madds" "Of these: a multiply-add of finding the face that is seen."
+        EdgeBoundMadds "edge_bound_madds" "Of these: a multiply-add of bounding the edges and the time they leave."
+        ScreenSetupMadds "screen_setup_madds" "Of these: a multiply-add of linearizing the edges to screen samples by."
     }
     ZCull "z_cull" "Drops tiles whose every sample is known to be hidden." {
         ZCullTests "z_cull_tests" "A depth interval compared with a tile's farthest depth."

@@ -1,6 +1,7 @@
 //! Bins: coarse tiles, each rasterized by one worker, triangle by triangle through its fine tiles.
 
 use super::counters::BinLog;
+use super::judge::Judge;
 use super::pass::Pass;
 use super::vertices::Ready;
 use super::worker::{Scratch, Worker};
@@ -12,6 +13,8 @@ pub(super) struct Bin {
     pub origin: [u32; 2],
     /// Its fine tiles, row by row; those outside the image are there and stay untouched.
     pub tiles: Vec<Option<DepthTile>>,
+    /// What `auto` has learnt about its tests.
+    pub judge: Judge,
 }
 
 impl Bin {
@@ -24,6 +27,7 @@ impl Bin {
             .map(|bin| Self {
                 origin: [bin % across * coarse, bin / across * coarse],
                 tiles: vec![None; tiles],
+                judge: Judge::new(),
             })
             .collect()
     }

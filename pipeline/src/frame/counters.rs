@@ -10,8 +10,15 @@ pub(super) struct TileWork {
     pub coarse_visited: u32,
     pub visited: u32,
     pub culled_sides: u32,
+    pub culled_lens: u32,
+    pub culled_facing: u32,
     pub culled_edges: u32,
-    pub tile_madds: u32,
+    pub lens_line_madds: u32,
+    pub side_plane_madds: u32,
+    pub edge_madds: u32,
+    pub facing_madds: u32,
+    pub edge_bound_madds: u32,
+    pub screen_setup_madds: u32,
     pub z_tests: u32,
     pub z_culled: u32,
     pub z_updates: u32,
@@ -23,12 +30,30 @@ impl TileWork {
         *self == Self::default()
     }
 
+    /// Multiply-adds of all tile tests.
+    pub fn tile_madds(&self) -> u32 {
+        self.lens_line_madds
+            + self.side_plane_madds
+            + self.edge_madds
+            + self.facing_madds
+            + self.edge_bound_madds
+            + self.screen_setup_madds
+    }
+
     pub fn add_to(&self, counts: &mut PacketCounts) {
         counts[Event::CoarseTilesVisited] += self.coarse_visited;
         counts[Event::TilesVisited] += self.visited;
         counts[Event::TilesCulledSides] += self.culled_sides;
         counts[Event::TilesCulledEdges] += self.culled_edges;
-        counts[Event::TileMadds] += self.tile_madds;
+        counts[Event::TilesCulledLens] += self.culled_lens;
+        counts[Event::TilesCulledFacing] += self.culled_facing;
+        counts[Event::LensLineMadds] += self.lens_line_madds;
+        counts[Event::SidePlaneMadds] += self.side_plane_madds;
+        counts[Event::EdgeMadds] += self.edge_madds;
+        counts[Event::FacingMadds] += self.facing_madds;
+        counts[Event::EdgeBoundMadds] += self.edge_bound_madds;
+        counts[Event::ScreenSetupMadds] += self.screen_setup_madds;
+        counts[Event::TileMadds] += self.tile_madds();
         counts[Event::ZCullTests] += self.z_tests;
         counts[Event::TilesCulledZMax] += self.z_culled;
         counts[Event::ZMaxUpdates] += self.z_updates;

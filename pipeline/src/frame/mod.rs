@@ -2,11 +2,13 @@
 
 mod bin;
 mod counters;
+mod judge;
 mod pass;
 mod replay;
 mod resolve;
 mod settings;
 mod surface;
+mod tile_tests;
 mod vertices;
 mod worker;
 

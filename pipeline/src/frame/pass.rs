@@ -5,11 +5,19 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::Settings;
-use crate::geometry::{Camera, Draw, MovingVertex, Projection, Viewport};
+use super::{Features, Settings};
+use crate::geometry::{Camera, Clip, Draw, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressMap, Allocator};
 use crate::setup::Corner;
 use crate::texture::Texture;
+use crate::traversal::small::{at_rest, blur_px, motion_px};
+
+/// A triangle as it is drawn.
+pub(super) struct Staged {
+    pub vertices: [MovingVertex; 3],
+    /// Whether it is sheared by the lens.
+    pub lens: bool,
+}
 
 /// Everything the stages read and none of them changes.
 pub(super) struct Pass<'a> {
@@ -25,6 +33,8 @@ pub(super) struct Pass<'a> {
     pub origin: [f32; 2],
     /// Whether the camera has a lens.
     pub lens: bool,
+    /// The part of lens and shutter in which anything is drawn.
+    pub clip: Clip,
     /// Whether the camera does not move while the shutter is open.
     pub still_camera: bool,
     /// The position of the camera in world space at mid-shutter.
@@ -50,6 +60,7 @@ impl<'a> Pass<'a> {
             addresses: addresses(draws, settings),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
+            clip: camera.clip(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),
             projection,
@@ -81,10 +92,22 @@ impl<'a> Pass<'a> {
         corners.map(|vertex| &self.vertices[draw][vertex])
     }
 
+    /// A triangle as it is drawn: with motion or blur left out where they are below the thresholds of the settings.
+    pub fn staged(&self, triangle: u32) -> Staged {
+        let (images, shear) = (self.images(triangle), &self.projection.shear);
+        let Features { still_px, in_focus_px, .. } = self.settings.spec.features;
+        let rests = still_px > 0.0 && motion_px(images, shear) <= f64::from(still_px);
+        let sharp = in_focus_px > 0.0 && self.lens && blur_px(images, shear) <= f64::from(in_focus_px);
+        Staged {
+            vertices: if rests { images.map(at_rest) } else { images.map(|v| *v) },
+            lens: self.lens && !sharp,
+        }
+    }
+
     /// The corners of a triangle and whether any of them moves.
     pub fn moving_corners(&self, triangle: u32) -> ([Corner; 3], bool) {
-        let images = self.images(triangle);
-        (images.map(Corner::new), images.iter().any(|vertex| !vertex.is_still()))
+        let vertices = self.staged(triangle).vertices;
+        (vertices.each_ref().map(Corner::new), vertices.iter().any(|vertex| !vertex.is_still()))
     }
 
     /// Fine tiles in a row of the image.

@@ -6,9 +6,10 @@ use serde::Deserialize;
 use crate::geometry::Viewport;
 use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
 use crate::sampling::SampleSource;
+use crate::traversal::Timeline;
 
 /// The functional side of the hardware: sizes that decide *what* happens. How fast is the business of a timing model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PipelineSpec {
     /// Side of a fine tile in pixels: 1, 2, 4 or 8.
@@ -27,25 +28,68 @@ pub struct PipelineSpec {
     pub features: Features,
 }
 
-/// Tests that can be switched off. They change what it costs, never the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Tests that can be switched off. They change what it costs, never the image; the two thresholds change the image where they are
+/// above zero.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Features {
+    /// Narrow the lens by dual-space lines found in set-up.
+    pub lens_lines: bool,
     /// Narrow the box of lens and time by the side planes of a tile.
     pub side_planes: bool,
+    /// Find which face a triangle shows over a tile and its box of lens and time.
+    pub facing: bool,
+    /// How often the time is bisected at most where it is not decided which face; 0 to 3.
+    pub facing_splits: u32,
     /// Bound the edges over a tile and its box of lens and time.
     pub edges: bool,
+    /// Find facing and bound edges on coarse tiles, too.
+    pub coarse: bool,
     /// Screen single samples by the linearized edges before they are tested.
     pub screen: bool,
     /// Cull tiles behind the farthest stored depth.
     pub z_max: bool,
+    /// Run of those switched on only what pays.
+    pub auto: bool,
+    /// A triangle none of whose points is farther than this many pixels from its place in mid-shutter is drawn there, still. 0: none is.
+    pub still_px: f32,
+    /// A triangle whose circle of confusion has at most this radius in pixels is drawn in focus. 0: none is.
+    pub in_focus_px: f32,
+}
+
+impl Default for Features {
+    fn default() -> Self {
+        Self::ALL
+    }
 }
 
 impl Features {
     /// Every test there is.
-    pub const ALL: Self = Self { side_planes: true, edges: true, screen: true, z_max: true };
+    pub const ALL: Self = Self {
+        lens_lines: true,
+        side_planes: true,
+        facing: true,
+        facing_splits: 2,
+        edges: true,
+        coarse: true,
+        screen: true,
+        z_max: true,
+        auto: false,
+        still_px: 0.0,
+        in_focus_px: 0.0,
+    };
     /// Bounding boxes only.
-    pub const NONE: Self = Self { side_planes: false, edges: false, screen: false, z_max: false };
+    pub const NONE: Self = Self {
+        lens_lines: false,
+        side_planes: false,
+        facing: false,
+        facing_splits: 0,
+        edges: false,
+        coarse: false,
+        screen: false,
+        z_max: false,
+        ..Self::ALL
+    };
 }
 
 /// Why a pipeline cannot be built.
@@ -60,6 +104,14 @@ pub enum SpecError {
         value: u32,
         /// What would do.
         allowed: &'static str,
+    },
+    /// A threshold is not a number of pixels.
+    #[error("`{field}` is {value}; it has to be 0 or a finite number above")]
+    Threshold {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: String,
     },
     /// A cache cannot be built.
     #[error("`{field}`: {source}")]
@@ -88,6 +140,14 @@ impl PipelineSpec {
         size("batch_triangles", batch, (1..=1 << 24).contains(&batch), "it has to be 1 to 16777216")?;
         let reuse = self.vertex_reuse;
         size("vertex_reuse", reuse, (1..=4096).contains(&reuse), "it has to be 1 to 4096")?;
+        let Features { facing_splits, still_px, in_focus_px, .. } = self.features;
+        let most = Timeline::MOST_SPLITS;
+        size("features.facing_splits", facing_splits, facing_splits <= most, "it has to be 0 to 3")?;
+        for (field, value) in [("features.still_px", still_px), ("features.in_focus_px", in_focus_px)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(SpecError::Threshold { field, value: value.to_string() });
+            }
+        }
         let caches = [
             ("shading_cache", self.shading_cache),
             ("memory.depth", self.memory.depth),

@@ -5,14 +5,27 @@ use std::ops::Range;
 use activity::{Event, Packet, PacketKind};
 use rayon::prelude::*;
 
-use super::pass::Pass;
+use super::Features;
+use super::pass::{Pass, Staged};
 use super::replay::Replay;
+use crate::geometry::{Draw, Shear};
 use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
+use crate::traversal::{self, Box5, LensLines, small};
 
 /// A triangle that traversal has to visit, with the pixels it may touch.
 pub(super) struct Ready {
     pub triangle: Triangle,
     pub pixels: PixelRect,
+    /// The part of lens and shutter between the clip planes, and whether the triangle is sheared by the lens.
+    pub within: Box5,
+    /// Bounds on lens and image, where they are asked for.
+    pub lines: Option<LensLines>,
+}
+
+impl Ready {
+    fn line_madds(&self) -> u32 {
+        if self.lines.is_some() { traversal::lens_line_setup_madds(self.triangle.moving) } else { 0 }
+    }
 }
 
 /// Triangles whose vertices travel in one packet.
@@ -37,19 +50,26 @@ pub(super) fn front_end(
 /// What became of a triangle as an event, and what goes on.
 fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let viewport = pass.settings.viewport;
-    let cull = pass.draws[pass.locate(id).0].cull;
+    let Draw { geometry, cull, .. } = &pass.draws[pass.locate(id).0];
     let half_px = [viewport.width(), viewport.height()].map(|side| 0.5 * side as f32);
-    let shear = &pass.projection.shear;
-    match set_up(id, pass.images(id), cull, shear, pass.projection.near, half_px) {
+    let (Staged { vertices, lens }, near) = (pass.staged(id), pass.projection.near);
+    let shear = if lens { pass.projection.shear } else { Shear::default() };
+    let within = Box5::whole(lens).clipped(&pass.clip).clipped(&geometry.clip());
+    if within.is_empty() {
+        return (Event::TrianglesOutside, None);
+    }
+    match set_up(id, vertices.each_ref(), *cull, &shear, near, half_px) {
         Outcome::Degenerate => (Event::TrianglesDegenerate, None),
         Outcome::Outside => (Event::TrianglesOutside, None),
         Outcome::FaceCulled => (Event::TrianglesFaceCulled, None),
         Outcome::Ready(triangle) => {
-            let pixels = bounds(&triangle, shear, viewport);
+            let pixels = bounds(&triangle, &shear, viewport);
+            let wanted = lens && pass.settings.spec.features.lens_lines;
+            let lines = wanted.then(|| LensLines::new(&triangle, &shear, near));
             if pixels.is_empty() {
                 (Event::TrianglesOutside, None)
             } else {
-                (Event::TrianglesSetUp, Some(Ready { triangle, pixels }))
+                (Event::TrianglesSetUp, Some(Ready { triangle, pixels, within, lines }))
             }
         }
     }
@@ -63,7 +83,8 @@ fn emit_packet(
     emit: &mut impl FnMut(&Packet),
 ) {
     let mut packet = super::packet(PacketKind::Vertices, 0, first);
-    for ((event, _), id) in outcomes.iter().zip(first..) {
+    let Features { still_px, in_focus_px, .. } = pass.settings.spec.features;
+    for ((event, ready), id) in outcomes.iter().zip(first..) {
         let (draw, place) = pass.locate(id);
         if place == 0 {
             let mut start = super::packet(PacketKind::Draw, 0, id);
@@ -78,6 +99,9 @@ fn emit_packet(
         packet.counts[Event::Indices] += 3;
         packet.counts[Event::SetupMadds] +=
             madds(corners.iter().any(|v| !v.is_still()), pass.draws[draw].cull);
+        packet.counts[Event::SetupMadds] += if still_px > 0.0 { small::MOTION_MADDS } else { 0 }
+            + if in_focus_px > 0.0 { small::BLUR_MADDS } else { 0 }
+            + ready.as_ref().map_or(0, Ready::line_madds);
         replay.vertices(draw, id, &mut packet.counts);
     }
     emit(&packet);

@@ -2,15 +2,18 @@
 
 use super::bin::Bin;
 use super::counters::{BinLog, TileWork, Work};
+use super::judge::Test;
 use super::pass::Pass;
 use super::surface::Grid;
+use super::tile_tests::{Left, Place, Run, Subject};
 use super::vertices::Ready;
 use crate::depth::{DepthTile, interval_madds, nearest};
+use crate::geometry::Shear;
 use crate::sample_test::{self, Hits, Target, test_screened};
 use crate::sampling::TileSamples;
 use crate::setup::{PixelRect, Triangle};
 use crate::shading::QuadSet;
-use crate::traversal::{self, Box5, EdgeBounds, Screen, TileRect, narrow};
+use crate::traversal::{self, Box5, TileRect};
 
 /// Memory a worker uses over and over.
 #[derive(Default)]
@@ -18,6 +21,9 @@ pub(super) struct Scratch {
     /// The samples of the bin's tiles, filled on first use.
     samples: Vec<TileSamples>,
     filled: Vec<bool>,
+    /// The same as through a pinhole, for triangles that are drawn in focus.
+    sharp: Vec<TileSamples>,
+    sharpened: Vec<bool>,
     hits: Hits,
     quads: QuadSet,
 }
@@ -34,75 +40,69 @@ pub(super) struct Worker<'a, 'p> {
 
 impl<'a, 'p> Worker<'a, 'p> {
     pub fn new(pass: &'a Pass<'p>, bin: &'a mut Bin, scratch: &'a mut Scratch) -> Self {
-        scratch.samples.resize_with(bin.tiles.len(), TileSamples::default);
-        scratch.filled.clear();
-        scratch.filled.resize(bin.tiles.len(), false);
+        let Scratch { samples, filled, sharp, sharpened, .. } = scratch;
+        for (tiles, flags) in [(samples, filled), (sharp, sharpened)] {
+            tiles.resize_with(bin.tiles.len(), TileSamples::default);
+            flags.clear();
+            flags.resize(bin.tiles.len(), false);
+        }
         Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default() }
     }
 
     /// One triangle through the tiles of the bin.
-    pub fn triangle(&mut self, Ready { triangle, pixels }: &Ready) {
+    pub fn triangle(&mut self, ready: &Ready) {
         let (side, coarse) = (self.pass.settings.spec.tile_px, self.pass.settings.spec.coarse_tile_px);
-        self.tests.coarse_visited += 1;
-        let rect = TileRect::new(self.pass.settings.viewport, self.bin.origin, coarse);
-        let Some(within) = self.side_planes(triangle, &rect) else { return };
+        let subject = self.subject(ready);
         let [x0, y0] = self.bin.origin;
-        let here = pixels.intersection(&PixelRect { x0, y0, x1: x0 + coarse, y1: y0 + coarse });
+        let here = ready.pixels.intersection(&PixelRect { x0, y0, x1: x0 + coarse, y1: y0 + coarse });
         let tiles = here.tiles(side);
+        self.tests.coarse_visited += 1;
+        let count = (tiles.x1 - tiles.x0) * (tiles.y1 - tiles.y0);
+        let place = Place {
+            rect: TileRect::new(self.pass.settings.viewport, self.bin.origin, coarse),
+            tiles: Some(count),
+            samples: count * self.samples_of_a_tile(),
+        };
+        let Some(left) = subject.test(&place, &Left::all(ready.within), &mut self.run()) else { return };
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
                 self.tests.visited += 1;
-                self.tile(triangle, &within, [column * side, row * side]);
+                self.tile(&subject, &left, [column * side, row * side]);
             }
         }
+    }
+
+    fn samples_of_a_tile(&self) -> u32 {
+        self.pass.settings.spec.tile_px.pow(2) * self.pass.settings.samples.per_pixel()
+    }
+
+    fn run(&mut self) -> Run<'_> {
+        let features = &self.pass.settings.spec.features;
+        Run { features, work: &mut self.tests, judge: &mut self.bin.judge }
+    }
+
+    fn subject<'r>(&self, ready: &'r Ready) -> Subject<'r>
+    where
+        'a: 'r,
+    {
+        let shear = &self.pass.projection.shear;
+        Subject { triangle: &ready.triangle, lines: ready.lines.as_ref(), shear }
     }
 
     /// One triangle in one tile, as far as the tests let it.
-    fn tile(&mut self, triangle: &Triangle, within: &Box5, origin: [u32; 2]) {
+    fn tile(&mut self, subject: &Subject<'_>, left: &Left, origin: [u32; 2]) {
         let rect = TileRect::new(self.pass.settings.viewport, origin, self.pass.settings.spec.tile_px);
-        let Some(within) = self.side_planes(triangle, &rect).map(|narrowed| narrowed.intersect(within))
-        else {
-            return;
-        };
-        let Some(screen) = self.edges(triangle, &rect, &within) else { return };
+        let tile = Place { rect, tiles: None, samples: self.samples_of_a_tile() };
+        let Some(mut left) = subject.test(&tile, left, &mut self.run()) else { return };
         let place = self.place(origin);
-        self.fill(place, origin);
-        if !self.behind_all(triangle, &within, place) {
-            self.samples(triangle, &within, screen.as_ref(), place);
+        self.fill(place, origin, left.within.lens);
+        if !self.behind_all(subject.triangle, &left.within, place) {
+            let tested = self.samples(subject, &tile, &mut left, place);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
-                self.ask_for_quads(triangle, place, origin);
-                self.record(triangle, origin);
+                self.ask_for_quads(subject.triangle, place, origin);
+                self.record(subject.triangle.id, tested, origin);
             }
         }
-    }
-
-    /// The part of lens and time in which the triangle may lie within the sides of a tile.
-    fn side_planes(&mut self, triangle: &Triangle, rect: &TileRect) -> Option<Box5> {
-        let whole = Box5::whole(self.pass.lens);
-        let plain = !triangle.moving && !self.pass.lens && !triangle.behind;
-        if plain || !self.pass.settings.spec.features.side_planes {
-            return Some(whole);
-        }
-        self.tests.tile_madds += traversal::madds(triangle.moving, self.pass.lens);
-        let within = narrow(triangle, &self.pass.projection.shear, rect, &whole);
-        self.tests.culled_sides += u32::from(within.is_none());
-        within
-    }
-
-    /// Nothing where the edges say that no sample of the tile is inside; otherwise the screen for single samples, if it
-    /// is switched on.
-    fn edges(&mut self, triangle: &Triangle, rect: &TileRect, within: &Box5) -> Option<Option<Screen>> {
-        let features = &self.pass.settings.spec.features;
-        if !features.edges && !features.screen {
-            return Some(None);
-        }
-        self.tests.tile_madds += traversal::tile_madds(triangle.moving, self.pass.lens);
-        let bounds = EdgeBounds::new(triangle, &self.pass.projection.shear, rect, within);
-        if features.edges && bounds.miss() {
-            self.tests.culled_edges += 1;
-            return None;
-        }
-        Some(features.screen.then(|| bounds.screen()))
     }
 
     /// Whether every sample of the tile is known to see something nearer.
@@ -120,16 +120,30 @@ impl<'a, 'p> Worker<'a, 'p> {
         behind
     }
 
-    fn samples(&mut self, triangle: &Triangle, within: &Box5, screen: Option<&Screen>, place: usize) {
-        let samples = &self.scratch.samples[place];
+    /// The samples of a tile in each piece of the time that is left. Says in which dimensions they were tested.
+    fn samples(&mut self, subject: &Subject<'_>, tile: &Place, left: &mut Left, place: usize) -> [bool; 2] {
+        let screened = subject.wants_screen(tile, left, &mut self.run());
+        let Scratch { samples, sharp, hits, .. } = &mut *self.scratch;
+        let drawn_sharp = self.pass.lens && !left.within.lens;
+        let samples = if drawn_sharp { &sharp[place] } else { &samples[place] };
         let stored = self.bin.tiles[place].get_or_insert_with(|| DepthTile::cleared(samples.len));
-        let hits = &mut self.scratch.hits;
         hits.clear();
         let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
-        test_screened(triangle, samples, within, screen, self.pass.projection.near, &mut target, hits);
+        let (times, near) = (left.times, self.pass.projection.near);
+        let (triangle, within) = unclipped(subject.triangle, left.within);
+        for piece in times.pieces() {
+            let within = Box5 { t: piece.t, ..within };
+            let screen = screened.then(|| subject.screen(&tile.rect, left, piece, &mut self.tests));
+            test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
+        }
         if !hits.written.is_empty() {
             stored.touch();
         }
+        if hits.screened > 0 {
+            let passed = f64::from(hits.tested) / f64::from(hits.screened);
+            self.bin.judge.learn(Test::Screen, false, 1.0 - passed, 1.0);
+        }
+        [triangle.moving, within.lens]
     }
 
     /// The place of the tile at `origin` in the bin.
@@ -139,18 +153,17 @@ impl<'a, 'p> Worker<'a, 'p> {
         (row * Bin::tiles_across(self.pass) + column) as usize
     }
 
-    fn fill(&mut self, place: usize, origin: [u32; 2]) {
-        if !self.scratch.filled[place] {
-            let settings = self.pass.settings;
-            let shear = &self.pass.projection.shear;
-            self.scratch.samples[place].fill(
-                settings.samples,
-                settings.viewport,
-                shear,
-                origin,
-                settings.spec.tile_px,
-            );
-            self.scratch.filled[place] = true;
+    fn fill(&mut self, place: usize, origin: [u32; 2], lens: bool) {
+        let (settings, shear) = (self.pass.settings, &self.pass.projection.shear);
+        let Scratch { samples, filled, sharp, sharpened, .. } = &mut *self.scratch;
+        let fill = |tile: &mut TileSamples, shear: &Shear, filled: &mut bool| {
+            if !std::mem::replace(filled, true) {
+                tile.fill(settings.samples, settings.viewport, shear, origin, settings.spec.tile_px);
+            }
+        };
+        fill(&mut samples[place], shear, &mut filled[place]);
+        if self.pass.lens && !lens {
+            fill(&mut sharp[place], &Shear::default(), &mut sharpened[place]);
         }
     }
 
@@ -168,18 +181,18 @@ impl<'a, 'p> Worker<'a, 'p> {
         self.scratch.quads.drain_into(&mut self.log.quads);
     }
 
-    fn record(&mut self, triangle: &Triangle, origin: [u32; 2]) {
+    fn record(&mut self, triangle: u32, [moving, lens]: [bool; 2], origin: [u32; 2]) {
         let hits = &self.scratch.hits;
         self.log.work.push(Work {
-            triangle: triangle.id,
+            triangle,
             tile: Bin::tile_number(self.pass, origin),
             tests: std::mem::take(&mut self.tests),
             screened: hits.screened,
-            screen_madds: hits.screened * traversal::screen_madds(triangle.moving, self.pass.lens),
+            screen_madds: hits.screened * traversal::screen_madds(moving, lens),
             tested: hits.tested,
             hit: hits.hit,
             written: hits.written.len() as u32,
-            sample_madds: hits.tested * sample_test::madds(triangle.moving, self.pass.lens),
+            sample_madds: hits.tested * sample_test::madds(moving, lens),
             read_pixels: hits.read_pixels,
             written_pixels: hits.written_pixels,
             quads_end: self.log.quads.len() as u32,
@@ -201,4 +214,14 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
         self.log
     }
+}
+
+/// The triangle and the box as the sample test has to take them: it looks at the time of samples where the triangle moves and at their place
+/// on the lens where there is one, so a clip plane asks for either.
+fn unclipped(triangle: &Triangle, within: Box5) -> (Triangle, Box5) {
+    let whole = Box5::whole(true);
+    let clipped_t = within.t[0] > whole.t[0] || within.t[1] < whole.t[1];
+    let clipped_lens = [within.u, within.v].iter().any(|[lo, hi]| *lo > -1.0 || *hi < 1.0);
+    let triangle = Triangle { moving: triangle.moving || clipped_t, ..*triangle };
+    (triangle, Box5 { lens: within.lens || clipped_lens, ..within })
 }

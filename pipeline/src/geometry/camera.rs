@@ -2,6 +2,8 @@
 
 use glam::{Affine3A, Vec2};
 
+use super::Clip;
+
 /// A camera looking down `+z` of its own space, `x` to the right and `y` up.
 ///
 /// The pose is given at both ends of the shutter; in between every vertex moves on a straight line, so a
@@ -14,6 +16,7 @@ pub struct Camera {
     shift: Vec2,
     lens: Option<Lens>,
     near: f32,
+    clip: Clip,
 }
 
 /// A thin lens.
@@ -80,6 +83,7 @@ impl Camera {
             shift: Vec2::ZERO,
             lens: None,
             near: positive("near depth", near)?,
+            clip: Clip::NONE,
         }
         .moving(pose, pose)
     }
@@ -100,6 +104,12 @@ impl Camera {
     #[must_use]
     pub fn with_lens(self, lens: Option<Lens>) -> Self {
         Self { lens, ..self }
+    }
+
+    /// The same camera with clip planes across lens and shutter: what is drawn is seen there only.
+    #[must_use]
+    pub fn with_clip(self, clip: Clip) -> Self {
+        Self { clip, ..self }
     }
 
     /// The same camera with an off-centre frustum: `shift` moves the image by that many image heights.
@@ -137,6 +147,11 @@ impl Camera {
     /// The lens, or `None` for a pinhole.
     pub fn lens(&self) -> Option<Lens> {
         self.lens
+    }
+
+    /// The part of lens and shutter in which anything is drawn.
+    pub fn clip(&self) -> Clip {
+        self.clip
     }
 
     /// Depth in scene units below which samples are not seen.

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::Clip;
 use crate::shading::Shader;
 
 /// Which faces are dropped. A face is front when its vertices appear counter-clockwise on the screen.
@@ -24,6 +25,7 @@ pub struct Geometry<'a> {
     normals: &'a [Vec3],
     uvs: &'a [Vec2],
     triangles: &'a [[u32; 3]],
+    clip: Clip,
 }
 
 /// Why triangles cannot be drawn.
@@ -76,7 +78,7 @@ impl<'a> Geometry<'a> {
                 return Err(DrawError::Index { triangle, vertex, vertices: open.len() });
             }
         }
-        Ok(Self { open, close, normals: &[], uvs: &[], triangles })
+        Ok(Self { open, close, normals: &[], uvs: &[], triangles, clip: Clip::NONE })
     }
 
     /// The same with one normal for each vertex (at mid-shutter, world space; need not be unit length).
@@ -97,6 +99,17 @@ impl<'a> Geometry<'a> {
         same_length("the texture coordinates", uvs.len(), self.open.len())?;
         finite("texture coordinate", uvs.iter().map(|uv| uv.is_finite()))?;
         Ok(Self { uvs, ..self })
+    }
+
+    /// The same with clip planes across lens and shutter: it is drawn there only.
+    #[must_use]
+    pub fn with_clip(self, clip: Clip) -> Self {
+        Self { clip, ..self }
+    }
+
+    /// The part of lens and shutter in which it is drawn.
+    pub fn clip(&self) -> Clip {
+        self.clip
     }
 
     /// Positions when the shutter opens.

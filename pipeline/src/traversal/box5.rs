@@ -1,6 +1,6 @@
 //! Boxes in screen, lens and time.
 
-use crate::geometry::Viewport;
+use crate::geometry::{Clip, Viewport};
 
 /// A tile in pixels from the centre of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +39,18 @@ impl Box5 {
     /// All of the lens and the whole shutter.
     pub fn whole(lens: bool) -> Self {
         Self { u: [-1.0, 1.0], v: [-1.0, 1.0], t: [0.0, 1.0], lens }
+    }
+
+    /// What lies between the clip planes, in standard mode; may be empty. A sample is in where it is in this box, ends included.
+    #[must_use]
+    pub fn clipped(&self, clip: &Clip) -> Self {
+        let [u, v, t] = clip.half_open();
+        self.intersect(&Self { u, v, t, lens: self.lens })
+    }
+
+    /// Whether nothing lies in it.
+    pub fn is_empty(&self) -> bool {
+        [self.u, self.v, self.t].iter().any(|[lo, hi]| lo > hi)
     }
 
     /// What lies in both boxes; may be empty.

@@ -4,9 +4,31 @@
 //! tile, and allows for the rounding of both.
 
 mod box5;
-mod edge_bounds;
+mod cost;
+mod edges;
+mod facing;
+mod lens_lines;
+mod number;
+mod quadratic;
+mod screen;
 mod side_planes;
+pub mod small;
+#[cfg(test)]
+mod testing;
+mod time_interval;
+mod view;
 
 pub use box5::{Box5, TileRect};
-pub use edge_bounds::{EdgeBounds, Screen, screen_madds, tile_madds};
-pub use side_planes::{madds, narrow};
+pub use cost::{
+    edge_bound_madds, edge_madds, facing_madds, lens_line_madds, lens_line_setup_madds, screen_setup_madds,
+    side_madds,
+};
+pub use edges::{EdgeBounds, Edges, Faces};
+pub use facing::{Facing, Piece, Timeline};
+pub use lens_lines::LensLines;
+pub use number::Number;
+pub use quadratic::{Pieces, Quadratic};
+pub use screen::{Screen, screen_madds};
+pub use side_planes::{narrow, narrow_counted};
+pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
+pub use view::View;

@@ -6,95 +6,128 @@
 //! of `t`. A vertex behind the camera (`w < 0`) is beyond the side only when it is for every `X` of the tile, so both
 //! edges of the tile are tried there.
 
-use super::{Box5, TileRect};
+use super::number::Number;
+use super::{Box5, TileRect, cost};
 use crate::geometry::Shear;
-use crate::setup::Triangle;
-
-/// Multiply-adds of testing the four sides once. For each side and vertex: a translation, and where there is a lens a
-/// shear of two, at each corner of the (lens, time) rectangle in use; then a root and its mapping, two, for each linear
-/// function of each variable in use.
-pub const fn madds(moving: bool, lens: bool) -> u32 {
-    let (times, places) = (1 + moving as u32, 1 + lens as u32);
-    let values = times * places * if lens { 3 } else { 1 };
-    let roots = moving as u32 * places + lens as u32 * times;
-    4 * 3 * (values + 2 * roots)
-}
+use crate::setup::{Corner, Triangle};
 
 /// The part of `within` in which `triangle` may touch `tile`, or `None` where it cannot.
 pub fn narrow(triangle: &Triangle, shear: &Shear, tile: &TileRect, within: &Box5) -> Option<Box5> {
-    let mut current = *within;
+    narrow_counted::<f64>(triangle, shear, tile, within).0
+}
+
+/// The same, with what it took in multiply-adds.
+pub fn narrow_counted<N: Number>(
+    triangle: &Triangle,
+    shear: &Shear,
+    tile: &TileRect,
+    within: &Box5,
+) -> (Option<Box5>, u32) {
+    let (mut current, mut madds) = (*within, 0);
+    let price = cost::side_madds(triangle.moving, within.lens, triangle.behind);
     for axis in [0, 1] {
         let [low, high] = if axis == 0 { tile.x } else { tile.y };
         for (edge, other, sign) in [(low, high, 1.0), (high, low, -1.0)] {
             let edges = if triangle.behind { [edge, other] } else { [edge, edge] };
-            current = Side { triangle, shear, axis, edges, sign }.narrow(&current)?;
+            let side = Side::<N> {
+                triangle,
+                s: N::from(shear.s[axis]),
+                a: N::from(shear.a[axis]),
+                axis,
+                edges: edges.map(N::from),
+                positive: sign > 0.0,
+            };
+            let (next, roots) = side.narrow(&current);
+            madds += price + roots * cost::SIDE_ROOT;
+            let Some(next) = next else { return (None, madds) };
+            current = next;
         }
     }
-    Some(current)
+    (Some(current), madds)
 }
 
-/// One side of a tile: `sign` is 1 for the left or top one and -1 for the right or bottom one.
-struct Side<'a> {
+/// One side of a tile: the left or top one is `positive`.
+struct Side<'a, N> {
     triangle: &'a Triangle,
-    shear: &'a Shear,
+    s: N,
+    a: N,
     axis: usize,
-    edges: [f32; 2],
-    sign: f32,
+    edges: [N; 2],
+    positive: bool,
 }
 
-impl Side<'_> {
-    fn narrow(&self, within: &Box5) -> Option<Box5> {
+impl<N: Number> Side<'_, N> {
+    fn narrow(&self, within: &Box5) -> (Option<Box5>, u32) {
         let lens = match (within.lens, self.axis) {
             (false, _) => [0.0, 0.0],
             (true, 0) => within.u,
             (true, _) => within.v,
         };
-        let slack = 2.0 * self.triangle.slack[self.axis];
-        let (mut times, mut places) = (None, None);
+        let slack = N::from(2.0 * self.triangle.slack[self.axis]);
+        let (mut times, mut places, mut roots) = (None, None, 0);
         for corner in &self.triangle.corners {
-            for edge in self.edges {
-                let d = self.distances(corner.at(within.t[0]), corner.at(within.t[1]), lens, edge);
-                for [opening, closing] in d {
-                    times = union(times, above(within.t, opening, closing, slack));
+            for &edge in &self.edges[..if self.triangle.behind { 2 } else { 1 }] {
+                let d = self.distances(corner, within, lens, edge, slack);
+                for [opening, closing] in &d[..if within.lens { 2 } else { 1 }] {
+                    times = union(times, above(within.t, *opening, *closing, &mut roots));
                 }
-                for end in [0, 1] {
-                    places = union(places, above(lens, d[0][end], d[1][end], slack));
+                if within.lens {
+                    let ends = if self.triangle.moving { 2 } else { 1 };
+                    for (left, right) in d[0].iter().zip(&d[1]).take(ends) {
+                        places = union(places, above(lens, *left, *right, &mut roots));
+                    }
                 }
             }
         }
-        let mut next = Box5 { t: times?, ..*within };
+        let Some(t) = times else { return (None, roots) };
+        let mut next = Box5 { t, ..*within };
         if within.lens {
-            *if self.axis == 0 { &mut next.u } else { &mut next.v } = places?;
+            let Some(places) = places else { return (None, roots) };
+            *if self.axis == 0 { &mut next.u } else { &mut next.v } = places;
         }
-        Some(next)
+        (Some(next), roots)
     }
 
-    /// How far a vertex lies to the inner side of `edge`, by end of the lens and end of the time interval.
-    fn distances(&self, opening: [f32; 3], closing: [f32; 3], lens: [f32; 2], edge: f32) -> [[f32; 2]; 2] {
-        lens.map(|place| {
-            [opening, closing].map(|p| {
-                let shift = place * (self.shear.a[self.axis] * p[2] - self.shear.s[self.axis]);
-                self.sign * (p[self.axis] + shift - edge * p[2])
-            })
-        })
+    /// How far a vertex lies to the inner side of `edge`, and a slack, by end of the lens and end of the time interval.
+    fn distances(&self, corner: &Corner, within: &Box5, lens: [f32; 2], edge: N, slack: N) -> [[N; 2]; 2] {
+        let ends = |end: usize| {
+            let [x, w] = [self.axis, 2].map(|k| {
+                let open = N::from(corner.open[k]);
+                if self.triangle.moving {
+                    open + N::from(within.t[end]) * N::from(corner.delta[k])
+                } else {
+                    open
+                }
+            });
+            let flat = x - edge * w;
+            let shift = if within.lens { self.a * w - self.s } else { N::zero() };
+            let from = |place: f32| {
+                let d = if within.lens { flat + N::from(place) * shift } else { flat };
+                if self.positive { d + slack } else { slack - d }
+            };
+            if within.lens { lens.map(from) } else { [from(0.0); 2] }
+        };
+        let first = ends(0);
+        let last = if self.triangle.moving { ends(1) } else { first };
+        [[first[0], last[0]], [first[1], last[1]]]
     }
 }
 
-/// The part of `range` where the linear function with the values `lo` and `hi` at its ends is at least `-slack`.
-fn above(range: [f32; 2], lo: f32, hi: f32, slack: f32) -> Option<[f32; 2]> {
-    let (lo, hi) = (lo + slack, hi + slack);
-    match (lo >= 0.0, hi >= 0.0) {
-        (true, true) => Some(range),
-        (false, false) => None,
-        (keeps_start, _) => {
-            // The slack is twice the rounding of the values, which pays for that of the quotient as well; the nudge
-            // pays for that of mapping it to the range.
-            let root = range[0] + (range[1] - range[0]) * (lo / (lo - hi));
-            let nudge = 4.0 * f32::EPSILON * range[0].abs().max(range[1].abs());
-            Some(if keeps_start {
-                [range[0], (root + nudge).min(range[1])]
+/// The part of `range` where the linear function with the values `lo` and `hi` at its ends is not below zero.
+fn above<N: Number>(range: [f32; 2], lo: N, hi: N, roots: &mut u32) -> Option<[f32; 2]> {
+    match (lo < N::zero(), hi < N::zero()) {
+        (false, false) => Some(range),
+        (true, true) => None,
+        (starts_below, _) => {
+            *roots += 1;
+            // The slack is twice the rounding of the sample test, which pays for that of the quotient as well; the nudge pays for
+            // that of mapping it to the range. What is not a number leaves the range as it is.
+            let share = lo / (lo - hi);
+            let root: f64 = (N::from(range[0]) + (N::from(range[1]) - N::from(range[0])) * share).into();
+            Some(if starts_below {
+                [(root as f32).next_down().max(range[0]), range[1]]
             } else {
-                [(root - nudge).max(range[0]), range[1]]
+                [range[0], (root as f32).next_up().min(range[1])]
             })
         }
     }
@@ -113,11 +146,35 @@ mod tests {
 
     #[test]
     fn the_part_above_zero() {
-        assert_eq!(above([0.0, 1.0], 1.0, 2.0, 0.0), Some([0.0, 1.0]));
-        assert_eq!(above([0.0, 1.0], -1.0, -2.0, 0.0), None);
-        let [lo, hi] = above([0.0, 1.0], -1.0, 1.0, 0.0).unwrap();
+        let part = |range: [f32; 2], lo: f64, hi: f64| above(range, lo, hi, &mut 0);
+        assert_eq!(part([0.0, 1.0], 1.0, 2.0), Some([0.0, 1.0]));
+        assert_eq!(part([0.0, 1.0], -1.0, -2.0), None);
+        let [lo, hi] = part([0.0, 1.0], -1.0, 1.0).unwrap();
         assert!((lo - 0.5).abs() < 1e-6 && lo <= 0.5 && hi == 1.0);
-        let [lo, hi] = above([2.0, 4.0], 3.0, -1.0, 0.0).unwrap();
+        let [lo, hi] = part([2.0, 4.0], 3.0, -1.0).unwrap();
         assert!((hi - 3.5).abs() < 1e-5 && hi >= 3.5 && lo == 2.0);
+    }
+
+    #[test]
+    fn no_part_of_lens_and_time_from_which_a_tile_sees_the_triangle_is_lost() {
+        use crate::traversal::testing::{Uniform, cases};
+        let (mut r, mut culled, mut narrowed) = (Uniform::new(13), 0, 0);
+        for (seed, case) in cases(400) {
+            let left = narrow(&case.triangle, &case.shear, &case.tile, &case.within);
+            culled += u32::from(left.is_none());
+            narrowed += u32::from(left.is_some_and(|left| left != case.within));
+            for _ in 0..60 {
+                let place = case.place(&mut r);
+                let e = case.edges(place);
+                let inside = e.iter().all(|&e| e >= 0.0) || e.iter().all(|&e| e <= 0.0);
+                let within = |[lo, hi]: [f32; 2], value: f64| (lo..=hi).contains(&(value as f32));
+                let kept = left.is_some_and(|b| {
+                    let lens = !case.within.lens || (within(b.u, place[2]) && within(b.v, place[3]));
+                    lens && (!case.triangle.moving || within(b.t, place[4]))
+                });
+                assert!(kept || !inside, "{seed}: {place:?} {left:?}");
+            }
+        }
+        assert!(culled > 300 && narrowed > 100, "{culled} {narrowed}");
     }
 }

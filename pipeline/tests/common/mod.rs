@@ -142,6 +142,24 @@ pub fn border_table(seed: u64) -> SampleTable {
     SampleTable::programmed(4, seed, samples).unwrap()
 }
 
+/// How many ways there are to switch the tests on and off.
+pub const SWITCHES: u32 = 1 << 7;
+
+/// One of them.
+pub fn switched(switches: u32) -> Features {
+    let on = |bit: u32| switches & (1 << bit) != 0;
+    Features {
+        lens_lines: on(0),
+        side_planes: on(1),
+        facing: on(2),
+        edges: on(3),
+        coarse: on(4),
+        screen: on(5),
+        z_max: on(6),
+        ..Features::ALL
+    }
+}
+
 pub fn spec(features: Features) -> PipelineSpec {
     let lines = CacheSpec { entries: 256, ways: 4 };
     PipelineSpec {

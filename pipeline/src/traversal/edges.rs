@@ -1,0 +1,321 @@
+//! The edges of a triangle over a box, as quadratics of time.
+//!
+//! Seen from the middle of a box (see [`View`]) the edge `e = P_i x P_j` is, exactly,
+//!
+//! ```text
+//! e(d) = e + dX (-A) + dY (-B) + du (a A + s (y_i - y_j)) + dv (b B + s' (x_j - x_i))
+//!          + (w_j - w_i) (dY s du - dX s' dv + (a s' - b s) du dv)
+//! A = w_i y_j - w_j y_i        B = w_j x_i - w_i x_j
+//! ```
+//!
+//! where `e`, `A` and `B` are quadratic in time and the last factor is linear. Each is kept in Bernstein form, so
+//! bounding its coefficients bounds it at all times (Munkberg and Akenine-Moeller 2012 bound edges so; the form recentred at
+//! the box is our own).
+
+use super::cost;
+use super::number::Number;
+use super::quadratic::Quadratic;
+use super::screen::{Screen, linearized};
+use super::{Piece, Timeline, View};
+
+/// The edges of a triangle over a box; edge `k` is the one opposite vertex `k`.
+#[derive(Clone, Copy, Debug)]
+pub struct Edges<N = f64> {
+    pub(super) view: View<N>,
+    pub(super) edges: [Edge<N>; 3],
+}
+
+/// One edge, from vertex `i` to vertex `j`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge<N> {
+    /// In the middle of the tile and the lens.
+    pub value: Quadratic<N>,
+    /// Its slopes along X, Y, u, v.
+    pub slopes: [Quadratic<N>; 4],
+    /// The difference of the depths of its ends, as time begins and ends.
+    pub depths: [N; 2],
+}
+
+/// Which faces a sample of a box may see: the one that appears clockwise on the screen (edges above zero), and the
+/// counter-clockwise one.
+pub type Faces = [bool; 2];
+
+impl<N: Number> Edges<N> {
+    /// The edges of the triangle in `view`.
+    pub fn new(view: View<N>) -> Self {
+        let edge = |i: usize, j: usize| Edge::new(&view, i, j);
+        let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
+        Self { view, edges }
+    }
+
+    /// Bounds on each edge all over the box.
+    pub fn bounds(&self) -> EdgeBounds<N> {
+        let skew = self.skew();
+        let ranges = self.edges.map(|edge| edge.range(&self.view, skew));
+        EdgeBounds { ranges, moving: self.view.moving }
+    }
+
+    /// Whether `t` is all of the time of the box, as far as that matters.
+    pub fn spans(&self, t: [f32; 2]) -> bool {
+        !self.view.moving || t == self.view.t
+    }
+
+    /// How strongly the difference of depths bends an edge over lens and tile.
+    fn skew(&self) -> N {
+        let View { half, s, a, lens, .. } = &self.view;
+        if !lens {
+            return N::zero();
+        }
+        let twist = (a[0] * s[1] - a[1] * s[0]).abs();
+        half[1] * s[0].abs() * half[2] + (half[0] * s[1].abs() + twist * half[2]) * half[3]
+    }
+
+    /// The screen for single samples with times `t`, within those of the box, of which only `faces` can be seen.
+    pub fn screen(&self, t: [f32; 2], faces: Faces) -> Screen {
+        linearized(self, t, faces, self.skew())
+    }
+}
+
+impl<N: Number> Edge<N> {
+    fn new(view: &View<N>, i: usize, j: usize) -> Self {
+        let [open, close] = view.ends.map(|points| (points[i], points[j]));
+        let product = |f: fn([N; 3], [N; 3]) -> N| {
+            let start = f(open.0, open.1);
+            if !view.moving {
+                return Quadratic::constant(start);
+            }
+            let middle = (f(open.0, close.1) + f(close.0, open.1)) * N::from(0.5);
+            Quadratic([start, middle, f(close.0, close.1)])
+        };
+        let difference = |axis: usize| [open, close].map(|(i, j)| j[axis] - i[axis]);
+        let along = product(|p, q| p[2] * q[1] - q[2] * p[1]);
+        let across = product(|p, q| q[2] * p[0] - p[2] * q[0]);
+        let none = Quadratic::constant(N::zero());
+        let negative = |q: Quadratic<N>| Quadratic(q.0.map(|b| -b));
+        let mut edge = Self {
+            value: product(|p, q| p[0] * q[1] - p[1] * q[0]),
+            slopes: [negative(along), negative(across), none, none],
+            depths: [N::zero(); 2],
+        };
+        if view.lens {
+            let [u, v] = [(1, -view.s[0], view.a[0], along), (0, view.s[1], view.a[1], across)].map(
+                |(axis, s, a, turn)| {
+                    let [start, end] = difference(axis);
+                    let shift =
+                        if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) };
+                    Self::lens_slope(view.moving, &shift, s, &turn, a)
+                },
+            );
+            (edge.slopes[2], edge.slopes[3], edge.depths) = (u, v, difference(2));
+        }
+        edge
+    }
+
+    fn lens_slope(moving: bool, shift: &Quadratic<N>, s: N, turn: &Quadratic<N>, a: N) -> Quadratic<N> {
+        if moving {
+            shift.zip(turn, |shift, turn| shift * s + turn * a)
+        } else {
+            Quadratic::constant(shift.0[0] * s + turn.0[0] * a)
+        }
+    }
+
+    /// The lowest and the highest it can be in the arithmetic of the sample test, as quadratics of time.
+    fn range(&self, view: &View<N>, skew: N) -> [Quadratic<N>; 2] {
+        let [from, to] = self.depths.map(N::abs);
+        let bend = [from, from.max(to), to];
+        let axes = if view.lens { 4 } else { 2 };
+        let mut range = [self.value; 2];
+        for (k, &bend) in bend.iter().enumerate().take(if view.moving { 3 } else { 1 }) {
+            let mut extent = view.rounding;
+            for axis in 0..axes {
+                extent = extent + self.slopes[axis].0[k].abs() * view.half[axis];
+            }
+            if view.lens {
+                extent = extent + skew * bend;
+            }
+            range[0].0[k] = self.value.0[k] - extent;
+            range[1].0[k] = self.value.0[k] + extent;
+        }
+        if !view.moving {
+            range = range.map(|q| Quadratic::constant(q.0[0]));
+        }
+        range
+    }
+}
+
+/// The lowest and the highest values of three edges over a box, as quadratics of time.
+#[derive(Clone, Copy, Debug)]
+pub struct EdgeBounds<N = f64> {
+    ranges: [[Quadratic<N>; 2]; 3],
+    moving: bool,
+}
+
+impl<N: Number> EdgeBounds<N> {
+    /// The part of the time, from 0 to 1, in which a sample may see one of `faces`, and how many quadratics had to be solved for
+    /// it. To see the clockwise face all three edges have to reach above zero, to see the other one all below. So where
+    /// facing is decided one edge is enough to cull, and else it takes one below zero and another above.
+    pub fn narrow(&self, part: [N; 2], faces: Faces) -> (Option<[N; 2]>, u32) {
+        let mut solved = 0;
+        let [clockwise, counter_clockwise] =
+            [0, 1].map(|face| if faces[face] { self.reaching(face, part, &mut solved) } else { None });
+        let hull = match (clockwise, counter_clockwise) {
+            (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
+            (a, b) => a.or(b),
+        };
+        (hull, solved)
+    }
+
+    /// The same for each piece of `times`, of which `drawn` faces matter; `edges` are those bounded. Also says what that takes beyond
+    /// [`Edges::bounds`] in multiply-adds.
+    pub fn timeline(&self, edges: &Edges<N>, times: &Timeline, drawn: Faces) -> (Timeline, u32) {
+        let (mut left, mut madds) = (Timeline::empty(), 0);
+        for piece in times.pieces() {
+            let part = if edges.spans(piece.t) {
+                [N::zero(), N::from(1.0)]
+            } else {
+                madds += 2 * cost::PHASE;
+                piece.t.map(|t| edges.view.phase(t))
+            };
+            let (part, roots) = self.narrow(part, piece.seen(drawn));
+            madds += roots * cost::ROOT;
+            if let Some(part) = part {
+                let [lo, hi] = if self.moving { edges.view.times(part) } else { piece.t };
+                let t = [lo.max(piece.t[0]), hi.min(piece.t[1])];
+                if t[0] <= t[1] {
+                    left.push(Piece { t, ..*piece });
+                }
+            }
+        }
+        (left, madds)
+    }
+
+    /// For each edge the farthest it can be on the side of the face, the clockwise one if both are asked for.
+    pub(super) fn tallest(&self, faces: Faces) -> [Quadratic<N>; 3] {
+        self.ranges.map(|[lowest, highest]| if faces[0] { highest } else { Quadratic(lowest.0.map(|b| -b)) })
+    }
+
+    /// The part of `part` in which every edge can have the sign of `face`.
+    fn reaching(&self, face: usize, part: [N; 2], solved: &mut u32) -> Option<[N; 2]> {
+        let mut left = part;
+        for tallest in self.tallest([face == 0, face == 1]) {
+            if !self.moving {
+                if tallest.0[0] < N::zero() {
+                    return None;
+                }
+                continue;
+            }
+            let (above, rooted) = tallest.hull_above();
+            *solved += u32::from(rooted);
+            let [lo, hi] = above?;
+            left = [left[0].max(lo), left[1].min(hi)];
+            if left[0] > left[1] {
+                return None;
+            }
+        }
+        Some(left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Case, Uniform, cases};
+    use super::*;
+
+    fn edges(case: &Case) -> Edges {
+        Edges::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within))
+    }
+
+    fn at(q: &Quadratic, phase: f64) -> f64 {
+        let rest = 1.0 - phase;
+        q.0[0] * rest * rest + 2.0 * q.0[1] * phase * rest + q.0[2] * phase * phase
+    }
+
+    #[test]
+    fn every_edge_stays_within_its_range() {
+        let mut r = Uniform::new(3);
+        for (seed, case) in cases(300) {
+            let edges = edges(&case);
+            let bounds = edges.bounds();
+            for _ in 0..40 {
+                let place = case.place(&mut r);
+                let phase = edges.view.phase(place[4] as f32);
+                for (value, [low, high]) in case.edges(place).into_iter().zip(&bounds.ranges) {
+                    // The part of the range that is there for the rounding of the sample test is not to be used up.
+                    let room = 0.99 * edges.view.rounding;
+                    let range = [at(low, phase) + room, at(high, phase) - room];
+                    assert!(range[0] <= value && value <= range[1], "{seed}: {value} {range:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn over_a_point_of_the_image_the_range_is_the_edge_itself() {
+        for (_, mut case) in cases(50).filter(|(_, case)| !case.within.lens) {
+            (case.tile.x[1], case.tile.y[1]) = (case.tile.x[0], case.tile.y[0]);
+            let edges = edges(&case);
+            for (k, [low, high]) in edges.bounds().ranges.iter().enumerate() {
+                for step in 0..=4_u8 {
+                    let phase = f64::from(step) / 4.0;
+                    let [start, end] = case.within.t.map(f64::from);
+                    let place = [case.tile.x[0], case.tile.y[0], 0.0, 0.0, 0.0].map(f64::from);
+                    let place = [place[0], place[1], 0.0, 0.0, start + phase * (end - start)];
+                    let [value, room] = [case.edges(place)[k], edges.view.rounding * 1.01];
+                    assert!(at(low, phase) >= value - room && at(high, phase) <= value + room);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_side_of_the_box_is_reached_along_each_axis_alone() {
+        for (_, case) in cases(60).filter(|(_, case)| case.within.lens && !case.triangle.moving) {
+            let middle = edges(&case).view.middle.map(f64::from);
+            for axis in 0..4 {
+                let mut thin =
+                    Case { triangle: case.triangle, shear: case.shear, tile: case.tile, within: case.within };
+                let flat = |k: usize, range: [f32; 2]| if k == axis { range } else { [middle[k] as f32; 2] };
+                (thin.tile.x, thin.tile.y) = (flat(0, case.tile.x), flat(1, case.tile.y));
+                (thin.within.u, thin.within.v) = (flat(2, case.within.u), flat(3, case.within.v));
+                let edges = edges(&thin);
+                let ranges = [thin.tile.x, thin.tile.y, thin.within.u, thin.within.v];
+                for (k, [_, high]) in edges.bounds().ranges.iter().enumerate() {
+                    let most = [0, 1].map(|end| {
+                        let mut place = [middle[0], middle[1], middle[2], middle[3], 0.0];
+                        place[axis] = f64::from(ranges[axis][end]);
+                        thin.edges(place)[k]
+                    });
+                    let (most, over) = (most[0].max(most[1]), high.0[0] - edges.view.rounding);
+                    let width = edges.edges[k].slopes[axis].0[0].abs() * edges.view.half[axis];
+                    assert!(
+                        (over - most).abs() <= 1e-5 * width + 1e-9 * most.abs() + 1e-9,
+                        "{axis}: {over} {most}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_time_in_which_a_place_is_inside_is_lost() {
+        let (mut r, mut culled, mut shrunk) = (Uniform::new(4), 0, 0);
+        for (seed, case) in cases(400) {
+            let edges = edges(&case);
+            let whole = Timeline::one(Piece { t: case.within.t, faces: [true; 2] });
+            for drawn in [[true, true], [true, false], [false, true]] {
+                let (left, _) = edges.bounds().timeline(&edges, &whole, drawn);
+                culled += u32::from(left.hull().is_none());
+                shrunk += u32::from(left.hull().is_some_and(|t| t != case.within.t));
+                for _ in 0..60 {
+                    let place = case.place(&mut r);
+                    let e = case.edges(place);
+                    let seen = (drawn[0] && e.iter().all(|&e| e >= 0.0))
+                        || (drawn[1] && e.iter().all(|&e| e <= 0.0));
+                    let kept = left.pieces().iter().any(|p| (p.t[0]..=p.t[1]).contains(&(place[4] as f32)));
+                    assert!(kept || !seen, "{seed}: {drawn:?} {place:?} {left:?}");
+                }
+            }
+        }
+        assert!(culled > 500 && shrunk > 100, "{culled} {shrunk}");
+    }
+}

@@ -1,0 +1,323 @@
+//! Which face a triangle shows to the samples of a box.
+//!
+//! Seen from `(u, v)` at time `t`, the determinant of its vertices is
+//!
+//! ```text
+//! det(u, v, t) = det[x, y, w] + u s sum(A) + v s' sum(B)        A, B as in `edges`
+//! ```
+//!
+//! cubic in time and affine in `u, v`. So its four Bernstein coefficients, each plus or minus its lens terms, bound it.
+//! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one: the sign of
+//! `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
+
+use super::edges::{Edges, Faces};
+use super::number::Number;
+
+/// A part of the time in which only some faces can be seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// First and last time, both included. Pieces do not overlap.
+    pub t: [f32; 2],
+    /// The faces that the triangle may show, drawn or not.
+    pub faces: Faces,
+}
+
+impl Piece {
+    /// Whether it is known which face is shown.
+    pub fn is_decided(&self) -> bool {
+        self.faces != [true; 2]
+    }
+
+    /// The faces that the triangle may show and that are drawn.
+    pub fn seen(&self, drawn: Faces) -> Faces {
+        [0, 1].map(|face| self.faces[face] && drawn[face])
+    }
+}
+
+/// Pieces of time in order.
+#[derive(Clone, Copy, Debug)]
+pub struct Timeline {
+    pieces: [Piece; Self::MOST],
+    len: usize,
+}
+
+impl Timeline {
+    /// The most pieces there can be.
+    pub const MOST: usize = 8;
+    /// The most often time can be bisected.
+    pub const MOST_SPLITS: u32 = Self::MOST.ilog2();
+
+    /// No time at all.
+    pub const fn empty() -> Self {
+        Self { pieces: [Piece { t: [0.0; 2], faces: [false; 2] }; Self::MOST], len: 0 }
+    }
+
+    /// One piece.
+    pub fn one(piece: Piece) -> Self {
+        let mut timeline = Self::empty();
+        timeline.push(piece);
+        timeline
+    }
+
+    /// Adds a piece after the others. One that shows the same as the last, and follows it at once, goes into that. Where all
+    /// places are taken the last piece grows, which keeps too much rather than too little.
+    pub fn push(&mut self, piece: Piece) {
+        let full = self.len == Self::MOST;
+        match self.pieces[..self.len].last_mut() {
+            Some(last) if full || (last.faces == piece.faces && last.t[1].next_up() >= piece.t[0]) => {
+                last.t[1] = last.t[1].max(piece.t[1]);
+                last.faces = [0, 1].map(|face| last.faces[face] | piece.faces[face]);
+            }
+            _ => {
+                self.pieces[self.len] = piece;
+                self.len += 1;
+            }
+        }
+    }
+
+    /// The pieces.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces[..self.len]
+    }
+
+    /// What both say, of one time.
+    pub fn meet(&self, other: &Self) -> Self {
+        let mut both = Self::empty();
+        for a in self.pieces() {
+            for b in other.pieces() {
+                let t = [a.t[0].max(b.t[0]), a.t[1].min(b.t[1])];
+                let faces = a.seen(b.faces);
+                if t[0] <= t[1] && faces != [false; 2] {
+                    both.push(Piece { t, faces });
+                }
+            }
+        }
+        both
+    }
+
+    /// From the first time to the last.
+    pub fn hull(&self) -> Option<[f32; 2]> {
+        let pieces = self.pieces();
+        Some([pieces.first()?.t[0], pieces.last()?.t[1]])
+    }
+}
+
+/// Bounds on the determinant over a box: its lowest and highest Bernstein coefficients.
+#[derive(Clone, Copy, Debug)]
+pub struct Facing<N = f64> {
+    range: [[N; 4]; 2],
+    margin: N,
+    moving: bool,
+}
+
+impl<N: Number> Facing<N> {
+    /// The determinant of the triangle of `edges`.
+    pub fn new(edges: &Edges<N>) -> Self {
+        let view = &edges.view;
+        let third = N::constant(1.0 / 3.0);
+        let count = if view.moving { 4 } else { 1 };
+        let [mut lowest, mut highest] = [[N::zero(); 4]; 2];
+        let sums: [[N; 3]; 2] = [0, 1].map(|axis| {
+            let [a, b, c] = edges.edges.map(|edge| edge.slopes[axis]);
+            if view.lens { a.zip(&b, |a, b| a + b).zip(&c, |a, b| a + b).0 } else { [N::zero(); 3] }
+        });
+        for (k, (low, high)) in lowest.iter_mut().zip(&mut highest).take(count).enumerate() {
+            let middle = determinant(edges, k);
+            let middle = if k == 1 || k == 2 { middle * third } else { middle };
+            let mut extent = N::zero();
+            if view.lens {
+                for (axis, sum) in sums.iter().enumerate() {
+                    extent =
+                        extent + elevated(sum, k, third).abs() * view.s[axis].abs() * view.half[2 + axis];
+                }
+            }
+            (*low, *high) = (middle - extent, middle + extent);
+        }
+        let mut range = [lowest, highest];
+        if !view.moving {
+            range = range.map(|[first, ..]| [first; 4]);
+        }
+        Self { range, margin: margin(edges), moving: view.moving }
+    }
+
+    /// The faces that can be seen over the whole time.
+    pub fn faces(&self) -> Faces {
+        // Written so that what is not a number leaves both.
+        let above = self.range[0].iter().all(|&low| low > self.margin);
+        let below = self.range[1].iter().all(|&high| high < -self.margin);
+        [!below, !above]
+    }
+
+    /// The parts of the times `t` in which one of the faces `drawn` can be seen, time being bisected `splits` times at most where it
+    /// is not decided which. Also says how often it was.
+    pub fn timeline(&self, t: [f32; 2], drawn: Faces, splits: u32) -> (Timeline, u32) {
+        let (mut timeline, mut done) = (Timeline::empty(), 0);
+        let splits = if self.moving { splits.min(Timeline::MOST_SPLITS) } else { 0 };
+        self.bisect([t[0], t[1], t[1]], drawn, splits, &mut timeline, &mut done);
+        (timeline, done)
+    }
+
+    /// `last` is the last time of a part that ends at `end`, which belongs to the next part unless it is the end of all.
+    fn bisect(
+        &self,
+        [start, end, last]: [f32; 3],
+        drawn: Faces,
+        splits: u32,
+        out: &mut Timeline,
+        done: &mut u32,
+    ) {
+        let piece = Piece { t: [start, last], faces: self.faces() };
+        let middle = 0.5 * (start + end);
+        if splits == 0 || piece.is_decided() || !(start < middle && middle < end) {
+            if piece.seen(drawn) != [false; 2] {
+                out.push(piece);
+            }
+            return;
+        }
+        *done += 1;
+        let (from, span) = (N::from(start), N::from(end) - N::from(start));
+        let phase = (N::from(middle) - from) / span;
+        let [earlier, later] = self.split(phase);
+        earlier.bisect([start, middle, middle.next_down()], drawn, splits - 1, out, done);
+        later.bisect([middle, end, last], drawn, splits - 1, out, done);
+    }
+
+    /// Before and after `phase` of the time. Each coefficient is a mean of others with weights that are not negative, so bounds
+    /// stay bounds.
+    fn split(&self, phase: N) -> [Self; 2] {
+        let mut parts = [*self; 2];
+        for side in [0, 1] {
+            let mut level = self.range[side];
+            for step in 0..4 {
+                parts[0].range[side][step] = level[0];
+                parts[1].range[side][3 - step] = level[3 - step];
+                for k in 0..3 - step {
+                    level[k] = level[k] + (level[k + 1] - level[k]) * phase;
+                }
+            }
+        }
+        parts
+    }
+}
+
+/// Bernstein coefficient `k` of the determinant, the inner two times three.
+fn determinant<N: Number>(edges: &Edges<N>, k: usize) -> N {
+    let [open, close] = edges.view.ends;
+    let mut sum = N::zero();
+    for (vertex, edge) in edges.edges.iter().enumerate() {
+        let ([e0, e1, e2], w0, w1) = (edge.value.0, open[vertex][2], close[vertex][2]);
+        let part = match k {
+            0 => e0 * w0,
+            1 => e0 * w1 + (e1 + e1) * w0,
+            2 => (e1 + e1) * w1 + e2 * w0,
+            _ => e2 * w1,
+        };
+        sum = if vertex == 0 { part } else { sum + part };
+    }
+    sum
+}
+
+/// Coefficient `k` of a quadratic written as a cubic.
+fn elevated<N: Number>(q: &[N; 3], k: usize, third: N) -> N {
+    match k {
+        0 => q[0],
+        1 => (q[0] + q[1] + q[1]) * third,
+        2 => (q[1] + q[1] + q[2]) * third,
+        _ => q[2],
+    }
+}
+
+/// How far the determinant of what the sample test sees, weighed with depths as it rounds them, may be from the true one:
+/// three edges of at most `2 reach_x reach_y`, each rounded, by depths that are rounded.
+fn margin<N: Number>(edges: &Edges<N>) -> N {
+    const ROUNDING: f64 = 1.0 / 524_288.0;
+    let view = &edges.view;
+    let [reach_x, reach_y] = view.reach;
+    let weight = reach_x * reach_y * view.depth[1];
+    // Outside the range of f32 the depth of a sample says nothing, and where some vertices are behind the camera its sign
+    // would count.
+    if !(weight > N::constant(1e-30) && weight < N::constant(1e36)) {
+        return N::from(f32::INFINITY);
+    }
+    view.depth[0] * view.rounding * N::from(3.0) + N::constant(3.0 * ROUNDING) * weight
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::View;
+    use super::super::testing::{Uniform, cases};
+    use super::*;
+
+    #[test]
+    fn the_face_is_the_sign_of_the_determinant_all_over_the_box() {
+        let (mut r, mut decided, mut pieces) = (Uniform::new(6), 0, 0);
+        for (seed, case) in cases(400) {
+            let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
+            let facing = Facing::new(&edges);
+            for (drawn, splits) in
+                [([true, true], 3), ([true, false], 2), ([false, true], 1), ([true, true], 0)]
+            {
+                let (times, _) = facing.timeline(case.within.t, drawn, splits);
+                decided += times.pieces().iter().filter(|p| p.is_decided()).count();
+                pieces += usize::from(times.pieces().len() > 1);
+                for _ in 0..40 {
+                    let place = case.place(&mut r);
+                    let det = case.det(place);
+                    // A hair beyond what rounding may hide, which is what the margin is for.
+                    let sure = 0.99 * facing.margin;
+                    let t = place[4] as f32;
+                    let here: Vec<_> = times.pieces().iter().filter(|p| p.t[0] <= t && t <= p.t[1]).collect();
+                    assert!(here.len() <= 1, "pieces overlap at {t}: {times:?}");
+                    let faces = here.first().map_or([false; 2], |piece| piece.faces);
+                    let hidden = [0, 1].map(|face| drawn[face] && !faces[face]);
+                    assert!(!hidden[0] || det < -sure, "{seed}: {det} {drawn:?} {times:?}");
+                    assert!(!hidden[1] || det > sure, "{seed}: {det} {drawn:?} {times:?}");
+                }
+            }
+        }
+        assert!(decided > 2000 && pieces > 50, "{decided} {pieces}");
+    }
+
+    #[test]
+    fn a_turn_in_the_middle_of_the_shutter_is_found_by_cutting_there() {
+        use crate::geometry::{Cull, MovingVertex, Shear};
+        use crate::setup::{Outcome, set_up};
+        use crate::traversal::{Box5, TileRect};
+        let still = |p| MovingVertex { open: p, close: p };
+        let v = [
+            still([0.0, 0.0, 1.0]),
+            still([0.0, 8.0, 1.0]),
+            MovingVertex { open: [8.0, 4.0, 1.0], close: [-8.0, 4.0, 1.0] },
+        ];
+        let shear = Shear::default();
+        let Outcome::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [8.0; 2]) else {
+            panic!("the triangle is visible");
+        };
+        let tile = TileRect { x: [0.0, 8.0], y: [0.0, 8.0] };
+        let edges = Edges::<f64>::new(View::new(&triangle, &shear, &tile, &Box5::whole(false)));
+        let facing = Facing::new(&edges);
+        assert_eq!(facing.timeline([0.0, 1.0], [true; 2], 0).0.pieces().len(), 1);
+        // About the instant at which it has no area neither half is decided; the outer quarters are.
+        let (times, bisections) = facing.timeline([0.0, 1.0], [true; 2], 3);
+        let found: Vec<_> = times.pieces().iter().map(|p| (p.t[0], p.faces)).collect();
+        assert_eq!(
+            found,
+            [(0.0, [false, true]), (0.375, [true, true]), (0.625, [true, false])],
+            "{bisections}"
+        );
+        let (front, _) = facing.timeline([0.0, 1.0], [true, false], 3);
+        assert_eq!(front.hull().map(|t| t[0]), Some(0.375));
+    }
+
+    #[test]
+    fn a_full_timeline_grows_rather_than_forgets() {
+        let mut timeline = Timeline::empty();
+        for k in 0..12_u8 {
+            let t = f32::from(k);
+            timeline.push(Piece { t: [t, t + 0.5], faces: [k % 2 == 0, k % 2 == 1] });
+        }
+        assert_eq!(timeline.pieces().len(), Timeline::MOST);
+        assert_eq!(timeline.hull(), Some([0.0, 11.5]));
+        assert_eq!(timeline.pieces()[Timeline::MOST - 1].faces, [true; 2]);
+    }
+}

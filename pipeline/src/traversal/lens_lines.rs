@@ -1,0 +1,225 @@
+//! Lines in the dual space of image and lens (after Laine, Aila, Karras and Lehtinen 2011, "Clipless dual-space bounds for
+//! faster stochastic rasterization").
+//!
+//! Seen from `u` of the lens a vertex appears at `X = (x + u (a w - s)) / w`, a line in the plane of X and u; all of the triangle
+//! lies between a lower and an upper line
+//!
+//! ```text
+//! l(u) <= X <= h(u)
+//! ```
+//!
+//! found once for each triangle, over all times; in (Y, v) alike. A tile then asks where on the lens the lower line is left of its
+//! right side and the upper line right of its left side: four differences an axis, and a quotient where it is not all or nothing.
+//!
+//! Nothing is clipped: a lower line needs `f = x + u (a w - s) - l(u) w >= 0` for each vertex, whatever the sign of `w`.
+//! Then a sample `X w = sum(l_i (x_i + u (a w_i - s)))` of positive depth has `(X - l(u)) w >= 0`. `f` is bilinear in `u` and
+//! time, so the corners decide, and the line is that through the tightest values at both ends of the lens. (The paper
+//! fixes a slope and finds the offset; the two ends of the lens are tighter and as cheap.) Vertices behind the camera bound
+//! those values from the other side, and where no value is left there is no line.
+
+use super::number::Number;
+use super::{Box5, TileRect};
+use crate::geometry::Shear;
+use crate::setup::Triangle;
+
+/// The lines of one triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensLines<N = f64> {
+    /// For (X, u) and (Y, v): the lower line, and the upper line with its sign turned, each at `u = -1` and `u = 1`.
+    axes: [[[N; 2]; 2]; 2],
+}
+
+impl<N: Number> LensLines<N> {
+    /// The lines of `triangle`, seen by samples beyond the depth `near`.
+    pub fn new(triangle: &Triangle, shear: &Shear, near: f32) -> Self {
+        let none = N::from(f32::NEG_INFINITY);
+        if !depth_is_sound(triangle, near) {
+            return Self { axes: [[[none; 2]; 2]; 2] };
+        }
+        Self { axes: [0, 1].map(|axis| lines(triangle, shear, axis)) }
+    }
+
+    /// The part of `within` from which the triangle can be seen in `tile`, or `None` where there is none; and how many crossings were
+    /// found.
+    pub fn narrow(&self, tile: &TileRect, within: &Box5) -> (Option<Box5>, u32) {
+        let (mut next, mut crossings) = (*within, 0);
+        if !within.lens {
+            return (Some(next), crossings);
+        }
+        for (axis, [low, high]) in [tile.x, tile.y].into_iter().enumerate() {
+            let range = if axis == 0 { &mut next.u } else { &mut next.v };
+            for (line, side) in self.axes[axis].iter().zip([high, -low]) {
+                // `side - l(u)`, not below zero where the triangle can be in the tile.
+                let room = line.map(|end| N::from(side) - end);
+                let Some(left) = narrowed(*range, room, &mut crossings) else { return (None, crossings) };
+                *range = left;
+            }
+        }
+        (Some(next), crossings)
+    }
+}
+
+/// Whether the sign of a sample's depth can be trusted: no vertex is behind the camera, or the near depth is well beyond what
+/// rounding may make of a depth, and products of depths and places stay within the range of f32.
+fn depth_is_sound(triangle: &Triangle, near: f32) -> bool {
+    let depth = triangle.corners.iter().map(|c| c.open[2].abs() + c.delta[2].abs()).fold(0.0, f32::max);
+    let [slack_x, slack_y] = triangle.slack;
+    let weight = f64::from(slack_x) * f64::from(slack_y) * f64::from(depth);
+    !triangle.behind || (near > depth / 1_048_576.0 && weight > 1e-36 && weight < 1e24)
+}
+
+/// The lower line of an axis and the upper one with its sign turned.
+fn lines<N: Number>(triangle: &Triangle, shear: &Shear, axis: usize) -> [[N; 2]; 2] {
+    let [s, a] = [shear.s[axis], shear.a[axis]].map(N::from);
+    let slack = N::from(triangle.slack[axis]);
+    let mut lines = [[Offset::<N>::any(); 2]; 2];
+    for corner in &triangle.corners {
+        for end in 0..if triangle.moving { 2 } else { 1 } {
+            let [x, w] = [axis, 2].map(|k| {
+                let open = N::from(corner.open[k]);
+                if end == 0 { open } else { open + N::from(corner.delta[k]) }
+            });
+            let shift = a * w - s;
+            for (u, place) in [x - shift, x + shift].into_iter().enumerate() {
+                lines[0][u].hold(place - slack, w);
+                lines[1][u].hold(-(place + slack), w);
+            }
+        }
+    }
+    lines.map(|line| line.map(|offset| offset.highest().unwrap_or(N::from(f32::NEG_INFINITY))))
+}
+
+/// The values a lower line can have at one place of the lens.
+#[derive(Clone, Copy)]
+struct Offset<N> {
+    most: N,
+    least: N,
+    possible: bool,
+}
+
+impl<N: Number> Offset<N> {
+    fn any() -> Self {
+        Self { most: N::from(f32::INFINITY), least: N::from(f32::NEG_INFINITY), possible: true }
+    }
+
+    /// Keeps those that leave a vertex at `place` on the homogeneous plane, with depth `w`, above the line.
+    fn hold(&mut self, place: N, w: N) {
+        if w > N::zero() {
+            self.most = self.most.min(place / w);
+        } else if w < N::zero() {
+            self.least = self.least.max(place / w);
+        } else {
+            self.possible &= w == N::zero() && place >= N::zero();
+        }
+    }
+
+    /// The highest, but for a hair to spare for the rounding of the quotients.
+    fn highest(&self) -> Option<N> {
+        let hair = N::constant(HAIR);
+        let most = self.most - self.most.abs() * hair;
+        let bounded = self.most < N::from(f32::INFINITY)
+            && (self.least == N::from(f32::NEG_INFINITY) || most >= self.least + self.least.abs() * hair);
+        (self.possible && bounded).then_some(most)
+    }
+}
+
+const HAIR: f64 = 1e-12;
+
+/// The part of `range` where what is `room` at -1 and at 1 is not below zero.
+fn narrowed<N: Number>(range: [f32; 2], [start, end]: [N; 2], crossings: &mut u32) -> Option<[f32; 2]> {
+    let starts_below = start < N::zero();
+    if starts_below == (end < N::zero()) {
+        return (!starts_below).then_some(range);
+    }
+    *crossings += 1;
+    // From -1 to 1, to a float outwards. What is not a number leaves the range as it is.
+    let place: f64 = (start / (start - end) * N::from(2.0) - N::from(1.0)).into();
+    let left = if starts_below {
+        [range[0].max((place as f32).next_down()), range[1]]
+    } else {
+        [range[0], range[1].min((place as f32).next_up())]
+    };
+    (left[0] <= left[1]).then_some(left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{NEAR, Uniform, cases};
+    use super::*;
+
+    #[test]
+    fn every_point_of_the_triangle_lies_between_the_lines() {
+        let (mut r, mut bounded, mut behind) = (Uniform::new(7), 0, 0);
+        for (seed, case) in cases(500).filter(|(_, case)| case.within.lens) {
+            let lines = LensLines::<f64>::new(&case.triangle, &case.shear, NEAR);
+            let finite = lines.axes.iter().flatten().flatten().filter(|line| line.is_finite()).count();
+            bounded += finite;
+            behind += if case.triangle.behind { finite } else { 0 };
+            for _ in 0..60 {
+                let [_, _, u, v, t] = case.place(&mut r);
+                let (seen, weights) = (case.seen([0.0, 0.0, u, v, t]), r.weights());
+                let [x, y, w] = [0, 1, 2].map(|k| (0..3).map(|i| weights[i] * seen[i][k]).sum::<f64>());
+                if w <= f64::from(NEAR) {
+                    continue;
+                }
+                for (axis, place, lens) in [(0, x / w, u), (1, y / w, v)] {
+                    let at = |line: [f64; 2]| {
+                        let bounded = line.iter().all(|end| end.is_finite());
+                        if bounded {
+                            line[0] + 0.5 * (lens + 1.0) * (line[1] - line[0])
+                        } else {
+                            f64::NEG_INFINITY
+                        }
+                    };
+                    let [low, high] = lines.axes[axis];
+                    let inside = at(low) <= place && place <= -at(high);
+                    assert!(inside, "{seed}: {place} {low:?} {high:?} {lens}");
+                }
+            }
+        }
+        assert!(bounded > 3000 && behind > 100, "{bounded} {behind}");
+    }
+
+    #[test]
+    fn a_lens_part_from_which_a_tile_sees_the_triangle_is_not_lost() {
+        let (mut r, mut culled, mut narrowed) = (Uniform::new(8), 0, 0);
+        for (seed, case) in cases(500).filter(|(_, case)| case.within.lens) {
+            let (left, _) =
+                LensLines::<f64>::new(&case.triangle, &case.shear, NEAR).narrow(&case.tile, &case.within);
+            culled += u32::from(left.is_none());
+            narrowed += u32::from(left.is_some_and(|left| left != case.within));
+            for _ in 0..60 {
+                let place = case.place(&mut r);
+                let e = case.edges(place);
+                let depth = case.det(place) / e.iter().sum::<f64>();
+                let inside = e.iter().all(|&e| e >= 0.0) || e.iter().all(|&e| e <= 0.0);
+                let [u, v] = [place[2] as f32, place[3] as f32];
+                let kept =
+                    left.is_some_and(|b| (b.u[0]..=b.u[1]).contains(&u) && (b.v[0]..=b.v[1]).contains(&v));
+                assert!(kept || !inside || depth <= f64::from(NEAR), "{seed}: {place:?}");
+            }
+        }
+        assert!(culled > 200 && narrowed > 40, "{culled} {narrowed}");
+    }
+
+    #[test]
+    fn a_point_at_one_depth_has_one_line() {
+        use crate::geometry::{Cull, MovingVertex};
+        use crate::setup::{Outcome, set_up};
+        // At twice the focus depth of 6 the circle of confusion has the radius a - s / w = 15 - 90 / 12 = 7.5.
+        let shear = Shear { s: [90.0, -90.0], a: [15.0, -15.0] };
+        let v = [[0.0, 0.0, 12.0], [12.0, 0.0, 12.0], [0.0, 12.0, 12.0]]
+            .map(|p| MovingVertex { open: p, close: p });
+        let Outcome::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [64.0; 2]) else {
+            panic!("the triangle is visible");
+        };
+        let [[low, high], _] = LensLines::<f64>::new(&triangle, &shear, 0.1).axes;
+        for (found, expected) in [(low, [-7.5, 7.5]), (high.map(|l| -l), [-6.5, 8.5])] {
+            assert!(found.iter().zip(expected).all(|(f, e): (&f64, f64)| (f - e).abs() < 1e-4), "{found:?}");
+        }
+        let tile = TileRect { x: [4.75, 12.75], y: [-8.0, 8.0] };
+        let lines = LensLines::<f64>::new(&triangle, &shear, 0.1);
+        let left = lines.narrow(&tile, &Box5::whole(true)).0.unwrap();
+        assert!((left.u[0] - 0.5).abs() < 1e-4 && left.u[0] <= 0.5 && left.u[1] == 1.0, "{left:?}");
+    }
+}

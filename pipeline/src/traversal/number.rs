@@ -1,0 +1,175 @@
+//! The numbers a kernel runs on: `f64` at run time, and in tests one that counts its operations.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What the kernels of the tile tests need of a number. A kernel written over it can be run to count what it costs.
+pub trait Number:
+    Copy
+    + PartialOrd
+    + From<f32>
+    + Into<f64>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The magnitude.
+    fn abs(self) -> Self;
+    /// The square root.
+    fn sqrt(self) -> Self;
+
+    /// The larger one; the other one where one is not a number.
+    fn max(self, other: Self) -> Self {
+        if other > self || self.partial_cmp(&self).is_none() { other } else { self }
+    }
+
+    /// The smaller one; the other one where one is not a number.
+    fn min(self, other: Self) -> Self {
+        if other < self || self.partial_cmp(&self).is_none() { other } else { self }
+    }
+
+    /// A number known beforehand.
+    fn constant(value: f64) -> Self;
+
+    /// Nothing.
+    fn zero() -> Self {
+        Self::from(0.0)
+    }
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    fn abs(self) -> Self {
+        Self::abs(self)
+    }
+
+    fn sqrt(self) -> Self {
+        Self::sqrt(self)
+    }
+}
+
+/// A number that counts multiply-adds, by the convention of the sample test: a product and the sum it goes into are one, a
+/// lone addition, multiplication, division or root is one; signs, magnitudes and comparisons are free.
+#[cfg(test)]
+pub mod counted {
+    use std::cell::Cell;
+    use std::cmp::Ordering;
+
+    use super::*;
+
+    thread_local! {
+        static COUNT: Cell<u32> = const { Cell::new(0) };
+    }
+
+    /// The multiply-adds of running `kernel`, and its result.
+    pub fn count<R>(kernel: impl FnOnce() -> R) -> (u32, R) {
+        COUNT.set(0);
+        let result = kernel();
+        (COUNT.get(), result)
+    }
+
+    /// A value, and whether it is a product that no sum has taken up yet.
+    #[derive(Clone, Copy, Debug, Default)]
+    pub struct Counted {
+        pub value: f64,
+        fresh: bool,
+    }
+
+    impl Counted {
+        fn sum(self, other: Self, value: f64) -> Self {
+            COUNT.set(COUNT.get() + u32::from(!self.fresh && !other.fresh));
+            Self { value, fresh: false }
+        }
+
+        fn product(value: f64, fresh: bool) -> Self {
+            COUNT.set(COUNT.get() + 1);
+            Self { value, fresh }
+        }
+    }
+
+    impl From<f32> for Counted {
+        fn from(value: f32) -> Self {
+            Self { value: f64::from(value), fresh: false }
+        }
+    }
+
+    impl From<Counted> for f64 {
+        fn from(counted: Counted) -> Self {
+            counted.value
+        }
+    }
+
+    impl PartialEq for Counted {
+        fn eq(&self, other: &Self) -> bool {
+            self.value == other.value
+        }
+    }
+
+    impl PartialOrd for Counted {
+        fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+            self.value.partial_cmp(&other.value)
+        }
+    }
+
+    impl Add for Counted {
+        type Output = Self;
+        fn add(self, other: Self) -> Self {
+            self.sum(other, self.value + other.value)
+        }
+    }
+
+    impl Sub for Counted {
+        type Output = Self;
+        fn sub(self, other: Self) -> Self {
+            self.sum(other, self.value - other.value)
+        }
+    }
+
+    impl Mul for Counted {
+        type Output = Self;
+        fn mul(self, other: Self) -> Self {
+            Self::product(self.value * other.value, true)
+        }
+    }
+
+    impl Div for Counted {
+        type Output = Self;
+        fn div(self, other: Self) -> Self {
+            Self::product(self.value / other.value, false)
+        }
+    }
+
+    impl Neg for Counted {
+        type Output = Self;
+        fn neg(self) -> Self {
+            Self { value: -self.value, ..self }
+        }
+    }
+
+    impl Number for Counted {
+        fn constant(value: f64) -> Self {
+            Self { value, fresh: false }
+        }
+
+        fn abs(self) -> Self {
+            Self { value: self.value.abs(), ..self }
+        }
+
+        fn sqrt(self) -> Self {
+            Self::product(self.value.sqrt(), false)
+        }
+    }
+
+    #[test]
+    fn an_edge_takes_two_and_a_move_takes_one() {
+        let [a, b, c, d] = [1.0, 2.0, 3.0, 4.0].map(Counted::from);
+        assert_eq!(count(|| (a * b - c * d).value), (2, -10.0));
+        assert_eq!(count(|| (a + b * c).value), (1, 7.0));
+        assert_eq!(count(|| (a + b + c).value), (2, 6.0));
+        assert_eq!(count(|| (-(a / b)).abs().value), (1, 0.5));
+    }
+}

@@ -1,0 +1,175 @@
+//! The edges linearized in (X, Y, u, v, t), to screen single samples by (Munkberg and Akenine-Moeller 2012, whose
+//! hyperplanes these are; the remainder is our own).
+
+use super::edges::{Edge, Edges, Faces};
+use super::number::Number;
+use super::quadratic::Quadratic;
+use super::view::View;
+
+/// Linear edges in the arithmetic of the sample test. A sample is outside where one edge is below `-margin` and another above
+/// `margin`.
+#[derive(Clone, Copy, Debug)]
+pub struct Screen {
+    /// The middle of the box: X, Y, u, v, t.
+    pub middle: [f32; 5],
+    /// For each edge its value in the middle.
+    pub value: [f32; 3],
+    /// For each edge its slope along X, Y, u, v, t.
+    pub gradient: [[f32; 5]; 3],
+    /// For each edge how far the linear value may be off.
+    pub margin: [f32; 3],
+}
+
+/// `value + slopes . d` over a box, right to within `remainder` of what the sample test computes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Linear<N> {
+    pub value: N,
+    pub slopes: [N; 5],
+    pub remainder: N,
+    /// How far the linear part reaches from its middle value.
+    pub extent: N,
+}
+
+/// Multiply-adds of screening one sample: three edges, one for each dimension in use.
+pub const fn screen_madds(moving: bool, lens: bool) -> u32 {
+    3 * (2 + moving as u32 + 2 * lens as u32)
+}
+
+/// The screen of `edges` over the times `t`, which lie within those of its box.
+pub(super) fn linearized<N: Number>(edges: &Edges<N>, t: [f32; 2], faces: Faces, skew: N) -> Screen {
+    let view = &edges.view;
+    let [x, y, u, v] = view.middle;
+    let middle = [x, y, u, v, if view.moving { 0.5 * (t[0] + t[1]) } else { 0.0 }];
+    let part = (view.moving && t != view.t).then(|| t.map(|t| view.phase(t)));
+    let half_t = (N::from(t[1]) - N::from(t[0])) * N::from(0.5);
+    let linear = edges.edges.map(|edge| edge.linear(view, part, half_t, skew));
+    let mut screen = Screen { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3] };
+    for (k, linear) in linear.iter().enumerate() {
+        // The middle of the times is rounded; what it moves by goes into the margin.
+        let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle[4].abs());
+        let [value, margin] = one_sided(linear, off, faces);
+        (screen.value[k], screen.margin[k]) = (value, margin);
+        screen.gradient[k] = linear.slopes.map(|slope| Into::<f64>::into(slope) as f32);
+    }
+    screen
+}
+
+/// The value of an edge and its margin. Where only one face can be seen, one edge on the wrong side is enough: the zero that values
+/// are compared with is moved so far that the other side is always met.
+fn one_sided<N: Number>(linear: &Linear<N>, off: f64, faces: Faces) -> [f32; 2] {
+    // The linear value is rounded a dozen times, each by at most 2^-24 of the sum of magnitudes.
+    const ROUNDING: f64 = 1.0 / 1_048_576.0;
+    let [value, extent, remainder]: [f64; 3] =
+        [linear.value, linear.extent, linear.remainder].map(Into::into);
+    let tallest = 1.001 * (value.abs() + extent);
+    let both = faces[0] == faces[1];
+    let margin = remainder + off + ROUNDING * if both { tallest } else { 4.0 * (tallest + remainder) };
+    let (value, margin) = if both {
+        (value, margin)
+    } else {
+        let beyond = 2.0 * (tallest + margin);
+        let shift = 0.5 * (beyond + margin);
+        (if faces[0] { value + shift } else { value - shift }, 0.5 * (margin - beyond))
+    };
+    [value as f32, margin as f32 + margin.abs() as f32 * 1e-6]
+}
+
+impl<N: Number> Edge<N> {
+    /// It linearized over `part` of the time, or all of it, half of which lasts `half_t`.
+    fn linear(&self, view: &View<N>, part: Option<[N; 2]>, half_t: N, skew: N) -> Linear<N> {
+        let over = |q: &Quadratic<N>| match part {
+            Some(part) => q.over(part),
+            None => *q,
+        };
+        let mut linear = Linear {
+            value: self.value.0[0],
+            slopes: [N::zero(); 5],
+            remainder: view.rounding,
+            extent: N::zero(),
+        };
+        if view.moving {
+            let [m0, m1, m2] = over(&self.value).centred();
+            // `c^2` is not negative: half of its term goes into the value.
+            let bend = m2 * N::from(0.5);
+            linear.value = m0 + bend;
+            linear.remainder = linear.remainder + bend.abs();
+            linear.extent = m1.abs();
+            linear.slopes[4] = if half_t > N::zero() { m1 / half_t } else { N::zero() };
+        }
+        for axis in 0..if view.lens { 4 } else { 2 } {
+            let half = view.half[axis];
+            linear.slopes[axis] = self.slopes[axis].0[0];
+            if view.moving {
+                let [m0, m1, m2] = over(&self.slopes[axis]).centred();
+                linear.slopes[axis] = m0;
+                linear.remainder = linear.remainder + half * (m1.abs() + m2.abs());
+            }
+            linear.extent = linear.extent + linear.slopes[axis].abs() * half;
+        }
+        if view.lens {
+            let bend = self.depths[0].abs().max(self.depths[1].abs());
+            linear.remainder = linear.remainder + skew * bend;
+        }
+        linear
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, cases};
+    use super::super::{Edges, View};
+
+    #[test]
+    fn edges_stay_within_the_margin_and_one_sided_screens_say_the_same() {
+        let (mut r, mut outside) = (Uniform::new(5), [0; 3]);
+        for (seed, case) in cases(300) {
+            let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
+            let [start, end] = case.within.t;
+            let part = if seed % 2 == 0 {
+                [start, end]
+            } else {
+                [start + 0.25 * (end - start), 0.5 * (start + end)]
+            };
+            for (kind, faces) in [[true, true], [true, false], [false, true]].into_iter().enumerate() {
+                let screen = edges.screen(part, faces);
+                for _ in 0..30 {
+                    let mut place = case.place(&mut r);
+                    place[4] = f64::from(r.often_an_end(part));
+                    let e = case.edges(place);
+                    // As the sample test does it, but for its rounding.
+                    let signs: Vec<_> = (0..3)
+                        .map(|k| {
+                            let linear: f64 = (0..5)
+                                .map(|axis| {
+                                    let offset = place[axis] - f64::from(screen.middle[axis]);
+                                    f64::from(screen.gradient[k][axis]) * offset
+                                })
+                                .sum();
+                            let value = f64::from(screen.value[k]) + linear;
+                            let margin = f64::from(screen.margin[k]);
+                            (value < -margin, value > margin)
+                        })
+                        .collect();
+                    let out = signs.iter().any(|s| s.0) && signs.iter().any(|s| s.1);
+                    outside[kind] += u32::from(out);
+                    let seen = (faces[0] && e.iter().all(|&e| e >= 0.0))
+                        || (faces[1] && e.iter().all(|&e| e <= 0.0));
+                    assert!(!(out && seen), "{seed} {faces:?}: {e:?} {screen:?}");
+                    let room = edges.view.rounding * 0.9;
+                    if kind == 0 {
+                        for (k, value) in e.into_iter().enumerate() {
+                            assert!(
+                                !(signs[k].0 && value > -room || signs[k].1 && value < room),
+                                "{seed}: {value}"
+                            );
+                        }
+                    } else {
+                        let edge_says = e.iter().any(|&e| if kind == 1 { e < 0.0 } else { e > 0.0 });
+                        assert!(!out || edge_says);
+                    }
+                }
+            }
+        }
+        assert!(outside[0] > 1000 && outside[1] > outside[0] && outside[2] > outside[0], "{outside:?}");
+    }
+}

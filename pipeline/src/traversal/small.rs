@@ -1,0 +1,105 @@
+//! Motion and blur too small to matter: how far a triangle is from where it would be drawn without.
+//!
+//! The image of a vertex in front of the camera moves monotonically in time on both axes, so it is never farther from its place in
+//! mid-shutter than at an end. On the lens it moves on a line of which the ends are farthest, by `a - s / w`, which is
+//! monotone in `w`. The image of a triangle wholly in front of the camera is the hull of those of its vertices, so no point of its
+//! outline moves farther than they do.
+
+use crate::geometry::{MovingVertex, Shear};
+
+/// Multiply-adds of [`motion_px`]: two quotients for three places of each vertex, the middle of it, and two distances.
+pub const MOTION_MADDS: u32 = 3 * (3 * 2 + 3 + 2 * 4);
+
+/// Multiply-adds of [`blur_px`]: a quotient and a difference for each axis, vertex and end.
+pub const BLUR_MADDS: u32 = 3 * 2 * 2 * 2;
+
+/// The farthest that a vertex is from its image in mid-shutter, in pixels, through a pinhole or from anywhere on the lens; infinite where
+/// one is not in front of the camera.
+pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
+    let one = |vertex: &MovingVertex| {
+        let (open, close) = (vertex.open.map(f64::from), vertex.close.map(f64::from));
+        let middle = [0, 1, 2].map(|axis| 0.5 * (open[axis] + close[axis]));
+        let away = |end: [f64; 3]| {
+            let [x, y] = [0, 1].map(|axis| {
+                let lens = f64::from(shear.s[axis]).abs() * (1.0 / end[2] - 1.0 / middle[2]).abs();
+                (end[axis] / end[2] - middle[axis] / middle[2]).abs() + lens
+            });
+            x.hypot(y)
+        };
+        if open[2] > 0.0 && close[2] > 0.0 { away(open).max(away(close)) } else { f64::INFINITY }
+    };
+    vertices.map(one).into_iter().fold(0.0, f64::max)
+}
+
+/// The largest radius of the circle of confusion of a vertex at either end of the shutter, in pixels; infinite where one is not in front of
+/// the camera.
+pub fn blur_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
+    let radius = |w: f64, axis: usize| (f64::from(shear.a[axis]) - f64::from(shear.s[axis]) / w).abs();
+    vertices
+        .into_iter()
+        .flat_map(|vertex| [vertex.open[2], vertex.close[2]])
+        .map(|w| if w > 0.0 { radius(f64::from(w), 0).max(radius(f64::from(w), 1)) } else { f64::INFINITY })
+        .fold(0.0, f64::max)
+}
+
+/// The vertex where it is in mid-shutter, at rest.
+pub fn at_rest(vertex: &MovingVertex) -> MovingVertex {
+    let middle = [0, 1, 2].map(|axis| vertex.open[axis] + 0.5 * (vertex.close[axis] - vertex.open[axis]));
+    MovingVertex { open: middle, close: middle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, cases};
+    use super::*;
+
+    fn vertices(case: &super::super::testing::Case) -> [MovingVertex; 3] {
+        case.triangle.corners.map(|corner| MovingVertex {
+            open: corner.open,
+            close: [0, 1, 2].map(|k| corner.open[k] + corner.delta[k]),
+        })
+    }
+
+    #[test]
+    fn no_vertex_is_farther_than_said_and_some_is_as_far() {
+        let (mut r, mut finite) = (Uniform::new(12), 0);
+        for (seed, case) in cases(200) {
+            let v = vertices(&case);
+            let (motion, blur) = (motion_px(v.each_ref(), &case.shear), blur_px(v.each_ref(), &case.shear));
+            if motion.is_infinite() {
+                assert!(
+                    blur.is_infinite()
+                        && case.triangle.corners.iter().any(|c| c.at(0.0)[2] <= 0.0 || c.at(1.0)[2] <= 0.0)
+                );
+                continue;
+            }
+            finite += 1;
+            let at_centre =
+                |t: f64, [u, v]: [f64; 2]| case.seen([0.0, 0.0, u, v, t]).map(|[x, y, w]| [x / w, y / w]);
+            let far = |a: [[f64; 2]; 3], b: [[f64; 2]; 3]| {
+                (0..3).map(|i| (a[i][0] - b[i][0]).hypot(a[i][1] - b[i][1])).fold(0.0, f64::max)
+            };
+            for _ in 0..40 {
+                let angle = f64::from(r.within(0.0, 7.0));
+                let lens = if case.within.lens { [angle.cos(), angle.sin()] } else { [0.0; 2] };
+                let t = f64::from(r.within(0.0, 1.0));
+                let moved = far(at_centre(t, lens), at_centre(0.5, lens));
+                assert!(moved <= motion * (1.0 + 1e-9) + 1e-4, "{seed}: {moved} > {motion}");
+                let blurred = far(at_centre(t, lens), at_centre(t, [0.0; 2]));
+                assert!(blurred <= blur * (1.0 + 1e-9) + 1e-4, "{seed}: {blurred} > {blur}");
+            }
+            if !case.within.lens {
+                let most = [0.0, 1.0].map(|t| far(at_centre(t, [0.0; 2]), at_centre(0.5, [0.0; 2])));
+                assert!((most[0].max(most[1]) - motion).abs() <= 1e-4 * (1.0 + motion), "{seed}");
+                assert_eq!(blur, 0.0);
+            }
+        }
+        assert!(finite > 300, "{finite}");
+    }
+
+    #[test]
+    fn at_rest_is_where_it_is_in_mid_shutter() {
+        let vertex = MovingVertex { open: [1.0, -2.0, 4.0], close: [3.0, 2.0, 2.0] };
+        assert_eq!(at_rest(&vertex), MovingVertex { open: [2.0, 0.0, 3.0], close: [2.0, 0.0, 3.0] });
+    }
+}

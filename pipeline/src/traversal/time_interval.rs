@@ -1,0 +1,228 @@
+//! When a point of the image lies inside a moving triangle seen through a pinhole (after Gribel, Doggett and Akenine-Moeller 2010,
+//! "Analytical motion blur rasterization with compression").
+//!
+//! At a fixed point each edge `e = (p_i x p_j) . (X, Y, 1)` is a quadratic in time. The point is inside where all three are not below
+//! zero (it sees the face that appears clockwise) or none is above (the other one). Both sets are intersections of roots' intervals.
+//! Over a rectangle the same holds for the largest, or the smallest, values of the edges: then a point of it *may* be inside.
+//!
+//! A homogeneous triangle also covers what lies behind the camera, mirrored. Where vertices have depths of both signs the
+//! caller asks for the depth at the times found.
+
+use super::quadratic::{Pieces, Quadratic};
+use super::{Edges, Faces, TileRect, View};
+use crate::geometry::Shear;
+use crate::setup::Triangle;
+
+use super::Box5;
+
+/// Intervals of time in order, within [0, 1], ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeIntervals {
+    intervals: [[f64; 2]; Self::MOST],
+    len: usize,
+}
+
+impl TimeIntervals {
+    /// The most there can be for one face: each of three quadratics cuts out one gap.
+    pub const MOST: usize = 4;
+
+    const WHOLE: Self = Self { intervals: [[0.0, 1.0]; Self::MOST], len: 1 };
+
+    /// The intervals.
+    pub fn as_slice(&self) -> &[[f64; 2]] {
+        &self.intervals[..self.len]
+    }
+
+    /// Whether `t` lies in one of them.
+    pub fn contains(&self, t: f64) -> bool {
+        self.as_slice().iter().any(|[lo, hi]| (lo..=hi).contains(&&t))
+    }
+
+    /// How long they last together.
+    pub fn length(&self) -> f64 {
+        self.as_slice().iter().map(|[lo, hi]| hi - lo).sum()
+    }
+
+    fn intersect(&self, pieces: Pieces<f64>) -> Self {
+        let mut both = Self { len: 0, ..*self };
+        let (count, parts) = match pieces {
+            Pieces::None => (0, [[0.0; 2]; 2]),
+            Pieces::One(piece) => (1, [piece; 2]),
+            Pieces::Two(first, last) if last[0] - first[1] <= 2.0 * WIDENED => (1, [[first[0], last[1]]; 2]),
+            Pieces::Two(first, last) => (2, [first, last]),
+        };
+        for mine in self.as_slice() {
+            for part in &parts[..count] {
+                let [lo, hi] = [mine[0].max(part[0] - WIDENED), mine[1].min(part[1] + WIDENED)];
+                if lo <= hi && both.len < Self::MOST {
+                    both.intervals[both.len] = [lo, hi];
+                    both.len += 1;
+                }
+            }
+        }
+        both
+    }
+}
+
+/// What rounding may move a root by once the quadratic is raised by [`RAISED`].
+const WIDENED: f64 = 4.0 * f64::EPSILON;
+
+/// By how much a quadratic is raised, as a part of its largest coefficient: far more than the rounding of its coefficients, of
+/// its discriminant and of the roots amounts to.
+const RAISED: f64 = 64.0 * f64::EPSILON;
+
+/// The times at which the point `(x, y)`, in pixels from the centre of the image, lies inside `triangle` and sees its clockwise
+/// face, and those at which it sees the other one. Widened by the rounding of `f64`.
+pub fn time_interval(triangle: &Triangle, x: f64, y: f64) -> [TimeIntervals; 2] {
+    let ends = [0.0, 1.0].map(|t| {
+        triangle.corners.map(|corner| {
+            let [px, py, w] = [0, 1, 2].map(|k| f64::from(corner.open[k]) + t * f64::from(corner.delta[k]));
+            [px - x * w, py - y * w]
+        })
+    });
+    let edge = |i: usize, j: usize| {
+        let cross = |s: usize, e: usize| ends[s][i][0] * ends[e][j][1] - ends[s][i][1] * ends[e][j][0];
+        Quadratic([cross(0, 0), 0.5 * (cross(0, 1) + cross(1, 0)), cross(1, 1)])
+    };
+    let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
+    // The size of the terms that cancel in an edge.
+    let size = [0, 1].map(|axis| ends.iter().flatten().map(|p| p[axis].abs()).fold(0.0, f64::max));
+    let error = RAISED * (size[0] * size[1]) + rounding_of_places(triangle, [x, y], size);
+    [1.0, -1.0].map(|sign| inside(edges.map(|edge| Quadratic(edge.0.map(|b| sign * b + error)))))
+}
+
+/// What the rounding of the places in `f64` adds to an edge.
+fn rounding_of_places(triangle: &Triangle, at: [f64; 2], size: [f64; 2]) -> f64 {
+    let largest = |axis: usize| {
+        let reach = |k: usize| triangle.corners.map(|c| f64::from(c.open[k].abs() + c.delta[k].abs()));
+        let [places, depths] = [reach(axis), reach(2)];
+        (0..3).map(|k| places[k] + at[axis].abs() * depths[k]).fold(0.0, f64::max)
+    };
+    RAISED * (largest(0) * size[1] + largest(1) * size[0])
+}
+
+/// The times at which some point of `rect` may lie inside `triangle`, by the face it sees: never too few, and for a rectangle
+/// without extent those of its point but for the rounding of the sample test, which is allowed for.
+pub fn time_interval_over(triangle: &Triangle, rect: &TileRect) -> [TimeIntervals; 2] {
+    let moving = Triangle { moving: true, ..*triangle };
+    let edges = Edges::new(View::new(&moving, &Shear::default(), rect, &Box5::whole(false)));
+    [[true, false], [false, true]].map(|face: Faces| inside(edges.bounds().tallest(face)))
+}
+
+fn inside(edges: [Quadratic; 3]) -> TimeIntervals {
+    edges.iter().fold(TimeIntervals::WHOLE, |left, edge| left.intersect(edge.above()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, cases};
+    use super::*;
+    use crate::setup::Corner;
+
+    /// The three edges at a point and the time `k / 64`, exactly, for vertices with small whole coordinates.
+    fn exact(corners: &[Corner; 3], at: [i128; 2], k: i128) -> [i128; 3] {
+        let seen = corners.map(|corner| {
+            let p = [0, 1, 2].map(|axis| corner.open[axis] as i128 * 64 + k * corner.delta[axis] as i128);
+            [p[0] - at[0] * p[2], p[1] - at[1] * p[2]]
+        });
+        [(1, 2), (2, 0), (0, 1)]
+            .map(|(i, j): (usize, usize)| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1])
+    }
+
+    fn whole_number_triangle(r: &mut Uniform) -> Triangle {
+        let (_, case) = cases(1).nth(1).unwrap();
+        let mut number = |lo: f32, hi: f32| r.within(lo, hi).round();
+        let corners = [0; 3].map(|_| {
+            let open = [number(-9.0, 9.0), number(-9.0, 9.0), number(1.0, 4.0)];
+            Corner { open, delta: [number(-9.0, 9.0), number(-9.0, 9.0), number(-5.0, 3.0)] }
+        });
+        Triangle { corners, moving: true, ..case.triangle }
+    }
+
+    #[test]
+    fn every_time_is_in_or_out_as_whole_numbers_say() {
+        let (mut r, mut found, mut several) = (Uniform::new(9), [0; 2], 0);
+        for _ in 0..20_000 {
+            let triangle = whole_number_triangle(&mut r);
+            let at = [0; 2].map(|_| r.within(-4.0, 4.0).round());
+            let sets = time_interval(&triangle, f64::from(at[0]), f64::from(at[1]));
+            several += usize::from(sets.iter().any(|set| set.as_slice().len() > 1));
+            for k in 0..=64 {
+                let e = exact(&triangle.corners, at.map(|c| c as i128), k);
+                let t = k as f64 / 64.0;
+                let inside = [e.iter().all(|&e| e >= 0), e.iter().all(|&e| e <= 0)];
+                for face in [0, 1] {
+                    found[face] += u32::from(inside[face]);
+                    // Away from the roots both say the same; on a root and nowhere else they may differ by rounding.
+                    let on_a_root = e.contains(&0);
+                    let says = sets[face].contains(t);
+                    assert!(says == inside[face] || (on_a_root && says), "{face} {t} {e:?} {sets:?}");
+                }
+            }
+        }
+        assert!(found[0] > 10_000 && found[1] > 10_000 && several > 20, "{found:?} {several}");
+    }
+
+    #[test]
+    fn dense_sampling_finds_no_other_time_and_the_intervals_are_no_wider() {
+        let mut r = Uniform::new(10);
+        for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
+            let place = case.place(&mut r);
+            let sets = time_interval(&case.triangle, place[0], place[1]);
+            let mut lasted = [0.0; 2];
+            for step in 0..=4000 {
+                let t = f64::from(step) / 4000.0;
+                let e = case.edges([place[0], place[1], 0.0, 0.0, t]);
+                for face in [0, 1] {
+                    let sign = if face == 0 { 1.0 } else { -1.0 };
+                    let inside = e.iter().all(|&e| sign * e >= 0.0);
+                    assert!(!inside || sets[face].contains(t), "{seed}: {t} {e:?} {sets:?}");
+                    lasted[face] += if inside { 1.0 / 4000.0 } else { 0.0 };
+                }
+            }
+            for face in [0, 1] {
+                assert!((sets[face].length() - lasted[face]).abs() < 3e-3, "{seed}: {lasted:?} {sets:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn over_a_rectangle_every_time_of_every_point_is_there() {
+        let (mut r, mut short) = (Uniform::new(11), 0);
+        for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
+            let over = time_interval_over(&case.triangle, &case.tile);
+            short += u32::from(over.iter().any(|set| set.length() < 0.9));
+            for _ in 0..40 {
+                let place = case.place(&mut r);
+                let point = time_interval(&case.triangle, place[0], place[1]);
+                for face in [0, 1] {
+                    for [lo, hi] in point[face].as_slice() {
+                        for t in [*lo, 0.5 * (lo + hi), *hi] {
+                            assert!(over[face].contains(t), "{seed}: {t} {over:?} {point:?}");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(short > 100, "{short}");
+    }
+
+    #[test]
+    fn a_triangle_that_flies_past_is_there_while_it_covers_the_point() {
+        // 4 wide, moving 16 to the right: its edges x = t 16 - 8 and x = t 16 - 4 pass the origin at 1/4 and 1/2.
+        let corner = |x: f32, y: f32| Corner { open: [x, y, 1.0], delta: [16.0, 0.0, 0.0] };
+        let (_, case) = cases(1).nth(1).unwrap();
+        let triangle = Triangle {
+            corners: [corner(-8.0, -9.0), corner(-4.0, 0.0), corner(-8.0, 9.0)],
+            moving: true,
+            ..case.triangle
+        };
+        let sets = time_interval(&triangle, 0.0, 0.0);
+        assert!(sets[1].as_slice().is_empty(), "{sets:?}");
+        let [[lo, hi]] = sets[0].as_slice() else { panic!("{sets:?}") };
+        assert!(
+            (lo - 0.25).abs() < 1e-12 && *lo <= 0.25 && (hi - 0.5).abs() < 1e-12 && *hi >= 0.5,
+            "{sets:?}"
+        );
+    }
+}
