@@ -310,6 +310,30 @@ mod tests {
     }
 
     #[test]
+    fn a_triangle_that_turns_and_turns_back_is_not_decided_by_its_ends() {
+        use crate::geometry::{Cull, MovingVertex, Shear};
+        use crate::setup::{Outcome, set_up};
+        use crate::traversal::{Box5, TileRect};
+        // Its area goes with (1 - 3 t) (2 - 3 t), which is below zero in the middle third only.
+        let v = [
+            ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
+            ([8.0, 0.0, 1.0], [-16.0, 0.0, 1.0]),
+            ([0.0, 16.0, 1.0], [0.0, -8.0, 1.0]),
+        ]
+        .map(|(open, close)| MovingVertex { open, close });
+        let shear = Shear::default();
+        for order in [[0, 1, 2], [0, 2, 1]] {
+            let corners = order.map(|k: usize| &v[k]);
+            let Outcome::Ready(triangle) = set_up(0, corners, Cull::None, &shear, 0.1, [8.0; 2]) else {
+                panic!("the triangle is visible");
+            };
+            let tile = TileRect { x: [0.0, 8.0], y: [0.0, 8.0] };
+            let edges = Edges::<f64>::new(View::new(&triangle, &shear, &tile, &Box5::whole(false)));
+            assert_eq!(Facing::new(&edges).faces(), [true; 2]);
+        }
+    }
+
+    #[test]
     fn a_full_timeline_grows_rather_than_forgets() {
         let mut timeline = Timeline::empty();
         for k in 0..12_u8 {
