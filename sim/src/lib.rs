@@ -5,6 +5,7 @@
 //! - [`timing`]: work packets become activity over time.
 //! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
 //! - [`output`]: files, plots, the timeline and the report.
+//! - [`visibility`]: what every sample of a scene sees, and how fast.
 //! - [`cli`]: the command `quintile`.
 
 pub mod cli;
@@ -12,3 +13,4 @@ pub mod gpu;
 pub mod output;
 pub mod run;
 pub mod timing;
+pub mod visibility;

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use pipeline::Features;
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
 #[derive(Debug, Parser)]
@@ -115,6 +116,13 @@ pub struct VisibilityArgs {
     /// `hash` (of the seed of the camera), `table` (the built-in one) or a sample table in a file
     #[arg(long, value_name = "SAMPLES", default_value = "hash")]
     pub samples: String,
+    /// Rasterize as the modelled hardware does, with these tile tests: `all`, `none`, `auto`, or names with commas between.
+    /// Without it the fastest way is taken; what is seen is the same
+    #[arg(long, value_name = "LIST", value_parser = tests)]
+    pub tests: Option<Features>,
+    /// Rasterize N times and report the median
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repeat: u16,
     /// File for the triangle and depth of every sample
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -164,6 +172,36 @@ fn frames(text: &str) -> Result<Range<u32>, String> {
     Ok(number(start)?..number(end)?)
 }
 
+/// Tile tests by the names they have in a GPU's file.
+fn tests(text: &str) -> Result<Features, String> {
+    match text {
+        "all" => return Ok(Features::ALL),
+        "none" => return Ok(Features::NONE),
+        "auto" => return Ok(Features { auto: true, ..Features::ALL }),
+        _ => {}
+    }
+    let mut features = Features::NONE;
+    let mut switches = [
+        ("lens_lines", &mut features.lens_lines),
+        ("side_planes", &mut features.side_planes),
+        ("facing", &mut features.facing),
+        ("edges", &mut features.edges),
+        ("coarse", &mut features.coarse),
+        ("screen", &mut features.screen),
+        ("z_max", &mut features.z_max),
+    ];
+    for name in text.split(',').map(|name| name.trim().replace('-', "_")) {
+        let names = switches.each_ref().map(|(known, _)| *known).join(", ");
+        let switch = switches.iter_mut().find(|(known, _)| *known == name);
+        let (_, on) = switch.ok_or_else(|| format!("`{name}` is no tile test; there are {names}, or all, none, auto"))?;
+        **on = true;
+    }
+    if features.facing {
+        features.facing_splits = Features::ALL.facing_splits;
+    }
+    Ok(features)
+}
+
 fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("`{text}` is not a size; write it as 1280x720");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
@@ -179,6 +217,14 @@ mod tests {
     #[test]
     fn the_declarations_make_sense() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn tile_tests_by_name() {
+        assert_eq!(tests("all"), Ok(Features::ALL));
+        assert_eq!(tests("edges, z-max"), Ok(Features { edges: true, z_max: true, ..Features::NONE }));
+        assert!(tests("edges,hiz").unwrap_err().contains("`hiz` is no tile test; there are lens_lines, side_planes"));
+        assert!(tests("").is_err());
     }
 
     #[test]

@@ -1,31 +1,20 @@
 //! `quintile visibility`.
 
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use activity::Warning;
+use pipeline::SampleTable;
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleTable, Settings, Shader, ShaderCost, ShadingPoint};
+use pipeline::visibility::Sighting;
 use serde::Serialize;
 use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, write_hits};
 
 use super::Failure;
 use super::args::VisibilityArgs;
 use super::terminal::{print, print_json};
-use crate::gpu::GpuSpec;
-
-/// Nothing is shaded: only who is seen matters.
-struct Unshaded;
-
-impl Shader for Unshaded {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
-        glam::Vec3::ZERO
-    }
-}
+use crate::visibility::{Rates, find};
 
 /// What was found.
 #[derive(Serialize)]
@@ -40,6 +29,8 @@ struct Found {
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<CameraSpec>,
     warnings: Vec<Warning>,
+    #[serde(flatten)]
+    rates: Rates,
 }
 
 pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
@@ -48,13 +39,20 @@ pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
         return print_camera(args, &scene);
     }
     let pool = super::threads(args.threads)?;
-    let found = pool.install(|| find(args, scene))?;
+    let found = pool.install(|| see(args, scene))?;
     if args.json {
         return print_json(&found, false);
     }
     let camera = found.camera.as_ref().map(|camera| format!("\nthe camera was fitted: {}", camera.to_ron()));
     let warnings = found.warnings.iter().map(|warning| format!("\nwarning {warning}"));
-    let remarks: String = camera.into_iter().chain(warnings).collect();
+    let rates = format!(
+        "\n{:.1} million samples/s by the CPU time of a thread ({} runs on {} threads), {:.1} end to end",
+        found.rates.samples_per_s / 1e6,
+        found.rates.runs,
+        found.rates.threads,
+        found.rates.end_to_end_samples_per_s / 1e6
+    );
+    let remarks: String = std::iter::once(rates).chain(camera).chain(warnings).collect();
     print(&format!(
         "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{remarks}",
         found.triangles, found.width, found.height, found.samples_per_pixel, found.hits, found.samples
@@ -74,37 +72,33 @@ fn named(args: &VisibilityArgs) -> String {
     args.files.first().map_or_else(String::new, |file| file.display().to_string())
 }
 
-fn find(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> {
+fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> {
     let samples = samples(args, &scene)?;
-    let gpu = GpuSpec::load("reference").map_err(|error| Failure { message: error.to_string(), code: 1 })?;
-    let background = glam::Vec3::ZERO;
-    let settings = Settings { spec: &gpu.pipeline, viewport: scene.viewport, samples: &*samples, background };
-    let wrong = |message: String| Failure { message: format!("{}: {message}", named(args)), code: 1 };
-    let close = if scene.open == scene.close { &scene.open } else { &scene.close };
-    let geometry =
-        Geometry::new(&scene.open, close, &scene.triangles).map_err(|error| wrong(error.to_string()))?;
-    let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
-    let seen = pipeline::frame::visibility(&scene.camera, &draws, &settings)
-        .map_err(|error| wrong(error.to_string()))?;
+    let found = find(&scene, &*samples, args.tests, args.repeat)
+        .map_err(|message| Failure { message: format!("{}: {message}", named(args)), code: 1 })?;
     if let Some(out) = &args.out {
-        let (triangles, depths): (Vec<u32>, Vec<f32>) =
-            seen.iter().map(|&(triangle, depth)| (triangle, f32::from_bits(depth))).unzip();
-        let written = traces::io::atomic::write_file(out, |file: &mut BufWriter<std::fs::File>| {
-            write_hits(scene.viewport, samples.per_pixel(), &triangles, &depths, file)?;
-            file.flush()
-        });
-        written.map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+        write(out, &scene, samples.per_pixel(), &found.seen)?;
     }
     Ok(Found {
         triangles: scene.triangles.len(),
         width: scene.viewport.width(),
         height: scene.viewport.height(),
         samples_per_pixel: samples.per_pixel(),
-        samples: seen.len(),
-        hits: seen.iter().filter(|(triangle, _)| *triangle != u32::MAX).count(),
+        samples: found.seen.len(),
+        hits: found.seen.iter().filter(|(triangle, _)| *triangle != u32::MAX).count(),
         camera: scene.fitted,
         warnings: scene.warnings,
+        rates: found.rates,
     })
+}
+
+fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[Sighting]) -> Result<(), Failure> {
+    let (triangles, depths): (Vec<u32>, Vec<f32>) = seen.iter().copied().unzip();
+    let written = traces::io::atomic::write_file(out, |file: &mut BufWriter<File>| {
+        write_hits(scene.viewport, per_pixel, &triangles, &depths, file)?;
+        file.flush()
+    });
+    written.map_err(|error| Failure { message: error.to_string(), code: 1 })
 }
 
 /// The samples asked for: those the scene's seed hashes to, the built-in table, or a file.
@@ -116,9 +110,8 @@ fn samples(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<Box<dyn Sam
     match args.samples.as_str() {
         "hash" => Ok(Box::new(scene.hashed_samples().ok_or_else(range)?)),
         "table" => {
-            let shape: LensShape = scene.shape;
             Ok(Box::new(
-                SampleTable::low_discrepancy(scene.per_pixel, scene.seed, shape).map_err(|_| range())?,
+                SampleTable::low_discrepancy(scene.per_pixel, scene.seed, scene.shape).map_err(|_| range())?,
             ))
         }
         file => Ok(Box::new(FixedSamples::load(Path::new(file))?)),
