@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
+use crate::depth::{BoxGrid, DepthSpec};
 use crate::geometry::Viewport;
 use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
 use crate::sampling::SampleSource;
@@ -25,6 +26,9 @@ pub struct PipelineSpec {
     pub memory: MemorySpec,
     /// Which tests are switched on.
     pub features: Features,
+    /// How depth is bounded and what a tile remembers of it.
+    #[serde(default)]
+    pub depth: DepthSpec,
 }
 
 /// Tests that can be switched off. They change what it costs, never the image.
@@ -88,6 +92,9 @@ impl PipelineSpec {
         size("batch_triangles", batch, (1..=1 << 24).contains(&batch), "it has to be 1 to 16777216")?;
         let reuse = self.vertex_reuse;
         size("vertex_reuse", reuse, (1..=4096).contains(&reuse), "it has to be 1 to 4096")?;
+        let boxes = self.depth.boxes;
+        let most = boxes.iter().copied().find(|count| !(1..=BoxGrid::MOST).contains(count));
+        size("depth.boxes", most.unwrap_or(1), most.is_none(), "each count has to be 1 to 16")?;
         let caches = [
             ("shading_cache", self.shading_cache),
             ("memory.depth", self.memory.depth),

@@ -5,7 +5,7 @@ use super::counters::{BinLog, TileWork, Work};
 use super::pass::Pass;
 use super::surface::Grid;
 use super::vertices::Ready;
-use crate::depth::{DepthTile, interval_madds, nearest};
+use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
 use crate::sample_test::{self, Hits, Target, test_screened};
 use crate::sampling::TileSamples;
 use crate::setup::{PixelRect, Triangle};
@@ -30,6 +30,10 @@ pub(super) struct Worker<'a, 'p> {
     log: BinLog,
     /// Tile tests since the last packet.
     tests: TileWork,
+    /// How lens and time are divided for depth culling.
+    grid: BoxGrid,
+    /// What is known of the depth of one triangle.
+    bounder: Option<(u32, Bounder)>,
 }
 
 impl<'a, 'p> Worker<'a, 'p> {
@@ -37,7 +41,8 @@ impl<'a, 'p> Worker<'a, 'p> {
         scratch.samples.resize_with(bin.tiles.len(), TileSamples::default);
         scratch.filled.clear();
         scratch.filled.resize(bin.tiles.len(), false);
-        Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default() }
+        let grid = pass.depth_grid();
+        Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default(), grid, bounder: None }
     }
 
     /// One triangle through the tiles of the bin.
@@ -67,11 +72,11 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Some(screen) = self.edges(triangle, &rect, &within) else { return };
         let place = self.place(origin);
         self.fill(place, origin);
-        if !self.behind_all(triangle, &within, place) {
+        if let Some((within, in_front)) = self.in_sight(triangle, &rect, &within, place) {
             self.samples(triangle, &within, screen.as_ref(), place);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
                 self.ask_for_quads(triangle, place, origin);
-                self.record(triangle, origin);
+                self.record(triangle, origin, in_front);
             }
         }
     }
@@ -105,30 +110,63 @@ impl<'a, 'p> Worker<'a, 'p> {
         Some(features.screen.then(|| bounds.screen()))
     }
 
-    /// Whether every sample of the tile is known to see something nearer.
-    fn behind_all(&mut self, triangle: &Triangle, within: &Box5, place: usize) -> bool {
-        if !self.pass.settings.spec.features.z_max {
-            return false;
+    /// Where the depths stored in the tile leave the triangle to be seen, and whether none of them has to be read for it.
+    fn in_sight(
+        &mut self,
+        triangle: &Triangle,
+        rect: &TileRect,
+        within: &Box5,
+        place: usize,
+    ) -> Option<(Box5, bool)> {
+        let (features, depth) = (&self.pass.settings.spec.features, &self.pass.settings.spec.depth);
+        if !features.z_max && !depth.z_min {
+            return Some((*within, false));
         }
-        let (farthest, updated) =
-            self.bin.tiles[place].as_mut().map_or((f32::INFINITY, false), DepthTile::farthest);
-        let behind = nearest(triangle, within.t) > farthest;
-        self.tests.z_tests += 1;
-        self.tests.z_updates += u32::from(updated);
-        self.tests.interval_madds += interval_madds(triangle.moving);
-        self.tests.z_culled += u32::from(behind);
-        behind
+        let bounder = self.bounder(triangle);
+        let mut visible = Visible::unknown(within);
+        if let Some(tile) = &mut self.bin.tiles[place] {
+            self.tests.z_updates += if features.z_max { tile.renew() } else { 0 };
+            visible = tile.boxes.look(within, |part| bounder.over(rect, part));
+        }
+        self.tests.z_tests += visible.compared;
+        self.tests.interval_madds +=
+            visible.compared * interval_madds(depth.bound, triangle.moving, self.pass.lens);
+        if !features.z_max {
+            return Some((*within, visible.in_front && visible.behind == 0));
+        }
+        self.tests.boxes_culled += visible.behind;
+        self.tests.z_culled += u32::from(visible.within.is_none());
+        // The sample test takes a still triangle at all times.
+        let time = |rest: Box5| Box5 { t: if triangle.moving { rest.t } else { within.t }, ..rest };
+        let front = depth.z_min && visible.in_front && (triangle.moving || visible.behind == 0);
+        visible.within.map(|rest| (time(rest), front))
+    }
+
+    /// What is known of the depth of the triangle in hand.
+    fn bounder(&mut self, triangle: &Triangle) -> Bounder {
+        match &self.bounder {
+            Some((id, bounder)) if *id == triangle.id => *bounder,
+            _ => {
+                let bound = self.pass.settings.spec.depth.bound;
+                self.tests.interval_madds += set_up_madds(bound, triangle.moving);
+                let bounder = Bounder::new(triangle, &self.pass.projection.shear, bound);
+                self.bounder = Some((triangle.id, bounder));
+                bounder
+            }
+        }
     }
 
     fn samples(&mut self, triangle: &Triangle, within: &Box5, screen: Option<&Screen>, place: usize) {
         let samples = &self.scratch.samples[place];
-        let stored = self.bin.tiles[place].get_or_insert_with(|| DepthTile::cleared(samples.len));
+        let grid = self.grid;
+        let stored = self.bin.tiles[place].get_or_insert_with(|| DepthTile::cleared(grid, samples));
         let hits = &mut self.scratch.hits;
         hits.clear();
         let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
         test_screened(triangle, samples, within, screen, self.pass.projection.near, &mut target, hits);
         if !hits.written.is_empty() {
-            stored.touch();
+            let lowered = stored.wrote(&hits.written);
+            self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
         }
     }
 
@@ -168,7 +206,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         self.scratch.quads.drain_into(&mut self.log.quads);
     }
 
-    fn record(&mut self, triangle: &Triangle, origin: [u32; 2]) {
+    fn record(&mut self, triangle: &Triangle, origin: [u32; 2], in_front: bool) {
         let hits = &self.scratch.hits;
         self.log.work.push(Work {
             triangle: triangle.id,
@@ -178,6 +216,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             screen_madds: hits.screened * traversal::screen_madds(triangle.moving, self.pass.lens),
             tested: hits.tested,
             hit: hits.hit,
+            unread: if in_front { hits.hit } else { 0 },
             written: hits.written.len() as u32,
             sample_madds: hits.tested * sample_test::madds(triangle.moving, self.pass.lens),
             read_pixels: hits.read_pixels,

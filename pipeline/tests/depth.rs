@@ -1,0 +1,81 @@
+//! Oracle: the depth interval of a triangle over a tile and a box of lens and time holds every depth the sample test computes
+//! there, and every depth of the exact triangle.
+
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod common;
+
+use common::case::{Case, setting};
+use common::*;
+use pipeline::depth::{Bounder, DepthBound};
+use pipeline::setup::{Outcome, Triangle};
+use pipeline::traversal::{Box5, TileRect};
+use pipeline::*;
+
+/// A random part of lens and time, or all of it.
+fn part(r: &mut Uniform, lens: bool) -> Box5 {
+    if r.next() < 0.25 {
+        return Box5::whole(lens);
+    }
+    let mut range = |lo: f32, hi: f32| {
+        let (a, b) = (r.within(lo, hi), r.within(lo, hi));
+        [a.min(b), a.max(b)]
+    };
+    Box5 { u: range(-1.0, 1.0), v: range(-1.0, 1.0), t: range(0.0, 1.0), lens }
+}
+
+/// What the tests found: samples looked at, depths outside, and where planes bounded better than vertices.
+#[derive(Debug, Default)]
+struct Found {
+    depths: u64,
+    outside: u64,
+    boxes: u64,
+    tighter: u64,
+}
+
+fn hold(found: &mut Found, triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5) {
+    let (seen, _) = probe.test(triangle, within);
+    // A still triangle is tested at all times.
+    let bounds = DepthBound::ALL.map(|bound| Bounder::new(triangle, &probe.shear, bound).over(tile, within));
+    let width = |[lo, hi]: [f32; 2]| hi - lo;
+    found.boxes += 1;
+    found.tighter += u64::from(width(bounds[3]) < width(bounds[1]));
+    for depth in seen.into_iter().flatten() {
+        found.depths += 1;
+        found.outside += bounds.iter().filter(|[lo, hi]| !(*lo..=*hi).contains(&depth)).count() as u64;
+    }
+}
+
+fn tile(far: bool) -> TileRect {
+    let (viewport, origin) = if far {
+        (Viewport::new(Viewport::MAX_PX, Viewport::MAX_PX).unwrap(), [0, Viewport::MAX_PX - 8])
+    } else {
+        (Viewport::new(8, 8).unwrap(), [0, 0])
+    };
+    TileRect::new(viewport, origin, 8)
+}
+
+/// Samples on the edges of triangles of every kind, a third of the vertices behind the camera, slivers among them.
+#[test]
+fn no_depth_of_the_sample_test_is_outside() {
+    for flags in 0..32_u32 {
+        let on = |bit: u32| flags & (1 << bit) != 0;
+        let mut found = Found::default();
+        for seed in 0..1500_u64 {
+            let scale = [0, -20, 19][seed as usize % 3];
+            let case = Case { moving: on(0), lens: on(1), behind: on(2), far: on(3), sliver: on(4), scale };
+            let setting = setting(case, seed * 32 + u64::from(flags));
+            let Outcome::Ready(triangle) = setting.probe.set_up(setting.triangle, Cull::None) else {
+                continue;
+            };
+            let mut r = Uniform::new(seed);
+            for _ in 0..3 {
+                let within = part(&mut r, case.lens);
+                hold(&mut found, &triangle, &setting.probe, &tile(case.far), &within);
+            }
+        }
+        println!("{flags:05b} {found:?}");
+        assert_eq!(found.outside, 0, "{flags:05b} {found:?}");
+        assert!(found.depths > 10_000, "{flags:05b} {found:?}");
+    }
+}
