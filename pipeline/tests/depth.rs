@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::case::{Case, setting};
+use common::case::{Case, Setting, setting};
 use common::*;
 use pipeline::depth::{Bounder, DepthBound};
 use pipeline::setup::{Outcome, Triangle};
@@ -61,7 +61,7 @@ fn no_depth_of_the_sample_test_is_outside() {
     for flags in 0..32_u32 {
         let on = |bit: u32| flags & (1 << bit) != 0;
         let mut found = Found::default();
-        for seed in 0..1500_u64 {
+        for seed in 0..500_u64 {
             let scale = [0, -20, 19][seed as usize % 3];
             let case = Case { moving: on(0), lens: on(1), behind: on(2), far: on(3), sliver: on(4), scale };
             let setting = setting(case, seed * 32 + u64::from(flags));
@@ -76,6 +76,38 @@ fn no_depth_of_the_sample_test_is_outside() {
         }
         println!("{flags:05b} {found:?}");
         assert_eq!(found.outside, 0, "{flags:05b} {found:?}");
-        assert!(found.depths > 10_000, "{flags:05b} {found:?}");
+        assert!(found.depths > 3_000, "{flags:05b} {found:?}");
     }
+}
+
+/// The tightest place: a tile that is one sample and a box that is its place on the lens and its time. What is left of the
+/// interval is rounding, so a margin too small shows.
+#[test]
+fn no_depth_is_outside_the_interval_of_its_own_sample() {
+    let (mut depths, mut bounded, mut outside) = (0_u64, 0_u64, 0_u64);
+    for flags in 0..32_u32 {
+        let on = |bit: u32| flags & (1 << bit) != 0;
+        for seed in 0..300_u64 {
+            let scale = [0, -20, 19][seed as usize % 3];
+            let case = Case { moving: on(0), lens: on(1), behind: on(2), far: on(3), sliver: on(4), scale };
+            let Setting { triangle, probe } = setting(case, seed * 32 + u64::from(flags) + 1_000_000);
+            let Outcome::Ready(triangle) = probe.set_up(triangle, Cull::None) else { continue };
+            let bounders = DepthBound::ALL.map(|bound| Bounder::new(&triangle, &probe.shear, bound));
+            let (seen, _) = probe.test(&triangle, &probe.whole());
+            for (slot, depth) in seen.into_iter().enumerate() {
+                let (Some(depth), s) = (depth, &probe.samples) else { continue };
+                let point = |value: f32| [value; 2];
+                let tile = TileRect { x: point(s.x[slot]), y: point(s.y[slot]) };
+                let within =
+                    Box5 { u: point(s.u[slot]), v: point(s.v[slot]), t: point(s.t[slot]), lens: case.lens };
+                let bounds = bounders.map(|bounder| bounder.over(&tile, &within));
+                depths += 1;
+                bounded += u64::from(bounds[3][1] - bounds[3][0] < 1e-3 * (bounds[1][1] - bounds[1][0]));
+                outside += bounds.iter().filter(|[lo, hi]| !(*lo..=*hi).contains(&depth)).count() as u64;
+            }
+        }
+    }
+    println!("{depths} depths, {bounded} known to a thousandth of the vertices' range, {outside} outside");
+    assert_eq!(outside, 0);
+    assert!(bounded > depths / 3, "{bounded} of {depths}");
 }
