@@ -7,6 +7,7 @@ mod common;
 
 use common::*;
 use glam::Vec3;
+use pipeline::depth::{DepthBound, DepthSpec};
 use pipeline::frame::visibility;
 use pipeline::*;
 use proptest::prelude::*;
@@ -15,7 +16,27 @@ fn culls() -> impl Strategy<Value = Cull> {
     prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
 }
 
+fn depths() -> impl Strategy<Value = DepthSpec> {
+    let boxes = (1..=5_u32, 1..=4_u32, 1..=9_u32).prop_map(|(u, v, t)| [u, v, t]);
+    let bound = (0..4_usize).prop_map(|index| DepthBound::ALL[index]);
+    (bound, boxes, any::<bool>()).prop_map(|(bound, boxes, z_min)| DepthSpec { bound, boxes, z_min })
+}
+
 fn check(kind: Kind, cull: Cull, lens: bool, features: Features, borders: bool, count: u32, seed: u64) {
+    check_depth(kind, cull, lens, features, DepthSpec::default(), borders, count, seed);
+}
+
+#[allow(clippy::too_many_arguments, reason = "one for each choice")]
+fn check_depth(
+    kind: Kind,
+    cull: Cull,
+    lens: bool,
+    features: Features,
+    depth: DepthSpec,
+    borders: bool,
+    count: u32,
+    seed: u64,
+) {
     let soup = Soup::new(kind, count, seed);
     let viewport = Viewport::new(72, 50).unwrap();
     let table = if borders {
@@ -23,7 +44,7 @@ fn check(kind: Kind, cull: Cull, lens: bool, features: Features, borders: bool, 
     } else {
         SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap()
     };
-    let spec = spec(features);
+    let spec = PipelineSpec { depth, ..spec(features) };
     let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
     let ours = visibility(&camera(lens), &[soup.draw(&Plain, cull)], &settings).unwrap();
     let theirs = brute_force(&soup, cull, lens, viewport, &table);
@@ -32,7 +53,7 @@ fn check(kind: Kind, cull: Cull, lens: bool, features: Features, borders: bool, 
     assert_eq!(
         differ,
         0,
-        "{differ} of {} samples differ: {kind:?} {cull:?} lens {lens} {features:?}",
+        "{differ} of {} samples differ: {kind:?} {cull:?} lens {lens} {features:?} {depth:?}",
         ours.len()
     );
 }
@@ -45,6 +66,18 @@ proptest! {
     ) {
         let on = |bit: u8| switches & (1 << bit) != 0;
         check(kind, cull, lens, Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3) }, borders, count, seed);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn depth_culling_changes_nothing_however_depth_is_bounded_and_kept(
+        kind in kinds(), cull in culls(), lens: bool, others: bool, z_max: bool, depth in depths(), borders: bool,
+        count in 1..160_u32, seed: u64,
+    ) {
+        let features = Features { z_max, ..if others { Features::ALL } else { Features::NONE } };
+        check_depth(kind, cull, lens, features, depth, borders, count, seed);
     }
 }
 

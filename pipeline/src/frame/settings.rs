@@ -94,7 +94,7 @@ impl PipelineSpec {
         size("vertex_reuse", reuse, (1..=4096).contains(&reuse), "it has to be 1 to 4096")?;
         let boxes = self.depth.boxes;
         let most = boxes.iter().copied().find(|count| !(1..=BoxGrid::MOST).contains(count));
-        size("depth.boxes", most.unwrap_or(1), most.is_none(), "each count has to be 1 to 16")?;
+        size("depth.boxes", most.unwrap_or(1), most.is_none(), "it has to be 1 to 16 along each axis")?;
         let caches = [
             ("shading_cache", self.shading_cache),
             ("memory.depth", self.memory.depth),
