@@ -80,6 +80,16 @@ fn no_depth_of_the_sample_test_is_outside() {
     }
 }
 
+/// The same triangle seen through a pinhole, nearly parallel to the image: there the depth's own rounding outweighs that of its place.
+fn flattened(triangle: [MovingVertex; 3]) -> [MovingVertex; 3] {
+    let depth = triangle[0].open[2];
+    let flat = |[x, y, w]: [f32; 3]| {
+        let scale = depth * (1.0 + 1e-3 * (w / depth).sin()) / w;
+        [x * scale, y * scale, w * scale]
+    };
+    triangle.map(|vertex| MovingVertex { open: flat(vertex.open), close: flat(vertex.close) })
+}
+
 /// The tightest place: a tile that is one sample and a box that is its place on the lens and its time. What is left of the
 /// interval is rounding, so a margin too small shows.
 #[test]
@@ -91,6 +101,7 @@ fn no_depth_is_outside_the_interval_of_its_own_sample() {
             let scale = [0, -20, 19][seed as usize % 3];
             let case = Case { moving: on(0), lens: on(1), behind: on(2), far: on(3), sliver: on(4), scale };
             let Setting { triangle, probe } = setting(case, seed * 32 + u64::from(flags) + 1_000_000);
+            let triangle = if seed % 2 == 0 { triangle } else { flattened(triangle) };
             let Outcome::Ready(triangle) = probe.set_up(triangle, Cull::None) else { continue };
             let bounders = DepthBound::ALL.map(|bound| Bounder::new(&triangle, &probe.shear, bound));
             let (seen, _) = probe.test(&triangle, &probe.whole());
