@@ -360,6 +360,18 @@ fn numbers_that_would_overflow_are_refused() {
     assert!(!all(&Rasterizer::new(lens), &large, &GRID).is_empty());
 }
 
+#[test]
+fn what_is_asked_of_depth_boxes_is_rounded_outward() {
+    let third = 1.0 / 3.0;
+    let touch = Touch { u: [-third, third], v: [third; 2], t: [third; 2], z: [-third, 1e40] };
+    let (within, [lo, hi]) = touch.outward(true);
+    for (range, exact) in [(within.u, touch.u), (within.v, touch.v), (within.t, touch.t), ([lo, hi], touch.z)]
+    {
+        assert!(f64::from(range[0]) <= exact[0] && exact[1] <= f64::from(range[1]), "{range:?} {exact:?}");
+        assert!(f64::from(range[0].next_up()) > exact[0], "{range:?} {exact:?}");
+    }
+}
+
 /// Walking tiles of one's own, from coarse to fine, finds no more than the grid does.
 #[test]
 fn tiles_can_be_walked_by_hand() {

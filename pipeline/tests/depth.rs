@@ -94,7 +94,7 @@ fn flattened(triangle: [MovingVertex; 3]) -> [MovingVertex; 3] {
 /// interval is rounding, so a margin too small shows.
 #[test]
 fn no_depth_is_outside_the_interval_of_its_own_sample() {
-    let (mut depths, mut bounded, mut outside) = (0_u64, 0_u64, 0_u64);
+    let (mut depths, mut plain, mut bounded, mut outside) = (0_u64, 0_u64, 0_u64, 0_u64);
     for flags in 0..32_u32 {
         let on = |bit: u32| flags & (1 << bit) != 0;
         for seed in 0..300_u64 {
@@ -113,12 +113,18 @@ fn no_depth_is_outside_the_interval_of_its_own_sample() {
                     Box5 { u: point(s.u[slot]), v: point(s.v[slot]), t: point(s.t[slot]), lens: case.lens };
                 let bounds = bounders.map(|bounder| bounder.over(&tile, &within));
                 depths += 1;
-                bounded += u64::from(bounds[3][1] - bounds[3][0] < 1e-3 * (bounds[1][1] - bounds[1][0]));
+                // A thousandth of the range of a flattened one would be rounding.
+                if seed % 2 == 0 {
+                    plain += 1;
+                    bounded += u64::from(bounds[3][1] - bounds[3][0] < 1e-3 * (bounds[1][1] - bounds[1][0]));
+                }
                 outside += bounds.iter().filter(|[lo, hi]| !(*lo..=*hi).contains(&depth)).count() as u64;
             }
         }
     }
-    println!("{depths} depths, {bounded} known to a thousandth of the vertices' range, {outside} outside");
+    println!(
+        "{depths} depths, {bounded} of {plain} known to a thousandth of the vertices' range, {outside} outside"
+    );
     assert_eq!(outside, 0);
-    assert!(bounded > depths / 3, "{bounded} of {depths}");
+    assert!(bounded > plain / 3, "{bounded} of {plain}");
 }

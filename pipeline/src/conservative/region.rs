@@ -1,5 +1,8 @@
 //! Tiles, and boxes of lens and time.
 
+use crate::depth::{down, up};
+use crate::traversal::Box5;
+
 /// A closed rectangle of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rect {
@@ -66,4 +69,15 @@ impl Touch {
     pub fn region(&self) -> Region {
         Region { u: self.u, v: self.v, t: self.t }
     }
+
+    /// The same rounded outward, to ask [`DepthBoxes`](crate::depth::DepthBoxes) with: box and depths. `lens` says whether the
+    /// camera has one.
+    pub fn outward(&self, lens: bool) -> (Box5, [f32; 2]) {
+        (Box5 { u: outward(self.u), v: outward(self.v), t: outward(self.t), lens }, outward(self.z))
+    }
+}
+
+/// The narrowest range of `f32` that holds this one.
+fn outward([lo, hi]: [f64; 2]) -> [f32; 2] {
+    [down(lo), up(hi)]
 }

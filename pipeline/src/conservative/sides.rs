@@ -70,3 +70,40 @@ fn union(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
         (a, b) => a.or(b),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact: `value` in units of 2^-80.
+    fn exact(value: f64) -> i128 {
+        let bits = value.to_bits();
+        let (mantissa, exponent) = (bits & ((1 << 52) - 1) | 1 << 52, (bits >> 52) as i32);
+        if value == 0.0 { 0 } else { i128::from(mantissa) << (exponent - 1023 - 52 + 80) }
+    }
+
+    /// The root lies within what is kept, in exact arithmetic, however narrow the range is.
+    #[test]
+    fn the_root_is_kept_whatever_is_rounded() {
+        for seed in 1..200_000_u64 {
+            let bits = crate::sampling::mix(seed);
+            let start = 0.25 + (bits % 1000) as f64 / 3000.0;
+            let range = [start, start + 1.0 / (3_u64 << (bits >> 20 & 31)) as f64];
+            let (p, q) = ((bits >> 40) % 4096 + 1, (bits >> 52) + 1);
+            let (low, high) = (exact(range[0]), exact(range[1]));
+            // Times (p + q), where the function is zero.
+            let root = low * i128::from(p + q) + (high - low) * i128::from(p);
+            let [from, _] = above(range, -(p as f64), q as f64, 0.0).unwrap();
+            assert!(exact(from) * i128::from(p + q) <= root, "{range:?} {p} {q}");
+            let [_, to] = above(range, p as f64, -(q as f64), 0.0).unwrap();
+            assert!(exact(to) * i128::from(p + q) >= root, "{range:?} {p} {q}");
+        }
+    }
+
+    #[test]
+    fn the_part_that_may_not_be_negative() {
+        assert_eq!(above([0.0, 1.0], 0.0, -1.0, 0.0).unwrap()[0], 0.0);
+        assert_eq!(above([0.0, 1.0], -1.0, -2.0, 0.25), None);
+        assert_eq!(above([0.0, 1.0], -0.5, -0.5, 0.25), Some([0.0, 1.0]));
+    }
+}

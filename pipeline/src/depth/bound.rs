@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::number::{Real, both};
+use super::number::{Real, both, down, up};
 use super::plane::{Beam, MovingPlane, Points, normal, tightest};
 use super::rounding::margin;
 use crate::geometry::Shear;
@@ -68,7 +68,8 @@ pub fn vertex_range(triangle: &Triangle, t: [f32; 2]) -> [f32; 2] {
 pub struct Bounder {
     triangle: Triangle,
     bound: DepthBound,
-    facts: Facts<f64>,
+    /// What planes need, where there are any.
+    facts: Option<Facts<f64>>,
     /// Through the triangle at the ends of the shutter, where set-up finds them.
     shutter: Option<[MovingPlane<f64>; 2]>,
 }
@@ -76,9 +77,9 @@ pub struct Bounder {
 impl Bounder {
     /// Prepares to bound `triangle` under a lens with `shear`.
     pub fn new(triangle: &Triangle, shear: &Shear, bound: DepthBound) -> Self {
-        let facts = Facts::new(triangle, shear);
+        let facts = bound.has_planes().then(|| Facts::new(triangle, shear));
         let early = bound == DepthBound::Planes || (bound == DepthBound::LocalPlanes && !triangle.moving);
-        let shutter = early.then(|| facts.shutter());
+        let shutter = facts.as_ref().filter(|_| early).map(Facts::shutter);
         Self { triangle: *triangle, bound, facts, shutter }
     }
 
@@ -87,26 +88,12 @@ impl Bounder {
     pub fn over(&self, tile: &TileRect, within: &Box5) -> [f32; 2] {
         let t = if self.bound == DepthBound::Vertices { [0.0, 1.0] } else { within.t };
         let vertices = vertex_range(&self.triangle, t);
-        if !self.bound.has_planes() {
-            return vertices;
+        let Some(facts) = &self.facts else { return vertices };
+        match facts.over(self.shutter.as_ref(), &Region::new(tile, within)) {
+            Some([lo, hi]) => both(vertices, [down(lo), up(hi)]),
+            None => vertices,
         }
-        let [lo, hi] = self.facts.over(self.shutter.as_ref(), &Region::new(tile, within)).unwrap_or(WIDE);
-        both(vertices.map(f64::from), [f64::from(down(lo)), f64::from(up(hi))]).map(|depth| depth as f32)
     }
-}
-
-/// No bound at all.
-const WIDE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
-
-/// The nearest `f32` that is not above.
-fn down(value: f64) -> f32 {
-    let near = value as f32;
-    if f64::from(near) > value { near.next_down() } else { near }
-}
-
-/// The nearest `f32` that is not below.
-fn up(value: f64) -> f32 {
-    -down(-value)
 }
 
 /// A tile and a box of lens and time.

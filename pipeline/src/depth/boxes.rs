@@ -1,121 +1,8 @@
 //! The farthest and nearest stored depth of a tile, for disjoint boxes that cover lens and time (thesis, Paper VI, section 3).
 
-use std::ops::Range;
-
-use serde::Deserialize;
-
-use super::DepthBound;
+use super::BoxGrid;
 use crate::sampling::TileSamples;
 use crate::traversal::Box5;
-
-/// How depth is bounded and what a tile remembers of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DepthSpec {
-    /// How the depth of a triangle over a tile is bounded.
-    pub bound: DepthBound,
-    /// Boxes of lens and time along u, v and t, each 1 to [`BoxGrid::MOST`]; a farthest and a nearest depth are kept for each.
-    pub boxes: [u32; 3],
-    /// Read no stored depth where a triangle lies in front of all of them (`z_min`).
-    pub z_min: bool,
-}
-
-impl Default for DepthSpec {
-    fn default() -> Self {
-        Self { bound: DepthBound::default(), boxes: [1; 3], z_min: false }
-    }
-}
-
-/// Lens and time divided into boxes of one size.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BoxGrid {
-    counts: [u32; 3],
-    lens: bool,
-}
-
-impl Default for BoxGrid {
-    /// One box.
-    fn default() -> Self {
-        Self { counts: [1; 3], lens: false }
-    }
-}
-
-impl BoxGrid {
-    /// Boxes along one axis at most.
-    pub const MOST: u32 = 16;
-    /// The ends of u, v and t.
-    const ENDS: [[f32; 2]; 3] = [[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]];
-
-    /// `counts` boxes along u, v and t, or `None` when one is not 1 to [`Self::MOST`]. Without a lens, time alone is divided.
-    pub fn new([u, v, t]: [u32; 3], lens: bool) -> Option<Self> {
-        let counts = if lens { [u, v, t] } else { [1, 1, t] };
-        [u, v, t].iter().all(|count| (1..=Self::MOST).contains(count)).then_some(Self { counts, lens })
-    }
-
-    /// How many boxes there are.
-    pub fn len(&self) -> usize {
-        self.counts.iter().map(|&count| count as usize).product()
-    }
-
-    /// Never: there is at least one box.
-    pub fn is_empty(&self) -> bool {
-        false
-    }
-
-    /// Where box `index` of `axis` begins; the one after the last begins where the axis ends.
-    fn border(&self, axis: usize, index: u32) -> f32 {
-        let [lo, hi] = Self::ENDS[axis];
-        lo + (hi - lo) * index as f32 / self.counts[axis] as f32
-    }
-
-    /// The box along `axis` in which a place lies.
-    fn index(&self, axis: usize, place: f32) -> u32 {
-        (1..self.counts[axis]).filter(|&index| self.border(axis, index) <= place).count() as u32
-    }
-
-    /// The box of the sample at `u`, `v`, `t`.
-    pub fn of_sample(&self, u: f32, v: f32, t: f32) -> usize {
-        self.number([self.index(0, u), self.index(1, v), self.index(2, t)])
-    }
-
-    fn number(&self, [u, v, t]: [u32; 3]) -> usize {
-        ((t * self.counts[1] + v) * self.counts[0] + u) as usize
-    }
-
-    /// The boxes that may hold a sample of `within`, with what they have in common with it.
-    pub fn overlapping(&self, within: &Box5) -> impl Iterator<Item = (usize, Box5)> + use<> {
-        let (grid, within) = (*self, *within);
-        let run = |axis: usize, [lo, hi]: [f32; 2]| -> Range<u32> {
-            if lo > hi { 0..0 } else { grid.index(axis, lo)..grid.index(axis, hi) + 1 }
-        };
-        let lens = if grid.lens { [run(0, within.u), run(1, within.v)] } else { [0..1, 0..1] };
-        let [us, vs] = lens;
-        run(2, within.t).flat_map(move |t| {
-            let us = us.clone();
-            vs.clone().flat_map(move |v| {
-                us.clone().map(move |u| (grid.number([u, v, t]), grid.part(&within, [u, v, t])))
-            })
-        })
-    }
-
-    fn part(&self, within: &Box5, [u, v, t]: [u32; 3]) -> Box5 {
-        let cut = |axis: usize, index: u32, [lo, hi]: [f32; 2]| {
-            [lo.max(self.border(axis, index)), hi.min(self.last(axis, index))]
-        };
-        let t = cut(2, t, within.t);
-        if self.lens {
-            Box5 { u: cut(0, u, within.u), v: cut(1, v, within.v), t, ..*within }
-        } else {
-            Box5 { t, ..*within }
-        }
-    }
-
-    /// The last place of box `index`: just before the next one begins.
-    fn last(&self, axis: usize, index: u32) -> f32 {
-        let end = self.border(axis, index + 1);
-        if index + 1 == self.counts[axis] { end } else { end.next_down() }
-    }
-}
 
 /// What is known of the stored depths in one box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,6 +64,18 @@ impl DepthBoxes {
             lowered: false,
         };
         Self { grid, boxes: counts.iter().map(known).collect(), places }
+    }
+
+    /// Of a tile whose samples have these depths.
+    pub fn of(grid: BoxGrid, samples: &TileSamples, depth: &[f32]) -> Self {
+        let mut boxes = Self::cleared(grid, samples);
+        for (slot, &depth) in depth.iter().enumerate() {
+            let place = boxes.place(slot);
+            let known = &mut boxes.boxes[place];
+            (known.nearest, known.stale) = (known.nearest.min(depth), true);
+        }
+        boxes.renew(depth);
+        boxes
     }
 
     /// How lens and time are divided.
@@ -263,43 +162,13 @@ impl DepthBoxes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Shear, Viewport};
-    use crate::sampling::{LensShape, SampleTable};
-
-    fn samples() -> TileSamples {
-        let table = SampleTable::low_discrepancy(16, 3, LensShape::Disk).unwrap();
-        let mut samples = TileSamples::default();
-        samples.fill(&table, Viewport::new(8, 8).unwrap(), &Shear::default(), [0, 0], 8);
-        samples
-    }
-
-    fn holds(within: &Box5, samples: &TileSamples, slot: usize) -> bool {
-        let inside = |[lo, hi]: [f32; 2], place: f32| (lo..=hi).contains(&place);
-        let lens = inside(within.u, samples.u[slot]) && inside(within.v, samples.v[slot]);
-        inside(within.t, samples.t[slot]) && (lens || !within.lens)
-    }
+    use crate::depth::grid::tests::{holds, samples};
 
     fn boxes() -> Vec<Box5> {
         let ranges = [[-1.0, 1.0], [-0.3, 0.2], [0.5, 1.0], [0.25, 0.25], [-1.0, -0.5]];
         let all = ranges.iter().flat_map(|&u| ranges.iter().map(move |&v| (u, v)));
         all.flat_map(|(u, v)| [[0.0, 1.0], [0.2, 0.4], [0.75, 0.75]].map(|t| Box5 { u, v, t, lens: true }))
             .collect()
-    }
-
-    #[test]
-    fn every_sample_lies_in_its_box_and_in_no_other() {
-        let samples = samples();
-        for lens in [false, true] {
-            let grid = BoxGrid::new([3, 2, 5], lens).unwrap();
-            let parts: Vec<_> = grid.overlapping(&Box5::whole(lens)).collect();
-            assert_eq!(parts.len(), if lens { 30 } else { 5 });
-            for slot in 0..samples.len {
-                let own = grid.of_sample(samples.u[slot], samples.v[slot], samples.t[slot]);
-                for (index, part) in &parts {
-                    assert_eq!(holds(part, &samples, slot), *index == own, "{slot} {part:?}");
-                }
-            }
-        }
     }
 
     #[test]
@@ -338,6 +207,8 @@ mod tests {
             let whole = Box5::whole(true);
             assert_eq!(depths.farthest(&whole), depth.iter().copied().fold(f32::NEG_INFINITY, f32::max));
             assert_eq!(depths.renew(&depth), 0);
+            let anew = DepthBoxes::of(*depths.grid(), &samples, &depth);
+            assert!(boxes().iter().all(|within| anew.farthest(within) == depths.farthest(within)));
         }
     }
 
@@ -362,12 +233,5 @@ mod tests {
         // Behind in the second of three.
         let wavy = depths.look(&whole, |part| if part.t[0] == 0.25 { [9.0; 2] } else { [0.1; 2] });
         assert_eq!(wavy, Visible { within: Some(whole), in_front: false, compared: 4, behind: 1 });
-    }
-
-    #[test]
-    fn grids_have_at_least_one_box_and_not_too_many() {
-        assert!(BoxGrid::new([0, 1, 1], true).is_none());
-        assert!(BoxGrid::new([1, 17, 1], true).is_none());
-        assert_eq!(BoxGrid::new([4, 4, 4], false).unwrap().len(), 4);
     }
 }

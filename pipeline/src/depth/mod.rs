@@ -7,6 +7,7 @@
 
 mod bound;
 mod boxes;
+mod grid;
 
 mod number;
 pub mod plane;
@@ -14,6 +15,8 @@ mod rounding;
 mod tile;
 
 pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
-pub use boxes::{BoxGrid, DepthBoxes, DepthSpec, Visible};
+pub use boxes::{DepthBoxes, Visible};
+pub use grid::{BoxGrid, DepthSpec};
 pub use number::Real;
+pub(crate) use number::{down, up};
 pub use tile::DepthTile;

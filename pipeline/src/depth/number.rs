@@ -61,13 +61,24 @@ pub(super) fn range<R: Real, const N: usize>(values: [R; N]) -> [R; 2] {
 }
 
 /// What lies in both.
-pub(super) fn both<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
-    [a[0].most(b[0]), a[1].least(b[1])]
+pub(super) fn both<R: PartialOrd + Copy>(a: [R; 2], b: [R; 2]) -> [R; 2] {
+    [if b[0] > a[0] { b[0] } else { a[0] }, if b[1] < a[1] { b[1] } else { a[1] }]
 }
 
 /// From the least of either to the most.
 pub(super) fn hull<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
     [a[0].least(b[0]), a[1].most(b[1])]
+}
+
+/// The nearest `f32` that is not above.
+pub(crate) fn down(value: f64) -> f32 {
+    let near = value as f32;
+    if f64::from(near) > value { near.next_down() } else { near }
+}
+
+/// The nearest `f32` that is not below.
+pub(crate) fn up(value: f64) -> f32 {
+    -down(-value)
 }
 
 #[cfg(test)]

@@ -122,9 +122,9 @@ impl<'a, 'p> Worker<'a, 'p> {
         if !features.z_max && !depth.z_min {
             return Some((*within, false));
         }
-        let bounder = self.bounder(triangle);
+        self.prepare(triangle);
         let mut visible = Visible::unknown(within);
-        if let Some(tile) = &mut self.bin.tiles[place] {
+        if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[place]) {
             self.tests.z_updates += if features.z_max { tile.renew() } else { 0 };
             visible = tile.boxes.look(within, |part| bounder.over(rect, part));
         }
@@ -142,17 +142,12 @@ impl<'a, 'p> Worker<'a, 'p> {
         visible.within.map(|rest| (time(rest), front))
     }
 
-    /// What is known of the depth of the triangle in hand.
-    fn bounder(&mut self, triangle: &Triangle) -> Bounder {
-        match &self.bounder {
-            Some((id, bounder)) if *id == triangle.id => *bounder,
-            _ => {
-                let bound = self.pass.settings.spec.depth.bound;
-                self.tests.interval_madds += set_up_madds(bound, triangle.moving);
-                let bounder = Bounder::new(triangle, &self.pass.projection.shear, bound);
-                self.bounder = Some((triangle.id, bounder));
-                bounder
-            }
+    /// Finds what is known of the depth of a triangle, once in a bin.
+    fn prepare(&mut self, triangle: &Triangle) {
+        if self.bounder.as_ref().is_none_or(|(id, _)| *id != triangle.id) {
+            let bound = self.pass.settings.spec.depth.bound;
+            self.tests.interval_madds += set_up_madds(bound, triangle.moving);
+            self.bounder = Some((triangle.id, Bounder::new(triangle, &self.pass.projection.shear, bound)));
         }
     }
 
