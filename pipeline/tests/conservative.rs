@@ -116,7 +116,10 @@ fn point(ends: &[[[f64; 3]; 3]; 2], view: &View, within: &Region, r: &mut Number
     let t = r.odd(within.t[0], within.t[1]);
     let first = r.odd(0.0, 1.0);
     let second = r.odd(0.0, 1.0) * (1.0 - first);
-    let weights = [first, second, 1.0 - first - second];
+    point_at(ends, view, [u, v, t], [first, second, 1.0 - first - second])
+}
+
+fn point_at(ends: &[[[f64; 3]; 3]; 2], view: &View, [u, v, t]: [f64; 3], weights: [f64; 3]) -> Point {
     let p: [f64; 3] = [0, 1, 2].map(|axis| {
         (0..3).map(|k| weights[k] * (ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]))).sum()
     });
@@ -265,6 +268,49 @@ fn no_tile_is_missed_and_nothing_lies_outside() {
             assert_eq!([found.missed, found.outside], [0, 0], "{kind:?} {view:?} {found:?}");
             assert!(found.points > 1000, "{kind:?} {view:?} {found:?}");
         }
+    }
+}
+
+/// Where rounding bites: far from the origin, a thin triangle that passes, at one time and from one place on the lens, through the
+/// corner of four tiles as near as `f64` can tell. The tiles that it is found in have to be among the reported ones.
+#[test]
+fn a_corner_cut_off_by_a_rounding_is_reported() {
+    let grid = Grid { origin: [1e6, -1e6], ..GRID };
+    for view in VIEWS {
+        let (mut r, mut checked, mut missed) = (Numbers(5), 0, 0);
+        for round in 0..3000_u32 {
+            let (u, v, t) = (r.odd(-1.0, 1.0), r.odd(-1.0, 1.0), r.odd(0.0, 1.0));
+            let corner = [0, 1].map(|axis| grid.origin[axis] + (1 + r.bits() % 15) as f64);
+            let way = [r.within(-1.0, 1.0), r.within(-1.0, 1.0)];
+            let speed = r.within(0.0, 1e3);
+            let mut ends = [[[0.0; 3]; 3]; 2];
+            for (k, along) in [-r.within(0.1, 2.0), r.within(0.1, 2.0), 0.0].into_iter().enumerate() {
+                let depth = r.within(1.0, 4.0);
+                let (w, (s, a)) = match view {
+                    View::Orthographic => (1.0, ([0.0; 2], [0.0; 2])),
+                    View::Perspective { s, a, .. } => (depth, (s, a)),
+                };
+                let at = [0, 1].map(|axis| {
+                    (corner[axis] + along * way[axis]) * w - [u, v][axis] * (a[axis] * w - s[axis])
+                });
+                for axis in [0, 1] {
+                    let velocity = if round % 2 == 0 { 0.0 } else { speed * r.within(-1.0, 1.0) };
+                    ends[0][k][axis] = at[axis] - t * velocity;
+                    ends[1][k][axis] = at[axis] + (1.0 - t) * velocity;
+                }
+                (ends[0][k][2], ends[1][k][2]) = (depth, depth);
+            }
+            let p = point_at(&ends, &view, [u, v, t], [0.0, 0.0, 1.0]);
+            let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
+            let mut reported = HashSet::new();
+            Rasterizer::new(view).rasterize(&moving, &grid, |tile, _| assert!(reported.insert(tile)));
+            for tile in tiles(&grid, &p) {
+                checked += 1;
+                missed += u32::from(!reported.contains(&tile));
+            }
+        }
+        assert_eq!(missed, 0, "{missed} of {checked} {view:?}");
+        assert!(checked > 3000, "{checked} {view:?}");
     }
 }
 
