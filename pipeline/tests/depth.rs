@@ -150,3 +150,59 @@ fn no_depth_is_outside_the_interval_of_its_own_sample() {
     assert_eq!(outside, 0);
     assert!(bounded > plain / 2, "{bounded} of {plain}");
 }
+
+/// A triangle that turns over in the very instant at which a sample on its first edge looks: broad at the ends of the shutter, so
+/// that planes through it there are sure of themselves, and nothing but rounding to the sample.
+#[test]
+fn no_depth_is_outside_where_the_triangle_turns_over() {
+    let (mut depths, mut outside) = (0_u64, 0_u64);
+    for flags in 0..8_u32 {
+        let on = |bit: u32| flags & (1 << bit) != 0;
+        for seed in 0..200_u64 {
+            let case = Case { moving: true, lens: on(0), behind: on(1), far: on(2), sliver: false, scale: 0 };
+            let Setting { triangle: [a, b, _], probe } = setting(case, seed + 5_000_000);
+            let mut r = Uniform::new(seed);
+            for slot in 0..probe.samples.len {
+                let t = probe.samples.t[slot];
+                let turning = turning_over_at(t, [a, b], &mut r);
+                let Outcome::Ready(triangle) = probe.set_up(turning, Cull::None) else { continue };
+                let s = &probe.samples;
+                let point = |value: f32| [value; 2];
+                let tile = TileRect { x: point(s.x[slot]), y: point(s.y[slot]) };
+                let span = if slot % 2 == 0 { 1.0 } else { (-20.0 * r.next()).exp2() };
+                let times = [(t - span * r.next()).max(0.0), (t + span * r.next()).min(1.0)];
+                let within = Box5 { u: point(s.u[slot]), v: point(s.v[slot]), t: times, lens: case.lens };
+                let Some(depth) = probe.test(&triangle, &Box5 { t: point(t), ..within }).0[slot] else {
+                    continue;
+                };
+                for bound in DepthBound::ALL {
+                    let bounder = Bounder::new(&triangle, &probe.shear, bound);
+                    for within in [within, Box5 { t: point(t), ..within }] {
+                        let [lo, hi] = bounder.over(&tile, &within);
+                        outside += u64::from(!(lo..=hi).contains(&depth));
+                    }
+                }
+                depths += 1;
+            }
+        }
+    }
+    println!("{depths} depths, {outside} outside");
+    assert_eq!(outside, 0);
+    assert!(depths > 5000, "{depths}");
+}
+
+/// A triangle on the edge from `a` to `b` whose third vertex comes to a hair from that edge at `t`.
+fn turning_over_at(t: f32, [a, b]: [MovingVertex; 2], r: &mut Uniform) -> [MovingVertex; 3] {
+    let (along, off) = (r.within(-0.2, 1.2), (-24.0 * r.next()).exp2());
+    let velocity = [0, 1, 2].map(|axis| if axis < 2 { r.within(-40.0, 40.0) } else { 0.0 });
+    let hair = [0, 1].map(|_| off * r.within(-1.0, 1.0));
+    let at =
+        |vertex: &MovingVertex, axis: usize| vertex.open[axis] + t * (vertex.close[axis] - vertex.open[axis]);
+    let end = |time: f32| {
+        std::array::from_fn(|axis| {
+            let on_edge = at(&a, axis) + along * (at(&b, axis) - at(&a, axis));
+            on_edge + hair.get(axis).copied().unwrap_or(0.0) + (time - t) * velocity[axis]
+        })
+    };
+    [a, b, MovingVertex { open: end(0.0), close: end(1.0) }]
+}

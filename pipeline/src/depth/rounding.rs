@@ -89,3 +89,96 @@ fn seen_area<R: Real>(ends: &[Points<R>], slopes: &[[R; 2]; 2]) -> R {
     }
     range[0].most(-range[1])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::mix;
+
+    struct Numbers(u64);
+
+    impl Numbers {
+        fn within(&mut self, lo: f64, hi: f64) -> f64 {
+            self.0 += 1;
+            lo + (hi - lo) * (mix(self.0) >> 11) as f64 / (1_u64 << 53) as f64
+        }
+
+        fn points(&mut self, reach: f64) -> Points<f64> {
+            [(); 3].map(|()| [self.within(-reach, reach), self.within(-reach, reach), self.within(1.0, 4.0)])
+        }
+    }
+
+    /// Twice the area, signed, of the triangle at `t` between two ends seen with slope `g`, and its extents.
+    fn seen_at(ends: &[Points<f64>; 2], t: f64, g: [f64; 2]) -> (f64, [f64; 2]) {
+        let p = [0, 1, 2].map(|k| {
+            let at = [0, 1, 2].map(|axis| ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]));
+            [0, 1].map(|axis| at[axis] - g[axis] * at[2])
+        });
+        let side = |i: usize, axis: usize| p[i][axis] - p[0][axis];
+        let extent = |axis: usize| {
+            let all = p.map(|p| p[axis]);
+            all.iter().fold(f64::MIN, |a, &b| a.max(b)) - all.iter().fold(f64::MAX, |a, &b| a.min(b))
+        };
+        (side(1, 0) * side(2, 1) - side(2, 0) * side(1, 1), [extent(0), extent(1)])
+    }
+
+    #[test]
+    fn area_and_extent_hold_over_the_whole_box() {
+        let (mut r, mut certain, mut turned_twice) = (Numbers(1), 0, 0);
+        for _ in 0..3000 {
+            let ends = [r.points(6.0), r.points(6.0)];
+            let slopes = [0, 1].map(|_| {
+                let lo = r.within(-1.0, 1.0);
+                [lo, lo + r.within(0.0, 0.1)]
+            });
+            let area = seen_area(&ends, &slopes);
+            let extents = [0, 1].map(|axis| super::extent(&ends, axis, slopes[axis]));
+            certain += u32::from(area > 0.0);
+            let middle = slopes.map(|[lo, hi]| 0.5 * (lo + hi));
+            let signs = [0.0, 0.5, 1.0].map(|t| seen_at(&ends, t, middle).0 > 0.0);
+            turned_twice += u32::from(signs[0] != signs[1] && signs[1] != signs[2]);
+            for _ in 0..40 {
+                let (t, g) = (r.within(0.0, 1.0), slopes.map(|[lo, hi]| r.within(lo, hi)));
+                let (found, extent) = seen_at(&ends, t, g);
+                assert!(found.abs() >= area - 1e-9, "{found} {area}");
+                assert!((0..2).all(|axis| extent[axis] <= extents[axis] + 1e-9), "{extent:?} {extents:?}");
+            }
+        }
+        assert!(certain > 300 && turned_twice > 100, "{certain} {turned_twice}");
+    }
+
+    /// Edges of vertices in `f32` around a sample, as the sample test rounds them: the mean they weigh is off the sample by no more
+    /// than the margin of a triangle whose vertices are not rounded.
+    #[test]
+    fn weights_are_off_by_no_more_than_the_margin() {
+        let (mut r, mut checked, mut closest) = (Numbers(2), 0, 0.0_f64);
+        for _ in 0..400_000 {
+            let thin = r.within(-12.0, 0.0).exp2();
+            let p = r.points(1.0).map(|[x, y, _]| [x as f32, (x + thin * y) as f32, 1.0]);
+            let e = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| f64::from(p[i][0] * p[j][1] - p[j][0] * p[i][1]));
+            if !(e.iter().all(|&e| e > 0.0) || e.iter().all(|&e| e < 0.0)) {
+                continue;
+            }
+            let ends = [p.map(|p| p.map(f64::from))];
+            let Some(margin) = margin(&ends, &Beam::pinhole([[0.0; 2]; 2]), [0.0; 2], 1.0) else { continue };
+            let sum: f64 = e.iter().sum();
+            for axis in [0, 1] {
+                let off = (0..3).map(|k| e[k] * ends[0][k][axis]).sum::<f64>() / sum;
+                assert!(off.abs() <= margin.off[axis], "{off} {margin:?}");
+                closest = closest.max(off.abs() / margin.off[axis]);
+            }
+            checked += 1;
+        }
+        assert!(checked > 10_000 && closest > 0.03, "{checked}, as near as {closest} to the margin");
+    }
+
+    #[test]
+    fn a_triangle_as_thin_as_the_rounding_of_its_vertices_has_no_margin() {
+        let beam = Beam::pinhole([[0.0; 2]; 2]);
+        let thin = |height: f64| [[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.5, height, 1.0]]];
+        // Twice the area is the height; each of six products may be off by half a slack times an extent of about one.
+        let margin = |height: f64| margin(&thin(height), &beam, [1e-6, 1e-6], 1.0);
+        assert!(margin(2.9e-6).is_none());
+        assert!(margin(1e-3).is_some_and(|margin| margin.off[0] > 5e-7 && margin.off[0] < 1e-2));
+    }
+}
