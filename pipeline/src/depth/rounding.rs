@@ -132,16 +132,16 @@ mod tests {
                 [lo, lo + r.within(0.0, 0.1)]
             });
             let area = seen_area(&ends, &slopes);
-            let extents = [0, 1].map(|axis| super::extent(&ends, axis, slopes[axis]));
+            let extents = [0, 1].map(|axis| extent(&ends, axis, slopes[axis]));
             certain += u32::from(area > 0.0);
             let middle = slopes.map(|[lo, hi]| 0.5 * (lo + hi));
             let signs = [0.0, 0.5, 1.0].map(|t| seen_at(&ends, t, middle).0 > 0.0);
             turned_twice += u32::from(signs[0] != signs[1] && signs[1] != signs[2]);
             for _ in 0..40 {
                 let (t, g) = (r.within(0.0, 1.0), slopes.map(|[lo, hi]| r.within(lo, hi)));
-                let (found, extent) = seen_at(&ends, t, g);
+                let (found, wide) = seen_at(&ends, t, g);
                 assert!(found.abs() >= area - 1e-9, "{found} {area}");
-                assert!((0..2).all(|axis| extent[axis] <= extents[axis] + 1e-9), "{extent:?} {extents:?}");
+                assert!((0..2).all(|axis| wide[axis] <= extents[axis] + 1e-9), "{wide:?} {extents:?}");
             }
         }
         assert!(certain > 300 && turned_twice > 100, "{certain} {turned_twice}");
