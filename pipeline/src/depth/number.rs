@@ -135,3 +135,17 @@ pub(super) mod counting {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_outward_and_no_further() {
+        for value in [1.0 / 3.0, -1.0 / 3.0, 0.1, 7.0, -7.0, 0.0, 1e-50, -1e-50, 1e30] {
+            let (below, above) = (down(value), up(value));
+            assert!(f64::from(below) <= value && value <= f64::from(above), "{value}");
+            assert!(above == below || above == below.next_up(), "{value}: {below} to {above}");
+        }
+    }
+}

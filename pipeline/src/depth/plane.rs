@@ -239,6 +239,18 @@ mod tests {
         close_to(depths(&lens).unwrap(), inner);
     }
 
+    /// Front from one end of the lens and back from the other: from between it is seen edge-on.
+    #[test]
+    fn a_plane_seen_from_both_faces_bounds_nothing() {
+        let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
+        let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
+        let tile = [[1.0, 1.2], [0.0, 0.1]];
+        let from = |u| Beam::lens(tile, [u, [0.0; 2]], [2.0; 2], [0.5; 2]);
+        assert!(plane.depths(plane.whole(), &from([1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths(plane.whole(), &from([-1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths(plane.whole(), &from([-1.0, 1.0]), [0.0; 2]).is_none());
+    }
+
     #[test]
     fn quotients_of_ranges() {
         assert_eq!(quotient([-1.0, 2.0], [2.0, 4.0]), Some([-0.5, 1.0]));
