@@ -13,6 +13,7 @@
 //! - [`depth`]: depth intervals and culling,
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
 //! - [`memory`]: caches and addresses,
+//! - [`conservative`]: the tiles a triangle may touch, without samples,
 //! - [`frame`]: all of it in order.
 //!
 //! What it guarantees:
@@ -24,6 +25,7 @@
 //! - *Watertight*: the sample test is exact for the rounded points it sees, so a shared edge has one owner.
 //! - *Deterministic*: the same bytes for any number of threads and any vector width.
 
+pub mod conservative;
 pub mod depth;
 pub mod frame;
 pub mod geometry;

@@ -7,6 +7,7 @@ mod common;
 use activity::{Counts, Event, Packet, PacketKind, Unit};
 use common::*;
 use glam::{Vec2, Vec3, Vec4};
+use pipeline::depth::{DepthBound, DepthSpec};
 use pipeline::frame::visibility;
 use pipeline::*;
 use proptest::prelude::*;
@@ -39,13 +40,18 @@ struct Frame {
     visible: u64,
     samples: u64,
     pixels: u64,
+    /// Boxes of lens and time that a tile may have.
+    boxes: u64,
 }
 
 fn frame(draws: &[Draw<'_>], lens: bool, features: Features) -> Frame {
+    frame_with(draws, lens, &spec(features))
+}
+
+fn frame_with(draws: &[Draw<'_>], lens: bool, spec: &PipelineSpec) -> Frame {
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
-    let spec = spec(features);
     let viewport = Viewport::new(70, 50).unwrap();
-    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
     let mut packets = Vec::new();
     let rendered = render(&camera(lens), draws, &settings, |packet| packets.push(*packet)).unwrap();
     let seen = visibility(&camera(lens), draws, &settings).unwrap();
@@ -55,6 +61,7 @@ fn frame(draws: &[Draw<'_>], lens: bool, features: Features) -> Frame {
         visible: seen.iter().filter(|(id, _)| *id != u32::MAX).count() as u64,
         samples: seen.len() as u64,
         pixels: 3500,
+        boxes: spec.depth.boxes.iter().map(|&count| u64::from(count)).product(),
     }
 }
 
@@ -112,6 +119,41 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    /// However depth is bounded and kept, the same is written; finer boxes and better bounds test no more samples.
+    #[test]
+    fn depth_settings_save_work_and_change_nothing(
+        kind in kinds(), lens: bool, count in 1..120_u32, boxes in (1..=4_u32, 1..=4_u32, 1..=8_u32), z_min: bool, seed: u64,
+    ) {
+        let soup = Soup::new(kind, count, seed);
+        let draws = [soup.draw(&Plain, Cull::None)];
+        let with = |bound, boxes, z_min| {
+            let spec = PipelineSpec { depth: DepthSpec { bound, boxes, z_min }, ..spec(Features::ALL) };
+            let frame = frame_with(&draws, lens, &spec);
+            agree(&frame);
+            frame.counts
+        };
+        let plain = with(DepthBound::VerticesInTime, [1; 3], false);
+        let boxes = [boxes.0, boxes.1, boxes.2];
+        let mut before = u64::MAX;
+        for bound in DepthBound::ALL {
+            let one = with(bound, [1; 3], z_min);
+            let many = with(bound, boxes, z_min);
+            for counts in [&one, &many] {
+                prop_assert_eq!(counts[Event::DepthWrites], plain[Event::DepthWrites]);
+                prop_assert_eq!(counts[Event::QuadsShaded], plain[Event::QuadsShaded]);
+                prop_assert!(z_min || counts[Event::DepthReadsSkipped] + counts[Event::ZMinUpdates] == 0);
+            }
+            prop_assert!(many[Event::SamplesTested] <= one[Event::SamplesTested], "{:?}", bound);
+            if bound != DepthBound::LocalPlanes {
+                prop_assert!(one[Event::SamplesTested] <= before, "{:?}", bound);
+                before = one[Event::SamplesTested];
+            }
+        }
+    }
+}
+
 /// Multiply-adds of one sample test as the design counts them: two for each vertex to bring it to the sample, three more to
 /// move it, two more to shear it; two for each edge; six for the depth.
 fn sample_madds(moving: bool, lens: bool) -> u64 {
@@ -124,6 +166,7 @@ fn agree(frame: &Frame) {
     frame.packets.iter().for_each(|packet| sum += &packet.counts);
     assert_eq!(sum, frame.counts, "packets add up to the counts");
     let n = |event: Event| frame.counts[event];
+    let boxes = frame.boxes;
     use Event as E;
     let equal = [
         (
@@ -136,7 +179,6 @@ fn agree(frame: &Frame) {
                 + n(E::EdgeBoundMadds)
                 + n(E::ScreenSetupMadds),
         ),
-        ("every hit is compared", n(E::DepthReads), n(E::SamplesHit)),
         ("every nearer hit has a colour", n(E::ColourWrites), n(E::DepthWrites)),
         ("and asks for it", n(E::ShadingLookups), n(E::DepthWrites)),
         ("a look-up hits or shades", n(E::ShadingHits) + n(E::QuadsShaded), n(E::ShadingLookups)),
@@ -150,6 +192,11 @@ fn agree(frame: &Frame) {
                 + n(E::TrianglesDegenerate)
                 + n(E::TrianglesOutside)
                 + n(E::TrianglesFaceCulled),
+        ),
+        (
+            "a hit is compared or known to be in front",
+            n(E::DepthReads) + n(E::DepthReadsSkipped),
+            n(E::SamplesHit),
         ),
         ("every pixel is resolved", n(E::PixelsResolved), frame.pixels),
         ("a line is 64 bytes", n(E::DramReadBytes) % 64 + n(E::DramWriteBytes) % 64, 0),
@@ -167,8 +214,11 @@ fn agree(frame: &Frame) {
             n(E::CoarseTilesVisited) + n(E::TilesVisited),
         ),
         ("what is hidden was tested for it", n(E::TilesCulledZMax), n(E::ZCullTests)),
-        ("and visited", n(E::ZCullTests), n(E::TilesVisited)),
-        ("a tile is renewed for a test", n(E::ZMaxUpdates), n(E::ZCullTests)),
+        ("every box of it", n(E::BoxesCulledZMax), n(E::ZCullTests)),
+        ("and visited", n(E::ZCullTests), boxes * n(E::TilesVisited)),
+        ("a box is renewed for tests", n(E::ZMaxUpdates), boxes * n(E::ZCullTests)),
+        ("a box comes nearer by a write", n(E::ZMinUpdates), n(E::DepthWrites)),
+        ("what is in front is written", n(E::DepthReadsSkipped), n(E::DepthWrites)),
         ("a quad has a lane that was asked for", n(E::HelperInvocations), 3 * n(E::QuadsShaded)),
         ("vertices are fetched for indices", n(E::VerticesFetched), n(E::Indices)),
         ("a miss is an access", n(E::DepthMisses), n(E::DepthLines)),
@@ -179,7 +229,7 @@ fn agree(frame: &Frame) {
         ("each read of memory is a miss", n(E::DramReadBytes), 64 * n(E::L2Misses)),
         ("samples resolved are those there are", n(E::SamplesResolved), frame.samples),
         ("what is seen is resolved", frame.visible, n(E::SamplesResolved)),
-        ("a line read holds a sample", n(E::DepthLines), n(E::DepthReads)),
+        ("a line read holds a sample", n(E::DepthLines), n(E::SamplesHit)),
     ];
     for (what, less, more) in at_most {
         assert!(less <= more, "{what}: {less} of {more}");
@@ -211,6 +261,8 @@ fn stays_in_its_units(packet: &Packet) {
     assert!(Unit::ALL.iter().any(|unit| packet.counts.uses(*unit)), "nothing happens in {packet:?}");
     let [hit, tested] = [Event::SamplesHit, Event::SamplesTested].map(|event| packet.counts[event]);
     assert!(hit <= tested && tested <= 64 * 4, "{packet:?}");
+    let [skipped, written] = [Event::DepthReadsSkipped, Event::DepthWrites].map(|event| packet.counts[event]);
+    assert!(skipped == 0 || (skipped == hit && hit == written), "not all in front: {packet:?}");
 }
 
 #[test]

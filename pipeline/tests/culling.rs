@@ -7,12 +7,19 @@ mod common;
 
 use common::*;
 use glam::Vec3;
+use pipeline::depth::{DepthBound, DepthSpec};
 use pipeline::frame::visibility;
 use pipeline::*;
 use proptest::prelude::*;
 
 fn culls() -> impl Strategy<Value = Cull> {
     prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)]
+}
+
+fn depths() -> impl Strategy<Value = DepthSpec> {
+    let boxes = (1..=5_u32, 1..=4_u32, 1..=9_u32).prop_map(|(u, v, t)| [u, v, t]);
+    let bound = (0..4_usize).prop_map(|index| DepthBound::ALL[index]);
+    (bound, boxes, any::<bool>()).prop_map(|(bound, boxes, z_min)| DepthSpec { bound, boxes, z_min })
 }
 
 /// A scene with the visible triangle and depth of every sample, by testing every sample against every triangle.
@@ -60,6 +67,19 @@ proptest! {
         let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (1, 8), (2, 64)][sizes];
         let features = Features { facing_splits: splits, auto, ..switched(switches) };
         let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(features) };
+        Scene::new(kind, cull, lens, borders, count, seed).check(&spec);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn depth_culling_changes_nothing_however_depth_is_bounded_and_kept(
+        kind in kinds(), cull in culls(), lens: bool, others in 0..SWITCHES, z_max: bool, depth in depths(),
+        borders: bool, count in 1..160_u32, seed: u64,
+    ) {
+        let features = Features { z_max, ..switched(others) };
+        let spec = PipelineSpec { depth, ..spec(features) };
         Scene::new(kind, cull, lens, borders, count, seed).check(&spec);
     }
 }

@@ -4,9 +4,11 @@
 
 mod common;
 
+use activity::Event;
 use common::stage::*;
 use common::*;
 use glam::Vec3;
+use pipeline::depth::DepthSpec;
 use pipeline::sampling::Sample;
 use pipeline::*;
 
@@ -161,4 +163,31 @@ fn who_hides_whom_changes_with_time() {
         // Time is stratified in every pixel.
         assert_eq!(red, 0.5);
     }
+}
+
+/// A curtain that comes nearer than a wall in the last quarter of the shutter: with four boxes of time it is tested in that
+/// quarter only, and where the wall is not yet drawn no depth is read.
+#[test]
+fn boxes_of_time_hide_what_is_behind_for_a_part_of_the_shutter() {
+    let stage = Stage::sampled(32, 32, 16);
+    let wall = rectangle([-99.0, 99.0], [-99.0, 99.0], 4.0);
+    let [open, close] = [7.0, 3.1].map(|z| rectangle([-99.0, 99.0], [-99.0, 99.0], z));
+    let draws = [still(&wall, &RED), quad(&open, &close, &BLUE)];
+    let counts = |boxes: [u32; 3]| {
+        let depth = DepthSpec { boxes, z_min: true, ..DepthSpec::default() };
+        let spec = PipelineSpec { depth, ..spec(Features { z_max: true, ..Features::NONE }) };
+        let settings =
+            Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
+        render(&stage.camera, &draws, &settings, |_| ()).unwrap().counts
+    };
+    let (one, four) = (counts([1; 3]), counts([1, 1, 4]));
+    let samples = 32 * 32 * 16;
+    // 7 - 3.9 t is beyond 4 up to t = 0.769, in the first three quarters. Every tile sees both triangles of either rectangle.
+    assert_eq!(one[Event::SamplesTested], 4 * samples);
+    assert_eq!(four[Event::SamplesTested], 2 * samples + 2 * samples / 4);
+    assert_eq!([one[Event::BoxesCulledZMax], four[Event::BoxesCulledZMax]], [0, 3 * 2 * 16]);
+    // The first triangle of the wall meets nothing in any tile.
+    let [skipped, of_one] = [four[Event::DepthReadsSkipped], one[Event::DepthReadsSkipped]];
+    assert!(skipped >= of_one && of_one > samples / 3, "{skipped} {of_one}");
+    assert_eq!(four[Event::DepthWrites], one[Event::DepthWrites]);
 }

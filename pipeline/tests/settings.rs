@@ -31,6 +31,8 @@ fn sizes_that_cannot_be_are_named_with_what_would_do() {
         (refused(|s| s.batch_triangles = (1 << 24) + 1), "batch_triangles"),
         (refused(|s| s.vertex_reuse = 0), "vertex_reuse"),
         (refused(|s| s.vertex_reuse = 4097), "vertex_reuse"),
+        (refused(|s| s.depth.boxes = [1, 0, 1]), "depth.boxes"),
+        (refused(|s| s.depth.boxes = [1, 1, 17]), "depth.boxes"),
     ] {
         assert!(matches!(found, SpecError::Size { field: named, .. } if named == field), "{found:?}");
         let text = found.to_string();

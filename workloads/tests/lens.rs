@@ -93,6 +93,7 @@ fn pixels_hit(scene: &Scene) -> usize {
         shading_cache: cache,
         memory: MemorySpec { depth: cache, colour: cache, texture: cache, l2: cache },
         features: Features::ALL,
+        depth: pipeline::depth::DepthSpec::default(),
     };
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk).unwrap();
     let background = Vec3::ZERO;

@@ -91,9 +91,11 @@ activity! {
         ScreenSetupMadds "screen_setup_madds" "Of these: a multiply-add of linearizing the edges to screen samples by."
     }
     ZCull "z_cull" "Drops tiles whose every sample is known to be hidden." {
-        ZCullTests "z_cull_tests" "A depth interval compared with a tile's farthest depth."
+        ZCullTests "z_cull_tests" "A depth interval compared with the farthest and nearest depth of a box of lens and time of a tile."
         TilesCulledZMax "tiles_culled_z_max" "A tile culled because the triangle lies behind all of it."
-        ZMaxUpdates "z_max_updates" "A tile's farthest depth written anew."
+        BoxesCulledZMax "boxes_culled_z_max" "A box of lens and time of a tile in which the triangle lies behind all that is stored."
+        ZMaxUpdates "z_max_updates" "The farthest depth of a box of lens and time written anew."
+        ZMinUpdates "z_min_updates" "The nearest depth of a box of lens and time written anew."
         DepthIntervalMadds "depth_interval_madds" "A multiply-add spent on a depth interval."
     }
     SampleTest "sample_test" "Tests samples against the edges of a triangle." {
@@ -106,6 +108,7 @@ activity! {
     }
     Depth "depth" "Compares and stores the depth of each sample." {
         DepthReads "depth_reads" "A stored sample depth read for a comparison."
+        DepthReadsSkipped "depth_reads_skipped" "A comparison spared because the triangle is nearer than all that is stored."
         DepthWrites "depth_writes" "A sample depth written."
         DepthLines "depth_lines" "A line of the depth cache accessed."
         DepthMisses "depth_misses" "A line that was not in the depth cache."

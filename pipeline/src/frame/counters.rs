@@ -22,6 +22,8 @@ pub(super) struct TileWork {
     pub z_tests: u32,
     pub z_culled: u32,
     pub z_updates: u32,
+    pub z_min_updates: u32,
+    pub boxes_culled: u32,
     pub interval_madds: u32,
 }
 
@@ -57,6 +59,8 @@ impl TileWork {
         counts[Event::ZCullTests] += self.z_tests;
         counts[Event::TilesCulledZMax] += self.z_culled;
         counts[Event::ZMaxUpdates] += self.z_updates;
+        counts[Event::ZMinUpdates] += self.z_min_updates;
+        counts[Event::BoxesCulledZMax] += self.boxes_culled;
         counts[Event::DepthIntervalMadds] += self.interval_madds;
     }
 }
@@ -71,6 +75,8 @@ pub(super) struct Work {
     pub screen_madds: u32,
     pub tested: u32,
     pub hit: u32,
+    /// Hits known to be nearer than what is stored.
+    pub unread: u32,
     pub written: u32,
     pub sample_madds: u32,
     pub read_pixels: u64,

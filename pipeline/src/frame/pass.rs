@@ -6,6 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{Features, Settings};
+use crate::depth::BoxGrid;
 use crate::geometry::{Camera, Clip, Draw, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressMap, Allocator};
 use crate::setup::Corner;
@@ -108,6 +109,11 @@ impl<'a> Pass<'a> {
     pub fn moving_corners(&self, triangle: u32) -> ([Corner; 3], bool) {
         let vertices = self.staged(triangle).vertices;
         (vertices.each_ref().map(Corner::new), vertices.iter().any(|vertex| !vertex.is_still()))
+    }
+
+    /// How lens and time are divided for depth culling.
+    pub fn depth_grid(&self) -> BoxGrid {
+        BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
     }
 
     /// Fine tiles in a row of the image.

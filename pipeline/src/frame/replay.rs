@@ -94,7 +94,8 @@ impl<'a> Replay<'a> {
         counts[Event::SamplesTested] = work.tested;
         counts[Event::SamplesHit] = work.hit;
         counts[Event::SampleMadds] = work.sample_madds;
-        counts[Event::DepthReads] = work.hit;
+        counts[Event::DepthReads] = work.hit - work.unread;
+        counts[Event::DepthReadsSkipped] = work.unread;
         counts[Event::DepthWrites] = work.written;
         counts[Event::ColourWrites] = work.written;
         let base = self.pass.addresses.depth;

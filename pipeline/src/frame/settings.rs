@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
+use crate::depth::{BoxGrid, DepthSpec};
 use crate::geometry::Viewport;
 use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
 use crate::sampling::SampleSource;
@@ -26,6 +27,9 @@ pub struct PipelineSpec {
     pub memory: MemorySpec,
     /// Which tests are switched on.
     pub features: Features,
+    /// How depth is bounded and what a tile remembers of it.
+    #[serde(default)]
+    pub depth: DepthSpec,
 }
 
 /// Tests that can be switched off. They change what it costs, never the image; the two thresholds change the image where they are
@@ -148,6 +152,9 @@ impl PipelineSpec {
                 return Err(SpecError::Threshold { field, value: value.to_string() });
             }
         }
+        let boxes = self.depth.boxes;
+        let most = boxes.iter().copied().find(|count| !(1..=BoxGrid::MOST).contains(count));
+        size("depth.boxes", most.unwrap_or(1), most.is_none(), "it has to be 1 to 16 along each axis")?;
         let caches = [
             ("shading_cache", self.shading_cache),
             ("memory.depth", self.memory.depth),

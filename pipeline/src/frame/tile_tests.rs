@@ -50,7 +50,7 @@ impl Left {
     }
 
     /// The same in the box `within`, or `None` where nothing is left.
-    fn narrowed(&self, within: Box5) -> Option<Self> {
+    pub fn narrowed(&self, within: Box5) -> Option<Self> {
         let times = self.times.meet(&Timeline::one(Piece { t: within.t, faces: [true; 2] }));
         Some(Self { within: Box5 { t: times.hull()?, ..within }, times, edges: None })
     }

@@ -7,7 +7,7 @@ use super::pass::Pass;
 use super::surface::Grid;
 use super::tile_tests::{Left, Place, Run, Subject};
 use super::vertices::Ready;
-use crate::depth::{DepthTile, interval_madds, nearest};
+use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
 use crate::geometry::Shear;
 use crate::sample_test::{self, Hits, Target, test_screened};
 use crate::sampling::TileSamples;
@@ -36,6 +36,10 @@ pub(super) struct Worker<'a, 'p> {
     log: BinLog,
     /// Tile tests since the last packet.
     tests: TileWork,
+    /// How lens and time are divided for depth culling.
+    grid: BoxGrid,
+    /// What is known of the depth of one triangle.
+    bounder: Option<(u32, Bounder)>,
 }
 
 impl<'a, 'p> Worker<'a, 'p> {
@@ -46,7 +50,8 @@ impl<'a, 'p> Worker<'a, 'p> {
             flags.clear();
             flags.resize(bin.tiles.len(), false);
         }
-        Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default() }
+        let grid = pass.depth_grid();
+        Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default(), grid, bounder: None }
     }
 
     /// One triangle through the tiles of the bin.
@@ -96,28 +101,58 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Some(mut left) = subject.test(&tile, left, &mut self.run()) else { return };
         let place = self.place(origin);
         self.fill(place, origin, left.within.lens);
-        if !self.behind_all(subject.triangle, &left.within, place) {
+        if let Some((within, in_front)) = self.in_sight(subject.triangle, &tile.rect, &left.within, place) {
+            if within != left.within {
+                let Some(rest) = left.narrowed(within) else { return };
+                left = rest;
+            }
             let tested = self.samples(subject, &tile, &mut left, place);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
                 self.ask_for_quads(subject.triangle, place, origin);
-                self.record(subject.triangle.id, tested, origin);
+                self.record(subject.triangle.id, tested, in_front, origin);
             }
         }
     }
 
-    /// Whether every sample of the tile is known to see something nearer.
-    fn behind_all(&mut self, triangle: &Triangle, within: &Box5, place: usize) -> bool {
-        if !self.pass.settings.spec.features.z_max {
-            return false;
+    /// Where the depths stored in the tile leave the triangle to be seen, and whether none of them has to be read for it.
+    fn in_sight(
+        &mut self,
+        triangle: &Triangle,
+        rect: &TileRect,
+        within: &Box5,
+        place: usize,
+    ) -> Option<(Box5, bool)> {
+        let (features, depth) = (&self.pass.settings.spec.features, &self.pass.settings.spec.depth);
+        if !features.z_max && !depth.z_min {
+            return Some((*within, false));
         }
-        let (farthest, updated) =
-            self.bin.tiles[place].as_mut().map_or((f32::INFINITY, false), DepthTile::farthest);
-        let behind = nearest(triangle, within.t) > farthest;
-        self.tests.z_tests += 1;
-        self.tests.z_updates += u32::from(updated);
-        self.tests.interval_madds += interval_madds(triangle.moving);
-        self.tests.z_culled += u32::from(behind);
-        behind
+        self.prepare(triangle);
+        let mut visible = Visible::unknown(within);
+        if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[place]) {
+            self.tests.z_updates += if features.z_max { tile.renew() } else { 0 };
+            visible = tile.boxes.look(within, |part| bounder.over(rect, part));
+        }
+        self.tests.z_tests += visible.compared;
+        self.tests.interval_madds +=
+            visible.compared * interval_madds(depth.bound, triangle.moving, within.lens);
+        if !features.z_max {
+            return Some((*within, visible.in_front && visible.behind == 0));
+        }
+        self.tests.boxes_culled += visible.behind;
+        self.tests.z_culled += u32::from(visible.within.is_none());
+        // The sample test takes a still triangle at all times.
+        let time = |rest: Box5| Box5 { t: if triangle.moving { rest.t } else { within.t }, ..rest };
+        let front = depth.z_min && visible.in_front && (triangle.moving || visible.behind == 0);
+        visible.within.map(|rest| (time(rest), front))
+    }
+
+    /// Finds what is known of the depth of a triangle, once in a bin.
+    fn prepare(&mut self, triangle: &Triangle) {
+        if self.bounder.as_ref().is_none_or(|(id, _)| *id != triangle.id) {
+            let bound = self.pass.settings.spec.depth.bound;
+            self.tests.interval_madds += set_up_madds(bound, triangle.moving);
+            self.bounder = Some((triangle.id, Bounder::new(triangle, &self.pass.projection.shear, bound)));
+        }
     }
 
     /// The samples of a tile in each piece of the time that is left. Says in which dimensions they were tested.
@@ -126,7 +161,8 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Scratch { samples, sharp, hits, .. } = &mut *self.scratch;
         let drawn_sharp = self.pass.lens && !left.within.lens;
         let samples = if drawn_sharp { &sharp[place] } else { &samples[place] };
-        let stored = self.bin.tiles[place].get_or_insert_with(|| DepthTile::cleared(samples.len));
+        let grid = self.grid;
+        let stored = self.bin.tiles[place].get_or_insert_with(|| DepthTile::cleared(grid, samples));
         hits.clear();
         let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
         let (times, near) = (left.times, self.pass.projection.near);
@@ -137,7 +173,8 @@ impl<'a, 'p> Worker<'a, 'p> {
             test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
         }
         if !hits.written.is_empty() {
-            stored.touch();
+            let lowered = stored.wrote(&hits.written);
+            self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
         }
         if hits.screened > 0 {
             let passed = f64::from(hits.tested) / f64::from(hits.screened);
@@ -181,7 +218,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         self.scratch.quads.drain_into(&mut self.log.quads);
     }
 
-    fn record(&mut self, triangle: u32, [moving, lens]: [bool; 2], origin: [u32; 2]) {
+    fn record(&mut self, triangle: u32, [moving, lens]: [bool; 2], in_front: bool, origin: [u32; 2]) {
         let hits = &self.scratch.hits;
         self.log.work.push(Work {
             triangle,
@@ -191,6 +228,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             screen_madds: hits.screened * traversal::screen_madds(moving, lens),
             tested: hits.tested,
             hit: hits.hit,
+            unread: if in_front { hits.hit } else { 0 },
             written: hits.written.len() as u32,
             sample_madds: hits.tested * sample_test::madds(moving, lens),
             read_pixels: hits.read_pixels,

@@ -58,4 +58,10 @@ impl Box5 {
         let both = |a: [f32; 2], b: [f32; 2]| [a[0].max(b[0]), a[1].min(b[1])];
         Self { u: both(self.u, other.u), v: both(self.v, other.v), t: both(self.t, other.t), lens: self.lens }
     }
+
+    /// The smallest box that holds both.
+    pub fn hull(&self, other: &Self) -> Self {
+        let hull = |a: [f32; 2], b: [f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Self { u: hull(self.u, other.u), v: hull(self.v, other.v), t: hull(self.t, other.t), lens: self.lens }
+    }
 }

@@ -7,6 +7,7 @@ mod probe;
 pub mod stage;
 
 use glam::{Affine3A, Vec3, Vec4};
+use pipeline::depth::DepthSpec;
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{Sample, TileSamples, mix};
 use pipeline::setup::{Outcome, set_up};
@@ -175,6 +176,7 @@ pub fn spec(features: Features) -> PipelineSpec {
             l2: CacheSpec { entries: 4096, ways: 8 },
         },
         features,
+        depth: DepthSpec::default(),
     }
 }
 

@@ -107,6 +107,7 @@ fn front(event: Event) -> Option<Interval> {
         Event::TilesVisited => sum([sram(4, 32.0, WRITE), sram(4, 32.0, READ)]),
         Event::ZCullTests => sum([sram(8, 32.0, READ), times(2.0, COMPARE)]),
         Event::ZMaxUpdates => sum([sram(8, 32.0, WRITE), times(64.0, COMPARE)]),
+        Event::ZMinUpdates => sum([sram(8, 32.0, WRITE), COMPARE]),
         _ => return None,
     })
 }

@@ -1,0 +1,144 @@
+//! From a triangle to the tiles it may touch.
+
+use std::ops::Range;
+
+use super::edges::miss;
+use super::seen::{ROUNDING, Seen};
+use super::sides::narrow;
+use super::{MovingTriangle, Prepared, Rect, Region, Touch, View};
+use crate::depth::plane::{Beam, MovingPlane, normal, tightest};
+
+/// Tiles of one size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Where the first tile begins.
+    pub origin: [f64; 2],
+    /// The side of a tile, above zero.
+    pub tile: f64,
+    /// Tiles in a row.
+    pub columns: u32,
+    /// Tiles in a column.
+    pub rows: u32,
+}
+
+impl Grid {
+    /// What the tiles in these columns and rows cover; neighbours share the number of their border.
+    pub fn rect(&self, columns: &Range<u32>, rows: &Range<u32>) -> Rect {
+        let border = |axis: usize, index: u32| self.origin[axis] + f64::from(index) * self.tile;
+        Rect {
+            x: [border(0, columns.start), border(0, columns.end)],
+            y: [border(1, rows.start), border(1, rows.end)],
+        }
+    }
+}
+
+/// Finds the tiles that triangles may touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rasterizer {
+    view: View,
+    clip: Region,
+    halvings: u32,
+}
+
+impl Rasterizer {
+    /// All of lens and shutter in `view`, the time of a tile halved twice.
+    pub fn new(view: View) -> Self {
+        Self { view, clip: Region::WHOLE, halvings: 2 }
+    }
+
+    /// The same for a part of lens and shutter, its ends included (user clip planes).
+    #[must_use]
+    pub fn clipped(self, clip: Region) -> Self {
+        Self { clip, ..self }
+    }
+
+    /// The same with the time of a tile that may be touched halved up to `halvings` times, each part tested anew: costs up to
+    /// `2^halvings` tests, and bounds better.
+    #[must_use]
+    pub fn halving(self, halvings: u32) -> Self {
+        Self { halvings, ..self }
+    }
+
+    /// Hands `each` tile that `triangle` may touch (column and row) its intervals, rows of blocks at a time. Allocates nothing.
+    pub fn rasterize(&self, triangle: &MovingTriangle, grid: &Grid, mut each: impl FnMut([u32; 2], &Touch)) {
+        let prepared = self.prepare(triangle);
+        self.descend(&prepared, grid, 0..grid.columns, 0..grid.rows, &self.clip, &mut each);
+    }
+
+    /// What every tile asks of a triangle.
+    pub fn prepare(&self, triangle: &MovingTriangle) -> Prepared {
+        Prepared::new(triangle, &self.view)
+    }
+
+    /// The intervals in which a prepared triangle may touch `rect` within `region`, or `None` where it does not. For those who walk
+    /// tiles of their own: what holds for a tile holds for the tiles in it.
+    pub fn touch(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Touch> {
+        self.halved(prepared, rect, region, self.halvings)
+    }
+
+    fn descend(
+        &self,
+        prepared: &Prepared,
+        grid: &Grid,
+        columns: Range<u32>,
+        rows: Range<u32>,
+        region: &Region,
+        each: &mut impl FnMut([u32; 2], &Touch),
+    ) {
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        let rect = grid.rect(&columns, &rows);
+        if columns.len() == 1 && rows.len() == 1 {
+            if let Some(touch) = self.touch(prepared, &rect, region) {
+                each([columns.start, rows.start], &touch);
+            }
+            return;
+        }
+        let Some(region) = self.region(prepared, &rect, region) else { return };
+        let middle = |range: &Range<u32>| range.start + (range.end - range.start).div_ceil(2);
+        let (column, row) = (middle(&columns), middle(&rows));
+        for rows in [rows.start..row, row..rows.end] {
+            for columns in [columns.start..column, column..columns.end] {
+                self.descend(prepared, grid, columns, rows.clone(), &region, each);
+            }
+        }
+    }
+
+    /// The part of `region` in which the triangle may touch `rect`.
+    fn region(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Region> {
+        let region = narrow(&self.view, prepared, rect, region)?;
+        let seen = Seen::new(&self.view, prepared, rect, &region);
+        (!miss(&seen, &region)).then_some(region)
+    }
+
+    fn halved(&self, prepared: &Prepared, rect: &Rect, region: &Region, halvings: u32) -> Option<Touch> {
+        let region = self.region(prepared, rect, region)?;
+        if halvings == 0 || !prepared.moving || region.t[0] == region.t[1] {
+            return self.depths(prepared, rect, &region).map(|z| Touch::new(&region, z));
+        }
+        let halves = region.halves().map(|half| self.halved(prepared, rect, &half, halvings - 1));
+        halves.into_iter().flatten().reduce(|a, b| a.hull(&b))
+    }
+
+    /// The depths at which the triangle may touch `rect` (thesis, Paper VI, Appendix A, both tests), or `None` where it cannot.
+    fn depths(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<[f64; 2]> {
+        let seen = Seen::new(&self.view, prepared, rect, region);
+        let vertices = seen.points.iter().flatten().map(|p| p[2]);
+        let vertices =
+            vertices.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
+        let beam = match self.view {
+            View::Orthographic => Beam::orthographic(seen.tile),
+            View::Perspective { .. } if !self.view.has_lens() => Beam::pinhole(seen.tile),
+            View::Perspective { s, a, .. } => Beam::lens(seen.tile, [region.u, region.v], s, a),
+        };
+        let planes = seen.points.iter().map(|points| {
+            let plane = MovingPlane::new(normal(points), [&seen.points[0], &seen.points[1]], seen.size);
+            plane.depths(plane.whole(), &beam, [0.0; 2])
+        });
+        let [lo, hi] = tightest(planes.chain([Some(vertices)]))?;
+        let widened = |z: f64| ROUNDING * z.abs() + 2.0 * seen.depth_noise;
+        let (lo, hi) = ((lo - widened(lo)).max(self.view.near()), hi + widened(hi));
+        (lo <= hi).then_some([lo, hi])
+    }
+}

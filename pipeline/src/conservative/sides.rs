@@ -1,0 +1,109 @@
+//! The sides of a tile over lens and time (Munkberg et al. 2011 in t, extended to u and v), in `f64`.
+//!
+//! A point of the triangle in the tile at depth `w > 0` is not beyond the left side; being a mean of the vertices it needs one of
+//! them not to be: `d = x(t) + u (a w(t) - s) - X0 w(t) >= 0`, bilinear in `u` and `t`. The times that matter are
+//! the hull over the vertices of where `d` is not negative at one end of `u`, and for `u` alike.
+
+use super::seen::Seen;
+use super::{Prepared, Rect, Region, View};
+
+/// The part of `region` in which the triangle may lie within the sides of the tile and beyond the near depth, or `None`.
+pub(super) fn narrow(view: &View, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Region> {
+    let mut region = *region;
+    for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let seen = Seen::new(view, prepared, rect, &region);
+        region = narrow_side(&seen, axis, side, &region)?;
+    }
+    beyond_near(view, prepared, &region)
+}
+
+fn narrow_side(seen: &Seen, axis: usize, side: usize, region: &Region) -> Option<Region> {
+    let lens = if axis == 0 { region.u } else { region.v };
+    let (sign, border) = (if side == 0 { 1.0 } else { -1.0 }, seen.tile[axis][side]);
+    let (mut times, mut places) = (None, None);
+    for k in 0..3 {
+        let d = lens.map(|place| [0, 1].map(|end| sign * seen.from(axis, k, end, place, border)));
+        for [opening, closing] in d {
+            times = union(times, above(region.t, opening, closing, seen.noise[axis]));
+        }
+        for [at_low, at_high] in [0, 1].map(|end| [d[0][end], d[1][end]]) {
+            places = union(places, above(lens, at_low, at_high, seen.noise[axis]));
+        }
+    }
+    let mut next = Region { t: times?, ..*region };
+    if seen.view.has_lens() {
+        *if axis == 0 { &mut next.u } else { &mut next.v } = places?;
+    }
+    Some(next)
+}
+
+/// The part of `region` at which a vertex is beyond the near depth.
+fn beyond_near(view: &View, prepared: &Prepared, region: &Region) -> Option<Region> {
+    let near = view.near();
+    if near == f64::NEG_INFINITY {
+        return Some(*region);
+    }
+    let noise = super::seen::ROUNDING * (prepared.size[2] + near.abs()) + prepared.uncertainty()[2];
+    let [open, close] = region.t.map(|t| prepared.at(t));
+    let times = (0..3).map(|k| above(region.t, open[k][2] - near, close[k][2] - near, noise));
+    Some(Region { t: times.fold(None, union)?, ..*region })
+}
+
+/// The part of `range` where the linear function with the values `lo` and `hi` at its ends, known up to `noise`, may not be
+/// negative.
+fn above(range: [f64; 2], lo: f64, hi: f64, noise: f64) -> Option<[f64; 2]> {
+    // Twice the noise pays for the rounding of the quotient as well, the nudge for mapping it to the range.
+    let (lo, hi) = (lo + 2.0 * noise, hi + 2.0 * noise);
+    let nudge = 4.0 * f64::EPSILON * range[0].abs().max(range[1].abs());
+    let root = || range[0] + (range[1] - range[0]) * (lo / (lo - hi));
+    match (lo >= 0.0, hi >= 0.0) {
+        (true, true) => Some(range),
+        (false, false) => None,
+        (true, false) => Some([range[0], (root() + nudge).min(range[1])]),
+        (false, true) => Some([(root() - nudge).max(range[0]), range[1]]),
+    }
+}
+
+fn union(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
+        (a, b) => a.or(b),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact: `value` in units of 2^-80.
+    fn exact(value: f64) -> i128 {
+        let bits = value.to_bits();
+        let (mantissa, exponent) = (bits & ((1 << 52) - 1) | 1 << 52, (bits >> 52) as i32);
+        if value == 0.0 { 0 } else { i128::from(mantissa) << (exponent - 1023 - 52 + 80) }
+    }
+
+    /// The root lies within what is kept, in exact arithmetic, however narrow the range is.
+    #[test]
+    fn the_root_is_kept_whatever_is_rounded() {
+        for seed in 1..200_000_u64 {
+            let bits = crate::sampling::mix(seed);
+            let start = 0.25 + (bits % 1000) as f64 / 3000.0;
+            let range = [start, start + 1.0 / (3_u64 << (bits >> 20 & 31)) as f64];
+            let (p, q) = ((bits >> 40) % 4096 + 1, (bits >> 52) + 1);
+            let (low, high) = (exact(range[0]), exact(range[1]));
+            // Times (p + q), where the function is zero.
+            let root = low * i128::from(p + q) + (high - low) * i128::from(p);
+            let [from, _] = above(range, -(p as f64), q as f64, 0.0).unwrap();
+            assert!(exact(from) * i128::from(p + q) <= root, "{range:?} {p} {q}");
+            let [_, to] = above(range, p as f64, -(q as f64), 0.0).unwrap();
+            assert!(exact(to) * i128::from(p + q) >= root, "{range:?} {p} {q}");
+        }
+    }
+
+    #[test]
+    fn the_part_that_may_not_be_negative() {
+        assert_eq!(above([0.0, 1.0], 0.0, -1.0, 0.0).unwrap()[0], 0.0);
+        assert_eq!(above([0.0, 1.0], -1.0, -2.0, 0.25), None);
+        assert_eq!(above([0.0, 1.0], -0.5, -0.5, 0.25), Some([0.0, 1.0]));
+    }
+}

@@ -1,0 +1,60 @@
+//! How points of view space appear on the image.
+
+use crate::geometry::Shear;
+
+/// A projection. Points are `[x, y, depth]` in units of tiles' borders (pixels, for instance).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum View {
+    /// A point is seen at `(x + u (a_x w - s_x)) / w`, `y` alike, where `w` is its depth: a thin lens with the shear `s`, `a`, or a
+    /// pinhole where these are zero. What is nearer than `near` (not below zero) is not seen.
+    Perspective {
+        /// Projection scale times lens radius.
+        s: [f64; 2],
+        /// The same over the focus depth.
+        a: [f64; 2],
+        /// The nearest depth at which anything is seen.
+        near: f64,
+    },
+    /// A point is seen at `(x, y)`, at any depth.
+    Orthographic,
+}
+
+impl View {
+    /// Through a pinhole.
+    pub fn pinhole(near: f64) -> Self {
+        Self::Perspective { s: [0.0; 2], a: [0.0; 2], near }
+    }
+
+    /// As a camera of the standard mode sees it.
+    pub fn of(shear: &Shear, near: f32) -> Self {
+        let [s, a] = [shear.s, shear.a].map(|part| part.map(f64::from));
+        Self::Perspective { s, a, near: f64::from(near) }
+    }
+
+    /// Whether places on the lens see different things.
+    pub fn has_lens(&self) -> bool {
+        self.shear() != ([0.0; 2], [0.0; 2])
+    }
+
+    pub(super) fn shear(&self) -> ([f64; 2], [f64; 2]) {
+        match self {
+            Self::Perspective { s, a, .. } => (*s, *a),
+            Self::Orthographic => ([0.0; 2], [0.0; 2]),
+        }
+    }
+
+    /// The weight of a point on the homogeneous image plane.
+    pub(super) fn weight(&self, depth: f64) -> f64 {
+        match self {
+            Self::Perspective { .. } => depth,
+            Self::Orthographic => 1.0,
+        }
+    }
+
+    pub(super) fn near(&self) -> f64 {
+        match self {
+            Self::Perspective { near, .. } => *near,
+            Self::Orthographic => f64::NEG_INFINITY,
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The numbers depth bounds are worked out in: `f64`, or in a test one that counts its operations.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A real number.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The number `value`.
+    fn new(value: f64) -> Self;
+
+    /// `self b + c`, each operation rounded; one multiply-add.
+    fn madd(self, b: Self, c: Self) -> Self;
+
+    /// The smaller of two; comparing is free.
+    fn least(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+
+    /// The larger of two.
+    fn most(self, other: Self) -> Self {
+        if other > self { other } else { self }
+    }
+
+    /// Without its sign.
+    fn size(self) -> Self {
+        if self < Self::new(0.0) { -self } else { self }
+    }
+}
+
+impl Real for f64 {
+    fn new(value: f64) -> Self {
+        value
+    }
+
+    fn madd(self, b: Self, c: Self) -> Self {
+        self * b + c
+    }
+}
+
+/// `a . b`.
+pub(super) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0].madd(b[0], a[1].madd(b[1], a[2] * b[2]))
+}
+
+/// `a x b`.
+pub(super) fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
+    let part = |i: usize, j: usize| a[i].madd(b[j], -(a[j] * b[i]));
+    [part(1, 2), part(2, 0), part(0, 1)]
+}
+
+/// The smallest and largest of some numbers.
+pub(super) fn range<R: Real, const N: usize>(values: [R; N]) -> [R; 2] {
+    values.iter().fold([values[0]; 2], |[lo, hi], &value| [lo.least(value), hi.most(value)])
+}
+
+/// What lies in both.
+pub(super) fn both<R: PartialOrd + Copy>(a: [R; 2], b: [R; 2]) -> [R; 2] {
+    [if b[0] > a[0] { b[0] } else { a[0] }, if b[1] < a[1] { b[1] } else { a[1] }]
+}
+
+/// From the least of either to the most.
+pub(super) fn hull<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
+    [a[0].least(b[0]), a[1].most(b[1])]
+}
+
+/// The nearest `f32` that is not above.
+pub(crate) fn down(value: f64) -> f32 {
+    let near = value as f32;
+    if f64::from(near) > value { near.next_down() } else { near }
+}
+
+/// The nearest `f32` that is not below.
+pub(crate) fn up(value: f64) -> f32 {
+    -down(-value)
+}
+
+#[cfg(test)]
+pub(super) mod counting {
+    use super::Real;
+    use std::cell::Cell;
+    use std::ops::{Add, Div, Mul, Neg, Sub};
+
+    thread_local!(static MADDS: Cell<u32> = const { Cell::new(0) });
+
+    /// A number that counts multiply-adds; a lone addition, multiplication or division counts as one.
+    #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+    pub struct Counted(pub f64);
+
+    fn count(value: f64) -> Counted {
+        MADDS.set(MADDS.get() + 1);
+        Counted(value)
+    }
+
+    /// The multiply-adds of `work`.
+    pub fn madds(work: impl FnOnce()) -> u32 {
+        MADDS.set(0);
+        work();
+        MADDS.get()
+    }
+
+    macro_rules! operator {
+        ($($name:ident $method:ident $op:tt),*) => {$(
+            impl $name for Counted {
+                type Output = Self;
+                fn $method(self, other: Self) -> Self {
+                    count(self.0 $op other.0)
+                }
+            }
+        )*};
+    }
+
+    operator!(Add add +, Sub sub -, Mul mul *, Div div /);
+
+    impl Neg for Counted {
+        type Output = Self;
+        fn neg(self) -> Self {
+            Self(-self.0)
+        }
+    }
+
+    impl Real for Counted {
+        fn new(value: f64) -> Self {
+            Self(value)
+        }
+
+        fn madd(self, b: Self, c: Self) -> Self {
+            count(self.0 * b.0 + c.0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_outward_and_no_further() {
+        for value in [1.0 / 3.0, -1.0 / 3.0, 0.1, 7.0, -7.0, 0.0, 1e-50, -1e-50, 1e30] {
+            let (below, above) = (down(value), up(value));
+            assert!(f64::from(below) <= value && value <= f64::from(above), "{value}");
+            assert!(above == below || above == below.next_up(), "{value}: {below} to {above}");
+        }
+    }
+}

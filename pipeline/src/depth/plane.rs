@@ -1,0 +1,262 @@
+//! Planes that move with a triangle and keep it on one side (thesis, Paper VI, Appendix A, second test).
+//!
+//! For any vector `n`, `n . p` over a moving triangle lies between the least and the most of its vertices. These move
+//! linearly, so at time `t` between two ends it is at most
+//!
+//! ```text
+//! h(t) = (1 - t) max_i n . q_i + t max_i n . r_i
+//! ```
+//!
+//! and at least the same with the minimum. A ray holds the points `z G + B` at depth `z`, so the depth of the triangle on it
+//! is at most `(h(t) - n . B) / (n . G)` where `n . G > 0`. The paper takes the normal of the triangle at one end for `n`,
+//! which makes `h` vanish there up to rounding; nothing here relies on it, so a normal that is rounding noise gives a loose bound
+//! and never a false one.
+//!
+//! In perspective with a thin lens `G = (X - u a_x, Y - v a_y, 1)` and `B = (u s_x, v s_y, 0)`; in an orthographic view
+//! `G = (0, 0, 1)` and `B = (X, Y, 0)`. The bound is a ratio of functions linear in each variable, so its extremes
+//! are at corners.
+
+use super::number::{Real, both, cross, dot, hull, range};
+
+/// Three points.
+pub type Points<R> = [[R; 3]; 3];
+
+/// Rays with the points `z (g_x, g_y, 1) + (b_x, b_y, 0)`, `g` and `b` anywhere in their ranges.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays<R> {
+    /// Smallest and largest `g_x` and `g_y`.
+    pub slope: [[R; 2]; 2],
+    /// Smallest and largest `b_x` and `b_y`.
+    pub base: [[R; 2]; 2],
+}
+
+/// The rays of a tile from a part of the lens, one set for each corner of that part.
+#[derive(Clone, Copy, Debug)]
+pub struct Beam<R> {
+    rays: [Rays<R>; 4],
+    corners: usize,
+}
+
+impl<R: Real> Beam<R> {
+    /// Through a pinhole: `tile` holds the ends of X and of Y.
+    pub fn pinhole(tile: [[R; 2]; 2]) -> Self {
+        Self::single(Rays { slope: tile, base: [[R::new(0.0); 2]; 2] })
+    }
+
+    /// Parallel ones.
+    pub fn orthographic(tile: [[R; 2]; 2]) -> Self {
+        Self::single(Rays { slope: [[R::new(0.0); 2]; 2], base: tile })
+    }
+
+    fn single(rays: Rays<R>) -> Self {
+        Self { rays: [rays; 4], corners: 1 }
+    }
+
+    /// Through the part `lens` (the ends of u and of v) of a thin lens with the shear `s`, `a`.
+    pub fn lens(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
+        let axis = |axis: usize| {
+            lens[axis].map(|place| {
+                let ([lo, hi], shift) = (tile[axis], place * a[axis]);
+                ([lo - shift, hi - shift], [place * s[axis]; 2])
+            })
+        };
+        let (across, down) = (axis(0), axis(1));
+        let rays = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| {
+            let ((slope_x, base_x), (slope_y, base_y)) = (across[i], down[j]);
+            Rays { slope: [slope_x, slope_y], base: [base_x, base_y] }
+        });
+        Self { rays, corners: 4 }
+    }
+
+    /// The rays from each corner of the part of the lens.
+    pub fn rays(&self) -> &[Rays<R>] {
+        &self.rays[..self.corners]
+    }
+
+    /// Smallest and largest slope of all rays.
+    pub fn slopes(&self) -> [[R; 2]; 2] {
+        let all = self.rays().iter();
+        all.fold(self.rays[0].slope, |slopes, rays| {
+            [hull(slopes[0], rays.slope[0]), hull(slopes[1], rays.slope[1])]
+        })
+    }
+}
+
+/// A plane that moves linearly between two times.
+#[derive(Clone, Copy, Debug)]
+pub struct MovingPlane<R> {
+    normal: [R; 3],
+    /// Least and most `n . p` at either end.
+    ends: [[R; 2]; 2],
+    /// What rounding may do to `n . p`.
+    noise: R,
+}
+
+/// Rounding of a handful of operations in `f64`, in parts of the sum of magnitudes.
+const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
+
+impl<R: Real> MovingPlane<R> {
+    /// The plane with `normal` that bounds a triangle with these vertices at the two ends, none of which is larger on an axis
+    /// than `size`.
+    pub fn new(normal: [R; 3], ends: [&Points<R>; 2], size: [R; 3]) -> Self {
+        let noise = R::new(ROUNDING) * dot(normal.map(R::size), size);
+        Self { normal, ends: ends.map(|points| range(points.map(|p| dot(normal, p)))), noise }
+    }
+
+    /// The same for a triangle that does not move.
+    pub fn still(normal: [R; 3], points: &Points<R>, size: [R; 3]) -> Self {
+        let noise = R::new(ROUNDING) * dot(normal.map(R::size), size);
+        Self { normal, ends: [range(points.map(|p| dot(normal, p))); 2], noise }
+    }
+
+    /// Least and most `n . p` over the whole way.
+    pub fn whole(&self) -> [R; 2] {
+        hull(self.ends[0], self.ends[1])
+    }
+
+    /// The same for the times `t` within [0, 1].
+    pub fn within(&self, t: [R; 2]) -> [R; 2] {
+        let at = |side: usize, t: R| t.madd(self.ends[1][side] - self.ends[0][side], self.ends[0][side]);
+        [at(0, t[0]).least(at(0, t[1])), at(1, t[0]).most(at(1, t[1]))]
+    }
+
+    /// Between which depths a ray of the beam meets points whose `n . p` lies within `reach` and which lie at most `off` from the
+    /// ray in x and in y. `None` where the plane may be seen edge-on, which bounds nothing.
+    pub fn depths(&self, reach: [R; 2], beam: &Beam<R>, off: [R; 2]) -> Option<[R; 2]> {
+        let [nx, ny, _] = self.normal;
+        let slack = nx.size().madd(off[0], ny.size().madd(off[1], self.noise));
+        let reach = [reach[0] - slack, reach[1] + slack];
+        let mut depths: Option<([R; 2], bool)> = None;
+        for rays in beam.rays() {
+            let (facing, base) = (self.facing(&rays.slope), self.based(&rays.base));
+            let found = quotient([reach[0] - base[1], reach[1] - base[0]], facing)?;
+            let front = facing[0] > R::new(0.0);
+            depths = match depths {
+                None => Some((found, front)),
+                Some((known, before)) if before == front => Some((hull(known, found), front)),
+                Some(_) => return None,
+            };
+        }
+        depths.map(|(depths, _)| depths)
+    }
+
+    /// Between what `n . G` lies, its rounding allowed for.
+    fn facing(&self, slope: &[[R; 2]; 2]) -> [R; 2] {
+        let [nx, ny, nw] = self.normal;
+        let (x, y) = (by_sign(nx, slope[0]), by_sign(ny, slope[1]));
+        let size = |slope: [R; 2]| slope[0].size().most(slope[1].size());
+        let sum = nx.size().madd(size(slope[0]), ny.size().madd(size(slope[1]), nw.size()));
+        let noise = R::new(ROUNDING) * sum;
+        [nx.madd(x[0], ny.madd(y[0], nw)) - noise, nx.madd(x[1], ny.madd(y[1], nw)) + noise]
+    }
+
+    /// Between what `n . B` lies, its rounding allowed for.
+    fn based(&self, base: &[[R; 2]; 2]) -> [R; 2] {
+        let [nx, ny, _] = self.normal;
+        let (x, y) = (by_sign(nx, base[0]), by_sign(ny, base[1]));
+        let size = |base: [R; 2]| base[0].size().most(base[1].size());
+        let noise = R::new(ROUNDING) * nx.size().madd(size(base[0]), ny.size() * size(base[1]));
+        [nx.madd(x[0], ny * y[0]) - noise, nx.madd(x[1], ny * y[1]) + noise]
+    }
+}
+
+/// The ends of `range` in the order in which `factor` times them rises.
+fn by_sign<R: Real>(factor: R, [lo, hi]: [R; 2]) -> [R; 2] {
+    if factor < R::new(0.0) { [hi, lo] } else { [lo, hi] }
+}
+
+/// Between what the quotient of two ranges lies; `None` where the denominator may be zero.
+fn quotient<R: Real>([lo, hi]: [R; 2], [least, most]: [R; 2]) -> Option<[R; 2]> {
+    let zero = R::new(0.0);
+    if most < zero {
+        return quotient([-hi, -lo], [-most, -least]);
+    }
+    let below = lo / if lo > zero { most } else { least };
+    let above = hi / if hi > zero { least } else { most };
+    (least > zero).then_some([below, above])
+}
+
+/// The normal of a triangle, twice its area long.
+pub fn normal<R: Real>(p: &Points<R>) -> [R; 3] {
+    let [first, second] = sides(p);
+    cross(first, second)
+}
+
+/// The two sides from the first vertex.
+pub(super) fn sides<R: Real>([a, b, c]: &Points<R>) -> [[R; 3]; 2] {
+    [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]])
+}
+
+/// The depths that all of these allow.
+pub fn tightest<R: Real>(bounds: impl IntoIterator<Item = Option<[R; 2]>>) -> Option<[R; 2]> {
+    bounds.into_iter().flatten().reduce(both)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square facing the camera that recedes from depth 2 to 4 while it slides.
+    const OPEN: Points<f64> = [[-2.0, -2.0, 2.0], [2.0, -2.0, 2.0], [-2.0, 2.0, 2.0]];
+    const CLOSE: Points<f64> = [[0.0, -4.0, 4.0], [4.0, -4.0, 4.0], [0.0, 4.0, 4.0]];
+    const SIZE: [f64; 3] = [4.0; 3];
+    const TILE: [[f64; 2]; 2] = [[-0.5, 0.5], [-0.25, 0.25]];
+
+    fn close_to(found: [f64; 2], expected: [f64; 2]) {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(near(found[0], expected[0]) && near(found[1], expected[1]), "{found:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_triangle_parallel_to_the_screen_is_bounded_by_its_depth() {
+        let plane = MovingPlane::new(normal(&OPEN), [&OPEN, &CLOSE], SIZE);
+        let beam = Beam::pinhole(TILE);
+        close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), [2.0, 4.0]);
+        close_to(plane.depths(plane.within([0.25, 0.5]), &beam, [0.0; 2]).unwrap(), [2.5, 3.0]);
+        let lens = Beam::lens(TILE, [[-1.0, 1.0]; 2], [3.0, -3.0], [0.5, -0.5]);
+        close_to(plane.depths(plane.within([0.25, 0.5]), &lens, [0.0; 2]).unwrap(), [2.5, 3.0]);
+        let parallel = Beam::orthographic(TILE);
+        close_to(plane.depths(plane.within([0.25, 0.5]), &parallel, [0.0; 2]).unwrap(), [2.5, 3.0]);
+    }
+
+    /// The plane w = 4 + x: seen at X it is at depth 4 / (1 - X), and at 4 + X in parallel light.
+    #[test]
+    fn a_slanted_plane_is_bounded_at_the_corners_of_the_tile() {
+        let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
+        let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
+        let depths = |beam: &Beam<f64>| plane.depths(plane.whole(), beam, [0.0; 2]);
+        close_to(depths(&Beam::pinhole(TILE)).unwrap(), [4.0 / 1.5, 8.0]);
+        close_to(depths(&Beam::orthographic(TILE)).unwrap(), [3.5, 4.5]);
+        assert!(depths(&Beam::pinhole([[0.5, 1.5], [0.0, 1.0]])).is_none(), "seen edge-on at X = 1");
+        // From u on a lens with s = 2, F = 4: w (1 - (X - u / 2)) = 4 + 2 u.
+        let lens = Beam::lens(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
+        let at = |x: f64, u: f64| (4.0 + 2.0 * u) / (1.0 - x + 0.5 * u);
+        let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
+        assert!(depths(&lens).is_none(), "seen edge-on from u = -1 at X = 1/2");
+        let lens = Beam::lens([[-0.5, 0.25], TILE[1]], [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
+        let inner = range([at(-0.5, -1.0), at(0.25, -1.0), at(-0.5, 0.5), at(0.25, 0.5)]);
+        assert!(corners[1] > inner[1]);
+        close_to(depths(&lens).unwrap(), inner);
+    }
+
+    /// Front from one end of the lens and back from the other: from between it is seen edge-on.
+    #[test]
+    fn a_plane_seen_from_both_faces_bounds_nothing() {
+        let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
+        let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
+        let tile = [[1.0, 1.2], [0.0, 0.1]];
+        let from = |u| Beam::lens(tile, [u, [0.0; 2]], [2.0; 2], [0.5; 2]);
+        assert!(plane.depths(plane.whole(), &from([1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths(plane.whole(), &from([-1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths(plane.whole(), &from([-1.0, 1.0]), [0.0; 2]).is_none());
+    }
+
+    #[test]
+    fn quotients_of_ranges() {
+        assert_eq!(quotient([-1.0, 2.0], [2.0, 4.0]), Some([-0.5, 1.0]));
+        assert_eq!(quotient([1.0, 2.0], [2.0, 4.0]), Some([0.25, 1.0]));
+        assert_eq!(quotient([1.0, 2.0], [-4.0, -2.0]), Some([-1.0, -0.25]));
+        assert_eq!(quotient([1.0, 2.0], [-1.0, 2.0]), None);
+        assert_eq!(quotient([1.0, 2.0], [0.0, 2.0]), None);
+    }
+}
