@@ -3,14 +3,20 @@
 mod hash;
 mod hashed;
 mod lens;
+mod pattern;
+mod region;
 mod sobol;
 mod source;
+mod spec;
 mod table;
 mod tile;
 
 pub use hash::mix;
 pub use hashed::HashedSamples;
 pub use lens::LensShape;
+pub use pattern::Pattern;
+pub use region::{LensRegion, LensRegions};
 pub use source::SampleSource;
+pub use spec::SampleSpec;
 pub use table::{Sample, SampleTable, TableError};
 pub use tile::TileSamples;
