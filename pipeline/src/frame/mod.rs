@@ -2,6 +2,7 @@
 
 mod bin;
 mod counters;
+mod look;
 mod pass;
 mod replay;
 mod resolve;
@@ -19,7 +20,7 @@ use crate::memory::CacheError;
 use bin::Bin;
 use pass::Pass;
 use replay::Replay;
-pub use settings::{Features, PipelineSpec, Settings, SpecError};
+pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
 
 /// A rendered frame.
 #[derive(Clone, Debug)]

@@ -3,8 +3,9 @@
 use super::bin::Bin;
 use super::counters::{BinLog, TileWork, Work};
 use super::pass::Pass;
-use super::surface::Grid;
+use super::surface::{Grid, own_pixel};
 use super::vertices::Ready;
+use super::{Settings, Shading};
 use crate::depth::{DepthTile, interval_madds, nearest};
 use crate::sample_test::{self, Hits, Target, test_screened};
 use crate::sampling::TileSamples;
@@ -155,17 +156,27 @@ impl<'a, 'p> Worker<'a, 'p> {
     }
 
     fn ask_for_quads(&mut self, triangle: &Triangle, place: usize, origin: [u32; 2]) {
-        let samples = &self.scratch.samples[place];
+        let Settings { spec, viewport, samples: source, .. } = *self.pass.settings;
+        let (samples, side) = (&self.scratch.samples[place], spec.tile_px);
+        let per_pixel = source.per_pixel();
         let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
-        for &slot in &self.scratch.hits.written {
-            self.scratch.quads.ask(grid.cell(
-                samples,
-                slot as usize,
-                origin,
-                self.pass.settings.spec.tile_px,
-            ));
+        for slot in self.scratch.hits.written.iter().map(|&slot| slot as usize) {
+            match spec.shading {
+                Shading::Cached => self.scratch.quads.ask(grid.cell(samples, slot, origin, side), 0),
+                Shading::PerSample => {
+                    let index =
+                        samples.in_image(slot, origin, side, viewport, per_pixel) % per_pixel as usize;
+                    self.scratch.quads.ask(own_pixel(samples, slot, origin, side), index as u16);
+                }
+            }
         }
+        let first = self.log.quads.len();
         self.scratch.quads.drain_into(&mut self.log.quads);
+        if spec.shading == Shading::PerSample {
+            // Samples are shaded pixel by pixel rather than in the order of time.
+            self.log.quads[first..]
+                .sort_unstable_by_key(|access| (access.quad[1], access.quad[0], access.sample));
+        }
     }
 
     fn record(&mut self, triangle: &Triangle, origin: [u32; 2]) {
