@@ -29,6 +29,8 @@ pub(super) struct Pass<'a> {
     pub still_camera: bool,
     /// The position of the camera in world space at mid-shutter.
     pub eye: Vec3,
+    /// Whether workers note where tile tests are done.
+    pub heat: bool,
 }
 
 impl<'a> Pass<'a> {
@@ -52,6 +54,7 @@ impl<'a> Pass<'a> {
             lens: !projection.shear.is_none(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),
+            heat: false,
             projection,
         }
     }

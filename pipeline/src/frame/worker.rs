@@ -1,7 +1,7 @@
 //! One worker at one bin: each triangle through the tile tests, the samples and the shading grid.
 
 use super::bin::Bin;
-use super::counters::{BinLog, TileWork, Work};
+use super::counters::{BinLog, TestsHere, TileWork, Work};
 use super::pass::Pass;
 use super::surface::{Grid, own_pixel};
 use super::vertices::Ready;
@@ -52,10 +52,22 @@ impl<'a, 'p> Worker<'a, 'p> {
         let tiles = here.tiles(side);
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
+                let before = (self.tests, self.log.work.len());
                 self.tests.visited += 1;
                 self.tile(triangle, &within, [column * side, row * side]);
+                if self.pass.heat {
+                    self.note_tests(before, [column * side, row * side]);
+                }
             }
         }
+    }
+
+    /// Notes where tile tests were done, for heat maps. They are in the packet that was made since, or wait for the next.
+    fn note_tests(&mut self, (before, packets): (TileWork, usize), origin: [u32; 2]) {
+        let place = self.place(origin);
+        let after = self.log.work[packets..].last().map_or(self.tests, |work| work.tests);
+        self.log.tests.resize(self.bin.tiles.len(), TestsHere::default());
+        self.log.tests[place].add(&before, &after);
     }
 
     /// One triangle in one tile, as far as the tests let it.
