@@ -10,4 +10,4 @@ mod table;
 
 pub use hits::write_hits;
 pub use m5d::M5d;
-pub use table::FixedSamples;
+pub use table::{FixedSamples, write_samples};

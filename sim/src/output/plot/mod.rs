@@ -4,6 +4,7 @@
 //! - [`FramePower`]: one frame's power over time, stacked by part.
 //! - [`FrameEnergy`]: energy of each frame, measured against true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
+//! - [`HeatMapPlot`]: where in the image something happens.
 //!
 //! Nothing to draw (no samples, no frames, nothing finite) is a plot that says so, never an error. All use of the
 //! `plotters` crate is in `render`.
@@ -12,6 +13,7 @@ mod axis;
 mod columns;
 mod frame_energy;
 mod frame_power;
+mod heat_map;
 mod palette;
 mod panel;
 mod picture;
@@ -21,6 +23,7 @@ mod unit_busy;
 
 pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
 pub use frame_power::{FramePower, PowerPart};
+pub use heat_map::{HeatMapPlot, HeatTile};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;
 pub use power_run::PowerRun;

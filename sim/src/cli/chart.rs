@@ -1,0 +1,8 @@
+//! `quintile chart`.
+
+use super::Failure;
+use super::args::ChartArgs;
+
+pub(super) fn run(_args: &ChartArgs) -> Result<(), Failure> {
+    Ok(())
+}
