@@ -4,6 +4,7 @@
 //! - [`FramePower`]: one frame's power over time, stacked by part.
 //! - [`FrameEnergy`]: energy of each frame, measured against true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
+//! - [`Curves`]: curves on logarithmic axes.
 //! - [`HeatMapPlot`]: where in the image something happens.
 //!
 //! Nothing to draw (no samples, no frames, nothing finite) is a plot that says so, never an error. All use of the
@@ -11,6 +12,7 @@
 
 mod axis;
 mod columns;
+mod curves;
 mod frame_energy;
 mod frame_power;
 mod heat_map;
@@ -21,6 +23,7 @@ mod power_run;
 mod render;
 mod unit_busy;
 
+pub use curves::{Curve, CurvePanel, Curves};
 pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
 pub use frame_power::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile};
