@@ -96,7 +96,7 @@ fn heat_maps_add_up_to_the_counters() {
             "{event}: {placed} of {counted}"
         );
         let page = fs::read_to_string(results.path("report.html")).unwrap();
-        report += usize::from(page.contains(&format!("heat/{event}_0001.png")));
+        report += usize::from(page.contains(&format!("{event}_0001.png")));
     }
     assert_eq!(report, events.len(), "the report shows the frame in the middle");
 }

@@ -1,32 +1,7 @@
 //! A programmable table of samples, tiled over the image.
 
 use super::hash::word;
-use super::{LensRegion, LensShape, SampleSource, SampleSpec};
-
-/// One sample of a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sample {
-    /// Position within the pixel, [0, 1).
-    pub x: f32,
-    /// Position within the pixel, [0, 1), downwards.
-    pub y: f32,
-    /// Lens position, [-1, 1].
-    pub u: f32,
-    /// Lens position, [-1, 1], upwards.
-    pub v: f32,
-    /// Time, [0, 1) over the shutter.
-    pub t: f32,
-}
-
-impl Sample {
-    /// Whether it lies in its pixel, in the square of the lens and in the shutter.
-    pub fn is_in_range(&self) -> bool {
-        let unit = 0.0..1.0;
-        let lens = -1.0..=1.0;
-        [self.x, self.y, self.t].iter().all(|c| unit.contains(c))
-            && [self.u, self.v].iter().all(|c| lens.contains(c))
-    }
-}
+use super::{LensRegion, LensShape, Sample, SampleSource, SampleSpec};
 
 /// Samples for a square block of pixels. The block repeats over the image, each copy turned round in itself by an
 /// offset hashed from the seed, so that a sample is a pure function of (seed, pixel, index).
