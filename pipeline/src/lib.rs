@@ -39,11 +39,11 @@ pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
-pub use frame::{Features, PipelineSpec, Rendered, Settings, render};
+pub use frame::{Features, PipelineSpec, Rendered, Settings, Shading, render};
 pub use geometry::{
     Camera, CameraError, Clip, Cull, Draw, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
 };
-pub use memory::{CacheSpec, MemorySpec};
-pub use sampling::{LensShape, SampleTable};
+pub use memory::{CacheSpec, MemorySpec, Replacement};
+pub use sampling::{LensShape, SampleSpec, SampleTable};
 pub use shading::{Shader, ShaderCost, ShadingPoint};
 pub use texture::{Texture, TextureError, Wrap, linear_to_srgb8};

@@ -42,15 +42,15 @@ fn sizes_that_cannot_be_are_named_with_what_would_do() {
 
 #[test]
 fn caches_that_cannot_be_are_named() {
-    let odd = CacheSpec { entries: 9, ways: 4 };
-    let none = CacheSpec { entries: 0, ways: 1 };
-    let no_way = CacheSpec { entries: 8, ways: 0 };
+    let odd = CacheSpec::lru(9, 4);
+    let none = CacheSpec::lru(0, 1);
+    let no_way = CacheSpec::lru(8, 0);
     for (found, field) in [
         (refused(|s| s.shading_cache = odd), "shading_cache"),
         (refused(|s| s.memory.depth = none), "memory.depth"),
         (refused(|s| s.memory.colour = no_way), "memory.colour"),
         (refused(|s| s.memory.texture = odd), "memory.texture"),
-        (refused(|s| s.memory.l2 = CacheSpec { entries: u32::MAX, ways: 1 }), "memory.l2"),
+        (refused(|s| s.memory.l2 = CacheSpec::lru(u32::MAX, 1)), "memory.l2"),
     ] {
         assert!(matches!(found, SpecError::Cache { field: named, .. } if named == field), "{found:?}");
         assert!(found.to_string().starts_with(&format!("`{field}`: a cache of ")), "{found}");
@@ -70,7 +70,7 @@ fn the_limits_themselves_are_accepted() {
 #[test]
 fn a_cache_that_cannot_be_is_an_error_to_the_renderer_not_a_panic() {
     let mut bad = spec(Features::ALL);
-    bad.memory.depth = CacheSpec { entries: 7, ways: 2 };
+    bad.memory.depth = CacheSpec::lru(7, 2);
     let table = SampleTable::low_discrepancy(1, 1, LensShape::Disk).unwrap();
     let viewport = Viewport::new(4, 4).unwrap();
     let settings = Settings { spec: &bad, viewport, samples: &table, background: Vec3::ZERO };

@@ -4,10 +4,12 @@
 //! - [`gpu`]: a GPU as a file.
 //! - [`timing`]: work packets become activity over time.
 //! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
+//! - [`chart`]: charts of the book, measured and drawn.
 //! - [`output`]: files, plots, the timeline and the report.
 //! - [`visibility`]: what every sample of a scene sees, and how fast.
 //! - [`cli`]: the command `quintile`.
 
+pub mod chart;
 pub mod cli;
 pub mod gpu;
 pub mod output;

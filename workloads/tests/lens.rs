@@ -5,7 +5,9 @@ mod common;
 
 use common::Files;
 use glam::Vec3;
-use pipeline::{CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, SampleTable, Viewport, render};
+use pipeline::{
+    CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, SampleTable, Shading, Viewport, render,
+};
 use workloads::{Overrides, Scene, load};
 
 const SIZE: (u32, u32) = (96, 54);
@@ -84,13 +86,14 @@ fn a_lens_that_can_be_held_is_held_close_to_the_limit() {
 
 /// Pixels of the first frame in which something is seen.
 fn pixels_hit(scene: &Scene) -> usize {
-    let cache = CacheSpec { entries: 256, ways: 4 };
+    let cache = CacheSpec::lru(256, 4);
     let spec = PipelineSpec {
         tile_px: 8,
         coarse_tile_px: 32,
         batch_triangles: 4096,
         vertex_reuse: 16,
         shading_cache: cache,
+        shading: Shading::Cached,
         memory: MemorySpec { depth: cache, colour: cache, texture: cache, l2: cache },
         features: Features::ALL,
         depth: pipeline::depth::DepthSpec::default(),

@@ -1,6 +1,6 @@
 //! What the tiles of one bin did, before the caches have their say.
 
-use activity::{Event, PacketCounts};
+use activity::{Counts, Event, PacketCounts};
 
 use crate::shading::QuadAccess;
 
@@ -63,6 +63,36 @@ impl TileWork {
         counts[Event::BoxesCulledZMax] += self.boxes_culled;
         counts[Event::DepthIntervalMadds] += self.interval_madds;
     }
+
+    /// How often `event` is among them.
+    pub fn of(&self, event: Event) -> u32 {
+        let mut counts = PacketCounts::default();
+        self.add_to(&mut counts);
+        counts[event]
+    }
+}
+
+/// The tile tests done in one tile, whichever packet they travel in: those of all packets that held some of them, less
+/// what these held already.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TestsHere {
+    after: Counts,
+    before: Counts,
+}
+
+impl TestsHere {
+    pub fn add(&mut self, before: &TileWork, after: &TileWork) {
+        for (sum, work) in [(&mut self.before, before), (&mut self.after, after)] {
+            let mut counts = PacketCounts::default();
+            work.add_to(&mut counts);
+            *sum += &counts;
+        }
+    }
+
+    /// How often `event` is among them.
+    pub fn of(&self, event: Event) -> u64 {
+        self.after[event] - self.before[event]
+    }
 }
 
 /// One triangle in one tile, or tile tests that led to none.
@@ -90,4 +120,6 @@ pub(super) struct Work {
 pub(super) struct BinLog {
     pub work: Vec<Work>,
     pub quads: Vec<QuadAccess>,
+    /// The tile tests in each tile of the bin, kept for heat maps only.
+    pub tests: Vec<TestsHere>,
 }

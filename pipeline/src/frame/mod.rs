@@ -2,7 +2,9 @@
 
 mod bin;
 mod counters;
+mod heat;
 mod judge;
+mod look;
 mod pass;
 mod replay;
 mod resolve;
@@ -12,16 +14,18 @@ mod tile_tests;
 mod vertices;
 mod worker;
 
-use activity::{Counts, Packet, PacketKind};
+use activity::{Counts, Event, Packet, PacketKind};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::geometry::{Camera, Draw};
 use crate::memory::CacheError;
 use bin::Bin;
+use counters::BinLog;
+pub use heat::{HeatMap, TileHeat};
 use pass::Pass;
 use replay::Replay;
-pub use settings::{Features, PipelineSpec, Settings, SpecError};
+pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
 
 /// A rendered frame.
 #[derive(Clone, Debug)]
@@ -42,18 +46,46 @@ pub fn render(
     camera: &Camera,
     draws: &[Draw<'_>],
     settings: &Settings<'_>,
-    mut emit: impl FnMut(&Packet),
+    emit: impl FnMut(&Packet),
 ) -> Result<Rendered, CacheError> {
-    let pass = Pass::new(camera, draws, settings);
+    render_with_heat(camera, draws, settings, &[], emit).map(|(rendered, _)| rendered)
+}
+
+/// The same, and where in the image each of `events` happened.
+///
+/// # Errors
+/// When a cache of the settings cannot be built.
+pub fn render_with_heat(
+    camera: &Camera,
+    draws: &[Draw<'_>],
+    settings: &Settings<'_>,
+    events: &[Event],
+    mut emit: impl FnMut(&Packet),
+) -> Result<(Rendered, Vec<HeatMap>), CacheError> {
+    let mut pass = Pass::new(camera, draws, settings);
+    pass.heat = !events.is_empty();
+    let mut heat: Vec<_> = events.iter().map(|&event| HeatMap::new(event, &pass)).collect();
     let mut counts = Counts::default();
-    let mut emit = |packet: &Packet| {
-        counts += &packet.counts;
-        emit(packet);
-    };
     let mut replay = Replay::new(&pass)?;
+    let mut emit = |work: Done<'_>| match work {
+        Done::Packet(packet) => {
+            counts += &packet.counts;
+            heat.iter_mut().for_each(|map| map.packet(packet));
+            emit(packet);
+        }
+        Done::Tests(number, bin, log) => heat.iter_mut().for_each(|map| map.tests(&pass, number, bin, log)),
+    };
     let bins = rasterize(&pass, &mut replay, &mut emit);
-    replay.finish(&mut emit);
-    Ok(Rendered { image: resolve::resolve(&pass, &bins), counts })
+    replay.finish(&mut |packet: &Packet| emit(Done::Packet(packet)));
+    Ok((Rendered { image: resolve::resolve(&pass, &bins), counts }, heat))
+}
+
+/// Something that was done, told in order.
+enum Done<'a> {
+    /// A packet.
+    Packet(&'a Packet),
+    /// The work of a batch in a bin, with the bin's number.
+    Tests(usize, &'a Bin, &'a BinLog),
 }
 
 /// The triangle each sample sees (`u32::MAX` for none) and the bits of its depth (infinite for none), in the order
@@ -67,21 +99,24 @@ pub fn visibility(
     settings: &Settings<'_>,
 ) -> Result<Vec<(u32, u32)>, CacheError> {
     let pass = Pass::new(camera, draws, settings);
-    let bins = rasterize(&pass, &mut Replay::new(&pass)?, &mut |_| ());
+    let bins = rasterize(&pass, &mut Replay::new(&pass)?, &mut |_: Done<'_>| ());
     Ok(resolve::visible(&pass, &bins))
 }
 
 /// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch. Bins are double
 /// buffered: the front end works on the next batch while tiles are traversed, so its packets come one batch ahead. After
 /// the last batch each bin is resolved at once, while its samples are still in the caches.
-fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Packet)) -> Vec<Bin> {
+fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut impl FnMut(Done<'_>)) -> Vec<Bin> {
     let mut bins = Bin::all(pass);
     let mut batches = pass.batches();
     // Without a single triangle there is still an image to resolve.
     let first = batches.next().unwrap_or(0..0);
-    let mut next = Some(vertices::front_end(pass, first, replay, emit));
+    let mut next =
+        Some(vertices::front_end(pass, first, replay, &mut |packet: &Packet| done(Done::Packet(packet))));
     while let Some(ready) = next {
-        next = batches.next().map(|batch| vertices::front_end(pass, batch, replay, emit));
+        next = batches.next().map(|batch| {
+            vertices::front_end(pass, batch, replay, &mut |packet: &Packet| done(Done::Packet(packet)))
+        });
         let lists = bin::distribute(pass, &ready);
         let logs: Vec<_> = bins
             .par_iter_mut()
@@ -90,7 +125,9 @@ fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, emit: &mut impl FnMut(&Pa
                 bin.rasterize(pass, &ready, list, scratch)
             })
             .collect();
-        for (bin, log) in bins.iter().zip(&logs) {
+        for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
+            done(Done::Tests(number, bin, log));
+            let emit = &mut |packet: &Packet| done(Done::Packet(packet));
             replay.bin(log, emit);
             if next.is_none() {
                 replay.resolve(bin, emit);

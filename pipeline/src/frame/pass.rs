@@ -40,6 +40,8 @@ pub(super) struct Pass<'a> {
     pub still_camera: bool,
     /// The position of the camera in world space at mid-shutter.
     pub eye: Vec3,
+    /// Whether workers note where tile tests are done.
+    pub heat: bool,
 }
 
 impl<'a> Pass<'a> {
@@ -64,6 +66,7 @@ impl<'a> Pass<'a> {
             clip: camera.clip(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),
+            heat: false,
             projection,
         }
     }

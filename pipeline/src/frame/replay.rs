@@ -2,12 +2,13 @@
 
 use activity::{Event, Packet, PacketCounts, PacketKind};
 
+use super::Shading;
 use super::bin::Bin;
 use super::counters::{BinLog, Work};
 use super::pass::Pass;
 use super::surface::Surface;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
-use crate::sampling::mix;
+use crate::sampling::{Sample, mix};
 use crate::shading::QuadAccess;
 
 /// Bytes of a stored depth or colour of one sample, and of a pixel of the image.
@@ -105,7 +106,10 @@ impl<'a> Replay<'a> {
             this.memory.depth(base + line * LINE_BYTES, write, fresh, counts);
         });
         if !quads.is_empty() {
-            self.shade(work.triangle, quads, counts);
+            match self.pass.settings.spec.shading {
+                Shading::Cached => self.shade(work.triangle, quads, counts),
+                Shading::PerSample => self.shade_samples(work.triangle, quads, counts),
+            }
         }
         let base = self.pass.addresses.colour;
         self.lines(work.tile, work.written_pixels, |this, line, _| {
@@ -115,9 +119,9 @@ impl<'a> Replay<'a> {
         packet
     }
 
+    /// The quads of a packet through the shading cache, those that are not there through the shader cores.
     fn shade(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
         let surface = Surface::new(self.pass, triangle);
-        let cost = self.pass.draws[self.pass.locate(triangle).0].shader.cost();
         for access in quads {
             counts[Event::ShadingLookups] += u32::from(access.lookups);
             let hit = self.shading.access(quad_key(triangle, access.quad), false) == Access::Hit;
@@ -125,13 +129,33 @@ impl<'a> Replay<'a> {
             if hit {
                 continue;
             }
-            counts[Event::QuadsShaded] += 1;
-            counts[Event::PixelInvocations] += 4;
-            counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
-            counts[Event::ShaderOps] += 4 * cost.pixel_ops;
+            run_quad(&surface, access, counts);
             let memory = &mut self.memory;
             let fetches = surface.fetch(access.quad, |line| memory.texture(line, counts));
             counts[Event::TextureFetches] += fetches;
+        }
+    }
+
+    /// The same where every sample is shaded: all quads through the shader cores.
+    fn shade_samples(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
+        let surface = Surface::new(self.pass, triangle);
+        let source = self.pass.settings.samples;
+        let mut samples: [Vec<Sample>; 4] =
+            std::array::from_fn(|_| vec![Sample::default(); source.per_pixel() as usize]);
+        for pixels in quads.chunk_by(|a, b| a.quad == b.quad) {
+            if surface.sampler().is_some() {
+                for (lane, of_pixel) in (0..).zip(&mut samples) {
+                    let [x, y] = pixels[0].quad.map(|part| 2 * part as u32);
+                    source.pixel_into(x + lane % 2, y + lane / 2, of_pixel);
+                }
+            }
+            for access in pixels {
+                run_quad(&surface, access, counts);
+                let memory = &mut self.memory;
+                let line = |line| memory.texture(line, counts);
+                let fetches = surface.fetch_at(self.pass, access, &samples, line);
+                counts[Event::TextureFetches] += fetches;
+            }
         }
     }
 
@@ -196,6 +220,14 @@ impl<'a> Replay<'a> {
         }
         packet
     }
+}
+
+/// Four lanes of the shader, those that nobody asked for being helpers.
+fn run_quad(surface: &Surface<'_>, access: &QuadAccess, counts: &mut PacketCounts) {
+    counts[Event::QuadsShaded] += 1;
+    counts[Event::PixelInvocations] += 4;
+    counts[Event::HelperInvocations] += 4 - access.lanes.count_ones();
+    counts[Event::ShaderOps] += 4 * surface.shader().cost().pixel_ops;
 }
 
 /// The key of a quad in the shading cache, spread so that the set a quad falls into does not favour any direction.

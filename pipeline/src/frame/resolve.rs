@@ -6,7 +6,9 @@ use std::hash::{BuildHasherDefault, Hasher};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::Shading;
 use super::bin::Bin;
+use super::look::Look;
 use super::pass::Pass;
 use super::surface::{Grid, Surface};
 use crate::depth::DepthTile;
@@ -79,7 +81,7 @@ struct Scratch {
     shaded: HashMap<[i32; 2], Vec3, BuildHasherDefault<CellHasher>>,
 }
 
-/// Every sample takes the colour of its cell; each cell of a triangle is shaded once for a tile.
+/// Every sample takes the colour of its cell, each cell of a triangle being shaded once for a tile, or is shaded itself.
 fn resolve_tile(
     pass: &Pass<'_>,
     tile: &DepthTile,
@@ -105,10 +107,15 @@ fn resolve_tile(
         let grid = Grid::new(pass, &corners, moving);
         let surface = Surface::new(pass, triangle);
         scratch.shaded.clear();
-        for &slot in group {
-            let cell = grid.cell(samples, slot as usize, origin, side);
-            let colour = scratch.shaded.entry(cell).or_insert_with(|| surface.shade(cell));
-            sums[samples.pixel[slot as usize] as usize] += *colour;
+        for slot in group.iter().map(|&slot| slot as usize) {
+            let colour = match pass.settings.spec.shading {
+                Shading::PerSample => surface.shade_at(&Look::of_slot(&corners, samples, slot)),
+                Shading::Cached => {
+                    let cell = grid.cell(samples, slot, origin, side);
+                    *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(cell))
+                }
+            };
+            sums[samples.pixel[slot] as usize] += colour;
         }
     }
     let per_pixel = pass.settings.samples.per_pixel() as f32;

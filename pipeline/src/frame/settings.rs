@@ -21,7 +21,10 @@ pub struct PipelineSpec {
     pub batch_triangles: u32,
     /// Vertices remembered after shading, first in first out.
     pub vertex_reuse: u32,
-    /// The shading cache, entries being quads.
+    /// Where visible samples are shaded.
+    #[serde(default)]
+    pub shading: Shading,
+    /// The shading cache, entries being quads; idle where every sample is shaded.
     pub shading_cache: CacheSpec,
     /// The caches of memory.
     pub memory: MemorySpec,
@@ -30,6 +33,16 @@ pub struct PipelineSpec {
     /// How depth is bounded and what a tile remembers of it.
     #[serde(default)]
     pub depth: DepthSpec,
+}
+
+/// Where visible samples are shaded. This changes the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum Shading {
+    /// At cells of the shading grid, remembered in the shading cache.
+    #[default]
+    Cached,
+    /// Each at its own place, lens position and time, and nothing is remembered.
+    PerSample,
 }
 
 /// Tests that can be switched off. They change what it costs, never the image; the two thresholds change the image where they are

@@ -6,7 +6,7 @@ use super::pass::Pass;
 use crate::sample_test::exact;
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
-use crate::shading::{self, REFERENCE_TIME, ShadingPoint};
+use crate::shading::{self, REFERENCE_TIME, Shader, ShadingPoint};
 use crate::texture::{Footprint, Sampler};
 
 /// The shading grid over one triangle.
@@ -26,8 +26,7 @@ impl<'a> Grid<'a> {
     /// The cell in which the sample in `slot` of a tile, which sees the triangle, is shaded. Where nothing moves and
     /// all is in focus that is its own pixel, and so it is where its point of the surface falls behind the camera.
     pub fn cell(&self, samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
-        let pixel = u32::from(samples.pixel[slot]);
-        let own = [(tile[0] + pixel % side) as i32, (tile[1] + pixel / side) as i32];
+        let own = own_pixel(samples, slot, tile, side);
         if self.plain {
             return own;
         }
@@ -39,11 +38,18 @@ impl<'a> Grid<'a> {
     }
 }
 
+/// The pixel of the sample in `slot` of a tile.
+pub(super) fn own_pixel(samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
+    let pixel = u32::from(samples.pixel[slot]);
+    [(tile[0] + pixel % side) as i32, (tile[1] + pixel / side) as i32]
+}
+
 /// One triangle as a surface to be shaded.
 pub(super) struct Surface<'a> {
     pass: &'a Pass<'a>,
     draw: usize,
     vertices: [usize; 3],
+    corners: [Corner; 3],
     reference: [[f32; 3]; 3],
     sampler: Option<Sampler<'a>>,
 }
@@ -51,11 +57,12 @@ pub(super) struct Surface<'a> {
 impl<'a> Surface<'a> {
     pub fn new(pass: &'a Pass<'a>, triangle: u32) -> Self {
         let (draw, vertices) = pass.corners(triangle);
-        let reference = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]).at(REFERENCE_TIME));
+        let corners = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]));
+        let reference = corners.map(|corner| corner.at(REFERENCE_TIME));
         let texture = pass.draws[draw].shader.texture();
         let textured = texture.filter(|_| !pass.draws[draw].geometry.uvs().is_empty());
         let sampler = textured.map(|texture| Sampler::new(texture, pass.addresses.textures[draw]));
-        Self { pass, draw, vertices, reference, sampler }
+        Self { pass, draw, vertices, corners, reference, sampler }
     }
 
     /// Linear RGB radiance of a cell; a function of the triangle and the cell alone.
@@ -65,7 +72,29 @@ impl<'a> Surface<'a> {
             let uv = self.uv(weights);
             sampler.sample(uv, &self.footprint(&sampler, cell.map(|c| c >> 1)))
         });
-        self.pass.draws[self.draw].shader.shade(&self.point(weights), texel)
+        let geometry = &self.pass.draws[self.draw].geometry;
+        let middle = self.vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5);
+        self.shader().shade(&self.point(weights, middle), texel)
+    }
+
+    /// What a shader is told about the point with the given weights at time `t`.
+    pub fn point_at(&self, weights: [f32; 3], t: f32) -> ShadingPoint {
+        let geometry = &self.pass.draws[self.draw].geometry;
+        let ends = self.vertices.map(|v| (geometry.open()[v], geometry.close()[v]));
+        self.point(weights, ends.map(|(open, close)| open + t * (close - open)))
+    }
+
+    pub fn shader(&self) -> &'a dyn Shader {
+        self.pass.draws[self.draw].shader
+    }
+
+    pub fn sampler(&self) -> Option<Sampler<'a>> {
+        self.sampler
+    }
+
+    /// The vertices on the image plane.
+    pub fn corners(&self) -> &[Corner; 3] {
+        &self.corners
     }
 
     /// Bilinear fetches that shading the four cells of a quad takes, and each line of memory they read.
@@ -90,14 +119,13 @@ impl<'a> Surface<'a> {
         sampler.footprint(at(1, 0) - corner, at(0, 1) - corner)
     }
 
-    fn uv(&self, weights: [f32; 3]) -> Vec2 {
+    pub fn uv(&self, weights: [f32; 3]) -> Vec2 {
         let uvs = self.pass.draws[self.draw].geometry.uvs();
         if uvs.is_empty() { Vec2::ZERO } else { (0..3).map(|k| uvs[self.vertices[k]] * weights[k]).sum() }
     }
 
-    fn point(&self, weights: [f32; 3]) -> ShadingPoint {
+    fn point(&self, weights: [f32; 3], corners: [Vec3; 3]) -> ShadingPoint {
         let geometry = &self.pass.draws[self.draw].geometry;
-        let corners = self.vertices.map(|v| (geometry.open()[v] + geometry.close()[v]) * 0.5);
         let position: Vec3 = (0..3).map(|k| corners[k] * weights[k]).sum();
         let flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let normals = geometry.normals();

@@ -1,12 +1,13 @@
 //! One worker at one bin: each triangle through the tile tests, the samples and the shading grid.
 
 use super::bin::Bin;
-use super::counters::{BinLog, TileWork, Work};
+use super::counters::{BinLog, TestsHere, TileWork, Work};
 use super::judge::Test;
 use super::pass::Pass;
-use super::surface::Grid;
+use super::surface::{Grid, own_pixel};
 use super::tile_tests::{Left, Place, Run, Subject};
 use super::vertices::Ready;
+use super::{Settings, Shading};
 use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
 use crate::geometry::Shear;
 use crate::sample_test::{self, Hits, Target, test_screened};
@@ -71,8 +72,12 @@ impl<'a, 'p> Worker<'a, 'p> {
         let Some(left) = subject.test(&place, &Left::all(ready.within), &mut self.run()) else { return };
         for row in tiles.y0..tiles.y1 {
             for column in tiles.x0..tiles.x1 {
+                let before = (self.tests, self.log.work.len());
                 self.tests.visited += 1;
                 self.tile(&subject, &left, [column * side, row * side]);
+                if self.pass.heat {
+                    self.note_tests(before, [column * side, row * side]);
+                }
             }
         }
     }
@@ -92,6 +97,14 @@ impl<'a, 'p> Worker<'a, 'p> {
     {
         let shear = &self.pass.projection.shear;
         Subject { triangle: &ready.triangle, lines: ready.lines.as_ref(), shear }
+    }
+
+    /// Notes where tile tests were done, for heat maps. They are in the packet that was made since, or wait for the next.
+    fn note_tests(&mut self, (before, packets): (TileWork, usize), origin: [u32; 2]) {
+        let place = self.place(origin);
+        let after = self.log.work[packets..].last().map_or(self.tests, |work| work.tests);
+        self.log.tests.resize(self.bin.tiles.len(), TestsHere::default());
+        self.log.tests[place].add(&before, &after);
     }
 
     /// One triangle in one tile, as far as the tests let it.
@@ -205,17 +218,27 @@ impl<'a, 'p> Worker<'a, 'p> {
     }
 
     fn ask_for_quads(&mut self, triangle: &Triangle, place: usize, origin: [u32; 2]) {
-        let samples = &self.scratch.samples[place];
+        let Settings { spec, viewport, samples: source, .. } = *self.pass.settings;
+        let (samples, side) = (&self.scratch.samples[place], spec.tile_px);
+        let per_pixel = source.per_pixel();
         let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
-        for &slot in &self.scratch.hits.written {
-            self.scratch.quads.ask(grid.cell(
-                samples,
-                slot as usize,
-                origin,
-                self.pass.settings.spec.tile_px,
-            ));
+        for slot in self.scratch.hits.written.iter().map(|&slot| slot as usize) {
+            match spec.shading {
+                Shading::Cached => self.scratch.quads.ask(grid.cell(samples, slot, origin, side), 0),
+                Shading::PerSample => {
+                    let index =
+                        samples.in_image(slot, origin, side, viewport, per_pixel) % per_pixel as usize;
+                    self.scratch.quads.ask(own_pixel(samples, slot, origin, side), index as u16);
+                }
+            }
         }
+        let first = self.log.quads.len();
         self.scratch.quads.drain_into(&mut self.log.quads);
+        if spec.shading == Shading::PerSample {
+            // Samples are shaded pixel by pixel rather than in the order of time.
+            self.log.quads[first..]
+                .sort_unstable_by_key(|access| (access.quad[1], access.quad[0], access.sample));
+        }
     }
 
     fn record(&mut self, triangle: u32, [moving, lens]: [bool; 2], in_front: bool, origin: [u32; 2]) {

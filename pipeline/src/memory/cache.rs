@@ -1,6 +1,8 @@
-//! A set-associative cache with least-recently-used replacement, as a functional model: it says what hits.
+//! A set-associative cache as a functional model: it says what hits.
 
 use serde::Deserialize;
+
+use crate::sampling::mix;
 
 /// Size and organization of a cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -10,6 +12,32 @@ pub struct CacheSpec {
     pub entries: u32,
     /// Entries a key may be kept in.
     pub ways: u32,
+    /// Which entry of a full set makes room.
+    #[serde(default)]
+    pub replacement: Replacement,
+}
+
+impl CacheSpec {
+    /// A cache in which the least recently used entry makes room.
+    pub const fn lru(entries: u32, ways: u32) -> Self {
+        Self { entries, ways, replacement: Replacement::Lru }
+    }
+}
+
+/// Which entry of a full set makes room.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Replacement {
+    /// The least recently used.
+    #[default]
+    Lru,
+    /// The one that came first, used since or not.
+    Fifo,
+    /// Any, by the hash of a seed and of how many made room before.
+    Random {
+        /// The seed.
+        seed: u64,
+    },
 }
 
 /// Why a cache cannot be built.
@@ -40,7 +68,10 @@ pub enum Access {
 pub struct Cache {
     ways: usize,
     sets: u64,
-    /// Per set, the most recently used first. Empty ways hold [`Line::EMPTY`].
+    replacement: Replacement,
+    /// Misses so far.
+    misses: u64,
+    /// Per set, the latest first: used or, where use does not count, come. Empty ways hold [`Line::EMPTY`] and lie behind.
     lines: Vec<Line>,
 }
 
@@ -60,27 +91,35 @@ impl Cache {
     /// # Errors
     /// When the ways do not divide the entries, or either is zero or absurdly large.
     pub fn new(spec: CacheSpec) -> Result<Self, CacheError> {
-        let CacheSpec { entries, ways } = spec;
+        let CacheSpec { entries, ways, replacement } = spec;
         let sane = 1..=16_777_216;
         if !sane.contains(&entries) || !sane.contains(&ways) || entries % ways != 0 {
             return Err(CacheError { entries, ways });
         }
         let lines = vec![Line::EMPTY; entries as usize];
-        Ok(Self { ways: ways as usize, sets: u64::from(entries / ways), lines })
+        Ok(Self { ways: ways as usize, sets: u64::from(entries / ways), replacement, misses: 0, lines })
     }
 
-    /// Looks `key` up and keeps it as the most recently used; `write` marks it as changed. The set is chosen by the
-    /// key modulo the number of sets. `u64::MAX` is not a key.
+    /// Looks `key` up and keeps it; `write` marks it as changed. The set is chosen by the key modulo the number of sets.
+    /// `u64::MAX` is not a key.
     pub fn access(&mut self, key: u64, write: bool) -> Access {
         let first = (key % self.sets) as usize * self.ways;
         let set = &mut self.lines[first..first + self.ways];
         if let Some(way) = set.iter().position(|line| line.key == key) {
-            let dirty = set[way].dirty | write;
-            set[..=way].rotate_right(1);
-            set[0].dirty = dirty;
+            set[way].dirty |= write;
+            if self.replacement == Replacement::Lru {
+                set[..=way].rotate_right(1);
+            }
             return Access::Hit;
         }
-        set.rotate_right(1);
+        self.misses += 1;
+        let way = match self.replacement {
+            Replacement::Random { seed } if set[self.ways - 1] != Line::EMPTY => {
+                (mix(seed ^ mix(self.misses)) % self.ways as u64) as usize
+            }
+            _ => self.ways - 1,
+        };
+        set[..=way].rotate_right(1);
         let victim = std::mem::replace(&mut set[0], Line { key, dirty: write });
         if victim.dirty { Access::MissEvicting(victim.key) } else { Access::Miss }
     }
@@ -108,7 +147,45 @@ mod tests {
     use super::*;
 
     fn cache(entries: u32, ways: u32) -> Cache {
-        Cache::new(CacheSpec { entries, ways }).unwrap()
+        Cache::new(CacheSpec::lru(entries, ways)).unwrap()
+    }
+
+    fn hits(replacement: Replacement, keys: &[u64]) -> Vec<bool> {
+        let mut cache = Cache::new(CacheSpec { replacement, ..CacheSpec::lru(2, 2) }).unwrap();
+        keys.iter().map(|&key| cache.access(key, false) == Access::Hit).collect()
+    }
+
+    #[test]
+    fn the_first_in_is_the_first_out_however_used() {
+        // 1 is used again before 3 comes: the policies differ on whom that spares.
+        let keys = [1, 2, 1, 3, 1];
+        assert_eq!(hits(Replacement::Lru, &keys), [false, false, true, false, true]);
+        assert_eq!(hits(Replacement::Fifo, &keys), [false, false, true, false, false]);
+    }
+
+    #[test]
+    fn random_victims_follow_the_seed_and_spare_empty_ways() {
+        let keys: Vec<u64> = (0..400).map(|i| mix(i) % 4).collect();
+        let of = |seed| hits(Replacement::Random { seed }, &keys);
+        assert_eq!(of(1), of(1));
+        assert_ne!(of(1), of(2));
+        // A set of two holds both of two keys for good, whatever the seed.
+        let two: Vec<u64> = (0..50).map(|i| i % 2).collect();
+        assert!(
+            (0..20).all(|seed| hits(Replacement::Random { seed }, &two).iter().filter(|h| !**h).count() == 2)
+        );
+        // Four keys at random in two ways: half of the look-ups hit.
+        let share = of(3).iter().filter(|hit| **hit).count() as f64 / 400.0;
+        assert!((0.42..0.58).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn a_cyclic_walk_defeats_recency_but_not_chance() {
+        // One key more than there are ways, round and round: the textbook case against LRU and FIFO.
+        let keys: Vec<u64> = (0..300).map(|i| i % 3).collect();
+        let count = |replacement| hits(replacement, &keys).iter().filter(|hit| **hit).count();
+        assert_eq!((count(Replacement::Lru), count(Replacement::Fifo)), (0, 0));
+        assert!(count(Replacement::Random { seed: 5 }) > 60);
     }
 
     #[test]
@@ -157,7 +234,7 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         for (entries, ways) in [(0, 1), (8, 0), (8, 3), (u32::MAX, 1)] {
-            assert!(Cache::new(CacheSpec { entries, ways }).is_err());
+            assert!(Cache::new(CacheSpec::lru(entries, ways)).is_err());
         }
     }
 }

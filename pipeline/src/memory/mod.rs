@@ -4,7 +4,7 @@ mod cache;
 mod map;
 mod system;
 
-pub use cache::{Access, Cache, CacheError, CacheSpec};
+pub use cache::{Access, Cache, CacheError, CacheSpec, Replacement};
 pub(crate) use map::Allocator;
 pub use map::{AddressMap, LINE_BYTES};
 pub use system::{MemorySpec, MemorySystem};

@@ -139,8 +139,8 @@ mod tests {
     use super::*;
 
     fn system() -> MemorySystem {
-        let small = CacheSpec { entries: 2, ways: 2 };
-        let l2 = CacheSpec { entries: 64, ways: 4 };
+        let small = CacheSpec::lru(2, 2);
+        let l2 = CacheSpec::lru(64, 4);
         MemorySystem::new(&MemorySpec { depth: small, colour: small, texture: small, l2 }).unwrap()
     }
 

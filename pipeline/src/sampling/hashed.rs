@@ -35,7 +35,12 @@ impl HashedSamples {
         let mut pair = 3;
         let [u, v] = loop {
             let [u, v] = [place(pair), place(pair + 1)];
-            if self.shape == LensShape::Square || u * u + v * v < RANGE * RANGE {
+            let inside = match self.shape {
+                LensShape::Square => true,
+                LensShape::Disk => u * u + v * v < RANGE * RANGE,
+                polygon => polygon.contains([u, v].map(|c| c as f32 / RANGE as f32)),
+            };
+            if inside {
                 break [u, v];
             }
             pair += 2;
@@ -60,6 +65,15 @@ impl SampleSource for HashedSamples {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_polygon_rejects_what_lies_outside() {
+        let shape = LensShape::Polygon { blades: 5, rotation_deg: 10 };
+        let source = HashedSamples::new(3, 64, 16, shape).unwrap();
+        let mut found = [Sample::default(); 16];
+        source.pixel_into(5, 6, &mut found);
+        assert!(found.iter().all(|s| shape.contains([s.u, s.v])));
+    }
 
     #[test]
     fn the_first_samples_are_those_of_the_peer() {

@@ -1,53 +1,173 @@
 //! Shapes of the aperture.
 
-use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_4, TAU};
+
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 /// The shape of the aperture, inscribed in the square [-1, 1]^2 of lens coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub enum LensShape {
     /// A round aperture.
     #[default]
     Disk,
     /// The whole square.
     Square,
+    /// A regular polygon with its corners on the unit circle, as the blades of an iris leave it open.
+    Polygon {
+        /// Blades, 3 to 64: the polygon has as many sides.
+        #[serde(deserialize_with = "blades")]
+        blades: u32,
+        /// How far the first corner is turned from `+u` towards `+v`, in degrees.
+        #[serde(default)]
+        rotation_deg: u16,
+    },
+}
+
+fn blades<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
+    let blades = u32::deserialize(from)?;
+    let fits = LensShape::BLADES.contains(&blades);
+    fits.then_some(blades).ok_or_else(|| D::Error::custom(format!("{blades} blades; it takes 3 to 64")))
 }
 
 impl LensShape {
+    /// How many blades an iris may have.
+    pub const BLADES: std::ops::RangeInclusive<u32> = 3..=64;
+
     /// Maps a point of the unit square to the aperture, areas kept in proportion. The disk uses the concentric
-    /// map of Shirley and Chiu 1997.
+    /// map of Shirley and Chiu 1997, the polygon that map with [`polygon`] behind it.
     pub fn map(self, unit: [f32; 2]) -> [f32; 2] {
         let [a, b] = unit.map(|c| f64::from(c) * 2.0 - 1.0);
-        match self {
-            Self::Square => [a as f32, b as f32],
-            Self::Disk if a == 0.0 && b == 0.0 => [0.0, 0.0],
+        let on_lens = match self {
+            Self::Square => [a, b],
             Self::Disk => {
-                let quarter = std::f64::consts::FRAC_PI_4;
-                let (radius, angle) =
-                    if a.abs() > b.abs() { (a, quarter * b / a) } else { (b, quarter * (2.0 - a / b)) };
-                [(radius * libm::cos(angle)) as f32, (radius * libm::sin(angle)) as f32]
+                let (radius, angle) = concentric(a, b);
+                [radius * libm::cos(angle), radius * libm::sin(angle)]
+            }
+            Self::Polygon { blades, rotation_deg } => polygon(concentric(a, b), blades, rotation_deg),
+        };
+        // Half a unit in the last place may lie beyond the square.
+        on_lens.map(|c| (c as f32).clamp(-1.0, 1.0))
+    }
+
+    /// Whether a point of the lens lies in the aperture, border included: for samples found by rejection.
+    pub fn contains(self, [u, v]: [f32; 2]) -> bool {
+        let [u, v] = [u, v].map(f64::from);
+        match self {
+            Self::Square => u.abs() <= 1.0 && v.abs() <= 1.0,
+            Self::Disk => u * u + v * v <= 1.0,
+            Self::Polygon { blades, rotation_deg } => (0..blades).all(|side| {
+                let [from, to] = [side, side + 1].map(|k| corner(k, blades, rotation_deg));
+                (to[0] - from[0]) * (v - from[1]) - (to[1] - from[1]) * (u - from[0]) >= 0.0
+            }),
+        }
+    }
+
+    /// The area of the aperture; that of the square is 4.
+    pub fn area(self) -> f64 {
+        match self {
+            Self::Square => 4.0,
+            Self::Disk => TAU / 2.0,
+            Self::Polygon { blades, .. } => {
+                let n = f64::from(blades);
+                0.5 * n * libm::sin(TAU / n)
             }
         }
     }
+}
+
+/// Signed radius and angle in the unit disk of a point of [-1, 1]^2 (Shirley and Chiu 1997). In these, equal areas of the
+/// square are equal steps of angle times equal steps of squared radius.
+fn concentric(a: f64, b: f64) -> (f64, f64) {
+    if a == 0.0 && b == 0.0 {
+        (0.0, 0.0)
+    } else if a.abs() > b.abs() {
+        (a, FRAC_PI_4 * b / a)
+    } else {
+        (b, FRAC_PI_4 * (2.0 - a / b))
+    }
+}
+
+/// From a place in the disk to one in the polygon: the angle picks a triangle between the centre and a side and the place
+/// along that side, the radius the place on the way out. In a triangle area goes with the squared way out (Turk 1990), as
+/// in the disk with the squared radius, so equal areas stay equal.
+fn polygon((radius, angle): (f64, f64), blades: u32, rotation_deg: u16) -> [f64; 2] {
+    let turned = if radius < 0.0 { angle + TAU / 2.0 } else { angle };
+    let sides = turned.rem_euclid(TAU) / TAU * f64::from(blades);
+    let side = (sides as u32).min(blades - 1);
+    let along = sides - f64::from(side);
+    let [from, to] = [side, side + 1].map(|k| corner(k, blades, rotation_deg));
+    [0, 1].map(|axis| radius.abs() * (from[axis] + along * (to[axis] - from[axis])))
+}
+
+fn corner(index: u32, blades: u32, rotation_deg: u16) -> [f64; 2] {
+    let angle = TAU * f64::from(index % blades) / f64::from(blades) + f64::from(rotation_deg).to_radians();
+    [libm::cos(angle), libm::sin(angle)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const SHAPES: [LensShape; 6] = [
+        LensShape::Disk,
+        LensShape::Square,
+        LensShape::Polygon { blades: 3, rotation_deg: 0 },
+        LensShape::Polygon { blades: 5, rotation_deg: 17 },
+        LensShape::Polygon { blades: 6, rotation_deg: 30 },
+        LensShape::Polygon { blades: 12, rotation_deg: 359 },
+    ];
+
+    /// The images of the middles of `n` x `n` cells of the unit square.
+    fn grid(shape: LensShape, n: u32) -> impl Iterator<Item = [f32; 2]> {
+        let at = move |i: u32| (i as f32 + 0.5) / n as f32;
+        (0..n * n).map(move |i| shape.map([at(i % n), at(i / n)]))
+    }
+
     #[test]
-    fn the_disk_stays_in_the_disk_and_fills_it_evenly() {
-        let n = 200;
-        let mut inner = 0;
-        for i in 0..n * n {
-            let unit = [(i % n) as f32 + 0.5, (i / n) as f32 + 0.5].map(|c| c / n as f32);
-            let [u, v] = LensShape::Disk.map(unit);
-            assert!(u * u + v * v <= 1.000_001);
-            inner += u32::from(u * u + v * v < 0.25);
+    fn points_stay_in_the_aperture() {
+        for shape in SHAPES {
+            for point in grid(shape, 150) {
+                assert!(shape.contains(point.map(|c| c * 0.999_999)), "{shape:?}: {point:?}");
+            }
         }
-        let share = f64::from(inner) / f64::from(n * n);
-        assert!(
-            (share - 0.25).abs() < 0.005,
-            "a quarter of the area lies within half the radius, found {share}"
-        );
+    }
+
+    #[test]
+    fn equal_areas_hold_equal_shares() {
+        // Every part of the aperture that a cell of a coarse grid cuts out gets its share of the points; the areas of the
+        // parts are measured by rejection on a finer grid.
+        let (n, cells) = (250, 8);
+        let cell = |[u, v]: [f32; 2]| {
+            let at = |c: f32| (((c + 1.0) * 0.5 * cells as f32) as usize).min(cells - 1);
+            at(v) * cells + at(u)
+        };
+        for shape in SHAPES {
+            let (mut found, mut due) = (vec![0_u32; cells * cells], vec![0_u32; cells * cells]);
+            grid(shape, n).for_each(|point| found[cell(point)] += 1);
+            grid(LensShape::Square, 2 * n).filter(|p| shape.contains(*p)).for_each(|p| due[cell(p)] += 1);
+            let total: u32 = due.iter().sum();
+            let area = 4.0 * f64::from(total) / f64::from(4 * n * n);
+            assert!((area - shape.area()).abs() < 0.01, "{shape:?}: area {area} for {}", shape.area());
+            for (found, due) in found.iter().zip(&due) {
+                let (found, due) = (f64::from(*found) / f64::from(n * n), f64::from(*due) / f64::from(total));
+                assert!((found - due).abs() < 0.0015, "{shape:?}: share {found} for {due}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_quarter_of_the_points_lies_within_half_the_size() {
+        for shape in SHAPES {
+            let inner = grid(shape, 200).filter(|p| shape.contains(p.map(|c| 2.0 * c))).count();
+            let share = inner as f64 / 40_000.0;
+            assert!((share - 0.25).abs() < 0.005, "{shape:?}: {share}");
+        }
+    }
+
+    #[test]
+    fn a_polygon_is_turned_as_asked() {
+        let tip = |rotation_deg| LensShape::Polygon { blades: 3, rotation_deg }.contains([0.99, 0.0]);
+        assert!(tip(0) && !tip(60) && tip(120));
     }
 }

@@ -4,7 +4,7 @@ use super::Sample;
 
 /// A source of samples. A sample is a pure function of the source, the pixel and the index: workers ask for the same
 /// ones again and again.
-pub trait SampleSource: Sync + std::fmt::Debug {
+pub trait SampleSource: Send + Sync + std::fmt::Debug {
     /// Samples in each pixel, 1 to 256.
     fn per_pixel(&self) -> u32;
 

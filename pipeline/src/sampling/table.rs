@@ -1,33 +1,7 @@
 //! A programmable table of samples, tiled over the image.
 
 use super::hash::word;
-use super::sobol::{owen, sobol};
-use super::{LensShape, SampleSource};
-
-/// One sample of a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sample {
-    /// Position within the pixel, [0, 1).
-    pub x: f32,
-    /// Position within the pixel, [0, 1), downwards.
-    pub y: f32,
-    /// Lens position, [-1, 1].
-    pub u: f32,
-    /// Lens position, [-1, 1], upwards.
-    pub v: f32,
-    /// Time, [0, 1) over the shutter.
-    pub t: f32,
-}
-
-impl Sample {
-    /// Whether it lies in its pixel, in the square of the lens and in the shutter.
-    pub fn is_in_range(&self) -> bool {
-        let unit = 0.0..1.0;
-        let lens = -1.0..=1.0;
-        [self.x, self.y, self.t].iter().all(|c| unit.contains(c))
-            && [self.u, self.v].iter().all(|c| lens.contains(c))
-    }
-}
+use super::{LensRegion, LensShape, Sample, SampleSource, SampleSpec};
 
 /// Samples for a square block of pixels. The block repeats over the image, each copy turned round in itself by an
 /// offset hashed from the seed, so that a sample is a pure function of (seed, pixel, index).
@@ -36,6 +10,7 @@ pub struct SampleTable {
     per_pixel: u32,
     seed: u64,
     samples: Vec<Sample>,
+    regions: Vec<LensRegion>,
     /// For each block of [`Self::TURN_PX`] pixels squared, its samples by time: the pixel in the block times
     /// `per_pixel` plus the index in the pixel.
     by_time: Vec<u16>,
@@ -58,6 +33,26 @@ pub enum TableError {
     /// A sample lies outside pixel, lens or shutter.
     #[error("sample {0} of the block lies outside [0, 1) in x, y or t, or outside [-1, 1] in u or v")]
     Range(usize),
+    /// The samples of a pixel cannot be shared out evenly.
+    #[error("{per_pixel} samples per pixel for {regions} regions of the lens; take a multiple of {regions}")]
+    Shares {
+        /// Samples in a pixel.
+        per_pixel: u32,
+        /// Regions of the lens.
+        regions: u32,
+    },
+    /// The regions of the lens are none, too many, improper, or overlap.
+    #[error("the regions of the lens have to be 1 to 256 rectangles within -1 and 1 that do not overlap")]
+    Regions,
+    /// A fixed set of points that cannot be.
+    #[error("a fixed set has 1 to 65536 points, u and v within -1 and 1, t from 0 to below 1")]
+    Points,
+    /// An iris of too few or too many blades.
+    #[error("{0} blades; an iris has 3 to 64")]
+    Blades(u32),
+    /// Given points are places on the lens, which cannot be divided any more.
+    #[error("given points are places on the lens as they are: leave `regions` out")]
+    GivenRegions,
 }
 
 impl SampleTable {
@@ -75,14 +70,44 @@ impl SampleTable {
     /// # Errors
     /// When `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
     pub fn low_discrepancy(per_pixel: u32, seed: u64, shape: LensShape) -> Result<Self, TableError> {
+        SampleSpec { lens: shape, ..SampleSpec::default() }.table(per_pixel, seed)
+    }
+
+    /// The table that `spec` describes. Every region of the lens has a run of the pattern's samples of its own.
+    pub(super) fn described(spec: &SampleSpec, per_pixel: u32, seed: u64) -> Result<Self, TableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
             return Err(TableError::PerPixel(per_pixel));
         }
-        let pixels = Self::SIDE_PX * Self::SIDE_PX;
-        let samples = (0..pixels)
-            .flat_map(|pixel| (0..per_pixel).map(move |index| scrambled(seed, pixel, index, shape)))
-            .collect();
-        Self::programmed(per_pixel, seed, samples)
+        if !spec.pattern.is_sane() {
+            return Err(TableError::Points);
+        }
+        if let LensShape::Polygon { blades, .. } = spec.lens
+            && !LensShape::BLADES.contains(&blades)
+        {
+            return Err(TableError::Blades(blades));
+        }
+        let regions = spec.regions.rectangles().ok_or(TableError::Regions)?;
+        if spec.pattern.is_on_lens() && regions != [LensRegion::WHOLE] {
+            return Err(TableError::GivenRegions);
+        }
+        let count = regions.len() as u32;
+        if !per_pixel.is_multiple_of(count) {
+            return Err(TableError::Shares { per_pixel, regions: count });
+        }
+        let mut samples = vec![Sample::default(); (Self::SIDE_PX * Self::SIDE_PX * per_pixel) as usize];
+        for (pixel, of_pixel) in (0_u32..).zip(samples.chunks_exact_mut(per_pixel as usize)) {
+            let at = [pixel % Self::SIDE_PX, pixel / Self::SIDE_PX];
+            let runs = of_pixel.chunks_exact_mut((per_pixel / count) as usize);
+            for ((region, run), number) in regions.iter().zip(runs).zip(0_u64..) {
+                // The first region keeps the seed, so that the whole lens is what it is without regions.
+                let seed = if number == 0 { seed } else { word(seed, u64::MAX, number) };
+                spec.pattern.fill(seed, at, Self::SIDE_PX, run);
+                if !spec.pattern.is_on_lens() {
+                    run.iter_mut().for_each(|s| [s.u, s.v] = region.place(spec.lens.map([s.u, s.v])));
+                }
+            }
+        }
+        Ok(Self { regions, ..Self::programmed(per_pixel, seed, samples)? })
     }
 
     /// A table of one's own: `per_pixel` samples for each pixel of a block of [`Self::SIDE_PX`] pixels squared, row by row.
@@ -100,7 +125,8 @@ impl SampleTable {
         if let Some(outside) = samples.iter().position(|sample| !sample.is_in_range()) {
             return Err(TableError::Range(outside));
         }
-        let mut table = Self { per_pixel, seed, samples, by_time: Vec::new() };
+        let regions = vec![LensRegion::WHOLE];
+        let mut table = Self { per_pixel, seed, samples, regions, by_time: Vec::new() };
         table.by_time = table.sorted_blocks();
         Ok(table)
     }
@@ -135,6 +161,16 @@ impl SampleTable {
         &self.samples[first..first + self.per_pixel as usize]
     }
 
+    /// The regions of the lens, in order; one, the whole of it, where it is not divided.
+    pub fn regions(&self) -> &[LensRegion] {
+        &self.regions
+    }
+
+    /// The region that sample `index` of any pixel lies in, as a place in [`Self::regions`].
+    pub fn region_of(&self, index: u32) -> usize {
+        (index * self.regions.len() as u32 / self.per_pixel) as usize
+    }
+
     /// Where in the block pixel (`px`, `py`) looks.
     fn place(&self, px: u32, py: u32) -> (u32, u32) {
         let copy = word(self.seed, u64::from(px / Self::SIDE_PX), u64::from(py / Self::SIDE_PX));
@@ -160,16 +196,6 @@ impl SampleSource for SampleTable {
         let per_block = (Self::TURN_PX * Self::TURN_PX * self.per_pixel) as usize;
         self.by_time.chunks_exact(per_block).nth(block as usize)
     }
-}
-
-fn scrambled(seed: u64, pixel: u32, index: u32, shape: LensShape) -> Sample {
-    let [x, y, u, v, t] = [0, 1, 2, 3, 4].map(|dim| {
-        let bits = owen(sobol(index, dim), word(seed, u64::from(pixel), dim as u64) as u32);
-        // 24 bits, so that the fraction is exact in f32 and below one.
-        (bits >> 8) as f32 / 16_777_216.0
-    });
-    let [u, v] = shape.map([u, v]);
-    Sample { x, y, u, v, t }
 }
 
 #[cfg(test)]
@@ -204,5 +230,48 @@ mod tests {
             SampleTable::low_discrepancy(257, 1, LensShape::Disk).unwrap_err(),
             TableError::PerPixel(257)
         );
+    }
+
+    #[test]
+    fn each_region_has_its_run_of_samples_and_no_other() {
+        use super::super::LensRegions;
+        for regions in [LensRegions::Across(2), LensRegions::Grid(2, 2), LensRegions::Across(8)] {
+            for lens in [LensShape::Square, LensShape::Disk] {
+                let spec = SampleSpec { lens, regions: regions.clone(), ..SampleSpec::default() };
+                let table = spec.table(16, 5).unwrap();
+                let each = 16 / table.regions().len();
+                for (px, py) in [(0, 0), (70, 9)] {
+                    for (index, s) in (0_u32..).zip(table.pixel(px, py)) {
+                        let region = table.region_of(index);
+                        assert_eq!(region, index as usize / each);
+                        let holds = table.regions().iter().map(|r| r.contains([s.u, s.v]));
+                        assert_eq!(holds.clone().position(|h| h), Some(region), "{s:?} of {regions:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_samples_of_each_region_are_stratified_in_time() {
+        use super::super::LensRegions;
+        let spec = SampleSpec { regions: LensRegions::Across(2), ..SampleSpec::default() };
+        let table = spec.table(16, 5).unwrap();
+        for run in table.pixel(9, 33).chunks_exact(8) {
+            let mut strata: Vec<_> = run.iter().map(|s| (s.t * 8.0) as u32).collect();
+            strata.sort_unstable();
+            assert_eq!(strata, (0..8).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn samples_that_cannot_be_shared_out_are_refused() {
+        use super::super::{LensRegions, Pattern};
+        let three = SampleSpec { regions: LensRegions::Across(3), ..SampleSpec::default() };
+        assert_eq!(three.table(8, 1).unwrap_err(), TableError::Shares { per_pixel: 8, regions: 3 });
+        let pattern = Pattern::Given { points: vec![(0.0, 0.0, 0.0)] };
+        assert_eq!(SampleSpec { pattern, ..three }.table(9, 1).unwrap_err(), TableError::GivenRegions);
+        let none = SampleSpec { pattern: Pattern::Interleaved { points: 0 }, ..SampleSpec::default() };
+        assert_eq!(none.table(9, 1).unwrap_err(), TableError::Points);
     }
 }

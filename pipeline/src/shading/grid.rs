@@ -17,10 +17,15 @@ pub fn cell(reference: &[[f32; 3]; 3], weights: [f32; 3], origin: [f32; 2]) -> O
 }
 
 /// Barycentric weights of the middle of a cell, which lies outside the triangle for cells its border crosses: shading
-/// extrapolates there, as pixel centres do. Where the triangle is seen edge on, its middle stands for all of it.
+/// extrapolates there, as pixel centres do.
 pub fn cell_weights(reference: &[[f32; 3]; 3], cell: [i32; 2], origin: [f32; 2]) -> [f32; 3] {
-    let at = [0, 1].map(|axis| cell[axis] as f32 + 0.5 + origin[axis]);
-    let seen = reference.map(|[x, y, w]| [x - at[0] * w, y - at[1] * w]);
+    weights_at(reference, [0, 1].map(|axis| cell[axis] as f32 + 0.5 + origin[axis]))
+}
+
+/// Barycentric weights of the point of a triangle seen at image coordinate `at`, extrapolated outside. Where the triangle
+/// is seen edge on, its middle stands for all of it.
+pub fn weights_at(vertices: &[[f32; 3]; 3], at: [f32; 2]) -> [f32; 3] {
+    let seen = vertices.map(|[x, y, w]| [x - at[0] * w, y - at[1] * w]);
     let edge = |i: usize, j: usize| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1];
     let e = [edge(1, 2), edge(2, 0), edge(0, 1)];
     let sum = e[0] + e[1] + e[2];

@@ -162,19 +162,15 @@ pub fn switched(switches: u32) -> Features {
 }
 
 pub fn spec(features: Features) -> PipelineSpec {
-    let lines = CacheSpec { entries: 256, ways: 4 };
+    let lines = CacheSpec::lru(256, 4);
     PipelineSpec {
         tile_px: 8,
         coarse_tile_px: 32,
         batch_triangles: 100,
         vertex_reuse: 16,
-        shading_cache: CacheSpec { entries: 1024, ways: 4 },
-        memory: MemorySpec {
-            depth: lines,
-            colour: lines,
-            texture: lines,
-            l2: CacheSpec { entries: 4096, ways: 8 },
-        },
+        shading_cache: CacheSpec::lru(1024, 4),
+        shading: Shading::Cached,
+        memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: CacheSpec::lru(4096, 8) },
         features,
         depth: DepthSpec::default(),
     }

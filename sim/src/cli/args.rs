@@ -3,8 +3,10 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use activity::{Event, spec::suggestion};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use pipeline::Features;
+use pipeline::frame::HeatMap;
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
 #[derive(Debug, Parser)]
@@ -22,6 +24,10 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Find the triangle each sample sees and its depth, to be held against another program sample by sample
     Visibility(VisibilityArgs),
+    /// Write a sample table into a file
+    Samples(SamplesArgs),
+    /// Measure and draw a chart of the book
+    Chart(ChartArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
     List(ListArgs),
 }
@@ -46,6 +52,10 @@ pub struct RunArgs {
     /// Samples in a pixel, 1 to 256
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub samples: Option<u32>,
+    /// Where and when each pixel looks: a built-in sample table (see `quintile list`), a description of one in a .ron
+    /// file, or the samples themselves in a .smp file
+    #[arg(long, value_name = "TABLE")]
+    pub table: Option<String>,
     /// Size of the image in pixels
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -88,6 +98,9 @@ pub struct RunArgs {
     /// Write every frame as EXR, too (linear light)
     #[arg(long)]
     pub exr: bool,
+    /// Write where in each frame a counter counted, as a picture, an EXR and a CSV in heat/; may be given several times
+    #[arg(long, value_name = "COUNTER", value_parser = counter)]
+    pub heat: Vec<Event>,
     /// Worker threads; all cores without it. The results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -134,6 +147,63 @@ pub struct VisibilityArgs {
     pub json: bool,
 }
 
+/// Arguments of `samples`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile samples jittered --samples 16 --size 640x360 --out mine.smp\n\n\
+    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is that of\n\
+    shared/peers/embree5d/README.md."
+)]
+pub struct SamplesArgs {
+    /// A built-in sample table (see `quintile list`) or a description of one in a .ron file
+    #[arg(value_name = "TABLE", default_value = "owen")]
+    pub table: String,
+    /// Samples in a pixel, 1 to 256
+    #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true)]
+    pub samples: u32,
+    /// Pixels to write; an image that is larger repeats them
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "64x64")]
+    pub size: (u32, u32),
+    /// Seed of the samples
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// The file
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Print what was written as one line of JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `chart`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile chart sampling --quick --out charts\n\n\
+    Results are in DIR: pictures as SVG and PNG, NAME.csv, NAME.json and NAME.md.")]
+pub struct ChartArgs {
+    /// Which chart
+    #[arg(value_enum, value_name = "NAME")]
+    pub chart: ChartArg,
+    /// Smaller images, fewer samples and a coarser reference: seconds instead of minutes
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder for the results; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out/charts")]
+    pub out: PathBuf,
+    /// Worker threads; all cores without it. Only times depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print the numbers as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The charts there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ChartArg {
+    /// Image error over samples per pixel and over host time, for every sample table
+    Sampling,
+}
+
 /// Arguments of `list`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  quintile list --json")]
@@ -163,6 +233,20 @@ pub enum PacingArg {
     Vsync,
     /// As soon as the one before is done
     Free,
+}
+
+fn counter(text: &str) -> Result<Event, String> {
+    let placed = || Event::ALL.into_iter().filter(|&event| HeatMap::is_of(event));
+    match Event::from_name(text) {
+        Some(event) if HeatMap::is_of(event) => Ok(event),
+        Some(_) => {
+            Err(format!("`{text}` is counted before it is known where in the image; samples_tested is not"))
+        }
+        None => {
+            let known: Vec<&str> = placed().map(Event::name).collect();
+            Err(format!("no counter is called `{text}`; {}", suggestion(text, &known)))
+        }
+    }
 }
 
 fn frames(text: &str) -> Result<Range<u32>, String> {

@@ -14,7 +14,9 @@ struct Listing {
     gpus: Vec<Entry>,
     platforms: Vec<Entry>,
     energy_tables: Vec<Entry>,
+    sample_tables: Vec<Entry>,
     workloads: Vec<Entry>,
+    charts: Vec<Entry>,
     figures: Vec<Entry>,
 }
 
@@ -40,7 +42,9 @@ pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
         ("GPUs", &listing.gpus),
         ("platforms", &listing.platforms),
         ("energy tables", &listing.energy_tables),
+        ("sample tables", &listing.sample_tables),
         ("workloads", &listing.workloads),
+        ("charts", &listing.charts),
         ("figures", &listing.figures),
     ];
     let mut lines = Vec::new();
@@ -70,6 +74,8 @@ fn listing() -> Listing {
         gpus: GpuSpec::names().map(gpu).collect(),
         platforms: power_model::Platform::names().map(platform).collect(),
         energy_tables: power_model::EnergyTable::names().map(table).collect(),
+        sample_tables: pipeline::SampleSpec::names().map(|(name, what)| Entry::new(name, what)).collect(),
+        charts: crate::chart::CHARTS.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
         workloads: vec![Entry::new("run", "draw a scene with motion and defocus, one opaque pass")],
         figures: crate::run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
     }

@@ -38,6 +38,7 @@ fn options(args: &RunArgs) -> RunOptions {
             lens_radius: args.lens,
             focus: args.focus,
             clip: args.clip.clone(),
+            table: args.table.clone(),
         },
         gpu: args.gpu.clone(),
         platform: args.platform.clone(),
@@ -54,6 +55,7 @@ fn options(args: &RunArgs) -> RunOptions {
         trace_rate_hz: args.trace_rate,
         seed: args.seed,
         exr: args.exr,
+        heat: args.heat.clone(),
     }
 }
 

@@ -92,7 +92,7 @@ impl OutDir {
 
     /// Removes temporary files of runs that were killed: those whose process is gone.
     fn remove_abandoned(&self) -> Result<(), OutputError> {
-        for folder in ["", "images", "plots"] {
+        for folder in ["", "images", "plots", "heat"] {
             let Ok(entries) = fs::read_dir(self.root.join(folder)) else { continue };
             for path in entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file()) {
                 if path.file_name().and_then(|name| name.to_str()).is_some_and(is_abandoned) {

@@ -54,7 +54,7 @@ impl Prefix {
 }
 
 /// 10^power, correctly rounded: the parser is exact where a power function need not be.
-pub(super) fn power_of_ten(power: i32) -> f64 {
+pub(in crate::output) fn power_of_ten(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(f64::NAN)
 }
 

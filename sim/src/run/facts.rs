@@ -39,6 +39,7 @@ pub(super) fn settings(outcome: &Outcome) -> Vec<FactRow> {
     vec![
         FactRow::new("size", format!("{}x{} pixels", settings.width, settings.height)),
         FactRow::new("samples per pixel", settings.samples.to_string()),
+        FactRow::new("sample table", outcome.plan.scene.settings().table.clone()),
         FactRow::new("frames", frames(&outcome.plan)),
         FactRow::new("frame rate", si(settings.frame_rate_hz, "Hz")),
         FactRow::new("shutter", format!("{} of the frame period", settings.shutter)),
@@ -66,7 +67,12 @@ fn frames(plan: &Plan) -> String {
 }
 
 /// The files beside the report.
-pub(super) fn files() -> Vec<FileLink> {
+pub(super) fn files(outcome: &Outcome) -> Vec<FileLink> {
+    let heat = [(
+        "heat/",
+        "where in each frame counters counted: pictures, values of the pixels, counts of the tiles",
+    )];
+    let heat = heat.into_iter().filter(|_| !outcome.simulated.heat.is_empty());
     [
         ("summary.json", "every number of this page, for scripts"),
         ("frames.csv", "energy of each found frame, with the truth beside it"),
@@ -76,6 +82,8 @@ pub(super) fn files() -> Vec<FileLink> {
         ("images/", "every frame"),
         ("plots/", "the plots as SVG and PNG"),
     ]
+    .into_iter()
+    .chain(heat)
     .map(|(path, what)| FileLink { path: path.to_owned(), what: what.to_owned() })
-    .to_vec()
+    .collect()
 }

@@ -7,6 +7,7 @@
 mod checks;
 mod error;
 mod facts;
+mod heat;
 mod limits;
 mod measure;
 mod modelled;
@@ -26,6 +27,7 @@ use crate::output::progress::Progress;
 
 pub use checks::Checks;
 pub use error::RunError;
+pub use heat::HeatPicture;
 pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use pipeline::{LensShape, SampleTable, Viewport};
+use activity::Event;
+use pipeline::Viewport;
+use pipeline::sampling::SampleSource;
 use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
-use workloads::{Overrides, Scene};
+use workloads::{Overrides, SampleChoice, Scene};
 
 use super::RunError;
 use super::limits::Size;
@@ -43,6 +45,8 @@ pub struct RunOptions {
     pub seed: u64,
     /// Whether images are written as EXR, too.
     pub exr: bool,
+    /// Counters whose heat maps are wanted.
+    pub heat: Vec<Event>,
 }
 
 impl Default for RunOptions {
@@ -58,6 +62,7 @@ impl Default for RunOptions {
             trace_rate_hz: 50e3,
             seed: 1,
             exr: false,
+            heat: Vec::new(),
         }
     }
 }
@@ -71,7 +76,7 @@ pub struct Plan {
     /// Size of the image.
     pub viewport: Viewport,
     /// Where and when each pixel looks.
-    pub samples: SampleTable,
+    pub samples: Box<dyn SampleSource>,
     /// The hardware.
     pub gpu: GpuSpec,
     /// What surrounds it.
@@ -96,7 +101,7 @@ impl Plan {
                 "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
             )));
         }
-        let scene = workloads::load(&options.scene)?.with_overrides(&options.overrides)?;
+        let (scene, table) = scene(&options)?;
         let settings = scene.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
@@ -114,7 +119,7 @@ impl Plan {
             idle_s: platform.lead_in_s.value() + platform.tail_s.value(),
         }
         .check()?;
-        let samples = SampleTable::low_discrepancy(settings.samples, options.seed, LensShape::Disk)?;
+        let samples = table.source(settings.samples, options.seed)?;
         let gpu = GpuSpec::load(&options.gpu)?;
         let table = file_or_name(&options.energy, EnergyTable::load, EnergyTable::builtin)?;
         let model = PowerModel::at(&table, &platform, options.bound)?;
@@ -124,6 +129,17 @@ impl Plan {
     /// Pixels of the image.
     pub fn pixels(&self) -> u64 {
         self.viewport.pixels() as u64
+    }
+}
+
+/// The scene with its settings changed as asked, and its sample table. A table in a file decides how many samples there
+/// are, unless the caller asked for another number.
+fn scene(options: &RunOptions) -> Result<(Scene, SampleChoice), RunError> {
+    let scene = workloads::load(&options.scene)?.with_overrides(&options.overrides)?;
+    let table = SampleChoice::load(&scene.settings().table)?;
+    match table.per_pixel().filter(|_| options.overrides.samples.is_none()) {
+        None => Ok((scene, table)),
+        samples => Ok((scene.with_overrides(&Overrides { samples, ..Overrides::default() })?, table)),
     }
 }
 

@@ -4,6 +4,7 @@ use activity::{Event, Unit};
 use glam::Vec3;
 use power_model::Part;
 
+use super::heat::heat_name;
 use super::pictures::{Plot, parts_in_use};
 use super::simulate::image_name;
 use super::{Outcome, RunError, facts};
@@ -20,7 +21,7 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
         facts: facts::facts(outcome),
         warnings: warnings(outcome),
         headline: outcome.summary.headline(),
-        images: images(outcome)?,
+        images: images(outcome)?.into_iter().chain(heat(outcome)).collect(),
         plots: plots.iter().map(plot).collect::<Result<_, _>>()?,
         parts: parts(outcome),
         frames: frames(outcome),
@@ -28,7 +29,7 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
         units: units(outcome),
         counters: counters(outcome),
         settings: facts::settings(outcome),
-        files: facts::files(),
+        files: facts::files(outcome),
     })
 }
 
@@ -56,6 +57,14 @@ fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
             })
         })
         .collect()
+}
+
+fn heat(outcome: &Outcome) -> impl Iterator<Item = ReportImage> {
+    outcome.simulated.heat.iter().map(|map| ReportImage {
+        caption: format!("where in frame {} the counter {} counted", map.frame, map.event.name()),
+        png: map.png.clone(),
+        link: Some(format!("{}.png", heat_name(map.event, map.frame))),
+    })
 }
 
 fn plot(plot: &Plot) -> Result<ReportPlot, RunError> {

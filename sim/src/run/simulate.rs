@@ -2,10 +2,12 @@
 
 use activity::{Counts, Timeline, Unit};
 use glam::Vec3;
+use pipeline::frame::{HeatMap, render_with_heat};
 use power_model::FramePower;
 use rayon::prelude::*;
 use workloads::Frame;
 
+use super::heat::{self, HeatPicture};
 use super::{Plan, RunError};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
@@ -47,6 +49,8 @@ pub struct Simulated {
     pub frames: Vec<usize>,
     /// Pictures for the report: frame number and the linear image.
     pub pictures: Vec<(u32, Vec<Vec3>)>,
+    /// The heat maps of the frame in the middle.
+    pub heat: Vec<HeatPicture>,
 }
 
 impl Simulated {
@@ -77,23 +81,32 @@ pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result
     let done: Vec<_> = numbers
         .par_iter()
         .map(|&number| {
-            let (frame, image) = simulate_frame(plan, number, most_bins)?;
+            let (frame, image, heat) = simulate_frame(plan, number, most_bins)?;
+            let maps = heat.iter().map(|map| heat::write(plan, dir, number, map));
+            let maps: Vec<HeatPicture> = maps.collect::<Result<_, _>>()?;
             // A still scene is simulated once; every frame of the run has its image all the same.
             let mut shown_as = if numbers.len() == 1 { range.clone() } else { number..number + 1 };
             shown_as.try_for_each(|frame| write_image(plan, dir, frame, &image))?;
             bar.inc();
-            Ok((frame, shown.contains(&number).then_some((number, image))))
+            let maps = if number == middle { maps } else { Vec::new() };
+            Ok((frame, shown.contains(&number).then_some((number, image)), maps))
         })
         .collect::<Result<_, RunError>>()?;
-    let (distinct, pictures): (Vec<_>, Vec<_>) = done.into_iter().unzip();
+    let (mut distinct, mut pictures, mut heat) = (Vec::new(), Vec::new(), Vec::new());
+    for (frame, picture, maps) in done {
+        distinct.push(frame);
+        pictures.extend(picture);
+        heat.extend(maps);
+    }
     let frames =
         range.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
-    Ok(Simulated { distinct, frames, pictures: pictures.into_iter().flatten().collect() })
+    Ok(Simulated { distinct, frames, pictures, heat })
 }
 
 /// What an earlier run left: should this one die on the way, nothing old may stand in for it.
 fn remove_stale(dir: &OutDir) -> Result<(), RunError> {
     dir.remove_stale("images", "frame_", &["png", "exr"])?;
+    dir.remove_stale("heat", "", &["png", "exr", "csv"])?;
     dir.remove_stale("", "report.", &["html"])?;
     dir.remove_stale("", "frames.", &["csv"])?;
     dir.remove_stale("", "trace.", &["csv", "json", "parquet"])?;
@@ -108,17 +121,19 @@ fn simulate_frame(
     plan: &Plan,
     number: u32,
     most_bins: usize,
-) -> Result<(SimulatedFrame, Vec<Vec3>), RunError> {
+) -> Result<(SimulatedFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let frame = plan.scene.frame(number)?;
     let settings = pipeline::Settings {
         spec: &plan.gpu.pipeline,
         viewport: plan.viewport,
-        samples: &plan.samples,
+        samples: &*plan.samples,
         background: plan.scene.background(),
     };
     let draws = frame.draws(&plan.scene)?;
     let mut clock = PacketClock::new(&plan.gpu, Recorder::new(BIN_PS, most_bins));
-    let rendered = pipeline::render(&frame.camera, &draws, &settings, |packet| clock.push(packet))
+    let events = &plan.options.heat;
+    let emit = |packet: &_| clock.push(packet);
+    let (rendered, heat) = render_with_heat(&frame.camera, &draws, &settings, events, emit)
         .map_err(|error| RunError::Setting(error.to_string()))?;
     let timeline = clock.finish();
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
@@ -133,7 +148,7 @@ fn simulate_frame(
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
     };
-    Ok((simulated, rendered.image))
+    Ok((simulated, rendered.image, heat))
 }
 
 fn is_moving(frame: &Frame) -> bool {

@@ -24,6 +24,8 @@ pub struct Settings {
     /// Depth in scene units at which the lens is sharp; without it the camera's target is, or, for cameras
     /// that have none, the centre of the scene.
     pub focus: Option<f32>,
+    /// Where and when each pixel looks: the name or file of a sample table.
+    pub table: String,
 }
 
 impl Default for Settings {
@@ -37,6 +39,7 @@ impl Default for Settings {
             frames: 0..1,
             lens_radius: 0.0,
             focus: None,
+            table: "owen".to_owned(),
         }
     }
 }
@@ -58,6 +61,8 @@ pub struct Overrides {
     pub lens_radius: Option<f32>,
     /// Focus depth in scene units.
     pub focus: Option<f32>,
+    /// Name or file of a sample table.
+    pub table: Option<String>,
     /// Name or index of an animation clip of a glTF scene.
     pub clip: Option<String>,
 }
@@ -81,6 +86,7 @@ impl Settings {
             frames: overrides.frames.clone().unwrap_or_else(|| self.frames.clone()),
             lens_radius: overrides.lens_radius.unwrap_or(self.lens_radius),
             // A pinhole asked for explicitly drops the focus that the scene had for its lens.
+            table: overrides.table.clone().unwrap_or_else(|| self.table.clone()),
             focus: overrides.focus.or(self.focus.filter(|_| overrides.lens_radius != Some(0.0))),
         };
         changed.check().map(|()| changed)

@@ -22,4 +22,4 @@ pub use m5d::parse as parse_m5d;
 pub use mesh::MovingMesh;
 pub use mts::{load_mts, parse_mts};
 pub use scene::VisibilityScene;
-pub use table::FixedSamples;
+pub use table::{FixedSamples, write_samples};

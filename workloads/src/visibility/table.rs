@@ -1,7 +1,9 @@
 //! Sample tables in files.
 
+use std::io::{self, Write};
 use std::path::Path;
 
+use pipeline::Viewport;
 use pipeline::sampling::{Sample, SampleSource};
 
 use super::bytes::Bytes;
@@ -74,9 +76,42 @@ impl SampleSource for FixedSamples {
     }
 }
 
+/// Writes the samples of every pixel of an image as a table that [`FixedSamples`] reads.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_samples(viewport: Viewport, source: &dyn SampleSource, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(b"M5DSMP1\0")?;
+    for word in [viewport.width(), viewport.height(), source.per_pixel(), 0] {
+        out.write_all(&word.to_le_bytes())?;
+    }
+    let mut samples = vec![Sample::default(); source.per_pixel() as usize];
+    for pixel in 0..viewport.pixels() as u32 {
+        source.pixel_into(pixel % viewport.width(), pixel / viewport.width(), &mut samples);
+        for number in samples.iter().flat_map(|s| [s.x, s.y, s.u, s.v, s.t]) {
+            out.write_all(&number.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let table = pipeline::SampleTable::low_discrepancy(3, 5, pipeline::LensShape::Disk).unwrap();
+        let (viewport, mut file) = (Viewport::new(70, 3).unwrap(), Vec::new());
+        write_samples(viewport, &table, &mut file).unwrap();
+        assert_eq!(file.len(), 24 + 70 * 3 * 3 * 20);
+        let read = FixedSamples::parse(Path::new("a.smp"), &file).unwrap();
+        let mut found = [Sample::default(); 3];
+        for (px, py) in [(0, 0), (69, 2), (64, 1)] {
+            read.pixel_into(px, py, &mut found);
+            assert_eq!(found, table.pixel(px, py));
+        }
+    }
 
     fn file(x: f32) -> Vec<u8> {
         let mut data = b"M5DSMP1\0".to_vec();

@@ -4,14 +4,18 @@
 //! - [`FramePower`]: one frame's power over time, stacked by part.
 //! - [`FrameEnergy`]: energy of each frame, measured against true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
+//! - [`Curves`]: curves on logarithmic axes.
+//! - [`HeatMapPlot`]: where in the image something happens.
 //!
 //! Nothing to draw (no samples, no frames, nothing finite) is a plot that says so, never an error. All use of the
 //! `plotters` crate is in `render`.
 
 mod axis;
 mod columns;
+mod curves;
 mod frame_energy;
 mod frame_power;
+mod heat_map;
 mod palette;
 mod panel;
 mod picture;
@@ -19,8 +23,10 @@ mod power_run;
 mod render;
 mod unit_busy;
 
+pub use curves::{Curve, CurvePanel, Curves};
 pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
 pub use frame_power::{FramePower, PowerPart};
+pub use heat_map::{HeatMapPlot, HeatTile};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;
 pub use power_run::PowerRun;

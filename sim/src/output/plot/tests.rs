@@ -139,3 +139,33 @@ fn unit_busy_takes_anything() {
     let units = vec![UnitLane { name: "odd", busy: vec![f64::NAN, -5.0, 7.0] }];
     check(&UnitBusy { subject: "scene", frame: 0, bin_s: 1e-3, units }.picture());
 }
+
+#[test]
+fn curves_and_their_legends_fit() {
+    let names = ["owen", "sobol", "random", "jittered", "interleaved"];
+    let panel = |scale: f64| {
+        let curves = names.iter().zip(1..).map(|(name, k)| Curve {
+            name: (*name).to_owned(),
+            note: "-0.71".to_owned(),
+            points: (0..9).map(|i| (f64::from(1 << i), scale / f64::from((1 << i) + k))).collect(),
+        });
+        let [title, across, up] = ["motion", "samples per pixel", "RMSE"].map(str::to_owned);
+        CurvePanel { title, across, up, doubling: true, curves: curves.collect() }
+    };
+    let empty = CurvePanel { curves: Vec::new(), ..panel(1.0) };
+    for panels in
+        [vec![], vec![panel(1.0)], vec![panel(1e-6), panel(3e7), panel(0.1)], vec![panel(0.0), empty]]
+    {
+        check(&Curves { title: "Error", subject: "of a scene", panels }.picture());
+    }
+}
+
+#[test]
+fn heat_maps_of_any_shape_fit() {
+    for (size, value) in [([1280, 720], 12.0), ([3, 800], 1e9), ([1, 1], 0.0), ([900, 2], f64::NAN)] {
+        let tiles = [HeatTile { origin: [0, 0], size, value }];
+        let (title, subject) =
+            ("samples_tested per pixel, frame 12", "default on reference: 6 364 653 in all");
+        check(&HeatMapPlot { title, subject, label: "events per pixel", size, tiles: &tiles }.picture());
+    }
+}

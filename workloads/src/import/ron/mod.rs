@@ -35,6 +35,15 @@ impl Context<'_> {
         LoadError::Description { file, place: place.into(), message: message.into() }
     }
 
+    /// A sample table: a name stays one, a file is relative to the scene.
+    fn table(self, name: &str) -> String {
+        if Path::new(name).extension().is_none() {
+            name.to_owned()
+        } else {
+            self.beside(name).display().to_string()
+        }
+    }
+
     /// A file named in the scene, relative to it.
     fn beside(self, name: &str) -> std::path::PathBuf {
         self.path.parent().map_or_else(|| Path::new(name).to_path_buf(), |folder| folder.join(name))
@@ -44,7 +53,7 @@ impl Context<'_> {
 fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
     let context = Context { path };
     let mut parts = Parts::new(spec.name.unwrap_or_else(|| path.display().to_string()));
-    parts.settings = settings(&spec.settings);
+    parts.settings = settings(context, &spec.settings);
     // The settings are checked with the scene, but an object's default timing needs a rate that makes sense.
     parts.settings.check().map_err(|error| context.wrong("settings", error.to_string()))?;
     if let Some(background) = spec.background {
@@ -69,7 +78,7 @@ fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
     Ok(parts)
 }
 
-fn settings(spec: &SettingsSpec) -> Settings {
+fn settings(context: Context, spec: &SettingsSpec) -> Settings {
     let plain = Settings::default();
     let (start, end) = spec.frames.unwrap_or((0, 12));
     Settings {
@@ -81,6 +90,7 @@ fn settings(spec: &SettingsSpec) -> Settings {
         frames: start..end,
         lens_radius: spec.lens_radius.unwrap_or(plain.lens_radius),
         focus: spec.focus,
+        table: spec.table.as_ref().map_or(plain.table, |table| context.table(table)),
     }
 }
 

@@ -55,6 +55,8 @@ pub(super) struct SettingsSpec {
     /// Depth at which the lens is sharp; the camera's target by default.
     #[serde(deserialize_with = "bounded::depth")]
     pub focus: Option<f32>,
+    /// A sample table: a name, or a `.ron` or `.smp` file relative to the scene file; `owen` by default.
+    pub table: Option<String>,
 }
 
 /// A camera that looks from one point at another.

@@ -1,0 +1,275 @@
+//! Patterns: how the samples of a pixel are spread over pixel, lens and shutter.
+
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
+
+use super::Sample;
+use super::hash::word;
+use super::sobol::{owen, sobol};
+
+/// How the samples of a pixel are spread.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Pattern {
+    /// The first points of the five-dimensional Sobol sequence, Owen scrambled by pixel and dimension (Laine and Karras
+    /// 2011, constants of Burley 2020).
+    #[default]
+    Owen,
+    /// The first points of the Sobol sequence as they are (Joe and Kuo 2008), the same ones in every pixel.
+    Sobol,
+    /// Independent uniform numbers, hashed from the seed.
+    Random,
+    /// Jittered (Cook 1986): the pixel and the lens each divided into as many cells as there are samples, the shutter into
+    /// as many intervals, a random point in each, paired at random.
+    Jittered,
+    /// A fixed set of places on the lens and in time, used by all pixels: each takes a run of it, and its neighbours the
+    /// runs that follow, in the order of a Z-curve (interleaved sampling, Keller and Heidrich 2001). With as many points
+    /// as samples all pixels see the same places. The set is the first points of the scrambled Sobol sequence; positions
+    /// in the pixel are those of [`Pattern::Owen`].
+    Interleaved {
+        /// Points of the set, best a power of two and a multiple of the samples of a pixel.
+        #[serde(deserialize_with = "points")]
+        points: u32,
+    },
+    /// The same with a set of one's own: `(u, v, t)` on the lens and in time, taken as they are.
+    Given {
+        /// Lens coordinates from -1 to 1, time from 0 to below 1.
+        #[serde(deserialize_with = "given")]
+        points: Vec<(f32, f32, f32)>,
+    },
+}
+
+fn points<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
+    let count = u32::deserialize(from)?;
+    let fits = Pattern::POINTS.contains(&count);
+    fits.then_some(count).ok_or_else(|| D::Error::custom(format!("{count} points; it takes 1 to 65536")))
+}
+
+fn given<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<(f32, f32, f32)>, D::Error> {
+    let points = Vec::<(f32, f32, f32)>::deserialize(from)?;
+    if !Pattern::POINTS.contains(&(points.len() as u32)) {
+        return Err(D::Error::custom(format!("{} points; it takes 1 to 65536", points.len())));
+    }
+    match points.iter().position(|&point| !in_range(point)) {
+        Some(index) => Err(D::Error::custom(format!(
+            "point {index} lies outside [-1, 1] in u or v, or outside [0, 1) in t"
+        ))),
+        None => Ok(points),
+    }
+}
+
+fn in_range((u, v, t): (f32, f32, f32)) -> bool {
+    Sample { u, v, t, ..Sample::default() }.is_in_range()
+}
+
+/// The dimension of a number in the Sobol sequence and in hashes.
+const X: usize = 0;
+const Y: usize = 1;
+const U: usize = 2;
+const V: usize = 3;
+const T: usize = 4;
+
+impl Pattern {
+    /// How many points a fixed set may have.
+    pub const POINTS: std::ops::RangeInclusive<u32> = 1..=65_536;
+
+    /// Whether `u, v` are places on the lens already rather than in the unit square.
+    pub(super) fn is_on_lens(&self) -> bool {
+        matches!(self, Self::Given { .. })
+    }
+
+    /// Whether the pattern can be: its points in number and range.
+    pub(super) fn is_sane(&self) -> bool {
+        match self {
+            Self::Interleaved { points } => Self::POINTS.contains(points),
+            Self::Given { points } => {
+                Self::POINTS.contains(&(points.len() as u32)) && points.iter().all(|&point| in_range(point))
+            }
+            _ => true,
+        }
+    }
+
+    /// Fills the samples of pixel (`px`, `py`) of a block `side` pixels wide, `u, v` in the unit square unless
+    /// [`Self::is_on_lens`].
+    pub(super) fn fill(&self, seed: u64, [px, py]: [u32; 2], side: u32, into: &mut [Sample]) {
+        let pixel = py * side + px;
+        let run = z_curve(px, py) * into.len() as u64;
+        if matches!(self, Self::Jittered) {
+            return jittered(seed, pixel, into);
+        }
+        for (sample, index) in into.iter_mut().zip(0_u32..) {
+            let scrambled =
+                |dim| fraction(owen(sobol(index, dim), word(seed, pixel.into(), dim as u64) as u32));
+            let all = |of: &dyn Fn(usize) -> f32| from_array([X, Y, U, V, T].map(of));
+            let in_set = |count: usize| ((run + u64::from(index)) % count as u64) as u32;
+            let here = Sample { x: scrambled(X), y: scrambled(Y), ..Sample::default() };
+            *sample = match self {
+                Self::Owen => all(&scrambled),
+                Self::Sobol => all(&|dim| fraction(sobol(index, dim))),
+                Self::Random | Self::Jittered => all(&|dim| random(seed, pixel, index, dim)),
+                Self::Interleaved { points } => {
+                    let at = in_set(*points as usize);
+                    let set = |dim| fraction(owen(sobol(at, dim), word(seed, u64::MAX, dim as u64) as u32));
+                    Sample { u: set(U), v: set(V), t: set(T), ..here }
+                }
+                Self::Given { points } => {
+                    let (u, v, t) = points[in_set(points.len()) as usize];
+                    Sample { u, v, t, ..here }
+                }
+            };
+        }
+    }
+}
+
+fn from_array([x, y, u, v, t]: [f32; 5]) -> Sample {
+    Sample { x, y, u, v, t }
+}
+
+/// 24 bits, so that the fraction is exact in f32 and below one.
+fn fraction(bits: u32) -> f32 {
+    (bits >> 8) as f32 / 16_777_216.0
+}
+
+fn random(seed: u64, pixel: u32, index: u32, dim: usize) -> f32 {
+    fraction((word(word(seed, pixel.into(), index.into()), dim as u64, 0) >> 32) as u32)
+}
+
+/// The place of a pixel on a Z-curve: the bits of its column and row in turn (Morton 1966).
+fn z_curve(px: u32, py: u32) -> u64 {
+    (0..32).fold(0, |code, bit| {
+        let [x, y] = [px, py].map(|c| u64::from(c >> bit & 1));
+        code | x << (2 * bit) | y << (2 * bit + 1)
+    })
+}
+
+fn jittered(seed: u64, pixel: u32, into: &mut [Sample]) {
+    let count = into.len() as u32;
+    let columns = columns(count);
+    let rows = count / columns;
+    let [lens, time] = [U, T].map(|dim| shuffled(seed, pixel, count, dim));
+    for (sample, index) in into.iter_mut().zip(0_u32..) {
+        let r = |dim| f64::from(random(seed, pixel, index, dim));
+        let within = |cell: u32, of: u32, dim| below_one((f64::from(cell) + r(dim)) / f64::from(of));
+        let (on_lens, at) = (lens[index as usize], time[index as usize]);
+        *sample = Sample {
+            x: within(index % columns, columns, X),
+            y: within(index / columns, rows, Y),
+            u: within(on_lens % columns, columns, U),
+            v: within(on_lens / columns, rows, V),
+            t: within(at, count, T),
+        };
+    }
+}
+
+fn below_one(value: f64) -> f32 {
+    (value as f32).min(1.0 - f32::EPSILON / 2.0)
+}
+
+/// The largest divisor of `count` up to its root: the cells are as square as can be.
+fn columns(count: u32) -> u32 {
+    (1..=count.isqrt()).rev().find(|&columns| count.is_multiple_of(columns)).unwrap_or(1)
+}
+
+/// The numbers below `count` in a random order (Fisher and Yates 1938, downwards).
+fn shuffled(seed: u64, pixel: u32, count: u32, dim: usize) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..count).collect();
+    for last in (1..count).rev() {
+        let pick = word(word(!seed, pixel.into(), dim as u64), last.into(), 1) % u64::from(last + 1);
+        order.swap(last as usize, pick as usize);
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pixel(pattern: &Pattern, at: [u32; 2], count: usize) -> Vec<Sample> {
+        let mut samples = vec![Sample::default(); count];
+        pattern.fill(9, at, 64, &mut samples);
+        samples
+    }
+
+    fn strata(values: impl Iterator<Item = f32>, count: usize) -> Vec<usize> {
+        let mut strata: Vec<usize> = values.map(|value| (value * count as f32) as usize).collect();
+        strata.sort_unstable();
+        strata
+    }
+
+    #[test]
+    fn jittered_samples_have_a_cell_each() {
+        for count in [1, 4, 7, 12, 16, 256] {
+            let samples = pixel(&Pattern::Jittered, [3, 5], count);
+            let each: Vec<usize> = (0..count).collect();
+            assert_eq!(strata(samples.iter().map(|s| s.t), count), each);
+            let across = columns(count as u32) as usize;
+            let cell = |a: f32, b: f32| {
+                (a * across as f32) as usize + (b * (count / across) as f32) as usize * across
+            };
+            for cells in [|s: &Sample| (s.x, s.y), |s: &Sample| (s.u, s.v)] {
+                let mut found: Vec<usize> = samples.iter().map(cells).map(|(a, b)| cell(a, b)).collect();
+                found.sort_unstable();
+                assert_eq!(found, each, "{count} samples");
+            }
+        }
+    }
+
+    #[test]
+    fn random_samples_are_uniform_and_differ_by_pixel() {
+        let pattern = Pattern::Random;
+        assert_ne!(pixel(&pattern, [0, 0], 4), pixel(&pattern, [1, 0], 4));
+        let all: Vec<Sample> = (0..64).flat_map(|px| pixel(&pattern, [px, 7], 64)).collect();
+        for of in [|s: &Sample| s.x, |s: &Sample| s.y, |s: &Sample| s.u, |s: &Sample| s.v, |s: &Sample| s.t] {
+            let mean = all.iter().map(|s| f64::from(of(s))).sum::<f64>() / 4096.0;
+            // Four standard errors of the mean of 4096 uniform numbers.
+            assert!((mean - 0.5).abs() < 4.0 / (12.0_f64 * 4096.0).sqrt(), "{mean}");
+        }
+    }
+
+    #[test]
+    fn plain_sobol_is_the_same_everywhere() {
+        let here = pixel(&Pattern::Sobol, [0, 0], 4);
+        assert_eq!(here, pixel(&Pattern::Sobol, [40, 9], 4));
+        assert_eq!((here[0], here[1].t), (Sample::default(), 0.5));
+    }
+
+    #[test]
+    fn two_by_two_pixels_share_a_set_of_four_runs() {
+        let pattern = Pattern::Interleaved { points: 64 };
+        let uvt = |s: &Sample| [s.u, s.v, s.t].map(f32::to_bits);
+        let set = |origin: [u32; 2]| {
+            let corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| [origin[0] + x, origin[1] + y]);
+            let mut set: Vec<_> =
+                corners.iter().flat_map(|&at| pixel(&pattern, at, 16)).map(|s| uvt(&s)).collect();
+            set.sort_unstable();
+            set
+        };
+        let mut distinct = set([0, 0]);
+        assert_eq!(set([0, 0]), set([34, 6]), "every block of 2x2 holds the same set");
+        distinct.dedup();
+        assert_eq!(distinct.len(), 64);
+        // With as many samples as points each pixel has them all.
+        let whole = |at| {
+            let mut set: Vec<_> = pixel(&pattern, at, 64).iter().map(uvt).collect();
+            set.sort_unstable();
+            set
+        };
+        assert_eq!(whole([5, 9]), set([0, 0]));
+    }
+
+    #[test]
+    fn given_points_are_taken_as_they_are() {
+        let pattern = Pattern::Given { points: vec![(0.5, -1.0, 0.0), (-0.25, 1.0, 0.75)] };
+        let samples = pixel(&pattern, [1, 0], 3);
+        assert_eq!(samples.iter().map(|s| s.t).collect::<Vec<_>>(), [0.75, 0.0, 0.75]);
+        assert_eq!(samples[0].u, -0.25);
+        assert!(!Pattern::Given { points: vec![(0.0, 0.0, 1.0)] }.is_sane());
+        assert!(!Pattern::Given { points: vec![] }.is_sane());
+    }
+
+    #[test]
+    fn the_z_curve_fills_squares() {
+        let mut first: Vec<u64> = (0..4).flat_map(|y| (0..4).map(move |x| z_curve(x, y))).collect();
+        first.sort_unstable();
+        assert_eq!(first, (0..16).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,22 @@
+//! Each way a chart can fail.
+
+use crate::gpu::GpuError;
+use crate::output::OutputError;
+
+/// Why a chart could not be made.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum ChartError {
+    #[error(transparent)]
+    Scene(#[from] workloads::LoadError),
+    #[error(transparent)]
+    Frame(#[from] workloads::FrameError),
+    #[error(transparent)]
+    Samples(#[from] pipeline::sampling::TableError),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error("the pipeline does not take the scene: {0}")]
+    Pipeline(String),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
