@@ -28,6 +28,7 @@ mod load;
 pub mod material;
 pub mod scene;
 pub mod shapes;
+pub mod stress;
 pub mod visibility;
 
 pub use builtin::builtin_names;

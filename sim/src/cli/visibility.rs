@@ -5,27 +5,14 @@ use std::path::Path;
 
 use pipeline::frame::visibility;
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleTable, Settings, Shader, ShaderCost, ShadingPoint};
+use pipeline::{Cull, Draw, Geometry, LensShape, SampleTable, Settings};
 use serde::Serialize;
-use workloads::visibility::{FixedSamples, M5d, write_hits};
+use workloads::visibility::{FixedSamples, M5d, Unshaded, write_hits};
 
 use super::Failure;
 use super::args::VisibilityArgs;
 use super::terminal::{print, print_json};
 use crate::gpu::GpuSpec;
-
-/// Nothing is shaded: only who is seen matters.
-struct Unshaded;
-
-impl Shader for Unshaded {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
-        glam::Vec3::ZERO
-    }
-}
 
 /// What was found.
 #[derive(Serialize)]

@@ -7,7 +7,9 @@ mod bytes;
 mod hits;
 mod m5d;
 mod table;
+mod unshaded;
 
 pub use hits::write_hits;
 pub use m5d::M5d;
 pub use table::FixedSamples;
+pub use unshaded::Unshaded;
