@@ -4,11 +4,15 @@
 //! - [`gpu`]: a GPU as a file.
 //! - [`timing`]: work packets become activity over time.
 //! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
+//! - [`stress`]: the failure catalogue, each tile test on each family of triangles.
+//! - [`chart`]: gain over cost of methods.
 //! - [`output`]: files, plots, the timeline and the report.
 //! - [`cli`]: the command `quintile`.
 
+pub mod chart;
 pub mod cli;
 pub mod gpu;
 pub mod output;
 pub mod run;
+pub mod stress;
 pub mod timing;

@@ -100,7 +100,7 @@ fn a_wrong_bound_is_noticed_and_a_right_one_is_not() {
         (|b| Some(Box5 { t: short(b.t), ..b }), &["speed", "zero-area", "large-lens"]),
         (|b| Some(Box5 { u: short(b.u), ..b }), &["large-lens", "through-lens"]),
         (|b| Some(Box5 { v: short(b.v), ..b }), &["large-lens", "through-lens"]),
-        (|b| (b.t[1] - b.t[0] > 0.05).then_some(b), &["speed"]),
+        (|b| (b.t[1] - b.t[0] > 0.6).then_some(b), &["speed"]),
     ];
     for (place, (mutant, names)) in mutants.into_iter().enumerate() {
         for name in names {

@@ -21,6 +21,10 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Find the triangle each sample sees and its depth, to be held against another program sample by sample
     Visibility(VisibilityArgs),
+    /// Try each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, width of intervals, cost
+    Stress(StressArgs),
+    /// Chart what a method gains over what it costs
+    Chart(ChartArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
     List(ListArgs),
 }
@@ -116,6 +120,58 @@ pub struct VisibilityArgs {
     /// Print what was found as one line of JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `stress`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile stress slivers --out slivers\n\n\
+    Results are in DIR: plots/, stress.csv and summary.json. Ends with 1 if any method loses a sample.")]
+pub struct StressArgs {
+    /// One family; all without it
+    pub family: Option<String>,
+    /// Folder for the results; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out/stress")]
+    pub out: PathBuf,
+    /// Smaller images, fewer triangles
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads; all cores without it. The results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print summary.json to standard output and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `chart`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile chart tile-tests --scene Fox.glb --out chart")]
+pub struct ChartArgs {
+    /// What to chart
+    #[arg(value_enum)]
+    pub name: ChartName,
+    /// Another scene to chart, by name or file; may be given several times
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Vec<String>,
+    /// Folder for the results; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out/chart")]
+    pub out: PathBuf,
+    /// Smaller images, fewer triangles
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads; all cores without it. The results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print every row as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What can be charted.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ChartName {
+    /// Every combination of tile tests: efficiency and tightness over multiply-adds
+    TileTests,
 }
 
 /// Arguments of `list`.

@@ -1,8 +1,10 @@
 //! The command `quintile`: what was typed, what it means, what is printed.
 
 mod args;
+mod chart;
 mod list;
 mod run;
+mod stress;
 mod terminal;
 mod visibility;
 
@@ -66,5 +68,7 @@ fn dispatch(cli: &Cli) -> Result<(), Failure> {
         Command::Run(args) => run::run(args),
         Command::List(args) => list::list(args),
         Command::Visibility(args) => visibility::run(args),
+        Command::Stress(args) => stress::run(args),
+        Command::Chart(args) => chart::run(args),
     }
 }

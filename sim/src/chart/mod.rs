@@ -1,0 +1,3 @@
+//! `quintile chart NAME`: charts of what a method gains over what it costs.
+
+pub mod tile_tests;
