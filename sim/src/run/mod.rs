@@ -12,6 +12,8 @@ mod measure;
 mod modelled;
 mod options;
 mod pictures;
+mod regime;
+mod regime_warnings;
 mod report;
 mod simulate;
 mod summary;
@@ -29,6 +31,7 @@ pub use error::RunError;
 pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};
+pub use regime::Regime;
 pub use simulate::{Simulated, SimulatedFrame};
 pub use summary::{Detection, Figures, Summary};
 

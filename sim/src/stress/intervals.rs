@@ -60,7 +60,7 @@ impl Pairs {
     pub fn of(subject: &Subject<'_>, most: u64) -> Self {
         let projection = Projection::new(subject.camera, subject.viewport);
         let side = subject.spec.tile_px;
-        let triangles = set_up_all(subject.camera, subject.draws, subject.viewport);
+        let triangles: Vec<_> = set_up_all(subject.camera, subject.draws, subject.viewport).collect();
         let rects: Vec<_> = triangles
             .iter()
             .map(|triangle| bounds(triangle, &projection.shear, subject.viewport).tiles(side))

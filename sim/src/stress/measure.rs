@@ -72,7 +72,7 @@ impl Work {
 }
 
 /// Pairs of triangle and tile whose true interval is found, at full size and where time is short.
-const PAIRS: [u64; 2] = [200, 40];
+const PAIRS: [u64; 2] = [400, 60];
 
 /// Every method on `family` at `value`.
 ///

@@ -8,27 +8,22 @@ use pipeline::traversal::{Box5, TileRect};
 use pipeline::{Camera, Draw, Viewport};
 
 /// The triangles of `draws` that set-up lets pass, numbered through all draws.
-pub fn set_up_all(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport) -> Vec<Triangle> {
+pub fn set_up_all<'a>(
+    camera: &Camera,
+    draws: &'a [Draw<'a>],
+    viewport: Viewport,
+) -> impl Iterator<Item = Triangle> + use<'a> {
     let projection = Projection::new(camera, viewport);
     let half_px = [viewport.width(), viewport.height()].map(|side| 0.5 * side as f32);
-    let mut ready = Vec::new();
-    let mut first = 0;
-    for draw in draws {
-        let geometry = &draw.geometry;
-        for (id, corners) in (first..).zip(geometry.triangles()) {
-            let vertices = corners.map(|v| {
-                let v = v as usize;
-                projection.vertex(geometry.open()[v], geometry.close()[v])
-            });
-            let vertices = [&vertices[0], &vertices[1], &vertices[2]];
-            let outcome = set_up(id, vertices, draw.cull, &projection.shear, projection.near, half_px);
-            if let Outcome::Ready(triangle) = outcome {
-                ready.push(triangle);
-            }
+    let triangles = draws.iter().flat_map(|draw| draw.geometry.triangles().iter().map(move |t| (draw, *t)));
+    (0..).zip(triangles).filter_map(move |(id, (draw, corners))| {
+        let (open, close) = (draw.geometry.open(), draw.geometry.close());
+        let [a, b, c] = corners.map(|v| projection.vertex(open[v as usize], close[v as usize]));
+        match set_up(id, [&a, &b, &c], draw.cull, &projection.shear, projection.near, half_px) {
+            Outcome::Ready(triangle) => Some(triangle),
+            _ => None,
         }
-        first += geometry.triangles().len() as u32;
-    }
-    ready
+    })
 }
 
 /// The triangle each sample sees and the bits of its depth, as [`visibility`](pipeline::frame::visibility) gives them, from
@@ -52,8 +47,8 @@ pub fn within_bounds(
 ) -> Vec<(u32, u32)> {
     const SIDE_PX: u32 = 8;
     let projection = Projection::new(camera, viewport);
-    let mut triangles = set_up_all(camera, draws, viewport);
-    triangles.iter_mut().for_each(|triangle| triangle.moving = true);
+    let triangles: Vec<_> =
+        set_up_all(camera, draws, viewport).map(|ready| Triangle { moving: true, ..ready }).collect();
     let per_pixel = source.per_pixel();
     let mut seen = vec![(u32::MAX, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel as usize];
     let (mut samples, mut hits) = (TileSamples::default(), Hits::default());

@@ -17,7 +17,7 @@ pub(super) const FAMILIES: &[Family] = &[
         paint: shared_edges,
     },
     Family {
-        name: "vertices-on-samples",
+        name: "on-samples",
         what: "still triangles whose corners are samples of the default table",
         parameter: "share of corners",
         values: &[0.0, 0.5, 1.0],
