@@ -1,5 +1,7 @@
 //! `quintile chart tile-tests`: every combination of tile tests on several scenes.
 
+use std::path::Path;
+
 use pipeline::sampling::SampleSource;
 use pipeline::{Camera, Draw, LensShape, SampleTable, Viewport};
 use rayon::prelude::*;
@@ -105,7 +107,8 @@ fn of_scene(name: &str, quick: bool, gpu: &GpuSpec) -> Result<Vec<Row>, RunError
     let draws = frame.draws(&scene)?;
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk)?;
     let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::Setting("size: none".to_owned()))?;
-    rows(scene.name().to_owned(), (&frame.camera, viewport), &samples, &draws, quick, gpu)
+    let label = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
+    rows(label.into_owned(), (&frame.camera, viewport), &samples, &draws, quick, gpu)
 }
 
 fn rows(

@@ -1,8 +1,8 @@
 //! Warnings of scenes that enter the regimes of the failure catalogue: results stay right, but the tests that save work do not.
 
-use activity::{Event, Warning};
+use activity::Warning;
 
-use super::{Plan, Regime, Simulated, SimulatedFrame};
+use super::{Regime, Simulated};
 
 /// Shares of triangles in view from which a regime is worth a word.
 const MOST: f64 = 0.5;
@@ -10,9 +10,9 @@ const MANY: f64 = 0.25;
 const SOME: f64 = 0.1;
 
 /// The warnings of a run, each about the frame that is worst.
-pub(super) fn gather(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
+pub(super) fn gather(simulated: &Simulated) -> Vec<Warning> {
     [
-        behind(plan, simulated),
+        behind(simulated),
         tiny(simulated),
         slivers(simulated),
         fast(simulated),
@@ -33,29 +33,15 @@ fn worst(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<St
         .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
 }
 
-/// Triangles behind the camera plane are tested in every coarse tile of the image: a word where that is half of all such tests.
-fn behind(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
-    let coarse = plan.gpu.pipeline.coarse_tile_px;
-    let bins = u64::from(plan.viewport.width().div_ceil(coarse))
-        * u64::from(plan.viewport.height().div_ceil(coarse));
-    let share = |frame: &SimulatedFrame| {
-        (frame.regime.behind * bins) as f64 / frame.counts[Event::CoarseTilesVisited].max(1) as f64
-    };
-    let frame = simulated.distinct.iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
-    // An image of one coarse tile has no other to test in vain.
-    (bins > 1 && share(frame) >= MOST).then(|| {
-        Warning::new(
-            "behind-camera",
-            format!(
-                "{} of {} triangles in view reach behind the camera (frame {}) and are tested all over the image, which is \
-                 {:.0} % of the tests of coarse tiles: move the camera, or cut large triangles into smaller ones",
-                frame.regime.behind,
-                frame.regime.in_view,
-                frame.index,
-                100.0 * share(frame)
-            ),
-        )
-    })
+fn behind(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, SOME, |regime| regime.behind)?;
+    Some(Warning::new(
+        "behind-camera",
+        format!(
+            "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
+             or cut large triangles into smaller ones"
+        ),
+    ))
 }
 
 fn tiny(simulated: &Simulated) -> Option<Warning> {

@@ -21,7 +21,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(short_frames(measurement));
     all.extend(detection(measurement));
     all.extend(clipped(measurement));
-    all.extend(regime_warnings::gather(plan, simulated));
+    all.extend(regime_warnings::gather(simulated));
     all.sort();
     all.dedup();
     all

@@ -34,7 +34,7 @@ pub(super) const FAMILIES: &[Family] = &[
     },
     Family {
         name: "layers",
-        what: "moving walls one behind the other, drawn from the back",
+        what: "moving walls one behind the other, the nearest drawn first",
         parameter: "gap over depth",
         values: &[1e-2, 1e-4, 1e-6, 1e-8, 0.0],
         slow: 0,
@@ -143,7 +143,7 @@ fn octahedron_face(steps: i32) -> impl Iterator<Item = (i32, i32, bool)> {
 fn layers(easel: &mut Easel, gap: f64) -> Result<(), StressError> {
     let reach = easel.side();
     for layer in 0..easel.size.triangles {
-        let w = 8.0 * (1.0 - gap * f64::from(layer)).max(0.1);
+        let w = 4.0 * (1.0 + gap * f64::from(layer));
         let lift = easel.between(-0.5, 0.5);
         let places = [DVec2::new(-reach, -reach + lift), DVec2::new(reach, -reach), DVec2::new(lift, reach)];
         let open = places.map(|px| easel.at(px, w));

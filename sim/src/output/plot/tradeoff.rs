@@ -1,9 +1,9 @@
 //! What is gained over what it costs, a panel for each subject, with the front of what nothing else beats.
 
 use super::axis::{Axis, is_drawable};
-use super::palette::{AXIS, INK, MEASURED, MUTED, TRUTH};
+use super::palette::{INK, MEASURED, MUTED, TRUTH};
 use super::panel::{Key, Panel, legend_line};
-use super::picture::{Picture, Text, text};
+use super::picture::{Picture, Point, Text, text};
 
 /// Panels in rows of three.
 #[derive(Clone, Debug)]
@@ -94,26 +94,42 @@ fn dots(panel: &Panel, points: &[&TradeoffPoint], picture: &mut Picture) {
     if front.len() > 1 {
         picture.polyline(front.iter().map(|point| at(point)).collect(), TRUTH.alpha(0.5), 1.5);
     }
-    for point in points.iter().filter(|point| !point.front) {
-        picture.dot(at(point), 3.5, MEASURED.alpha(0.8));
-        let (x, y) = at(point);
-        picture.text(Text { size: 9.5, colour: AXIS, ..text(&point.label, (x + 6.0, y)) });
+    for (colour, radius, of_front) in [(MEASURED.alpha(0.8), 3.5, false), (TRUTH, 4.5, true)] {
+        let chosen = || points.iter().filter(|point| point.front == of_front);
+        chosen().for_each(|point| picture.dot(at(point), radius, colour));
+        for (place, label) in labels(chosen().map(|point| (at(point), point.label.as_str()))) {
+            let place = (place.0 + 7.0, if of_front { place.1 - 10.0 } else { place.1 + 10.0 });
+            let (size, colour) = if of_front { (12.0, INK) } else { (10.0, MUTED) };
+            picture.text(Text { size, colour, bold: of_front, ..text(&label, place) });
+        }
     }
-    for point in front {
-        picture.dot(at(point), 4.5, TRUTH);
-        let (x, y) = at(point);
-        picture.text(Text {
-            size: 12.0,
-            colour: MUTED,
-            bold: true,
-            ..text(&point.label, (x + 7.0, y - 9.0))
-        });
+}
+
+/// Labels of points that almost fall together share a place, the first two of them in full.
+fn labels<'a>(points: impl Iterator<Item = (Point, &'a str)>) -> Vec<(Point, String)> {
+    let mut placed: Vec<(Point, Vec<&str>)> = Vec::new();
+    for (at, label) in points {
+        let near = |place: &Point| (place.0 - at.0).abs() < 60.0 && (place.1 - at.1).abs() < 11.0;
+        match placed.iter_mut().find(|(place, _)| near(place)) {
+            Some((_, names)) => names.push(label),
+            None => placed.push((at, vec![label])),
+        }
     }
+    let joined =
+        |names: &[&str]| names[..names.len().min(2)].join(", ") + if names.len() > 2 { ", …" } else { "" };
+    placed.iter().map(|(at, names)| (*at, joined(names))).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn labels_of_points_that_fall_together_are_joined() {
+        let points = [(0.0, "a"), (3.0, "b"), (200.0, "c"), (5.0, "d")];
+        let placed = labels(points.into_iter().map(|(x, label)| ((x, 10.0), label)));
+        assert_eq!(placed, [((0.0, 10.0), "a, b, …".to_owned()), ((200.0, 10.0), "c".to_owned())]);
+    }
 
     #[test]
     fn points_of_the_front_are_named() {
