@@ -33,10 +33,13 @@ fn no_box_leaves_out_what_truly_touches() {
     }
 }
 
+/// A deliberately wrong bound: what it does to a right one.
+type Mutant = fn(Box5) -> Option<Box5>;
+
 /// Bounds made wrong on purpose: the measurement has to see each of them.
 #[test]
 fn a_box_too_small_is_counted_as_wrong() {
-    let cases: [(&str, usize, fn(Box5) -> Option<Box5>); 4] = [
+    let cases: [(&str, usize, Mutant); 4] = [
         ("speed", 3, |b| Some(Box5 { t: [b.t[0], b.t[1] - 0.01], ..b })),
         ("large-lens", 2, |b| Some(Box5 { u: [b.u[0] + 0.05, b.u[1]], ..b })),
         ("defocus", 3, |b| Some(Box5 { v: [b.v[0], b.v[1] - 0.05], ..b })),
