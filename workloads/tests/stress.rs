@@ -18,7 +18,7 @@ const NOTHING: u32 = u32::MAX;
 fn combinations() -> impl Iterator<Item = Features> {
     (0..16_u8).map(|switches| {
         let on = |bit: u8| switches & (1 << bit) != 0;
-        Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3), ..Features::NONE }
+        Features { side_planes: on(0), edges: on(1), screen: on(2), z_max: on(3) }
     })
 }
 
