@@ -4,6 +4,7 @@
 //! - [`gpu`]: a GPU as a file.
 //! - [`timing`]: work packets become activity over time.
 //! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
+//! - [`stress`]: the failure catalogue, each tile test on each family of triangles.
 //! - [`chart`]: charts of the book, measured and drawn.
 //! - [`output`]: files, plots, the timeline and the report.
 //! - [`visibility`]: what every sample of a scene sees, and how fast.
@@ -14,5 +15,6 @@ pub mod cli;
 pub mod gpu;
 pub mod output;
 pub mod run;
+pub mod stress;
 pub mod timing;
 pub mod visibility;

@@ -5,11 +5,9 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::{SampleLayout, Sighting, Visibility, resolve};
-use pipeline::{
-    Cull, Draw, Features, Geometry, PipelineSpec, Settings, Shader, ShaderCost, ShadingPoint, frame,
-};
+use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, Settings, frame};
 use serde::Serialize;
-use workloads::visibility::VisibilityScene;
+use workloads::visibility::{Unshaded, VisibilityScene};
 
 use crate::gpu::GpuSpec;
 
@@ -42,19 +40,6 @@ struct Run {
     wall_s: f64,
 }
 
-/// Nothing is shaded: only who is seen matters.
-struct Unshaded;
-
-impl Shader for Unshaded {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
-        glam::Vec3::ZERO
-    }
-}
-
 /// Finds what the samples of `source` see of `scene`, `runs` times: with tile tests as the modelled hardware does it, or
 /// without as fast as it goes. Uses the threads of the pool it is called in.
 ///
@@ -81,7 +66,8 @@ fn fastest(scene: &VisibilityScene, source: &dyn SampleSource, geometry: &Geomet
     let layout = SampleLayout::new(&scene.camera, scene.viewport, source, moving);
     let mut visibility = Visibility::new(&layout);
     let before_s = before.elapsed().as_secs_f64();
-    let timed = (0..runs).map(|_| timed(|| resolve(&layout, geometry, Cull::None, &mut visibility)).1).collect();
+    let timed =
+        (0..runs).map(|_| timed(|| resolve(&layout, geometry, Cull::None, &mut visibility)).1).collect();
     let after = Instant::now();
     let seen = visibility.in_image_order(&layout);
     Found { rates: rates(seen.len(), timed, before_s + after.elapsed().as_secs_f64()), seen }

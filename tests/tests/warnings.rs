@@ -15,11 +15,15 @@ const NOT_PROVOKED: [(&str, &str); 1] = [(
 )];
 
 /// Codes brought about by the tests below.
-const PROVOKED: [&str; 21] = [
+const PROVOKED: [&str; 27] = [
     "alpha-ignored",
+    "behind-camera",
+    "blur-beyond-image",
     "camera-ignored",
+    "coordinates-out-of-range",
     "degenerate-triangle",
     "empty-frame",
+    "fast-motion",
     "few-samples",
     "focus-of-fitted-camera",
     "frames-missed",
@@ -33,6 +37,8 @@ const PROVOKED: [&str; 21] = [
     "only-mark",
     "primitive-dropped",
     "short-frame",
+    "sliver-triangles",
+    "sub-sample-triangles",
     "vertex-colors-ignored",
     "weak-separation",
     "window-cut",
@@ -220,6 +226,41 @@ fn a_lens_for_a_camera_placed_by_itself() {
     assert_warns(&run_file("a.ron", focus, &[]), "focus-of-fitted-camera");
     let wide = format!("(objects: [{SPHERE}])");
     assert_warns(&run_file("a.ron", wide, &["--lens", "1", "--focus", "1"]), "lens-leaves-view");
+}
+
+/// Scenes in the regimes of the failure catalogue, and next to each a harmless one of the same kind that is not warned of.
+#[test]
+fn regimes_in_which_tile_tests_pay_little() {
+    let camera = "camera: (position: (0, 0, 5), target: (0, 0, 0))";
+    let scene = |camera: &str, object: &str| format!("({camera}, objects: [{object}])");
+    let floor = |y: &str| format!("(shape: Plane(size: 100), position: (0, {y}, 0))");
+    let moving = |speed: &str| format!("(shape: Sphere(radius: 1, segments: 12), velocity: ({speed}, 0, 0))");
+    let sphere = |segments: &str| format!("(shape: Sphere(radius: 1, segments: {segments}))");
+    let thin = |height: &str| format!("(shape: Box(size: (2, {height}, 2)))");
+    let boxed = |scale: &str| {
+        let camera = format!("camera: (position: (0, 0, 5{scale}), target: (0, 0, 0))");
+        scene(&camera, &format!("(shape: Box(size: (1{scale}, 1{scale}, 1{scale})))"))
+    };
+    let sphere = |segments: &str| scene(camera, &sphere(segments));
+    let (sharp, soft) = (["--lens", "0.1", "--focus", "1"], ["--lens", "100", "--focus", "1"]);
+    let cases: [(&str, String, &[&str], String, &[&str]); 6] = [
+        ("behind-camera", scene(camera, &floor("-1")), &[], sphere("12"), &[]),
+        ("sub-sample-triangles", sphere("1000"), &[], sphere("12"), &[]),
+        ("sliver-triangles", scene(camera, &thin("0.001")), &[], scene(camera, &thin("1")), &[]),
+        ("fast-motion", scene(camera, &moving("2000")), &[], scene(camera, &moving("1")), &[]),
+        ("blur-beyond-image", sphere("12"), &soft, sphere("12"), &sharp),
+        ("coordinates-out-of-range", boxed("e13"), &[], boxed("e3"), &[]),
+    ];
+    let small = ["--size", "160x90", "--frames", "0..2", "--samples", "2"];
+    let run = |scene: &str, args: &[&str]| {
+        let inputs = Inputs::new();
+        quintile!().run(&inputs.put("a.ron", scene), &[&small, args].concat())
+    };
+    for (code, hopeless, args, harmless, quiet) in cases {
+        assert_warns(&run(&hopeless, args), code);
+        let codes = run(&harmless, quiet).warning_codes();
+        assert!(!codes.contains(&code.to_owned()), "{code} without need: {codes:?}");
+    }
 }
 
 /// The reference platform with less time recorded before the first frame and after the last.

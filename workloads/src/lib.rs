@@ -29,6 +29,7 @@ pub mod material;
 mod samples;
 pub mod scene;
 pub mod shapes;
+pub mod stress;
 pub mod visibility;
 
 pub use builtin::builtin_names;

@@ -8,5 +8,4 @@ mod vertex;
 pub use camera::{Camera, CameraError, Lens};
 pub use clip::Clip;
 pub use draw::{Cull, Draw, DrawError, Geometry};
-pub(crate) use vertex::Projection;
-pub use vertex::{MovingVertex, Shear, Viewport};
+pub use vertex::{MovingVertex, Projection, Shear, Viewport};

@@ -79,16 +79,19 @@ impl Shear {
 
 /// A camera fitted to a viewport. Works in `f64` and rounds once, so that equal input gives equal vertices.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Projection {
+pub struct Projection {
     open: DAffine3,
     close: DAffine3,
     scale_px: f64,
     shift_px: [f64; 2],
+    /// The shear of the lens, nothing for a pinhole.
     pub shear: Shear,
+    /// Depth in scene units below which samples are not seen.
     pub near: f32,
 }
 
 impl Projection {
+    /// The projection of `camera` onto an image of the size of `viewport`.
     pub fn new(camera: &Camera, viewport: Viewport) -> Self {
         let height = f64::from(viewport.height);
         let scale_px = 0.5 * height / f64::from(camera.tan_half_height());

@@ -26,6 +26,8 @@ pub enum Command {
     Visibility(VisibilityArgs),
     /// Write a sample table into a file
     Samples(SamplesArgs),
+    /// Try each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, width of intervals, cost
+    Stress(StressArgs),
     /// Measure and draw a chart of the book
     Chart(ChartArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
@@ -175,6 +177,27 @@ pub struct SamplesArgs {
     pub json: bool,
 }
 
+/// Arguments of `stress`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile stress slivers --out slivers\n\n\
+    Results are in DIR: plots/, stress.csv and summary.json. Ends with 1 if any method loses a sample.")]
+pub struct StressArgs {
+    /// One family; all without it
+    pub family: Option<String>,
+    /// Folder for the results; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "out/stress")]
+    pub out: PathBuf,
+    /// Smaller images, fewer triangles
+    #[arg(long)]
+    pub quick: bool,
+    /// Worker threads; all cores without it. The results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print summary.json to standard output and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `chart`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  quintile chart sampling --quick --out charts\n\n\
@@ -183,6 +206,9 @@ pub struct ChartArgs {
     /// Which chart
     #[arg(value_enum, value_name = "NAME")]
     pub chart: ChartArg,
+    /// Another scene for `tile-tests`, by name or file; may be given several times
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Vec<String>,
     /// Smaller images, fewer samples and a coarser reference: seconds instead of minutes
     #[arg(long)]
     pub quick: bool,
@@ -202,6 +228,8 @@ pub struct ChartArgs {
 pub enum ChartArg {
     /// Image error over samples per pixel and over host time, for every sample table
     Sampling,
+    /// Every combination of tile tests: efficiency and tightness over multiply-adds
+    TileTests,
 }
 
 /// Arguments of `list`.
@@ -277,7 +305,8 @@ fn tests(text: &str) -> Result<Features, String> {
     for name in text.split(',').map(|name| name.trim().replace('-', "_")) {
         let names = switches.each_ref().map(|(known, _)| *known).join(", ");
         let switch = switches.iter_mut().find(|(known, _)| *known == name);
-        let (_, on) = switch.ok_or_else(|| format!("`{name}` is no tile test; there are {names}, or all, none, auto"))?;
+        let (_, on) = switch
+            .ok_or_else(|| format!("`{name}` is no tile test; there are {names}, or all, none, auto"))?;
         **on = true;
     }
     if features.facing {
@@ -307,7 +336,11 @@ mod tests {
     fn tile_tests_by_name() {
         assert_eq!(tests("all"), Ok(Features::ALL));
         assert_eq!(tests("edges, z-max"), Ok(Features { edges: true, z_max: true, ..Features::NONE }));
-        assert!(tests("edges,hiz").unwrap_err().contains("`hiz` is no tile test; there are lens_lines, side_planes"));
+        assert!(
+            tests("edges,hiz")
+                .unwrap_err()
+                .contains("`hiz` is no tile test; there are lens_lines, side_planes")
+        );
         assert!(tests("").is_err());
     }
 

@@ -7,8 +7,11 @@ use super::args::{ChartArg, ChartArgs};
 use super::terminal::{print, print_json};
 use crate::chart::ChartError;
 use crate::chart::sampling::{self, Effort, SamplingChart};
+use crate::chart::tile_tests::tile_tests;
+use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
+use crate::run::RunError;
 
 impl From<ChartError> for Failure {
     fn from(error: ChartError) -> Self {
@@ -17,24 +20,43 @@ impl From<ChartError> for Failure {
 }
 
 pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
-    let started = Instant::now();
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
     match args.chart {
-        ChartArg::Sampling => {
-            let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
-            let chart = pool.install(|| sampling::chart(effort, &args.out, &progress))?;
-            if args.json {
-                return print_json(&chart, true);
-            }
-            print(&format!(
-                "{}results: {}\ntook {:.1} s",
-                text(&chart),
-                args.out.display(),
-                started.elapsed().as_secs_f64()
-            ))
-        }
+        ChartArg::Sampling => pool.install(|| chart_sampling(args, &progress)),
+        ChartArg::TileTests => pool.install(|| chart_tile_tests(args, &progress)),
     }
+}
+
+fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    if !args.scene.is_empty() {
+        return Err(Failure {
+            message: "--scene goes with `chart tile-tests`; leave it out".to_owned(),
+            code: 2,
+        });
+    }
+    let started = Instant::now();
+    let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
+    let chart = sampling::chart(effort, &args.out, progress)?;
+    if args.json {
+        return print_json(&chart, true);
+    }
+    let took_s = started.elapsed().as_secs_f64();
+    print(&format!("{}results: {}\ntook {took_s:.1} s", text(&chart), args.out.display()))
+}
+
+fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    let chart = tile_tests(&args.scene, args.quick, progress)?;
+    if args.json {
+        print_json(&chart, true)?
+    } else {
+        print(&chart.text())?
+    }
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    chart.write(dir).map_err(RunError::from)?;
+    let lost = chart.samples_lost();
+    let message = format!("{lost} samples were lost: a test is not conservative; please report it");
+    if lost == 0 { Ok(()) } else { Err(Failure { message, code: 1 }) }
 }
 
 /// Exponents and errors, a row for each scene and table.

@@ -5,6 +5,7 @@ mod chart;
 mod list;
 mod run;
 mod samples;
+mod stress;
 mod terminal;
 mod visibility;
 
@@ -69,6 +70,7 @@ fn dispatch(cli: &Cli) -> Result<(), Failure> {
         Command::List(args) => list::list(args),
         Command::Visibility(args) => visibility::run(args),
         Command::Samples(args) => samples::run(args),
+        Command::Stress(args) => stress::run(args),
         Command::Chart(args) => chart::run(args),
     }
 }

@@ -109,11 +109,9 @@ fn samples(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<Box<dyn Sam
     };
     match args.samples.as_str() {
         "hash" => Ok(Box::new(scene.hashed_samples().ok_or_else(range)?)),
-        "table" => {
-            Ok(Box::new(
-                SampleTable::low_discrepancy(scene.per_pixel, scene.seed, scene.shape).map_err(|_| range())?,
-            ))
-        }
+        "table" => Ok(Box::new(
+            SampleTable::low_discrepancy(scene.per_pixel, scene.seed, scene.shape).map_err(|_| range())?,
+        )),
         file => Ok(Box::new(FixedSamples::load(Path::new(file))?)),
     }
 }

@@ -13,6 +13,8 @@ mod measure;
 mod modelled;
 mod options;
 mod pictures;
+mod regime;
+mod regime_warnings;
 mod report;
 mod simulate;
 mod summary;
@@ -31,6 +33,7 @@ pub use heat::HeatPicture;
 pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};
+pub use regime::Regime;
 pub use simulate::{Simulated, SimulatedFrame};
 pub use summary::{Detection, Figures, Summary};
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use workloads::Frame;
 
 use super::heat::{self, HeatPicture};
+use super::regime::Regime;
 use super::{Plan, RunError};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
@@ -33,6 +34,8 @@ pub struct SimulatedFrame {
     pub lens: bool,
     /// How often each event happened.
     pub counts: Counts,
+    /// Triangles that tile tests are known to be bad at.
+    pub regime: Regime,
     /// Watts over time and joules by part.
     pub power: FramePower,
     /// For how long each unit was busy, in picoseconds.
@@ -144,6 +147,7 @@ fn simulate_frame(
         moving,
         lens: frame.camera.lens().is_some(),
         counts: rendered.counts,
+        regime: Regime::of(&frame.camera, &draws, plan.viewport, plan.samples.per_pixel()),
         power,
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),

@@ -3,7 +3,7 @@
 use activity::{Counts, Event, Warning};
 use traces::frames::Flag;
 
-use super::{Measurement, Plan, Simulated};
+use super::{Measurement, Plan, Simulated, regime_warnings};
 
 /// A frame shorter than this many samples cannot be integrated well: each end is uncertain by a good part of a sample.
 const FEWEST_SAMPLES: f64 = 50.0;
@@ -21,6 +21,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(short_frames(measurement));
     all.extend(detection(measurement));
     all.extend(clipped(measurement));
+    all.extend(regime_warnings::gather(simulated));
     all.sort();
     all.dedup();
     all

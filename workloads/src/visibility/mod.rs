@@ -14,6 +14,7 @@ mod mts;
 mod pair;
 mod scene;
 mod table;
+mod unshaded;
 
 pub use camera::CameraSpec;
 pub use hits::write_hits;
@@ -23,3 +24,4 @@ pub use mesh::MovingMesh;
 pub use mts::{load_mts, parse_mts};
 pub use scene::VisibilityScene;
 pub use table::{FixedSamples, write_samples};
+pub use unshaded::Unshaded;

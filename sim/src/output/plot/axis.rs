@@ -42,11 +42,38 @@ impl Axis {
         axis
     }
 
+    /// A logarithmic axis: `low` and `high`, and the values drawn on it, are powers of ten. At most about eight ticks.
+    pub fn log(name: &str, low: f64, high: f64) -> Self {
+        let (low, high) = (low.min(high) - 0.1, high.max(low) + 0.1);
+        let (first, last) = (libm::ceil(low) as i32, libm::floor(high) as i32);
+        let step = ((last - first) / 8 + 1) as usize;
+        let mut ticks: Vec<_> =
+            (first..=last).step_by(step).map(|power| (f64::from(power), format!("1e{power}"))).collect();
+        if ticks.len() < 2 {
+            // Within one decade: a few plain values.
+            let values =
+                [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].map(|digit| digit * power_of_ten(libm::floor(low) as i32));
+            let values = values.into_iter().flat_map(|value| [value, value * 10.0]);
+            ticks = values
+                .map(|value| (libm::log10(value), format!("{value:.4e}")))
+                .map(|(at, label)| (at, trimmed(&label)))
+                .filter(|(at, _)| (low..=high).contains(at))
+                .collect();
+        }
+        Self { low, high, ticks, label: name.to_owned() }
+    }
+
     /// Where `value` lies, 0 at the low end and 1 at the high one, held to [0, 1].
     pub fn fraction(&self, value: f64) -> f64 {
         let fraction = (value - self.low) / (self.high - self.low);
         if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) }
     }
+}
+
+/// `1.5000e3` as `1.5e3`.
+fn trimmed(label: &str) -> String {
+    let (digits, power) = label.split_once('e').unwrap_or((label, "0"));
+    format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
 fn widened(low: f64, high: f64) -> (f64, f64) {
@@ -115,6 +142,13 @@ mod tests {
             let axis = Axis::new("x", "W", low, high);
             assert!(axis.low < axis.high && !axis.ticks.is_empty(), "{axis:?}");
         }
+    }
+
+    #[test]
+    fn decades_are_ticked() {
+        assert_eq!(labels(&Axis::log("madds", 0.5, 3.2)), ["1e1", "1e2", "1e3"]);
+        assert_eq!(labels(&Axis::log("madds", -20.0, 20.0)).len(), 7);
+        assert_eq!(labels(&Axis::log("madds", 3.15, 3.2)), ["1.5e3"]);
     }
 
     #[test]

@@ -7,6 +7,12 @@
 //! - [`Curves`]: curves on logarithmic axes.
 //! - [`HeatMapPlot`]: where in the image something happens.
 //!
+//! And those of comparisons of methods:
+//!
+//! - [`Matrix`]: costs of methods by what they were tried on.
+//! - [`Sweep`]: several measures along one parameter.
+//! - [`Tradeoff`]: gain over cost with its front.
+//!
 //! Nothing to draw (no samples, no frames, nothing finite) is a plot that says so, never an error. All use of the
 //! `plotters` crate is in `render`.
 
@@ -16,21 +22,27 @@ mod curves;
 mod frame_energy;
 mod frame_power;
 mod heat_map;
+mod matrix;
 mod palette;
 mod panel;
 mod picture;
 mod power_run;
 mod render;
+mod sweep;
+mod tradeoff;
 mod unit_busy;
 
 pub use curves::{Curve, CurvePanel, Curves};
 pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
 pub use frame_power::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile};
+pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;
 pub use power_run::PowerRun;
 pub use render::PlotError;
+pub use sweep::{Sweep, SweepCurve, SweepPanel};
+pub use tradeoff::{Tradeoff, TradeoffPanel, TradeoffPoint};
 pub use unit_busy::{UnitBusy, UnitLane};
 
 #[cfg(test)]

@@ -1,0 +1,31 @@
+//! `quintile stress`.
+
+use super::Failure;
+use super::args::StressArgs;
+use super::terminal::{print, print_json};
+use crate::output::OutDir;
+use crate::output::progress::Progress;
+use crate::run::RunError;
+
+pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
+    let pool = super::threads(args.threads)?;
+    let progress = Progress::new(args.json);
+    let report = pool.install(|| crate::stress::stress(args.family.as_deref(), args.quick, &progress))?;
+    if args.json {
+        print_json(&report.summary(), true)?;
+    } else {
+        print(&report.text())?;
+    }
+    let clean = report.is_clean();
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    report.write(dir).map_err(RunError::from)?;
+    if !args.json {
+        print(&format!("results: {}", args.out.display()))?;
+    }
+    let lost = || Failure {
+        message: "a test is not conservative: samples were lost or boxes are too small; please report it"
+            .to_owned(),
+        code: 1,
+    };
+    if clean { Ok(()) } else { Err(lost()) }
+}

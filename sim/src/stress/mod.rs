@@ -1,0 +1,62 @@
+//! `quintile stress`: the failure catalogue, each method on each family.
+//!
+//! - [`methods`]: the sets of tests compared.
+//! - [`subject`]: what they are tried on, and what every sample has to see.
+//! - [`sweep`], [`truth`]: when a triangle truly touches a tile.
+//! - [`intervals`]: the boxes of tile tests against that.
+//! - [`measure`]: all of it for one value of a family.
+//! - [`report`]: every row, as table, CSV and pictures.
+
+pub mod intervals;
+pub mod measure;
+pub mod methods;
+mod picture;
+pub mod report;
+pub mod subject;
+pub mod sweep;
+pub mod truth;
+
+use rayon::prelude::*;
+use workloads::stress::{Family, Size, families, family};
+
+use crate::gpu::GpuSpec;
+use crate::output::progress::Progress;
+use crate::run::RunError;
+use measure::Row;
+pub use report::Report;
+
+/// Sweeps the family called `only`, or all of them.
+///
+/// # Errors
+/// When there is no such family, or a scene cannot be made.
+pub fn stress(only: Option<&str>, quick: bool, progress: &Progress) -> Result<Report, RunError> {
+    let chosen = choose(only)?;
+    let size = if quick { Size::QUICK } else { Size::FULL };
+    let gpu = GpuSpec::load("reference")?;
+    let cases: Vec<(&'static Family, f64)> = chosen
+        .iter()
+        .flat_map(|&family| family.sweep(quick).iter().map(move |&value| (family, value)))
+        .collect();
+    let bar = progress.bar("values", cases.len() as u64);
+    let rows: Vec<Vec<Row>> = cases
+        .par_iter()
+        .map(|&(family, value)| {
+            let rows = measure::measure(family, value, size, &gpu, &methods::METHODS);
+            bar.inc();
+            rows
+        })
+        .collect::<Result<_, RunError>>()?;
+    Ok(Report { families: chosen, size, rows: rows.into_iter().flatten().collect() })
+}
+
+fn choose(only: Option<&str>) -> Result<Vec<&'static Family>, RunError> {
+    let Some(name) = only else { return Ok(families().collect()) };
+    let unknown = || {
+        let names: Vec<_> = families().map(|family| family.name).collect();
+        RunError::Setting(format!("no family called `{name}`; there are {}", names.join(", ")))
+    };
+    Ok(vec![family(name).ok_or_else(unknown)?])
+}
+
+#[cfg(test)]
+mod tests;
