@@ -36,7 +36,7 @@ pub(super) fn conclude(
     let period_s = trace.period_s();
     let pre_s = placement.marks.first().map_or(0.0, |mark| libm::round(mark.anchor) * period_s);
     let window = Window { pre_s, post_s: placement.samples as f64 * period_s - pre_s };
-    let mut found = Found { starts, frames, end_s: marks.end_s, window, threshold, warnings: Vec::new() };
+    let mut found = Found { starts, frames, end_s: marks.end_s, method: crate::frames::Method::SumOfSquares, window, threshold, warnings: Vec::new() };
     found.warnings = [
         window_cut(placement, &found),
         only_marks(&found),

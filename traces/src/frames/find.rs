@@ -1,6 +1,8 @@
 //! The finder, step by step.
 
 use super::flags::Flags;
+use super::method::Method;
+use super::track::track;
 use super::marks::{MarkError, Marks, Placement, Window};
 use super::minima::spaced_minima;
 use super::profile::summed_squared_difference;
@@ -50,6 +52,8 @@ pub struct Found {
     pub frames: Vec<FrameSpan>,
     /// Where the last frame ends, s.
     pub end_s: f64,
+    /// How it was found.
+    pub method: Method,
     /// The window as compared, after cutting, s.
     pub window: Window,
     /// Which minima were taken, and why.
@@ -97,6 +101,47 @@ impl View<'_> {
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+    find_with(trace, marks, &Options::default())
+}
+
+/// How to search.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Which method.
+    pub method: Method,
+}
+
+/// As [`find`], with a method chosen.
+///
+/// # Errors
+/// [`MarkError`] if the marks do not fit the trace.
+pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+    match options.method {
+        Method::SumOfSquares => find_squares(trace, marks),
+        _ => find_tracked(trace, marks),
+    }
+}
+
+fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+    let placement = marks.place(trace)?;
+    let power: Vec<f64> = trace.powers_w().collect();
+    let tracked = track(&power, &placement);
+    let mark = &placement.marks[0];
+    let starts = tracked.starts.iter().map(|start| {
+        FrameStart {
+            time_s: mark.mark_s + (start.offset as f64 - mark.first as f64) * trace.period_s(),
+            distance_w2: 0.0,
+            confidence: start.confidence,
+            marked: placement.marks.iter().any(|m| m.first == start.offset),
+        }
+    }).collect();
+    let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
+    let mut found = assess::conclude(trace, marks, &placement, starts, nothing);
+    found.method = Method::Tracking;
+    Ok(found)
+}
+
+fn find_squares(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
     let (profile, nearest) = nearest_profile(&power, &placement);

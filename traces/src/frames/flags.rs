@@ -15,11 +15,16 @@ pub enum Flag {
     Short,
     /// Confidence below one half.
     Unsure,
+    /// Its length is about two or more of its neighbours': starts between were not found.
+    Merged,
+    /// It and a neighbour together are as long as the frames around.
+    Split,
 }
 
 impl Flag {
     /// Every flag, in the order in which they are written.
-    pub const ALL: [Self; 5] = [Self::Marked, Self::Last, Self::Long, Self::Short, Self::Unsure];
+    pub const ALL: [Self; 7] =
+        [Self::Marked, Self::Last, Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split];
 
     /// The word in the `flags` column.
     pub fn name(self) -> &'static str {
@@ -29,6 +34,8 @@ impl Flag {
             Self::Long => "long",
             Self::Short => "short",
             Self::Unsure => "unsure",
+            Self::Merged => "merged",
+            Self::Split => "split",
         }
     }
 
