@@ -74,6 +74,7 @@ fn spans(starts: &[FrameStart], end_s: f64) -> Vec<FrameSpan> {
         });
     }
     flag_lengths(&mut frames);
+    flag_merged_and_split(&mut frames);
     frames
 }
 
@@ -85,6 +86,31 @@ fn flag_lengths(frames: &mut [FrameSpan]) {
             frame.flags.insert(Flag::Long);
         } else if duration_s < 0.5 * median_s {
             frame.flags.insert(Flag::Short);
+        }
+    }
+}
+
+/// How many frames on either side tell what a usual length is here.
+const AROUND: usize = 4;
+/// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
+const TWICE: f64 = 1.6;
+
+/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one.
+fn flag_merged_and_split(frames: &mut [FrameSpan]) {
+    let durations_s: Vec<f64> = frames.iter().map(|frame| frame.end_s - frame.start_s).collect();
+    let Some(inner) = durations_s.len().checked_sub(1) else { return };
+    for index in 0..inner {
+        let mut around: Vec<f64> =
+            (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1)).filter(|&i| i != index).map(|i| durations_s[i]).collect();
+        if around.len() < 2 {
+            continue;
+        }
+        around.sort_by(f64::total_cmp);
+        let usual_s = around[around.len() / 2];
+        if durations_s[index] > TWICE * usual_s {
+            frames[index].flags.insert(Flag::Merged);
+        } else if durations_s[index] * TWICE < usual_s {
+            frames[index].flags.insert(Flag::Split);
         }
     }
 }

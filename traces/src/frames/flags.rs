@@ -15,9 +15,9 @@ pub enum Flag {
     Short,
     /// Confidence below one half.
     Unsure,
-    /// Its length is about two or more of its neighbours': starts between were not found.
+    /// Over 1.6 times as long as the frames around it: starts in between may have been missed.
     Merged,
-    /// It and a neighbour together are as long as the frames around.
+    /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
     Split,
 }
 

@@ -1,4 +1,4 @@
-//! The ways to find frames, each built on the one before.
+//! The ways to find frames.
 
 use core::fmt;
 use core::str::FromStr;
@@ -10,27 +10,21 @@ use serde::Serialize;
 pub enum Method {
     /// Sum of squared differences to the marked window, threshold, local minima (Paper III).
     SumOfSquares,
-    /// The same with windows brought to zero mean and unit deviation, so that neither idle power nor clock counts.
-    Normalized,
-    /// The nearest of several windows, learnt from starts that are beyond doubt.
-    Templates,
-    /// The sequence of starts that resembles the templates, itself and an even beat best.
+    /// The sequence of starts that resembles several templates, by shape and by squares, itself, and an even beat best.
     Tracking,
-    /// Sum of squares where that is clear, else tracking.
+    /// Tracking; the sum of squares where there are fewer than 16 frames, or more than 16 million samples and no doubt.
     #[default]
     Auto,
 }
 
 impl Method {
     /// All of them, in order.
-    pub const ALL: [Self; 5] = [Self::SumOfSquares, Self::Normalized, Self::Templates, Self::Tracking, Self::Auto];
+    pub const ALL: [Self; 3] = [Self::SumOfSquares, Self::Tracking, Self::Auto];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::SumOfSquares => "squares",
-            Self::Normalized => "normalized",
-            Self::Templates => "templates",
             Self::Tracking => "tracking",
             Self::Auto => "auto",
         }
@@ -52,5 +46,18 @@ impl FromStr for Method {
             .into_iter()
             .find(|method| method.name() == text)
             .ok_or_else(|| format!("no method {text}: choose one of {}", names()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_read_back_and_others_are_refused_with_the_choice() {
+        for method in Method::ALL {
+            assert_eq!(method.to_string().parse(), Ok(method));
+        }
+        assert_eq!("dtw".parse::<Method>(), Err("no method dtw: choose one of squares, tracking, auto".to_owned()));
     }
 }

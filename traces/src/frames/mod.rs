@@ -12,6 +12,7 @@ mod method;
 mod minima;
 pub mod profile;
 mod refine;
+mod register;
 mod regularity;
 mod split;
 mod threshold;

@@ -1,145 +1,201 @@
-//! prototype
+//! Following the frames outwards from the mark.
+//!
+//! What a frame start looks like changes slowly, so it is learnt where it is known: from the frames around the mark. In rounds the
+//! stretch considered doubles; in each one
+//!
+//! 1. candidates are the local minima of the distance to the nearest template, by shape and by summed squares;
+//! 2. how much a distance says is learnt from the starts found so far and from what lies between them ([`evidence`]);
+//! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a template, alike to the
+//!    one before, and in an even beat that may jump now and then;
+//! 4. starts that their neighbours resemble more than any template does become templates ([`bank`]).
+
 mod bank;
 mod chain;
 mod evidence;
+mod guess;
 
-pub(super) use bank::Bank;
+use super::marks::Placement;
+use super::minima::spaced_minima;
+use bank::Bank;
 use chain::{Chain, Graph};
-use evidence::{Evidence, FEATURES};
-use crate::frames::marks::Placement;
-use crate::frames::minima::spaced_minima;
-use crate::frames::regularity::regularity;
-use crate::frames::split::otsu_tree;
+use evidence::{Evidence, FEATURES, Label};
 
-/// What came out.
+/// How many first-guess periods around a mark the first round looks at.
+const FIRST_PERIODS: usize = 12;
+/// Rounds after the whole trace has been reached.
+const LAST_ROUNDS: usize = 3;
+/// Candidates kept of every stretch of one period.
+const KEPT: usize = 10;
+/// Where the sequence covers less than this share of the stretch considered, power levels have changed.
+const COVERED: f64 = 0.75;
+
+/// What was found.
+#[derive(Debug)]
 pub(super) struct Tracked {
+    /// Offsets of the windows of the starts, in order.
     pub starts: Vec<Start>,
+    /// Median gap between starts, samples.
+    pub period: usize,
+    /// How many templates were in use at the end.
+    pub templates: usize,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// One start.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Start {
+    /// First sample of its window.
     pub offset: usize,
+    /// Least difference of the window to a template, W^2.
+    pub distance_w2: f64,
+    /// Whether the evidence is for it, 0 to 1.
     pub confidence: f64,
 }
 
+/// A local minimum of the distance to the templates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    pub offset: usize,
-    pub features: [f64; FEATURES],
+struct Candidate {
+    offset: usize,
+    features: [f64; FEATURES],
+    weight: f64,
 }
 
+/// Finds the sequence of starts that fits the marked ones.
 pub(super) fn track(power: &[f64], placement: &Placement) -> Tracked {
-    let debug = std::env::var("TRACK_DEBUG").is_ok();
-    let knob = |name: &str, default: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
-    let width = placement.samples;
-    let mut bank = Bank::new(power, width);
-    for mark in &placement.marks {
-        bank.add(&power[mark.first..mark.first + width]);
-    }
-    let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
-    let spacing = (width / 8).max(2);
-    // First guess: the more regular of the two measures at the usual spacing.
-    let mut weights: Vec<f64>;
-    let all = |offset: usize, reach: usize| marks.iter().any(|m| m.abs_diff(offset) <= reach);
-    let (mut period, initial) = first_guess(&bank, width / 2, &marks, 200 * width);
-    let mut reach = knob("REACH", 12.0) as usize * period;
-    let within = |bank: &Bank, reach: usize| -> Vec<Candidate> {
-        let mut candidates = collect(bank, spacing, &marks);
-        candidates.retain(|c| all(c.offset, reach));
-        candidates
-    };
-    let mut candidates = within(&bank, reach);
-    if debug { eprintln!("period {period} of {} candidates, initial {}", candidates.len(), initial.len()); }
-    let near = |offset: usize, set: &[usize]| {
-        let at = set.partition_point(|&o| o < offset);
-        set[at.saturating_sub(1)..(at + 1).min(set.len())].iter().any(|&o| o.abs_diff(offset) < spacing)
-    };
-    let mut chosen: Vec<bool> = candidates.iter().map(|c| near(c.offset, &initial)).collect();
-    let mut evidence = Evidence::learn(&candidates, &chosen);
-    let mut chain = Chain::default();
-    let mut last = knob("LAST", 3.0) as usize;
+    let mut tracker = Tracker::new(power, placement);
+    let mut rounds_left = LAST_ROUNDS;
     loop {
-        candidates = within(&bank, reach);
-        weights = evidence.weights(&candidates, &marks);
-        prune(&mut candidates, &mut weights, period, knob("KEEP", 10.0) as usize, &marks);
-        let graph = Graph::new(&bank, &candidates, &weights, period);
-        chain = graph.best(&bank, knob("PAIR", 1.0), chain.pairing());
-        let offsets: Vec<usize> = chain.nodes.iter().map(|&n| candidates[n].offset).collect();
-        period = median_gap(&offsets).unwrap_or(period);
-        if debug { eprintln!("reach {reach}: chain {} of {} period {period} score {:.1} evidence {:?}", chain.nodes.len(), candidates.len(), chain.score, evidence); }
-        if reach >= power.len() {
-            if last == 0 { break; }
-            last -= 1;
+        tracker.solve();
+        if tracker.reach >= power.len() {
+            if rounds_left == 0 {
+                return tracker.conclude();
+            }
+            rounds_left -= 1;
         }
-        let added = bank.learn(power, &candidates, &chain, knob("LEARN", 6.0) as usize);
-        if debug { eprintln!("  added {added:?}"); }
-        let known = within(&bank, reach);
-        chosen = known.iter().map(|c| near(c.offset, &offsets)).collect();
-        evidence = Evidence::learn(&known, &chosen);
-        reach = (reach as f64 * knob("GROW", 2.0)) as usize;
+        tracker.learn();
+        tracker.reach *= 2;
     }
-    let starts = chain.nodes.iter().map(|&n| Start { offset: candidates[n].offset, confidence: 1.0 }).collect();
-    Tracked { starts }
 }
 
-fn median_gap(offsets: &[usize]) -> Option<usize> {
-    let mut gaps: Vec<usize> = offsets.windows(2).map(|p| p[1] - p[0]).collect();
-    gaps.sort_unstable();
-    gaps.get(gaps.len() / 2).copied()
+/// The state between rounds.
+struct Tracker {
+    bank: Bank,
+    marks: Vec<usize>,
+    spacing: usize,
+    period: usize,
+    reach: usize,
+    candidates: Vec<Candidate>,
+    evidence: Evidence,
+    chain: Chain,
+    /// Once power levels have changed, the sum of squares says nothing more.
+    shape_only: bool,
 }
 
-fn collect(bank: &Bank, spacing: usize, marks: &[usize]) -> Vec<Candidate> {
-    let mut offsets = spaced_minima(&bank.shape, spacing);
-    offsets.extend(spaced_minima(&bank.squares, spacing));
-    offsets.retain(|o| marks.iter().all(|m| m.abs_diff(*o) >= spacing));
-    offsets.extend(marks);
-    offsets.sort_unstable();
-    offsets.dedup_by(|b, a| *b - *a < 3);
-    offsets.into_iter().map(|offset| Candidate { offset, features: bank.features(offset) }).collect()
-}
+impl Tracker {
+    fn new(power: &[f64], placement: &Placement) -> Self {
+        let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
+        let bank = Bank::new(power, placement.samples, &marks);
+        let (period, starts) = guess::first(&bank, (placement.samples / 2).max(1), &marks);
+        let mut tracker = Self {
+            bank,
+            marks,
+            spacing: (placement.samples / 8).max(2),
+            period,
+            reach: FIRST_PERIODS * period,
+            candidates: Vec::new(),
+            evidence: Evidence::default(),
+            chain: Chain::default(),
+            shape_only: false,
+        };
+        tracker.relearn(&starts);
+        tracker
+    }
 
-/// Period and starts from one of the two measures.
-fn first_guess(bank: &Bank, spacing: usize, marks: &[usize], reach: usize) -> (usize, Vec<usize>) {
-    let mut best: (f64, usize, Vec<usize>) = (-1.0, spacing * 2, marks.to_vec());
-    for profile in [&bank.shape, &bank.squares] {
-        let mut minima = spaced_minima(profile, spacing);
-        minima.retain(|o| marks.iter().any(|m| m.abs_diff(*o) <= reach));
-        let usual = median_gap(&minima).unwrap_or(spacing);
-        let mut logs: Vec<f64> = minima.iter().filter(|o| !marks.contains(o)).map(|&o| libm::log(profile[o].max(1e-12))).collect();
-        logs.sort_by(f64::total_cmp);
-        for split in otsu_tree(&logs, 3) {
-            let threshold = libm::exp(0.5 * (logs[split.count - 1] + logs[split.count]));
-            let starts: Vec<usize> = minima.iter().copied().filter(|&o| profile[o] < threshold).collect();
-            let span = minima.last().copied().unwrap_or(0) - minima.first().copied().unwrap_or(0);
-            let Some(gap) = median_gap(&starts) else { continue };
-            let regular = regularity(&starts, span);
-            // as regular as the minima themselves means nothing
-            if (gap as f64) < 1.3 * usual as f64 { continue; }
-            let separation = (split.high.mean - split.low.mean) / (split.low.deviation + split.high.deviation).max(1e-3);
-            let value = regular + 0.1 * separation.min(5.0);
-            if std::env::var("TRACK_DEBUG").is_ok() { eprintln!("  guess {} gap {gap} regular {regular:.3} sep {separation:.2}", starts.len()); }
-            if value > best.0 { best = (value, gap, starts); }
+    /// The best sequence within reach.
+    fn solve(&mut self) {
+        self.candidates = self.collect();
+        for candidate in &mut self.candidates {
+            candidate.weight = self.evidence.weight(candidate, &self.marks);
         }
+        self.prune();
+        self.chain = Graph::new(&self.bank, &self.candidates, self.period).best();
+        let starts = self.starts();
+        self.period = guess::median_gap(&starts).unwrap_or(self.period);
+        let span = |offsets: &[usize]| offsets.last().zip(offsets.first()).map_or(0, |(last, first)| last - first);
+        let all: Vec<usize> = self.candidates.iter().map(|candidate| candidate.offset).collect();
+        self.shape_only |= (span(&starts) as f64) < COVERED * span(&all) as f64;
     }
-    (best.1, best.2)
-}
 
-/// Keeps the most likely candidates of every stretch of a period.
-fn prune(candidates: &mut Vec<Candidate>, weights: &mut Vec<f64>, period: usize, keep: usize, marks: &[usize]) {
-    let mut kept = Vec::new();
-    let mut from = 0;
-    while from < candidates.len() {
-        let block = candidates[from].offset / period.max(1);
-        let mut to = from;
-        while to < candidates.len() && candidates[to].offset / period.max(1) == block { to += 1; }
-        let mut order: Vec<usize> = (from..to).collect();
-        order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
-        for (rank, index) in order.into_iter().enumerate() {
-            if rank < keep || marks.contains(&candidates[index].offset) { kept.push(index); }
-        }
-        from = to;
+    /// New templates, and what distances mean, from the sequence found.
+    fn learn(&mut self) {
+        let starts = self.starts();
+        self.bank.learn(&starts);
+        self.relearn(&starts);
     }
-    kept.sort_unstable();
-    *weights = kept.iter().map(|&i| weights[i]).collect();
-    *candidates = kept.iter().map(|&i| candidates[i]).collect();
+
+    fn relearn(&mut self, starts: &[usize]) {
+        let candidates = self.collect();
+        let labels = self.labels(&candidates, starts);
+        self.evidence = Evidence::learn(&candidates, &labels, self.shape_only);
+    }
+
+    fn starts(&self) -> Vec<usize> {
+        self.chain.nodes.iter().map(|&node| self.candidates[node].offset).collect()
+    }
+
+    /// The minima within reach of a mark, and the marks.
+    fn collect(&self) -> Vec<Candidate> {
+        let mut offsets = spaced_minima(&self.bank.shape, self.spacing);
+        offsets.extend(spaced_minima(&self.bank.squares_w2, self.spacing));
+        offsets.retain(|offset| {
+            let nearest = self.marks.iter().map(|mark| mark.abs_diff(*offset)).min().unwrap_or(0);
+            (self.spacing..=self.reach).contains(&nearest)
+        });
+        offsets.extend(&self.marks);
+        offsets.sort_unstable();
+        offsets.dedup_by(|later, earlier| *later - *earlier < 3);
+        let candidate = |offset| Candidate { offset, features: self.bank.features(offset), weight: 0.0 };
+        offsets.into_iter().map(candidate).collect()
+    }
+
+    /// Starts are examples of starts, what is well away from them of the rest. What is beside them, or what a template was made
+    /// of, is an example of neither.
+    fn labels(&self, candidates: &[Candidate], starts: &[usize]) -> Vec<Label> {
+        let mut labels = vec![Label::Rest; candidates.len()];
+        for &start in starts {
+            let from = candidates.partition_point(|candidate| candidate.offset + 2 * self.spacing <= start);
+            let to = candidates.partition_point(|candidate| candidate.offset < start + 2 * self.spacing);
+            labels[from..to].fill(Label::Neither);
+            let away = |index: &usize| candidates[*index].offset.abs_diff(start);
+            let nearest = (from..to).min_by_key(away).filter(|index| away(index) < self.spacing);
+            if let Some(index) = nearest.filter(|_| !self.bank.own.contains(&start)) {
+                labels[index] = Label::Start;
+            }
+        }
+        labels
+    }
+
+    /// Keeps the likeliest candidates of every stretch of a period, and the marks, which weigh most.
+    fn prune(&mut self) {
+        let period = self.period.max(1);
+        let mut kept = Vec::with_capacity(self.candidates.len());
+        for stretch in self.candidates.chunk_by(|a, b| a.offset / period == b.offset / period) {
+            let mut stretch = stretch.to_vec();
+            stretch.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+            stretch.truncate(KEPT);
+            stretch.sort_by_key(|candidate| candidate.offset);
+            kept.extend(stretch);
+        }
+        self.candidates = kept;
+    }
+
+    fn conclude(self) -> Tracked {
+        let start = |(&node, &support): (&usize, &f64)| {
+            let offset = self.candidates[node].offset;
+            let marked = self.marks.contains(&offset);
+            let confidence = if marked { 1.0 } else { 1.0 / (1.0 + libm::exp(-support)) };
+            Start { offset, distance_w2: self.bank.squares_w2[offset], confidence }
+        };
+        let starts = self.chain.nodes.iter().zip(&self.chain.support).map(start).collect();
+        Tracked { starts, period: self.period, templates: self.bank.templates }
+    }
 }
