@@ -250,7 +250,7 @@ fn nearest_profile(power: &[f64], placement: &Placement) -> (Vec<f64>, Vec<usize
 }
 
 fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<FrameStart> {
-    let start = |mark: &super::marks::Placed| FrameStart {
+    let start = |mark: &Placed| FrameStart {
         time_s: mark.mark_s,
         distance_w2: profile.get(mark.first).copied().unwrap_or(0.0),
         confidence: 1.0,

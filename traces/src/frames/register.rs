@@ -5,8 +5,9 @@
 //! start, and positions `x_i` are chosen to fit all of them: minimize `sum w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with
 //! `c_i` the position by template and marks held fixed. It is solved by Gauss-Seidel sweeps.
 
-/// How many of the following frames each is aligned with.
-const LAGS: usize = 4;
+/// How many frames on are those that each is aligned with. The near ones are most alike; the far ones keep errors from adding up
+/// along the trace.
+const LAGS: [usize; 8] = [1, 2, 3, 4, 8, 16, 32, 64];
 /// Greatest shift tried, samples.
 const SHIFT: usize = 6;
 /// Shares of the window before and after the start that are compared.
@@ -37,7 +38,7 @@ pub(super) fn register(power: &[f64], offsets: &[usize], fixed: &[bool], anchor:
     let (skip, length) = (anchor - before, before + after);
     let mut links = Vec::new();
     for earlier in 0..offsets.len() {
-        for later in earlier + 1..offsets.len().min(earlier + 1 + LAGS) {
+        for later in LAGS.map(|lag| earlier + lag).into_iter().filter(|later| *later < offsets.len()) {
             let measured = shift(power, offsets[earlier] + skip, offsets[later] + skip, length);
             links.extend(measured.map(|(shift, weight)| Link { earlier, later, shift, weight }));
         }

@@ -28,7 +28,6 @@ pub(super) struct Bank {
     pub squares_w2: Vec<f64>,
     /// Starts that templates were made of.
     pub own: Vec<usize>,
-    pub templates: usize,
 }
 
 impl Bank {
@@ -41,7 +40,7 @@ impl Bank {
         let floor = FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;
         let (shape, squares_w2) = (vec![2.0; mean.len()], vec![f64::INFINITY; mean.len()]);
         let mut bank =
-            Self { width, signal, mean, norm, floor, shape, squares_w2, own: Vec::new(), templates: 0 };
+            Self { width, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
         for &mark in marks {
             bank.add(&[mark]);
         }
@@ -68,7 +67,6 @@ impl Bank {
             self.squares_w2[k] = self.squares_w2[k].min(squares.max(0.0));
         }
         self.own.extend(starts);
-        self.templates += 1;
     }
 
     /// The logarithms of the two distances.

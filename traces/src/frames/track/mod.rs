@@ -34,10 +34,6 @@ const COVERED: f64 = 0.75;
 pub(super) struct Tracked {
     /// Offsets of the windows of the starts, in order.
     pub starts: Vec<Start>,
-    /// Median gap between starts, samples.
-    pub period: usize,
-    /// How many templates were in use at the end.
-    pub templates: usize,
 }
 
 /// One start.
@@ -196,6 +192,6 @@ impl Tracker {
             Start { offset, distance_w2: self.bank.squares_w2[offset], confidence }
         };
         let starts = self.chain.nodes.iter().zip(&self.chain.support).map(start).collect();
-        Tracked { starts, period: self.period, templates: self.bank.templates }
+        Tracked { starts }
     }
 }
