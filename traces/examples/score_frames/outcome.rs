@@ -31,8 +31,19 @@ impl Outcome {
         let score = score(&frames, &case.truth, TOLERANCE_S);
         let (wrong, wrong_flagged) = wrong(case, &frames);
         let confidence = frames.iter().map(|frame| frame.confidence).sum::<f64>() / frames.len() as f64;
-        let chosen = format!("{:?} {}", found.method, found.warnings.iter().map(|w| w.code).collect::<Vec<_>>().join(","));
-        Ok(Self { f1: score.f1(), confidence, energy: errors(&score.energy_errors), wrong, wrong_flagged, chosen })
+        let chosen = format!(
+            "{:?} {}",
+            found.method,
+            found.warnings.iter().map(|w| w.code).collect::<Vec<_>>().join(",")
+        );
+        Ok(Self {
+            f1: score.f1(),
+            confidence,
+            energy: errors(&score.energy_errors),
+            wrong,
+            wrong_flagged,
+            chosen,
+        })
     }
 }
 
@@ -41,10 +52,21 @@ pub fn floor(case: &Case) -> Errors {
     let on_grid = |time_s: f64| case.trace.time_s(case.trace.position(time_s).round() as usize);
     let ends_s = case.truth.iter().skip(1).map(|frame| frame.start_s).chain([case.end_s]);
     let integral = PowerIntegral::new(&case.trace);
-    let frames: Vec<FrameEnergy> = case.truth.iter().zip(ends_s).map(|(frame, end_s)| {
-        let (start_s, end_s) = (on_grid(frame.start_s), on_grid(end_s));
-        FrameEnergy { start_s, end_s, energy_j: integral.energy_j(start_s, end_s), confidence: 1.0, flags: Flags::default() }
-    }).collect();
+    let frames: Vec<FrameEnergy> = case
+        .truth
+        .iter()
+        .zip(ends_s)
+        .map(|(frame, end_s)| {
+            let (start_s, end_s) = (on_grid(frame.start_s), on_grid(end_s));
+            FrameEnergy {
+                start_s,
+                end_s,
+                energy_j: integral.energy_j(start_s, end_s),
+                confidence: 1.0,
+                flags: Flags::default(),
+            }
+        })
+        .collect();
     errors(&score(&frames, &case.truth, TOLERANCE_S).energy_errors)
 }
 

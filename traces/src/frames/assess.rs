@@ -36,7 +36,15 @@ pub(super) fn conclude(
     let period_s = trace.period_s();
     let pre_s = placement.marks.first().map_or(0.0, |mark| libm::round(mark.anchor) * period_s);
     let window = Window { pre_s, post_s: placement.samples as f64 * period_s - pre_s };
-    let mut found = Found { starts, frames, end_s: marks.end_s, method: crate::frames::Method::SumOfSquares, window, threshold, warnings: Vec::new() };
+    let mut found = Found {
+        starts,
+        frames,
+        end_s: marks.end_s,
+        method: crate::frames::Method::SumOfSquares,
+        window,
+        threshold,
+        warnings: Vec::new(),
+    };
     found.warnings = [
         window_cut(placement, &found),
         only_marks(&found),
@@ -100,8 +108,10 @@ fn flag_merged_and_split(frames: &mut [FrameSpan]) {
     let durations_s: Vec<f64> = frames.iter().map(|frame| frame.end_s - frame.start_s).collect();
     let Some(inner) = durations_s.len().checked_sub(1) else { return };
     for index in 0..inner {
-        let mut around: Vec<f64> =
-            (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1)).filter(|&i| i != index).map(|i| durations_s[i]).collect();
+        let mut around: Vec<f64> = (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1))
+            .filter(|&i| i != index)
+            .map(|i| durations_s[i])
+            .collect();
         if around.len() < 2 {
             continue;
         }

@@ -1,14 +1,14 @@
 //! The finder, step by step.
 
-use super::flags::Flags;
-use super::method::Method;
-use super::register::register;
-use super::track::{Start, track};
-use super::marks::{MarkError, Marks, Placed, Placement, Window};
-use super::minima::spaced_minima;
 use super::correlate::squares;
+use super::flags::Flags;
+use super::marks::{MarkError, Marks, Placed, Placement, Window};
+use super::method::Method;
+use super::minima::spaced_minima;
+use super::register::register;
 use super::regularity::regularity;
 use super::threshold::{Threshold, choose};
+use super::track::{Start, track};
 use super::{assess, refine};
 use crate::trace::Trace;
 use crate::warning::Warning;
@@ -232,10 +232,7 @@ fn spacing(window_samples: usize) -> usize {
 /// The smallest distance to any mark's window at each offset, and with several marks which one it was.
 fn nearest_profile(power: &[f64], placement: &Placement) -> (Vec<f64>, Vec<usize>) {
     let template = |first: usize| &power[first..first + placement.samples];
-    let mut profile = placement
-        .marks
-        .first()
-        .map_or(Vec::new(), |mark| squares(power, template(mark.first)));
+    let mut profile = placement.marks.first().map_or(Vec::new(), |mark| squares(power, template(mark.first)));
     let mut nearest = Vec::new();
     for (index, mark) in placement.marks.iter().enumerate().skip(1) {
         nearest.resize(profile.len(), 0);

@@ -58,6 +58,9 @@ mod tests {
         for method in Method::ALL {
             assert_eq!(method.to_string().parse(), Ok(method));
         }
-        assert_eq!("dtw".parse::<Method>(), Err("no method dtw: choose one of squares, tracking, auto".to_owned()));
+        assert_eq!(
+            "dtw".parse::<Method>(),
+            Err("no method dtw: choose one of squares, tracking, auto".to_owned())
+        );
     }
 }

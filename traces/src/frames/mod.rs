@@ -20,6 +20,6 @@ mod track;
 
 pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_only};
 pub use flags::{Flag, Flags};
-pub use method::Method;
 pub use marks::{MarkError, Marks, Window, default_window};
+pub use method::Method;
 pub use threshold::{Population, Rule, Threshold};

@@ -39,8 +39,7 @@ impl Bank {
         let total: f64 = signal.iter().map(|x| x * x).sum();
         let floor = FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;
         let (shape, squares_w2) = (vec![2.0; mean.len()], vec![f64::INFINITY; mean.len()]);
-        let mut bank =
-            Self { width, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
+        let mut bank = Self { width, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
         for &mark in marks {
             bank.add(&[mark]);
         }
@@ -62,7 +61,8 @@ impl Bank {
         template.iter_mut().for_each(|x| *x /= norm);
         for (k, c) in Correlator::new(&template).correlate(&self.signal).into_iter().enumerate() {
             let offset = self.mean[k] - mean;
-            let squares = self.norm[k] * self.norm[k] + norm * norm - 2.0 * c * norm + width * offset * offset;
+            let squares =
+                self.norm[k] * self.norm[k] + norm * norm - 2.0 * c * norm + width * offset * offset;
             self.shape[k] = self.shape[k].min(1.0 - c / (self.norm[k] + self.floor));
             self.squares_w2[k] = self.squares_w2[k].min(squares.max(0.0));
         }
@@ -94,7 +94,8 @@ impl Bank {
     pub fn learn(&mut self, starts: &[usize]) {
         for _ in 0..MOST_A_ROUND {
             let novelty = |three: &[usize]| {
-                let uneven = libm::log((three[2] - three[1]) as f64 / (three[1] - three[0]) as f64).abs() > EVEN;
+                let uneven =
+                    libm::log((three[2] - three[1]) as f64 / (three[1] - three[0]) as f64).abs() > EVEN;
                 let alike = f64::min(self.alike(three[0], three[1]), self.alike(three[1], three[2]));
                 if uneven { f64::NEG_INFINITY } else { alike - (1.0 - self.shape[three[1]]) }
             };

@@ -1,7 +1,7 @@
 //! The best sequence of starts, by dynamic programming over pairs of neighbours (Bellman 1957).
 
-use super::bank::Bank;
 use super::Candidate;
+use super::bank::Bank;
 
 /// Least and greatest distance of neighbours, in periods. What is farther apart begins a new stretch.
 const REACH: [f64; 2] = [0.45, 2.3];

@@ -47,7 +47,8 @@ impl Evidence {
             pooled[i][i] += 1e-4 + SHRINKAGE[i] * total[i][i];
         }
         let apart = [m1[0] - m0[0], m1[1] - m0[1]];
-        let direction = if shape_only { [(apart[0] / pooled[0][0]).min(0.0), 0.0] } else { discriminant(pooled, apart) };
+        let direction =
+            if shape_only { [(apart[0] / pooled[0][0]).min(0.0), 0.0] } else { discriminant(pooled, apart) };
         let middle = (0..FEATURES).map(|i| direction[i] * 0.5 * (m1[i] + m0[i])).sum();
         Self { direction, middle }
     }
@@ -65,10 +66,8 @@ impl Evidence {
 /// `S^-1 d`; if that would count a greater distance for a start, the better feature alone.
 fn discriminant(s: [[f64; FEATURES]; FEATURES], d: [f64; FEATURES]) -> [f64; FEATURES] {
     let determinant = s[0][0] * s[1][1] - s[0][1] * s[1][0];
-    let both = [
-        (s[1][1] * d[0] - s[0][1] * d[1]) / determinant,
-        (s[0][0] * d[1] - s[1][0] * d[0]) / determinant,
-    ];
+    let both =
+        [(s[1][1] * d[0] - s[0][1] * d[1]) / determinant, (s[0][0] * d[1] - s[1][0] * d[0]) / determinant];
     if both[0] <= 0.0 && both[1] <= 0.0 {
         return both;
     }

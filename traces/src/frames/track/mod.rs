@@ -116,7 +116,8 @@ impl Tracker {
         self.chain = Graph::new(&self.bank, &self.candidates, self.period).best();
         let starts = self.starts();
         self.period = guess::median_gap(&starts).unwrap_or(self.period);
-        let span = |offsets: &[usize]| offsets.last().zip(offsets.first()).map_or(0, |(last, first)| last - first);
+        let span =
+            |offsets: &[usize]| offsets.last().zip(offsets.first()).map_or(0, |(last, first)| last - first);
         let all: Vec<usize> = self.candidates.iter().map(|candidate| candidate.offset).collect();
         self.shape_only |= (span(&starts) as f64) < COVERED * span(&all) as f64;
     }
