@@ -13,7 +13,7 @@ const LAGS: [usize; 8] = [1, 2, 3, 4, 8, 16, 32, 64];
 const SHIFT: usize = 6;
 /// Shares of the window before and after the start that are compared.
 const SHARES: [f64; 2] = [0.02, 0.2];
-/// Least number of samples compared.
+/// Least number of samples compared after the start, and half as many before, as the offset to be mended may put the edge there.
 const LEAST: usize = 8;
 /// Weight of a position by template, per squared sample.
 const TEMPLATE: f64 = 0.05;
@@ -40,7 +40,7 @@ pub(super) fn register(
     anchor: usize,
     width: usize,
 ) -> Vec<f64> {
-    let before = ((SHARES[0] * width as f64) as usize).min(anchor);
+    let before = ((SHARES[0] * width as f64) as usize).max(LEAST / 2).min(anchor);
     let after = ((SHARES[1] * width as f64) as usize).max(LEAST).min(width - anchor.min(width - 1));
     let (skip, length) = (anchor - before, before + after);
     let mut links = Vec::new();
