@@ -36,7 +36,15 @@ pub(super) fn conclude(
     let period_s = trace.period_s();
     let pre_s = placement.marks.first().map_or(0.0, |mark| libm::round(mark.anchor) * period_s);
     let window = Window { pre_s, post_s: placement.samples as f64 * period_s - pre_s };
-    let mut found = Found { starts, frames, end_s: marks.end_s, window, threshold, warnings: Vec::new() };
+    let mut found = Found {
+        starts,
+        frames,
+        end_s: marks.end_s,
+        method: crate::frames::Method::SumOfSquares,
+        window,
+        threshold,
+        warnings: Vec::new(),
+    };
     found.warnings = [
         window_cut(placement, &found),
         only_marks(&found),
@@ -74,6 +82,7 @@ fn spans(starts: &[FrameStart], end_s: f64) -> Vec<FrameSpan> {
         });
     }
     flag_lengths(&mut frames);
+    flag_merged_and_split(&mut frames);
     frames
 }
 
@@ -85,6 +94,33 @@ fn flag_lengths(frames: &mut [FrameSpan]) {
             frame.flags.insert(Flag::Long);
         } else if duration_s < 0.5 * median_s {
             frame.flags.insert(Flag::Short);
+        }
+    }
+}
+
+/// How many frames on either side tell what a usual length is here.
+const AROUND: usize = 4;
+/// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
+const TWICE: f64 = 1.6;
+
+/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one.
+fn flag_merged_and_split(frames: &mut [FrameSpan]) {
+    let durations_s: Vec<f64> = frames.iter().map(|frame| frame.end_s - frame.start_s).collect();
+    let Some(inner) = durations_s.len().checked_sub(1) else { return };
+    for index in 0..inner {
+        let mut around: Vec<f64> = (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1))
+            .filter(|&i| i != index)
+            .map(|i| durations_s[i])
+            .collect();
+        if around.len() < 2 {
+            continue;
+        }
+        around.sort_by(f64::total_cmp);
+        let usual_s = around[around.len() / 2];
+        if durations_s[index] > TWICE * usual_s {
+            frames[index].flags.insert(Flag::Merged);
+        } else if durations_s[index] * TWICE < usual_s {
+            frames[index].flags.insert(Flag::Split);
         }
     }
 }

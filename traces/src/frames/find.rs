@@ -1,17 +1,24 @@
 //! The finder, step by step.
 
+use super::correlate::squares;
 use super::flags::Flags;
-use super::marks::{MarkError, Marks, Placement, Window};
+use super::marks::{MarkError, Marks, Placed, Placement, Window};
+use super::method::Method;
 use super::minima::spaced_minima;
-use super::profile::summed_squared_difference;
+use super::register::register;
 use super::regularity::regularity;
 use super::threshold::{Threshold, choose};
+use super::track::{Start, track};
 use super::{assess, refine};
 use crate::trace::Trace;
 use crate::warning::Warning;
 
 /// How far, in samples, refinement may move a start from the lowest offset of the profile.
 pub(super) const REACH: usize = 2;
+/// With fewer starts than this there is too little to learn from: [`Method::Auto`] keeps the sum of squares.
+const FEW: usize = 16;
+/// Traces of more samples are tracked by [`Method::Auto`] only where the sum of squares is in doubt.
+const LONG: usize = 1 << 24;
 /// How many values a median over the whole trace is taken from.
 const MEDIAN_OF: usize = 65_536;
 
@@ -50,6 +57,8 @@ pub struct Found {
     pub frames: Vec<FrameSpan>,
     /// Where the last frame ends, s.
     pub end_s: f64,
+    /// How it was found.
+    pub method: Method,
     /// The window as compared, after cutting, s.
     pub window: Window,
     /// Which minima were taken, and why.
@@ -88,7 +97,8 @@ impl View<'_> {
     }
 }
 
-/// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end mark.
+/// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end mark, by
+/// [`Method::Auto`].
 ///
 /// A start is at `mark + offset of the best alignment`: the marks themselves are exact by definition, and a mark set
 /// late by some microseconds makes every start late by as many. Starts nearer to the end mark than a quarter of the
@@ -97,6 +107,61 @@ impl View<'_> {
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+    find_with(trace, marks, &Options::default())
+}
+
+/// How to search.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Which method.
+    pub method: Method,
+}
+
+/// As [`find`], with a method chosen.
+///
+/// # Errors
+/// [`MarkError`] if the marks do not fit the trace.
+pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+    match options.method {
+        Method::SumOfSquares => find_squares(trace, marks),
+        Method::Tracking => find_tracked(trace, marks),
+        Method::Auto => {
+            let found = find_squares(trace, marks)?;
+            let few = found.starts.len() < FEW;
+            let long_and_clear = trace.samples() > LONG && found.threshold.clarity() >= 1.0;
+            if few || long_and_clear { Ok(found) } else { find_tracked(trace, marks) }
+        }
+    }
+}
+
+/// By the sequence of starts that fits best.
+fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+    let placement = marks.place(trace)?;
+    let power: Vec<f64> = trace.powers_w().collect();
+    let tracked = track(&power, &placement);
+    let offsets: Vec<usize> = tracked.starts.iter().map(|start| start.offset).collect();
+    let marked: Vec<Option<&Placed>> =
+        offsets.iter().map(|offset| placement.marks.iter().find(|mark| mark.first == *offset)).collect();
+    let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
+    let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
+    let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
+    let start = |((start, position), marked): ((&Start, f64), &Option<&Placed>)| FrameStart {
+        time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
+        distance_w2: start.distance_w2,
+        confidence: start.confidence,
+        marked: marked.is_some(),
+    };
+    let mut starts: Vec<FrameStart> = tracked.starts.iter().zip(positions).zip(&marked).map(start).collect();
+    starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
+    let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
+    starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
+    let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
+    let mut found = assess::conclude(trace, marks, &placement, starts, nothing);
+    found.method = Method::Tracking;
+    Ok(found)
+}
+
+fn find_squares(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
     let (profile, nearest) = nearest_profile(&power, &placement);
@@ -167,14 +232,11 @@ fn spacing(window_samples: usize) -> usize {
 /// The smallest distance to any mark's window at each offset, and with several marks which one it was.
 fn nearest_profile(power: &[f64], placement: &Placement) -> (Vec<f64>, Vec<usize>) {
     let template = |first: usize| &power[first..first + placement.samples];
-    let mut profile = placement
-        .marks
-        .first()
-        .map_or(Vec::new(), |mark| summed_squared_difference(power, template(mark.first)));
+    let mut profile = placement.marks.first().map_or(Vec::new(), |mark| squares(power, template(mark.first)));
     let mut nearest = Vec::new();
     for (index, mark) in placement.marks.iter().enumerate().skip(1) {
         nearest.resize(profile.len(), 0);
-        let other = summed_squared_difference(power, template(mark.first));
+        let other = squares(power, template(mark.first));
         for ((lowest, which), value) in profile.iter_mut().zip(&mut nearest).zip(other) {
             if value < *lowest {
                 (*lowest, *which) = (value, index);
@@ -185,7 +247,7 @@ fn nearest_profile(power: &[f64], placement: &Placement) -> (Vec<f64>, Vec<usize
 }
 
 fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<FrameStart> {
-    let start = |mark: &super::marks::Placed| FrameStart {
+    let start = |mark: &Placed| FrameStart {
         time_s: mark.mark_s,
         distance_w2: profile.get(mark.first).copied().unwrap_or(0.0),
         confidence: 1.0,

@@ -15,11 +15,16 @@ pub enum Flag {
     Short,
     /// Confidence below one half.
     Unsure,
+    /// Over 1.6 times as long as the frames around it: starts in between may have been missed.
+    Merged,
+    /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
+    Split,
 }
 
 impl Flag {
     /// Every flag, in the order in which they are written.
-    pub const ALL: [Self; 5] = [Self::Marked, Self::Last, Self::Long, Self::Short, Self::Unsure];
+    pub const ALL: [Self; 7] =
+        [Self::Marked, Self::Last, Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split];
 
     /// The word in the `flags` column.
     pub fn name(self) -> &'static str {
@@ -29,6 +34,8 @@ impl Flag {
             Self::Long => "long",
             Self::Short => "short",
             Self::Unsure => "unsure",
+            Self::Merged => "merged",
+            Self::Split => "split",
         }
     }
 

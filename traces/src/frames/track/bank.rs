@@ -1,0 +1,126 @@
+//! Templates, and the nearest of them at every offset.
+
+use super::super::correlate::Correlator;
+use super::FEATURES;
+
+/// At most so many templates are added in one round.
+const MOST_A_ROUND: usize = 6;
+/// Neighbours must resemble a start by this much more (in correlation) than any template does.
+const NEW: f64 = 0.08;
+/// The gaps before and after a start that is to be a template differ by less than this share.
+const EVEN: f64 = 0.1;
+/// Added to the norm of every window, as a share of the whole trace's deviation, so that steady windows resemble nothing.
+const FLOOR: f64 = 1e-3;
+
+/// The templates' distances to the trace.
+pub(super) struct Bank {
+    width: usize,
+    /// Power less its mean over the trace, W.
+    signal: Vec<f64>,
+    /// Of each window.
+    mean: Vec<f64>,
+    /// Of each window, about its mean.
+    norm: Vec<f64>,
+    floor: f64,
+    /// One less the correlation coefficient with the nearest template, at every offset.
+    pub shape: Vec<f64>,
+    /// Summed squared difference to the nearest template, W^2, at every offset.
+    pub squares_w2: Vec<f64>,
+    /// Starts that templates were made of.
+    pub own: Vec<usize>,
+}
+
+impl Bank {
+    /// The windows at `marks` are the first templates.
+    pub fn new(power: &[f64], width: usize, marks: &[usize]) -> Self {
+        let centre = power.iter().sum::<f64>() / power.len() as f64;
+        let signal: Vec<f64> = power.iter().map(|watts| watts - centre).collect();
+        let (mean, norm) = windows(&signal, width);
+        let total: f64 = signal.iter().map(|x| x * x).sum();
+        let floor = FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;
+        let (shape, squares_w2) = (vec![2.0; mean.len()], vec![f64::INFINITY; mean.len()]);
+        let mut bank = Self { width, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
+        for &mark in marks {
+            bank.add(&[mark]);
+        }
+        bank
+    }
+
+    /// Adds the mean of the windows at `starts` as a template.
+    fn add(&mut self, starts: &[usize]) {
+        let width = self.width as f64;
+        let mut template = vec![0.0; self.width];
+        for &start in starts {
+            for (sum, value) in template.iter_mut().zip(&self.signal[start..]) {
+                *sum += value / starts.len() as f64;
+            }
+        }
+        let mean = template.iter().sum::<f64>() / width;
+        template.iter_mut().for_each(|x| *x -= mean);
+        let norm = libm::sqrt(template.iter().map(|x| x * x).sum()) + f64::MIN_POSITIVE;
+        template.iter_mut().for_each(|x| *x /= norm);
+        for (k, c) in Correlator::new(&template).correlate(&self.signal).into_iter().enumerate() {
+            let offset = self.mean[k] - mean;
+            let squares =
+                self.norm[k] * self.norm[k] + norm * norm - 2.0 * c * norm + width * offset * offset;
+            self.shape[k] = self.shape[k].min(1.0 - c / (self.norm[k] + self.floor));
+            self.squares_w2[k] = self.squares_w2[k].min(squares.max(0.0));
+        }
+        self.own.extend(starts);
+    }
+
+    /// The logarithms of the two distances.
+    pub fn features(&self, offset: usize) -> [f64; FEATURES] {
+        let least_w2 = 1e3 * self.floor * self.floor;
+        [libm::log(self.shape[offset].max(1e-4)), libm::log(self.squares_w2[offset].max(least_w2))]
+    }
+
+    /// Correlation coefficient of two windows of the trace.
+    pub fn alike(&self, a: usize, b: usize) -> f64 {
+        let (x, y) = (&self.signal[a..a + self.width], &self.signal[b..b + self.width]);
+        let mut lanes = [0.0; 8];
+        let (x8, y8) = (x.chunks_exact(8), y.chunks_exact(8));
+        let rest: f64 = x8.remainder().iter().zip(y8.remainder()).map(|(p, q)| p * q).sum();
+        for (p, q) in x8.zip(y8) {
+            for (lane, (p, q)) in lanes.iter_mut().zip(p.iter().zip(q)) {
+                *lane += p * q;
+            }
+        }
+        let dot = lanes.iter().sum::<f64>() + rest - self.width as f64 * self.mean[a] * self.mean[b];
+        dot / ((self.norm[a] + self.floor) * (self.norm[b] + self.floor))
+    }
+
+    /// Makes templates of starts that sit in an even beat and that their neighbours resemble more than any template does.
+    pub fn learn(&mut self, starts: &[usize]) {
+        for _ in 0..MOST_A_ROUND {
+            let novelty = |three: &[usize]| {
+                let uneven =
+                    libm::log((three[2] - three[1]) as f64 / (three[1] - three[0]) as f64).abs() > EVEN;
+                let alike = f64::min(self.alike(three[0], three[1]), self.alike(three[1], three[2]));
+                if uneven { f64::NEG_INFINITY } else { alike - (1.0 - self.shape[three[1]]) }
+            };
+            let newest = starts.windows(3).map(|three| (novelty(three), three));
+            match newest.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((novelty, three)) if novelty > NEW => self.add(three),
+                _ => return,
+            }
+        }
+    }
+}
+
+/// Mean and norm about the mean of every window, by running sums.
+fn windows(signal: &[f64], width: usize) -> (Vec<f64>, Vec<f64>) {
+    let count = signal.len() - width + 1;
+    let (mut means, mut norms) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let mut sum: f64 = signal[..width].iter().sum();
+    let mut squares: f64 = signal[..width].iter().map(|x| x * x).sum();
+    for first in 0..count {
+        means.push(sum / width as f64);
+        norms.push(libm::sqrt((squares - sum * sum / width as f64).max(0.0)));
+        if let Some(next) = signal.get(first + width) {
+            sum += next - signal[first];
+            squares += next * next - signal[first] * signal[first];
+        }
+    }
+    (means, norms)
+}

@@ -1,0 +1,191 @@
+//! The best sequence of starts, by dynamic programming over pairs of neighbours (Bellman 1957).
+
+use super::Candidate;
+use super::bank::Bank;
+
+/// Least and greatest distance of neighbours, in periods. What is farther apart begins a new stretch.
+const REACH: [f64; 2] = [0.45, 2.3];
+/// What a gap as long as the one before is worth, nats.
+const EVEN: f64 = 3.0;
+/// Change of a gap, in logarithm, that costs a nat.
+const TIGHT: f64 = 0.04;
+/// What a jump of the gap costs, nats, however far: clock steps, missed ticks.
+const JUMP: f64 = -3.5;
+/// What a new stretch costs, nats.
+const BREAK: f64 = 12.0;
+/// What the likeness of neighbours may say, nats: much against, hardly anything for, as any phase of the frame is alike to itself.
+const LIKENESS: [f64; 2] = [-4.0, 0.5];
+/// Candidates of at least this weight show what likeness neighbours have.
+const SURE: f64 = 2.0;
+const NONE: usize = usize::MAX;
+
+/// A sequence of candidates.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chain {
+    /// Indices of candidates, in order.
+    pub nodes: Vec<usize>,
+    /// The evidence for each, nats.
+    pub support: Vec<f64>,
+}
+
+/// All pairs of candidates that may be neighbours, grouped by the later one.
+pub(super) struct Graph<'a> {
+    candidates: &'a [Candidate],
+    least: usize,
+    /// The earliest that may come before each.
+    before: Vec<usize>,
+    /// Where the pairs of each begin; one more than there are candidates.
+    first: Vec<usize>,
+    /// What the likeness of each pair says, nats.
+    likeness: Vec<f64>,
+}
+
+/// Best scores.
+struct Solution {
+    /// Of sequences that end in each pair.
+    score: Vec<f64>,
+    /// The pair before it, or none where a stretch begins.
+    back: Vec<usize>,
+    /// The last pair of the stretch before the one that begins with each candidate.
+    entry: Vec<usize>,
+    last: usize,
+}
+
+impl<'a> Graph<'a> {
+    pub fn new(bank: &Bank, candidates: &'a [Candidate], period: usize) -> Self {
+        let [least, most] = REACH.map(|share| (share * period as f64) as usize);
+        let least = least.max(1);
+        let (mut first, mut before) = (vec![0], Vec::with_capacity(candidates.len()));
+        let (mut from, mut to) = (0, 0);
+        for candidate in candidates {
+            while candidates[from].offset + most < candidate.offset {
+                from += 1;
+            }
+            while candidates[to].offset + least <= candidate.offset {
+                to += 1;
+            }
+            before.push(from);
+            first.push(first[first.len() - 1] + to.saturating_sub(from));
+        }
+        let mut graph = Self { candidates, least, before, first, likeness: Vec::new() };
+        graph.likeness = graph.likenesses(bank);
+        graph
+    }
+
+    /// The pairs that end in a candidate, each with the candidate it begins with.
+    fn pairs(&self, end: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (self.first[end]..self.first[end + 1]).zip(self.before[end]..)
+    }
+
+    fn gap(&self, begin: usize, end: usize) -> f64 {
+        (self.candidates[end].offset - self.candidates[begin].offset) as f64
+    }
+
+    /// The evidence of likeness: how that of a pair compares with that of two sure starts and of a sure start with anything else.
+    fn likenesses(&self, bank: &Bank) -> Vec<f64> {
+        let (mut logs, mut sums) = (vec![0.0; self.first[self.candidates.len()]], [[0.0_f64; 3]; 2]);
+        for (end, candidate) in self.candidates.iter().enumerate() {
+            for (pair, begin) in self.pairs(end) {
+                let other = &self.candidates[begin];
+                let log = libm::log((1.0 - bank.alike(other.offset, candidate.offset)).max(1e-4));
+                logs[pair] = log;
+                if other.weight > SURE {
+                    let sum = &mut sums[usize::from(candidate.weight > SURE)];
+                    *sum = [sum[0] + 1.0, sum[1] + log, sum[2] + log * log];
+                }
+            }
+        }
+        let moments = |[count, sum, squares]: [f64; 3]| {
+            let mean = sum / count.max(1.0);
+            (mean, (squares / count.max(1.0) - mean * mean).max(0.01))
+        };
+        let [(rest, rest_variance), (starts, variance)] = sums.map(moments);
+        let slope = (2.0 * (starts - rest) / (variance + rest_variance)).min(0.0);
+        let evidence = |log: f64| (slope * (log - 0.5 * (starts + rest))).clamp(LIKENESS[0], LIKENESS[1]);
+        logs.into_iter().map(evidence).collect()
+    }
+
+    /// The sequence with the most evidence.
+    pub fn best(&self) -> Chain {
+        let solution = self.solve();
+        let mut nodes = Vec::new();
+        let mut support: Vec<f64> = Vec::new();
+        let mut pair = solution.last;
+        let mut behind = None;
+        while pair != NONE {
+            // The end of a pair: the pairs of each candidate follow those of the one before.
+            let end = self.first.partition_point(|&first| first <= pair) - 1;
+            let begin = self.before[end] + pair - self.first[end];
+            nodes.push(end);
+            support.push(self.candidates[end].weight + self.likeness[pair] + behind.unwrap_or(0.0));
+            behind = Some(self.likeness[pair]);
+            if solution.back[pair] == NONE {
+                nodes.push(begin);
+                support.push(self.candidates[begin].weight + self.likeness[pair]);
+                (pair, behind) = (solution.entry[begin], None);
+            } else {
+                pair = solution.back[pair];
+            }
+        }
+        nodes.reverse();
+        support.reverse();
+        self.or_alone(Chain { nodes, support })
+    }
+
+    /// Where nothing follows anything, the candidates that stand by themselves beyond doubt.
+    fn or_alone(&self, chain: Chain) -> Chain {
+        if !chain.nodes.is_empty() {
+            return chain;
+        }
+        let alone = (0..self.candidates.len()).filter(|&node| self.candidates[node].weight > 100.0);
+        let nodes: Vec<usize> = alone.collect();
+        Chain { support: nodes.iter().map(|&node| self.candidates[node].weight).collect(), nodes }
+    }
+
+    fn solve(&self) -> Solution {
+        let total = self.likeness.len();
+        let mut solution =
+            Solution { score: vec![0.0; total], back: vec![NONE; total], entry: Vec::new(), last: NONE };
+        // The best of all sequences that end before each candidate.
+        let mut ended = vec![(0.0, NONE)];
+        let mut until = 0;
+        for (end, candidate) in self.candidates.iter().enumerate() {
+            while self.candidates[until].offset + self.least <= candidate.offset {
+                until += 1;
+            }
+            let begins = Some(ended[until]).filter(|(score, _)| *score > BREAK).unwrap_or((BREAK, NONE));
+            solution.entry.push(begins.1);
+            let mut best = ended[end];
+            for (pair, begin) in self.pairs(end) {
+                let (value, from) = self.extend(&solution, begin, end);
+                solution.score[pair] = value + self.likeness[pair] + candidate.weight;
+                solution.back[pair] = from;
+                if solution.score[pair] > best.0 {
+                    best = (solution.score[pair], pair);
+                }
+            }
+            ended.push(best);
+        }
+        solution.last = ended[self.candidates.len()].1;
+        solution
+    }
+
+    /// The best score of what comes before the pair `(begin, end)`, with `begin`, and the pair that ends in it.
+    fn extend(&self, solution: &Solution, begin: usize, end: usize) -> (f64, usize) {
+        let before = solution.score.get(solution.entry[begin]).map_or(0.0, |score| score - BREAK);
+        let mut best = (self.candidates[begin].weight + before, NONE);
+        let gap = self.gap(begin, end);
+        for (pair, earlier) in self.pairs(begin) {
+            let value = solution.score[pair] + beat(self.gap(earlier, begin), gap);
+            if value > best.0 {
+                best = (value, pair);
+            }
+        }
+        best
+    }
+}
+
+/// What a gap says after the one before it, nats.
+fn beat(before: f64, after: f64) -> f64 {
+    (EVEN - libm::log(after / before).abs() / TIGHT).max(JUMP)
+}

@@ -1,0 +1,198 @@
+//! Following the frames outwards from the mark.
+//!
+//! What a frame start looks like changes slowly, so it is learnt where it is known: from the frames around the mark. In rounds the
+//! stretch considered doubles; in each one
+//!
+//! 1. candidates are the local minima of the distance to the nearest template, by shape and by summed squares;
+//! 2. how much a distance says is learnt from the starts found so far and from what lies between them ([`evidence`]);
+//! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a template, alike to the
+//!    one before, and in an even beat that may jump now and then;
+//! 4. starts that their neighbours resemble more than any template does become templates ([`bank`]).
+
+mod bank;
+mod chain;
+mod evidence;
+mod guess;
+
+use super::marks::Placement;
+use super::minima::spaced_minima;
+use bank::Bank;
+use chain::{Chain, Graph};
+use evidence::{Evidence, FEATURES, Label};
+
+/// How many first-guess periods around a mark the first round looks at.
+const FIRST_PERIODS: usize = 12;
+/// Rounds after the whole trace has been reached.
+const LAST_ROUNDS: usize = 3;
+/// Candidates kept of every stretch of one period.
+const KEPT: usize = 10;
+/// Where the sequence covers less than this share of the stretch considered, power levels have changed.
+const COVERED: f64 = 0.75;
+
+/// What was found.
+#[derive(Debug)]
+pub(super) struct Tracked {
+    /// Offsets of the windows of the starts, in order.
+    pub starts: Vec<Start>,
+}
+
+/// One start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Start {
+    /// First sample of its window.
+    pub offset: usize,
+    /// Least difference of the window to a template, W^2.
+    pub distance_w2: f64,
+    /// Whether the evidence is for it, 0 to 1.
+    pub confidence: f64,
+}
+
+/// A local minimum of the distance to the templates.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    offset: usize,
+    features: [f64; FEATURES],
+    weight: f64,
+}
+
+/// Finds the sequence of starts that fits the marked ones.
+pub(super) fn track(power: &[f64], placement: &Placement) -> Tracked {
+    let mut tracker = Tracker::new(power, placement);
+    let mut rounds_left = LAST_ROUNDS;
+    loop {
+        tracker.solve();
+        if tracker.reach >= power.len() {
+            if rounds_left == 0 {
+                return tracker.conclude();
+            }
+            rounds_left -= 1;
+        }
+        tracker.learn();
+        tracker.reach *= 2;
+    }
+}
+
+/// The state between rounds.
+struct Tracker {
+    bank: Bank,
+    marks: Vec<usize>,
+    spacing: usize,
+    period: usize,
+    reach: usize,
+    candidates: Vec<Candidate>,
+    evidence: Evidence,
+    chain: Chain,
+    /// Once power levels have changed, the sum of squares says nothing more.
+    shape_only: bool,
+}
+
+impl Tracker {
+    fn new(power: &[f64], placement: &Placement) -> Self {
+        let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
+        let bank = Bank::new(power, placement.samples, &marks);
+        let (period, starts) = guess::first(&bank, (placement.samples / 2).max(1), &marks);
+        let mut tracker = Self {
+            bank,
+            marks,
+            spacing: (placement.samples / 8).max(2),
+            period,
+            reach: FIRST_PERIODS * period,
+            candidates: Vec::new(),
+            evidence: Evidence::default(),
+            chain: Chain::default(),
+            shape_only: false,
+        };
+        tracker.relearn(&starts);
+        tracker
+    }
+
+    /// The best sequence within reach.
+    fn solve(&mut self) {
+        self.candidates = self.collect();
+        for candidate in &mut self.candidates {
+            candidate.weight = self.evidence.weight(candidate, &self.marks);
+        }
+        self.prune();
+        self.chain = Graph::new(&self.bank, &self.candidates, self.period).best();
+        let starts = self.starts();
+        self.period = guess::median_gap(&starts).unwrap_or(self.period);
+        let span =
+            |offsets: &[usize]| offsets.last().zip(offsets.first()).map_or(0, |(last, first)| last - first);
+        let all: Vec<usize> = self.candidates.iter().map(|candidate| candidate.offset).collect();
+        self.shape_only |= (span(&starts) as f64) < COVERED * span(&all) as f64;
+    }
+
+    /// New templates, and what distances mean, from the sequence found.
+    fn learn(&mut self) {
+        let starts = self.starts();
+        self.bank.learn(&starts);
+        self.relearn(&starts);
+    }
+
+    fn relearn(&mut self, starts: &[usize]) {
+        let candidates = self.collect();
+        let labels = self.labels(&candidates, starts);
+        self.evidence = Evidence::learn(&candidates, &labels, self.shape_only);
+    }
+
+    fn starts(&self) -> Vec<usize> {
+        self.chain.nodes.iter().map(|&node| self.candidates[node].offset).collect()
+    }
+
+    /// The minima within reach of a mark, and the marks.
+    fn collect(&self) -> Vec<Candidate> {
+        let mut offsets = spaced_minima(&self.bank.shape, self.spacing);
+        offsets.extend(spaced_minima(&self.bank.squares_w2, self.spacing));
+        offsets.retain(|offset| {
+            let nearest = self.marks.iter().map(|mark| mark.abs_diff(*offset)).min().unwrap_or(0);
+            (self.spacing..=self.reach).contains(&nearest)
+        });
+        offsets.extend(&self.marks);
+        offsets.sort_unstable();
+        offsets.dedup_by(|later, earlier| *later - *earlier < 3);
+        let candidate = |offset| Candidate { offset, features: self.bank.features(offset), weight: 0.0 };
+        offsets.into_iter().map(candidate).collect()
+    }
+
+    /// Starts are examples of starts, what is well away from them of the rest. What is beside them, or what a template was made
+    /// of, is an example of neither.
+    fn labels(&self, candidates: &[Candidate], starts: &[usize]) -> Vec<Label> {
+        let mut labels = vec![Label::Rest; candidates.len()];
+        for &start in starts {
+            let from = candidates.partition_point(|candidate| candidate.offset + 2 * self.spacing <= start);
+            let to = candidates.partition_point(|candidate| candidate.offset < start + 2 * self.spacing);
+            labels[from..to].fill(Label::Neither);
+            let away = |index: &usize| candidates[*index].offset.abs_diff(start);
+            let nearest = (from..to).min_by_key(away).filter(|index| away(index) < self.spacing);
+            if let Some(index) = nearest.filter(|_| !self.bank.own.contains(&start)) {
+                labels[index] = Label::Start;
+            }
+        }
+        labels
+    }
+
+    /// Keeps the likeliest candidates of every stretch of a period, and the marks, which weigh most.
+    fn prune(&mut self) {
+        let period = self.period.max(1);
+        let mut kept = Vec::with_capacity(self.candidates.len());
+        for stretch in self.candidates.chunk_by(|a, b| a.offset / period == b.offset / period) {
+            let mut stretch = stretch.to_vec();
+            stretch.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+            stretch.truncate(KEPT);
+            stretch.sort_by_key(|candidate| candidate.offset);
+            kept.extend(stretch);
+        }
+        self.candidates = kept;
+    }
+
+    fn conclude(self) -> Tracked {
+        let start = |(&node, &support): (&usize, &f64)| {
+            let offset = self.candidates[node].offset;
+            let marked = self.marks.contains(&offset);
+            let confidence = if marked { 1.0 } else { 1.0 / (1.0 + libm::exp(-support)) };
+            Start { offset, distance_w2: self.bank.squares_w2[offset], confidence }
+        };
+        let starts = self.chain.nodes.iter().zip(&self.chain.support).map(start).collect();
+        Tracked { starts }
+    }
+}
