@@ -128,7 +128,7 @@ fn a_trace_without_noise_is_the_curve_within_the_quantization() {
         let bound_j = number(checks, "/quantization_bound_j");
         assert!(off_j <= bound_j, "{off_j} J off, the recorder's steps explain {bound_j} J");
         let total_j = number(&results.summary(), "/truth/total_j");
-        assert!(bound_j < 0.02 * total_j, "a bound of {bound_j} J says nothing about {total_j} J");
+        assert!(bound_j < 0.03 * total_j, "a bound of {bound_j} J says nothing about {total_j} J");
         assert!(number(checks, "/parts_against_curve_relative") < 1e-9);
     }
 }

@@ -118,7 +118,7 @@ fn a_marked_frame_like_no_other() {
 
 #[test]
 fn starts_of_frames_no_longer_than_a_sample() {
-    let results = quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20"]);
+    let results = quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "5000"]);
     assert_warns(&results, "irregular-spacing");
 }
 

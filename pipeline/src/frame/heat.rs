@@ -84,12 +84,13 @@ impl HeatMap {
 
     /// Counts the tile tests of a bin, `number` row by row.
     pub(super) fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
-        if !is_tile_test(self.event) || log.tests.is_empty() {
+        if !is_tile_test(self.event) {
             return;
         }
         let mut in_tiles = 0;
         for (tile, place, ..) in bin.inside(pass) {
-            let count = log.tests[place].of(self.event);
+            // A bin of which no fine tile was visited has noted none.
+            let count = log.tests.get(place).map_or(0, |tests| tests.of(self.event));
             self.tiles[tile as usize].count += count;
             in_tiles += count;
         }

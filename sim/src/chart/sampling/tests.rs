@@ -4,10 +4,10 @@ use super::*;
 /// Small enough for a test.
 const SMALL: Effort = Effort {
     scene: ("tiny", 1),
-    size: [48, 36],
+    size: [64, 48],
     most_samples: 32,
     reference_frames: 4,
-    reference_samples: 128,
+    reference_samples: 256,
     seeds: 2,
     every_up_to: 2,
 };
