@@ -156,6 +156,9 @@ fn the_camera_that_was_fitted_is_told_and_can_be_given_back() {
     assert!(!told.stdout.contains("fov_deg"), "only a fitted camera is told: {}", told.stdout);
 }
 
+/// Files, flags, exit code, and what the message has to say.
+type Case<'a> = (&'a [&'a String], &'a [&'a str], i32, &'a [&'a str]);
+
 #[test]
 fn wrong_inputs_are_told_from_failures() {
     let inputs = Inputs::new();
@@ -168,7 +171,7 @@ fn wrong_inputs_are_told_from_failures() {
     let strange = inputs.put("a.glb", b"glTF\x02\0\0\0");
     let gone = inputs.path("gone.mts");
     let typo = inputs.put("typo.ron", "(\n  widht: 3,\n)");
-    let cases: [(&[&String], &[&str], i32, &[&str]); 11] = [
+    let cases: [Case<'_>; 11] = [
         (
             &[&start, &short],
             &[],

@@ -228,6 +228,9 @@ fn a_lens_for_a_camera_placed_by_itself() {
     assert_warns(&run_file("a.ron", wide, &["--lens", "1", "--focus", "1"]), "lens-leaves-view");
 }
 
+/// A code, a scene that provokes it with its flags, and one that does not with its flags.
+type Regime<'a> = (&'a str, String, &'a [&'a str], String, &'a [&'a str]);
+
 /// Scenes in the regimes of the failure catalogue, and next to each a harmless one of the same kind that is not warned of.
 #[test]
 fn regimes_in_which_tile_tests_pay_little() {
@@ -243,7 +246,7 @@ fn regimes_in_which_tile_tests_pay_little() {
     };
     let sphere = |segments: &str| scene(camera, &sphere(segments));
     let (sharp, soft) = (["--lens", "0.1", "--focus", "1"], ["--lens", "100", "--focus", "1"]);
-    let cases: [(&str, String, &[&str], String, &[&str]); 6] = [
+    let cases: [Regime<'_>; 6] = [
         ("behind-camera", scene(camera, &floor("-1")), &[], sphere("12"), &[]),
         ("sub-sample-triangles", sphere("1000"), &[], sphere("12"), &[]),
         ("sliver-triangles", scene(camera, &thin("0.001")), &[], scene(camera, &thin("1")), &[]),

@@ -92,7 +92,15 @@ impl<V: Lanes> Crossing<V> {
     /// Lanes inside that show a face to be drawn.
     #[inline(always)]
     pub fn shown(&self, faces: [bool; 2]) -> Mask {
-        self.inside[0] & face_mask(faces[0]) | self.inside[1] & face_mask(faces[1])
+        // By branches, which are always taken alike, rather than by masks, which the compiler would put into vectors.
+        let mut shown = 0;
+        if faces[0] {
+            shown |= self.inside[0];
+        }
+        if faces[1] {
+            shown |= self.inside[1];
+        }
+        shown
     }
 
     /// The depth of the lanes inside.
@@ -103,10 +111,4 @@ impl<V: Lanes> Crossing<V> {
         // The quotient may leave the range of the vertices by a rounding; depth culling relies on it.
         quotient.max(a.min(b).min(c)).min(a.max(b).max(c))
     }
-}
-
-/// All lanes where a face is drawn, none where it is not.
-#[inline(always)]
-fn face_mask(drawn: bool) -> Mask {
-    Mask::from(drawn).wrapping_neg()
 }

@@ -35,7 +35,7 @@ impl LensShape {
     pub const BLADES: std::ops::RangeInclusive<u32> = 3..=64;
 
     /// Maps a point of the unit square to the aperture, areas kept in proportion. The disk uses the concentric
-    /// map of Shirley and Chiu 1997, the polygon that map with [`polygon`] behind it.
+    /// map of Shirley and Chiu 1997, the polygon that map with `polygon` behind it.
     pub fn map(self, unit: [f32; 2]) -> [f32; 2] {
         let [a, b] = unit.map(|c| f64::from(c) * 2.0 - 1.0);
         let on_lens = match self {

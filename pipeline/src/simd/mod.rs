@@ -1,6 +1,6 @@
 //! Sixteen numbers side by side, in the vectors this machine has.
 //!
-//! Kernels are written once over [`Lanes`] and entered through [`dispatch`], which picks the widest vectors when
+//! Kernels are written once over `Lanes` and entered through `dispatch`, which picks the widest vectors when
 //! the program runs. Every operation rounds as IEEE 754 asks and none is contracted, so all widths give the same bytes.
 
 mod plain;
@@ -78,10 +78,15 @@ impl Width {
         let mut widths = vec![Self(Vectors::Plain)];
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            let bits = is_x86_feature_detected!("popcnt")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2");
+            let half = bits && is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+            if half {
                 widths.push(Self(Vectors::Avx2));
             }
-            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            if half && is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
                 widths.push(Self(Vectors::Avx512));
             }
         }

@@ -11,8 +11,8 @@ pub(crate) struct Plain([f32; LANES]);
 #[inline(always)]
 fn zip(a: Plain, b: Plain, of: impl Fn(f32, f32) -> f32) -> Plain {
     let mut out = a.0;
-    for lane in 0..LANES {
-        out[lane] = of(a.0[lane], b.0[lane]);
+    for (out, b) in out.iter_mut().zip(b.0) {
+        *out = of(*out, b);
     }
     Plain(out)
 }
@@ -77,8 +77,8 @@ impl Lanes for Plain {
     #[inline(always)]
     fn times_plus(self, by: Self, plus: Self) -> Self {
         let mut out = plus.0;
-        for lane in 0..LANES {
-            out[lane] = self.0[lane].mul_add(by.0[lane], plus.0[lane]);
+        for (out, (a, b)) in out.iter_mut().zip(self.0.into_iter().zip(by.0)) {
+            *out = a.mul_add(b, *out);
         }
         Self(out)
     }
@@ -100,9 +100,9 @@ impl Lanes for Plain {
 
     #[inline(always)]
     fn store_masked(self, mask: Mask, to: &mut [f32; LANES]) {
-        for lane in 0..LANES {
+        for (lane, (place, value)) in to.iter_mut().zip(self.0).enumerate() {
             if mask >> lane & 1 != 0 {
-                to[lane] = self.0[lane];
+                *place = value;
             }
         }
     }

@@ -9,13 +9,13 @@ use std::ops::{Add, Div, Mul, Sub};
 use super::{Kernel, LANES, Lanes, Mask};
 
 /// Runs a kernel with 256-bit vectors.
-#[target_feature(enable = "avx2,fma")]
+#[target_feature(enable = "avx2,fma,popcnt,bmi1,bmi2,lzcnt")]
 pub(super) fn avx2(kernel: impl Kernel) {
     kernel.run::<Avx2>();
 }
 
 /// Runs a kernel with 512-bit vectors.
-#[target_feature(enable = "avx512f,avx512dq")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma,popcnt,bmi1,bmi2,lzcnt")]
 pub(super) fn avx512(kernel: impl Kernel) {
     kernel.run::<Avx512>();
 }

@@ -1,9 +1,20 @@
 //! One triangle over the cells of a bin, sixteen cells at a time.
 //!
 //! For every cell, a box of lens and time: where on the screen the triangle may be, which faces it may show, and a linear
-//! function in X and Y above each of its edge functions. The edges are linearized about the middle of the box, and what is
-//! left out is bounded as in [`crate::traversal`] (`edge_bounds`), in `f32` and with an allowance for the rounding of both
-//! sides: the sample test sees each vertex within `slack` of its place (see [`Triangle::slack`]), and so does this.
+//! function in X and Y above each of its edge functions. The edges are linearized about the middle of the box (Munkberg and
+//! Akenine-Moeller 2012), and what is left out is bounded term by term. With `dX, dY, du, dv, dt` from the middle, a vertex
+//! there at `P` with velocity `V`, depth `w` and change of depth `w'`, and `(s, a)` the shear of the lens in x, `(r, b)` in y,
+//!
+//! ```text
+//! P(d) = P + (du (a w - s) - dX w, dv (b w - r) - dY w) + dt (V + w' (a du - dX, b dv - dY))
+//! e(d) = e + linear + (w_j - w_i + dt (w'_j - w'_i)) (dY s du - dX r dv)
+//!          + dt [-dX c_a - dY c_b + du (a c_a + s (V_i - V_j)_y) + dv (b c_b + r (V_j - V_i)_x)]
+//!          + dt^2 [V_i x V_j + (a du - dX) (w'_i V_j - w'_j V_i)_y + (b dv - dY) (w'_j V_i - w'_i V_j)_x]
+//! c_a = w_i V_jy - w_j V_iy + w'_i P_jy - w'_j P_iy        c_b = w_j V_ix - w_i V_jx + w'_j P_ix - w'_i P_jx
+//! ```
+//!
+//! which is exact, as `a r = b s` for a lens. All is in `f32` with an allowance for the rounding of both sides: the sample test
+//! sees each vertex within `slack` of its place (see [`Triangle::slack`]), and so does this.
 
 use super::facing::Facing;
 use super::layout::{BinSamples, CellRange};
@@ -325,7 +336,7 @@ impl Scene<'_> {
         rounding
     }
 
-    /// What the linear part leaves out; the formula stands in `traversal::edge_bounds`.
+    /// The most that the linear part leaves out, by the formula above.
     #[inline(always)]
     fn remainder<V: Lanes, const MOTION: bool, const LENS: bool>(
         &self,

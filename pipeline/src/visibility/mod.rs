@@ -2,7 +2,7 @@
 //!
 //! [`crate::frame`] models tile tests one by one, counts them and logs what they touch; here nothing is logged, and samples
 //! are sorted beforehand into packets of sixteen that are close on the screen, on the lens and in time. The hierarchy
-//! is bin, cell, block, packet (see [`plan`]):
+//! is bin, cell, block, packet (see `plan`):
 //!
 //! 1. triangles are set up, sorted front to back and handed to the bins they may touch;
 //! 2. in a bin each is bounded over sixteen boxes of lens and time at once (`cells`);

@@ -199,13 +199,12 @@ impl Worker<'_> {
         }
         self.tally.hits += u64::from(seen.count_ones());
         if closer != 0 {
-            depth.store_masked(closer, &mut self.surface.depth[packet].0);
+            let nearest = depth.or_else(closer, stored);
+            nearest.store(&mut self.surface.depth[packet].0);
             V::put(closer, triangle.id, &mut self.surface.triangle[packet]);
+            self.surface.farthest[block_cell].0[lane] = nearest.largest();
         }
-        if crossing.tie != 0 {
-            closer |= self.ties(triangle, packet, crossing.tie);
-        }
-        if closer != 0 {
+        if crossing.tie != 0 && self.ties(triangle, packet, crossing.tie) {
             self.surface.farthest[block_cell].0[lane] = V::load(&self.surface.depth[packet].0).largest();
         }
     }
@@ -219,10 +218,10 @@ impl Worker<'_> {
             .fold(0, |mask, lane| mask | 1 << lane)
     }
 
-    /// Decides and stores the lanes on an edge; says which were written.
+    /// Decides and stores the lanes on an edge; says whether any was written.
     #[cold]
-    fn ties(&mut self, triangle: &Triangle, packet: usize, tie: Mask) -> Mask {
-        let mut written = 0;
+    fn ties(&mut self, triangle: &Triangle, packet: usize, tie: Mask) -> bool {
+        let mut written = false;
         for lane in (0..LANES).filter(|lane| tie >> lane & 1 != 0) {
             let seen = exact::seen(&triangle.corners, &self.samples.packet(packet), lane);
             let Some(depth) = exact::hit(&seen, triangle.faces) else { continue };
@@ -232,7 +231,7 @@ impl Worker<'_> {
             self.tally.hits += u64::from(seen);
             if seen && (depth < *stored || (depth == *stored && triangle.id < *owner)) {
                 (*stored, *owner) = (depth, triangle.id);
-                written |= 1 << lane;
+                written = true;
             }
         }
         written
