@@ -12,10 +12,13 @@
 //! The result is that of the sample test on all samples, bit for bit.
 
 mod cells;
+mod edges;
+mod faces;
 mod facing;
 mod layout;
 mod plan;
 mod raster;
+mod sorter;
 
 use rayon::prelude::*;
 

@@ -3,6 +3,7 @@
 mod args;
 mod chart;
 mod list;
+mod parse;
 mod run;
 mod samples;
 mod stress;
