@@ -76,19 +76,3 @@ impl Bin {
         worker.finish()
     }
 }
-
-/// The triangles of each bin, in order: those whose pixels meet it.
-pub(super) fn distribute(pass: &Pass<'_>, ready: &[Ready]) -> Vec<Vec<u32>> {
-    let (viewport, coarse) = (pass.settings.viewport, pass.settings.spec.coarse_tile_px);
-    let [across, down] = [viewport.width(), viewport.height()].map(|side| side.div_ceil(coarse));
-    let mut lists = vec![Vec::new(); (across * down) as usize];
-    for (index, Ready { pixels, .. }) in ready.iter().enumerate() {
-        let bins = pixels.tiles(coarse);
-        for row in bins.y0..bins.y1 {
-            for column in bins.x0..bins.x1 {
-                lists[(row * across + column) as usize].push(index as u32);
-            }
-        }
-    }
-    lists
-}

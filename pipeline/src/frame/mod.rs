@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use crate::geometry::{Camera, Draw};
 use crate::memory::CacheError;
+use crate::setup::distribute;
 use bin::Bin;
 use counters::BinLog;
 pub use heat::{HeatMap, TileHeat};
@@ -117,7 +118,11 @@ fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut impl FnMut(Don
         next = batches.next().map(|batch| {
             vertices::front_end(pass, batch, replay, &mut |packet: &Packet| done(Done::Packet(packet)))
         });
-        let lists = bin::distribute(pass, &ready);
+        let lists = distribute(
+            ready.iter().map(|ready| ready.pixels),
+            pass.settings.viewport,
+            pass.settings.spec.coarse_tile_px,
+        );
         let logs: Vec<_> = bins
             .par_iter_mut()
             .zip(&lists)

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::{Features, Settings};
 use crate::depth::BoxGrid;
@@ -47,7 +46,7 @@ pub(super) struct Pass<'a> {
 impl<'a> Pass<'a> {
     pub fn new(camera: &Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
         let projection = Projection::new(camera, settings.viewport);
-        let vertices = draws.iter().map(|draw| images(&projection, draw)).collect();
+        let vertices = draws.iter().map(|draw| projection.images(&draw.geometry)).collect();
         let first_triangle = std::iter::once(0)
             .chain(draws.iter().scan(0, |count, draw| {
                 *count += draw.geometry.triangles().len() as u32;
@@ -123,15 +122,6 @@ impl<'a> Pass<'a> {
     pub fn tiles_across(&self) -> u32 {
         self.settings.viewport.width().div_ceil(self.settings.spec.tile_px)
     }
-}
-
-fn images(projection: &Projection, draw: &Draw<'_>) -> Vec<MovingVertex> {
-    let (open, close) = (draw.geometry.open(), draw.geometry.close());
-    open.par_iter()
-        .zip(close)
-        .with_min_len(1024)
-        .map(|(&open, &close)| projection.vertex(open, close))
-        .collect()
 }
 
 fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>) -> AddressMap {

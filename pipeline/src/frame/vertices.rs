@@ -51,14 +51,13 @@ pub(super) fn front_end(
 fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let viewport = pass.settings.viewport;
     let Draw { geometry, cull, .. } = &pass.draws[pass.locate(id).0];
-    let half_px = [viewport.width(), viewport.height()].map(|side| 0.5 * side as f32);
     let (Staged { vertices, lens }, near) = (pass.staged(id), pass.projection.near);
     let shear = if lens { pass.projection.shear } else { Shear::default() };
     let within = Box5::whole(lens).clipped(&pass.clip).clipped(&geometry.clip());
     if within.is_empty() {
         return (Event::TrianglesOutside, None);
     }
-    match set_up(id, vertices.each_ref(), *cull, &shear, near, half_px) {
+    match set_up(id, vertices.each_ref(), *cull, &shear, near, viewport.half_px()) {
         Outcome::Degenerate => (Event::TrianglesDegenerate, None),
         Outcome::Outside => (Event::TrianglesOutside, None),
         Outcome::FaceCulled => (Event::TrianglesFaceCulled, None),

@@ -2,7 +2,9 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::Camera;
+use rayon::prelude::*;
+
+use super::{Camera, Geometry};
 
 /// The size of an image in pixels; both sides are 1 to 16384.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +31,11 @@ impl Viewport {
     /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.height
+    }
+
+    /// Half the size in pixels: the largest |X| and |Y| of an image coordinate.
+    pub fn half_px(&self) -> [f32; 2] {
+        [0.5 * self.width as f32, 0.5 * self.height as f32]
     }
 
     /// Pixels of the image.
@@ -114,6 +121,17 @@ impl Projection {
     /// The image of a vertex that is at `open` and `close`, in world space, at the ends of the shutter.
     pub fn vertex(&self, open: Vec3, close: Vec3) -> MovingVertex {
         MovingVertex { open: self.image(&self.open, open), close: self.image(&self.close, close) }
+    }
+
+    /// The images of all vertices of `geometry`.
+    pub(crate) fn images(&self, geometry: &Geometry<'_>) -> Vec<MovingVertex> {
+        geometry
+            .open()
+            .par_iter()
+            .zip(geometry.close())
+            .with_min_len(1024)
+            .map(|(&open, &close)| self.vertex(open, close))
+            .collect()
     }
 
     fn image(&self, pose: &DAffine3, world: Vec3) -> [f32; 3] {

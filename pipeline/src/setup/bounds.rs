@@ -83,6 +83,25 @@ fn extent(triangle: &Triangle, shear: &Shear, axis: usize) -> [f64; 2] {
     range
 }
 
+/// For each square of `side_px` pixels of the image, row by row, which of the rectangles meet it, in their order.
+pub(crate) fn distribute(
+    rects: impl IntoIterator<Item = PixelRect>,
+    viewport: Viewport,
+    side_px: u32,
+) -> Vec<Vec<u32>> {
+    let squares = PixelRect::whole(viewport).tiles(side_px);
+    let mut lists = vec![Vec::new(); (squares.x1 * squares.y1) as usize];
+    for (index, rect) in (0..).zip(rects) {
+        let met = rect.tiles(side_px);
+        for row in met.y0..met.y1 {
+            for column in met.x0..met.x1 {
+                lists[(row * squares.x1 + column) as usize].push(index);
+            }
+        }
+    }
+    lists
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -106,7 +106,7 @@ pub fn is_flat([a, b, c]: [&MovingVertex; 3]) -> bool {
     [cross(ab0, ac0), mixed, cross(ab1, ac1)].iter().flatten().all(|&part| part == 0.0)
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -47,8 +47,6 @@ pub(crate) trait Lanes:
     fn gt(self, other: Self) -> Mask;
     fn ge(self, other: Self) -> Mask;
     fn equal(self, other: Self) -> Mask;
-    /// Writes the lanes of the mask only.
-    fn store_masked(self, mask: Mask, to: &mut [f32; LANES]);
     /// Writes `value` to the lanes of the mask only.
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]);
     /// The lanes of the mask from `self`, the others from `other`.
@@ -139,8 +137,6 @@ mod tests {
                 let (from_a, from_b) = (awkward(seed), awkward(7 * seed + 3));
                 let (a, b) = (V::load(&from_a), V::load(&from_b));
                 let masks = [a.gt(b), a.ge(b), a.equal(b)];
-                let mut stored = [1.5; LANES];
-                b.store_masked(masks[0], &mut stored);
                 let mut put = [7; LANES];
                 V::put(masks[1], seed, &mut put);
                 let results = [
@@ -164,7 +160,6 @@ mod tests {
                 self.0.extend(masks.map(u32::from));
                 self.0.push(a.abs().min(V::splat(f32::MAX)).largest().to_bits());
                 self.0.extend(put);
-                self.0.extend(stored.map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }));
             }
         }
     }

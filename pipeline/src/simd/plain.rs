@@ -99,15 +99,6 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn store_masked(self, mask: Mask, to: &mut [f32; LANES]) {
-        for (lane, (place, value)) in to.iter_mut().zip(self.0).enumerate() {
-            if mask >> lane & 1 != 0 {
-                *place = value;
-            }
-        }
-    }
-
-    #[inline(always)]
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]) {
         for (lane, place) in to.iter_mut().enumerate() {
             if mask >> lane & 1 != 0 {
@@ -119,7 +110,11 @@ impl Lanes for Plain {
     #[inline(always)]
     fn or_else(self, mask: Mask, other: Self) -> Self {
         let mut out = other.0;
-        self.store_masked(mask, &mut out);
+        for (lane, (place, value)) in out.iter_mut().zip(self.0).enumerate() {
+            if mask >> lane & 1 != 0 {
+                *place = value;
+            }
+        }
         Self(out)
     }
 

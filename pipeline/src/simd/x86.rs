@@ -102,11 +102,6 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn store_masked(self, mask: Mask, to: &mut [f32; LANES]) {
-        unsafe { _mm512_mask_storeu_ps(to.as_mut_ptr(), mask, self.0) }
-    }
-
-    #[inline(always)]
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]) {
         unsafe {
             _mm512_mask_storeu_epi32(to.as_mut_ptr().cast(), mask, _mm512_set1_epi32(value.cast_signed()));
@@ -204,15 +199,6 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn equal(self, other: Self) -> Mask {
         compare!(self, other, _CMP_EQ_OQ)
-    }
-
-    #[inline(always)]
-    fn store_masked(self, mask: Mask, to: &mut [f32; LANES]) {
-        unsafe {
-            let (low, high) = spread(mask);
-            _mm256_maskstore_ps(to.as_mut_ptr(), low, self.0);
-            _mm256_maskstore_ps(to.as_mut_ptr().add(8), high, self.1);
-        }
     }
 
     #[inline(always)]

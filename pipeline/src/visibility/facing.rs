@@ -11,7 +11,7 @@
 //! sees all edges with its sign: it tells the face before any sample is tested.
 
 use crate::geometry::Shear;
-use crate::setup::Corner;
+use crate::setup::{Corner, cross};
 
 /// The facing determinant of a triangle by powers of `t`.
 #[derive(Clone, Copy, Debug)]
@@ -52,10 +52,6 @@ impl Facing {
 fn mixed(i: usize, j: usize, open: &[Point; 3], delta: &[Point; 3]) -> Point {
     let (a, b) = (cross(open[i], delta[j]), cross(delta[i], open[j]));
     [0, 1, 2].map(|axis| a[axis] + b[axis])
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn dot(a: Point, b: Point) -> f64 {

@@ -116,11 +116,6 @@ impl SampleLayout {
         let pixel = y as usize * self.viewport.width() as usize + x as usize;
         Some(pixel * self.per_pixel as usize + index as usize)
     }
-
-    /// The largest |X| and |Y| of the image.
-    pub(super) fn half_px(&self) -> [f32; 2] {
-        [0.5 * self.viewport.width() as f32, 0.5 * self.viewport.height() as f32]
-    }
 }
 
 impl BinSamples {

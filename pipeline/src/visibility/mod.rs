@@ -22,8 +22,9 @@ mod sorter;
 
 use rayon::prelude::*;
 
-use crate::geometry::{Cull, Geometry, MovingVertex};
-use crate::setup::{Outcome, bounds, set_up};
+use crate::depth::vertex_range;
+use crate::geometry::{Cull, Geometry};
+use crate::setup::{Outcome, bounds, distribute, set_up};
 use crate::simd::{Width, dispatch};
 use facing::Facing;
 pub use layout::SampleLayout;
@@ -77,7 +78,7 @@ pub fn resolve_at(
     into: &mut Visibility,
 ) -> Tally {
     let (ready, lists) = front_end(layout, geometry, cull);
-    let tallies: Vec<Tally> = layout
+    layout
         .bins
         .par_iter()
         .zip(&mut into.bins)
@@ -87,22 +88,12 @@ pub fn resolve_at(
             dispatch(width, Worker { layout, samples, surface, ready: &ready, list, tally: &mut tally });
             tally
         })
-        .collect();
-    tallies.into_iter().fold(Tally::default(), |mut sum, tally| {
-        sum += tally;
-        sum
-    })
+        .sum()
 }
 
 /// Triangles that have to be visited, front to back, and those of them each bin has to visit.
 fn front_end(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull) -> (Vec<Ready>, Vec<Vec<u32>>) {
-    let vertices: Vec<MovingVertex> = geometry
-        .open()
-        .par_iter()
-        .zip(geometry.close())
-        .with_min_len(1024)
-        .map(|(&open, &close)| layout.projection.vertex(open, close))
-        .collect();
+    let vertices = layout.projection.images(geometry);
     let mut placed: Vec<_> = (0..geometry.triangles().len() as u32)
         .into_par_iter()
         .with_min_len(256)
@@ -110,27 +101,18 @@ fn front_end(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull) -> (Vec
             let corners = geometry.triangles()[id as usize].map(|vertex| &vertices[vertex as usize]);
             let projection = &layout.projection;
             let Outcome::Ready(triangle) =
-                set_up(id, corners, cull, &projection.shear, projection.near, layout.half_px())
+                set_up(id, corners, cull, &projection.shear, projection.near, layout.viewport.half_px())
             else {
                 return None;
             };
             let pixels = bounds(&triangle, &projection.shear, layout.viewport);
-            let depths = triangle.corners.iter().flat_map(|c| [c.at(0.0)[2], c.at(1.0)[2]]);
-            let nearest = depths.fold(f32::INFINITY, f32::min).max(0.0);
+            let nearest = vertex_range(&triangle, [0.0, 1.0])[0].max(0.0);
             let facing = Facing::new(&triangle.corners, &projection.shear);
             (!pixels.is_empty()).then_some((nearest.to_bits(), pixels, Ready { triangle, facing }))
         })
         .collect();
     placed.sort_unstable_by_key(|(nearest, _, ready)| (*nearest, ready.triangle.id));
-    let across = layout.viewport.width().div_ceil(layout.plan.bin_px);
-    let mut lists = vec![Vec::new(); layout.bins.len()];
-    for (index, (_, pixels, _)) in placed.iter().enumerate() {
-        let bins = pixels.tiles(layout.plan.bin_px);
-        for row in bins.y0..bins.y1 {
-            for column in bins.x0..bins.x1 {
-                lists[(row * across + column) as usize].push(index as u32);
-            }
-        }
-    }
+    let rects = placed.iter().map(|(_, pixels, _)| *pixels);
+    let lists = distribute(rects, layout.viewport, layout.plan.bin_px);
     (placed.into_iter().map(|(_, _, ready)| ready).collect(), lists)
 }

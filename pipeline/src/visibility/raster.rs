@@ -41,13 +41,15 @@ pub struct Tally {
     pub hits: u64,
 }
 
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Self) {
-        self.bins += other.bins;
-        self.cells += other.cells;
-        self.blocks += other.blocks;
-        self.packets += other.packets;
-        self.hits += other.hits;
+impl std::iter::Sum for Tally {
+    fn sum<I: Iterator<Item = Self>>(tallies: I) -> Self {
+        tallies.fold(Self::default(), |a, b| Self {
+            bins: a.bins + b.bins,
+            cells: a.cells + b.cells,
+            blocks: a.blocks + b.blocks,
+            packets: a.packets + b.packets,
+            hits: a.hits + b.hits,
+        })
     }
 }
 
@@ -137,7 +139,7 @@ impl Worker<'_> {
             shear: &self.layout.projection.shear,
             near: self.layout.projection.near,
             bin: self.samples,
-            half_px: self.layout.half_px(),
+            half_px: self.layout.viewport.half_px(),
             block_px: self.layout.plan.block_px,
             blocks: self.layout.plan.blocks(),
         }

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use pipeline::Features;
 
+use crate::stress::methods::SWITCHES;
+
 /// Frames from the first to one past the last.
 pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {
     let wrong = || format!("`{text}` is not a range of frames; write it as 0..36");
@@ -21,24 +23,12 @@ pub(super) fn tests(text: &str) -> Result<Features, String> {
         _ => {}
     }
     let mut features = Features::NONE;
-    let mut switches = [
-        ("lens_lines", &mut features.lens_lines),
-        ("side_planes", &mut features.side_planes),
-        ("facing", &mut features.facing),
-        ("edges", &mut features.edges),
-        ("coarse", &mut features.coarse),
-        ("screen", &mut features.screen),
-        ("z_max", &mut features.z_max),
-    ];
     for name in text.split(',').map(|name| name.trim().replace('-', "_")) {
-        let names = switches.each_ref().map(|(known, _)| *known).join(", ");
-        let switch = switches.iter_mut().find(|(known, _)| *known == name);
-        let (_, on) = switch
-            .ok_or_else(|| format!("`{name}` is no tile test; there are {names}, or all, none, auto"))?;
-        **on = true;
-    }
-    if features.facing {
-        features.facing_splits = Features::ALL.facing_splits;
+        let switch = SWITCHES.iter().find(|switch| switch.name == name).ok_or_else(|| {
+            let names = SWITCHES.map(|switch| switch.name).join(", ");
+            format!("`{name}` is no tile test; there are {names}, or all, none, auto")
+        })?;
+        (switch.on)(&mut features);
     }
     Ok(features)
 }

@@ -44,7 +44,8 @@ pub struct Switch {
     pub letter: char,
     /// Its name, as in a GPU file.
     pub name: &'static str,
-    on: fn(&mut Features),
+    /// Switches it on.
+    pub on: fn(&mut Features),
 }
 
 /// Every test that can be switched on, each a line.

@@ -14,12 +14,11 @@ pub fn set_up_all<'a>(
     viewport: Viewport,
 ) -> impl Iterator<Item = Triangle> + use<'a> {
     let projection = Projection::new(camera, viewport);
-    let half_px = [viewport.width(), viewport.height()].map(|side| 0.5 * side as f32);
     let triangles = draws.iter().flat_map(|draw| draw.geometry.triangles().iter().map(move |t| (draw, *t)));
     (0..).zip(triangles).filter_map(move |(id, (draw, corners))| {
         let (open, close) = (draw.geometry.open(), draw.geometry.close());
         let [a, b, c] = corners.map(|v| projection.vertex(open[v as usize], close[v as usize]));
-        match set_up(id, [&a, &b, &c], draw.cull, &projection.shear, projection.near, half_px) {
+        match set_up(id, [&a, &b, &c], draw.cull, &projection.shear, projection.near, viewport.half_px()) {
             Outcome::Ready(triangle) => Some(triangle),
             _ => None,
         }
