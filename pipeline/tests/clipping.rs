@@ -8,6 +8,7 @@ use common::*;
 use glam::Vec3;
 use pipeline::frame::visibility;
 use pipeline::sampling::Sample;
+use pipeline::visibility::{SampleLayout, Visibility, resolve};
 use pipeline::*;
 use proptest::prelude::*;
 
@@ -21,6 +22,15 @@ struct Scene {
 }
 
 impl Scene {
+    /// By the fast engine.
+    fn see_fast(&self, frame: Clip) -> Vec<(u32, u32)> {
+        let camera = camera(self.lens).with_clip(frame);
+        let layout = SampleLayout::new(&camera, viewport(), &self.table, self.soup.open != self.soup.close);
+        let mut seen = Visibility::new(&layout);
+        resolve(&layout, &self.soup.draw(&Plain, Cull::None).geometry, Cull::None, &mut seen);
+        seen.in_image_order(&layout).into_iter().map(|(id, depth)| (id, depth.to_bits())).collect()
+    }
+
     fn see(&self, features: Features, frame: Clip, draw: Clip) -> Vec<(u32, u32)> {
         let spec = spec(features);
         let settings =
@@ -56,6 +66,7 @@ proptest! {
         let features = switched(switches);
         let clipped = scene.see(features, frame, draw);
         let whole = scene.see(features, Clip::NONE, Clip::NONE);
+        prop_assert!(scene.see_fast(clip) == clipped);
         for ((_, sample), (ours, all)) in looks(&scene.table, viewport()).iter().zip(clipped.iter().zip(&whole)) {
             let inside = within(u, sample.u) && within(v, sample.v) && within(t, sample.t);
             let expected = if inside { *all } else { (NOTHING, f32::INFINITY.to_bits()) };

@@ -111,7 +111,12 @@ fn many_hits_lie_beyond_an_edge_by_rounding_alone() {
                 (hits, beyond) = (hits + found.hits, beyond + found.beyond);
             }
             println!("moving {moving} lens {lens} far {far}: {beyond} of {hits} hits");
-            assert!(beyond >= 20, "moving {moving} lens {lens} far {far}: {beyond} of {hits} hits");
+            // Far out, what is left of a still vertex once the sample is taken off it by a fused multiply-add is exact.
+            let exact = far && !moving && !lens;
+            assert!(
+                hits > 1000 && (beyond >= 20) != exact,
+                "moving {moving} lens {lens} far {far}: {beyond}"
+            );
         }
     }
 }

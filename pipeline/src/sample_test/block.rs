@@ -46,15 +46,15 @@ impl<V: Lanes, const MOTION: bool, const LENS: bool> View<V, MOTION, LENS> {
         let [mut x, mut y, mut w] =
             [V::splat(corner.open[0]), V::splat(corner.open[1]), V::splat(corner.open[2])];
         if MOTION {
-            x = x + self.t * V::splat(corner.delta[0]);
-            y = y + self.t * V::splat(corner.delta[1]);
-            w = w + self.t * V::splat(corner.delta[2]);
+            x = self.t.times_plus(V::splat(corner.delta[0]), x);
+            y = self.t.times_plus(V::splat(corner.delta[1]), y);
+            w = self.t.times_plus(V::splat(corner.delta[2]), w);
         }
         if LENS {
             x = x - self.lens[0];
             y = y - self.lens[1];
         }
-        Seen { x: x - self.slope[0] * w, y: y - self.slope[1] * w, w }
+        Seen { x: self.slope[0].times_from(w, x), y: self.slope[1].times_from(w, y), w }
     }
 }
 
@@ -62,10 +62,8 @@ impl<V: Lanes, const MOTION: bool, const LENS: bool> View<V, MOTION, LENS> {
 pub(crate) struct Crossing<V> {
     edges: [V; 3],
     depths: [V; 3],
-    /// Lanes inside a triangle that turns clockwise on the screen, and counter-clockwise.
-    pub inside: [Mask; 2],
-    /// Lanes on an edge or a vertex, and outside of no other edge, for [`super::exact`] to decide.
-    pub tie: Mask,
+    /// The smallest and largest edge function.
+    ends: [V; 2],
 }
 
 impl<V: Lanes> Crossing<V> {
@@ -79,26 +77,34 @@ impl<V: Lanes> Crossing<V> {
         let e1 = c.x * a.y - a.x * c.y;
         let e2 = a.x * b.y - b.x * a.y;
         let (least, most) = (e0.min(e1).min(e2), e0.max(e1).max(e2));
+        Self { edges: [e0, e1, e2], depths: [a.w, b.w, c.w], ends: [least, most] }
+    }
+
+    /// Whether any lane is inside or on an edge.
+    #[inline(always)]
+    pub fn any(&self) -> bool {
         let zero = V::splat(0.0);
-        let inside = [least.gt(zero), zero.gt(most)];
-        Self {
-            edges: [e0, e1, e2],
-            depths: [a.w, b.w, c.w],
-            inside,
-            tie: least.equal(zero) | most.equal(zero),
-        }
+        (self.ends[0].ge(zero) | zero.ge(self.ends[1])) != 0
+    }
+
+    /// Lanes on an edge or a vertex, and outside of no other edge, for [`super::exact`] to decide.
+    #[inline(always)]
+    pub fn tie(&self) -> Mask {
+        let zero = V::splat(0.0);
+        self.ends[0].equal(zero) | self.ends[1].equal(zero)
     }
 
     /// Lanes inside that show a face to be drawn.
     #[inline(always)]
     pub fn shown(&self, faces: [bool; 2]) -> Mask {
+        let zero = V::splat(0.0);
         // By branches, which are always taken alike, rather than by masks, which the compiler would put into vectors.
         let mut shown = 0;
         if faces[0] {
-            shown |= self.inside[0];
+            shown |= self.ends[0].gt(zero);
         }
         if faces[1] {
-            shown |= self.inside[1];
+            shown |= zero.gt(self.ends[1]);
         }
         shown
     }

@@ -24,7 +24,7 @@ pub(crate) fn seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) ->
 /// One vertex, with the operations of the kernel in their order.
 fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
     let [x, y, w] = corner.at(t);
-    [(x - lens[0]) - slope[0] * w, (y - lens[1]) - slope[1] * w, w]
+    [(-slope[0]).mul_add(w, x - lens[0]), (-slope[1]).mul_add(w, y - lens[1]), w]
 }
 
 /// The depth at which a sample hits a triangle of which the given faces are drawn.

@@ -1,7 +1,7 @@
 //! The sample test over a run of samples of a tile, sixteen at a time.
 //!
-//! One source serves every combination of dimensions and every vector width, by generics. No operation is contracted,
-//! so all of them give the same bytes.
+//! One source serves every combination of dimensions and every vector width, by generics. Where a multiply-add is fused is
+//! written out, so all of them give the same bytes.
 
 use std::ops::Range;
 
@@ -190,7 +190,7 @@ impl Job<'_, '_> {
                 self.keep(base + lane, depth[lane]);
             }
         }
-        let mut tie = crossing.tie & active;
+        let mut tie = crossing.tie() & active;
         while tie != 0 {
             let lane = tie.trailing_zeros() as usize;
             tie &= tie - 1;

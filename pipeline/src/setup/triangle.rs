@@ -23,7 +23,7 @@ impl Corner {
     #[inline]
     pub fn at(&self, t: f32) -> [f32; 3] {
         let ([x, y, w], [dx, dy, dw]) = (self.open, self.delta);
-        [x + t * dx, y + t * dy, w + t * dw]
+        [t.mul_add(dx, x), t.mul_add(dy, y), t.mul_add(dw, w)]
     }
 }
 

@@ -1,7 +1,8 @@
 //! Sixteen numbers side by side, in the vectors this machine has.
 //!
 //! Kernels are written once over `Lanes` and entered through `dispatch`, which picks the widest vectors when
-//! the program runs. Every operation rounds as IEEE 754 asks and none is contracted, so all widths give the same bytes.
+//! the program runs. Every operation rounds as IEEE 754 asks, and multiply-adds round once where they are written and nowhere
+//! else, so all widths give the same bytes.
 
 mod plain;
 #[cfg(target_arch = "x86_64")]
@@ -42,13 +43,17 @@ pub(crate) trait Lanes:
     /// The larger of each pair; `other` where either is NaN.
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
-    /// `self * by + plus`, rounded once. For bounds only: what decides is written as products and sums.
+    /// `self * by + plus`, rounded once.
     fn times_plus(self, by: Self, plus: Self) -> Self;
+    /// `from - self * by`, rounded once.
+    fn times_from(self, by: Self, from: Self) -> Self;
     fn gt(self, other: Self) -> Mask;
     fn ge(self, other: Self) -> Mask;
     fn equal(self, other: Self) -> Mask;
     /// Writes `value` to the lanes of the mask only.
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]);
+    /// `first` plus the number of each lane of the mask, one after the other; what comes after them is of no use.
+    fn number(mask: Mask, first: u32, to: &mut [u32; LANES]);
     /// The lanes of the mask from `self`, the others from `other`.
     fn or_else(self, mask: Mask, other: Self) -> Self;
     /// The largest of the sixteen, none of them NaN.
@@ -103,6 +108,15 @@ pub(crate) trait Kernel {
     fn run<V: Lanes>(self);
 }
 
+/// Asks for the memory of `at` to be fetched, as it is read soon.
+#[inline(always)]
+pub(crate) fn prefetch<T>(at: &T) {
+    #[cfg(target_arch = "x86_64")]
+    x86::prefetch(at);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = at;
+}
+
 /// Runs a kernel with vectors of the given width.
 pub(crate) fn dispatch(width: Width, kernel: impl Kernel) {
     match width.0 {
@@ -139,6 +153,8 @@ mod tests {
                 let masks = [a.gt(b), a.ge(b), a.equal(b)];
                 let mut put = [7; LANES];
                 V::put(masks[1], seed, &mut put);
+                let mut numbers = [0; LANES];
+                V::number(masks[1], seed, &mut numbers);
                 let results = [
                     a + b,
                     a - b,
@@ -148,6 +164,7 @@ mod tests {
                     a.max(b),
                     a.abs(),
                     a.times_plus(b, a),
+                    a.times_from(b, a),
                     a.or_else(masks[0], b),
                     V::splat(2.0),
                 ];
@@ -160,6 +177,7 @@ mod tests {
                 self.0.extend(masks.map(u32::from));
                 self.0.push(a.abs().min(V::splat(f32::MAX)).largest().to_bits());
                 self.0.extend(put);
+                self.0.extend(&numbers[..masks[1].count_ones() as usize]);
             }
         }
     }

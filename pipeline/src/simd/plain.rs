@@ -84,6 +84,15 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
+    fn times_from(self, by: Self, from: Self) -> Self {
+        let mut out = from.0;
+        for (out, (a, b)) in out.iter_mut().zip(self.0.into_iter().zip(by.0)) {
+            *out = (-a).mul_add(b, *out);
+        }
+        Self(out)
+    }
+
+    #[inline(always)]
     fn gt(self, other: Self) -> Mask {
         mask(self, other, |a, b| a > b)
     }
@@ -104,6 +113,15 @@ impl Lanes for Plain {
             if mask >> lane & 1 != 0 {
                 *place = value;
             }
+        }
+    }
+
+    #[inline(always)]
+    fn number(mask: Mask, first: u32, to: &mut [u32; LANES]) {
+        let mut rest = mask;
+        for place in to.iter_mut().take(mask.count_ones() as usize) {
+            *place = first + rest.trailing_zeros();
+            rest &= rest - 1;
         }
     }
 

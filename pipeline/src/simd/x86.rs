@@ -20,6 +20,16 @@ pub(super) fn avx512(kernel: impl Kernel) {
     kernel.run::<Avx512>();
 }
 
+/// Asks for every cache line of `at`.
+#[inline(always)]
+pub(super) fn prefetch<T>(at: &T) {
+    let first = std::ptr::from_ref(at).cast::<i8>();
+    for offset in (0..size_of::<T>()).step_by(64) {
+        // A prefetch never faults, and this is within the value.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(offset)) };
+    }
+}
+
 #[derive(Clone, Copy)]
 pub(super) struct Avx512(__m512);
 
@@ -87,6 +97,11 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    fn times_from(self, by: Self, from: Self) -> Self {
+        Self(unsafe { _mm512_fnmadd_ps(self.0, by.0, from.0) })
+    }
+
+    #[inline(always)]
     fn gt(self, other: Self) -> Mask {
         unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, other.0) }
     }
@@ -105,6 +120,15 @@ impl Lanes for Avx512 {
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]) {
         unsafe {
             _mm512_mask_storeu_epi32(to.as_mut_ptr().cast(), mask, _mm512_set1_epi32(value.cast_signed()));
+        }
+    }
+
+    #[inline(always)]
+    fn number(mask: Mask, first: u32, to: &mut [u32; LANES]) {
+        unsafe {
+            let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let number = _mm512_add_epi32(_mm512_set1_epi32(first.cast_signed()), lane);
+            _mm512_storeu_epi32(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(mask, number));
         }
     }
 
@@ -187,6 +211,11 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn times_from(self, by: Self, from: Self) -> Self {
+        unsafe { Self(_mm256_fnmadd_ps(self.0, by.0, from.0), _mm256_fnmadd_ps(self.1, by.1, from.1)) }
+    }
+
+    #[inline(always)]
     fn gt(self, other: Self) -> Mask {
         compare!(self, other, _CMP_GT_OQ)
     }
@@ -208,6 +237,11 @@ impl Lanes for Avx2 {
             _mm256_maskstore_epi32(to.as_mut_ptr().cast(), low, value);
             _mm256_maskstore_epi32(to.as_mut_ptr().add(8).cast(), high, value);
         }
+    }
+
+    #[inline(always)]
+    fn number(mask: Mask, first: u32, to: &mut [u32; LANES]) {
+        super::Plain::number(mask, first, to);
     }
 
     #[inline(always)]

@@ -25,8 +25,7 @@ pub(super) struct CellSetup {
     /// Where it may be seen: lowest and highest x and y.
     pub x: [Row; 2],
     pub y: [Row; 2],
-    /// First and last column, and first and last row, of the blocks that may hold it.
-    pub columns: [Row; 2],
+    /// First and last row of the blocks that may hold it.
     pub rows: [Row; 2],
     /// The smallest depth of its vertices.
     pub nearest: Row,
@@ -48,15 +47,7 @@ impl CellSetup {
     pub const EMPTY: Self = {
         const ZERO: Row = Row::splat(0.0);
         const EDGE: EdgeRows = EdgeRows { most: [ZERO; 2], slope_x: ZERO, slope_y: ZERO };
-        Self {
-            x: [ZERO; 2],
-            y: [ZERO; 2],
-            columns: [ZERO; 2],
-            rows: [ZERO; 2],
-            nearest: ZERO,
-            edges: [EDGE; 3],
-            faces: [0; 2],
-        }
+        Self { x: [ZERO; 2], y: [ZERO; 2], rows: [ZERO; 2], nearest: ZERO, edges: [EDGE; 3], faces: [0; 2] }
     };
 }
 
@@ -70,9 +61,9 @@ pub(super) struct Scene<'a> {
     pub bin: &'a BinSamples,
     /// The largest |X| and |Y| of the image.
     pub half_px: [f32; 2],
-    /// Size of a block, and blocks of a bin, across and down.
-    pub block_px: [u32; 2],
-    pub blocks: [u32; 2],
+    /// Height of a block, and rows of blocks in a bin.
+    pub block_px: u32,
+    pub block_rows: u32,
 }
 
 impl Scene<'_> {
@@ -87,8 +78,7 @@ impl Scene<'_> {
             x[end].store(&mut setup.x[end].0);
             y[end].store(&mut setup.y[end].0);
         }
-        self.blocks(x, 0, &mut setup.columns);
-        self.blocks(y, 1, &mut setup.rows);
+        self.rows(y, &mut setup.rows);
         nearest.store(&mut setup.nearest.0);
         let (middle, extent) = self.extent::<V, MOTION, LENS>(x, y);
         let view = self.middle::<V, MOTION, LENS>(middle);
@@ -176,17 +166,16 @@ impl Scene<'_> {
         ([low, high], high.ge(low))
     }
 
-    /// First and last column or row of the blocks of a bin that may hold samples in `range`, as whole numbers once
-    /// cut off.
+    /// First and last row of the blocks of a bin that may hold samples in `range`, as whole numbers once cut off.
     #[inline(always)]
-    fn blocks<V: Lanes>(&self, range: [V; 2], axis: usize, into: &mut [Row; 2]) {
+    fn rows<V: Lanes>(&self, range: [V; 2], into: &mut [Row; 2]) {
         // Rounding may put a sample of the last pixel of a block at the first position of the next.
         const ROUNDING_PX: f32 = 1.0 / 64.0;
-        let per_px = V::splat(1.0 / self.block_px[axis] as f32);
-        let (corner, last) = (self.bin.corner[axis], V::splat((self.blocks[axis] - 1) as f32));
-        let first = (range[0] - V::splat(corner + ROUNDING_PX)) * per_px;
+        let per_px = V::splat(1.0 / self.block_px as f32);
+        let last = V::splat((self.block_rows - 1) as f32);
+        let first = (range[0] - V::splat(self.bin.top + ROUNDING_PX)) * per_px;
         first.max(V::splat(0.0)).min(last).store(&mut into[0].0);
-        ((range[1] - V::splat(corner)) * per_px).max(V::splat(0.0)).min(last).store(&mut into[1].0);
+        ((range[1] - V::splat(self.bin.top)) * per_px).max(V::splat(0.0)).min(last).store(&mut into[1].0);
     }
 
     /// The middle of the box on the screen and half the extents of the cell.

@@ -24,19 +24,30 @@ pub struct SampleLayout {
 pub(super) struct BinSamples {
     /// Its first pixel.
     pub origin: [u32; 2],
-    /// The position of that on the image.
-    pub corner: [f32; 2],
+    /// The y of that on the image.
+    pub top: f32,
     /// The range of its sample positions in x and in y.
     pub rect: [[f32; 2]; 2],
     /// The box of lens and time of each cell.
     pub cells: CellBoxes,
+    /// By sixteen blocks, the box of each on the screen.
+    pub blocks: Vec<Boxes>,
     /// By block and cell, the box of each packet on the screen.
-    pub boxes: Vec<PacketBoxes>,
+    pub boxes: Vec<Boxes>,
     /// By packet and lane, the place of the sample in the bin: pixel by pixel in rows, times samples in a pixel, plus index.
     pub places: Vec<[u32; LANES]>,
-    /// [`Stride`] rows for each packet.
-    pub rows: Vec<Row>,
-    pub stride: Stride,
+    /// The packets with fewer samples than lanes, but for those with none.
+    pub partial: Vec<u32>,
+    /// The samples of each packet.
+    pub packets: Vec<Packet>,
+}
+
+/// Sixteen samples as the sample test asks for them; zero in dimensions that are not in use, whose rows are not read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Packet {
+    pub slope: [Row; 2],
+    pub lens: [Row; 2],
+    pub t: Row,
 }
 
 /// By cell: the lowest, middle and highest of an axis, and how far from the middle either end may be.
@@ -56,35 +67,19 @@ pub(super) struct CellBoxes {
     pub t: CellRange,
 }
 
-/// By packet of a cell: lowest and highest x and y of its samples. Lowest above highest where it has none.
+/// By packet of a cell, or by block: lowest and highest x and y of its samples. Lowest above highest where it has none.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PacketBoxes {
+pub(super) struct Boxes {
     pub x: [Row; 2],
     pub y: [Row; 2],
 }
-
-/// Which rows a packet has: two slopes, the time if anything may move, two lens shears if there is a lens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stride {
-    pub moving: bool,
-    pub lens: bool,
-}
-
-impl Stride {
-    pub fn rows(self) -> usize {
-        2 + usize::from(self.moving) + 2 * usize::from(self.lens)
-    }
-}
-
-/// The place of samples in a dimension that is not in use.
-static NOWHERE: Row = Row::splat(0.0);
 
 /// No range at all.
 pub(super) const NOTHING: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 impl SampleLayout {
     /// Sorts the samples of `source` for what `camera` sees in `viewport`. `moving` says whether triangles may move; where
-    /// none does, time is not divided.
+    /// none does, time is not divided. Samples outside the clip planes of the camera see nothing.
     pub fn new(camera: &Camera, viewport: Viewport, source: &dyn SampleSource, moving: bool) -> Self {
         let projection = Projection::new(camera, viewport);
         let per_pixel = source.per_pixel();
@@ -95,7 +90,8 @@ impl SampleLayout {
             .into_par_iter()
             .map(|bin| {
                 let origin = [bin % across * plan.bin_px, bin / across * plan.bin_px];
-                Sorter { viewport, source, shear: &projection.shear, plan: &plan, moving }.bin(origin)
+                Sorter { viewport, source, shear: &projection.shear, plan: &plan, clip: camera.clip() }
+                    .bin(origin)
             })
             .collect();
         Self { viewport, per_pixel, projection, plan, bins }
@@ -121,23 +117,37 @@ impl SampleLayout {
 impl BinSamples {
     /// The place of a lane that has no sample.
     pub const NO_SAMPLE: u32 = u32::MAX;
+}
 
-    /// The samples of a packet. In dimensions that are not in use they are all at zero.
+impl Packet {
+    /// No samples: infinitely far away, where all edge functions are NaN.
+    pub const NOWHERE: Self = {
+        const FAR: Row = Row::splat(f32::INFINITY);
+        const ZERO: Row = Row::splat(0.0);
+        Self { slope: [FAR; 2], lens: [ZERO; 2], t: ZERO }
+    };
+
     #[inline(always)]
-    pub fn packet(&self, packet: usize) -> SampleRows<'_> {
-        let stride = self.stride.rows();
-        let rows = &self.rows[packet * stride..(packet + 1) * stride];
-        let lens =
-            if self.stride.lens { [&rows[stride - 2].0, &rows[stride - 1].0] } else { [&NOWHERE.0; 2] };
-        let t = if self.stride.moving { &rows[2].0 } else { &NOWHERE.0 };
-        SampleRows { slope: [&rows[0].0, &rows[1].0], lens, t }
+    pub fn rows(&self) -> SampleRows<'_> {
+        SampleRows {
+            slope: [&self.slope[0].0, &self.slope[1].0],
+            lens: [&self.lens[0].0, &self.lens[1].0],
+            t: &self.t.0,
+        }
     }
 }
 
-impl PacketBoxes {
+impl Boxes {
     pub fn nothing() -> Self {
         let range = NOTHING.map(Row::splat);
         Self { x: range, y: range }
+    }
+
+    pub fn include(&mut self, lane: usize, x: f32, y: f32) {
+        for (range, at) in [(&mut self.x, x), (&mut self.y, y)] {
+            range[0].0[lane] = range[0].0[lane].min(at);
+            range[1].0[lane] = range[1].0[lane].max(at);
+        }
     }
 }
 

@@ -11,23 +11,26 @@
 //!
 //! The result is that of the sample test on all samples, bit for bit.
 
+mod block;
 mod cells;
 mod edges;
 mod faces;
 mod facing;
 mod layout;
 mod plan;
+mod queue;
 mod raster;
 mod sorter;
 
 use rayon::prelude::*;
 
 use crate::depth::vertex_range;
-use crate::geometry::{Cull, Geometry};
-use crate::setup::{Outcome, bounds, distribute, set_up};
+use crate::geometry::{Clip, Cull, Geometry, MovingVertex, Projection};
+use crate::setup::{Outcome, PixelRect, bounds, distribute, set_up};
 use crate::simd::{Width, dispatch};
 use facing::Facing;
 pub use layout::SampleLayout;
+use queue::Queue;
 pub use raster::Tally;
 use raster::{BinSurface, Ready, Worker};
 
@@ -42,7 +45,7 @@ pub type Sighting = (u32, f32);
 
 impl Visibility {
     /// The triangle of a sample that sees none.
-    pub const NOTHING: u32 = BinSurface::NOTHING;
+    pub const NOTHING: u32 = u32::MAX;
 
     /// Room for what the samples of `layout` see; may be used again and again.
     pub fn new(layout: &SampleLayout) -> Self {
@@ -56,7 +59,7 @@ impl Visibility {
             let lanes = samples.places.as_flattened().iter().zip(surface.triangle.as_flattened());
             for ((&place, &triangle), depth) in lanes.zip(surface.depth.iter().flat_map(|row| row.0)) {
                 if let Some(index) = layout.in_image(samples, place) {
-                    image[index] = (triangle, depth);
+                    image[index] = (if depth.is_finite() { triangle } else { Self::NOTHING }, depth);
                 }
             }
         }
@@ -65,6 +68,9 @@ impl Visibility {
 }
 
 /// Finds what every sample of `layout` sees of `geometry`.
+///
+/// # Panics
+/// When the geometry has clip planes of its own: the samples are sorted without those outside, so they belong to the camera.
 pub fn resolve(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull, into: &mut Visibility) -> Tally {
     resolve_at(Width::widest(), layout, geometry, cull, into)
 }
@@ -77,6 +83,7 @@ pub fn resolve_at(
     cull: Cull,
     into: &mut Visibility,
 ) -> Tally {
+    assert_eq!(geometry.clip(), Clip::NONE, "clip planes have to be those of the camera");
     let (ready, lists) = front_end(layout, geometry, cull);
     layout
         .bins
@@ -85,7 +92,18 @@ pub fn resolve_at(
         .zip(&lists)
         .map(|((samples, surface), list)| {
             let mut tally = Tally::default();
-            dispatch(width, Worker { layout, samples, surface, ready: &ready, list, tally: &mut tally });
+            dispatch(
+                width,
+                Worker {
+                    layout,
+                    samples,
+                    surface,
+                    ready: &ready,
+                    list,
+                    tally: &mut tally,
+                    queue: Queue::new(samples.places.len()),
+                },
+            );
             tally
         })
         .sum()
@@ -94,25 +112,39 @@ pub fn resolve_at(
 /// Triangles that have to be visited, front to back, and those of them each bin has to visit.
 fn front_end(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull) -> (Vec<Ready>, Vec<Vec<u32>>) {
     let vertices = layout.projection.images(geometry);
-    let mut placed: Vec<_> = (0..geometry.triangles().len() as u32)
+    let placed: Vec<Placed> = (0..geometry.triangles().len() as u32)
         .into_par_iter()
         .with_min_len(256)
         .filter_map(|id| {
             let corners = geometry.triangles()[id as usize].map(|vertex| &vertices[vertex as usize]);
-            let projection = &layout.projection;
-            let Outcome::Ready(triangle) =
-                set_up(id, corners, cull, &projection.shear, projection.near, layout.viewport.half_px())
-            else {
-                return None;
-            };
-            let pixels = bounds(&triangle, &projection.shear, layout.viewport);
-            let nearest = vertex_range(&triangle, [0.0, 1.0])[0].max(0.0);
-            let facing = Facing::new(&triangle.corners, &projection.shear);
-            (!pixels.is_empty()).then_some((nearest.to_bits(), pixels, Ready { triangle, facing }))
+            place(layout, id, corners, cull)
         })
         .collect();
-    placed.sort_unstable_by_key(|(nearest, _, ready)| (*nearest, ready.triangle.id));
-    let rects = placed.iter().map(|(_, pixels, _)| *pixels);
-    let lists = distribute(rects, layout.viewport, layout.plan.bin_px);
-    (placed.into_iter().map(|(_, _, ready)| ready).collect(), lists)
+    // Sorted by keys, as the triangles are large.
+    let mut order: Vec<(u32, u32)> =
+        placed.iter().zip(0..).map(|(p, at)| (p.nearest.to_bits(), at)).collect();
+    order.sort_unstable();
+    let sorted = || order.iter().map(|&(_, at)| &placed[at as usize]);
+    let lists = distribute(sorted().map(|p| p.pixels), layout.viewport, layout.plan.bin_px);
+    (sorted().map(|p| p.ready.clone()).collect(), lists)
+}
+
+/// A triangle and the pixels it may touch.
+struct Placed {
+    /// The smallest depth it may be seen at, not negative.
+    nearest: f32,
+    pixels: PixelRect,
+    ready: Ready,
+}
+
+/// Sets up a triangle, unless it cannot be seen.
+fn place(layout: &SampleLayout, id: u32, corners: [&MovingVertex; 3], cull: Cull) -> Option<Placed> {
+    let Projection { shear, near, .. } = &layout.projection;
+    let Outcome::Ready(triangle) = set_up(id, corners, cull, shear, *near, layout.viewport.half_px()) else {
+        return None;
+    };
+    let pixels = bounds(&triangle, shear, layout.viewport);
+    let nearest = vertex_range(&triangle, [0.0, 1.0])[0].max(0.0);
+    let facing = Facing::new(&triangle.corners, shear);
+    (!pixels.is_empty()).then_some(Placed { nearest, pixels, ready: Ready { triangle, facing } })
 }

@@ -1,12 +1,20 @@
 //! One worker at one bin: each triangle through cells, blocks and packets.
 
+use super::block::{CellBounds, FaceBounds};
 use super::cells::{CellSetup, Scene, all};
 use super::facing::Facing;
-use super::layout::{BinSamples, PacketBoxes, SampleLayout};
+use super::layout::{BinSamples, Boxes, SampleLayout};
+use super::queue::Queue;
 use crate::sample_test::block::{Crossing, View};
 use crate::sample_test::exact;
 use crate::setup::Triangle;
-use crate::simd::{Kernel, LANES, Lanes, Mask, Row};
+use crate::simd::{Kernel, LANES, Lanes, Mask, Row, prefetch};
+
+/// How many triangles, or packets, ahead of the one in work memory is asked for.
+const AHEAD: usize = 4;
+
+/// So many blocks are not worth being tested against edges before their packets are.
+const FEW_BLOCKS: u32 = 4;
 
 /// A triangle set up for all bins.
 #[derive(Clone, Debug)]
@@ -20,7 +28,7 @@ pub(super) struct Ready {
 pub(super) struct BinSurface {
     /// By packet, the depth of the nearest hit; infinite where there is none, below everything where there is no sample.
     pub depth: Vec<Row>,
-    /// By packet, the triangle of the nearest hit, [`Self::NOTHING`] where there is none.
+    /// By packet, the triangle of the nearest hit; meaningless where there is none.
     pub triangle: Vec<[u32; LANES]>,
     /// By block and cell, the largest depth of each packet.
     pub farthest: Vec<Row>,
@@ -54,24 +62,23 @@ impl std::iter::Sum for Tally {
 }
 
 impl BinSurface {
-    pub const NOTHING: u32 = u32::MAX;
-
     pub fn new(samples: &BinSamples) -> Self {
         let packets = samples.places.len();
         Self {
             depth: vec![Row::splat(0.0); packets],
-            triangle: vec![[Self::NOTHING; LANES]; packets],
+            triangle: vec![[0; LANES]; packets],
             farthest: vec![Row::splat(0.0); samples.boxes.len()],
         }
     }
 
     /// Forgets what was seen.
     fn clear(&mut self, samples: &BinSamples) {
-        self.triangle.fill([Self::NOTHING; LANES]);
         self.farthest.fill(Row::splat(f32::INFINITY));
-        for (depth, places) in self.depth.iter_mut().zip(&samples.places) {
-            for (depth, &place) in depth.0.iter_mut().zip(places) {
-                *depth = if place == BinSamples::NO_SAMPLE { f32::NEG_INFINITY } else { f32::INFINITY };
+        self.depth.fill(Row::splat(f32::INFINITY));
+        for &packet in &samples.partial {
+            let lanes = self.depth[packet as usize].0.iter_mut().zip(&samples.places[packet as usize]);
+            for (depth, _) in lanes.filter(|(_, place)| **place == BinSamples::NO_SAMPLE) {
+                *depth = f32::NEG_INFINITY;
             }
         }
     }
@@ -85,6 +92,7 @@ pub(super) struct Worker<'a> {
     pub ready: &'a [Ready],
     pub list: &'a [u32],
     pub tally: &'a mut Tally,
+    pub queue: Queue,
 }
 
 impl Kernel for Worker<'_> {
@@ -99,7 +107,10 @@ impl Worker<'_> {
     #[inline(always)]
     fn bin<V: Lanes, const LENS: bool>(&mut self) {
         let mut setup = CellSetup::EMPTY;
-        for &index in self.list {
+        for (turn, &index) in self.list.iter().enumerate() {
+            if let Some(&soon) = self.list.get(turn + AHEAD) {
+                prefetch(&self.ready[soon as usize]);
+            }
             let ready = &self.ready[index as usize];
             if ready.triangle.moving {
                 self.triangle::<V, true, LENS>(ready, &mut setup);
@@ -118,17 +129,16 @@ impl Worker<'_> {
         let mut active = self.scene(ready).cells::<V, MOTION, LENS>(setup) & all(self.layout.plan.cells());
         self.tally.bins += 1;
         self.tally.cells += u64::from(active.count_ones());
+        self.queue.clear();
         while active != 0 {
             let cell = active.trailing_zeros() as usize;
             active &= active - 1;
-            let [columns, rows] =
-                [&setup.columns, &setup.rows].map(|ends| [ends[0].0[cell] as u32, ends[1].0[cell] as u32]);
-            for row in rows[0]..=rows[1] {
-                for column in columns[0]..=columns[1] {
-                    let block = row * self.layout.plan.blocks()[0] + column;
-                    self.block::<V, MOTION, LENS>(&ready.triangle, setup, cell, block as usize);
-                }
-            }
+            self.cell::<V>(setup, cell);
+        }
+        self.tally.packets += self.queue.len() as u64;
+        for turn in 0..self.queue.len() {
+            prefetch(&self.samples.packets[self.queue.packet(turn + AHEAD)]);
+            self.packet::<V, MOTION, LENS>(&ready.triangle, self.queue.packet(turn));
         }
     }
 
@@ -140,57 +150,66 @@ impl Worker<'_> {
             near: self.layout.projection.near,
             bin: self.samples,
             half_px: self.layout.viewport.half_px(),
-            block_px: self.layout.plan.block_px,
-            blocks: self.layout.plan.blocks(),
+            block_px: self.layout.plan.block_px[1],
+            block_rows: self.layout.plan.blocks()[1],
         }
     }
 
-    /// The packets of one cell in one block that may see the triangle, each to be tested.
+    /// Queues the packets of a cell that may see the triangle.
     #[inline(always)]
-    fn block<V: Lanes, const MOTION: bool, const LENS: bool>(
-        &mut self,
-        triangle: &Triangle,
-        setup: &CellSetup,
-        cell: usize,
-        block: usize,
-    ) {
-        let block_cell = block * self.layout.plan.cells() + cell;
-        let boxes = &self.samples.boxes[block_cell];
-        self.tally.blocks += 1;
-        let mut pass = V::load(&self.surface.farthest[block_cell].0).ge(V::splat(setup.nearest.0[cell]));
-        for (packets, range) in [(&boxes.x, &setup.x), (&boxes.y, &setup.y)] {
-            pass &= V::load(&packets[1].0).ge(V::splat(range[0].0[cell]));
-            pass &= V::splat(range[1].0[cell]).ge(V::load(&packets[0].0));
-        }
-        let mut shown = 0;
-        for face in 0..2 {
-            if setup.faces[face] >> cell & 1 != 0 {
-                shown |= in_front_of_edges::<V>(setup, cell, face, boxes);
+    fn cell<V: Lanes>(&mut self, setup: &CellSetup, cell: usize) {
+        let bounds = CellBounds::<V>::new(setup, cell);
+        match setup.faces.map(|cells| cells >> cell & 1 != 0) {
+            [true, true] => {
+                let faces = [FaceBounds::<V>::new(setup, cell, 0), FaceBounds::<V>::new(setup, cell, 1)];
+                self.blocks(setup, cell, &bounds, &faces);
+            }
+            shown => {
+                let face = FaceBounds::<V>::new(setup, cell, usize::from(shown[1]));
+                self.blocks(setup, cell, &bounds, &[face]);
             }
         }
-        pass &= shown;
-        while pass != 0 {
-            let lane = pass.trailing_zeros() as usize;
-            pass &= pass - 1;
-            self.packet::<V, MOTION, LENS>(triangle, block_cell, lane);
-        }
     }
 
     #[inline(always)]
-    fn packet<V: Lanes, const MOTION: bool, const LENS: bool>(
+    fn blocks<V: Lanes, const FACES: usize>(
         &mut self,
-        triangle: &Triangle,
-        block_cell: usize,
-        lane: usize,
+        setup: &CellSetup,
+        cell: usize,
+        bounds: &CellBounds<V>,
+        faces: &[FaceBounds<V>; FACES],
     ) {
-        let packet = block_cell * LANES + lane;
-        self.tally.packets += 1;
-        let view = View::<V, MOTION, LENS>::load(&self.samples.packet(packet));
+        let (across, cells) = (self.layout.plan.blocks()[0], self.layout.plan.cells());
+        let [first, last] = [setup.rows[0].0[cell] as u32, setup.rows[1].0[cell] as u32 + 1];
+        for group in first * across / LANES as u32..(last * across).div_ceil(LANES as u32) {
+            let boxes = &self.samples.blocks[group as usize];
+            let mut pass = bounds.meet(boxes);
+            if pass.count_ones() > FEW_BLOCKS {
+                pass &= meet_any(faces, boxes);
+            }
+            self.tally.blocks += u64::from(pass.count_ones());
+            while pass != 0 {
+                let block = group as usize * LANES + pass.trailing_zeros() as usize;
+                pass &= pass - 1;
+                let block_cell = block * cells + cell;
+                let boxes = &self.samples.boxes[block_cell];
+                let packets = bounds.meet(boxes)
+                    & bounds.before(&self.surface.farthest[block_cell])
+                    & meet_any(faces, boxes);
+                self.queue.push::<V>(packets, (block_cell * LANES) as u32);
+            }
+        }
+    }
+
+    /// Stores what the samples of a packet see of a triangle.
+    #[inline(always)]
+    fn packet<V: Lanes, const MOTION: bool, const LENS: bool>(&mut self, triangle: &Triangle, packet: usize) {
+        let view = View::<V, MOTION, LENS>::load(&self.samples.packets[packet].rows());
         let crossing = Crossing::new(&triangle.corners, &view);
-        let inside = crossing.shown(triangle.faces);
-        if inside == 0 && crossing.tie == 0 {
+        if !crossing.any() {
             return;
         }
+        let inside = crossing.shown(triangle.faces);
         let depth = crossing.depth();
         let seen = inside & depth.gt(V::splat(self.layout.projection.near));
         let stored = V::load(&self.surface.depth[packet].0);
@@ -200,15 +219,14 @@ impl Worker<'_> {
             closer |= self.lower_id(triangle.id, packet, equal);
         }
         self.tally.hits += u64::from(seen.count_ones());
-        if closer != 0 {
-            let nearest = depth.or_else(closer, stored);
-            nearest.store(&mut self.surface.depth[packet].0);
-            V::put(closer, triangle.id, &mut self.surface.triangle[packet]);
-            self.surface.farthest[block_cell].0[lane] = nearest.largest();
+        let mut nearest = depth.or_else(closer, stored);
+        nearest.store(&mut self.surface.depth[packet].0);
+        V::put(closer, triangle.id, &mut self.surface.triangle[packet]);
+        let tie = crossing.tie();
+        if tie != 0 && self.ties(triangle, packet, tie) {
+            nearest = V::load(&self.surface.depth[packet].0);
         }
-        if crossing.tie != 0 && self.ties(triangle, packet, crossing.tie) {
-            self.surface.farthest[block_cell].0[lane] = V::load(&self.surface.depth[packet].0).largest();
-        }
+        self.surface.farthest[packet / LANES].0[packet % LANES] = nearest.largest();
     }
 
     /// Of the lanes at equal depth, those where this triangle comes first.
@@ -225,7 +243,7 @@ impl Worker<'_> {
     fn ties(&mut self, triangle: &Triangle, packet: usize, tie: Mask) -> bool {
         let mut written = false;
         for lane in (0..LANES).filter(|lane| tie >> lane & 1 != 0) {
-            let seen = exact::seen(&triangle.corners, &self.samples.packet(packet), lane);
+            let seen = exact::seen(&triangle.corners, &self.samples.packets[packet].rows(), lane);
             let Some(depth) = exact::hit(&seen, triangle.faces) else { continue };
             let (stored, owner) =
                 (&mut self.surface.depth[packet].0[lane], &mut self.surface.triangle[packet][lane]);
@@ -240,20 +258,12 @@ impl Worker<'_> {
     }
 }
 
-/// The packets in which no edge of the face is known to be below zero, in the sign of the face, for all samples.
+/// The boxes that one of the faces may be seen in.
 #[inline(always)]
-fn in_front_of_edges<V: Lanes>(setup: &CellSetup, cell: usize, face: usize, boxes: &PacketBoxes) -> Mask {
-    let (mut pass, zero) = (Mask::MAX, V::splat(0.0));
-    for edge in &setup.edges {
-        let (slope_x, slope_y) = (edge.slope_x.0[cell], edge.slope_y.0[cell]);
-        // The end of the box at which the edge is largest.
-        let (end_x, end_y) = (usize::from(slope_x > 0.0) ^ face, usize::from(slope_y > 0.0) ^ face);
-        let sign = if face == 0 { 1.0 } else { -1.0 };
-        let most = V::load(&boxes.x[end_x].0)
-            .times_plus(V::splat(sign * slope_x), V::splat(edge.most[face].0[cell]));
-        let most = V::load(&boxes.y[end_y].0).times_plus(V::splat(sign * slope_y), most);
-        // Where the arithmetic overflowed to NaN nothing is known.
-        pass &= !zero.gt(most);
+fn meet_any<V: Lanes, const FACES: usize>(faces: &[FaceBounds<V>; FACES], boxes: &Boxes) -> Mask {
+    let mut pass = 0;
+    for face in faces {
+        pass |= face.meet(boxes);
     }
     pass
 }

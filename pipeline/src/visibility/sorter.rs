@@ -1,10 +1,10 @@
 //! Dividing the samples of a bin into cells and packets.
 
-use super::layout::{BinSamples, CellBoxes, CellRange, NOTHING, PacketBoxes, Stride};
+use super::layout::{BinSamples, Boxes, CellBoxes, CellRange, NOTHING, Packet};
 use super::plan::{Axis, Plan};
-use crate::geometry::{Shear, Viewport};
+use crate::geometry::{Clip, Shear, Viewport};
 use crate::sampling::{Sample, SampleSource};
-use crate::simd::{LANES, Row};
+use crate::simd::LANES;
 
 /// A sample on its way into a packet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,7 +35,7 @@ pub(super) struct Sorter<'a> {
     pub source: &'a dyn SampleSource,
     pub shear: &'a Shear,
     pub plan: &'a Plan,
-    pub moving: bool,
+    pub clip: Clip,
 }
 
 impl Sorter<'_> {
@@ -43,20 +43,16 @@ impl Sorter<'_> {
     pub fn bin(&self, origin: [u32; 2]) -> BinSamples {
         let [across, down] = self.plan.blocks();
         let (blocks, cells) = ((across * down) as usize, self.plan.cells());
-        let stride = Stride { moving: self.moving, lens: !self.shear.is_none() };
         let mut bin = BinSamples {
             origin,
-            corner: [
-                Viewport::edge(origin[0], self.viewport.width()),
-                Viewport::edge(origin[1], self.viewport.height()),
-            ],
+            top: Viewport::edge(origin[1], self.viewport.height()),
             rect: [NOTHING; 2],
             cells: CellBoxes { u: CellRange::nothing(), v: CellRange::nothing(), t: CellRange::nothing() },
-            boxes: vec![PacketBoxes::nothing(); blocks * cells],
+            blocks: vec![Boxes::nothing(); blocks.div_ceil(LANES)],
+            boxes: vec![Boxes::nothing(); blocks * cells],
+            partial: Vec::new(),
             places: vec![[BinSamples::NO_SAMPLE; LANES]; blocks * cells * LANES],
-            // What is not a sample is infinitely far away, where all edge functions are NaN.
-            rows: vec![Row::splat(f32::INFINITY); blocks * cells * LANES * stride.rows()],
-            stride,
+            packets: vec![Packet::NOWHERE; blocks * cells * LANES],
         };
         let (mut samples, mut pixel) =
             (Vec::new(), vec![Sample::default(); self.source.per_pixel() as usize]);
@@ -82,7 +78,8 @@ impl Sorter<'_> {
             }
             self.source.pixel_into(px, py, pixel);
             let place = (by * self.plan.bin_px + bx) * pixel.len() as u32;
-            samples.extend(pixel.iter().zip(place..).map(|(s, place)| Placed {
+            let drawn = pixel.iter().zip(place..).filter(|(sample, _)| self.is_drawn(sample));
+            samples.extend(drawn.map(|(s, place)| Placed {
                 x: Viewport::edge(px, viewport.width()) + s.x,
                 y: Viewport::edge(py, viewport.height()) + s.y,
                 u: s.u,
@@ -91,6 +88,12 @@ impl Sorter<'_> {
                 place,
             }));
         }
+    }
+
+    /// Whether a sample lies between the clip planes.
+    fn is_drawn(&self, sample: &Sample) -> bool {
+        let places = [sample.u, sample.v, sample.t];
+        places.iter().zip(self.clip.half_open()).all(|(at, [lo, hi])| (lo..=hi).contains(at))
     }
 
     /// Halves `samples` along each axis, down to cells.
@@ -112,8 +115,9 @@ impl Sorter<'_> {
     }
 
     fn cell(&self, bin: &mut BinSamples, block_cell: usize, samples: &mut [Placed]) {
-        let cell = block_cell % self.plan.cells();
+        let (block, cell) = (block_cell / self.plan.cells(), block_cell % self.plan.cells());
         for sample in &*samples {
+            bin.blocks[block / LANES].include(block % LANES, sample.x, sample.y);
             for (range, at) in bin.rect.iter_mut().zip([sample.x, sample.y]) {
                 *range = [range[0].min(at), range[1].max(at)];
             }
@@ -148,25 +152,20 @@ impl Sorter<'_> {
     }
 
     fn packet(&self, bin: &mut BinSamples, block_cell: usize, lane_in_cell: usize, samples: &[Placed]) {
-        let (packet, stride) = (block_cell * LANES + lane_in_cell, bin.stride);
-        let rows = &mut bin.rows[packet * stride.rows()..(packet + 1) * stride.rows()];
+        let number = block_cell * LANES + lane_in_cell;
+        if samples.len() < LANES {
+            bin.partial.push(number as u32);
+        }
+        let packet = &mut bin.packets[number];
         let boxes = &mut bin.boxes[block_cell];
         for (lane, s) in samples.iter().enumerate() {
-            bin.places[packet][lane] = s.place;
-            rows[0].0[lane] = s.x - s.u * self.shear.a[0];
-            rows[1].0[lane] = s.y - s.v * self.shear.a[1];
-            if stride.moving {
-                rows[2].0[lane] = s.t;
+            bin.places[number][lane] = s.place;
+            for (axis, (at, lens)) in [(s.x, s.u), (s.y, s.v)].into_iter().enumerate() {
+                packet.slope[axis].0[lane] = at - lens * self.shear.a[axis];
+                packet.lens[axis].0[lane] = lens * self.shear.s[axis];
             }
-            if stride.lens {
-                let last = stride.rows() - 2;
-                rows[last].0[lane] = s.u * self.shear.s[0];
-                rows[last + 1].0[lane] = s.v * self.shear.s[1];
-            }
-            for (range, at) in [(&mut boxes.x, s.x), (&mut boxes.y, s.y)] {
-                range[0].0[lane_in_cell] = range[0].0[lane_in_cell].min(at);
-                range[1].0[lane_in_cell] = range[1].0[lane_in_cell].max(at);
-            }
+            packet.t.0[lane] = s.t;
+            boxes.include(lane_in_cell, s.x, s.y);
         }
     }
 }
