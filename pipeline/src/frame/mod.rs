@@ -119,7 +119,7 @@ fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut impl FnMut(Don
             vertices::front_end(pass, batch, replay, &mut |packet: &Packet| done(Done::Packet(packet)))
         });
         let lists = distribute(
-            ready.iter().map(|ready| ready.pixels),
+            (0..).zip(ready.iter().map(|ready| ready.pixels)),
             pass.settings.viewport,
             pass.settings.spec.coarse_tile_px,
         );

@@ -53,45 +53,46 @@ impl PixelRect {
 /// lens position, so the corners are the extremes; where it does not, nothing is divided and the whole viewport
 /// stands.
 pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRect {
-    let depths = triangle.corners.iter().flat_map(|c| [c.at(0.0)[2], c.at(1.0)[2]]);
-    let nearest = depths.fold(f32::INFINITY, f32::min);
+    let mut nearest = f32::INFINITY;
+    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for corner in &triangle.corners {
+        for p in &corner.ends()[..1 + usize::from(triangle.moving)] {
+            nearest = nearest.min(p[2]);
+            let inverse = 1.0 / f64::from(p[2]);
+            for (axis, range) in range.iter_mut().enumerate() {
+                let (x, circle) = (f64::from(p[axis]) * inverse, circle(shear, axis, inverse));
+                *range = [range[0].min(x - circle), range[1].max(x + circle)];
+            }
+        }
+    }
     if nearest <= 0.0 {
         return PixelRect::whole(viewport);
     }
     let side = [viewport.width(), viewport.height()];
     let [x, y] = [0, 1].map(|axis| {
-        let [lo, hi] = extent(triangle, shear, axis);
         let slack = 2.0 * f64::from(triangle.slack[axis]) / f64::from(nearest);
         let half = 0.5 * f64::from(side[axis]);
+        // Cutting off rounds down what is not negative.
         let pixel = |at: f64| at.clamp(0.0, f64::from(side[axis])) as u32;
-        [pixel((lo - slack + half).floor()), pixel((hi + slack + half).floor() + 1.0)]
+        [pixel(range[axis][0] - slack + half), pixel(range[axis][1] + slack + half + 1.0)]
     });
     PixelRect { x0: x[0], y0: y[0], x1: x[1], y1: y[1] }
 }
 
-fn extent(triangle: &Triangle, shear: &Shear, axis: usize) -> [f64; 2] {
-    let (s, a) = (f64::from(shear.s[axis]).abs(), f64::from(shear.a[axis]).abs());
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for corner in &triangle.corners {
-        for t in [0.0, 1.0] {
-            let p = corner.at(t);
-            let w = f64::from(p[2]);
-            let (x, circle) = (f64::from(p[axis]) / w, (a - s / w).abs());
-            range = [range[0].min(x - circle), range[1].max(x + circle)];
-        }
-    }
-    range
+/// The radius of the circle of confusion at a depth, given inverted.
+fn circle(shear: &Shear, axis: usize, inverse: f64) -> f64 {
+    (f64::from(shear.a[axis]).abs() - f64::from(shear.s[axis]).abs() * inverse).abs()
 }
 
-/// For each square of `side_px` pixels of the image, row by row, which of the rectangles meet it, in their order.
+/// For each square of `side_px` pixels of the image, row by row, the numbers of the rectangles that meet it, in their order.
 pub(crate) fn distribute(
-    rects: impl IntoIterator<Item = PixelRect>,
+    rects: impl IntoIterator<Item = (u32, PixelRect)>,
     viewport: Viewport,
     side_px: u32,
 ) -> Vec<Vec<u32>> {
     let squares = PixelRect::whole(viewport).tiles(side_px);
     let mut lists = vec![Vec::new(); (squares.x1 * squares.y1) as usize];
-    for (index, rect) in (0..).zip(rects) {
+    for (index, rect) in rects {
         let met = rect.tiles(side_px);
         for row in met.y0..met.y1 {
             for column in met.x0..met.x1 {

@@ -19,6 +19,12 @@ impl Corner {
         Self { open: vertex.open, delta }
     }
 
+    /// The vertex when the shutter opens and when it closes, with the rounding of the sample test.
+    #[inline]
+    pub fn ends(&self) -> [[f32; 3]; 2] {
+        [self.open, std::array::from_fn(|axis| self.open[axis] + self.delta[axis])]
+    }
+
     /// The vertex at time `t`, with the rounding of the sample test: monotone in `t` on every axis.
     #[inline]
     pub fn at(&self, t: f32) -> [f32; 3] {
@@ -77,16 +83,16 @@ pub fn set_up(
     }
     let corners = vertices.map(Corner::new);
     // The depth of a sample lies between those of the vertices, which are farthest at an end of the shutter.
-    if corners.iter().all(|c| c.at(0.0)[2] <= near && c.at(1.0)[2] <= near) {
+    if corners.iter().all(|c| c.ends().iter().all(|p| p[2] <= near)) {
         return Outcome::Outside;
     }
     let faces = [cull != Cull::Back, cull != Cull::Front];
     let moving = vertices.iter().any(|vertex| !vertex.is_still());
-    let slack = [0, 1].map(|axis| slack(&corners, shear, axis, half_px[axis]));
+    let slack = slack(&corners, shear, half_px);
     if !moving && shear.is_none() && !(faces[0] && faces[1]) && shows_culled_face(&corners, faces, slack) {
         return Outcome::FaceCulled;
     }
-    let behind = corners.iter().any(|c| c.at(0.0)[2] < 0.0 || c.at(1.0)[2] < 0.0);
+    let behind = corners.iter().any(|c| c.ends().iter().any(|p| p[2] < 0.0));
     Outcome::Ready(Triangle { id, corners, moving, behind, faces, slack })
 }
 
@@ -131,17 +137,20 @@ fn shows_culled_face(corners: &[Corner; 3], faces: [bool; 2], slack: [f32; 2]) -
     det.abs() > rounding && !faces[usize::from(det < 0.0)]
 }
 
-/// A bound on the rounding error of `(x - u s) - (X - u a) w` for any sample, eight units in the last place of the
-/// largest intermediate value and more: 2^-20 of the sum of magnitudes.
-fn slack(corners: &[Corner; 3], shear: &Shear, axis: usize, half_px: f32) -> f32 {
+/// A bound on the rounding error of `(x - u s) - (X - u a) w` for any sample, in x and in y, eight units in the last place
+/// of the largest intermediate value and more: 2^-20 of the sum of magnitudes.
+fn slack(corners: &[Corner; 3], shear: &Shear, half_px: [f32; 2]) -> [f32; 2] {
     const ROUNDING: f32 = 1.0 / 1_048_576.0;
-    let largest = |axis: usize| {
-        let ends =
-            corners.iter().flat_map(|c| [c.open[axis].abs(), c.open[axis].abs() + c.delta[axis].abs()]);
-        ends.fold(0.0, f32::max)
-    };
-    let reach = half_px + 1.0 + shear.a[axis].abs();
-    ROUNDING * (largest(axis) + shear.s[axis].abs() + reach * largest(2))
+    let mut largest = [0.0_f32; 3];
+    for corner in corners {
+        for (axis, largest) in largest.iter_mut().enumerate() {
+            *largest = largest.max(corner.open[axis].abs() + corner.delta[axis].abs());
+        }
+    }
+    [0, 1].map(|axis| {
+        let reach = half_px[axis] + 1.0 + shear.a[axis].abs();
+        ROUNDING * (largest[axis] + shear.s[axis].abs() + reach * largest[2])
+    })
 }
 
 #[cfg(test)]

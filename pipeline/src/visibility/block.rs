@@ -11,17 +11,6 @@ pub(super) struct CellBounds<V> {
     y: [V; 2],
 }
 
-/// The edges of one face of a triangle in a cell.
-pub(super) struct FaceBounds<V>([EdgeBound<V>; 3]);
-
-/// An edge is at most `most + x slope_x + y slope_y`, in the sign of the face; `ends` says at which end of a box in x and in y
-/// that is largest.
-struct EdgeBound<V> {
-    most: V,
-    slope: [V; 2],
-    ends: [usize; 2],
-}
-
 impl<V: Lanes> CellBounds<V> {
     #[inline(always)]
     pub fn new(setup: &CellSetup, cell: usize) -> Self {
@@ -48,38 +37,29 @@ impl<V: Lanes> CellBounds<V> {
     }
 }
 
-impl<V: Lanes> FaceBounds<V> {
-    #[inline(always)]
-    pub fn new(setup: &CellSetup, cell: usize, face: usize) -> Self {
-        let [a, b, c] = &setup.edges;
-        Self([EdgeBound::new(a, cell, face), EdgeBound::new(b, cell, face), EdgeBound::new(c, cell, face)])
-    }
-
-    /// The boxes in which no edge is known to be below zero.
-    #[inline(always)]
-    pub fn meet(&self, boxes: &Boxes) -> Mask {
-        let [a, b, c] = &self.0;
-        a.meet(boxes) & b.meet(boxes) & c.meet(boxes)
-    }
-}
-
-impl<V: Lanes> EdgeBound<V> {
-    #[inline(always)]
-    fn new(edge: &EdgeRows, cell: usize, face: usize) -> Self {
-        let sign = if face == 0 { 1.0 } else { -1.0 };
-        let (x, y) = (sign * edge.slope_x.0[cell], sign * edge.slope_y.0[cell]);
-        Self {
-            most: V::splat(edge.most[face].0[cell]),
-            slope: [V::splat(x), V::splat(y)],
-            ends: [usize::from(x > 0.0), usize::from(y > 0.0)],
+/// The boxes in which, for a face that may be seen, no edge is known to be below zero in the sign of the face.
+#[inline(always)]
+pub(super) fn in_front_of_edges<V: Lanes>(setup: &CellSetup, cell: usize, boxes: &Boxes) -> Mask {
+    let mut shown = 0;
+    for face in 0..2 {
+        if setup.faces[face] >> cell & 1 != 0 {
+            let [a, b, c] = &setup.edges;
+            shown |= in_front::<V>(a, cell, face, boxes)
+                & in_front::<V>(b, cell, face, boxes)
+                & in_front::<V>(c, cell, face, boxes);
         }
     }
+    shown
+}
 
-    #[inline(always)]
-    fn meet(&self, boxes: &Boxes) -> Mask {
-        let most = V::load(&boxes.x[self.ends[0]].0).times_plus(self.slope[0], self.most);
-        let most = V::load(&boxes.y[self.ends[1]].0).times_plus(self.slope[1], most);
-        // Where the arithmetic overflowed to NaN nothing is known.
-        !V::splat(0.0).gt(most)
-    }
+/// The same for one edge and face: `most` and the slopes, where in a box they are largest.
+#[inline(always)]
+fn in_front<V: Lanes>(edge: &EdgeRows, cell: usize, face: usize, boxes: &Boxes) -> Mask {
+    let sign = if face == 0 { 1.0 } else { -1.0 };
+    let (x, y) = (sign * edge.slope_x.0[cell], sign * edge.slope_y.0[cell]);
+    let (end_x, end_y) = (usize::from(x > 0.0), usize::from(y > 0.0));
+    let most = V::load(&boxes.x[end_x].0).times_plus(V::splat(x), V::splat(edge.most[face].0[cell]));
+    let most = V::load(&boxes.y[end_y].0).times_plus(V::splat(y), most);
+    // Where the arithmetic overflowed to NaN nothing is known.
+    !V::splat(0.0).gt(most)
 }

@@ -36,7 +36,7 @@ pub(super) struct BinSamples {
     pub boxes: Vec<Boxes>,
     /// By packet and lane, the place of the sample in the bin: pixel by pixel in rows, times samples in a pixel, plus index.
     pub places: Vec<[u32; LANES]>,
-    /// The packets with fewer samples than lanes, but for those with none.
+    /// The packets with fewer samples than lanes.
     pub partial: Vec<u32>,
     /// The samples of each packet.
     pub packets: Vec<Packet>,

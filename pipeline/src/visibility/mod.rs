@@ -26,13 +26,13 @@ use rayon::prelude::*;
 
 use crate::depth::vertex_range;
 use crate::geometry::{Clip, Cull, Geometry, MovingVertex, Projection};
-use crate::setup::{Outcome, PixelRect, bounds, distribute, set_up};
+use crate::setup::{Outcome, PixelRect, Triangle, bounds, distribute, set_up};
 use crate::simd::{Width, dispatch};
 use facing::Facing;
 pub use layout::SampleLayout;
 use queue::Queue;
 pub use raster::Tally;
-use raster::{BinSurface, Ready, Worker};
+use raster::{BinSurface, Worker};
 
 /// What every sample of a layout sees.
 #[derive(Clone, Debug)]
@@ -84,7 +84,7 @@ pub fn resolve_at(
     into: &mut Visibility,
 ) -> Tally {
     assert_eq!(geometry.clip(), Clip::NONE, "clip planes have to be those of the camera");
-    let (ready, lists) = front_end(layout, geometry, cull);
+    let (placed, lists) = front_end(layout, geometry, cull);
     layout
         .bins
         .par_iter()
@@ -98,7 +98,7 @@ pub fn resolve_at(
                     layout,
                     samples,
                     surface,
-                    ready: &ready,
+                    placed: &placed,
                     list,
                     tally: &mut tally,
                     queue: Queue::new(samples.places.len()),
@@ -109,36 +109,50 @@ pub fn resolve_at(
         .sum()
 }
 
-/// Triangles that have to be visited, front to back, and those of them each bin has to visit.
-fn front_end(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull) -> (Vec<Ready>, Vec<Vec<u32>>) {
+/// Triangles set up, and those that each bin has to visit, front to back.
+fn front_end(
+    layout: &SampleLayout,
+    geometry: &Geometry<'_>,
+    cull: Cull,
+) -> (Vec<Option<Placed>>, Vec<Vec<u32>>) {
     let vertices = layout.projection.images(geometry);
-    let placed: Vec<Placed> = (0..geometry.triangles().len() as u32)
+    let (mut spans, mut placed) = (Vec::new(), Vec::new());
+    (0..geometry.triangles().len() as u32)
         .into_par_iter()
         .with_min_len(256)
-        .filter_map(|id| {
+        .map(|id| {
             let corners = geometry.triangles()[id as usize].map(|vertex| &vertices[vertex as usize]);
-            place(layout, id, corners, cull)
+            place(layout, id, corners, cull).unzip()
         })
-        .collect();
-    // Sorted by keys, as the triangles are large.
-    let mut order: Vec<(u32, u32)> =
-        placed.iter().zip(0..).map(|(p, at)| (p.nearest.to_bits(), at)).collect();
+        .unzip_into_vecs(&mut spans, &mut placed);
+    // Keys are sorted, not triangles, which are large; of equal depths the lower number comes first.
+    let keys = (0_u32..).zip(&spans).filter_map(|(id, span): (u32, &Option<Span>)| {
+        span.as_ref().map(|span| u64::from(span.nearest.to_bits()) << 32 | u64::from(id))
+    });
+    let mut order: Vec<u64> = keys.collect();
     order.sort_unstable();
-    let sorted = || order.iter().map(|&(_, at)| &placed[at as usize]);
-    let lists = distribute(sorted().map(|p| p.pixels), layout.viewport, layout.plan.bin_px);
-    (sorted().map(|p| p.ready.clone()).collect(), lists)
+    let pixels = |id: u32| spans[id as usize].as_ref().map(|span| (id, span.pixels));
+    let lists =
+        distribute(order.iter().filter_map(|&key| pixels(key as u32)), layout.viewport, layout.plan.bin_px);
+    (placed, lists)
 }
 
-/// A triangle and the pixels it may touch.
-struct Placed {
-    /// The smallest depth it may be seen at, not negative.
+/// Where a triangle may be seen.
+struct Span {
+    /// The smallest depth, not negative.
     nearest: f32,
     pixels: PixelRect,
-    ready: Ready,
+}
+
+/// A triangle set up for all bins.
+#[derive(Clone, Debug)]
+struct Placed {
+    triangle: Triangle,
+    facing: Facing,
 }
 
 /// Sets up a triangle, unless it cannot be seen.
-fn place(layout: &SampleLayout, id: u32, corners: [&MovingVertex; 3], cull: Cull) -> Option<Placed> {
+fn place(layout: &SampleLayout, id: u32, corners: [&MovingVertex; 3], cull: Cull) -> Option<(Span, Placed)> {
     let Projection { shear, near, .. } = &layout.projection;
     let Outcome::Ready(triangle) = set_up(id, corners, cull, shear, *near, layout.viewport.half_px()) else {
         return None;
@@ -146,5 +160,5 @@ fn place(layout: &SampleLayout, id: u32, corners: [&MovingVertex; 3], cull: Cull
     let pixels = bounds(&triangle, shear, layout.viewport);
     let nearest = vertex_range(&triangle, [0.0, 1.0])[0].max(0.0);
     let facing = Facing::new(&triangle.corners, shear);
-    (!pixels.is_empty()).then_some(Placed { nearest, pixels, ready: Ready { triangle, facing } })
+    (!pixels.is_empty()).then_some((Span { nearest, pixels }, Placed { triangle, facing }))
 }

@@ -1,9 +1,9 @@
 //! One worker at one bin: each triangle through cells, blocks and packets.
 
-use super::block::{CellBounds, FaceBounds};
+use super::Placed;
+use super::block::{CellBounds, in_front_of_edges};
 use super::cells::{CellSetup, Scene, all};
-use super::facing::Facing;
-use super::layout::{BinSamples, Boxes, SampleLayout};
+use super::layout::{BinSamples, SampleLayout};
 use super::queue::Queue;
 use crate::sample_test::block::{Crossing, View};
 use crate::sample_test::exact;
@@ -15,13 +15,6 @@ const AHEAD: usize = 4;
 
 /// So many blocks are not worth being tested against edges before their packets are.
 const FEW_BLOCKS: u32 = 4;
-
-/// A triangle set up for all bins.
-#[derive(Clone, Debug)]
-pub(super) struct Ready {
-    pub triangle: Triangle,
-    pub facing: Facing,
-}
 
 /// What the samples of a bin see.
 #[derive(Clone, Debug)]
@@ -75,11 +68,13 @@ impl BinSurface {
     fn clear(&mut self, samples: &BinSamples) {
         self.farthest.fill(Row::splat(f32::INFINITY));
         self.depth.fill(Row::splat(f32::INFINITY));
-        for &packet in &samples.partial {
-            let lanes = self.depth[packet as usize].0.iter_mut().zip(&samples.places[packet as usize]);
-            for (depth, _) in lanes.filter(|(_, place)| **place == BinSamples::NO_SAMPLE) {
-                *depth = f32::NEG_INFINITY;
+        for packet in samples.partial.iter().map(|&packet| packet as usize) {
+            let mut farthest = f32::NEG_INFINITY;
+            for (depth, &place) in self.depth[packet].0.iter_mut().zip(&samples.places[packet]) {
+                *depth = if place == BinSamples::NO_SAMPLE { f32::NEG_INFINITY } else { f32::INFINITY };
+                farthest = farthest.max(*depth);
             }
+            self.farthest[packet / LANES].0[packet % LANES] = farthest;
         }
     }
 }
@@ -89,7 +84,7 @@ pub(super) struct Worker<'a> {
     pub layout: &'a SampleLayout,
     pub samples: &'a BinSamples,
     pub surface: &'a mut BinSurface,
-    pub ready: &'a [Ready],
+    pub placed: &'a [Option<Placed>],
     pub list: &'a [u32],
     pub tally: &'a mut Tally,
     pub queue: Queue,
@@ -109,9 +104,9 @@ impl Worker<'_> {
         let mut setup = CellSetup::EMPTY;
         for (turn, &index) in self.list.iter().enumerate() {
             if let Some(&soon) = self.list.get(turn + AHEAD) {
-                prefetch(&self.ready[soon as usize]);
+                prefetch(&self.placed[soon as usize]);
             }
-            let ready = &self.ready[index as usize];
+            let Some(ready) = &self.placed[index as usize] else { continue };
             if ready.triangle.moving {
                 self.triangle::<V, true, LENS>(ready, &mut setup);
             } else {
@@ -123,7 +118,7 @@ impl Worker<'_> {
     #[inline(always)]
     fn triangle<V: Lanes, const MOTION: bool, const LENS: bool>(
         &mut self,
-        ready: &Ready,
+        ready: &Placed,
         setup: &mut CellSetup,
     ) {
         let mut active = self.scene(ready).cells::<V, MOTION, LENS>(setup) & all(self.layout.plan.cells());
@@ -142,7 +137,7 @@ impl Worker<'_> {
         }
     }
 
-    fn scene<'s>(&'s self, ready: &'s Ready) -> Scene<'s> {
+    fn scene<'s>(&'s self, ready: &'s Placed) -> Scene<'s> {
         Scene {
             triangle: &ready.triangle,
             facing: &ready.facing,
@@ -159,33 +154,13 @@ impl Worker<'_> {
     #[inline(always)]
     fn cell<V: Lanes>(&mut self, setup: &CellSetup, cell: usize) {
         let bounds = CellBounds::<V>::new(setup, cell);
-        match setup.faces.map(|cells| cells >> cell & 1 != 0) {
-            [true, true] => {
-                let faces = [FaceBounds::<V>::new(setup, cell, 0), FaceBounds::<V>::new(setup, cell, 1)];
-                self.blocks(setup, cell, &bounds, &faces);
-            }
-            shown => {
-                let face = FaceBounds::<V>::new(setup, cell, usize::from(shown[1]));
-                self.blocks(setup, cell, &bounds, &[face]);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn blocks<V: Lanes, const FACES: usize>(
-        &mut self,
-        setup: &CellSetup,
-        cell: usize,
-        bounds: &CellBounds<V>,
-        faces: &[FaceBounds<V>; FACES],
-    ) {
         let (across, cells) = (self.layout.plan.blocks()[0], self.layout.plan.cells());
         let [first, last] = [setup.rows[0].0[cell] as u32, setup.rows[1].0[cell] as u32 + 1];
         for group in first * across / LANES as u32..(last * across).div_ceil(LANES as u32) {
             let boxes = &self.samples.blocks[group as usize];
             let mut pass = bounds.meet(boxes);
             if pass.count_ones() > FEW_BLOCKS {
-                pass &= meet_any(faces, boxes);
+                pass &= in_front_of_edges::<V>(setup, cell, boxes);
             }
             self.tally.blocks += u64::from(pass.count_ones());
             while pass != 0 {
@@ -193,10 +168,11 @@ impl Worker<'_> {
                 pass &= pass - 1;
                 let block_cell = block * cells + cell;
                 let boxes = &self.samples.boxes[block_cell];
-                let packets = bounds.meet(boxes)
-                    & bounds.before(&self.surface.farthest[block_cell])
-                    & meet_any(faces, boxes);
-                self.queue.push::<V>(packets, (block_cell * LANES) as u32);
+                let near = bounds.meet(boxes) & bounds.before(&self.surface.farthest[block_cell]);
+                if near != 0 {
+                    let packets = near & in_front_of_edges::<V>(setup, cell, boxes);
+                    self.queue.push::<V>(packets, (block_cell * LANES) as u32);
+                }
             }
         }
     }
@@ -256,14 +232,4 @@ impl Worker<'_> {
         }
         written
     }
-}
-
-/// The boxes that one of the faces may be seen in.
-#[inline(always)]
-fn meet_any<V: Lanes, const FACES: usize>(faces: &[FaceBounds<V>; FACES], boxes: &Boxes) -> Mask {
-    let mut pass = 0;
-    for face in faces {
-        pass |= face.meet(boxes);
-    }
-    pass
 }

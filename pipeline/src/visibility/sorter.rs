@@ -63,6 +63,9 @@ impl Sorter<'_> {
             self.split_cells(&mut bin, block * cells, cells, &mut samples, self.plan.cell_axes);
         }
         bin.cells.finish();
+        let partial = |places: &[u32; LANES]| places.contains(&BinSamples::NO_SAMPLE);
+        bin.partial =
+            (0..).zip(&bin.places).filter(|(_, places)| partial(places)).map(|(at, _)| at).collect();
         bin
     }
 
@@ -153,9 +156,6 @@ impl Sorter<'_> {
 
     fn packet(&self, bin: &mut BinSamples, block_cell: usize, lane_in_cell: usize, samples: &[Placed]) {
         let number = block_cell * LANES + lane_in_cell;
-        if samples.len() < LANES {
-            bin.partial.push(number as u32);
-        }
         let packet = &mut bin.packets[number];
         let boxes = &mut bin.boxes[block_cell];
         for (lane, s) in samples.iter().enumerate() {
