@@ -170,7 +170,7 @@ fn a_camera_on_a_moving_node_looks_down_minus_z() {
     near(camera.open().transform_point3(Vec3::new(1.0, 2.0, 5.0)), Vec3::new(-1.0, 2.0, 3.0));
     near(camera.close().transform_point3(Vec3::new(1.0, 2.0, 5.0)), Vec3::new(-1.0, 2.0, 1.0));
     assert_eq!(camera.near(), 0.25);
-    assert!((camera.tan_half_height() - 0.5f32.tan()).abs() < 1e-6);
+    assert!((camera.half_height() - 0.5f32.tan()).abs() < 1e-6);
 }
 
 #[test]

@@ -51,10 +51,10 @@ impl PixelRect {
 /// The pixels `triangle` may touch: the box of its vertices at the corners of the shutter and the lens, widened by
 /// the rounding of the sample test. While `w` stays positive the image of a vertex is monotone in time and in the
 /// lens position, so the corners are the extremes; where it does not, nothing is divided and the whole viewport
-/// stands.
+/// stands. In an orthographic view the image moves as the vertex does and is linear in the lens position: corners again.
 pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRect {
-    let depths = triangle.corners.iter().flat_map(|c| [c.at(0.0)[2], c.at(1.0)[2]]);
-    let nearest = depths.fold(f32::INFINITY, f32::min);
+    let weights = triangle.corners.iter().flat_map(|c| [0.0, 1.0].map(|t| shear.weight(c.at(t)[2])));
+    let nearest = weights.fold(f32::INFINITY, f32::min);
     if nearest <= 0.0 {
         return PixelRect::whole(viewport);
     }
@@ -70,13 +70,12 @@ pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRe
 }
 
 fn extent(triangle: &Triangle, shear: &Shear, axis: usize) -> [f64; 2] {
-    let (s, a) = (f64::from(shear.s[axis]).abs(), f64::from(shear.a[axis]).abs());
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for corner in &triangle.corners {
         for t in [0.0, 1.0] {
             let p = corner.at(t);
-            let w = f64::from(p[2]);
-            let (x, circle) = (f64::from(p[axis]) / w, (a - s / w).abs());
+            let x = f64::from(p[axis]) / f64::from(shear.weight(p[2]));
+            let circle = shear.circle(axis, f64::from(p[2])).abs();
             range = [range[0].min(x - circle), range[1].max(x + circle)];
         }
     }

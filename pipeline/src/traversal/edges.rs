@@ -8,6 +8,13 @@
 //! A = w_i y_j - w_j y_i        B = w_j x_i - w_i x_j
 //! ```
 //!
+//! In an orthographic view `dX` and `dY` move a vertex as it stands, not times its depth, and so
+//!
+//! ```text
+//! e(d) = e + dX (y_i - y_j) + dY (x_j - x_i) + du (a A + s (y_i - y_j)) + dv (b B + s' (x_j - x_i))
+//!          + (w_j - w_i) (dY a du - dX b dv + (a s' - b s) du dv)
+//! ```
+//!
 //! where `e`, `A` and `B` are quadratic in time and the last factor is linear. Each is kept in Bernstein form, so
 //! bounding its coefficients bounds it at all times (Munkberg and Akenine-Moeller 2012 bound edges so; the form recentred at
 //! the box is our own).
@@ -62,12 +69,13 @@ impl<N: Number> Edges<N> {
 
     /// How strongly the difference of depths bends an edge over lens and tile.
     fn skew(&self) -> N {
-        let View { half, s, a, lens, .. } = &self.view;
+        let View { half, s, a, lens, parallel, .. } = &self.view;
         if !lens {
             return N::zero();
         }
         let twist = (a[0] * s[1] - a[1] * s[0]).abs();
-        half[1] * s[0].abs() * half[2] + (half[0] * s[1].abs() + twist * half[2]) * half[3]
+        let with_image = (if *parallel { a } else { s }).map(N::abs);
+        half[1] * with_image[0] * half[2] + (half[0] * with_image[1] + twist * half[2]) * half[3]
     }
 
     /// The screen for single samples with times `t`, within those of the box, of which only `faces` can be seen.
@@ -88,25 +96,31 @@ impl<N: Number> Edge<N> {
             Quadratic([start, middle, f(close.0, close.1)])
         };
         let difference = |axis: usize| [open, close].map(|(i, j)| j[axis] - i[axis]);
-        let along = product(|p, q| p[2] * q[1] - q[2] * p[1]);
-        let across = product(|p, q| q[2] * p[0] - p[2] * q[0]);
+        let over_time = |[start, end]: [N; 2]| {
+            if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) }
+        };
         let none = Quadratic::constant(N::zero());
-        let negative = |q: Quadratic<N>| Quadratic(q.0.map(|b| -b));
+        // What the view does not ask for is not found.
+        let [along, across] = if view.lens || !view.parallel {
+            [product(|p, q| p[2] * q[1] - q[2] * p[1]), product(|p, q| q[2] * p[0] - p[2] * q[0])]
+        } else {
+            [none; 2]
+        };
+        let [right, down] = if view.lens || view.parallel {
+            [over_time(difference(0)), over_time(difference(1))]
+        } else {
+            [none; 2]
+        };
+        let [by_x, by_y] = if view.parallel { [-down, right] } else { [-along, -across] };
         let mut edge = Self {
             value: product(|p, q| p[0] * q[1] - p[1] * q[0]),
-            slopes: [negative(along), negative(across), none, none],
+            slopes: [by_x, by_y, none, none],
             depths: [N::zero(); 2],
         };
         if view.lens {
-            let [u, v] = [(1, -view.s[0], view.a[0], along), (0, view.s[1], view.a[1], across)].map(
-                |(axis, s, a, turn)| {
-                    let [start, end] = difference(axis);
-                    let shift =
-                        if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) };
-                    Self::lens_slope(view.moving, &shift, s, &turn, a)
-                },
-            );
-            (edge.slopes[2], edge.slopes[3], edge.depths) = (u, v, difference(2));
+            edge.slopes[2] = Self::lens_slope(view.moving, &down, -view.s[0], &along, view.a[0]);
+            edge.slopes[3] = Self::lens_slope(view.moving, &right, view.s[1], &across, view.a[1]);
+            edge.depths = difference(2);
         }
         edge
     }

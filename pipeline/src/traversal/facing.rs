@@ -6,9 +6,15 @@
 //! det(u, v, t) = det[x, y, w] + u s sum(A) + v s' sum(B)        A, B as in `edges`
 //! ```
 //!
-//! cubic in time and affine in `u, v`. So its four Bernstein coefficients, each plus or minus its lens terms, bound it.
-//! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one: the sign of
-//! `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
+//! cubic in time and affine in `u, v`. In an orthographic view the determinant of `(x, y, 1)` stands for it, twice the area as seen:
+//!
+//! ```text
+//! det(u, v, t) = sum(e_k) + u a sum(A) + v b sum(B)
+//! ```
+//!
+//! So its four Bernstein coefficients, each plus or minus its lens terms, bound it.
+//! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one, or `det = sum(e_k)`:
+//! the sign of `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
 
 use super::edges::{Edges, Faces};
 use super::number::Number;
@@ -117,8 +123,10 @@ impl<N: Number> Facing<N> {
         let third = N::constant(1.0 / 3.0);
         let count = if view.moving { 4 } else { 1 };
         let [mut lowest, mut highest] = [[N::zero(); 4]; 2];
+        // Where vertices weigh alike their lens terms add up to the slopes of the edges themselves.
+        let (first, factors) = if view.parallel { (2, [N::from(1.0); 2]) } else { (0, view.s.map(N::abs)) };
         let sums: [[N; 3]; 2] = [0, 1].map(|axis| {
-            let [a, b, c] = edges.edges.map(|edge| edge.slopes[axis]);
+            let [a, b, c] = edges.edges.map(|edge| edge.slopes[first + axis]);
             if view.lens { a.zip(&b, |a, b| a + b).zip(&c, |a, b| a + b).0 } else { [N::zero(); 3] }
         });
         for (k, (low, high)) in lowest.iter_mut().zip(&mut highest).take(count).enumerate() {
@@ -127,8 +135,7 @@ impl<N: Number> Facing<N> {
             let mut extent = N::zero();
             if view.lens {
                 for (axis, sum) in sums.iter().enumerate() {
-                    extent =
-                        extent + elevated(sum, k, third).abs() * view.s[axis].abs() * view.half[2 + axis];
+                    extent = extent + elevated(sum, k, third).abs() * factors[axis] * view.half[2 + axis];
                 }
             }
             (*low, *high) = (middle - extent, middle + extent);
@@ -205,7 +212,8 @@ fn determinant<N: Number>(edges: &Edges<N>, k: usize) -> N {
     let [open, close] = edges.view.ends;
     let mut sum = N::zero();
     for (vertex, edge) in edges.edges.iter().enumerate() {
-        let ([e0, e1, e2], w0, w1) = (edge.value.0, open[vertex][2], close[vertex][2]);
+        let [w0, w1] = [open, close].map(|points| edges.view.weight(points[vertex][2]));
+        let [e0, e1, e2] = edge.value.0;
         let part = match k {
             0 => e0 * w0,
             1 => e0 * w1 + (e1 + e1) * w0,
