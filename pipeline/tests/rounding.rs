@@ -113,7 +113,9 @@ fn many_hits_lie_beyond_an_edge_by_rounding_alone() {
                 (hits, beyond) = (hits + found.hits, beyond + found.beyond);
             }
             println!("{case:?}: {beyond} of {hits} hits");
-            assert!(beyond >= 20, "{case:?}: {beyond} of {hits} hits");
+            // So far out vertex and sample differ by less than a factor of two, and their difference is exact.
+            let exact = parallel && far && !moving && !lens;
+            assert!(if exact { beyond == 0 } else { beyond >= 20 }, "{case:?}: {beyond} of {hits} hits");
         }
     }
 }

@@ -26,7 +26,9 @@ fn patch(r: &mut Uniform, centre: [f32; 2], dims: Dims, lift: f32) -> Mesh {
     for i in 0..(CELLS + 1) * (CELLS + 1) {
         let grid = [i % (CELLS + 1), i / (CELLS + 1)].map(|step| step as f32 * CELL_PX - half);
         let at = grid.map(|c| c + CELL_PX * r.within(-0.11, 0.11));
-        let w = 1.0 / (nearness + tilt[0] * at[0] + tilt[1] * at[1] + lift * r.within(-1.0, 1.0));
+        let plane = nearness + tilt[0] * at[0] + tilt[1] * at[1] + lift * r.within(-1.0, 1.0);
+        // What a lens shifts the image by is linear in 1 / w in perspective, and in w in an orthographic view.
+        let w = if dims.parallel { 4.0 * plane } else { 1.0 / plane };
         let open = dims.vertex([centre[0] + at[0], centre[1] + at[1]], w);
         let (sin, cos) = (grow * libm::sinf(turn), grow * libm::cosf(turn));
         let turned = [cos * at[0] - sin * at[1] + drift[0], sin * at[0] + cos * at[1] + drift[1]];
