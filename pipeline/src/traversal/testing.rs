@@ -50,7 +50,11 @@ pub fn case(seed: u64, moving: bool, lens: bool, parallel: bool) -> Case {
     let mut r = Uniform::new(seed);
     let size = [4.0, 40.0, 400.0][(seed % 3) as usize];
     let shear = if lens { Shear::new([90.0, -90.0], [15.0, -15.0]) } else { Shear::default() };
-    let shear = Shear { parallel, ..shear };
+    // Focused so near that what grows with depth outweighs the rest, and another way on each axis.
+    let shear = match (parallel, lens) {
+        (true, true) => Shear { parallel, ..Shear::new([12.0, -30.0], [18.0, -5.0]) },
+        _ => Shear { parallel, ..shear },
+    };
     let [px, py] = [r.within(-60.0, 52.0).floor(), r.within(-60.0, 52.0).floor()];
     let side = [1.0, 8.0, 32.0][(seed / 3 % 3) as usize];
     let tile = TileRect { x: [px, px + side], y: [py, py + side] };
