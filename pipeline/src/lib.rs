@@ -5,7 +5,7 @@
 //!
 //! The folders are the block diagram, in the order of the work:
 //!
-//! - [`geometry`]: cameras, draws and vertices on the homogeneous image plane,
+//! - [`geometry`]: cameras (perspective or orthographic), draws and vertices on the homogeneous image plane,
 //! - [`setup`]: triangles ready for traversal,
 //! - [`traversal`]: tile tests, which bound where in lens and time a triangle may touch a tile,
 //! - [`sample_test`]: the exact test of a sample against a triangle,

@@ -25,7 +25,8 @@ impl Scene {
     /// By the fast engine.
     fn see_fast(&self, frame: Clip) -> Vec<(u32, u32)> {
         let camera = camera(self.lens).with_clip(frame);
-        let layout = SampleLayout::new(&camera, viewport(), &self.table, self.soup.open != self.soup.close);
+        let layout =
+            SampleLayout::new(&camera, viewport(), &self.table, self.soup.open != self.soup.close).unwrap();
         let mut seen = Visibility::new(&layout);
         resolve(&layout, &self.soup.draw(&Plain, Cull::None).geometry, Cull::None, &mut seen);
         seen.in_image_order(&layout).into_iter().map(|(id, depth)| (id, depth.to_bits())).collect()

@@ -83,7 +83,7 @@ fn body(r: &mut Uniform, kind: Body, centre: [f32; 2], dims: Dims, snapped: bool
         let (at, w) = ([centre[0] + p[0], centre[1] + p[1]], depth + p[2]);
         // On corners of pixels at depths that are powers of two nothing rounds and samples lie on vertices.
         let (at, w) = if snapped { (at.map(f32::round), if w < 4.0 { 2.0 } else { 4.0 }) } else { (at, w) };
-        [at[0] * w, at[1] * w, w]
+        dims.vertex(at, w)
     };
     let vertices = directions
         .iter()
@@ -102,7 +102,7 @@ fn closed_case(dims: Dims, kind: Body, far: bool, snapped: bool, seed: u64) {
     let centre = [0, 1].map(|axis| origin_px[axis] + 4.0);
     let mesh = body(&mut r, kind, centre, dims, snapped);
     let shear = if snapped && dims.lens {
-        Shear { s: [4.0, -4.0], a: [1.0, -1.0] }
+        Shear { parallel: dims.parallel, ..Shear::new([4.0, -4.0], [1.0, -1.0]) }
     } else {
         random_shear(&mut r, dims, 6.0)
     };
@@ -137,7 +137,7 @@ fn the_bodies_are_crossed_at_all() {
         let mut crossed = 0;
         for seed in 0..8 {
             let mut r = Uniform::new(seed);
-            let dims = Dims { moving: true, lens: true };
+            let dims = Dims { moving: true, lens: true, parallel: seed % 2 == 1 };
             let mesh = body(&mut r, kind, [0.0; 2], dims, false);
             let table = SampleTable::low_discrepancy(4, seed, LensShape::Square).unwrap();
             let shear = random_shear(&mut r, dims, 6.0);

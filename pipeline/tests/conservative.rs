@@ -55,8 +55,10 @@ const KINDS: [Kind; 8] = [
     Kind::Behind,
 ];
 
-const VIEWS: [View; 4] = [
-    View::Orthographic,
+const VIEWS: [View; 6] = [
+    View::Orthographic { s: [0.0; 2], a: [0.0; 2], near: f64::NEG_INFINITY },
+    View::Orthographic { s: [2.0, -2.0], a: [0.5, -0.5], near: 0.25 },
+    View::Orthographic { s: [3.0, -1.0], a: [2.0, -0.25], near: -1.0 },
     View::Perspective { s: [0.0; 2], a: [0.0; 2], near: 0.25 },
     View::Perspective { s: [2.0, -2.0], a: [0.5, -0.5], near: 0.25 },
     View::Perspective { s: [3.0, -1.0], a: [2.0, -0.25], near: 0.0 },
@@ -100,6 +102,17 @@ fn triangle(kind: Kind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
     [open, if still { open } else { end(drift) }]
 }
 
+/// The shear of the lens.
+fn lens(view: &View) -> [[f64; 2]; 2] {
+    let (View::Perspective { s, a, .. } | View::Orthographic { s, a, .. }) = view;
+    [*s, *a]
+}
+
+/// What a point at this depth is multiplied with to be moved by a tile.
+fn weight(view: &View, depth: f64) -> f64 {
+    if let View::Orthographic { .. } = view { 1.0 } else { depth }
+}
+
 /// A point of the triangle at a time and place on the lens: where it is seen and how deep.
 struct Point {
     u: f64,
@@ -123,11 +136,8 @@ fn point_at(ends: &[[[f64; 3]; 3]; 2], view: &View, [u, v, t]: [f64; 3], weights
     let p: [f64; 3] = [0, 1, 2].map(|axis| {
         (0..3).map(|k| weights[k] * (ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]))).sum()
     });
-    let (w, [s, a]) = match *view {
-        View::Orthographic => (1.0, [[0.0; 2]; 2]),
-        View::Perspective { s, a, .. } => (p[2], [s, a]),
-    };
-    let shear = |axis: usize, place: f64| p[axis] + place * (a[axis] * w - s[axis]);
+    let ([s, a], w) = (lens(view), weight(view, p[2]));
+    let shear = |axis: usize, place: f64| p[axis] + place * (a[axis] * p[2] - s[axis]);
     Point { u, v, t, x: shear(0, u), y: shear(1, v), w, z: p[2] }
 }
 
@@ -146,15 +156,12 @@ fn aimed(
         grid.origin[axis] + grid.tile * ((r.bits() % u64::from(count)) as f64 + r.within(0.01, 0.99))
     };
     let at = [place(0, grid.columns), place(1, grid.rows)];
-    let [s, a] = match *view {
-        View::Orthographic => [[0.0; 2]; 2],
-        View::Perspective { s, a, .. } => [s, a],
-    };
+    let [s, a] = lens(view);
     let seen = [0, 1, 2].map(|k| {
         let p = [0, 1, 2].map(|axis| ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]));
-        let w = if let View::Orthographic = view { 1.0 } else { p[2] };
+        let w = weight(view, p[2]);
         [0, 1]
-            .map(|axis| p[axis] + [u, v][axis] * (a[axis] * w - s[axis]) - at[axis] * w)
+            .map(|axis| p[axis] + [u, v][axis] * (a[axis] * p[2] - s[axis]) - at[axis] * w)
             .into_iter()
             .chain([w, p[2]])
             .collect::<Vec<_>>()
@@ -187,7 +194,7 @@ fn tiles(grid: &Grid, point: &Point) -> impl Iterator<Item = [u32; 2]> + use<> {
 
 fn near(view: &View) -> f64 {
     match view {
-        View::Orthographic => f64::NEG_INFINITY,
+        View::Orthographic { near, .. } => *near,
         View::Perspective { near, .. } => near.max(1e-3),
     }
 }
@@ -286,12 +293,9 @@ fn a_corner_cut_off_by_a_rounding_is_reported() {
             let mut ends = [[[0.0; 3]; 3]; 2];
             for (k, along) in [-r.within(0.1, 2.0), r.within(0.1, 2.0), 0.0].into_iter().enumerate() {
                 let depth = r.within(1.0, 4.0);
-                let (w, (s, a)) = match view {
-                    View::Orthographic => (1.0, ([0.0; 2], [0.0; 2])),
-                    View::Perspective { s, a, .. } => (depth, (s, a)),
-                };
+                let ([s, a], w) = (lens(&view), weight(&view, depth));
                 let at = [0, 1].map(|axis| {
-                    (corner[axis] + along * way[axis]) * w - [u, v][axis] * (a[axis] * w - s[axis])
+                    (corner[axis] + along * way[axis]) * w - [u, v][axis] * (a[axis] * depth - s[axis])
                 });
                 for axis in [0, 1] {
                     let velocity = if round % 2 == 0 { 0.0 } else { speed * r.within(-1.0, 1.0) };
@@ -348,7 +352,7 @@ fn still(points: [[f64; 3]; 3]) -> MovingTriangle {
 /// A point on the corner of four tiles touches all of them; a segment along a border both rows.
 #[test]
 fn touching_counts() {
-    let rasterizer = Rasterizer::new(View::Orthographic);
+    let rasterizer = Rasterizer::new(View::orthographic());
     let tiles = |points| {
         all(&rasterizer, &still(points), &GRID).into_iter().map(|(tile, _)| tile).collect::<HashSet<_>>()
     };
@@ -364,7 +368,7 @@ fn times_and_depths_are_those_of_the_passing() {
     let open = [[-8.0, -8.0, 1.0], [-7.5, -8.0, 1.0], [-8.0, -7.5, 1.0]];
     let close = open.map(|[x, y, _]| [x + 4.0, y, 2.0]);
     let triangle = MovingTriangle::new(open, close).unwrap();
-    let touched = all(&Rasterizer::new(View::Orthographic), &triangle, &GRID);
+    let touched = all(&Rasterizer::new(View::orthographic()), &triangle, &GRID);
     assert_eq!(touched.len(), 5);
     for (tile, touch) in touched {
         let enters = (f64::from(tile[0]) - 0.5).max(0.0) / 4.0;
@@ -389,7 +393,7 @@ fn what_is_too_near_is_not_seen() {
 fn a_triangle_that_may_be_off_is_reported_as_far_as_it_may_be() {
     let points = [[0.25, 0.25, 3.0], [0.75, 0.25, 3.0], [0.25, 0.75, 3.0]];
     let unsure = MovingTriangle::uncertain(points, points, [0.5, 0.125, 1.0]).unwrap();
-    let touched = all(&Rasterizer::new(View::Orthographic), &unsure, &GRID);
+    let touched = all(&Rasterizer::new(View::orthographic()), &unsure, &GRID);
     let tiles: HashSet<_> = touched.iter().map(|(tile, _)| *tile).collect();
     assert!(tiles.is_superset(&HashSet::from([[7, 8], [8, 8], [9, 8]])), "{tiles:?}");
     assert!(touched.iter().all(|(_, touch)| touch.z[0] <= 2.0 && touch.z[1] >= 4.0));
@@ -422,8 +426,8 @@ fn what_is_asked_of_depth_boxes_is_rounded_outward() {
 #[test]
 fn tiles_can_be_walked_by_hand() {
     let mut r = Numbers(3);
-    let rasterizer = Rasterizer::new(VIEWS[1]);
-    let ends = triangle(Kind::Ordinary, &VIEWS[1], &mut r);
+    let rasterizer = Rasterizer::new(VIEWS[3]);
+    let ends = triangle(Kind::Ordinary, &VIEWS[3], &mut r);
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
     let prepared = rasterizer.prepare(&moving);
     let reported: HashMap<_, _> = all(&rasterizer, &moving, &GRID).into_iter().collect();

@@ -26,31 +26,35 @@ fn depths() -> impl Strategy<Value = DepthSpec> {
 struct Scene {
     soup: Soup,
     cull: Cull,
-    lens: bool,
+    optics: Optics,
     table: SampleTable,
     truth: Vec<(u32, u32)>,
 }
 
 impl Scene {
-    fn new(kind: Kind, cull: Cull, lens: bool, borders: bool, count: u32, seed: u64) -> Self {
+    fn new(kind: Kind, cull: Cull, optics: Optics, borders: bool, count: u32, seed: u64) -> Self {
         let soup = Soup::new(kind, count, seed);
         let table = if borders {
             border_table(seed)
         } else {
             SampleTable::low_discrepancy(4, seed, LensShape::Disk).unwrap()
         };
-        let truth = brute_force(&soup, cull, lens, viewport(), &table);
-        Self { soup, cull, lens, table, truth }
+        let truth = brute_force(&soup, cull, optics, viewport(), &table);
+        Self { soup, cull, optics, table, truth }
     }
 
     fn check(&self, spec: &PipelineSpec) {
         let settings = Settings { spec, viewport: viewport(), samples: &self.table, background: Vec3::ZERO };
-        let ours = visibility(&camera(self.lens), &[self.soup.draw(&Plain, self.cull)], &settings).unwrap();
+        let ours = visibility(&camera(self.optics), &[self.soup.draw(&Plain, self.cull)], &settings).unwrap();
         assert_eq!(ours.len(), self.truth.len());
         let differ = ours.iter().zip(&self.truth).filter(|(a, b)| a != b).count();
         let of = ours.len();
-        assert_eq!(differ, 0, "{differ} of {of} samples differ: {:?} lens {} {spec:?}", self.cull, self.lens);
+        assert_eq!(differ, 0, "{differ} of {of} samples differ: {:?} {:?} {spec:?}", self.cull, self.optics);
     }
+}
+
+fn optics() -> impl Strategy<Value = Optics> {
+    (any::<bool>(), any::<bool>()).prop_map(|(lens, parallel)| Optics { lens, parallel })
 }
 
 fn viewport() -> Viewport {
@@ -61,13 +65,13 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 160, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn culling_changes_nothing(
-        kind in kinds(), cull in culls(), lens: bool, switches in 0..SWITCHES, splits in 0..4_u32, borders: bool,
+        kind in kinds(), cull in culls(), optics in optics(), switches in 0..SWITCHES, splits in 0..4_u32, borders: bool,
         sizes in 0..4_usize, auto: bool, count in 1..160_u32, seed: u64,
     ) {
         let (tile_px, coarse_tile_px) = [(8, 32), (4, 16), (1, 8), (2, 64)][sizes];
         let features = Features { facing_splits: splits, auto, ..switched(switches) };
         let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(features) };
-        Scene::new(kind, cull, lens, borders, count, seed).check(&spec);
+        Scene::new(kind, cull, optics, borders, count, seed).check(&spec);
     }
 }
 
@@ -75,21 +79,22 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn depth_culling_changes_nothing_however_depth_is_bounded_and_kept(
-        kind in kinds(), cull in culls(), lens: bool, others in 0..SWITCHES, z_max: bool, depth in depths(),
+        kind in kinds(), cull in culls(), optics in optics(), others in 0..SWITCHES, z_max: bool, depth in depths(),
         borders: bool, count in 1..160_u32, seed: u64,
     ) {
         let features = Features { z_max, ..switched(others) };
         let spec = PipelineSpec { depth, ..spec(features) };
-        Scene::new(kind, cull, lens, borders, count, seed).check(&spec);
+        Scene::new(kind, cull, optics, borders, count, seed).check(&spec);
     }
 }
 
 #[test]
 fn every_combination_on_one_scene_of_each_kind() {
     for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid, Kind::Layers] {
-        for (lens, borders) in [(false, false), (false, true), (true, false), (true, true)] {
+        for ways in 0..8 {
+            let [lens, borders, parallel] = [1, 2, 4].map(|bit| ways & bit != 0);
             let cull = if borders { Cull::Back } else { Cull::None };
-            let scene = Scene::new(kind, cull, lens, borders, 60, 11);
+            let scene = Scene::new(kind, cull, Optics { lens, parallel }, borders, 60, 11);
             for switches in 0..SWITCHES {
                 scene.check(&spec(switched(switches)));
             }

@@ -58,13 +58,14 @@ fn tile(far: bool) -> TileRect {
 /// Samples on the edges of triangles of every kind, a third of the vertices behind the camera, slivers among them.
 #[test]
 fn no_depth_of_the_sample_test_is_outside() {
-    for flags in 0..32_u32 {
+    for flags in 0..64_u32 {
         let on = |bit: u32| flags & (1 << bit) != 0;
         let mut found = Found::default();
         for seed in 0..500_u64 {
             let scale = [0, -20, 19][seed as usize % 3];
-            let case = Case { moving: on(0), lens: on(1), behind: on(2), far: on(3), sliver: on(4), scale };
-            let setting = setting(case, seed * 32 + u64::from(flags));
+            let (moving, lens, parallel) = (on(0), on(1), on(5));
+            let case = Case { moving, lens, parallel, behind: on(2), far: on(3), sliver: on(4), scale };
+            let setting = setting(case, seed * 64 + u64::from(flags));
             let Outcome::Ready(triangle) = setting.probe.set_up(setting.triangle, Cull::None) else {
                 continue;
             };
@@ -74,9 +75,9 @@ fn no_depth_of_the_sample_test_is_outside() {
                 hold(&mut found, &triangle, &setting.probe, &tile(case.far), &within);
             }
         }
-        println!("{flags:05b} {found:?}");
-        assert_eq!(found.outside, 0, "{flags:05b} {found:?}");
-        assert!(found.depths > 3_000, "{flags:05b} {found:?}");
+        println!("{flags:06b} {found:?}");
+        assert_eq!(found.outside, 0, "{flags:06b} {found:?}");
+        assert!(found.depths > 3_000, "{flags:06b} {found:?}");
     }
 }
 
@@ -106,12 +107,13 @@ fn thinned(triangle: [MovingVertex; 3], r: &mut Uniform) -> [MovingVertex; 3] {
 #[test]
 fn no_depth_is_outside_the_interval_of_its_own_sample() {
     let (mut depths, mut plain, mut bounded, mut outside) = (0_u64, 0_u64, 0_u64, 0_u64);
-    for flags in 0..32_u32 {
+    for flags in 0..64_u32 {
         let on = |bit: u32| flags & (1 << bit) != 0;
         for seed in 0..360_u64 {
             let (scale, shape) = ([0, -20, 19][seed as usize % 3], seed / 3 % 3);
-            let case = Case { moving: on(0), lens: on(1), behind: on(2), far: on(3), sliver: on(4), scale };
-            let Setting { triangle, probe } = setting(case, seed * 32 + u64::from(flags) + 1_000_000);
+            let (moving, lens, parallel) = (on(0), on(1), on(5));
+            let case = Case { moving, lens, parallel, behind: on(2), far: on(3), sliver: on(4), scale };
+            let Setting { triangle, probe } = setting(case, seed * 64 + u64::from(flags) + 1_000_000);
             let mut r = Uniform::new(seed);
             let triangle = match shape {
                 0 => triangle,
@@ -156,10 +158,11 @@ fn no_depth_is_outside_the_interval_of_its_own_sample() {
 #[test]
 fn no_depth_is_outside_where_the_triangle_turns_over() {
     let (mut depths, mut outside) = (0_u64, 0_u64);
-    for flags in 0..8_u32 {
+    for flags in 0..16_u32 {
         let on = |bit: u32| flags & (1 << bit) != 0;
         for seed in 0..200_u64 {
-            let case = Case { moving: true, lens: on(0), behind: on(1), far: on(2), sliver: false, scale: 0 };
+            let (moving, lens, parallel) = (true, on(0), on(3));
+            let case = Case { moving, lens, parallel, behind: on(1), far: on(2), sliver: false, scale: 0 };
             let Setting { triangle: [a, b, _], probe } = setting(case, seed + 5_000_000);
             let mut r = Uniform::new(seed);
             for slot in 0..probe.samples.len {

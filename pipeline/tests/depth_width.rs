@@ -88,7 +88,7 @@ fn exact(triangle: &[MovingVertex; 3], shear: &Shear, tile: &TileRect, within: &
 fn mean_widths(motion: Motion, lens: bool, count: u32) -> [f64; 6] {
     let mut r = Uniform::new(5);
     let viewport = Viewport::new(80, 80).unwrap();
-    let shear = if lens { Shear { s: [6.0, -6.0], a: [1.5, -1.5] } } else { Shear::default() };
+    let shear = if lens { Shear::new([6.0, -6.0], [1.5, -1.5]) } else { Shear::default() };
     let (mut sums, mut tiles) = ([0.0; 6], 0);
     while tiles < count {
         let v = random(motion, &mut r);

@@ -32,14 +32,16 @@ fn ready(probe: &Probe, vertices: [MovingVertex; 3]) -> Option<Triangle> {
     }
 }
 
-fn probe(r: &mut Uniform, lens: bool, seed: u64) -> Probe {
+fn probe(r: &mut Uniform, optics: impl Into<Optics>, seed: u64) -> Probe {
+    let Optics { lens, parallel } = optics.into();
     let table = if seed.is_multiple_of(2) {
         border_table(seed)
     } else {
         SampleTable::low_discrepancy(5, seed, LensShape::Disk).unwrap()
     };
     let s = [r.within(-20.0, 20.0), r.within(-20.0, 20.0)];
-    let shear = if lens { Shear { s, a: s.map(|s| s / r.within(1.0, 8.0)) } } else { Shear::default() };
+    let shear = if lens { Shear::new(s, s.map(|s| s / r.within(1.0, 8.0))) } else { Shear::default() };
+    let shear = Shear { parallel, ..shear };
     Probe::new(&table, Viewport::new(20, 20).unwrap(), shear, [8, 8], 0.25)
 }
 
@@ -52,9 +54,9 @@ fn bits(seen: &[Option<f32>]) -> Bits {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn every_path_that_holds_the_dimensions_in_use_gives_the_same_bits(moving: bool, lens: bool, seed: u64) {
+    fn every_path_that_holds_the_dimensions_in_use_gives_the_same_bits(moving: bool, lens: bool, parallel: bool, seed: u64) {
         let mut r = Uniform::new(seed);
-        let probe = probe(&mut r, lens, seed);
+        let probe = probe(&mut r, Optics { lens, parallel }, seed);
         for _ in 0..8 {
             let Some(triangle) = ready(&probe, random_triangle(&mut r, moving)) else { continue };
             prop_assert_eq!(triangle.moving, moving);
@@ -68,9 +70,9 @@ proptest! {
     }
 
     #[test]
-    fn a_box_takes_away_what_lies_outside_it_and_nothing_else(lens: bool, seed: u64) {
+    fn a_box_takes_away_what_lies_outside_it_and_nothing_else(lens: bool, parallel: bool, seed: u64) {
         let mut r = Uniform::new(seed);
-        let probe = probe(&mut r, lens, seed);
+        let probe = probe(&mut r, Optics { lens, parallel }, seed);
         let mut range = |lo: f32, hi: f32| {
             let ends = [r.within(lo, hi), r.within(lo, hi)];
             // Now and then the ends are those of samples, and the box is empty.
@@ -103,7 +105,7 @@ proptest! {
         let vertices = random_triangle(&mut r, moving);
         for power in [-down, up] {
             let scale = libm::exp2f(power as f32);
-            let shear = Shear { s: one.shear.s.map(|s| s * scale), a: one.shear.a };
+            let shear = Shear { s: one.shear.s.map(|s| s * scale), ..one.shear };
             let table = if seed.is_multiple_of(2) { border_table(seed) } else { SampleTable::low_discrepancy(5, seed, LensShape::Disk).unwrap() };
             let other = Probe::new(&table, Viewport::new(20, 20).unwrap(), shear, [8, 8], 0.25 * scale);
             let scaled = vertices.map(|v| MovingVertex { open: v.open.map(|c| c * scale), close: v.close.map(|c| c * scale) });

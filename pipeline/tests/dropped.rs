@@ -18,6 +18,7 @@ fn set_up_drops_nothing_that_a_sample_sees() {
         let case = Case {
             moving: false,
             lens: false,
+            parallel: bit(0),
             behind: bit(2),
             far: bit(3),
             sliver: bit(4),

@@ -12,6 +12,14 @@
 //!        + |slope| off p.w + |p.w| off slope + g |slope p.w| + g |x'|
 //! ```
 //!
+//! In an orthographic view the ideal is `x' = p.x - (X + u s) + u a p.w`, and
+//!
+//! ```text
+//! base   = X + u s                        off by g (|u s| + |base|) where there is a lens, else 0
+//! band_x = off p.x + off base + g |p.x - base| + |u a| off p.w
+//!        + g (2 |u a p.w| + |x'|)         where there is a lens
+//! ```
+//!
 //! and an edge `x_i' y_j' - x_j' y_i'` by
 //!
 //! ```text
@@ -52,8 +60,16 @@ fn ideal(vertex: &MovingVertex, shear: &Shear, look: &Look) -> Point {
     };
     let band = |axis: usize, sheared: f64, at: f64, lens: f64| {
         let (s, a) = (lens * f64::from(shear.s[axis]), lens * f64::from(shear.a[axis]));
-        let slope = at - a;
         let lens = |error: f64| if shear.is_none() { 0.0 } else { ROUNDING * error };
+        if shear.parallel {
+            let (base, slope) = (at + s, a.abs());
+            return off(axis)
+                + lens(s.abs() + base.abs())
+                + ROUNDING * (sheared - a * w - at).abs()
+                + slope * off(2)
+                + lens(slope * w.abs() + slope * w.abs() + (sheared - at).abs());
+        }
+        let slope = at - a;
         let (off_slope, less) = (lens(a.abs() + slope.abs()), sheared - a * w);
         off(axis)
             + lens(s.abs() + less.abs())
@@ -62,7 +78,7 @@ fn ideal(vertex: &MovingVertex, shear: &Shear, look: &Look) -> Point {
             + ROUNDING * ((slope * w).abs() + (sheared - at * w).abs())
     };
     Point {
-        p: [x - look.x * w, y - look.y * w, w],
+        p: [x - look.x * weight(shear, w), y - look.y * weight(shear, w), w],
         band: [band(0, x, look.x, look.u), band(1, y, look.y, look.v)],
         band_w: off(2),
     }
@@ -189,8 +205,9 @@ fn the_band_is_measured() {
     let mut all = Tally::default();
     for seed in 0..1200_u64 {
         let bit = |k: u32| seed >> k & 1 == 1;
-        let (moving, lens, behind, far) = (bit(0), bit(1), bit(2), bit(3));
-        let case = Case { moving, lens, behind, far, sliver: seed % 5 == 0, scale: (seed % 7) as i32 - 3 };
+        let (moving, lens, behind, far, parallel) = (bit(0), bit(1), bit(2), bit(3), bit(4));
+        let (sliver, scale) = (seed % 5 == 0, (seed % 7) as i32 - 3);
+        let case = Case { moving, lens, parallel, behind, far, sliver, scale };
         all.add(&compare(case, seed));
     }
     println!("{all:#?}");
@@ -219,7 +236,8 @@ fn nothing_disagrees_where_nothing_rounds() {
             .collect();
         let mut vertex = || [int(-24.0, 24.0), int(-24.0, 24.0), int(-2.0, 6.0)];
         let triangle = [(); 3].map(|()| MovingVertex { open: vertex(), close: vertex() });
-        let shear = Shear { s: [int(-8.0, 8.0), int(-8.0, 8.0)], a: [int(-2.0, 2.0), int(-2.0, 2.0)] };
+        let shear = Shear::new([int(-8.0, 8.0), int(-8.0, 8.0)], [int(-2.0, 2.0), int(-2.0, 2.0)]);
+        let shear = Shear { parallel: int(0.0, 1.0) == 1.0, ..shear };
         let probe = Probe::new(&repeated(2, &block), Viewport::new(8, 8).unwrap(), shear, [0, 0], 0.25);
         for (slot, seen) in probe.see(triangle, Cull::None).into_iter().enumerate() {
             let points = triangle.map(|vertex| ideal(&vertex, &probe.shear, &probe.at(slot)));

@@ -190,6 +190,8 @@ fn a_camera_that_is_not_finite_is_refused() {
         for error in [
             Camera::new(Affine3A::IDENTITY, bad, 0.1).unwrap_err(),
             Camera::new(Affine3A::IDENTITY, 0.5, bad).unwrap_err(),
+            Camera::orthographic(Affine3A::IDENTITY, bad, 0.1).unwrap_err(),
+            Camera::orthographic(Affine3A::IDENTITY, 0.5, bad).unwrap_err(),
             Lens::new(bad, 1.0).unwrap_err(),
             Lens::new(0.1, bad).unwrap_err(),
         ] {
@@ -213,10 +215,14 @@ fn absurd_numbers_do_not_panic() {
             let triangles: Vec<_> = (0..20).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
             let geometry = Geometry::new(&open, &close, &triangles).unwrap();
             let draws = [Draw { geometry, shader: &Plain, cull: Cull::Back }];
-            for features in [Features::ALL, Features::NONE] {
+            let flat = |half| Camera::orthographic(Affine3A::IDENTITY, half, 0.25).unwrap();
+            for (features, camera) in [Features::ALL, Features::NONE]
+                .into_iter()
+                .flat_map(|features| [camera(false), flat(1.0), flat(size)].map(|one| (features, one)))
+            {
                 let spec = spec(features);
                 let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
-                let rendered = render(&camera(false).with_lens(lens), &draws, &settings, |_| ()).unwrap();
+                let rendered = render(&camera.with_lens(lens), &draws, &settings, |_| ()).unwrap();
                 assert_eq!(rendered.image.len(), 17 * 9);
             }
         }

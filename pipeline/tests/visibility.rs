@@ -22,7 +22,7 @@ fn seen(
     source: &dyn SampleSource,
     width: Width,
 ) -> Seen {
-    let layout = SampleLayout::new(&camera(lens), viewport, source, soup.open != soup.close);
+    let layout = SampleLayout::new(&camera(lens), viewport, source, soup.open != soup.close).unwrap();
     seen_in(&layout, soup, cull, width)
 }
 
@@ -106,13 +106,21 @@ fn every_width_and_number_of_threads_gives_the_same_bytes() {
     }
 }
 
+/// The engine would see another picture, so it takes no such camera.
+#[test]
+fn an_orthographic_camera_is_refused() {
+    let table = SampleTable::low_discrepancy(1, 1, LensShape::Disk).unwrap();
+    let camera = camera(Optics { lens: false, parallel: true });
+    assert!(SampleLayout::new(&camera, Viewport::new(8, 8).unwrap(), &table, false).is_none());
+}
+
 #[test]
 fn dividing_time_where_nothing_moves_changes_nothing() {
     let (soup, viewport) = (Soup::new(Kind::Still, 200, 4), Viewport::new(64, 64).unwrap());
     let table = SampleTable::low_discrepancy(16, 3, LensShape::Disk).unwrap();
     for lens in [false, true] {
         let [divided, whole] = [true, false].map(|moving| {
-            let layout = SampleLayout::new(&camera(lens), viewport, &table, moving);
+            let layout = SampleLayout::new(&camera(lens), viewport, &table, moving).unwrap();
             seen_in(&layout, &soup, Cull::None, Width::widest())
         });
         assert!(divided == whole, "lens {lens}");

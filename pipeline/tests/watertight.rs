@@ -26,12 +26,14 @@ fn patch(r: &mut Uniform, centre: [f32; 2], dims: Dims, lift: f32) -> Mesh {
     for i in 0..(CELLS + 1) * (CELLS + 1) {
         let grid = [i % (CELLS + 1), i / (CELLS + 1)].map(|step| step as f32 * CELL_PX - half);
         let at = grid.map(|c| c + CELL_PX * r.within(-0.11, 0.11));
-        let w = 1.0 / (nearness + tilt[0] * at[0] + tilt[1] * at[1] + lift * r.within(-1.0, 1.0));
-        let open = [(centre[0] + at[0]) * w, (centre[1] + at[1]) * w, w];
+        let plane = nearness + tilt[0] * at[0] + tilt[1] * at[1] + lift * r.within(-1.0, 1.0);
+        // What a lens shifts the image by is linear in 1 / w in perspective, and in w in an orthographic view.
+        let w = if dims.parallel { 4.0 * plane } else { 1.0 / plane };
+        let open = dims.vertex([centre[0] + at[0], centre[1] + at[1]], w);
         let (sin, cos) = (grow * libm::sinf(turn), grow * libm::cosf(turn));
         let turned = [cos * at[0] - sin * at[1] + drift[0], sin * at[0] + cos * at[1] + drift[1]];
         let w = w * deeper;
-        let close = [(centre[0] + turned[0]) * w, (centre[1] + turned[1]) * w, w];
+        let close = dims.vertex([centre[0] + turned[0], centre[1] + turned[1]], w);
         vertices.push(MovingVertex { open, close: if dims.moving { close } else { open } });
     }
     let mut triangles = Vec::new();
@@ -90,7 +92,7 @@ fn check_patch(mesh: &Mesh, probe: &Probe, far: bool) {
     for (slot, &count) in covered.iter().enumerate() {
         let look = probe.at(slot);
         assert_one_to_one(mesh, probe, &look);
-        let rim: Vec<_> = rim.iter().map(|&v| image(look.sheared(&mesh.vertices[v], &probe.shear))).collect();
+        let rim: Vec<_> = rim.iter().map(|&v| image(&mesh.vertices[v], &look, &probe.shear)).collect();
         match inside([look.x, look.y], &rim, margin) {
             Some(true) => assert_eq!(count, 1, "a sample inside is covered {count} times: {look:?}"),
             Some(false) => assert_eq!(count, 0, "a sample outside is covered {count} times: {look:?}"),
@@ -102,13 +104,14 @@ fn check_patch(mesh: &Mesh, probe: &Probe, far: bool) {
     assert!(within > 100 && without > 0, "{within} samples inside and {without} outside show little");
 }
 
-fn image([x, y, w]: [f64; 3]) -> [f64; 2] {
-    [x / w, y / w]
+fn image(vertex: &MovingVertex, look: &Look, shear: &Shear) -> [f64; 2] {
+    let [x, y, w] = look.sheared(vertex, shear);
+    [x, y].map(|c| c / weight(shear, w))
 }
 
 /// What the property asks for: no triangle of the patch is turned over, as this sample sees it.
 fn assert_one_to_one(mesh: &Mesh, probe: &Probe, look: &Look) {
-    let seen: Vec<_> = mesh.vertices.iter().map(|v| image(look.sheared(v, &probe.shear))).collect();
+    let seen: Vec<_> = mesh.vertices.iter().map(|v| image(v, look, &probe.shear)).collect();
     for cell in 0..CELLS * CELLS {
         let a = cell / CELLS * (CELLS + 1) + cell % CELLS;
         let around = [a, a + 1, a + CELLS + 2, a + CELLS + 1].map(|v| seen[v]);
@@ -148,12 +151,15 @@ proptest! {
 /// exact: ties everywhere, at every time and place on the lens.
 #[test]
 fn every_sample_on_a_corner_of_a_grid_has_one_owner() {
-    for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
-        let shear = if lens { Shear { s: [4.0, -4.0], a: [1.0, -1.0] } } else { Shear::default() };
+    for ways in 0..8 {
+        let [moving, lens, parallel] = [1, 2, 4].map(|bit| ways & bit != 0);
+        let shear = if lens { Shear::new([4.0, -4.0], [1.0, -1.0]) } else { Shear::default() };
+        let (shear, weight) = (Shear { parallel, ..shear }, if parallel { 1.0 } else { 2.0 });
         // A grid of 4x4 cells of 4 pixels, at depth 2 throughout: half of the lens moves it by half a pixel.
         let vertex = |i: usize| {
             let at = [i % 5, i / 5].map(|step| step as f32 * 4.0 - 8.0);
-            let (open, shift) = ([at[0] * 2.0, at[1] * 2.0, 2.0], if moving { 4.0 } else { 0.0 });
+            let (open, shift) =
+                ([at[0] * weight, at[1] * weight, 2.0], if moving { 2.0 * weight } else { 0.0 });
             MovingVertex { open, close: [open[0] + shift, open[1] - shift, 2.0] }
         };
         let mut triangles = Vec::new();
@@ -187,10 +193,10 @@ fn every_sample_on_a_corner_of_a_grid_has_one_owner() {
             for (slot, &count) in covered.iter().enumerate() {
                 let look = probe.at(slot);
                 // Half open: the sample is moved by an infinitely small step towards +x and, smaller still, +y.
-                let from = image(look.sheared(&mesh.vertices[0], &shear));
+                let from = image(&mesh.vertices[0], &look, &shear);
                 let at = [look.x - from[0], look.y - from[1]];
                 let expected = at.iter().all(|c| (0.0..16.0).contains(c));
-                assert_eq!(count, u32::from(expected), "moving {moving} lens {lens}: {at:?} {look:?}");
+                assert_eq!(count, u32::from(expected), "moving {moving} {shear:?}: {at:?} {look:?}");
                 once += count;
                 columns += u32::from(at[0] % 4.0 == 0.0 && expected);
             }

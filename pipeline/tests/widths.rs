@@ -11,14 +11,16 @@ use pipeline::setup::{Outcome, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 
-fn hits_at(width: Width, kind: Kind, lens: bool) -> (Vec<u32>, Vec<u32>, Hits) {
+fn hits_at(width: Width, kind: Kind, Optics { lens, parallel }: Optics) -> (Vec<u32>, Vec<u32>, Hits) {
     let (soup, viewport) = (Soup::new(kind, 200, 5), Viewport::new(64, 64).unwrap());
-    let shear = if lens { Shear { s: [12.0, -12.0], a: [2.0, -2.0] } } else { Shear::default() };
+    let shear = if lens { Shear::new([12.0, -12.0], [2.0, -2.0]) } else { Shear::default() };
+    let shear = Shear { parallel, ..shear };
     let mut samples = TileSamples::default();
     samples.fill(&border_table(9), viewport, &shear, [32, 24], 8);
     let (mut depth, mut seen) = (vec![f32::INFINITY; samples.len], vec![u32::MAX; samples.len]);
     let mut hits = Hits::default();
-    let image = |p: glam::Vec3| [46.0 * p.x, -46.0 * p.y, p.z];
+    let scale = if parallel { 10.0 } else { 46.0 };
+    let image = |p: glam::Vec3| [scale * p.x, -scale * p.y, p.z];
     for (id, corners) in soup.triangles.iter().enumerate() {
         let v = corners
             .map(|c| c as usize)
@@ -39,11 +41,12 @@ fn every_width_gives_the_same_bytes() {
     let widths: Vec<Width> = Width::available().collect();
     println!("widths of this machine: {widths:?}");
     for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Slivers, Kind::Grid] {
-        for lens in [false, true] {
-            let plain = hits_at(widths[0], kind, lens);
+        for ways in 0..4 {
+            let optics = Optics { lens: ways & 1 != 0, parallel: ways & 2 != 0 };
+            let plain = hits_at(widths[0], kind, optics);
             assert!(plain.2.hit > 0, "{kind:?} is hit");
             for &width in &widths[1..] {
-                assert_eq!(hits_at(width, kind, lens), plain, "{width:?} on {kind:?}, lens {lens}");
+                assert_eq!(hits_at(width, kind, optics), plain, "{width:?} on {kind:?}, {optics:?}");
             }
         }
     }

@@ -41,7 +41,7 @@ struct Run {
 }
 
 /// Finds what the samples of `source` see of `scene`, `runs` times: with tile tests as the modelled hardware does it, or
-/// without as fast as it goes. Uses the threads of the pool it is called in.
+/// without as fast as it goes; the engine that goes fastest takes no orthographic camera, so that is modelled with all tests. Uses the threads of the pool it is called in.
 ///
 /// # Errors
 /// When the mesh cannot be drawn, in words.
@@ -54,23 +54,30 @@ pub fn find(
     // One array twice is a still mesh.
     let close = if scene.open == scene.close { &scene.open } else { &scene.close };
     let geometry = Geometry::new(&scene.open, close, &scene.triangles).map_err(|error| error.to_string())?;
-    match tests {
-        None => Ok(fastest(scene, source, &geometry, runs)),
-        Some(features) => modelled(scene, source, geometry, features, runs),
+    let fast = if tests.is_none() { fastest(scene, source, &geometry, runs) } else { None };
+    match fast {
+        Some(found) => Ok(found),
+        None => modelled(scene, source, geometry, tests.unwrap_or(Features::ALL), runs),
     }
 }
 
-fn fastest(scene: &VisibilityScene, source: &dyn SampleSource, geometry: &Geometry<'_>, runs: u16) -> Found {
+/// `None` where the camera is one the engine does not take.
+fn fastest(
+    scene: &VisibilityScene,
+    source: &dyn SampleSource,
+    geometry: &Geometry<'_>,
+    runs: u16,
+) -> Option<Found> {
     let before = Instant::now();
     let moving = scene.open != scene.close;
-    let layout = SampleLayout::new(&scene.camera, scene.viewport, source, moving);
+    let layout = SampleLayout::new(&scene.camera, scene.viewport, source, moving)?;
     let mut visibility = Visibility::new(&layout);
     let before_s = before.elapsed().as_secs_f64();
     let timed =
         (0..runs).map(|_| timed(|| resolve(&layout, geometry, Cull::None, &mut visibility)).1).collect();
     let after = Instant::now();
     let seen = visibility.in_image_order(&layout);
-    Found { rates: rates(seen.len(), timed, before_s + after.elapsed().as_secs_f64()), seen }
+    Some(Found { rates: rates(seen.len(), timed, before_s + after.elapsed().as_secs_f64()), seen })
 }
 
 fn modelled(

@@ -156,6 +156,33 @@ fn the_camera_that_was_fitted_is_told_and_can_be_given_back() {
     assert!(!told.stdout.contains("fov_deg"), "only a fitted camera is told: {}", told.stdout);
 }
 
+/// The engine takes no orthographic camera; what is modelled instead sees the same whatever is tested, and says so.
+#[test]
+fn an_orthographic_camera_is_modelled_and_told() {
+    let inputs = Inputs::new();
+    let files = [inputs.put("a.mts", mts(&soup(), 8))];
+    for lens in ["", "lens_radius: 0.25, focus: 6, "] {
+        let view = format!(
+            "(width: {SIDE}, height: 32, samples: 4, {lens}position: (0, 0, 0), target: (0, 0, -1), view_height: 7)"
+        );
+        let camera = inputs.put("c.ron", view);
+        let expected = hits(&inputs, &files, &["--camera", &camera]);
+        for tests in ["none", "all", "auto"] {
+            assert!(
+                hits(&inputs, &files, &["--camera", &camera, "--tests", tests]) == expected,
+                "{tests} {lens}"
+            );
+        }
+        let codes = |flags: &[&str]| {
+            let ended = visibility(&files, &[&["--camera", &camera, "--json"], flags].concat());
+            let found: serde_json::Value = serde_json::from_str(ended.stdout.trim()).expect("JSON");
+            assert!(found["hits"].as_u64() > Some(500), "{found}");
+            found["warnings"].to_string().contains("orthographic-view")
+        };
+        assert!(codes(&[]) && !codes(&["--tests", "all"]));
+    }
+}
+
 /// Files, flags, exit code, and what the message has to say.
 type Case<'a> = (&'a [&'a String], &'a [&'a str], i32, &'a [&'a str]);
 
@@ -171,7 +198,12 @@ fn wrong_inputs_are_told_from_failures() {
     let strange = inputs.put("a.glb", b"glTF\x02\0\0\0");
     let gone = inputs.path("gone.mts");
     let typo = inputs.put("typo.ron", "(\n  widht: 3,\n)");
-    let cases: [Case<'_>; 11] = [
+    let both =
+        inputs.put("both.ron", "(position: (0, 0, 1), target: (0, 0, 0), fov_deg: 40, view_height: 2)");
+    let adrift = inputs.put("adrift.ron", "(view_height: 2)");
+    let cases: [Case<'_>; 13] = [
+        (&[&start, &end], &["--camera", &both], 2, &["both.ron: camera", "`view_height`", "leave one out"]),
+        (&[&start, &end], &["--camera", &adrift], 2, &["adrift.ron: camera", "give `position` and `target`"]),
         (
             &[&start, &short],
             &[],

@@ -107,7 +107,7 @@ fn measure(scene: &Scene, threads: usize) -> (f64, f64, Tally) {
         let viewport = Viewport::new(512, 512).unwrap();
         let samples = HashedSamples::new(1, 512, 16, LensShape::Disk).unwrap();
         let moving = scene.open != scene.close;
-        let layout = SampleLayout::new(&scene.camera, viewport, &samples, moving);
+        let layout = SampleLayout::new(&scene.camera, viewport, &samples, moving).unwrap();
         let close = if moving { &scene.close } else { &scene.open };
         let geometry = Geometry::new(&scene.open, close, &scene.triangles).unwrap();
         let mut visibility = Visibility::new(&layout);

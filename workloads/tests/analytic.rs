@@ -170,7 +170,44 @@ fn a_camera_on_a_moving_node_looks_down_minus_z() {
     near(camera.open().transform_point3(Vec3::new(1.0, 2.0, 5.0)), Vec3::new(-1.0, 2.0, 3.0));
     near(camera.close().transform_point3(Vec3::new(1.0, 2.0, 5.0)), Vec3::new(-1.0, 2.0, 1.0));
     assert_eq!(camera.near(), 0.25);
-    assert!((camera.tan_half_height() - 0.5f32.tan()).abs() < 1e-6);
+    assert!((camera.half_height() - 0.5f32.tan()).abs() < 1e-6);
+}
+
+#[test]
+fn an_orthographic_camera_sees_twice_its_ymag_at_any_depth() {
+    let with = |lens: &str| {
+        let mut file = Builder::triangle();
+        let lens: serde_json::Value = serde_json::from_str(lens).unwrap();
+        file.json["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
+        file.json["nodes"] = json!([{"camera": 0, "translation": [0, 0, 4]}, {"mesh": 0}]);
+        file.json["scenes"][0]["nodes"] = json!([0, 1]);
+        load_glb(&file.bytes()).unwrap()
+    };
+    let scene = with(r#"{"xmag": 3.0, "ymag": 2.0, "zfar": 10.0, "znear": 0.25}"#);
+    let camera = scene.frame(0).unwrap().camera;
+    assert!(camera.is_orthographic() && scene.warnings().is_empty(), "{:?}", scene.warnings());
+    assert_eq!((camera.half_height(), camera.near()), (2.0, 0.25));
+    near(camera.open().transform_point3(Vec3::new(1.0, 2.0, 3.0)), Vec3::new(1.0, 2.0, 1.0));
+    // A near plane at zero, which the format allows, is left to the scene.
+    let touching = with(r#"{"xmag": 3.0, "ymag": 2.0, "zfar": 10.0, "znear": 0.0}"#).frame(0).unwrap().camera;
+    assert!(touching.is_orthographic() && touching.near() > 0.0 && touching.near() < 0.01);
+    for bad in [
+        r#"{"xmag": 1.0, "ymag": 0.0, "zfar": 9.0, "znear": 0.1}"#,
+        r#"{"xmag": 1.0, "ymag": -1.0, "zfar": 9.0, "znear": 0.1}"#,
+    ] {
+        let scene = with(bad);
+        assert!(scene.warnings().iter().any(|warning| warning.code == "camera-ignored"), "{bad}");
+        assert!(!scene.frame(0).unwrap().camera.is_orthographic());
+    }
+}
+
+#[test]
+fn a_ron_camera_with_a_height_is_orthographic() {
+    let text = "(settings: (lens_radius: 0.1), camera: (position: (0, 0, 7), target: (0, 0, 1), view_height: 3), \
+                objects: [(shape: Sphere(radius: 1))])";
+    let camera = workloads::load(&Files::new().put("s.ron", text)).unwrap().frame(0).unwrap().camera;
+    assert!(camera.is_orthographic());
+    assert_eq!((camera.half_height(), camera.lens().unwrap().focus()), (1.5, 6.0));
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn warns(scene: &Scene) -> bool {
 /// Every vertex as a pinhole in the middle of the lens sees it: `|x|` and `|y|` in halves of the image, and depth.
 fn through_the_centre(scene: &Scene) -> Vec<Vec3> {
     let frame = scene.frame(0).unwrap();
-    let tan = frame.camera.tan_half_height();
+    let tan = frame.camera.half_height();
     let aspect = SIZE.0 as f32 / SIZE.1 as f32;
     let points = frame.meshes.iter().flat_map(|mesh| mesh.open.iter());
     let seen = points.map(|point| {

@@ -12,7 +12,7 @@ use workloads::{Frame, Overrides, load};
 /// Every vertex at both ends, seen from five points of the lens, lies in the image and beyond the near depth.
 fn all_in_view(frame: &Frame, aspect: f32) -> Result<(), TestCaseError> {
     let camera = &frame.camera;
-    let tan = camera.tan_half_height();
+    let tan = camera.half_height();
     let lens = camera.lens().map_or((0.0, 1.0), |lens| (lens.radius(), lens.focus()));
     for mesh in &frame.meshes {
         for (points, pose) in [(&mesh.open, camera.open()), (&mesh.close, camera.close())] {

@@ -124,7 +124,7 @@ fn an_m5d_under_the_camera_it_carries_is_itself() {
     let same = load(&[&mesh], Some(Path::new(&files.put("c.ron", text)))).unwrap();
     assert_eq!((&own.open, &own.close, own.viewport), (&same.open, &same.close, same.viewport));
     assert_eq!((own.camera.lens(), own.camera.near()), (same.camera.lens(), same.camera.near()));
-    assert!((own.camera.tan_half_height() - same.camera.tan_half_height()).abs() < 1e-6);
+    assert!((own.camera.half_height() - same.camera.half_height()).abs() < 1e-6);
 }
 
 #[test]

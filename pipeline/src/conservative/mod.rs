@@ -20,7 +20,7 @@
 //! let triangle = MovingTriangle::new(corners, corners).unwrap();
 //! let grid = Grid { origin: [0.0, 0.0], tile: 1.0, columns: 8, rows: 8 };
 //! let mut tiles = Vec::new();
-//! Rasterizer::new(View::Orthographic).rasterize(&triangle, &grid, |tile, touch| tiles.push((tile, touch.z)));
+//! Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, touch| tiles.push((tile, touch.z)));
 //! // Four in the first row, two in the second, and one that is touched at its corner (2, 1).
 //! assert_eq!(tiles.len(), 7);
 //! ```

@@ -128,7 +128,8 @@ impl Rasterizer {
         let vertices =
             vertices.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
         let beam = match self.view {
-            View::Orthographic => Beam::orthographic(seen.tile),
+            View::Orthographic { .. } if !self.view.has_lens() => Beam::orthographic(seen.tile),
+            View::Orthographic { s, a, .. } => Beam::oblique(seen.tile, [region.u, region.v], s, a),
             View::Perspective { .. } if !self.view.has_lens() => Beam::pinhole(seen.tile),
             View::Perspective { s, a, .. } => Beam::lens(seen.tile, [region.u, region.v], s, a),
         };

@@ -34,8 +34,9 @@ impl Seen {
         let (s, a) = view.shear();
         let (weight, unsure, off) = (prepared.weight, prepared.uncertainty(), prepared.weight_off);
         let noise = [0, 1].map(|axis| {
-            let reach = a[axis].abs() + sides[axis][0].abs().max(sides[axis][1].abs());
-            ROUNDING * (prepared.size[axis] + s[axis].abs() + reach * weight) + unsure[axis] + reach * off
+            let (lens, side) = (a[axis].abs(), sides[axis][0].abs().max(sides[axis][1].abs()));
+            let sum = prepared.size[axis] + s[axis].abs() + lens * prepared.size[2] + side * weight;
+            ROUNDING * sum + unsure[axis] + lens * unsure[2] + side * off
         });
         let size = [0, 1, 2].map(|axis| {
             let moved = if axis < 2 { middle[axis].abs() * weight } else { 0.0 };
@@ -56,7 +57,7 @@ impl Seen {
     /// Vertex `k` at `end` of the time along `axis`, seen from `place` on the lens and `side` from the middle of the tile.
     pub fn from(&self, axis: usize, k: usize, end: usize, place: f64, side: f64) -> f64 {
         let p = &self.points[end][k];
-        let (w, (s, a)) = (self.view.weight(p[2]), self.view.shear());
-        p[axis] + place * (a[axis] * w - s[axis]) - side * w
+        let (s, a) = self.view.shear();
+        p[axis] + place * (a[axis] * p[2] - s[axis]) - side * self.view.weight(p[2])
     }
 }

@@ -125,6 +125,7 @@ struct Facts<R> {
     slack: [R; 2],
     s: [R; 2],
     a: [R; 2],
+    parallel: bool,
 }
 
 impl Facts<f64> {
@@ -135,7 +136,8 @@ impl Facts<f64> {
         let largest =
             |axis: usize| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max);
         let size = [largest(0) + s[0].abs(), largest(1) + s[1].abs(), largest(2)];
-        Self { open, delta, moving: triangle.moving, size, slack: triangle.slack.map(f64::from), s, a }
+        let (moving, slack, parallel) = (triangle.moving, triangle.slack.map(f64::from), shear.parallel);
+        Self { open, delta, moving, size, slack, s, a, parallel }
     }
 }
 
@@ -160,9 +162,11 @@ impl<R: Real> Facts<R> {
     /// The depths that the planes allow, those of set-up or else those through the triangle at the ends of the region's
     /// time, with what rounding in the sample test adds.
     fn over(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>) -> Option<[R; 2]> {
-        let beam = match region.lens {
-            Some(lens) => Beam::lens(region.tile, lens, self.s, self.a),
-            None => Beam::pinhole(region.tile),
+        let beam = match (region.lens, self.parallel) {
+            (Some(lens), false) => Beam::lens(region.tile, lens, self.s, self.a),
+            (None, false) => Beam::pinhole(region.tile),
+            (Some(lens), true) => Beam::oblique(region.tile, lens, self.s, self.a),
+            (None, true) => Beam::orthographic(region.tile),
         };
         let ends = if self.moving { region.t.map(|t| self.at(t)) } else { [self.open; 2] };
         let different = if self.moving { 2 } else { 1 };
@@ -195,7 +199,7 @@ mod tests {
         }
     }
 
-    const SHEAR: Shear = Shear { s: [9.0, -9.0], a: [2.0, -2.0] };
+    const SHEAR: Shear = Shear::new([9.0, -9.0], [2.0, -2.0]);
     const TILE: TileRect = TileRect { x: [-1.0, 1.0], y: [-1.0, 1.0] };
 
     fn counted<const N: usize>(values: [f64; N]) -> [Counted; N] {
@@ -211,16 +215,20 @@ mod tests {
             slack: counted(facts.slack),
             s: counted(facts.s),
             a: counted(facts.a),
+            parallel: facts.parallel,
         }
     }
 
     #[test]
     fn multiply_adds_are_those_of_the_code() {
-        for (bound, moving, lens) in all() {
+        for ((bound, moving, lens), parallel) in
+            all().flat_map(|one| [false, true].map(|parallel| (one, parallel)))
+        {
             if !bound.has_planes() {
                 continue;
             }
-            let facts = counting(&Facts::new(&triangle(moving), &SHEAR));
+            let shear = Shear { parallel, ..SHEAR };
+            let facts = counting(&Facts::new(&triangle(moving), &shear));
             let mut shutter = None;
             let set_up =
                 madds(|| shutter = (bound == DepthBound::Planes || !moving).then(|| facts.shutter()));

@@ -13,7 +13,7 @@
 //! and never a false one.
 //!
 //! In perspective with a thin lens `G = (X - u a_x, Y - v a_y, 1)` and `B = (u s_x, v s_y, 0)`; in an orthographic view
-//! `G = (0, 0, 1)` and `B = (X, Y, 0)`. The bound is a ratio of functions linear in each variable, so its extremes
+//! `G = (-u a_x, -v a_y, 1)` and `B = (X + u s_x, Y + v s_y, 0)`. The bound is a ratio of functions linear in each variable, so its extremes
 //! are at corners.
 
 use super::number::{Real, both, cross, dot, hull, range};
@@ -54,12 +54,23 @@ impl<R: Real> Beam<R> {
 
     /// Through the part `lens` (the ends of u and of v) of a thin lens with the shear `s`, `a`.
     pub fn lens(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
-        let axis = |axis: usize| {
-            lens[axis].map(|place| {
-                let ([lo, hi], shift) = (tile[axis], place * a[axis]);
-                ([lo - shift, hi - shift], [place * s[axis]; 2])
-            })
-        };
+        Self::corners(lens, |axis, place| {
+            let ([lo, hi], shift) = (tile[axis], place * a[axis]);
+            ([lo - shift, hi - shift], [place * s[axis]; 2])
+        })
+    }
+
+    /// The same in an orthographic view.
+    pub fn oblique(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
+        Self::corners(lens, |axis, place| {
+            let ([lo, hi], shift) = (tile[axis], place * s[axis]);
+            ([-(place * a[axis]); 2], [lo + shift, hi + shift])
+        })
+    }
+
+    /// From each corner of a part of the lens, given slope and base along an axis from a place on it.
+    fn corners(lens: [[R; 2]; 2], ray: impl Fn(usize, R) -> ([R; 2], [R; 2])) -> Self {
+        let axis = |axis: usize| lens[axis].map(|place| ray(axis, place));
         let (across, down) = (axis(0), axis(1));
         let rays = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| {
             let ((slope_x, base_x), (slope_y, base_y)) = (across[i], down[j]);
@@ -237,6 +248,17 @@ mod tests {
         let inner = range([at(-0.5, -1.0), at(0.25, -1.0), at(-0.5, 0.5), at(0.25, 0.5)]);
         assert!(corners[1] > inner[1]);
         close_to(depths(&lens).unwrap(), inner);
+    }
+
+    /// The plane w = 4 + x at X + u (a w - s) = x with s = 2, a = 1/2: w = 4 + X - u (w / 2 - 2), so w (1 + u / 2) = 4 + X + 2 u.
+    #[test]
+    fn an_oblique_view_is_bounded_at_the_corners_of_tile_and_lens() {
+        let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
+        let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
+        let beam = Beam::oblique(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
+        let at = |x: f64, u: f64| (4.0 + x + 2.0 * u) / (1.0 + 0.5 * u);
+        let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
+        close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), corners);
     }
 
     /// Front from one end of the lens and back from the other: from between it is seen edge-on.

@@ -12,7 +12,8 @@ use crate::texture::{Footprint, Sampler};
 
 /// A triangle as one sample sees it.
 pub(super) struct Look {
-    /// The vertices at the sample's time, moved by the lens as far as that does not depend on depth.
+    /// The vertices at the sample's time, moved by the lens as far as that does not depend on depth. In an orthographic view they are
+    /// homogeneous points seen from the sample.
     vertices: [[f32; 3]; 3],
     /// Where the sample looks, the other part of the lens included.
     at: [f32; 2],
@@ -22,8 +23,8 @@ pub(super) struct Look {
 impl Look {
     /// The look of the sample in `slot` of a tile.
     pub fn of_slot(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> Self {
-        let [lens, at] = [&samples.lens, &samples.slope].map(|axes| [axes[0][slot], axes[1][slot]]);
-        Self::new(corners, lens, at, samples.t[slot])
+        let rays = [0, 1].map(|axis| [samples.slope[axis][slot], samples.lens[axis][slot]]);
+        Self::new(corners, rays, samples.t[slot], samples.parallel)
     }
 
     /// The look of a sample of pixel (`px`, `py`).
@@ -31,16 +32,17 @@ impl Look {
         let (shear, viewport) = (&pass.projection.shear, pass.settings.viewport);
         let x = Viewport::edge(px, viewport.width()) + s.x;
         let y = Viewport::edge(py, viewport.height()) + s.y;
-        let lens = [s.u * shear.s[0], s.v * shear.s[1]];
-        Self::new(corners, lens, [x - s.u * shear.a[0], y - s.v * shear.a[1]], s.t)
+        Self::new(corners, [shear.ray(0, x, s.u), shear.ray(1, y, s.v)], s.t, shear.parallel)
     }
 
-    fn new(corners: &[Corner; 3], lens: [f32; 2], at: [f32; 2], t: f32) -> Self {
+    /// Along each axis a slope and a base ([`crate::geometry::Shear::ray`]).
+    fn new(corners: &[Corner; 3], [across, down]: [[f32; 2]; 2], t: f32, parallel: bool) -> Self {
         let vertices = corners.map(|corner| {
             let [x, y, w] = corner.at(t);
-            [x - lens[0], y - lens[1], w]
+            let [x, y] = [x - across[1], y - down[1]];
+            if parallel { [x - across[0] * w, y - down[0] * w, 1.0] } else { [x, y, w] }
         });
-        Self { vertices, at, t }
+        Self { vertices, at: if parallel { [0.0; 2] } else { [across[0], down[0]] }, t }
     }
 
     /// Barycentric weights of the point seen so many pixels to the right and below, at the same lens position and time.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::Vec4;
 
 use super::{Features, Settings};
 use crate::depth::BoxGrid;
@@ -37,8 +37,8 @@ pub(super) struct Pass<'a> {
     pub clip: Clip,
     /// Whether the camera does not move while the shutter is open.
     pub still_camera: bool,
-    /// The position of the camera in world space at mid-shutter.
-    pub eye: Vec3,
+    /// The camera in world space at mid-shutter, as a homogeneous point.
+    pub eye: Vec4,
     /// Whether workers note where tile tests are done.
     pub heat: bool,
 }

@@ -19,7 +19,7 @@ pub(super) struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     pub fn new(pass: &Pass<'_>, corners: &'a [Corner; 3], moving: bool) -> Self {
-        let reference = corners.map(|corner| corner.at(REFERENCE_TIME));
+        let reference = reference(pass, corners);
         Self { corners, reference, origin: pass.origin, plain: !moving && !pass.lens }
     }
 
@@ -36,6 +36,11 @@ impl<'a> Grid<'a> {
         let sum = (e[0] + e[1]) + e[2];
         shading::cell(&self.reference, e.map(|part| part / sum), self.origin).unwrap_or(own)
     }
+}
+
+/// The vertices at the reference as homogeneous points of the image plane.
+fn reference(pass: &Pass<'_>, corners: &[Corner; 3]) -> [[f32; 3]; 3] {
+    corners.map(|corner| pass.projection.shear.homogeneous(corner.at(REFERENCE_TIME)))
 }
 
 /// The pixel of the sample in `slot` of a tile.
@@ -58,7 +63,7 @@ impl<'a> Surface<'a> {
     pub fn new(pass: &'a Pass<'a>, triangle: u32) -> Self {
         let (draw, vertices) = pass.corners(triangle);
         let corners = vertices.map(|vertex| Corner::new(&pass.vertices[draw][vertex]));
-        let reference = corners.map(|corner| corner.at(REFERENCE_TIME));
+        let reference = reference(pass, &corners);
         let texture = pass.draws[draw].shader.texture();
         let textured = texture.filter(|_| !pass.draws[draw].geometry.uvs().is_empty());
         let sampler = textured.map(|texture| Sampler::new(texture, pass.addresses.textures[draw]));
@@ -134,7 +139,8 @@ impl<'a> Surface<'a> {
         } else {
             (0..3).map(|k| normals[self.vertices[k]] * weights[k]).sum::<Vec3>().normalize_or(flat)
         };
-        let to_camera = (self.pass.eye - position).normalize_or_zero();
+        let eye = self.pass.eye;
+        let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
         ShadingPoint { position, normal, to_camera, uv: self.uv(weights) }
     }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::Features;
 use super::pass::{Pass, Staged};
 use super::replay::Replay;
-use crate::geometry::{Draw, Shear};
+use crate::geometry::Draw;
 use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
 use crate::traversal::{self, Box5, LensLines, small};
 
@@ -52,7 +52,8 @@ fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let viewport = pass.settings.viewport;
     let Draw { geometry, cull, .. } = &pass.draws[pass.locate(id).0];
     let (Staged { vertices, lens }, near) = (pass.staged(id), pass.projection.near);
-    let shear = if lens { pass.projection.shear } else { Shear::default() };
+    let shear = pass.projection.shear;
+    let shear = if lens { shear } else { shear.sharp() };
     let within = Box5::whole(lens).clipped(&pass.clip).clipped(&geometry.clip());
     if within.is_empty() {
         return (Event::TrianglesOutside, None);

@@ -213,7 +213,7 @@ impl<'a, 'p> Worker<'a, 'p> {
         };
         fill(&mut samples[place], shear, &mut filled[place]);
         if self.pass.lens && !lens {
-            fill(&mut sharp[place], &Shear::default(), &mut sharpened[place]);
+            fill(&mut sharp[place], &shear.sharp(), &mut sharpened[place]);
         }
     }
 

@@ -1,4 +1,4 @@
-//! A thin-lens camera that may move while the shutter is open.
+//! A thin-lens or orthographic camera that may move while the shutter is open.
 
 use glam::{Affine3A, Vec2};
 
@@ -12,14 +12,16 @@ use super::Clip;
 pub struct Camera {
     open: Affine3A,
     close: Affine3A,
-    tan_half_height: f32,
+    half_height: f32,
+    orthographic: bool,
     shift: Vec2,
     lens: Option<Lens>,
     near: f32,
     clip: Clip,
 }
 
-/// A thin lens.
+/// A thin lens. In an orthographic view, where there is none, what it does to the image far away: a point at depth `w` is moved by
+/// `radius (w / focus - 1)` scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     radius: f32,
@@ -76,16 +78,23 @@ impl Camera {
     /// # Errors
     /// When the pose is not finite, or the others are not finite and above zero.
     pub fn new(pose: Affine3A, tan_half_height: f32, near: f32) -> Result<Self, CameraError> {
-        Self {
-            open: pose,
-            close: pose,
-            tan_half_height: positive("tangent of half the field of view", tan_half_height)?,
-            shift: Vec2::ZERO,
-            lens: None,
-            near: positive("near depth", near)?,
-            clip: Clip::NONE,
-        }
-        .moving(pose, pose)
+        let half_height = positive("tangent of half the field of view", tan_half_height)?;
+        Self::still(pose, half_height, false, near)
+    }
+
+    /// A still camera that sees everything from the same side, at the same size at any depth: `half_height` is half the height of its
+    /// view in scene units.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn orthographic(pose: Affine3A, half_height: f32, near: f32) -> Result<Self, CameraError> {
+        Self::still(pose, positive("half the height of the view", half_height)?, true, near)
+    }
+
+    fn still(pose: Affine3A, half_height: f32, orthographic: bool, near: f32) -> Result<Self, CameraError> {
+        let (shift, near) = (Vec2::ZERO, positive("near depth", near)?);
+        Self { open: pose, close: pose, half_height, orthographic, shift, lens: None, near, clip: Clip::NONE }
+            .moving(pose, pose)
     }
 
     /// The same camera moving from the world-to-camera transform `open` to `close` over the shutter.
@@ -134,9 +143,15 @@ impl Camera {
         self.close
     }
 
-    /// Tangent of half the vertical field of view.
-    pub fn tan_half_height(&self) -> f32 {
-        self.tan_half_height
+    /// Half the height of the view: at depth 1 in perspective, which is the tangent of half the vertical field of view, and in scene
+    /// units at any depth in an orthographic view.
+    pub fn half_height(&self) -> f32 {
+        self.half_height
+    }
+
+    /// Whether the view is orthographic.
+    pub fn is_orthographic(&self) -> bool {
+        self.orthographic
     }
 
     /// Shift of the image in image heights.
@@ -170,6 +185,11 @@ mod tests {
         assert!(Camera::new(Affine3A::IDENTITY, 0.0, 0.1).is_err());
         assert!(Camera::new(Affine3A::IDENTITY, 0.5, f32::NAN).is_err());
         assert!(Camera::new(Affine3A::from_translation(glam::Vec3::splat(f32::INFINITY)), 0.5, 0.1).is_err());
+        for bad in [0.0, -1.0, f32::INFINITY, f32::NAN] {
+            let error = Camera::orthographic(Affine3A::IDENTITY, bad, 0.1).unwrap_err();
+            assert!(error.to_string().contains("half the height of the view is"), "{error}");
+            assert!(Camera::orthographic(Affine3A::IDENTITY, 1.0, bad).is_err());
+        }
         assert!(Lens::new(0.0, 1.0).is_err());
         assert!(Lens::new(0.1, -1.0).is_err());
     }

@@ -1,6 +1,6 @@
 //! From world space to the homogeneous image plane.
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3, Vec4};
 
 use rayon::prelude::*;
 
@@ -50,8 +50,9 @@ impl Viewport {
     }
 }
 
-/// A vertex on the homogeneous image plane at both ends of the shutter, as `[x, y, w]`: its image is at
-/// `(x / w, y / w)` pixels from the centre of the image, `y` downwards, and `w` is its depth in scene units.
+/// A vertex on the image plane at both ends of the shutter, as `[x, y, w]`: `w` is its depth in scene units. In perspective `x, y` are
+/// homogeneous, its image is at `(x / w, y / w)` pixels from the centre of the image, `y` downwards; in an orthographic view it is
+/// at `(x, y)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingVertex {
     /// When the shutter opens.
@@ -67,20 +68,65 @@ impl MovingVertex {
     }
 }
 
-/// The shear of a thin lens: a point at depth `w` seen from `(u, v)` of the lens moves by `u (a.x w - s.x)` and
-/// `v (a.y w - s.y)` on the homogeneous image plane. `s` is projection scale times lens radius and `a = s / F`.
+/// How a sample sees a point: from `(X, Y)` of the image and `(u, v)` of a thin lens it is at
+///
+/// ```text
+/// x' = x + u (a.x w - s.x) - X w        in perspective
+/// x' = x + u (a.x w - s.x) - X          in an orthographic view
+/// ```
+///
+/// from the sample, and `y'` alike. `s` is projection scale times lens radius and `a = s / F`. The lens of an orthographic view is
+/// an oblique shear, nothing at the focus depth and linear in depth: what a lens does to the image far away.
+///
+/// Both are `(x - base) - slope w` with a `base` and a `slope` of the sample's own, so one sample test serves both; see [`Self::ray`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shear {
-    /// Projection scale times lens radius, pixels times scene units.
+    /// Projection scale times lens radius: pixels times scene units, or pixels in an orthographic view.
     pub s: [f32; 2],
-    /// `s` over the focus depth, pixels.
+    /// `s` over the focus depth.
     pub a: [f32; 2],
+    /// Whether the view is orthographic.
+    pub parallel: bool,
 }
 
 impl Shear {
+    /// In perspective through a lens.
+    pub const fn new(s: [f32; 2], a: [f32; 2]) -> Self {
+        Self { s, a, parallel: false }
+    }
+
     /// Whether the camera is a pinhole, so that the lens dimensions can be dropped.
     pub fn is_none(&self) -> bool {
-        *self == Self::default()
+        *self == self.sharp()
+    }
+
+    /// The same view through a pinhole.
+    #[must_use]
+    pub fn sharp(&self) -> Self {
+        Self { parallel: self.parallel, ..Self::default() }
+    }
+
+    /// What a place on the image is multiplied with for a point at this depth.
+    pub fn weight(&self, depth: f32) -> f32 {
+        if self.parallel { 1.0 } else { depth }
+    }
+
+    /// The vertex `[x, y, w]` as a homogeneous point of the image plane.
+    pub fn homogeneous(&self, [x, y, depth]: [f32; 3]) -> [f32; 3] {
+        [x, y, self.weight(depth)]
+    }
+
+    /// The slope and the base along `axis` of the sample at `at` on the image and `place` on the lens: it sees the points with
+    /// `x = base + slope w`.
+    pub fn ray(&self, axis: usize, at: f32, place: f32) -> [f32; 2] {
+        let (s, a) = (self.s[axis], self.a[axis]);
+        if self.parallel { [-(place * a), at + place * s] } else { [at - place * a, place * s] }
+    }
+
+    /// How far along `axis` the image of a point at this depth moves from the middle of the lens to its rim, in pixels; signed.
+    pub fn circle(&self, axis: usize, depth: f64) -> f64 {
+        let (s, a) = (f64::from(self.s[axis]), f64::from(self.a[axis]));
+        if self.parallel { a * depth - s } else { a - s / depth }
     }
 }
 
@@ -91,7 +137,7 @@ pub struct Projection {
     close: DAffine3,
     scale_px: f64,
     shift_px: [f64; 2],
-    /// The shear of the lens, nothing for a pinhole.
+    /// How samples see points: perspective or not, and through which lens.
     pub shear: Shear,
     /// Depth in scene units below which samples are not seen.
     pub near: f32,
@@ -101,13 +147,14 @@ impl Projection {
     /// The projection of `camera` onto an image of the size of `viewport`.
     pub fn new(camera: &Camera, viewport: Viewport) -> Self {
         let height = f64::from(viewport.height);
-        let scale_px = 0.5 * height / f64::from(camera.tan_half_height());
+        let scale_px = 0.5 * height / f64::from(camera.half_height());
         let shear = camera.lens().map_or(Shear::default(), |lens| {
             let s = scale_px * f64::from(lens.radius());
             let a = s / f64::from(lens.focus());
             // v points up on the lens and y down in the image.
-            Shear { s: [s as f32, -s as f32], a: [a as f32, -a as f32] }
+            Shear::new([s as f32, -s as f32], [a as f32, -a as f32])
         });
+        let shear = Shear { parallel: camera.is_orthographic(), ..shear };
         Self {
             open: widen(camera.open()),
             close: widen(camera.close()),
@@ -143,15 +190,21 @@ impl Projection {
 
     fn image(&self, pose: &DAffine3, world: Vec3) -> [f32; 3] {
         let p = pose.transform_point3(DVec3::from(world));
-        let x = self.scale_px * p.x + self.shift_px[0] * p.z;
-        let y = -self.scale_px * p.y + self.shift_px[1] * p.z;
+        let weight = if self.shear.parallel { 1.0 } else { p.z };
+        let x = self.scale_px * p.x + self.shift_px[0] * weight;
+        let y = -self.scale_px * p.y + self.shift_px[1] * weight;
         [x as f32, y as f32, p.z as f32]
     }
 
-    /// The position of the camera in world space at mid-shutter.
-    pub fn eye(&self) -> Vec3 {
-        let at = |pose: &DAffine3| pose.inverse().translation;
-        (0.5 * (at(&self.open) + at(&self.close))).as_vec3()
+    /// The camera in world space at mid-shutter as a homogeneous point: where it stands, or in an orthographic view the direction
+    /// towards it.
+    pub fn eye(&self) -> Vec4 {
+        let at = |pose: &DAffine3| {
+            let world = pose.inverse();
+            if self.shear.parallel { -world.matrix3.z_axis } else { world.translation }
+        };
+        let middle = 0.5 * (at(&self.open) + at(&self.close));
+        middle.as_vec3().extend(if self.shear.parallel { 0.0 } else { 1.0 })
     }
 }
 
@@ -180,6 +233,33 @@ mod tests {
         let shear = Projection::new(&camera, Viewport::new(512, 512).unwrap()).shear;
         assert_eq!(shear.a[0] * 8.0 - shear.s[0], 0.0);
         assert!(shear.s[0] > 0.0 && shear.s[1] < 0.0);
+    }
+
+    #[test]
+    fn an_orthographic_view_is_as_high_at_any_depth() {
+        let camera = Camera::orthographic(Affine3A::IDENTITY, 2.0, 0.1).unwrap();
+        let camera = camera.with_shift(glam::Vec2::new(0.25, 0.0)).unwrap();
+        let projection = Projection::new(&camera, Viewport::new(400, 200).unwrap());
+        for depth in [-1.0, 0.0, 2.0, 50.0] {
+            let corner = projection.vertex(Vec3::new(4.0, 2.0, depth), Vec3::ZERO).open;
+            assert_eq!(corner, [250.0, -100.0, depth]);
+        }
+        assert_eq!(projection.eye(), Vec4::new(0.0, 0.0, -1.0, 0.0));
+        assert_eq!(projection.shear.homogeneous([3.0, 4.0, 5.0]), [3.0, 4.0, 1.0]);
+    }
+
+    /// On its ray a sample sees what the formula says, whichever view and lens.
+    #[test]
+    fn rays_are_the_formula() {
+        let (s, a, [x, w], [at, place]) = ([6.0, -6.0], [2.0, -2.0], [7.0_f32, 5.0], [-3.0_f32, 0.5]);
+        for parallel in [false, true] {
+            let shear = Shear { parallel, ..Shear::new(s, a) };
+            for axis in [0, 1] {
+                let [slope, base] = shear.ray(axis, at, place);
+                let seen = x + place * (a[axis] * w - s[axis]) - at * shear.weight(w);
+                assert_eq!((x - base) - slope * w, seen, "{parallel} {axis}");
+            }
+        }
     }
 
     #[test]

@@ -6,17 +6,17 @@ use crate::simd::{LANES, Lanes, Mask};
 /// Sixteen samples in memory, as far as the sample test asks for them.
 #[derive(Clone, Copy)]
 pub(crate) struct SampleRows<'a> {
-    /// `x - u a.x` and `y - v a.y`: what multiplies the depth of a vertex.
+    /// What multiplies the depth of a vertex ([`crate::geometry::Shear::ray`]).
     pub slope: [&'a [f32; LANES]; 2],
-    /// `u s.x` and `v s.y`: the part of the lens shear that does not depend on depth; read where there is a lens.
+    /// What is taken off a vertex whatever its depth; read where there is a lens or the view is orthographic.
     pub lens: [&'a [f32; LANES]; 2],
     /// Time; read where something moves.
     pub t: &'a [f32; LANES],
 }
 
-/// The same in registers.
+/// The same in registers, in perspective or in an orthographic view.
 #[derive(Clone, Copy)]
-pub(crate) struct View<V, const MOTION: bool, const LENS: bool> {
+pub(crate) struct View<V, const MOTION: bool, const LENS: bool, const PARALLEL: bool = false> {
     pub slope: [V; 2],
     pub lens: [V; 2],
     pub t: V,
@@ -30,13 +30,16 @@ pub(crate) struct Seen<V> {
     pub w: V,
 }
 
-impl<V: Lanes, const MOTION: bool, const LENS: bool> View<V, MOTION, LENS> {
+impl<V: Lanes, const MOTION: bool, const LENS: bool, const PARALLEL: bool> View<V, MOTION, LENS, PARALLEL> {
+    const HAS_BASE: bool = LENS || PARALLEL;
+    const HAS_SLOPE: bool = LENS || !PARALLEL;
+
     #[inline(always)]
     pub fn load(rows: &SampleRows<'_>) -> Self {
         let zero = V::splat(0.0);
         Self {
             slope: [V::load(rows.slope[0]), V::load(rows.slope[1])],
-            lens: if LENS { [V::load(rows.lens[0]), V::load(rows.lens[1])] } else { [zero; 2] },
+            lens: if Self::HAS_BASE { [V::load(rows.lens[0]), V::load(rows.lens[1])] } else { [zero; 2] },
             t: if MOTION { V::load(rows.t) } else { zero },
         }
     }
@@ -50,11 +53,15 @@ impl<V: Lanes, const MOTION: bool, const LENS: bool> View<V, MOTION, LENS> {
             y = self.t.times_plus(V::splat(corner.delta[1]), y);
             w = self.t.times_plus(V::splat(corner.delta[2]), w);
         }
-        if LENS {
+        if Self::HAS_BASE {
             x = x - self.lens[0];
             y = y - self.lens[1];
         }
-        Seen { x: self.slope[0].times_from(w, x), y: self.slope[1].times_from(w, y), w }
+        if Self::HAS_SLOPE {
+            x = self.slope[0].times_from(w, x);
+            y = self.slope[1].times_from(w, y);
+        }
+        Seen { x, y, w }
     }
 }
 
@@ -68,9 +75,9 @@ pub(crate) struct Crossing<V> {
 
 impl<V: Lanes> Crossing<V> {
     #[inline(always)]
-    pub fn new<const MOTION: bool, const LENS: bool>(
+    pub fn new<const MOTION: bool, const LENS: bool, const PARALLEL: bool>(
         corners: &[Corner; 3],
-        view: &View<V, MOTION, LENS>,
+        view: &View<V, MOTION, LENS, PARALLEL>,
     ) -> Self {
         let (a, b, c) = (view.see(&corners[0]), view.see(&corners[1]), view.see(&corners[2]));
         let e0 = b.x * c.y - c.x * b.y;

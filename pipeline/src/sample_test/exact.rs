@@ -39,6 +39,10 @@ pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<f32> {
 /// Ties are broken by moving the sample by `(eps, eps^2)` for an infinitely small `eps`: the edge becomes
 /// `e + eps B + eps^2 C` with `B = y_i w_j - y_j w_i`, `C = w_i x_j - w_j x_i`, and its first term that is not zero
 /// decides (Edelsbrunner and Mücke 1990, simulation of simplicity). Products of two `f32` are exact in `f64`.
+///
+/// In an orthographic view the same terms tilt the ray about its place at depth zero, by `(eps, eps^2)` for each unit of depth. Any
+/// tilted ray does for neighbours to agree, and at a depth above zero, where alone a sample counts, edges and vertices go to
+/// the owner they would have if the sample were moved.
 pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
     let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| terms(&seen[i], &seen[j]));
     let signs = edges.map(|levels| levels.into_iter().map(sign).find(|&s| s != 0).unwrap_or(0));

@@ -94,18 +94,24 @@ struct Job<'a, 'b> {
 }
 
 /// A job in the dimensions it needs.
-struct Run<'a, 'b, const MOTION: bool, const LENS: bool>(Job<'a, 'b>);
+struct Run<'a, 'b, const MOTION: bool, const LENS: bool, const PARALLEL: bool>(Job<'a, 'b>);
 
 fn start(width: Width, job: Job<'_, '_>) {
+    if job.samples.parallel { start_in::<true>(width, job) } else { start_in::<false>(width, job) }
+}
+
+fn start_in<const PARALLEL: bool>(width: Width, job: Job<'_, '_>) {
     match (job.triangle.moving, job.within.lens) {
-        (false, false) => dispatch(width, Run::<false, false>(job)),
-        (true, false) => dispatch(width, Run::<true, false>(job)),
-        (false, true) => dispatch(width, Run::<false, true>(job)),
-        (true, true) => dispatch(width, Run::<true, true>(job)),
+        (false, false) => dispatch(width, Run::<false, false, PARALLEL>(job)),
+        (true, false) => dispatch(width, Run::<true, false, PARALLEL>(job)),
+        (false, true) => dispatch(width, Run::<false, true, PARALLEL>(job)),
+        (true, true) => dispatch(width, Run::<true, true, PARALLEL>(job)),
     }
 }
 
-impl<const MOTION: bool, const LENS: bool> Kernel for Run<'_, '_, MOTION, LENS> {
+impl<const MOTION: bool, const LENS: bool, const PARALLEL: bool> Kernel
+    for Run<'_, '_, MOTION, LENS, PARALLEL>
+{
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let mut job = self.0;
@@ -122,7 +128,7 @@ impl<const MOTION: bool, const LENS: bool> Kernel for Run<'_, '_, MOTION, LENS> 
             }
             if active != 0 {
                 job.hits.tested += active.count_ones();
-                let view = View::<V, MOTION, LENS>::load(&job.rows(base));
+                let view = View::<V, MOTION, LENS, PARALLEL>::load(&job.rows(base));
                 job.store(base, &Crossing::new(&job.triangle.corners, &view), active);
             }
             base += LANES;

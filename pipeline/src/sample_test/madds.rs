@@ -3,7 +3,7 @@
 /// Multiply-adds of one sample test; a lone addition or multiplication counts as one.
 ///
 /// For each vertex: one for each coordinate that moves with time, one for each axis sheared by the lens, and one for
-/// each axis translated to the sample. For the edges two each. For the depth: two additions, three multiply-adds and a
+/// each axis translated to the sample, in perspective or not. For the edges two each. For the depth: two additions, three multiply-adds and a
 /// division.
 pub const fn madds(moving: bool, lens: bool) -> u32 {
     let vertex = 2 + if moving { 3 } else { 0 } + if lens { 2 } else { 0 };

@@ -8,7 +8,10 @@
 //! e_ij = x_i' y_j' - x_j' y_i'
 //! ```
 //!
-//! which equals `(p_i x p_j) . (X, Y, 1)` and has far smaller intermediate values. The sample is inside when all three
+//! In an orthographic view `X` is taken off as it is, not times `w`, and `u a w` stays: of a base and a slope of its own,
+//! `(x - base) - slope w`, a sample has both forms ([`crate::geometry::Shear::ray`]).
+//!
+//! The first equals `(p_i x p_j) . (X, Y, 1)` and has far smaller intermediate values. The sample is inside when all three
 //! edges have one sign, and its depth is the convex combination `sum(e_k w_k) / sum(e_k)` beyond the near depth.
 //!
 //! Why this form: every operation rounds once, so `e_ji = -e_ij` holds to the last bit and neighbours agree on a shared

@@ -19,10 +19,12 @@ pub struct TileSamples {
     pub v: Vec<f32>,
     /// Time over the shutter.
     pub t: Vec<f32>,
-    /// `u s.x` and `v s.y`: the part of the lens shear that does not depend on depth.
+    /// `u s.x` and `v s.y`, in an orthographic view `x + u s.x` and `y + v s.y`: what is taken off a vertex whatever its depth.
     pub lens: [Vec<f32>; 2],
-    /// `x - u a.x` and `y - v a.y`: what multiplies the depth of a vertex.
+    /// `x - u a.x` and `y - v a.y`, in an orthographic view `-u a.x` and `-v a.y`: what multiplies the depth of a vertex.
     pub slope: [Vec<f32>; 2],
+    /// Whether the view is orthographic.
+    pub parallel: bool,
     /// The pixel within the tile, row by row.
     pub pixel: Vec<u8>,
     order: Vec<u16>,
@@ -49,7 +51,7 @@ impl TileSamples {
         let inside = [side_px.min(viewport.width() - px), side_px.min(viewport.height() - py)];
         self.gather(source, [px, py], inside, side_px);
         self.sort_by_time(source, [px, py], inside, side_px);
-        self.len = self.order.len();
+        (self.len, self.parallel) = (self.order.len(), shear.parallel);
         self.resize(self.len.next_multiple_of(Self::LANES));
         for slot in 0..self.len {
             let index = u32::from(self.order[slot]);
@@ -58,8 +60,9 @@ impl TileSamples {
             let y = Viewport::edge(py + pixel / side_px, viewport.height()) + s.y;
             (self.x[slot], self.y[slot]) = (x, y);
             (self.u[slot], self.v[slot], self.t[slot]) = (s.u, s.v, s.t);
-            (self.lens[0][slot], self.lens[1][slot]) = (s.u * shear.s[0], s.v * shear.s[1]);
-            (self.slope[0][slot], self.slope[1][slot]) = (x - s.u * shear.a[0], y - s.v * shear.a[1]);
+            for (axis, at, place) in [(0, x, s.u), (1, y, s.v)] {
+                [self.slope[axis][slot], self.lens[axis][slot]] = shear.ray(axis, at, place);
+            }
             self.pixel[slot] = pixel as u8;
         }
     }

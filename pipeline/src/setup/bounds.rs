@@ -51,16 +51,19 @@ impl PixelRect {
 /// The pixels `triangle` may touch: the box of its vertices at the corners of the shutter and the lens, widened by
 /// the rounding of the sample test. While `w` stays positive the image of a vertex is monotone in time and in the
 /// lens position, so the corners are the extremes; where it does not, nothing is divided and the whole viewport
-/// stands.
+/// stands. In an orthographic view the image moves as the vertex does and is linear in the lens position: corners again.
 pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRect {
     let mut nearest = f32::INFINITY;
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for corner in &triangle.corners {
         for p in &corner.ends()[..1 + usize::from(triangle.moving)] {
-            nearest = nearest.min(p[2]);
-            let inverse = 1.0 / f64::from(p[2]);
+            let weight = shear.weight(p[2]);
+            nearest = nearest.min(weight);
+            let inverse = 1.0 / f64::from(weight);
             for (axis, range) in range.iter_mut().enumerate() {
-                let (x, circle) = (f64::from(p[axis]) * inverse, circle(shear, axis, inverse));
+                let (s, a) = (f64::from(shear.s[axis]), f64::from(shear.a[axis]));
+                let circle = ((a * f64::from(p[2]) - s) * inverse).abs();
+                let x = f64::from(p[axis]) * inverse;
                 *range = [range[0].min(x - circle), range[1].max(x + circle)];
             }
         }
@@ -77,11 +80,6 @@ pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRe
         [pixel(range[axis][0] - slack + half), pixel(range[axis][1] + slack + half + 1.0)]
     });
     PixelRect { x0: x[0], y0: y[0], x1: x[1], y1: y[1] }
-}
-
-/// The radius of the circle of confusion at a depth, given inverted.
-fn circle(shear: &Shear, axis: usize, inverse: f64) -> f64 {
-    (f64::from(shear.a[axis]).abs() - f64::from(shear.s[axis]).abs() * inverse).abs()
 }
 
 /// For each square of `side_px` pixels of the image, row by row, the numbers of the rectangles that meet it, in their order.

@@ -2,7 +2,7 @@
 
 use crate::geometry::{Cull, MovingVertex, Shear};
 
-/// A vertex `open + t delta` on the homogeneous image plane, as `[x, y, w]`. Written so that a still vertex is
+/// A vertex `open + t delta` on the image plane, as `[x, y, w]` (see [`MovingVertex`]). Written so that a still vertex is
 /// `open` to the last bit at every time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Corner {
@@ -42,7 +42,7 @@ pub struct Triangle {
     pub corners: [Corner; 3],
     /// Whether any vertex moves; where none does the time dimension is dropped.
     pub moving: bool,
-    /// Whether any vertex is behind the camera at an end of the shutter.
+    /// Whether any vertex is behind the camera at an end of the shutter, where perspective mirrors it; never in an orthographic view.
     pub behind: bool,
     /// Whether samples may see the face that appears clockwise (`[0]`) and counter-clockwise (`[1]`) on the screen.
     pub faces: [bool; 2],
@@ -89,10 +89,11 @@ pub fn set_up(
     let faces = [cull != Cull::Back, cull != Cull::Front];
     let moving = vertices.iter().any(|vertex| !vertex.is_still());
     let slack = slack(&corners, shear, half_px);
-    if !moving && shear.is_none() && !(faces[0] && faces[1]) && shows_culled_face(&corners, faces, slack) {
+    let images = corners.map(|corner| shear.homogeneous(corner.open));
+    if !moving && shear.is_none() && !(faces[0] && faces[1]) && shows_culled_face(&images, faces, slack) {
         return Outcome::FaceCulled;
     }
-    let behind = corners.iter().any(|c| c.ends().iter().any(|p| p[2] < 0.0));
+    let behind = corners.iter().any(|c| c.ends().iter().any(|p| shear.weight(p[2]) < 0.0));
     Outcome::Ready(Triangle { id, corners, moving, behind, faces, slack })
 }
 
@@ -116,10 +117,10 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Whether a still triangle seen through a pinhole shows a face that is not drawn: the sign of det[p0, p1, p2], trusted only
+/// Whether a still triangle seen through a pinhole, given by its homogeneous points, shows a face that is not drawn: the sign of det[p0, p1, p2], trusted only
 /// beyond what the rounding of the sample test can do to it. Where it reaches behind the camera that is left to the samples.
-fn shows_culled_face(corners: &[Corner; 3], faces: [bool; 2], slack: [f32; 2]) -> bool {
-    let p = corners.map(|corner| corner.open.map(f64::from));
+fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) -> bool {
+    let p = images.map(|image| image.map(f64::from));
     if p.iter().any(|vertex| vertex[2] <= 0.0) {
         return false;
     }
@@ -137,8 +138,8 @@ fn shows_culled_face(corners: &[Corner; 3], faces: [bool; 2], slack: [f32; 2]) -
     det.abs() > rounding && !faces[usize::from(det < 0.0)]
 }
 
-/// A bound on the rounding error of `(x - u s) - (X - u a) w` for any sample, in x and in y, eight units in the last place
-/// of the largest intermediate value and more: 2^-20 of the sum of magnitudes.
+/// A bound on the rounding error of `(x - u s) - (X - u a) w`, or `(x - (X + u s)) + u a w`, for any sample, in x and in y,
+/// eight units in the last place of the largest intermediate value and more: 2^-20 of the sum of magnitudes.
 fn slack(corners: &[Corner; 3], shear: &Shear, half_px: [f32; 2]) -> [f32; 2] {
     const ROUNDING: f32 = 1.0 / 1_048_576.0;
     let mut largest = [0.0_f32; 3];
@@ -148,8 +149,9 @@ fn slack(corners: &[Corner; 3], shear: &Shear, half_px: [f32; 2]) -> [f32; 2] {
         }
     }
     [0, 1].map(|axis| {
-        let reach = half_px[axis] + 1.0 + shear.a[axis].abs();
-        ROUNDING * (largest[axis] + shear.s[axis].abs() + reach * largest[2])
+        let (image, s, a) = (half_px[axis] + 1.0, shear.s[axis].abs(), shear.a[axis].abs());
+        let by_depth = if shear.parallel { image + a * largest[2] } else { (image + a) * largest[2] };
+        ROUNDING * (largest[axis] + s + by_depth)
     })
 }
 

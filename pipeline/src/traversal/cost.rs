@@ -1,4 +1,4 @@
-//! What each test costs in multiply-adds. The kernels are written over [`Number`](super::Number); the tests below run them on
+//! What each test costs in multiply-adds, the same whether the view is orthographic or not. The kernels are written over [`Number`](super::Number); the tests below run them on
 //! numbers that count and hold the figures here against that.
 
 /// Solving one quadratic for its roots.
@@ -58,7 +58,7 @@ mod tests {
     use crate::geometry::{Cull, MovingVertex, Shear};
     use crate::setup::{Outcome, Triangle, set_up};
 
-    const SHEAR: Shear = Shear { s: [90.0, -90.0], a: [15.0, -15.0] };
+    const SHEAR: Shear = Shear::new([90.0, -90.0], [15.0, -15.0]);
 
     fn triangle(moving: bool, shear: &Shear) -> Triangle {
         let v = [
@@ -103,6 +103,34 @@ mod tests {
             let (madds, _) = count(|| edges.screen([0.25, 0.5], [true; 2]));
             println!("screen part {moving} {lens} {madds}");
             assert_eq!(madds, screen_setup_madds(moving, lens, !moving), "part {moving} {lens}");
+        }
+    }
+
+    /// One unit serves both views, so its price is one. What an orthographic view asks of it is less, or a tenth more.
+    #[test]
+    fn orthographic_views_cost_about_as_much() {
+        for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
+            let shear = Shear { parallel: true, ..if lens { SHEAR } else { Shear::default() } };
+            let triangle = triangle(moving, &shear);
+            let tile = TileRect { x: [0.0, 8.0], y: [16.0, 24.0] };
+            let within = Box5 { t: [0.25, 0.75], ..Box5::whole(lens) };
+            let (found, edges) =
+                count(|| Edges::<Counted>::new(View::new(&triangle, &shear, &tile, &within)));
+            let (facing, _) = count(|| Facing::new(&edges));
+            let (bounds, _) = count(|| edges.bounds());
+            let (screen, _) = count(|| edges.screen(within.t, [true; 2]));
+            let (sides, (_, told)) = count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
+            println!("{moving} {lens}: {found} {facing} {bounds} {screen} {sides}");
+            assert!(10 * found <= 11 * edge_madds(moving, lens) + 1, "{found}");
+            assert!(10 * facing <= 11 * facing_madds(moving, lens, 0), "{facing}");
+            assert!(bounds <= edge_bound_madds(moving, lens) && sides <= told);
+            assert!(screen <= screen_setup_madds(moving, lens, true));
+        }
+        for moving in [false, true] {
+            let shear = Shear { parallel: true, ..SHEAR };
+            let triangle = triangle(moving, &shear);
+            let (madds, _) = count(|| LensLines::<Counted>::new(&triangle, &shear, 0.1));
+            assert!(madds <= lens_line_setup_madds(moving));
         }
     }
 

@@ -8,15 +8,22 @@
 //! A = w_i y_j - w_j y_i        B = w_j x_i - w_i x_j
 //! ```
 //!
+//! In an orthographic view `dX` and `dY` move a vertex as it stands, not times its depth, and so
+//!
+//! ```text
+//! e(d) = e + dX (y_i - y_j) + dY (x_j - x_i) + du (a A + s (y_i - y_j)) + dv (b B + s' (x_j - x_i))
+//!          + (w_j - w_i) (dY a du - dX b dv + (a s' - b s) du dv)
+//! ```
+//!
 //! where `e`, `A` and `B` are quadratic in time and the last factor is linear. Each is kept in Bernstein form, so
 //! bounding its coefficients bounds it at all times (Munkberg and Akenine-Moeller 2012 bound edges so; the form recentred at
 //! the box is our own).
 
-use super::cost;
+use super::View;
+use super::edge_bounds::EdgeBounds;
 use super::number::Number;
 use super::quadratic::Quadratic;
 use super::screen::{Screen, linearized};
-use super::{Piece, Timeline, View};
 
 /// The edges of a triangle over a box; edge `k` is the one opposite vertex `k`.
 #[derive(Clone, Copy, Debug)]
@@ -62,12 +69,13 @@ impl<N: Number> Edges<N> {
 
     /// How strongly the difference of depths bends an edge over lens and tile.
     fn skew(&self) -> N {
-        let View { half, s, a, lens, .. } = &self.view;
+        let View { half, s, a, lens, parallel, .. } = &self.view;
         if !lens {
             return N::zero();
         }
         let twist = (a[0] * s[1] - a[1] * s[0]).abs();
-        half[1] * s[0].abs() * half[2] + (half[0] * s[1].abs() + twist * half[2]) * half[3]
+        let with_image = (if *parallel { a } else { s }).map(N::abs);
+        half[1] * with_image[0] * half[2] + (half[0] * with_image[1] + twist * half[2]) * half[3]
     }
 
     /// The screen for single samples with times `t`, within those of the box, of which only `faces` can be seen.
@@ -88,25 +96,31 @@ impl<N: Number> Edge<N> {
             Quadratic([start, middle, f(close.0, close.1)])
         };
         let difference = |axis: usize| [open, close].map(|(i, j)| j[axis] - i[axis]);
-        let along = product(|p, q| p[2] * q[1] - q[2] * p[1]);
-        let across = product(|p, q| q[2] * p[0] - p[2] * q[0]);
+        let over_time = |[start, end]: [N; 2]| {
+            if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) }
+        };
         let none = Quadratic::constant(N::zero());
-        let negative = |q: Quadratic<N>| Quadratic(q.0.map(|b| -b));
+        // What the view does not ask for is not found.
+        let [along, across] = if view.lens || !view.parallel {
+            [product(|p, q| p[2] * q[1] - q[2] * p[1]), product(|p, q| q[2] * p[0] - p[2] * q[0])]
+        } else {
+            [none; 2]
+        };
+        let [right, down] = if view.lens || view.parallel {
+            [over_time(difference(0)), over_time(difference(1))]
+        } else {
+            [none; 2]
+        };
+        let [by_x, by_y] = if view.parallel { [-down, right] } else { [-along, -across] };
         let mut edge = Self {
             value: product(|p, q| p[0] * q[1] - p[1] * q[0]),
-            slopes: [negative(along), negative(across), none, none],
+            slopes: [by_x, by_y, none, none],
             depths: [N::zero(); 2],
         };
         if view.lens {
-            let [u, v] = [(1, -view.s[0], view.a[0], along), (0, view.s[1], view.a[1], across)].map(
-                |(axis, s, a, turn)| {
-                    let [start, end] = difference(axis);
-                    let shift =
-                        if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) };
-                    Self::lens_slope(view.moving, &shift, s, &turn, a)
-                },
-            );
-            (edge.slopes[2], edge.slopes[3], edge.depths) = (u, v, difference(2));
+            edge.slopes[2] = Self::lens_slope(view.moving, &down, -view.s[0], &along, view.a[0]);
+            edge.slopes[3] = Self::lens_slope(view.moving, &right, view.s[1], &across, view.a[1]);
+            edge.depths = difference(2);
         }
         edge
     }
@@ -140,79 +154,6 @@ impl<N: Number> Edge<N> {
             range = range.map(|q| Quadratic::constant(q.0[0]));
         }
         range
-    }
-}
-
-/// The lowest and the highest values of three edges over a box, as quadratics of time.
-#[derive(Clone, Copy, Debug)]
-pub struct EdgeBounds<N = f64> {
-    ranges: [[Quadratic<N>; 2]; 3],
-    moving: bool,
-}
-
-impl<N: Number> EdgeBounds<N> {
-    /// The part of the time, from 0 to 1, in which a sample may see one of `faces`, and how many quadratics had to be solved for
-    /// it. To see the clockwise face all three edges have to reach above zero, to see the other one all below. So where
-    /// facing is decided one edge is enough to cull, and else it takes one below zero and another above.
-    pub fn narrow(&self, part: [N; 2], faces: Faces) -> (Option<[N; 2]>, u32) {
-        let mut solved = 0;
-        let [clockwise, counter_clockwise] =
-            [0, 1].map(|face| if faces[face] { self.reaching(face, part, &mut solved) } else { None });
-        let hull = match (clockwise, counter_clockwise) {
-            (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
-            (a, b) => a.or(b),
-        };
-        (hull, solved)
-    }
-
-    /// The same for each piece of `times`, of which `drawn` faces matter; `edges` are those bounded. Also says what that takes beyond
-    /// [`Edges::bounds`] in multiply-adds.
-    pub fn timeline(&self, edges: &Edges<N>, times: &Timeline, drawn: Faces) -> (Timeline, u32) {
-        let (mut left, mut madds) = (Timeline::empty(), 0);
-        for piece in times.pieces() {
-            let part = if edges.spans(piece.t) {
-                [N::zero(), N::from(1.0)]
-            } else {
-                madds += 2 * cost::PHASE;
-                piece.t.map(|t| edges.view.phase(t))
-            };
-            let (part, roots) = self.narrow(part, piece.seen(drawn));
-            madds += roots * cost::ROOT;
-            if let Some(part) = part {
-                let [lo, hi] = if self.moving { edges.view.times(part) } else { piece.t };
-                let t = [lo.max(piece.t[0]), hi.min(piece.t[1])];
-                if t[0] <= t[1] {
-                    left.push(Piece { t, ..*piece });
-                }
-            }
-        }
-        (left, madds)
-    }
-
-    /// For each edge the farthest it can be on the side of the face, the clockwise one if both are asked for.
-    pub(super) fn tallest(&self, faces: Faces) -> [Quadratic<N>; 3] {
-        self.ranges.map(|[lowest, highest]| if faces[0] { highest } else { Quadratic(lowest.0.map(|b| -b)) })
-    }
-
-    /// The part of `part` in which every edge can have the sign of `face`.
-    fn reaching(&self, face: usize, part: [N; 2], solved: &mut u32) -> Option<[N; 2]> {
-        let mut left = part;
-        for tallest in self.tallest([face == 0, face == 1]) {
-            if !self.moving {
-                if tallest.0[0] < N::zero() {
-                    return None;
-                }
-                continue;
-            }
-            let (above, rooted) = tallest.hull_above();
-            *solved += u32::from(rooted);
-            let [lo, hi] = above?;
-            left = [left[0].max(lo), left[1].min(hi)];
-            if left[0] > left[1] {
-                return None;
-            }
-        }
-        Some(left)
     }
 }
 
@@ -294,28 +235,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn no_time_in_which_a_place_is_inside_is_lost() {
-        let (mut r, mut culled, mut shrunk) = (Uniform::new(4), 0, 0);
-        for (seed, case) in cases(400) {
-            let edges = edges(&case);
-            let whole = Timeline::one(Piece { t: case.within.t, faces: [true; 2] });
-            for drawn in [[true, true], [true, false], [false, true]] {
-                let (left, _) = edges.bounds().timeline(&edges, &whole, drawn);
-                culled += u32::from(left.hull().is_none());
-                shrunk += u32::from(left.hull().is_some_and(|t| t != case.within.t));
-                for _ in 0..60 {
-                    let place = case.place(&mut r);
-                    let e = case.edges(place);
-                    let seen = (drawn[0] && e.iter().all(|&e| e >= 0.0))
-                        || (drawn[1] && e.iter().all(|&e| e <= 0.0));
-                    let kept = left.pieces().iter().any(|p| (p.t[0]..=p.t[1]).contains(&(place[4] as f32)));
-                    assert!(kept || !seen, "{seed}: {drawn:?} {place:?} {left:?}");
-                }
-            }
-        }
-        assert!(culled > 500 && shrunk > 100, "{culled} {shrunk}");
     }
 }

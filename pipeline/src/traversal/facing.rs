@@ -6,101 +6,19 @@
 //! det(u, v, t) = det[x, y, w] + u s sum(A) + v s' sum(B)        A, B as in `edges`
 //! ```
 //!
-//! cubic in time and affine in `u, v`. So its four Bernstein coefficients, each plus or minus its lens terms, bound it.
-//! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one: the sign of
-//! `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
+//! cubic in time and affine in `u, v`. In an orthographic view the determinant of `(x, y, 1)` stands for it, twice the area as seen:
+//!
+//! ```text
+//! det(u, v, t) = sum(e_k) + u a sum(A) + v b sum(B)
+//! ```
+//!
+//! So its four Bernstein coefficients, each plus or minus its lens terms, bound it.
+//! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one, or `det = sum(e_k)`:
+//! the sign of `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
 
 use super::edges::{Edges, Faces};
 use super::number::Number;
-
-/// A part of the time in which only some faces can be seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
-    /// First and last time, both included. Pieces do not overlap.
-    pub t: [f32; 2],
-    /// The faces that the triangle may show, drawn or not.
-    pub faces: Faces,
-}
-
-impl Piece {
-    /// Whether it is known which face is shown.
-    pub fn is_decided(&self) -> bool {
-        self.faces != [true; 2]
-    }
-
-    /// The faces that the triangle may show and that are drawn.
-    pub fn seen(&self, drawn: Faces) -> Faces {
-        [0, 1].map(|face| self.faces[face] && drawn[face])
-    }
-}
-
-/// Pieces of time in order.
-#[derive(Clone, Copy, Debug)]
-pub struct Timeline {
-    pieces: [Piece; Self::MOST],
-    len: usize,
-}
-
-impl Timeline {
-    /// The most pieces there can be.
-    pub const MOST: usize = 8;
-    /// The most often time can be bisected.
-    pub const MOST_SPLITS: u32 = Self::MOST.ilog2();
-
-    /// No time at all.
-    pub const fn empty() -> Self {
-        Self { pieces: [Piece { t: [0.0; 2], faces: [false; 2] }; Self::MOST], len: 0 }
-    }
-
-    /// One piece.
-    pub fn one(piece: Piece) -> Self {
-        let mut timeline = Self::empty();
-        timeline.push(piece);
-        timeline
-    }
-
-    /// Adds a piece after the others. One that shows the same as the last, and follows it at once, goes into that. Where all
-    /// places are taken the last piece grows, which keeps too much rather than too little.
-    pub fn push(&mut self, piece: Piece) {
-        let full = self.len == Self::MOST;
-        match self.pieces[..self.len].last_mut() {
-            Some(last) if full || (last.faces == piece.faces && last.t[1].next_up() >= piece.t[0]) => {
-                last.t[1] = last.t[1].max(piece.t[1]);
-                last.faces = [0, 1].map(|face| last.faces[face] | piece.faces[face]);
-            }
-            _ => {
-                self.pieces[self.len] = piece;
-                self.len += 1;
-            }
-        }
-    }
-
-    /// The pieces.
-    pub fn pieces(&self) -> &[Piece] {
-        &self.pieces[..self.len]
-    }
-
-    /// What both say, of one time.
-    pub fn meet(&self, other: &Self) -> Self {
-        let mut both = Self::empty();
-        for a in self.pieces() {
-            for b in other.pieces() {
-                let t = [a.t[0].max(b.t[0]), a.t[1].min(b.t[1])];
-                let faces = a.seen(b.faces);
-                if t[0] <= t[1] && faces != [false; 2] {
-                    both.push(Piece { t, faces });
-                }
-            }
-        }
-        both
-    }
-
-    /// From the first time to the last.
-    pub fn hull(&self) -> Option<[f32; 2]> {
-        let pieces = self.pieces();
-        Some([pieces.first()?.t[0], pieces.last()?.t[1]])
-    }
-}
+use super::timeline::{Piece, Timeline};
 
 /// Bounds on the determinant over a box: its lowest and highest Bernstein coefficients.
 #[derive(Clone, Copy, Debug)]
@@ -117,8 +35,10 @@ impl<N: Number> Facing<N> {
         let third = N::constant(1.0 / 3.0);
         let count = if view.moving { 4 } else { 1 };
         let [mut lowest, mut highest] = [[N::zero(); 4]; 2];
+        // Where vertices weigh alike their lens terms add up to the slopes of the edges themselves.
+        let (first, factors) = if view.parallel { (2, [N::from(1.0); 2]) } else { (0, view.s.map(N::abs)) };
         let sums: [[N; 3]; 2] = [0, 1].map(|axis| {
-            let [a, b, c] = edges.edges.map(|edge| edge.slopes[axis]);
+            let [a, b, c] = edges.edges.map(|edge| edge.slopes[first + axis]);
             if view.lens { a.zip(&b, |a, b| a + b).zip(&c, |a, b| a + b).0 } else { [N::zero(); 3] }
         });
         for (k, (low, high)) in lowest.iter_mut().zip(&mut highest).take(count).enumerate() {
@@ -127,8 +47,7 @@ impl<N: Number> Facing<N> {
             let mut extent = N::zero();
             if view.lens {
                 for (axis, sum) in sums.iter().enumerate() {
-                    extent =
-                        extent + elevated(sum, k, third).abs() * view.s[axis].abs() * view.half[2 + axis];
+                    extent = extent + elevated(sum, k, third).abs() * factors[axis] * view.half[2 + axis];
                 }
             }
             (*low, *high) = (middle - extent, middle + extent);
@@ -205,7 +124,8 @@ fn determinant<N: Number>(edges: &Edges<N>, k: usize) -> N {
     let [open, close] = edges.view.ends;
     let mut sum = N::zero();
     for (vertex, edge) in edges.edges.iter().enumerate() {
-        let ([e0, e1, e2], w0, w1) = (edge.value.0, open[vertex][2], close[vertex][2]);
+        let [w0, w1] = [open, close].map(|points| edges.view.weight(points[vertex][2]));
+        let [e0, e1, e2] = edge.value.0;
         let part = match k {
             0 => e0 * w0,
             1 => e0 * w1 + (e1 + e1) * w0,
@@ -331,17 +251,5 @@ mod tests {
             let edges = Edges::<f64>::new(View::new(&triangle, &shear, &tile, &Box5::whole(false)));
             assert_eq!(Facing::new(&edges).faces(), [true; 2]);
         }
-    }
-
-    #[test]
-    fn a_full_timeline_grows_rather_than_forgets() {
-        let mut timeline = Timeline::empty();
-        for k in 0..12_u8 {
-            let t = f32::from(k);
-            timeline.push(Piece { t: [t, t + 0.5], faces: [k % 2 == 0, k % 2 == 1] });
-        }
-        assert_eq!(timeline.pieces().len(), Timeline::MOST);
-        assert_eq!(timeline.hull(), Some([0.0, 11.5]));
-        assert_eq!(timeline.pieces()[Timeline::MOST - 1].faces, [true; 2]);
     }
 }

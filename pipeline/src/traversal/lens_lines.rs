@@ -14,7 +14,8 @@
 //! Nothing is clipped: a lower line needs `f = x + u (a w - s) - l(u) w >= 0` for each vertex, whatever the sign of `w`.
 //! Then a sample `X w = sum(l_i (x_i + u (a w_i - s)))` of positive depth has `(X - l(u)) w >= 0`. `f` is bilinear in `u` and
 //! time, so the corners decide, and the line is that through the tightest values at both ends of the lens. (The paper
-//! fixes a slope and finds the offset; the two ends of the lens are tighter and as cheap.) Vertices behind the camera bound
+//! fixes a slope and finds the offset; the two ends of the lens are tighter and as cheap.) In an orthographic view `X = x + u (a w - s)`, a
+//! line again, and `f` has 1 for the last `w`. Vertices behind the camera bound
 //! those values from the other side, and where no value is left there is no line.
 
 use super::number::Number;
@@ -81,8 +82,9 @@ fn lines<N: Number>(triangle: &Triangle, shear: &Shear, axis: usize) -> [[N; 2];
             });
             let shift = a * w - s;
             for (u, place) in [x - shift, x + shift].into_iter().enumerate() {
-                lines[0][u].hold(place - slack, w);
-                lines[1][u].hold(-(place + slack), w);
+                let weight = if shear.parallel { N::from(1.0) } else { w };
+                lines[0][u].hold(place - slack, weight);
+                lines[1][u].hold(-(place + slack), weight);
             }
         }
     }
@@ -102,7 +104,7 @@ impl<N: Number> Offset<N> {
         Self { most: N::from(f32::INFINITY), least: N::from(f32::NEG_INFINITY), possible: true }
     }
 
-    /// Keeps those that leave a vertex at `place` on the homogeneous plane, with depth `w`, above the line.
+    /// Keeps those that leave a vertex at `place` on the homogeneous plane, with weight `w`, above the line.
     fn hold(&mut self, place: N, w: N) {
         if w > N::zero() {
             self.most = self.most.min(place / w);
@@ -159,10 +161,11 @@ mod tests {
                 let [_, _, u, v, t] = case.place(&mut r);
                 let (seen, weights) = (case.seen([0.0, 0.0, u, v, t]), r.weights());
                 let [x, y, w] = [0, 1, 2].map(|k| (0..3).map(|i| weights[i] * seen[i][k]).sum::<f64>());
-                if w <= f64::from(NEAR) {
+                if w <= f64::from(NEAR) && !case.shear.parallel {
                     continue;
                 }
-                for (axis, place, lens) in [(0, x / w, u), (1, y / w, v)] {
+                let weight = case.weight(w);
+                for (axis, place, lens) in [(0, x / weight, u), (1, y / weight, v)] {
                     let at = |line: [f64; 2]| {
                         let bounded = line.iter().all(|end| end.is_finite());
                         if bounded {
@@ -191,7 +194,7 @@ mod tests {
             for _ in 0..60 {
                 let place = case.place(&mut r);
                 let e = case.edges(place);
-                let depth = case.det(place) / e.iter().sum::<f64>();
+                let depth = case.depth(place);
                 let inside = e.iter().all(|&e| e >= 0.0) || e.iter().all(|&e| e <= 0.0);
                 let [u, v] = [place[2] as f32, place[3] as f32];
                 let kept =
@@ -207,7 +210,7 @@ mod tests {
         use crate::geometry::{Cull, MovingVertex};
         use crate::setup::{Outcome, set_up};
         // At twice the focus depth of 6 the circle of confusion has the radius a - s / w = 15 - 90 / 12 = 7.5.
-        let shear = Shear { s: [90.0, -90.0], a: [15.0, -15.0] };
+        let shear = Shear::new([90.0, -90.0], [15.0, -15.0]);
         let v = [[0.0, 0.0, 12.0], [12.0, 0.0, 12.0], [0.0, 12.0, 12.0]]
             .map(|p| MovingVertex { open: p, close: p });
         let Outcome::Ready(triangle) = set_up(0, v.each_ref(), Cull::None, &shear, 0.1, [64.0; 2]) else {

@@ -5,6 +5,7 @@
 
 mod box5;
 mod cost;
+mod edge_bounds;
 mod edges;
 mod facing;
 mod lens_lines;
@@ -16,6 +17,7 @@ pub mod small;
 #[cfg(test)]
 mod testing;
 mod time_interval;
+mod timeline;
 mod view;
 
 pub use box5::{Box5, TileRect};
@@ -23,12 +25,14 @@ pub use cost::{
     edge_bound_madds, edge_madds, facing_madds, lens_line_madds, lens_line_setup_madds, screen_setup_madds,
     side_madds,
 };
-pub use edges::{EdgeBounds, Edges, Faces};
-pub use facing::{Facing, Piece, Timeline};
+pub use edge_bounds::EdgeBounds;
+pub use edges::{Edges, Faces};
+pub use facing::Facing;
 pub use lens_lines::LensLines;
 pub use number::Number;
 pub use quadratic::{Pieces, Quadratic};
 pub use screen::{Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
+pub use timeline::{Piece, Timeline};
 pub use view::View;

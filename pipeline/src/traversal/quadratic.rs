@@ -1,5 +1,7 @@
 //! Quadratics of time in Bernstein form, and where they are not below zero.
 
+use std::ops::Neg;
+
 use super::number::Number;
 
 /// `b0 (1-s)^2 + 2 b1 s (1-s) + b2 s^2` for `s` in [0, 1]. The values lie between the smallest and the largest coefficient.
@@ -89,6 +91,13 @@ impl<N: Number> Quadratic<N> {
             (true, false) => Pieces::One([if b1 < zero { by_end } else { by_start }, one]),
             (false, true) => Pieces::One([zero, if b1 < zero { by_start } else { by_end }]),
         }
+    }
+}
+
+impl<N: Number> Neg for Quadratic<N> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(self.0.map(|b| -b))
     }
 }
 

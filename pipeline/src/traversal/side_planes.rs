@@ -4,7 +4,7 @@
 //! triangle is outside where all three are. `d` is bilinear in `(u, t)`, so the times that can matter are the hull over
 //! the vertices of where `max(d(u_lo, t), d(u_hi, t)) >= 0`: two linear functions each. For `u` likewise with the ends
 //! of `t`. A vertex behind the camera (`w < 0`) is beyond the side only when it is for every `X` of the tile, so both
-//! edges of the tile are tried there.
+//! edges of the tile are tried there. In an orthographic view `d = x(t) + u (a w(t) - s) - X0`, whatever the sign of `w`.
 
 use super::number::Number;
 use super::{Box5, TileRect, cost};
@@ -33,6 +33,7 @@ pub fn narrow_counted<N: Number>(
                 triangle,
                 s: N::from(shear.s[axis]),
                 a: N::from(shear.a[axis]),
+                parallel: shear.parallel,
                 axis,
                 edges: edges.map(N::from),
                 positive: sign > 0.0,
@@ -51,6 +52,7 @@ struct Side<'a, N> {
     triangle: &'a Triangle,
     s: N,
     a: N,
+    parallel: bool,
     axis: usize,
     edges: [N; 2],
     positive: bool,
@@ -99,7 +101,7 @@ impl<N: Number> Side<'_, N> {
                     open
                 }
             });
-            let flat = x - edge * w;
+            let flat = x - if self.parallel { edge } else { edge * w };
             let shift = if within.lens { self.a * w - self.s } else { N::zero() };
             let from = |place: f32| {
                 let d = if within.lens { flat + N::from(place) * shift } else { flat };

@@ -2,7 +2,7 @@
 //!
 //! The image of a vertex in front of the camera moves monotonically in time on both axes, so it is never farther from its place in
 //! mid-shutter than at an end. On the lens it moves on a line of which the ends are farthest, by `a - s / w`, which is
-//! monotone in `w`. The image of a triangle wholly in front of the camera is the hull of those of its vertices, so no point of its
+//! monotone in `w`; in an orthographic view by `a w - s`, which is, too. The image of a triangle wholly in front of the camera is the hull of those of its vertices, so no point of its
 //! outline moves farther than they do.
 
 use crate::geometry::{MovingVertex, Shear};
@@ -16,17 +16,23 @@ pub const BLUR_MADDS: u32 = 3 * 2 * 2 * 2;
 /// The farthest that a vertex is from its image in mid-shutter, in pixels, through a pinhole or from anywhere on the lens; infinite where
 /// one is not in front of the camera.
 pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
+    let weight = |depth: f64| if shear.parallel { 1.0 } else { depth };
     let one = |vertex: &MovingVertex| {
         let (open, close) = (vertex.open.map(f64::from), vertex.close.map(f64::from));
         let middle = [0, 1, 2].map(|axis| 0.5 * (open[axis] + close[axis]));
         let away = |end: [f64; 3]| {
             let [x, y] = [0, 1].map(|axis| {
-                let lens = f64::from(shear.s[axis]).abs() * (1.0 / end[2] - 1.0 / middle[2]).abs();
-                (end[axis] / end[2] - middle[axis] / middle[2]).abs() + lens
+                let circles = [end, middle].map(|p| shear.circle(axis, p[2]));
+                let images = [end, middle].map(|p| p[axis] / weight(p[2]));
+                (images[0] - images[1]).abs() + (circles[0] - circles[1]).abs()
             });
             x.hypot(y)
         };
-        if open[2] > 0.0 && close[2] > 0.0 { away(open).max(away(close)) } else { f64::INFINITY }
+        if weight(open[2]) > 0.0 && weight(close[2]) > 0.0 {
+            away(open).max(away(close))
+        } else {
+            f64::INFINITY
+        }
     };
     vertices.map(one).into_iter().fold(0.0, f64::max)
 }
@@ -34,11 +40,17 @@ pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
 /// The largest radius of the circle of confusion of a vertex at either end of the shutter, in pixels; infinite where one is not in front of
 /// the camera.
 pub fn blur_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
-    let radius = |w: f64, axis: usize| (f64::from(shear.a[axis]) - f64::from(shear.s[axis]) / w).abs();
+    let radius = |w: f64, axis: usize| shear.circle(axis, w).abs();
     vertices
         .into_iter()
         .flat_map(|vertex| [vertex.open[2], vertex.close[2]])
-        .map(|w| if w > 0.0 { radius(f64::from(w), 0).max(radius(f64::from(w), 1)) } else { f64::INFINITY })
+        .map(|w| {
+            if shear.weight(w) > 0.0 {
+                radius(f64::from(w), 0).max(radius(f64::from(w), 1))
+            } else {
+                f64::INFINITY
+            }
+        })
         .fold(0.0, f64::max)
 }
 
@@ -74,8 +86,9 @@ mod tests {
                 continue;
             }
             finite += 1;
-            let at_centre =
-                |t: f64, [u, v]: [f64; 2]| case.seen([0.0, 0.0, u, v, t]).map(|[x, y, w]| [x / w, y / w]);
+            let at_centre = |t: f64, [u, v]: [f64; 2]| {
+                case.seen([0.0, 0.0, u, v, t]).map(|[x, y, w]| [x, y].map(|c| c / case.weight(w)))
+            };
             let far = |a: [[f64; 2]; 3], b: [[f64; 2]; 3]| {
                 (0..3).map(|i| (a[i][0] - b[i][0]).hypot(a[i][1] - b[i][1])).fold(0.0, f64::max)
             };

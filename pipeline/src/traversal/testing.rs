@@ -46,17 +46,23 @@ pub struct Case {
 }
 
 /// A random one; a third of the vertices of every other triangle may be behind the camera.
-pub fn case(seed: u64, moving: bool, lens: bool) -> Case {
+pub fn case(seed: u64, moving: bool, lens: bool, parallel: bool) -> Case {
     let mut r = Uniform::new(seed);
     let size = [4.0, 40.0, 400.0][(seed % 3) as usize];
-    let shear = if lens { Shear { s: [90.0, -90.0], a: [15.0, -15.0] } } else { Shear::default() };
+    let shear = if lens { Shear::new([90.0, -90.0], [15.0, -15.0]) } else { Shear::default() };
+    // Focused so near that what grows with depth outweighs the rest, and another way on each axis.
+    let shear = match (parallel, lens) {
+        (true, true) => Shear { parallel, ..Shear::new([12.0, -30.0], [18.0, -5.0]) },
+        _ => Shear { parallel, ..shear },
+    };
     let [px, py] = [r.within(-60.0, 52.0).floor(), r.within(-60.0, 52.0).floor()];
     let side = [1.0, 8.0, 32.0][(seed / 3 % 3) as usize];
     let tile = TileRect { x: [px, px + side], y: [py, py + side] };
     let mut end = || {
         let behind = seed.is_multiple_of(2) && r.within(0.0, 1.0) < 0.33;
         let w = if behind { r.within(-3.0, 1.0) } else { r.within(2.0, 9.0) };
-        [(px + r.within(-size, size)) * w, (py + r.within(-size, size)) * w, w]
+        let weight = shear.weight(w);
+        [(px + r.within(-size, size)) * weight, (py + r.within(-size, size)) * weight, w]
     };
     let v = [0; 3].map(|_| {
         let (open, close) = (end(), end());
@@ -70,18 +76,19 @@ pub fn case(seed: u64, moving: bool, lens: bool) -> Case {
     let within = Box5 { u: range(-1.0, 1.0), v: range(-1.0, 1.0), t: range(0.0, 1.0), lens };
     match set_up(0, [&v[0], &v[1], &v[2]], Cull::None, &shear, NEAR, [64.0; 2]) {
         Outcome::Ready(triangle) => Case { triangle, shear, tile, within },
-        _ => case(seed + 1_000_003, moving, lens),
+        _ => case(seed + 1_000_003, moving, lens, parallel),
     }
 }
 
-/// Every mixture of dimensions, with `count` random cases each.
+/// Every mixture of dimensions, with `count` random cases each, in perspective and in orthographic views.
 pub fn cases(count: u64) -> impl Iterator<Item = (u64, Case)> {
-    (0..count).flat_map(|seed| {
-        [[false, false], [true, false], [false, true], [true, true]]
-            .map(|[moving, lens]| (seed, case(seed * 4 + 1, moving, lens)))
-            .into_iter()
-            .chain([[true, false], [true, true]].map(|[moving, lens]| (seed, case(seed * 4, moving, lens))))
-    })
+    [false, true].into_iter().flat_map(move |parallel| (0..count).flat_map(move |seed| mixed(seed, parallel)))
+}
+
+fn mixed(seed: u64, parallel: bool) -> impl Iterator<Item = (u64, Case)> {
+    let all = [[false, false], [true, false], [false, true], [true, true]];
+    let one = move |first: u64| move |[moving, lens]: [bool; 2]| (seed, case(first, moving, lens, parallel));
+    all.map(one(seed * 4 + 1)).into_iter().chain([[true, false], [true, true]].map(one(seed * 4)))
 }
 
 impl Case {
@@ -92,12 +99,18 @@ impl Case {
             .map(|range| f64::from(r.often_an_end(range)))
     }
 
+    /// What a vertex at this depth is multiplied with to be moved by a pixel.
+    pub fn weight(&self, depth: f64) -> f64 {
+        if self.shear.parallel { 1.0 } else { depth }
+    }
+
     /// The vertices seen from a place of the box: `[x', y', w]`.
     pub fn seen(&self, [x, y, u, v, t]: [f64; 5]) -> [[f64; 3]; 3] {
         let [s, a] = [self.shear.s, self.shear.a].map(|c| c.map(f64::from));
         self.triangle.corners.map(|corner| {
             let p = [0, 1, 2].map(|k| f64::from(corner.open[k]) + t * f64::from(corner.delta[k]));
-            [p[0] + u * (a[0] * p[2] - s[0]) - x * p[2], p[1] + v * (a[1] * p[2] - s[1]) - y * p[2], p[2]]
+            let weight = self.weight(p[2]);
+            [p[0] + u * (a[0] * p[2] - s[0]) - x * weight, p[1] + v * (a[1] * p[2] - s[1]) - y * weight, p[2]]
         })
     }
 
@@ -110,6 +123,12 @@ impl Case {
     /// The determinant there.
     pub fn det(&self, at: [f64; 5]) -> f64 {
         let p = self.seen(at);
-        (0..3).map(|k| self.edges(at)[k] * p[k][2]).sum()
+        (0..3).map(|k| self.edges(at)[k] * self.weight(p[k][2])).sum()
+    }
+
+    /// The depth of the triangle's plane there.
+    pub fn depth(&self, at: [f64; 5]) -> f64 {
+        let (p, e) = (self.seen(at), self.edges(at));
+        (0..3).map(|k| e[k] * p[k][2]).sum::<f64>() / e.iter().sum::<f64>()
     }
 }

@@ -1,8 +1,9 @@
-//! When a point of the image lies inside a moving triangle seen through a pinhole (after Gribel, Doggett and Akenine-Moeller 2010,
-//! "Analytical motion blur rasterization with compression").
+//! When a point of the image lies inside a moving triangle seen through a pinhole or in an orthographic view (after Gribel, Doggett and
+//! Akenine-Moeller 2010, "Analytical motion blur rasterization with compression").
 //!
-//! At a fixed point each edge `e = (p_i x p_j) . (X, Y, 1)` is a quadratic in time. The point is inside where all three are not below
-//! zero (it sees the face that appears clockwise) or none is above (the other one). Both sets are intersections of roots' intervals.
+//! At a fixed point each edge, `e = (p_i x p_j) . (X, Y, 1)` in perspective, is a quadratic in time. The point is inside where all
+//! three are not below zero (it sees the face that appears clockwise) or none is above (the other one). Both sets are intersections of
+//! roots' intervals.
 //! Over a rectangle the same holds for the largest, or the smallest, values of the edges: then a point of it *may* be inside.
 //!
 //! A homogeneous triangle also covers what lies behind the camera, mirrored. Where vertices have depths of both signs the
@@ -72,12 +73,14 @@ const WIDENED: f64 = 4.0 * f64::EPSILON;
 const RAISED: f64 = 64.0 * f64::EPSILON;
 
 /// The times at which the point `(x, y)`, in pixels from the centre of the image, lies inside `triangle` and sees its clockwise
-/// face, and those at which it sees the other one. Widened by the rounding of `f64`.
-pub fn time_interval(triangle: &Triangle, x: f64, y: f64) -> [TimeIntervals; 2] {
+/// face, and those at which it sees the other one. Of `shear` it only matters whether the view is orthographic. Widened by the
+/// rounding of `f64`.
+pub fn time_interval(triangle: &Triangle, shear: &Shear, x: f64, y: f64) -> [TimeIntervals; 2] {
+    let weight = |depth: f64| if shear.parallel { 1.0 } else { depth };
     let ends = [0.0, 1.0].map(|t| {
         triangle.corners.map(|corner| {
             let [px, py, w] = [0, 1, 2].map(|k| f64::from(corner.open[k]) + t * f64::from(corner.delta[k]));
-            [px - x * w, py - y * w]
+            [px - x * weight(w), py - y * weight(w)]
         })
     });
     let edge = |i: usize, j: usize| {
@@ -87,25 +90,26 @@ pub fn time_interval(triangle: &Triangle, x: f64, y: f64) -> [TimeIntervals; 2] 
     let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
     // The size of the terms that cancel in an edge.
     let size = [0, 1].map(|axis| ends.iter().flatten().map(|p| p[axis].abs()).fold(0.0, f64::max));
-    let error = RAISED * (size[0] * size[1]) + rounding_of_places(triangle, [x, y], size);
+    let error = RAISED * (size[0] * size[1]) + rounding_of_places(triangle, shear, [x, y], size);
     [1.0, -1.0].map(|sign| inside(edges.map(|edge| Quadratic(edge.0.map(|b| sign * b + error)))))
 }
 
 /// What the rounding of the places in `f64` adds to an edge.
-fn rounding_of_places(triangle: &Triangle, at: [f64; 2], size: [f64; 2]) -> f64 {
+fn rounding_of_places(triangle: &Triangle, shear: &Shear, at: [f64; 2], size: [f64; 2]) -> f64 {
     let largest = |axis: usize| {
         let reach = |k: usize| triangle.corners.map(|c| f64::from(c.open[k].abs() + c.delta[k].abs()));
         let [places, depths] = [reach(axis), reach(2)];
-        (0..3).map(|k| places[k] + at[axis].abs() * depths[k]).fold(0.0, f64::max)
+        let weight = |k: usize| if shear.parallel { 1.0 } else { depths[k] };
+        (0..3).map(|k| places[k] + at[axis].abs() * weight(k)).fold(0.0, f64::max)
     };
     RAISED * (largest(0) * size[1] + largest(1) * size[0])
 }
 
 /// The times at which some point of `rect` may lie inside `triangle`, by the face it sees: never too few, and for a rectangle
 /// without extent those of its point but for the rounding of the sample test, which is allowed for.
-pub fn time_interval_over(triangle: &Triangle, rect: &TileRect) -> [TimeIntervals; 2] {
+pub fn time_interval_over(triangle: &Triangle, shear: &Shear, rect: &TileRect) -> [TimeIntervals; 2] {
     let moving = Triangle { moving: true, ..*triangle };
-    let edges = Edges::new(View::new(&moving, &Shear::default(), rect, &Box5::whole(false)));
+    let edges = Edges::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
     [[true, false], [false, true]].map(|face: Faces| inside(edges.bounds().tallest(face)))
 }
 
@@ -145,7 +149,7 @@ mod tests {
         for _ in 0..20_000 {
             let triangle = whole_number_triangle(&mut r);
             let at = [0; 2].map(|_| r.within(-4.0, 4.0).round());
-            let sets = time_interval(&triangle, f64::from(at[0]), f64::from(at[1]));
+            let sets = time_interval(&triangle, &Shear::default(), f64::from(at[0]), f64::from(at[1]));
             several += usize::from(sets.iter().any(|set| set.as_slice().len() > 1));
             for k in 0..=64 {
                 let e = exact(&triangle.corners, at.map(|c| c as i128), k);
@@ -168,7 +172,7 @@ mod tests {
         let mut r = Uniform::new(10);
         for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
             let place = case.place(&mut r);
-            let sets = time_interval(&case.triangle, place[0], place[1]);
+            let sets = time_interval(&case.triangle, &case.shear, place[0], place[1]);
             let mut lasted = [0.0; 2];
             for step in 0..=4000 {
                 let t = f64::from(step) / 4000.0;
@@ -190,11 +194,11 @@ mod tests {
     fn over_a_rectangle_every_time_of_every_point_is_there() {
         let (mut r, mut short) = (Uniform::new(11), 0);
         for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
-            let over = time_interval_over(&case.triangle, &case.tile);
+            let over = time_interval_over(&case.triangle, &case.shear, &case.tile);
             short += u32::from(over.iter().any(|set| set.length() < 0.9));
             for _ in 0..40 {
                 let place = case.place(&mut r);
-                let point = time_interval(&case.triangle, place[0], place[1]);
+                let point = time_interval(&case.triangle, &case.shear, place[0], place[1]);
                 for face in [0, 1] {
                     for [lo, hi] in point[face].as_slice() {
                         for t in [*lo, 0.5 * (lo + hi), *hi] {
@@ -217,7 +221,7 @@ mod tests {
             moving: true,
             ..case.triangle
         };
-        let sets = time_interval(&triangle, 0.0, 0.0);
+        let sets = time_interval(&triangle, &Shear::default(), 0.0, 0.0);
         assert!(sets[1].as_slice().is_empty(), "{sets:?}");
         let [[lo, hi]] = sets[0].as_slice() else { panic!("{sets:?}") };
         assert!(

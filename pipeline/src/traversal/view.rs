@@ -5,7 +5,7 @@ use super::{Box5, TileRect};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 
-/// A vertex relative to a sample: `[x', y', w]` on the homogeneous image plane.
+/// A vertex relative to a sample: `[x', y', w]` on the image plane.
 pub(super) type Point<N> = [N; 3];
 
 /// A triangle moved and sheared so that the middle of a tile, seen from the middle of a part of the lens, is the origin.
@@ -13,6 +13,12 @@ pub(super) type Point<N> = [N; 3];
 ///
 /// ```text
 /// (x', y') + (alpha w - s du, beta w - s' dv)
+/// ```
+///
+/// In an orthographic view `alpha = a du`, `beta = b dv`, and `dX`, `dY` are taken off as they are:
+///
+/// ```text
+/// (x', y') + (alpha w - s du - dX, beta w - s' dv - dY)
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct View<N = f64> {
@@ -28,11 +34,13 @@ pub struct View<N = f64> {
     pub(super) a: [N; 2],
     pub(super) moving: bool,
     pub(super) lens: bool,
+    /// Whether the view is orthographic.
+    pub(super) parallel: bool,
     /// The largest |x'| and |y'| of any vertex anywhere in the box.
     pub(super) reach: [N; 2],
     /// How far an edge the sample test computes may be from the true one.
     pub(super) rounding: N,
-    /// The largest |w| in the box, and the largest that rounding of any depth goes by.
+    /// The largest weight of a vertex in the box ([`View::weight`]), and the largest that rounding of any goes by.
     pub(super) depth: [N; 2],
 }
 
@@ -58,6 +66,7 @@ impl<N: Number> View<N> {
             a: shear.a.map(N::from),
             moving,
             lens,
+            parallel: shear.parallel,
             reach: [N::zero(); 2],
             rounding: N::zero(),
             depth: [N::zero(); 2],
@@ -68,9 +77,7 @@ impl<N: Number> View<N> {
     }
 
     fn place(&mut self, triangle: &Triangle) {
-        let m = self.middle.map(N::from);
-        let shift = [0, 1].map(|axis| m[2 + axis] * self.s[axis]);
-        let slope = [0, 1].map(|axis| if self.lens { m[axis] - m[2 + axis] * self.a[axis] } else { m[axis] });
+        let rays = [0, 1].map(|axis| self.middle_ray(axis));
         for end in 0..if self.moving { 2 } else { 1 } {
             for (point, corner) in self.ends[end].iter_mut().zip(&triangle.corners) {
                 let open = corner.open.map(N::from);
@@ -80,15 +87,31 @@ impl<N: Number> View<N> {
                 } else {
                     open
                 };
-                for axis in [0, 1] {
-                    let seen = if self.lens { point[axis] - shift[axis] } else { point[axis] };
-                    point[axis] = seen - slope[axis] * point[2];
+                for (axis, [slope, base]) in rays.into_iter().enumerate() {
+                    let seen = if self.lens || self.parallel { point[axis] - base } else { point[axis] };
+                    point[axis] = if self.lens || !self.parallel { seen - slope * point[2] } else { seen };
                 }
             }
         }
         if !self.moving {
             self.ends[1] = self.ends[0];
         }
+    }
+
+    /// The slope and the base of the middle as if it were a sample ([`Shear::ray`]).
+    fn middle_ray(&self, axis: usize) -> [N; 2] {
+        let [at, place] = [axis, 2 + axis].map(|k| N::from(self.middle[k]));
+        match (self.parallel, self.lens) {
+            (false, false) => [at, place * self.s[axis]],
+            (false, true) => [at - place * self.a[axis], place * self.s[axis]],
+            (true, false) => [N::zero(), at],
+            (true, true) => [-(place * self.a[axis]), at + place * self.s[axis]],
+        }
+    }
+
+    /// What a vertex at this depth is multiplied with to be moved by a pixel; the determinant weighs its edge with it, too.
+    pub(super) fn weight(&self, depth: N) -> N {
+        if self.parallel { N::from(1.0) } else { depth }
     }
 
     fn measure(&mut self, triangle: &Triangle) {
@@ -98,16 +121,19 @@ impl<N: Number> View<N> {
                 for axis in [0, 1] {
                     self.reach[axis] = self.reach[axis].max(point[axis].abs() + point[2].abs() * sway[axis]);
                 }
-                self.depth[0] = self.depth[0].max(point[2].abs());
+                self.depth[0] = self.depth[0].max(self.weight(point[2]).abs());
             }
         }
-        if self.lens {
-            for axis in [0, 1] {
+        for axis in [0, 1] {
+            if self.lens {
                 self.reach[axis] = self.reach[axis] + self.s[axis].abs() * self.half[2 + axis];
+            }
+            if self.parallel {
+                self.reach[axis] = self.reach[axis] + self.half[axis];
             }
         }
         let deepest = |corner: &crate::setup::Corner| corner.open[2].abs() + corner.delta[2].abs();
-        self.depth[1] = N::from(triangle.corners.iter().map(deepest).fold(0.0, f32::max));
+        self.depth[1] = self.weight(N::from(triangle.corners.iter().map(deepest).fold(0.0, f32::max)));
         // The sample test is exact for points seen from the sample, and these are rounded by up to half the slack on each axis.
         let [slack_x, slack_y] = triangle.slack.map(|slack| N::from(2.0 * slack));
         self.rounding = slack_x * (self.reach[1] + slack_y) + slack_y * self.reach[0];
@@ -115,7 +141,12 @@ impl<N: Number> View<N> {
 
     /// The largest |alpha| (or |beta|): how far the vertices move for each unit of depth.
     fn sway(&self, axis: usize) -> N {
-        if self.lens { self.half[axis] + self.a[axis].abs() * self.half[2 + axis] } else { self.half[axis] }
+        match (self.parallel, self.lens) {
+            (false, false) => self.half[axis],
+            (false, true) => self.half[axis] + self.a[axis].abs() * self.half[2 + axis],
+            (true, false) => N::zero(),
+            (true, true) => self.a[axis].abs() * self.half[2 + axis],
+        }
     }
 
     /// The place of the time `t` in the interval, from 0 to 1.

@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn the_polynomial_is_the_determinant_of_the_sheared_vertices() {
-        let shear = Shear { s: [3.0, -3.0], a: [0.5, -0.5] };
+        let shear = Shear::new([3.0, -3.0], [0.5, -0.5]);
         let ends = [
             ([1.0, 2.0, 4.0], [2.0, -1.0, 5.0]),
             ([-3.0, 0.5, 6.0], [0.0, 1.0, -2.0]),

@@ -79,8 +79,12 @@ pub(super) const NOTHING: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 impl SampleLayout {
     /// Sorts the samples of `source` for what `camera` sees in `viewport`. `moving` says whether triangles may move; where
-    /// none does, time is not divided. Samples outside the clip planes of the camera see nothing.
-    pub fn new(camera: &Camera, viewport: Viewport, source: &dyn SampleSource, moving: bool) -> Self {
+    /// none does, time is not divided. Samples outside the clip planes of the camera see nothing. `None` for an orthographic
+    /// camera, which the engine does not take.
+    pub fn new(camera: &Camera, viewport: Viewport, source: &dyn SampleSource, moving: bool) -> Option<Self> {
+        if camera.is_orthographic() {
+            return None;
+        }
         let projection = Projection::new(camera, viewport);
         let per_pixel = source.per_pixel();
         let plan = Plan::new(per_pixel, moving, !projection.shear.is_none());
@@ -94,7 +98,7 @@ impl SampleLayout {
                     .bin(origin)
             })
             .collect();
-        Self { viewport, per_pixel, projection, plan, bins }
+        Some(Self { viewport, per_pixel, projection, plan, bins })
     }
 
     /// Samples of the image.

@@ -1,6 +1,6 @@
 //! Random triangles that stress one thing each, and samples on their edges.
 
-use super::{Look, Probe, Uniform, repeated};
+use super::{Look, Probe, Uniform, repeated, weight};
 use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
@@ -10,6 +10,8 @@ use proptest::prelude::*;
 pub struct Case {
     pub moving: bool,
     pub lens: bool,
+    /// The view is orthographic; pixels are no lengths of the scene then.
+    pub parallel: bool,
     /// A third of the vertices may be behind the camera.
     pub behind: bool,
     /// In the far corner of the largest image.
@@ -21,10 +23,12 @@ pub struct Case {
 }
 
 pub fn cases() -> impl Strategy<Value = Case> {
-    let flags = (any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>(), -20..20_i32);
-    flags.prop_map(|(moving, lens, behind, far, sliver, scale)| Case {
+    let shape = (any::<bool>(), any::<bool>(), any::<bool>(), -20..20_i32);
+    let flags = (any::<bool>(), any::<bool>(), any::<bool>(), shape);
+    flags.prop_map(|(moving, lens, parallel, (behind, far, sliver, scale))| Case {
         moving,
         lens,
+        parallel,
         behind,
         far,
         sliver,
@@ -45,13 +49,14 @@ pub fn setting(case: Case, seed: u64) -> Setting {
     let origin = if case.far { [0, side - 8] } else { [0, 0] };
     let origin_px = origin.map(|px| px as f32 - 0.5 * side as f32);
     let scale = libm::exp2f(case.scale as f32);
+    let weight = |w: f32| if case.parallel { 1.0 } else { w };
     let end = |r: &mut Uniform, near: Option<[f32; 3]>| {
         let w = if case.behind && r.next() < 0.33 { r.within(-4.0, 1.0) } else { r.within(0.5, 8.0) } * scale;
         let mut at = [0, 1].map(|axis| origin_px[axis] + r.within(-8.0, 16.0));
         if let Some([x, y, w]) = near.filter(|_| case.sliver) {
-            at = [x / w + r.within(-1e-3, 1e-3), y / w + r.within(-1e-3, 1e-3)];
+            at = [x, y].map(|c| c / weight(w) + r.within(-1e-3, 1e-3));
         }
-        [at[0] * w, at[1] * w, w]
+        [at[0] * weight(w), at[1] * weight(w), w]
     };
     let mut triangle = [MovingVertex { open: [0.0; 3], close: [0.0; 3] }; 3];
     for k in 0..3 {
@@ -60,9 +65,10 @@ pub fn setting(case: Case, seed: u64) -> Setting {
         let close = end(&mut r, near[1]);
         triangle[k] = MovingVertex { open, close: if case.moving { close } else { open } };
     }
-    let s = [r.within(-20.0, 20.0) * scale, r.within(-20.0, 20.0) * scale];
+    let s = [0; 2].map(|_| r.within(-20.0, 20.0) * if case.parallel { 1.0 } else { scale });
     let focus = r.within(0.5, 10.0) * scale;
-    let shear = if case.lens { Shear { s, a: s.map(|s| s / focus) } } else { Shear::default() };
+    let shear = if case.lens { Shear::new(s, s.map(|s| s / focus)) } else { Shear::default() };
+    let shear = Shear { parallel: case.parallel, ..shear };
     let table = on_its_edges(&mut r, &triangle, &shear, origin_px, case.lens);
     let probe = Probe::new(&table, Viewport::new(side, side).unwrap(), shear, origin, NEAR * scale);
     Setting { triangle, probe }
@@ -86,7 +92,7 @@ pub fn on_its_edges(
         let [p, q] = [k, (k + 1) % 3].map(|corner| look.sheared(&triangle[corner], shear));
         let along = f64::from(r.next());
         let mix = |axis: usize| p[axis] + along * (q[axis] - p[axis]);
-        let at = [0, 1].map(|axis| mix(axis) / mix(2) - f64::from(origin_px[axis]));
+        let at = [0, 1].map(|axis| mix(axis) / weight(shear, mix(2)) - f64::from(origin_px[axis]));
         let mut pixel = (r.next() * 64.0) as usize;
         if at.iter().all(|c| (0.0..8.0).contains(c)) {
             pixel = at[0] as usize + 8 * (at[1] as usize);

@@ -1,6 +1,6 @@
 //! Meshes on the homogeneous image plane whose triangles share vertices, and samples that lie on their edges.
 
-use super::{Look, Uniform, repeated};
+use super::{Look, Uniform, repeated, weight};
 use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
@@ -10,10 +10,15 @@ use proptest::prelude::*;
 pub struct Dims {
     pub moving: bool,
     pub lens: bool,
+    pub parallel: bool,
 }
 
 pub fn dims() -> impl Strategy<Value = Dims> {
-    (any::<bool>(), any::<bool>()).prop_map(|(moving, lens)| Dims { moving, lens })
+    (any::<bool>(), any::<bool>(), any::<bool>()).prop_map(|(moving, lens, parallel)| Dims {
+        moving,
+        lens,
+        parallel,
+    })
 }
 
 /// Triangles on the homogeneous image plane that share vertices.
@@ -48,7 +53,7 @@ pub fn on_edges(r: &mut Uniform, mesh: &Mesh, shear: &Shear, origin_px: [f32; 2]
         let [p, q] = [0, 1].map(|k| look.sheared(&mesh.vertices[triangle[k]], shear));
         let along = if r.next() < 0.2 { 0.0 } else { f64::from(r.next()) };
         let mix = |axis: usize| p[axis] + along * (q[axis] - p[axis]);
-        let at = [0, 1].map(|axis| mix(axis) / mix(2) - f64::from(origin_px[axis]));
+        let at = [0, 1].map(|axis| mix(axis) / weight(shear, mix(2)) - f64::from(origin_px[axis]));
         let inside = at.iter().all(|c| (0.0..8.0).contains(c));
         let at = if inside { at } else { [0, 1].map(|_| 8.0 * f64::from(r.next())) };
         let pixel = at[0] as usize + 8 * (at[1] as usize);
@@ -69,7 +74,16 @@ pub fn on_edges(r: &mut Uniform, mesh: &Mesh, shear: &Shear, origin_px: [f32; 2]
 pub fn random_shear(r: &mut Uniform, dims: Dims, reach: f32) -> Shear {
     let s = [r.within(0.2, 1.0) * reach, -r.within(0.2, 1.0) * reach];
     let focus = r.within(2.0, 8.0);
-    if dims.lens { Shear { s, a: s.map(|s| s / focus) } } else { Shear::default() }
+    let shear = if dims.lens { Shear::new(s, s.map(|s| s / focus)) } else { Shear::default() };
+    Shear { parallel: dims.parallel, ..shear }
+}
+
+impl Dims {
+    /// A vertex at this place on the image and depth.
+    pub fn vertex(&self, at: [f32; 2], w: f32) -> [f32; 3] {
+        let weight = if self.parallel { 1.0 } else { w };
+        [at[0] * weight, at[1] * weight, w]
+    }
 }
 
 /// The middle of the image, or the far corner of the largest one, where f32 pixels are coarse.

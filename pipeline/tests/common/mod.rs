@@ -13,7 +13,7 @@ use pipeline::sampling::{Sample, TileSamples, mix};
 use pipeline::setup::{Outcome, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
-pub use probe::{Look, Probe, looks, repeated};
+pub use probe::{Look, Probe, looks, repeated, weight};
 use proptest::prelude::*;
 
 /// Counter-based uniform numbers in [0, 1).
@@ -176,8 +176,24 @@ pub fn spec(features: Features) -> PipelineSpec {
     }
 }
 
-pub fn camera(lens: bool) -> Camera {
-    let camera = Camera::new(Affine3A::IDENTITY, 0.7, 0.25).unwrap();
+/// What kind of camera; `lens.into()` is one in perspective.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    pub lens: bool,
+    pub parallel: bool,
+}
+
+impl From<bool> for Optics {
+    fn from(lens: bool) -> Self {
+        Self { lens, parallel: false }
+    }
+}
+
+pub fn camera(optics: impl Into<Optics>) -> Camera {
+    let Optics { lens, parallel } = optics.into();
+    // Orthographic as large as the other is at depth 4, so that the grid lies on pixels in both.
+    let make = if parallel { Camera::orthographic } else { Camera::new };
+    let camera = make(Affine3A::IDENTITY, if parallel { 2.8 } else { 0.7 }, 0.25).unwrap();
     camera.with_lens(lens.then(|| Lens::new(0.3, 6.0).unwrap()))
 }
 
@@ -186,19 +202,21 @@ pub fn camera(lens: bool) -> Camera {
 pub fn brute_force(
     soup: &Soup,
     cull: Cull,
-    lens: bool,
+    optics: impl Into<Optics>,
     viewport: Viewport,
     table: &SampleTable,
 ) -> Vec<(u32, u32)> {
-    let camera = camera(lens);
-    let shear = if lens {
-        let s = 0.5 * f64::from(viewport.height()) / f64::from(camera.tan_half_height()) * f64::from(0.3_f32);
-        Shear { s: [s as f32, -s as f32], a: [(s / 6.0) as f32, -(s / 6.0) as f32] }
+    let optics = optics.into();
+    let camera = camera(optics);
+    let shear = if optics.lens {
+        let s = 0.5 * f64::from(viewport.height()) / f64::from(camera.half_height()) * f64::from(0.3_f32);
+        Shear::new([s as f32, -s as f32], [(s / 6.0) as f32, -(s / 6.0) as f32])
     } else {
         Shear::default()
     };
+    let shear = Shear { parallel: optics.parallel, ..shear };
     let image = |p: Vec3| {
-        let k = 0.5 * f64::from(viewport.height()) / f64::from(camera.tan_half_height());
+        let k = 0.5 * f64::from(viewport.height()) / f64::from(camera.half_height());
         [(k * f64::from(p.x)) as f32, (-k * f64::from(p.y)) as f32, p.z]
     };
     let vertex =

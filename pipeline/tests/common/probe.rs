@@ -106,6 +106,11 @@ impl Look {
     }
 }
 
+/// What a vertex at this depth is multiplied with to be moved by a pixel: 1 in an orthographic view.
+pub fn weight(shear: &Shear, depth: f64) -> f64 {
+    if shear.parallel { 1.0 } else { depth }
+}
+
 /// A table that repeats one block of 8x8 pixels, `block[pixel * per_pixel + index]`, over the whole image.
 pub fn repeated(per_pixel: u32, block: &[Sample]) -> SampleTable {
     assert_eq!(block.len(), 64 * per_pixel as usize);

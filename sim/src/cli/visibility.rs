@@ -74,6 +74,8 @@ fn named(args: &VisibilityArgs) -> String {
 
 fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> {
     let samples = samples(args, &scene)?;
+    let mut warnings = scene.warnings.clone();
+    warnings.extend((args.tests.is_none() && scene.camera.is_orthographic()).then(slow_view));
     let found = find(&scene, &*samples, args.tests, args.repeat)
         .map_err(|message| Failure { message: format!("{}: {message}", named(args)), code: 1 })?;
     if let Some(out) = &args.out {
@@ -87,9 +89,16 @@ fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> 
         samples: found.seen.len(),
         hits: found.seen.iter().filter(|(triangle, _)| *triangle != u32::MAX).count(),
         camera: scene.fitted,
-        warnings: scene.warnings,
+        warnings,
         rates: found.rates,
     })
+}
+
+/// The warning that rates are not those of the engine.
+fn slow_view() -> Warning {
+    let message = "the engine that is fast takes no orthographic camera, so all tile tests were modelled: the samples see what they \
+                   would, but the rates are those of the model";
+    Warning::new("orthographic-view", message)
 }
 
 fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[Sighting]) -> Result<(), Failure> {

@@ -48,11 +48,11 @@ impl Regime {
         let seen = [0.0, 1.0].map(|t| triangle.corners.map(|c| c.at(t).map(f64::from)));
         self.in_view += 1;
         self.extreme += u64::from(look.is_extreme(&seen));
-        if seen.as_flattened().iter().any(|p| p[2] <= 0.0) {
+        if seen.as_flattened().iter().any(|p| look.weight(p[2]) <= 0.0) {
             self.behind += 1;
             return;
         }
-        let image = seen.map(|corners| corners.map(|[x, y, w]| [x / w, y / w]));
+        let image = seen.map(|corners| corners.map(|[x, y, w]| [x, y].map(|c| c / look.weight(w))));
         self.tiny += u64::from(image.iter().all(|corners| look.is_tiny(corners)));
         self.slivers += u64::from(!look.is_tiny(&image[0]) && is_sliver(&image[0]));
         let way = |k: usize| distance(image[0][k], image[1][k]);
@@ -75,15 +75,20 @@ impl Look {
 
     /// The radius of the circle of confusion at depth `w`.
     fn blur_px(&self, w: f64) -> f64 {
-        (f64::from(self.lens.s[0]) / w - f64::from(self.lens.a[0])).abs()
+        self.lens.circle(0, w).abs()
+    }
+
+    /// What a place on the image is multiplied with for a vertex at this depth.
+    fn weight(&self, depth: f64) -> f64 {
+        if self.lens.parallel { 1.0 } else { depth }
     }
 
     /// Whether the product of an edge and a depth, both as a sample may see them, leaves the range.
     fn is_extreme(&self, seen: &[[[f64; 3]; 3]; 2]) -> bool {
         let largest = |axis: usize| seen.as_flattened().iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
-        let (w, half) = (largest(2), 0.5 * self.side_px);
-        let edge = 2.0 * (largest(0) + half * w) * (largest(1) + half * w);
-        edge * w > PRODUCTS[1] || w * w * w < PRODUCTS[0]
+        let (w, half) = (largest(2), 0.5 * self.side_px * self.weight(largest(2)));
+        let edge = 2.0 * (largest(0) + half) * (largest(1) + half);
+        edge * w > PRODUCTS[1] || w * self.weight(w) * self.weight(w) < PRODUCTS[0]
     }
 }
 

@@ -179,7 +179,7 @@ mod tests {
         // of a pixel about (-10, 4) touches the tile for u from 0.5 to 0.9, v from -0.2 to 0.2.
         let corner = |x: f32, y: f32| [4.0 * (-10.0 + x), 4.0 * (4.0 + y), 4.0];
         let open = [corner(0.0, 0.0), corner(0.01, 0.0), corner(0.0, 0.01)];
-        let truth = truth(open, open, Shear { s: [80.0, -80.0], a: [40.0, -40.0] }, TILE);
+        let truth = truth(open, open, Shear::new([80.0, -80.0], [40.0, -40.0]), TILE);
         let [u, v, t] = truth.hulls().unwrap();
         let expected = [[0.5, 0.9], [-0.2, 0.2], [0.0, 1.0]];
         for (found, expected) in [u, v, t].into_iter().zip(expected) {

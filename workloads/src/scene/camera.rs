@@ -1,7 +1,7 @@
 //! Cameras of a scene, and the pipeline's camera made from them for one frame.
 
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
-use pipeline::{Camera, Lens};
+use pipeline::{Camera, CameraError, Lens};
 
 use super::deform::Pose;
 use super::track::{Instant, Track};
@@ -57,13 +57,61 @@ impl Rig {
     }
 }
 
+/// How much a camera sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum View {
+    /// What lies within a field of view.
+    Perspective {
+        /// Tangent of half of it, vertically.
+        tan_half_height: f64,
+    },
+    /// The same height at any depth.
+    Orthographic {
+        /// Half of it, in scene units.
+        half_height: f64,
+    },
+}
+
+impl View {
+    /// What is said by a vertical field of view in degrees, 40 by default, or by the height of what is seen in scene units.
+    ///
+    /// # Errors
+    /// In words, when both are given.
+    pub fn given(fov_deg: Option<f64>, view_height: Option<f64>) -> Result<Self, String> {
+        match (fov_deg, view_height) {
+            (Some(_), Some(_)) => Err(
+                "`fov_deg` makes a perspective camera and `view_height` an orthographic one: leave one out"
+                    .to_owned(),
+            ),
+            (_, Some(height)) => Ok(Self::Orthographic { half_height: 0.5 * height }),
+            (fov_deg, None) => {
+                Ok(Self::Perspective { tan_half_height: tan_half(fov_deg.unwrap_or(DEFAULT_FOV_DEG)) })
+            }
+        }
+    }
+
+    /// The still pipeline camera that sees so much.
+    pub(crate) fn camera(self, pose: Affine3A, near: f32) -> Result<Camera, CameraError> {
+        match self {
+            Self::Perspective { tan_half_height } => Camera::new(pose, tan_half_height as f32, near),
+            Self::Orthographic { half_height } => Camera::orthographic(pose, half_height as f32, near),
+        }
+    }
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self::Perspective { tan_half_height: tan_half(DEFAULT_FOV_DEG) }
+    }
+}
+
 /// A scene's camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCamera {
     /// What holds it.
     pub rig: Rig,
-    /// Tangent of half the vertical field of view.
-    pub tan_half_height: f64,
+    /// How much it sees.
+    pub view: View,
     /// Depth in scene units below which nothing is seen; `None` for a thousandth of the distance of the
     /// target (a quarter of the nearest vertex's depth for a fitted camera).
     pub near: Option<f64>,
@@ -79,7 +127,7 @@ pub fn tan_half(fov_deg: f64) -> f64 {
 
 impl Default for SceneCamera {
     fn default() -> Self {
-        Self { rig: Rig::Fitted, tan_half_height: tan_half(DEFAULT_FOV_DEG), near: None }
+        Self { rig: Rig::Fitted, view: View::default(), near: None }
     }
 }
 
@@ -160,7 +208,7 @@ impl SceneCamera {
 pub(super) fn between(
     open: &Stand,
     close: &Stand,
-    tan_half_height: f64,
+    view: View,
     near: f64,
     lens: Option<(f32, f64)>,
 ) -> Result<Camera, String> {
@@ -169,7 +217,7 @@ pub(super) fn between(
         Some((radius, focus)) => Some(Lens::new(radius, focus as f32).map_err(|e| describe(&e))?),
         None => None,
     };
-    let camera = Camera::new(open.pose(), tan_half_height as f32, near as f32).map_err(|e| describe(&e))?;
+    let camera = view.camera(open.pose(), near as f32).map_err(|e| describe(&e))?;
     let camera = camera.moving(open.pose(), close.pose()).map_err(|e| describe(&e))?;
     Ok(camera.with_lens(lens))
 }

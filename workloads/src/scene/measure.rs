@@ -6,7 +6,7 @@ use activity::Warning;
 use glam::DVec3;
 
 use super::Scene;
-use super::camera::Rig;
+use super::camera::{Rig, View};
 use super::fit::{Extent, Fit};
 use super::frame::FrameError;
 
@@ -36,7 +36,7 @@ impl Scene {
             return Ok((centre, None));
         }
         let aspect = f64::from(self.settings.width) / f64::from(self.settings.height);
-        let tan = self.camera.tan_half_height;
+        let View::Perspective { tan_half_height: tan } = self.camera.view else { return Ok((centre, None)) };
         let Some(mut extent) = Extent::new(tan * aspect, tan) else { return Ok((centre, None)) };
         for index in self.fitted_frames() {
             self.visit_points(index, index != first, &mut |point| extent.add(point))?;

@@ -19,7 +19,7 @@ use std::sync::OnceLock;
 use activity::Warning;
 use glam::{DVec3, Vec3};
 
-pub use camera::{DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, tan_half};
+pub use camera::{DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, View, tan_half};
 pub use clip::{Clip, Property};
 pub use frame::{Frame, FrameError, FrameMesh};
 pub use graph::Graph;
@@ -204,7 +204,7 @@ impl Scene {
         let (open, close, near, subject) = self.stands(interval)?;
         let radius = self.settings.lens_radius;
         let lens = (radius > 0.0).then(|| (radius, self.settings.focus.map_or(subject, f64::from)));
-        between(&open, &close, self.camera.tan_half_height, near, lens)
+        between(&open, &close, self.camera.view, near, lens)
             .map_err(|message| FrameError::Camera { frame: interval.frame, message })
     }
 }

@@ -2,15 +2,15 @@
 
 use activity::Warning;
 use glam::{DVec3, Vec3};
-use gltf::json::camera::Type as CameraType;
+use gltf::json::camera::{Camera, Type as CameraType};
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use gltf::json::validation::Checked;
 
 use super::document::Document;
 use super::nodes::Tree;
-use crate::scene::{Instant, Light, Rig, SceneCamera, world_poses};
+use crate::scene::{Instant, Light, Rig, SceneCamera, View, world_poses};
 
-/// The first perspective camera and the first directional light of the default scene, or what stands in.
+/// The first usable camera and the first directional light of the default scene, or what stands in.
 pub(super) fn view(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> (SceneCamera, Light) {
     (camera(document, tree, warnings), light(document, tree, warnings))
 }
@@ -22,31 +22,33 @@ fn camera(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Scen
         if !tree.in_scene[index] {
             continue;
         }
-        match (&camera.type_, &camera.perspective) {
-            (Checked::Valid(CameraType::Perspective), Some(lens))
-                if lens.yfov > 0.0 && lens.yfov < 3.1 && lens.znear > 0.0 =>
-            {
-                return SceneCamera {
-                    rig: Rig::Node(tree.place[index]),
-                    tan_half_height: libm::tan(f64::from(lens.yfov) / 2.0),
-                    near: Some(f64::from(lens.znear)),
-                };
-            }
-            (Checked::Valid(CameraType::Orthographic), _) => {
-                let message = format!(
-                    "the camera at node {index} is orthographic, which is not supported: another one is used"
-                );
-                warnings.push(Warning::new("camera-ignored", message));
-            }
-            _ => {
-                let message = format!(
-                    "the camera at node {index} has no usable field of view or near plane: another one is used"
-                );
-                warnings.push(Warning::new("camera-ignored", message));
-            }
+        if let Some((view, near)) = seen(camera) {
+            return SceneCamera { rig: Rig::Node(tree.place[index]), view, near };
         }
+        let message = format!(
+            "the camera at node {index} has no usable field of view, height or near plane: another one is used"
+        );
+        warnings.push(Warning::new("camera-ignored", message));
     }
     SceneCamera::default()
+}
+
+/// How much the camera sees and its near depth. The image has its own width, so the file's aspect ratio or `xmag` does not count
+/// (glTF 2.0, 3.10.3); an orthographic near plane at zero, which it allows, is left to the scene.
+fn seen(camera: &Camera) -> Option<(View, Option<f64>)> {
+    match (&camera.type_, &camera.perspective, &camera.orthographic) {
+        (Checked::Valid(CameraType::Perspective), Some(lens), _) => {
+            let usable = lens.yfov > 0.0 && lens.yfov < 3.1 && lens.znear > 0.0;
+            let tan_half_height = libm::tan(f64::from(lens.yfov) / 2.0);
+            usable.then_some((View::Perspective { tan_half_height }, Some(f64::from(lens.znear))))
+        }
+        (Checked::Valid(CameraType::Orthographic), _, Some(lens)) => {
+            let usable = lens.ymag > 0.0 && lens.ymag.is_finite() && lens.znear >= 0.0;
+            let near = (lens.znear > 0.0).then_some(f64::from(lens.znear));
+            usable.then_some((View::Orthographic { half_height: f64::from(lens.ymag) }, near))
+        }
+        _ => None,
+    }
 }
 
 fn light(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Light {

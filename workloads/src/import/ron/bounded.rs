@@ -26,6 +26,10 @@ pub(crate) fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>
     checked(from, |value: &f64| value.is_finite() && *value > 0.0, "a finite number above zero")
 }
 
+pub(crate) fn height<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    checked(from, |value| (1e-30..=1e30).contains(value), "a height above zero (1e-30 to 1e30)")
+}
+
 pub(crate) fn depth<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
     checked(from, |value: &f32| value.is_finite() && *value > 0.0, "a finite depth above zero")
 }

@@ -10,7 +10,7 @@ use activity::Warning;
 use glam::{DVec3, Vec3};
 
 use crate::error::{LoadError, Source};
-use crate::scene::{Light, LookAt, Parts, Place, Rig, SceneCamera, Settings, Track, tan_half};
+use crate::scene::{Light, LookAt, Parts, Place, Rig, SceneCamera, Settings, Track, View};
 use spec::{CameraSpec, LightSpec, SceneSpec, SettingsSpec};
 
 /// Reads the scene at `path`.
@@ -169,7 +169,8 @@ fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<S
             target: path("camera.end_target", target, spec.end_target, |key| key.target)?,
             up,
         })),
-        tan_half_height: tan_half(spec.fov_deg.unwrap_or(crate::scene::DEFAULT_FOV_DEG)),
+        view: View::given(spec.fov_deg, spec.view_height)
+            .map_err(|message| context.wrong("camera", message))?,
         near: spec.near,
     })
 }

@@ -72,6 +72,9 @@ pub(super) struct CameraSpec {
     /// Vertical field of view, 40 degrees by default.
     #[serde(default, deserialize_with = "bounded::field_of_view")]
     pub fov_deg: Option<f64>,
+    /// Height of what is seen, at any depth: an orthographic view, instead of a field of view.
+    #[serde(default, deserialize_with = "bounded::height")]
+    pub view_height: Option<f64>,
     /// Depth below which nothing is seen; a thousandth of the target's by default.
     #[serde(default, deserialize_with = "bounded::positive")]
     pub near: Option<f64>,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{LoadError, Source};
 use crate::import::ron::bounded;
-use crate::scene::DEFAULT_FOV_DEG;
+use crate::scene::{DEFAULT_FOV_DEG, View as Seen};
 
 pub(super) use place::{View, fit};
 
@@ -35,8 +35,11 @@ pub struct CameraSpec {
     /// Shape of the aperture, a disk by default.
     lens_shape: LensShape,
     /// Vertical field of view in degrees, 40 by default.
-    #[serde(deserialize_with = "bounded::field_of_view")]
+    #[serde(deserialize_with = "bounded::field_of_view", skip_serializing_if = "Option::is_none")]
     fov_deg: Option<f64>,
+    /// Height of what is seen, at any depth: an orthographic view, instead of a field of view.
+    #[serde(deserialize_with = "bounded::height", skip_serializing_if = "Option::is_none")]
+    view_height: Option<f64>,
     /// Where it is when the shutter opens.
     #[serde(deserialize_with = "bounded::vector")]
     position: Option<[f64; 3]>,
@@ -137,6 +140,12 @@ impl CameraSpec {
             "camera",
             "it has an end but no start: give `position` and `target`, too",
         )?;
+        self.seen()?;
+        ensure(
+            self.view_height.is_none() || self.is_placed(),
+            "camera",
+            "an orthographic camera (`view_height`) is not fitted: give `position` and `target`, too",
+        )?;
         ensure(
             self.focus.is_none() || self.radius() > 0.0,
             "focus",
@@ -168,6 +177,11 @@ impl CameraSpec {
     fn field_of_view(&self) -> f64 {
         self.fov_deg.unwrap_or(DEFAULT_FOV_DEG)
     }
+
+    /// How much it sees.
+    fn seen(&self) -> Result<Seen, Wrong> {
+        Seen::given(self.fov_deg, self.view_height).map_err(|message| ("camera", message))
+    }
 }
 
 /// What of a camera is wrong, and how, in words.
@@ -193,6 +207,15 @@ mod tests {
             ("(seed: -1)", ["c.ron:1:", "out of bounds"]),
             ("(lens_shape: Disc)", ["c.ron:1:", "unknown variant `Disc`, did you mean `Disk`?"]),
             ("(fov_deg: 180)", ["c.ron:1:", "0.1 to 175 degrees"]),
+            ("(view_height: 0)", ["c.ron:1:", "above zero"]),
+            ("(view_height: -2)", ["c.ron:1:", "above zero"]),
+            ("(view_height: NaN)", ["c.ron:1:", "above zero"]),
+            ("(view_height: inf)", ["c.ron:1:", "above zero"]),
+            ("(view_height: 2)", ["c.ron: camera:", "give `position` and `target`"]),
+            (
+                "(position: (0, 0, 5), target: (0, 0, 0), fov_deg: 40, view_height: 2)",
+                ["c.ron: camera:", "leave one out"],
+            ),
             ("(position: (0, NaN, 0))", ["c.ron:1:", "finite numbers"]),
             ("(shift: (0, inf))", ["c.ron:1:", "finite numbers"]),
             ("(position: (0, 0))", ["c.ron:1:", "3"]),
@@ -228,6 +251,10 @@ mod tests {
         let written = spec.to_ron();
         assert_eq!(parse(&written).unwrap(), spec, "{written}");
         assert!(written.contains("end_position") && !written.contains("end_target"), "{written}");
+        let flat = parse("(position: (0, 0, 3), target: (0, 0, 0), view_height: 2.5)").unwrap().completed();
+        let written = flat.to_ron();
+        assert_eq!(parse(&written).unwrap(), flat, "{written}");
+        assert!(written.contains("view_height") && !written.contains("fov_deg"), "{written}");
         assert!(parse("()").unwrap() == CameraSpec::default() && !CameraSpec::default().is_placed());
     }
 }

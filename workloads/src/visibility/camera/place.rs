@@ -33,7 +33,7 @@ impl CameraSpec {
             height: Some(height),
             samples: Some(self.samples()),
             seed: Some(self.seed()),
-            fov_deg: Some(self.field_of_view()),
+            fov_deg: self.view_height.is_none().then(|| self.field_of_view()),
             up: self.up.or(Some(DVec3::Y.to_array())),
             lens_radius: Some(self.radius()),
             focus,
@@ -66,8 +66,7 @@ impl CameraSpec {
     fn camera(&self) -> Result<Camera, Wrong> {
         let out_of = |place| move |error: CameraError| (place, error.to_string());
         let near = self.near.unwrap_or(0.0);
-        let camera = Camera::new(Affine3A::IDENTITY, tan_half(self.field_of_view()) as f32, near);
-        let camera = camera.map_err(out_of("near"))?;
+        let camera = self.seen()?.camera(Affine3A::IDENTITY, near).map_err(out_of("near"))?;
         let camera = camera
             .with_shift(DVec2::from_array(self.shift.unwrap_or_default()).as_vec2())
             .map_err(out_of("shift"))?;
@@ -138,11 +137,14 @@ mod tests {
             "(position: (0, 0, 5), target: (0, 0, 0), lens_radius: 0.5, focus: 3, near: 0.25, fov_deg: 90)",
         );
         assert_eq!(told.camera.lens(), Some(Lens::new(0.5, 3.0).unwrap()));
-        assert_eq!((told.camera.near(), told.camera.tan_half_height()), (0.25, 1.0));
+        assert_eq!((told.camera.near(), told.camera.half_height()), (0.25, 1.0));
         let plain = view("(position: (0, 0, 5), target: (0, 0, 0), lens_radius: 0.5)");
         assert_eq!(plain.camera.lens(), Some(Lens::new(0.5, 5.0).unwrap()));
         assert_eq!(plain.camera.near(), 0.005);
         assert_eq!(view("(position: (0, 0, 5), target: (0, 0, 0))").camera.lens(), None);
+        let flat = view("(position: (0, 0, 5), target: (0, 0, 0), view_height: 3, lens_radius: 0.5)").camera;
+        assert!(flat.is_orthographic() && !plain.camera.is_orthographic());
+        assert_eq!((flat.half_height(), flat.lens()), (1.5, plain.camera.lens()));
     }
 
     #[test]
@@ -157,7 +159,7 @@ mod tests {
         assert!(holds_lens && spec.is_placed());
         let view = spec.view().unwrap();
         for point in mesh.corners().flatten().map(|corner| view.stands[0].view(corner)) {
-            let tan = f64::from(view.camera.tan_half_height());
+            let tan = f64::from(view.camera.half_height());
             assert!(point.z > f64::from(view.camera.near()));
             assert!((point.x / point.z).abs() < tan && (point.y / point.z).abs() < tan, "{point}");
         }
