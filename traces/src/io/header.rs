@@ -15,7 +15,7 @@ pub(super) const KEYS: [&str; 2] = ["trace", "power_trace"];
 /// The description: what the columns alone do not say, and the exact rate and start, which rounded time stamps lose.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub(super) struct Header {
+pub(crate) struct Header {
     pub version: u32,
     #[serde(alias = "sample_rate_hz")]
     pub rate_hz: Option<f64>,
