@@ -12,6 +12,7 @@ mod method;
 mod minima;
 pub mod profile;
 mod refine;
+mod propose;
 mod register;
 mod regularity;
 mod split;
@@ -22,4 +23,13 @@ pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_on
 pub use flags::{Flag, Flags};
 pub use marks::{MarkError, Marks, Window, default_window};
 pub use method::Method;
+pub use propose::{Proposal, propose};
 pub use threshold::{Population, Rule, Threshold};
+
+// For the analysis of files in pieces.
+pub(crate) use assess::{conclude_at, confidence};
+pub(crate) use find::{misalignment_w2, start_after_idle};
+pub(crate) use marks::{Placed, Placement};
+pub(crate) use refine::vertex;
+pub(crate) use regularity::regularity;
+pub(crate) use threshold::choose;

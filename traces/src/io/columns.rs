@@ -287,7 +287,7 @@ mod tests {
         let of = |options: &ReadOptions| layout(Path::new("a"), &names, options, "time_s");
         assert_eq!(of(&ReadOptions::default()).unwrap().names, ["cpu", "gpu"]);
         let gpu = ReadOptions { rails: vec!["GPU".to_owned()], ..ReadOptions::default() };
-        assert_eq!(of(&gpu).unwrap().rails, [Rail::Measured { voltage: 1, current: 0 }]);
+        assert_eq!(of(&gpu).unwrap().rails, [Rail::Measured { voltage: 0, current: 1 }]);
         let other = ReadOptions { rails: vec!["ram".to_owned()], ..ReadOptions::default() };
         assert!(of(&other).unwrap_err().to_string().contains("of rail ram"));
     }

@@ -2,6 +2,8 @@
 
 use super::{ReadError, ReadOptions, Rows, WriteError, atomic, header};
 use crate::trace::Trace;
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -15,12 +17,20 @@ const CHANNELS: [&str; 2] = ["voltage_V", "current_A"];
 /// # Errors
 /// [`WriteError::Encode`] if the writer fails.
 pub fn write<W: Write>(trace: &Trace, out: W) -> Result<(), WriteError> {
-    let mut out = BufWriter::with_capacity(1 << 16, out);
-    write_rows(trace, &mut out).map_err(|error| WriteError::Encode(error.to_string()))
+    write_with(trace, out, b',')
 }
 
-fn write_rows(trace: &Trace, out: &mut impl Write) -> std::io::Result<()> {
-    writeln!(out, "{TIME},{},{}", CHANNELS[0], CHANNELS[1])?;
+/// As [`write`], with something else than a comma between the fields: a tab for TSV.
+///
+/// # Errors
+/// [`WriteError::Encode`] if the writer fails.
+pub fn write_with<W: Write>(trace: &Trace, out: W, delimiter: u8) -> Result<(), WriteError> {
+    let mut out = BufWriter::with_capacity(1 << 16, out);
+    write_rows(trace, &mut out, char::from(delimiter)).map_err(|error| WriteError::Encode(error.to_string()))
+}
+
+fn write_rows(trace: &Trace, out: &mut impl Write, c: char) -> std::io::Result<()> {
+    writeln!(out, "{TIME}{c}{}{c}{}", CHANNELS[0], CHANNELS[1])?;
     for (index, (voltage, current)) in trace.voltage_v().iter().zip(trace.current_a()).enumerate() {
         let time_ns = trace.time_ns(index);
         let (sign, time_ns) = (if time_ns < 0 { "-" } else { "" }, time_ns.unsigned_abs());
@@ -30,7 +40,7 @@ fn write_rows(trace: &Trace, out: &mut impl Write) -> std::io::Result<()> {
             digits -= 1;
         }
         let (voltage, current) = (f64::from(*voltage), f64::from(*current));
-        writeln!(out, "{sign}{seconds}.{fraction:0digits$},{voltage},{current}")?;
+        writeln!(out, "{sign}{seconds}.{fraction:0digits$}{c}{voltage}{c}{current}")?;
     }
     out.flush()
 }
@@ -56,6 +66,23 @@ pub fn sidecar_path(path: &Path) -> PathBuf {
 pub fn save(trace: &Trace, path: &Path) -> Result<(), WriteError> {
     atomic::write_file(path, |out| write(trace, out))?;
     atomic::write_file(&sidecar_path(path), |out| write_sidecar(trace, out))
+}
+
+/// As [`save`], with another delimiter and compressed with gzip if asked.
+///
+/// # Errors
+/// [`WriteError`] names the file.
+pub fn save_as(trace: &Trace, path: &Path, delimiter: u8, gzip: bool) -> Result<(), WriteError> {
+    atomic::write_file(path, |out| {
+        if !gzip {
+            return write_with(trace, out, delimiter);
+        }
+        let mut packed = GzEncoder::new(out, Compression::default());
+        write_with(trace, &mut packed, delimiter)?;
+        packed.finish().map(|_| ()).map_err(|error| WriteError::Encode(error.to_string()))
+    })?;
+    let beside = if gzip { path.with_extension("") } else { path.to_owned() };
+    atomic::write_file(&sidecar_path(&beside), |out| write_sidecar(trace, out))
 }
 
 /// Reads a CSV file, and its description if there is a [`sidecar_path`].

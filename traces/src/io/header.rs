@@ -64,7 +64,7 @@ pub(super) fn from_json(path: &Path, json: &str) -> Result<Header, ReadError> {
 
 impl Header {
     /// Holds the stated number of samples against the rows found.
-    pub(super) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
+    pub(crate) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
         match self.samples {
             Some(stated) if stated != found => Err(ReadError::Rows { path: path.to_owned(), found, stated }),
             _ => Ok(()),
