@@ -71,7 +71,8 @@ fn repairs_are_made_on_request_alone_and_told() {
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("row 2"));
     let report = json(folder.path(), &["convert", "bad.csv", "good.csv", "--repair"]);
-    let codes: Vec<&str> = report["repairs"].as_array().unwrap().iter().map(|r| r["code"].as_str().unwrap()).collect();
+    let codes: Vec<&str> =
+        report["repairs"].as_array().unwrap().iter().map(|r| r["code"].as_str().unwrap()).collect();
     assert_eq!(codes, ["sorted-rows", "filled-values", "filled-gap"]);
     let good = fs::read_to_string(folder.path().join("good.csv")).unwrap();
     let current: Vec<&str> = good.lines().skip(1).map(|line| line.rsplit(',').next().unwrap()).collect();
@@ -123,15 +124,45 @@ fn every_plot_is_drawn_in_every_format() {
 fn sampling_alignment_energy_and_frontiers_answer() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
-    let coarse = ["sample", "t.csv", "--device-rate", "1000", "--rail-ohm", "0.5", "--specified-voltage", "12", "--out", "c.parquet"];
+    let coarse = [
+        "sample",
+        "t.csv",
+        "--device-rate",
+        "1000",
+        "--rail-ohm",
+        "0.5",
+        "--specified-voltage",
+        "12",
+        "--out",
+        "c.parquet",
+    ];
     // The rail sags by R I; a voltage by specification misses that and finds too much.
     assert!(json(folder.path(), &coarse)["relative_error"].as_f64().unwrap() > 0.02);
     fs::write(folder.path().join("s.csv"), "0\n10\n20\n").unwrap();
-    let aligned = json(folder.path(), &["align", "t.csv", "s.csv", "--anchor", "0=0.1", "--anchor", "10=0.2"]);
+    let aligned =
+        json(folder.path(), &["align", "t.csv", "s.csv", "--anchor", "0=0.1", "--anchor", "10=0.2"]);
     assert!((aligned["times_s"][2].as_f64().unwrap() - 0.3).abs() < 1e-12);
-    let energy = json(folder.path(), &[&["energy", "t.csv", "--idle", "0..0.09", "--pass", "draw=0", "--pass", "rest=4", "--drop-outliers"], &MARK[..]].concat());
+    let energy = json(
+        folder.path(),
+        &[
+            &[
+                "energy",
+                "t.csv",
+                "--idle",
+                "0..0.09",
+                "--pass",
+                "draw=0",
+                "--pass",
+                "rest=4",
+                "--drop-outliers",
+            ],
+            &MARK[..],
+        ]
+        .concat(),
+    );
     let run = &energy["runs"][0];
-    let passes: f64 = run["passes"].as_array().unwrap().iter().map(|p| p["energy_J"]["mean"].as_f64().unwrap()).sum();
+    let passes: f64 =
+        run["passes"].as_array().unwrap().iter().map(|p| p["energy_J"]["mean"].as_f64().unwrap()).sum();
     assert!((passes / run["energy_J"]["mean"].as_f64().unwrap() - 1.0).abs() < 1e-9);
     assert!((run["energy_J"]["mean"].as_f64().unwrap() - 0.0568).abs() < 5e-4, "{run}");
     fs::write(folder.path().join("p.csv"), "a,time_ms,energy_mJ\nx,1,10\ny,2,11\nz,3,9\n").unwrap();

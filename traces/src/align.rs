@@ -107,10 +107,12 @@ mod tests {
     use super::*;
 
     fn uneven() -> Vec<f64> {
-        (0..40).scan(3.0, |t, i| {
-            *t += 0.01 + 0.003 * f64::from(i * i * 7 % 31) / 8.0;
-            Some(*t)
-        }).collect()
+        (0..40)
+            .scan(3.0, |t, i| {
+                *t += 0.01 + 0.003 * f64::from(i * i * 7 % 31) / 8.0;
+                Some(*t)
+            })
+            .collect()
     }
 
     #[test]

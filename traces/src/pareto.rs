@@ -57,7 +57,11 @@ pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<Standing> {
         point: point.clone(),
         compensated_j: pairs[index].1,
         on_frontier: on[index],
-        probability: if certain { f64::from(u8::from(on[index])) } else { f64::from(counts[index]) / f64::from(DRAWS) },
+        probability: if certain {
+            f64::from(u8::from(on[index]))
+        } else {
+            f64::from(counts[index]) / f64::from(DRAWS)
+        },
     };
     points.iter().enumerate().map(standing).collect()
 }

@@ -97,8 +97,10 @@ impl Pyramid {
             let read = rows.next(ROWS, &mut chunk)? as u64;
             rows.channels(&mut chunk, &mut voltage_v, &mut current_a);
             samples += read;
-            let whole = if read == 0 { voltage_v.len() } else { voltage_v.len() / BLOCK as usize * BLOCK as usize };
-            let blocks = voltage_v[..whole].chunks(BLOCK as usize).zip(current_a[..whole].chunks(BLOCK as usize));
+            let whole =
+                if read == 0 { voltage_v.len() } else { voltage_v.len() / BLOCK as usize * BLOCK as usize };
+            let blocks =
+                voltage_v[..whole].chunks(BLOCK as usize).zip(current_a[..whole].chunks(BLOCK as usize));
             base.extend(blocks.map(|(v, i)| Entry::of_samples(v, i)));
             voltage_v.drain(..whole);
             current_a.drain(..whole);
@@ -141,7 +143,13 @@ impl Pyramid {
             let end = (begin + entries.len() as u64 * size).min(self.samples);
             let time_s = |sample: u64| self.start_s + sample as f64 / self.rate_hz;
             let all = Entry::of_entries(entries);
-            Column { from_s: time_s(begin), to_s: time_s(end), low_w: all.low_w, high_w: all.high_w, mean_w: all.mean_w }
+            Column {
+                from_s: time_s(begin),
+                to_s: time_s(end),
+                low_w: all.low_w,
+                high_w: all.high_w,
+                mean_w: all.mean_w,
+            }
         };
         entries.chunks(per_column as usize).enumerate().map(column).collect()
     }
@@ -179,7 +187,8 @@ impl Pyramid {
     fn kept(path: &Path, stamp: u64) -> Option<Self> {
         let mut bytes = [0; HEADER_BYTES as usize];
         File::open(path).ok()?.read_exact(&mut bytes).ok()?;
-        let word = |index: usize| bytes[8 * index..8 * index + 8].try_into().map(u64::from_le_bytes).unwrap_or(0);
+        let word =
+            |index: usize| bytes[8 * index..8 * index + 8].try_into().map(u64::from_le_bytes).unwrap_or(0);
         let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
         let size = samples.checked_add(0).filter(|&samples| samples < 1 << 48)?;
         let whole = HEADER_BYTES + ENTRY_BYTES * sizes(size).iter().sum::<u64>();
@@ -203,7 +212,8 @@ fn stamp(path: &Path, options: &ReadOptions) -> u64 {
     let metadata = fs::metadata(path).ok();
     let modified = metadata.as_ref().and_then(|m| m.modified().ok()?.duration_since(UNIX_EPOCH).ok());
     let text = format!("{:?} {modified:?} {options:?}", metadata.map(|m| m.len()));
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 impl Entry {
@@ -264,7 +274,9 @@ mod tests {
         for (from_s, to_s, columns) in [(1.0, 7.1, 1000), (1.0, 7.1, 3), (2.5, 2.6, 20), (6.99, 7.00002, 7)] {
             let found = kept.columns(from_s, to_s, columns);
             assert_eq!(found, made.columns(from_s, to_s, columns));
-            assert!(found[0].from_s <= from_s && found[found.len() - 1].to_s >= to_s.min(trace.end_s()) - 1e-9);
+            assert!(
+                found[0].from_s <= from_s && found[found.len() - 1].to_s >= to_s.min(trace.end_s()) - 1e-9
+            );
             for column in found {
                 let place = |time_s: f64| libm::round(trace.position(time_s)) as usize;
                 let powers = (place(column.from_s)..place(column.to_s)).map(|i| trace.power_w(i) as f32);

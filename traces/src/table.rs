@@ -100,11 +100,13 @@ impl Table {
     /// [`TableReadError`] if there is none of that name, or a value is no number.
     pub fn numbers(&self, column: &str) -> Result<Vec<f64>, TableReadError> {
         let number = |(row, text): (usize, String)| {
-            text.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| TableReadError::Value {
-                path: self.path.clone(),
-                row: row + 1,
-                column: column.to_owned(),
-                value: text,
+            text.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
+                TableReadError::Value {
+                    path: self.path.clone(),
+                    row: row + 1,
+                    column: column.to_owned(),
+                    value: text,
+                }
             })
         };
         self.texts(column)?.into_iter().enumerate().map(number).collect()
@@ -116,8 +118,10 @@ type Content = (Vec<String>, Vec<Vec<String>>);
 fn from_text(bytes: &[u8]) -> Result<Content, String> {
     let line = bytes.split(|&byte| byte == b'\n').next().unwrap_or_default();
     let delimiter = [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
-    let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).delimiter(delimiter).from_reader(bytes);
-    let text = |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).delimiter(delimiter).from_reader(bytes);
+    let text =
+        |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
     let names = text(reader.byte_headers().map_err(|error| error.to_string())?);
     let rows = reader.byte_records().map(|record| record.map(|record| text(&record)));
     Ok((names, rows.collect::<Result<_, _>>().map_err(|error| error.to_string())?))
@@ -149,6 +153,12 @@ mod tests {
         let table = Table::read(&path).unwrap();
         assert_eq!(table.texts("algorithm").unwrap(), ["VB", "TF"]);
         assert!(table.numbers("time_ms").unwrap_err().to_string().contains("row 2: time_ms is \"x\""));
-        assert!(table.numbers("energy").unwrap_err().to_string().contains("no column energy (found: Algorithm, time_ms)"));
+        assert!(
+            table
+                .numbers("energy")
+                .unwrap_err()
+                .to_string()
+                .contains("no column energy (found: Algorithm, time_ms)")
+        );
     }
 }

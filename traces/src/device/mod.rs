@@ -61,7 +61,10 @@ impl Device {
     fn is_true(&self) -> bool {
         let spec = &self.spec;
         let straight = spec.current_gain == 1.0 && spec.voltage_gain == 1.0;
-        straight && spec.current_offset_a == 0.0 && spec.voltage_offset_v == 0.0 && spec.specified_voltage_v.is_none()
+        straight
+            && spec.current_offset_a == 0.0
+            && spec.voltage_offset_v == 0.0
+            && spec.specified_voltage_v.is_none()
     }
 
     fn is_noise_free(&self) -> bool {

@@ -153,8 +153,10 @@ impl Device {
                 return Err(SampleError::Overload { time_s, power_w, limit_w: self.rail.limit_w() });
             };
             let (a, v) = if noisy { noise.pair(index as u64) } else { (0.0, 0.0) };
-            let (voltage, voltage_clipped) = self.voltage.quantize(self.volts(volts) + self.spec.voltage_noise_v * v);
-            let (current, current_clipped) = self.current.quantize(self.amperes(amperes) + self.spec.current_noise_a * a);
+            let (voltage, voltage_clipped) =
+                self.voltage.quantize(self.volts(volts) + self.spec.voltage_noise_v * v);
+            let (current, current_clipped) =
+                self.current.quantize(self.amperes(amperes) + self.spec.current_noise_a * a);
             channels.voltage_v.push(self.spec.specified_voltage_v.map_or(voltage, |volts| volts as f32));
             channels.current_a.push(current);
             channels.clipped_voltages += usize::from(voltage_clipped);

@@ -18,7 +18,8 @@ pub fn outliers(values: &[f64]) -> Vec<bool> {
     if values.len() < 5 {
         return vec![false; values.len()];
     }
-    let deviations: Vec<f64> = (0..values.len()).into_par_iter().map(|index| deviation(values, index)).collect();
+    let deviations: Vec<f64> =
+        (0..values.len()).into_par_iter().map(|index| deviation(values, index)).collect();
     let mut out: Vec<bool> = deviations.iter().map(|z| z.abs() > FAR[0]).collect();
     let core = out.clone();
     for index in 0..values.len() {

@@ -86,7 +86,12 @@ fn understood(name: &str) -> Option<Named> {
         *name == token && told.is_none_or(|told| told == *of)
     };
     let unit = tokens.iter().rev().find_map(|token| {
-        UNITS.iter().copied().enumerate().find(|unit| fits(unit, token)).map(|(_, (_, of, scale))| (*token, of, scale))
+        UNITS
+            .iter()
+            .copied()
+            .enumerate()
+            .find(|unit| fits(unit, token))
+            .map(|(_, (_, of, scale))| (*token, of, scale))
     });
     let quantity_told = told.or(unit.map(|(_, of, _)| of))?;
     // A single letter is a unit only where nothing but a rail stands beside it or the quantity is told as well.
@@ -123,9 +128,11 @@ fn missing(path: &Path, names: &[String], column: &str) -> ReadError {
 /// A column by its name, else by its number from 1.
 fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Picked, ReadError> {
     let named = names.iter().position(|name| name.eq_ignore_ascii_case(column));
-    let numbered = || column.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).filter(|&n| n < names.len());
+    let numbered =
+        || column.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).filter(|&n| n < names.len());
     let index = named.or_else(numbered).ok_or_else(|| missing(path, names, column))?;
-    let scale = understood(&names[index]).filter(|named| named.quantity == of).map_or(1.0, |named| named.scale);
+    let scale =
+        understood(&names[index]).filter(|named| named.quantity == of).map_or(1.0, |named| named.scale);
     Ok(Picked { index, name: names[index].clone(), scale })
 }
 
@@ -136,9 +143,15 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         None => time_column(path, names)?,
     };
     if let Some(power) = pick(&options.power, Quantity::Power)? {
-        return Ok(Layout { time, values: vec![power], rails: vec![Rail::Power { power: 0 }], names: vec![String::new()] });
+        return Ok(Layout {
+            time,
+            values: vec![power],
+            rails: vec![Rail::Power { power: 0 }],
+            names: vec![String::new()],
+        });
     }
-    let current = pick(&options.current, Quantity::Current)?.ok_or_else(|| missing(path, names, "current_A"))?;
+    let current =
+        pick(&options.current, Quantity::Current)?.ok_or_else(|| missing(path, names, "current_A"))?;
     let (values, rail) = match (options.fixed_voltage_v, pick(&options.voltage, Quantity::Voltage)?) {
         (Some(volts), _) => (vec![current], Rail::Specified { volts, current: 0 }),
         (None, Some(voltage)) => (vec![voltage, current], Rail::Measured { voltage: 0, current: 1 }),
@@ -149,7 +162,8 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
 
 fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadError> {
     let mut times = names.iter().enumerate().filter_map(|(index, name)| {
-        let named = understood(name).filter(|named| named.quantity == Quantity::Time && named.rail.is_empty())?;
+        let named =
+            understood(name).filter(|named| named.quantity == Quantity::Time && named.rail.is_empty())?;
         Some(Picked { index, name: name.clone(), scale: named.scale })
     });
     let first = times.next();
@@ -178,7 +192,10 @@ fn by_name(
         let Some(named) = understood(name).filter(|named| named.quantity != Quantity::Time) else { continue };
         let picked = Picked { index, name: name.clone(), scale: named.scale };
         if rails.entry(named.rail).or_default().insert(named.quantity, picked).is_some() {
-            return Err(ReadError::DuplicateColumn { path: path.to_owned(), column: native(named.quantity).to_owned() });
+            return Err(ReadError::DuplicateColumn {
+                path: path.to_owned(),
+                column: native(named.quantity).to_owned(),
+            });
         }
     }
     let time = match &options.time {
@@ -204,18 +221,29 @@ fn native(quantity: Quantity) -> &'static str {
 type Rails = BTreeMap<String, BTreeMap<Quantity, Picked>>;
 
 /// The rails that were asked for, or all that can be read.
-fn chosen(path: &Path, names: &[String], options: &ReadOptions, mut rails: Rails) -> Result<Rails, ReadError> {
+fn chosen(
+    path: &Path,
+    names: &[String],
+    options: &ReadOptions,
+    mut rails: Rails,
+) -> Result<Rails, ReadError> {
     if options.rails.is_empty() {
         // A voltage alone (a sense line) is no rail, unless it is all there is and what is missing is to be told.
         let whole: Rails = rails
             .iter()
-            .filter(|(_, columns)| columns.contains_key(&Quantity::Current) || columns.contains_key(&Quantity::Power))
+            .filter(|(_, columns)| {
+                columns.contains_key(&Quantity::Current) || columns.contains_key(&Quantity::Power)
+            })
             .map(|(name, columns)| (name.clone(), columns.clone()))
             .collect();
         if !whole.is_empty() {
             return Ok(whole);
         }
-        let column = if rails.values().any(|c| c.contains_key(&Quantity::Voltage)) { "current_A" } else { "voltage_V" };
+        let column = if rails.values().any(|c| c.contains_key(&Quantity::Voltage)) {
+            "current_A"
+        } else {
+            "voltage_V"
+        };
         return Err(missing(path, names, column));
     }
     let mut asked = Rails::new();
@@ -240,7 +268,9 @@ impl Layout {
         let rail_of = match (columns.remove(&Quantity::Current), options.fixed_voltage_v) {
             (Some(current), Some(volts)) => Rail::Specified { volts, current: self.value(current) },
             (Some(current), None) => match columns.remove(&Quantity::Voltage) {
-                Some(voltage) => Rail::Measured { voltage: self.value(voltage), current: self.value(current) },
+                Some(voltage) => {
+                    Rail::Measured { voltage: self.value(voltage), current: self.value(current) }
+                }
                 None => return Err(missing(path, names, &format!("{prefix}voltage_V"))),
             },
             (None, _) => match columns.remove(&Quantity::Power) {
@@ -283,7 +313,8 @@ mod tests {
 
     #[test]
     fn rails_are_added_or_chosen() {
-        let names: Vec<String> = ["time_s", "gpu_voltage_V", "gpu_current_A", "cpu_power_mW"].map(str::to_owned).into();
+        let names: Vec<String> =
+            ["time_s", "gpu_voltage_V", "gpu_current_A", "cpu_power_mW"].map(str::to_owned).into();
         let of = |options: &ReadOptions| layout(Path::new("a"), &names, options, "time_s");
         assert_eq!(of(&ReadOptions::default()).unwrap().names, ["cpu", "gpu"]);
         let gpu = ReadOptions { rails: vec!["GPU".to_owned()], ..ReadOptions::default() };

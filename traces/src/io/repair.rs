@@ -29,7 +29,11 @@ pub struct Repair {
 
 /// Mends rows in place: drops those without a time, sorts them, fills what is not finite from its neighbours, and puts
 /// samples where some are missing.
-pub(super) fn mend(path: &Path, columns: &mut Columns, header: &mut Header) -> Result<Vec<Repair>, ReadError> {
+pub(super) fn mend(
+    path: &Path,
+    columns: &mut Columns,
+    header: &mut Header,
+) -> Result<Vec<Repair>, ReadError> {
     let mut told = Vec::new();
     let times = seconds(&columns.stamps);
     let mut times = times.map(|times| order(times, columns, &mut told));
@@ -64,12 +68,21 @@ fn order(times: Vec<f64>, columns: &mut Columns, told: &mut Vec<Repair>) -> Vec<
     let dropped = times.len() - rows.len();
     if dropped > 0 {
         let row = lost.unwrap_or(0) as u64 + 1;
-        let message = format!("{dropped} rows without a time of their own were dropped ({} repeats)", before - rows.len());
+        let message = format!(
+            "{dropped} rows without a time of their own were dropped ({} repeats)",
+            before - rows.len()
+        );
         told.push(Repair { code: "dropped-rows", row, time_s: 0.0, count: dropped as u64, message });
     }
     if let Some(row) = unsorted {
         let message = format!("rows were sorted by time; row {} was the first out of order", row + 1);
-        told.push(Repair { code: "sorted-rows", row: row as u64 + 1, time_s: times[row], count: rows.len() as u64, message });
+        told.push(Repair {
+            code: "sorted-rows",
+            row: row as u64 + 1,
+            time_s: times[row],
+            count: rows.len() as u64,
+            message,
+        });
     }
     if dropped > 0 || unsorted.is_some() {
         columns.voltage_v = rows.iter().map(|&row| columns.voltage_v[row]).collect();
@@ -88,18 +101,29 @@ fn fill(
 ) -> Result<(), ReadError> {
     let mut from = 0;
     while let Some(first) = values[from..].iter().position(|value| !value.is_finite()).map(|at| from + at) {
-        let end = values[first..].iter().position(|value| value.is_finite()).map_or(values.len(), |at| first + at);
+        let end =
+            values[first..].iter().position(|value| value.is_finite()).map_or(values.len(), |at| first + at);
         let (before, after) = (first.checked_sub(1).map(|at| values[at]), values.get(end).copied());
         let Some((before, after)) = before.or(after).zip(after.or(before)) else {
-            return Err(ReadError::Repair { path: path.to_owned(), reason: format!("{name} has no finite value") });
+            return Err(ReadError::Repair {
+                path: path.to_owned(),
+                reason: format!("{name} has no finite value"),
+            });
         };
         for at in first..end {
             let share = (at + 1 - first) as f32 / (end + 1 - first) as f32;
             values[at] = before + share * (after - before);
         }
         let time_s = times.map_or(0.0, |times| times[first]);
-        let message = format!("{name}: {} values from row {} ({time_s} s) on were not finite", end - first, first + 1);
-        told.push(Repair { code: "filled-values", row: first as u64 + 1, time_s, count: (end - first) as u64, message });
+        let message =
+            format!("{name}: {} values from row {} ({time_s} s) on were not finite", end - first, first + 1);
+        told.push(Repair {
+            code: "filled-values",
+            row: first as u64 + 1,
+            time_s,
+            count: (end - first) as u64,
+            message,
+        });
         from = end;
     }
     Ok(())
@@ -122,20 +146,37 @@ fn space(
     }
     let slots = libm::round(place(times[times.len() - 1])) + 1.0;
     if !(slots >= 1.0 && slots <= (LONGER * times.len()) as f64) {
-        let reason = format!("filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows", times.len());
+        let reason = format!(
+            "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
+            times.len()
+        );
         return Err(ReadError::Repair { path: path.to_owned(), reason });
     }
     let off = times.iter().filter(|&&time| (place(time) - libm::round(place(time))).abs() > OFF).count();
     if off > 0 {
-        let row = times.iter().position(|&time| (place(time) - libm::round(place(time))).abs() > OFF).unwrap_or(0);
-        let message = format!("{off} rows, the first of them {}, were off an even rate of {rate_hz} Hz", row + 1);
-        told.push(Repair { code: "resampled", row: row as u64 + 1, time_s: times[row], count: off as u64, message });
+        let row =
+            times.iter().position(|&time| (place(time) - libm::round(place(time))).abs() > OFF).unwrap_or(0);
+        let message =
+            format!("{off} rows, the first of them {}, were off an even rate of {rate_hz} Hz", row + 1);
+        told.push(Repair {
+            code: "resampled",
+            row: row as u64 + 1,
+            time_s: times[row],
+            count: off as u64,
+            message,
+        });
     }
     for (row, pair) in times.windows(2).enumerate() {
         let missing = libm::round(place(pair[1])) - libm::round(place(pair[0])) - 1.0;
         if missing >= 1.0 {
             let message = format!("after row {} ({} s) {missing:.0} samples were missing", row + 1, pair[0]);
-            told.push(Repair { code: "filled-gap", row: row as u64 + 1, time_s: pair[0], count: missing as u64, message });
+            told.push(Repair {
+                code: "filled-gap",
+                row: row as u64 + 1,
+                time_s: pair[0],
+                count: missing as u64,
+                message,
+            });
         }
     }
     let grid: Vec<f64> = (0..slots as usize).map(|slot| start_s + slot as f64 / rate_hz).collect();

@@ -40,11 +40,17 @@ impl Clock {
             // Equal steps and both ends in place: so is all between.
             let step = b.wrapping_sub(a);
             let even = times.windows(2).all(|pair| pair[1].wrapping_sub(pair[0]) == step);
-            if even && self.off(stamps, 0, first).abs() <= OFF && self.off(stamps, times.len() - 1, first).abs() <= OFF {
+            if even
+                && self.off(stamps, 0, first).abs() <= OFF
+                && self.off(stamps, times.len() - 1, first).abs() <= OFF
+            {
                 return Ok(());
             }
         }
-        match (0..stamps.len()).map(|row| (row, self.off(stamps, row, first))).find(|(_, off)| !(off.abs() <= OFF)) {
+        match (0..stamps.len())
+            .map(|row| (row, self.off(stamps, row, first)))
+            .find(|(_, off)| !(off.abs() <= OFF))
+        {
             Some((row, off_periods)) => Err(ReadError::Uneven {
                 path: path.to_owned(),
                 row: first + row as u64 + 1,
@@ -75,7 +81,9 @@ pub fn clock(path: &Path, options: &ReadOptions) -> Result<Clock, ReadError> {
     let stated = rows.header.rate_hz.is_some();
     let first = grid(path, &chunk.stamps, &rows.header)?;
     let mut clock = Clock { start_s: first.start_s, rate_hz: first.rate_hz, samples };
-    let Some(last) = samples.filter(|&n| !stated && n > FIRST_ROWS as u64).map(|n| n - 1) else { return Ok(clock) };
+    let Some(last) = samples.filter(|&n| !stated && n > FIRST_ROWS as u64).map(|n| n - 1) else {
+        return Ok(clock);
+    };
     let start_s = chunk.stamps.time_s(0);
     let mut rows = Rows::open(path, options)?;
     rows.skip(last)?;

@@ -92,7 +92,8 @@ impl Starter<'_> {
         let (voltage_v, current_a) = (head.voltage_v[..kept].to_vec(), head.current_a[..kept].to_vec());
         let start_s = self.plan.clock.start_s;
         let trace = Trace::new(voltage_v, current_a, rate_hz, start_s, Metadata::default()).ok()?;
-        let first = start_after_idle(&trace, &power, &placement, &self.threshold, &starts, self.plan.spacing)?;
+        let first =
+            start_after_idle(&trace, &power, &placement, &self.threshold, &starts, self.plan.spacing)?;
         Some((first, head.sum_to(self.plan.clock.position(first.time_s))))
     }
 }
@@ -101,7 +102,10 @@ impl Plan {
     /// Leaves out the marks and their surroundings.
     fn beside_marks(&self, candidates: &mut Vec<Candidate>) {
         let far = |offset: u64| {
-            self.placement.marks.iter().all(|mark| (mark.first as u64).abs_diff(offset) >= self.spacing as u64)
+            self.placement
+                .marks
+                .iter()
+                .all(|mark| (mark.first as u64).abs_diff(offset) >= self.spacing as u64)
         };
         candidates.retain(|candidate| far(candidate.offset));
     }
@@ -119,7 +123,8 @@ impl Plan {
         choose(&distances, background_w2, noise_w2, self.misalignment_w2(), |value_w2| {
             let below = candidates.iter().filter(|candidate| candidate.distance_w2 < value_w2);
             let marks = self.placement.marks.iter().map(|mark| mark.first);
-            let mut offsets: Vec<usize> = below.map(|candidate| candidate.offset as usize).chain(marks).collect();
+            let mut offsets: Vec<usize> =
+                below.map(|candidate| candidate.offset as usize).chain(marks).collect();
             offsets.sort_unstable();
             regularity(&offsets, span)
         })

@@ -7,7 +7,7 @@ pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mu
     let mut block = from;
     while block < to {
         let values = &profile[block..to.min(block + spacing)];
-        let lowest = values.iter().fold(f32::INFINITY, |low, &value| if value < low { value } else { low });
+        let lowest = lowest(values);
         let Some(at) = values.iter().position(|&value| value == lowest) else {
             block += spacing;
             continue;
@@ -19,5 +19,39 @@ pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mu
             take(offset);
         }
         block += spacing;
+    }
+}
+
+/// The lowest value, in lanes that the compiler keeps in one register.
+fn lowest(values: &[f32]) -> f32 {
+    let less = |a: f32, b: f32| if b < a { b } else { a };
+    let mut lanes = [f32::INFINITY; 16];
+    let chunks = values.chunks_exact(16);
+    let rest = chunks.remainder().iter().fold(f32::INFINITY, |low, &value| less(low, value));
+    for chunk in chunks {
+        for (low, &value) in lanes.iter_mut().zip(chunk) {
+            *low = less(*low, value);
+        }
+    }
+    lanes.into_iter().fold(rest, less)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_by_comparing_all() {
+        let profile: Vec<f32> = (0..5000_u32).map(|i| (i * 7919 % 4999) as f32).collect();
+        for spacing in [1, 2, 7, 40, 125] {
+            let (from, to) = (spacing * 3, 4000);
+            let mut found = Vec::new();
+            minima(&profile, from, to, spacing, |offset| found.push(offset));
+            let alone = |k: &usize| {
+                let around = (k + 1).saturating_sub(spacing)..(k + spacing).min(profile.len());
+                around.filter(|other| other != k).all(|other| profile[other] > profile[*k])
+            };
+            assert_eq!(found, (from..to).filter(alone).collect::<Vec<_>>(), "{spacing}");
+        }
     }
 }

@@ -92,8 +92,8 @@ impl Plan {
     fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
         let (mut piece, mut chunk, mut next) = (Piece::default(), Chunk::default(), 0_u64);
+        let mut read = rows.next(ROWS, &mut chunk)?;
         loop {
-            let read = rows.next(ROWS, &mut chunk)?;
             let fresh = piece.len();
             self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
             if read > 0 {
@@ -103,11 +103,17 @@ impl Plan {
             gathered.keep_head(&piece, fresh);
             piece.add_up();
             self.look_up(&piece, &mut gathered);
-            next = self.search(&piece, next, read == 0, &mut gathered);
             if read == 0 {
+                self.search(&piece, next, true, &mut gathered);
                 (gathered.total_w, gathered.samples) = (piece.sum_to(piece.end() as f64), piece.end());
                 return Ok(gathered);
             }
+            // The next rows are decoded while these are searched.
+            let (coming, searched) = rayon::join(
+                || rows.next(ROWS, &mut chunk),
+                || self.search(&piece, next, false, &mut gathered),
+            );
+            (read, next) = (coming?, searched);
             piece.drop_before(next.saturating_sub((self.spacing + MARGIN) as u64));
         }
     }
@@ -144,7 +150,10 @@ impl Plan {
             gathered.distances_w2.extend(found.distances_w2);
             gathered.steps_w.extend(found.steps_w);
             for candidate in found.candidates {
-                let tied = gathered.candidates.last().is_some_and(|before| candidate.offset - before.offset < spacing);
+                let tied = gathered
+                    .candidates
+                    .last()
+                    .is_some_and(|before| candidate.offset - before.offset < spacing);
                 if !tied {
                     gathered.candidates.push(candidate);
                 }
@@ -159,12 +168,13 @@ impl Plan {
         let end = all.min(to + self.spacing as u64 - 1);
         let place = |offset: u64| (offset - piece.base) as usize;
         let samples = place(begin)..place(end) + width - 1;
-        let signal: Vec<f32> = piece.voltage_v[samples.clone()]
-            .iter()
-            .zip(&piece.current_a[samples])
-            .map(|(v, i)| v * i - self.mean_w)
-            .collect();
-        let mut profile = vec![f32::INFINITY; (end - begin) as usize];
+        let (mut signal, mut profile) =
+            (std::mem::take(&mut buffers.signal), std::mem::take(&mut buffers.profile));
+        let powers = piece.voltage_v[samples.clone()].iter().zip(&piece.current_a[samples]);
+        signal.clear();
+        signal.extend(powers.map(|(v, i)| v * i - self.mean_w));
+        profile.clear();
+        profile.resize((end - begin) as usize, f32::INFINITY);
         self.screens.iter().for_each(|screen| screen.lower(&signal, &mut profile, buffers));
         let mut found = Found::default();
         let inside = ((from - begin) as usize, (to - begin) as usize);
@@ -177,6 +187,7 @@ impl Plan {
             let place = place(offset);
             found.steps_w.push((piece.power_w(place + 1) - piece.power_w(place)).abs());
         }
+        (buffers.signal, buffers.profile) = (signal, profile);
         found
     }
 
@@ -193,23 +204,28 @@ impl Plan {
     }
 
     fn candidate(&self, piece: &Piece, offset: u64, all: u64) -> Candidate {
-        let (_, mark) = self.nearest(piece, offset);
-        let low = offset.saturating_sub(REACH as u64 + 1).max(piece.base);
-        let high = (offset + REACH as u64 + 2).min(all);
-        let around: Vec<f64> = (low..high).map(|offset| self.distance_w2(piece, offset, mark)).collect();
-        let mut best = (offset - low) as usize;
-        for (index, value) in around.iter().enumerate() {
-            if (low + index as u64).abs_diff(offset) <= REACH as u64 && *value < around[best] {
-                best = index;
+        let (mut distance_w2, mark) = self.nearest(piece, offset);
+        let at = |offset: u64| self.distance_w2(piece, offset, mark);
+        let mut best = offset;
+        let inside = |offset: u64| offset > piece.base && offset + 1 < all;
+        let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
+        // The screen may be off by its rounding: downhill to the lowest, a few offsets at most.
+        for _ in 0..=REACH {
+            if !inside(best) {
+                break;
+            }
+            (before, after) = (at(best - 1), at(best + 1));
+            match (before < distance_w2, after < distance_w2) {
+                (true, _) if before <= after => (best, distance_w2) = (best - 1, before),
+                (_, true) => (best, distance_w2) = (best + 1, after),
+                _ => break,
             }
         }
-        let finer = match (best.checked_sub(1).map(|b| around[b]), around.get(best + 1)) {
-            (Some(before), Some(after)) => vertex(before, around[best], *after),
-            _ => 0.0,
-        };
-        let aligned = (low + best as u64) as f64 + finer;
+        let lowest = inside(best) && before >= distance_w2 && after >= distance_w2;
+        let finer = if lowest { vertex(before, distance_w2, after) } else { 0.0 };
+        let aligned = best as f64 + finer;
         let sum_w = piece.sum_to(aligned + self.placement.marks[mark].anchor);
-        Candidate { offset, aligned, distance_w2: around[best], sum_w, mark: mark as u32 }
+        Candidate { offset, aligned, distance_w2, sum_w, mark: mark as u32 }
     }
 }
 
@@ -238,7 +254,8 @@ fn difference(voltage_v: &[f32], current_a: &[f32], template: &[f64]) -> f64 {
         let difference = f64::from(voltage_v[j]) * f64::from(current_a[j]) - template[j];
         difference * difference
     };
-    let chunks = template[..whole].chunks_exact(8).zip(voltage_v.chunks_exact(8)).zip(current_a.chunks_exact(8));
+    let chunks =
+        template[..whole].chunks_exact(8).zip(voltage_v.chunks_exact(8)).zip(current_a.chunks_exact(8));
     for ((t, v), i) in chunks {
         for lane in 0..8 {
             let difference = f64::from(v[lane]) * f64::from(i[lane]) - t[lane];

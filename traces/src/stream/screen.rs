@@ -24,6 +24,9 @@ pub(super) struct Buffers {
     complex: Vec<Complex<f32>>,
     scratch: Vec<Complex<f32>>,
     squares: Vec<f64>,
+    /// For whoever calls: the signal and the profile of one task.
+    pub signal: Vec<f32>,
+    pub profile: Vec<f32>,
 }
 
 impl Screen {
@@ -48,23 +51,32 @@ impl Screen {
     /// Lowers `into` to the summed squared difference at each offset, where that is less. `signal` is
     /// `width - 1` longer. By overlap and save (Oppenheim and Schafer 2010, section 8.7.3).
     pub fn lower(&self, signal: &[f32], into: &mut [f32], buffers: &mut Buffers) {
-        let Buffers { real, complex, scratch, squares } = buffers;
+        let Buffers { real, complex, scratch, squares, .. } = buffers;
         running_squares(signal, squares);
         real.resize(self.block, 0.0);
         complex.resize(self.block / 2 + 1, Complex::default());
-        scratch.resize(self.forward.get_scratch_len().max(self.inverse.get_scratch_len()), Complex::default());
+        scratch
+            .resize(self.forward.get_scratch_len().max(self.inverse.get_scratch_len()), Complex::default());
         let step = self.block - self.width + 1;
         for (index, out) in into.chunks_mut(step).enumerate() {
             let from = index * step;
             let part = &signal[from..signal.len().min(from + self.block)];
             real[..part.len()].copy_from_slice(part);
             real[part.len()..].fill(0.0);
-            let _ = self.forward.process_with_scratch(real, complex, &mut scratch[..self.forward.get_scratch_len()]);
+            let _ = self.forward.process_with_scratch(
+                real,
+                complex,
+                &mut scratch[..self.forward.get_scratch_len()],
+            );
             complex.iter_mut().zip(&self.spectrum).for_each(|(value, factor)| *value *= factor);
             // The first and the last bin of a real signal are real; rounding may leave them not quite so.
             complex[0].im = 0.0;
             complex[self.block / 2].im = 0.0;
-            let _ = self.inverse.process_with_scratch(complex, real, &mut scratch[..self.inverse.get_scratch_len()]);
+            let _ = self.inverse.process_with_scratch(
+                complex,
+                real,
+                &mut scratch[..self.inverse.get_scratch_len()],
+            );
             let (before, after) = (&squares[from..], &squares[from + self.width..]);
             for (((value, cross), before), after) in out.iter_mut().zip(real.iter()).zip(before).zip(after) {
                 let distance = ((after - before) + self.own) as f32 + cross;
@@ -97,8 +109,11 @@ mod tests {
         let mut profile = vec![f32::INFINITY; signal.len() - 249];
         Screen::new(&template).lower(&signal, &mut profile, &mut Buffers::default());
         for (offset, &value) in profile.iter().enumerate() {
-            let exact: f64 =
-                template.iter().zip(&signal[offset..]).map(|(t, &x)| (f64::from(x) - t) * (f64::from(x) - t)).sum();
+            let exact: f64 = template
+                .iter()
+                .zip(&signal[offset..])
+                .map(|(t, &x)| (f64::from(x) - t) * (f64::from(x) - t))
+                .sum();
             assert!((f64::from(value) - exact).abs() < 2e-2 + 1e-5 * exact, "{offset}: {value} {exact}");
         }
     }

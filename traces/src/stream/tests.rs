@@ -1,10 +1,10 @@
 use super::find;
+use crate::CurveBuilder;
 use crate::device::{Device, DeviceSpec};
 use crate::energy::PowerIntegral;
 use crate::frames::{Marks, Method, Options, default_window, find_with};
 use crate::io::{ReadOptions, parquet};
 use crate::trace::Trace;
-use crate::CurveBuilder;
 
 /// Frames whose length and content vary, over more than one piece.
 fn trace(frames: u32) -> Trace {
@@ -30,7 +30,11 @@ fn oracle_streamed_frames_are_those_found_in_memory_and_add_up() {
     parquet::save(&trace, &path).unwrap();
     let window = default_window(0.01, trace.rate_hz());
     let found = find_with(&trace, &Marks::one(0.05, window, trace.end_s()), &Options::default()).unwrap();
-    let marks = Marks { starts_s: vec![found.starts[100].time_s, found.starts[2000].time_s], window, end_s: f64::INFINITY };
+    let marks = Marks {
+        starts_s: vec![found.starts[100].time_s, found.starts[2000].time_s],
+        window,
+        end_s: f64::INFINITY,
+    };
     let in_memory = Marks { end_s: trace.end_s(), ..marks.clone() };
     let expected = find_with(&trace, &in_memory, &Options { method: Method::SumOfSquares }).unwrap();
     let streamed = find(&path, &ReadOptions::default(), &marks).unwrap();

@@ -31,7 +31,9 @@ pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
         _ => return Err(wrong("--anchor is given twice, or not at all for a fit to the frames found")),
     };
     if alignment.ambiguous {
-        complain("warning ambiguous-alignment: another pairing fits about as well, as frame times are even; give two anchors");
+        complain(
+            "warning ambiguous-alignment: another pairing fits about as well, as frame times are even; give two anchors",
+        );
     }
     if let Some(out) = &args.out {
         write_file(out, |file| {

@@ -431,6 +431,9 @@ fn pass(text: &str) -> Result<(String, f64), String> {
 fn discard(text: &str) -> Result<Discard, String> {
     match text {
         "auto" => Ok(Discard::Auto),
-        _ => text.parse().map(Discard::Count).map_err(|_| format!("`{text}` is neither a number of frames nor auto")),
+        _ => text
+            .parse()
+            .map(Discard::Count)
+            .map_err(|_| format!("`{text}` is neither a number of frames nor auto")),
     }
 }

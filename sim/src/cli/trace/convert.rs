@@ -23,7 +23,10 @@ pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let (samples, rate_hz) = (trace.samples(), trace.rate_hz());
     if args.json {
         let out = args.out.display().to_string();
-        return print_json(&json!({ "out": out, "samples": samples, "rate_hz": rate_hz, "repairs": repairs }), true);
+        return print_json(
+            &json!({ "out": out, "samples": samples, "rate_hz": rate_hz, "repairs": repairs }),
+            true,
+        );
     }
     print(&format!("{}: {samples} samples at {rate_hz} Hz", args.out.display()))
 }
@@ -53,7 +56,11 @@ pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
     }
     let bytes = trace.samples() as u64 * ROW_BYTES;
     if bytes > LARGE_BYTES {
-        complain(&format!("{}: about {:.1} GB as text; Parquet takes a tenth", path.display(), bytes as f64 * 1e-9));
+        complain(&format!(
+            "{}: about {:.1} GB as text; Parquet takes a tenth",
+            path.display(),
+            bytes as f64 * 1e-9
+        ));
     }
     let delimiter = if plain.ends_with(".tsv") { b'\t' } else { b',' };
     Ok(csv::save_as(trace, path, delimiter, name.ends_with(".gz"))?)
@@ -62,11 +69,19 @@ pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
 /// A counter track of the power, thinned out to what the viewer holds.
 fn perfetto(trace: &Trace, path: &Path) -> Result<(), Failure> {
     let start_ns = trace.time_ns(0);
-    let points = trace.powers_w().enumerate().map(|(index, watts)| ((trace.time_ns(index) - start_ns).unsigned_abs(), watts));
+    let points = trace
+        .powers_w()
+        .enumerate()
+        .map(|(index, watts)| ((trace.time_ns(index) - start_ns).unsigned_abs(), watts));
     let points: Vec<(u64, f64)> = points.collect();
     let thinned = decimate(&points, MAX_POINTS);
     if thinned.len() < points.len() {
-        complain(&format!("{}: {} of {} samples kept, extremes among them", path.display(), thinned.len(), points.len()));
+        complain(&format!(
+            "{}: {} of {} samples kept, extremes among them",
+            path.display(),
+            thinned.len(),
+            points.len()
+        ));
     }
     let counters = vec![CounterTrack { name: "power", unit: "W", points: thinned }];
     let timeline = Timeline { process: "trace", counters, ..Timeline::default() };

@@ -20,7 +20,8 @@ pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
         let (other, _) = args.input.load_other(path)?;
         runs.push(one_run(args, &other, self::idle(args, &other)?.as_ref())?);
     }
-    let energies: Vec<Vec<f64>> = runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
+    let energies: Vec<Vec<f64>> =
+        runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
     let pool = pooled(&energies).ok_or_else(|| wrong("no frame is left; discard fewer"))?;
     if args.json {
         let runs: Vec<_> = runs.iter().map(Run::json).collect();
@@ -33,7 +34,10 @@ pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
 fn pooled_text(pool: &Pooled) -> String {
     format!(
         "{} runs, {} frames: {:.4} mJ/frame, pooled standard deviation {:.4} mJ",
-        pool.runs, pool.values, pool.mean * 1e3, pool.deviation * 1e3
+        pool.runs,
+        pool.values,
+        pool.mean * 1e3,
+        pool.deviation * 1e3
     )
 }
 
@@ -103,13 +107,17 @@ fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle>) -> Result<Run,
     let out = outliers(&all);
     let count = out.iter().skip(discarded).filter(|out| **out).count();
     let busy_w = busy_above(args, trace, &frames);
-    let old = frames.iter().map(|frame| integral.energy_j(frame.start_s, finish_s(trace, frame, busy_w)));
-    let old: Vec<f64> = old.collect();
+    let begin_to_finish = |frame: &FrameEnergy| {
+        let (a_s, b_s) = (frame.start_s, finish_s(trace, frame, busy_w));
+        integral.energy_j(a_s, b_s) - idle.map_or(0.0, |idle| idle.energy_j(trace.start_s(), a_s, b_s))
+    };
+    let old: Vec<f64> = frames.iter().map(begin_to_finish).collect();
     if let Some(idle) = idle {
         idle.take_off(trace.start_s(), &mut frames);
     }
     let keep = |index: usize| index >= discarded && !(args.drop_outliers && out[index]);
-    let kept: Vec<FrameEnergy> = frames.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, f)| *f).collect();
+    let kept: Vec<FrameEnergy> =
+        frames.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, f)| *f).collect();
     let old: Vec<f64> = old.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, j)| j).collect();
     let none = || wrong(format!("of {} frames none is left after {discarded} are discarded", frames.len()));
     let old = Spread::of(&old).ok_or_else(none)?;
@@ -163,7 +171,8 @@ fn passes(
 impl Run {
     fn json(&self) -> serde_json::Value {
         let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
-        let passes: Vec<_> = self.passes.iter().map(|(name, j)| json!({ "pass": name, "energy_J": j })).collect();
+        let passes: Vec<_> =
+            self.passes.iter().map(|(name, j)| json!({ "pass": name, "energy_J": j })).collect();
         json!({
             "frames": self.kept.len(), "discarded": self.discarded, "warm_up_clearness": self.clearness,
             "outliers": self.outliers, "energy_J": Spread::of(&energies), "begin_to_finish_J": self.old,
@@ -175,11 +184,17 @@ impl Run {
         let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
         let spread = Spread::of(&energies).unwrap_or_default();
         let mut text = format!(
-            "{} frames ({} discarded, {} outliers): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish (idle within the frame left in)\n",
-            self.kept.len(), self.discarded, self.outliers, spread.mean * 1e3, spread.deviation * 1e3, self.old.mean * 1e3
+            "{} frames ({} discarded, {} outliers): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
+            self.kept.len(),
+            self.discarded,
+            self.outliers,
+            spread.mean * 1e3,
+            spread.deviation * 1e3,
+            self.old.mean * 1e3
         );
         for (name, spread) in &self.passes {
-            text += &format!("  {name}: {:.4} mJ (deviation {:.4})\n", spread.mean * 1e3, spread.deviation * 1e3);
+            text +=
+                &format!("  {name}: {:.4} mJ (deviation {:.4})\n", spread.mean * 1e3, spread.deviation * 1e3);
         }
         text
     }

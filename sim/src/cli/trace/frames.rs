@@ -45,15 +45,20 @@ struct Row {
 }
 
 fn report(frames: &Frames, table: &FrameTable, pixels: Option<u64>, inverse: bool) -> Value {
-    let rows: Vec<Row> = table.frames().iter().zip(table.outliers()).map(|(frame, outlier)| Row {
-        start_s: frame.start_s,
-        end_s: frame.end_s,
-        energy_j: frame.energy_j,
-        power_w: frame.power_w(),
-        confidence: frame.confidence,
-        flags: frame.flags.to_string(),
-        outlier: u8::from(*outlier),
-    }).collect();
+    let rows: Vec<Row> = table
+        .frames()
+        .iter()
+        .zip(table.outliers())
+        .map(|(frame, outlier)| Row {
+            start_s: frame.start_s,
+            end_s: frame.end_s,
+            energy_j: frame.energy_j,
+            power_w: frame.power_w(),
+            confidence: frame.confidence,
+            flags: frame.flags.to_string(),
+            outlier: u8::from(*outlier),
+        })
+        .collect();
     let window = frames.found.window;
     let mut report = json!({
         "samples": frames.samples, "rate_hz": frames.rate_hz, "start_s": frames.start_s, "total_J": frames.total_j,
@@ -73,13 +78,22 @@ fn text(frames: &Frames, table: &FrameTable, pixels: Option<u64>) -> String {
     if let Some(p) = &frames.proposal {
         lines += &format!(
             "proposed mark: {} s, the most even of {} rises: {} alike divide {:.0} % of the stretch evenly\n",
-            p.mark_s, p.tried, p.alike, 100.0 * p.regularity
+            p.mark_s,
+            p.tried,
+            p.alike,
+            100.0 * p.regularity
         );
     }
     let t = &frames.found.threshold;
     lines += &format!(
         "{} samples at {}, {} frames by {}; threshold {:.4e} W^2 ({:?}, separation {:.2})\n",
-        frames.samples, si(frames.rate_hz, "Hz"), table.frames().len(), frames.found.method, t.value_w2, t.rule, t.separation
+        frames.samples,
+        si(frames.rate_hz, "Hz"),
+        table.frames().len(),
+        frames.found.method,
+        t.value_w2,
+        t.rule,
+        t.separation
     );
     let mut shown = Table::new(["frame", "start", "time", "energy", "power", "confidence", "flags"]);
     for (index, (frame, outlier)) in table.frames().iter().zip(table.outliers()).enumerate().take(SHOWN) {
@@ -101,7 +115,10 @@ fn text(frames: &Frames, table: &FrameTable, pixels: Option<u64>) -> String {
     if let Some(s) = Summary::of(table.frames()) {
         lines += &format!(
             "mean: {:.4} mJ/frame (deviation {:.4}), {:.3} ms, {}",
-            s.energy_j.mean * 1e3, s.energy_j.deviation * 1e3, s.duration_s.mean * 1e3, si_digits(s.power_w.mean, "W", 4)
+            s.energy_j.mean * 1e3,
+            s.energy_j.deviation * 1e3,
+            s.duration_s.mean * 1e3,
+            si_digits(s.power_w.mean, "W", 4)
         );
         if let Some(pixels) = pixels.filter(|&pixels| pixels > 0) {
             lines += &format!(", {:.3} nJ/pixel", s.energy_j.mean / pixels as f64 * 1e9);
@@ -128,11 +145,15 @@ fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
 
 fn inverse_text(table: &FrameTable, pixels: Option<u64>) -> String {
     let units = inverse_units(table, pixels);
-    complain("warning inverse-units: inverse units cannot be averaged; these are inverses of the mean energy (Paper II)");
+    complain(
+        "warning inverse-units: inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
+    );
     let number = |key: &str| units[key].as_f64().unwrap_or(f64::NAN);
-    let per_pixel = units["pixels_per_J"].as_f64().map_or(String::new(), |p| format!(", {:.3} Mpixels/J", p * 1e-6));
+    let per_pixel =
+        units["pixels_per_J"].as_f64().map_or(String::new(), |p| format!(", {:.3} Mpixels/J", p * 1e-6));
     format!(
         "inverse: {:.4} frames/J{per_pixel} (the mean of the inverses would be {:.4}, which is wrong)",
-        number("frames_per_J"), number("wrong_mean_of_frames_per_J")
+        number("frames_per_J"),
+        number("wrong_mean_of_frames_per_J")
     )
 }

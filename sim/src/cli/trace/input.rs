@@ -121,7 +121,17 @@ impl FindArgs {
         let integral = PowerIntegral::new(&trace);
         let (energies, total_j) = (integral.frames(&found), integral.total_j());
         let (samples, rate_hz, start_s) = (trace.samples() as u64, trace.rate_hz(), trace.start_s());
-        Ok(Frames { found, energies, samples, rate_hz, start_s, total_j, proposal, repairs, metadata: trace.metadata })
+        Ok(Frames {
+            found,
+            energies,
+            samples,
+            rate_hz,
+            start_s,
+            total_j,
+            proposal,
+            repairs,
+            metadata: trace.metadata,
+        })
     }
 
     fn streams(&self, input: &InputArgs) -> Result<bool, Failure> {
@@ -217,11 +227,17 @@ pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
         match fields.get(column).and_then(|field| field.parse::<f64>().ok()).filter(|time| time.is_finite()) {
             Some(time) => times.push(time),
             None if times.is_empty() && index == 0 => {
-                let named = |field: &&str| ["start_s", "time_s", "mark_s"].iter().any(|n| field.eq_ignore_ascii_case(n));
+                let named = |field: &&str| {
+                    ["start_s", "time_s", "mark_s"].iter().any(|n| field.eq_ignore_ascii_case(n))
+                };
                 column = fields.iter().position(|field| named(&field)).unwrap_or(0);
             }
             None => {
-                let message = format!("{}: line {}: `{line}` holds no time in seconds; mend it", path.display(), index + 1);
+                let message = format!(
+                    "{}: line {}: `{line}` holds no time in seconds; mend it",
+                    path.display(),
+                    index + 1
+                );
                 return Err(wrong(message));
             }
         }

@@ -28,12 +28,17 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
             write(&picture(args, &groups), out, Ending::of(out)?)?;
         }
     }
-    if args.json { print_json(&json!({ "idle_W": args.idle_w, "groups": groups }), true) } else { print(&text(&groups)) }
+    if args.json {
+        print_json(&json!({ "idle_W": args.idle_w, "groups": groups }), true)
+    } else {
+        print(&text(&groups))
+    }
 }
 
 /// Unit at the end of a column's name: what to multiply by for s or J.
 fn scale(column: &str) -> f64 {
-    let unit = column.rsplit(['_', ' ', '(']).next().unwrap_or_default().trim_end_matches(')').to_ascii_lowercase();
+    let unit =
+        column.rsplit(['_', ' ', '(']).next().unwrap_or_default().trim_end_matches(')').to_ascii_lowercase();
     match unit.as_str() {
         "ms" | "mj" => 1e-3,
         "us" | "uj" => 1e-6,
@@ -47,9 +52,8 @@ fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
         let values = table.numbers(column).map_err(|error| wrong(error.to_string()))?;
         Ok(values.into_iter().map(|value| value * scale(column)).collect())
     };
-    let deviations = |column: &Option<String>| {
-        column.as_deref().map_or_else(|| Ok(vec![0.0; table.rows()]), &numbers)
-    };
+    let deviations =
+        |column: &Option<String>| column.as_deref().map_or_else(|| Ok(vec![0.0; table.rows()]), &numbers);
     let texts = |column: &String| table.texts(column).map_err(|error| wrong(error.to_string()));
     let (times, energies) = (numbers(&args.time)?, numbers(&args.energy)?);
     let (time_sd, energy_sd) = (deviations(&args.time_sd)?, deviations(&args.energy_sd)?);
@@ -91,7 +95,15 @@ fn text(groups: &Groups) -> String {
 
 fn write_table(groups: &Groups, out: &mut impl Write) -> std::io::Result<()> {
     let mut rows = csv::Writer::from_writer(out);
-    rows.write_record(["group", "label", "time_s", "energy_J", "compensated_J", "on_frontier", "probability"])?;
+    rows.write_record([
+        "group",
+        "label",
+        "time_s",
+        "energy_J",
+        "compensated_J",
+        "on_frontier",
+        "probability",
+    ])?;
     for (group, standings) in groups {
         for s in standings {
             rows.write_record([
@@ -125,9 +137,13 @@ fn picture(args: &ParetoArgs, groups: &Groups) -> crate::output::plot::Picture {
         let mut line: Vec<(f64, f64)> = on.map(|s| (s.point.time_s, s.point.energy_j)).collect();
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
         if line.len() > 1 && series.len() < 8 {
-            series.push(Series { name: if group.is_empty() { "frontier".to_owned() } else { group.clone() }, mark: Mark::Line(line) });
+            series.push(Series {
+                name: if group.is_empty() { "frontier".to_owned() } else { group.clone() },
+                mark: Mark::Line(line),
+            });
         }
     }
     let subject = format!("{} - idle power charged: {} W", args.table.display(), args.idle_w);
-    Lines { title: "Time and energy", subject: &subject, x: ("time", "s"), y: ("energy", "J"), series }.picture()
+    Lines { title: "Time and energy", subject: &subject, x: ("time", "s"), y: ("energy", "J"), series }
+        .picture()
 }

@@ -87,7 +87,10 @@ fn curve(args: &PlotArgs) -> Result<(Picture, String), Failure> {
         Series { name: format!("mean over {}", si(width_s, "s")), mark: Mark::Line(mean) },
     ];
     let subject = args.input.trace.display().to_string();
-    Ok((Lines { title: "Power", subject: &subject, x: ("time", "s"), y: ("power", "W"), series }.picture(), shown))
+    Ok((
+        Lines { title: "Power", subject: &subject, x: ("time", "s"), y: ("power", "W"), series }.picture(),
+        shown,
+    ))
 }
 
 /// Means of the columns within half a width on either side.
@@ -120,7 +123,12 @@ fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
             let means = mean_over_discarded(&energies);
             let kept = means[..means.len().saturating_sub(means.len() / 10).max(1)].iter();
             let line = kept.enumerate().map(|(index, j)| (index as f64, *j)).collect();
-            ("Mean energy over discarded frames", ("frames discarded", ""), ("energy", "J"), vec![series("mean of the rest", Mark::Line(line))])
+            (
+                "Mean energy over discarded frames",
+                ("frames discarded", ""),
+                ("energy", "J"),
+                vec![series("mean of the rest", Mark::Line(line))],
+            )
         }
         PlotKind::Repeats => repeats(args, energies)?,
         PlotKind::Energy | PlotKind::Curve => {
@@ -153,16 +161,28 @@ fn within(trace: &Trace, frame: &FrameEnergy) -> Vec<(f64, f64)> {
 
 fn one_frame(args: &PlotArgs, trace: &Trace, frames: &[FrameEnergy]) -> Result<Drawn, Failure> {
     let number = args.frame.unwrap_or(frames.len() / 2);
-    let frame = frames.get(number).ok_or_else(|| wrong(format!("--frame {number}: there are {} frames", frames.len())))?;
+    let frame = frames
+        .get(number)
+        .ok_or_else(|| wrong(format!("--frame {number}: there are {} frames", frames.len())))?;
     let name = format!("frame {number}, {}", si(frame.energy_j, "J"));
-    Ok(("Power of one frame", ("time since its start", "s"), ("power", "W"), vec![series(&name, Mark::Line(within(trace, frame)))]))
+    Ok((
+        "Power of one frame",
+        ("time since its start", "s"),
+        ("power", "W"),
+        vec![series(&name, Mark::Line(within(trace, frame)))],
+    ))
 }
 
 fn overlay(trace: &Trace, frames: &[FrameEnergy]) -> Drawn {
     let step = frames.len().div_ceil(OVERLAID).max(1);
     let lines: Vec<_> = frames.iter().step_by(step).map(|frame| within(trace, frame)).collect();
     let name = format!("{} frames", lines.len());
-    ("Frames on top of one another", ("time since the start", "s"), ("power", "W"), vec![series(&name, Mark::Faint(lines))])
+    (
+        "Frames on top of one another",
+        ("time since the start", "s"),
+        ("power", "W"),
+        vec![series(&name, Mark::Faint(lines))],
+    )
 }
 
 fn histogram(energies: &[f64]) -> Drawn {
@@ -176,7 +196,12 @@ fn histogram(energies: &[f64]) -> Drawn {
     }
     let at = |index: usize| low + index as f64 * width;
     let bars = counts.iter().enumerate().map(|(i, &count)| (at(i), at(i + 1), f64::from(count))).collect();
-    ("How often which energy occurs", ("energy", "J"), ("frames", ""), vec![series("frames", Mark::Bars(bars))])
+    (
+        "How often which energy occurs",
+        ("energy", "J"),
+        ("frames", ""),
+        vec![series("frames", Mark::Bars(bars))],
+    )
 }
 
 /// Mean and deviation of the n-th frame over all runs.
@@ -188,11 +213,21 @@ fn repeats(args: &PlotArgs, first: Vec<f64>) -> Result<Drawn, Failure> {
         runs.push(PowerIntegral::new(&trace).frames(&found).iter().map(|frame| frame.energy_j).collect());
     }
     let frames = runs.iter().map(Vec::len).min().unwrap_or(0);
-    let spreads = (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));
+    let spreads =
+        (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));
     let spreads: Vec<Spread> = spreads.collect();
     let at = |index: usize| index as f64;
-    let band = spreads.iter().enumerate().map(|(i, s)| (at(i), s.mean - s.deviation, s.mean + s.deviation)).collect();
+    let band = spreads
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (at(i), s.mean - s.deviation, s.mean + s.deviation))
+        .collect();
     let mean = spreads.iter().enumerate().map(|(i, s)| (at(i), s.mean)).collect();
     let name = format!("one deviation over {} runs", runs.len());
-    Ok(("Energy of each frame over repeated runs", ("frame", ""), ("energy", "J"), vec![series(&name, Mark::Band(band)), series("mean", Mark::Line(mean))]))
+    Ok((
+        "Energy of each frame over repeated runs",
+        ("frame", ""),
+        ("energy", "J"),
+        vec![series(&name, Mark::Band(band)), series("mean", Mark::Line(mean))],
+    ))
 }

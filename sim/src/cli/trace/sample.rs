@@ -36,7 +36,9 @@ pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     }
     print(&format!(
         "{}: {samples} samples at {} Hz; {before_j:.6} J became {after_j:.6} J ({:+.3} %)",
-        args.out.display(), device.spec().rate_hz, 100.0 * error
+        args.out.display(),
+        device.spec().rate_hz,
+        100.0 * error
     ))
 }
 

@@ -66,8 +66,12 @@ impl Lines<'_> {
             series.mark.draw(&panel, colour, &mut picture);
         }
         panel.axes(&mut picture, 0.0);
-        let keys: Vec<(Key, String)> =
-            self.series.iter().zip(colours).map(|(series, colour)| (series.mark.key(colour), series.name.clone())).collect();
+        let keys: Vec<(Key, String)> = self
+            .series
+            .iter()
+            .zip(colours)
+            .map(|(series, colour)| (series.mark.key(colour), series.name.clone()))
+            .collect();
         legend_line(&mut picture, (110.0, 78.0), &keys);
         picture
     }
@@ -136,13 +140,21 @@ impl Mark {
                     picture.dot(at, 3.0, colour);
                     if !name.is_empty() {
                         let ink = if colour == TRUTH { INK } else { MUTED };
-                        picture.text(Text { size: 11.0, colour: ink, ..text(name, (at.0 + 6.0, at.1 - 8.0)) });
+                        picture.text(Text {
+                            size: 11.0,
+                            colour: ink,
+                            ..text(name, (at.0 + 6.0, at.1 - 8.0))
+                        });
                     }
                 }
             }
             Self::Bars(bars) => {
                 for &(from, to, y) in bars {
-                    picture.rect(panel.at(from, y), (panel.x_px(to) - 1.0, panel.y_px(0.0)), colour.alpha(0.8));
+                    picture.rect(
+                        panel.at(from, y),
+                        (panel.x_px(to) - 1.0, panel.y_px(0.0)),
+                        colour.alpha(0.8),
+                    );
                 }
             }
         }

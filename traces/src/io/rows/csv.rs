@@ -55,7 +55,8 @@ impl CsvRows {
     pub fn open(path: &Path, options: &ReadOptions, gzip: bool) -> Result<(Self, Layout, Header), ReadError> {
         let header = description(path)?;
         let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
-        let text: Text = if gzip { Box::new(MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
+        let text: Text =
+            if gzip { Box::new(MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
         let mut text = BufReader::with_capacity(1 << 16, Box::new(LineLimit::new(text)) as Text);
         let guessed = delimiter(&mut text).map_err(|error| ReadError::io(path, error))?;
         let mut reader = ReaderBuilder::new()
@@ -72,7 +73,10 @@ impl CsvRows {
         let names: Vec<String> = if held {
             unnamed(record.len())
         } else {
-            record.iter().map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned()).collect()
+            record
+                .iter()
+                .map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned())
+                .collect()
         };
         let layout = layout(path, &names, options, "time_s")?;
         Ok((Self { path: path.to_owned(), reader, record, names, row: 0, held }, layout, header))
@@ -136,7 +140,12 @@ impl CsvRows {
     }
 
     /// A finite number; if it is to be mended later, what stands for none; else the error that names its place.
-    fn field<T: std::str::FromStr + Finite>(&self, column: &Picked, repair: bool, none: T) -> Result<T, ReadError> {
+    fn field<T: std::str::FromStr + Finite>(
+        &self,
+        column: &Picked,
+        repair: bool,
+        none: T,
+    ) -> Result<T, ReadError> {
         let field = self.record.get(column.index).unwrap_or_default();
         match number(field) {
             Some(value) => Ok(value),
@@ -144,7 +153,12 @@ impl CsvRows {
             None => {
                 let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
                 let value = if shown.is_empty() { "empty".to_owned() } else { format!("{shown:?}") };
-                Err(ReadError::Value { path: self.path.clone(), row: self.row, column: column.name.clone(), value })
+                Err(ReadError::Value {
+                    path: self.path.clone(),
+                    row: self.row,
+                    column: column.name.clone(),
+                    value,
+                })
             }
         }
     }
@@ -152,8 +166,11 @@ impl CsvRows {
 
 /// Names for columns that have none: time, voltage, current; two columns are voltage and current.
 fn unnamed(columns: usize) -> Vec<String> {
-    let usual: &[&str] = if columns == 2 { &["voltage_V", "current_A"] } else { &["time_s", "voltage_V", "current_A"] };
-    (0..columns).map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned())).collect()
+    let usual: &[&str] =
+        if columns == 2 { &["voltage_V", "current_A"] } else { &["time_s", "voltage_V", "current_A"] };
+    (0..columns)
+        .map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned()))
+        .collect()
 }
 
 fn number<T: std::str::FromStr + Finite>(field: &[u8]) -> Option<T> {

@@ -3,6 +3,7 @@
 mod csv;
 mod lines;
 mod parquet;
+mod zstd;
 
 use super::columns::{Layout, Rail};
 use super::header::Header;
@@ -17,7 +18,11 @@ use std::path::{Path, PathBuf};
 const FOREIGN: [(&[u8], &str, &str); 3] = [
     (b"jlsfmt\r\n", "a JLS recording", "export it with pyjls or the Joulescope UI to CSV or Parquet"),
     (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
-    (b"PK\x03\x04", "an archive (sigrok .sr, .ppk2 or a spreadsheet)", "export it to CSV from its own program"),
+    (
+        b"PK\x03\x04",
+        "an archive (sigrok .sr, .ppk2 or a spreadsheet)",
+        "export it to CSV from its own program",
+    ),
 ];
 
 /// Some rows.
@@ -58,9 +63,7 @@ impl Rows {
         match first_bytes(path)? {
             start if start.starts_with(b"PAR1") => Self::parquet(path, options),
             start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
-                Some((_, found, mend)) => {
-                    Err(ReadError::Format { path: path.to_owned(), found, mend })
-                }
+                Some((_, found, mend)) => Err(ReadError::Format { path: path.to_owned(), found, mend }),
                 None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),
             },
         }
@@ -165,7 +168,8 @@ impl Rows {
             ref rails => {
                 let rows = chunk.values.first().map_or(0, Vec::len);
                 voltage_v.resize(voltage_v.len() + rows, 1.0);
-                let power_w = |row: usize| rails.iter().map(|rail| rail.power_w(&chunk.values, row)).sum::<f64>();
+                let power_w =
+                    |row: usize| rails.iter().map(|rail| rail.power_w(&chunk.values, row)).sum::<f64>();
                 current_a.extend((0..rows).map(|row| power_w(row) as f32));
             }
         }

@@ -1,12 +1,13 @@
 //! Rows of Parquet: each column by a reader of its own, all of them at once.
 
 use super::Chunk;
+use super::zstd::ZstdPages;
 use crate::io::columns::{Layout, layout};
 use crate::io::header::{self, Header, KEYS};
 use crate::io::timing::Stamps;
 use crate::io::{ReadError, ReadOptions};
 use parquet::basic::{Compression, LogicalType, TimeUnit, Type as Physical};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -103,8 +104,9 @@ impl ParquetRows {
 
 fn description(path: &Path, file: &SerializedFileReader<File>) -> Result<Header, ReadError> {
     let pairs = file.metadata().file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
-    let json =
-        KEYS.iter().find_map(|key| pairs.iter().find(|pair| pair.key == *key).and_then(|pair| pair.value.as_deref()));
+    let json = KEYS
+        .iter()
+        .find_map(|key| pairs.iter().find(|pair| pair.key == *key).and_then(|pair| pair.value.as_deref()));
     json.map_or(Ok(Header::default()), |json| header::from_json(path, json))
 }
 
@@ -118,7 +120,10 @@ fn check_chunks(
     let read: Vec<usize> = layout.time.iter().chain(&layout.values).map(|picked| picked.index).collect();
     for group in file.metadata().row_groups() {
         for chunk in read.iter().filter_map(|&index| group.columns().get(index)) {
-            if !matches!(chunk.compression(), Compression::UNCOMPRESSED | Compression::SNAPPY) {
+            if !matches!(
+                chunk.compression(),
+                Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_)
+            ) {
                 let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
                 let codec = codec.split('(').next().unwrap_or_default().to_owned();
                 return Err(ReadError::Compression { path: path.to_owned(), column, codec });
@@ -183,11 +188,27 @@ impl Column {
     /// The reader of the row group at hand; `false` at the end.
     fn open_group(&mut self) -> Result<bool, ReadError> {
         while self.reader.is_none() && self.group < self.file.num_row_groups() {
-            let reader = self.file.get_row_group(self.group).and_then(|group| group.get_column_reader(self.index));
+            let reader = self.reader_of(self.group);
             self.reader = Some(reader.map_err(|error| self.damaged(&error))?);
             self.group += 1;
         }
         Ok(self.reader.is_some())
+    }
+
+    fn reader_of(&self, group: usize) -> Result<ColumnReader, ParquetError> {
+        let chunk = self.file.metadata().row_group(group).column(self.index);
+        if !matches!(chunk.compression(), Compression::ZSTD(_)) {
+            return self.file.get_row_group(group)?.get_column_reader(self.index);
+        }
+        let start = chunk
+            .dictionary_page_offset()
+            .map_or(chunk.data_page_offset(), |at| at.min(chunk.data_page_offset()));
+        let pages = ZstdPages::new(
+            File::open(&self.path)?,
+            start.max(0) as u64,
+            chunk.compressed_size().max(0) as u64,
+        );
+        Ok(get_column_reader(chunk.column_descr_ptr(), Box::new(pages)))
     }
 
     fn skip(&mut self, mut rows: u64) -> Result<(), ReadError> {

@@ -178,7 +178,8 @@ mod tests {
         let bytes = picture.pdf();
         let text: String = bytes.iter().map(|&byte| char::from(byte)).collect();
         assert!(text.starts_with("%PDF-1.4") && text.ends_with("%%EOF\n") && text.contains("A \\(title\\)"));
-        let start: usize = text.rsplit("startxref\n").next().unwrap().lines().next().unwrap().parse().unwrap();
+        let start: usize =
+            text.rsplit("startxref\n").next().unwrap().lines().next().unwrap().parse().unwrap();
         let table: Vec<&str> = text[start..].lines().skip(3).take(6).collect();
         for (index, line) in table.iter().enumerate() {
             let offset: usize = line[..10].parse().unwrap();
