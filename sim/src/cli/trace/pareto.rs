@@ -36,27 +36,33 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
 }
 
 /// Unit at the end of a column's name: what to multiply by for s or J.
-fn scale(column: &str) -> f64 {
-    let unit =
-        column.rsplit(['_', ' ', '(']).next().unwrap_or_default().trim_end_matches(')').to_ascii_lowercase();
-    match unit.as_str() {
-        "ms" | "mj" => 1e-3,
-        "us" | "uj" => 1e-6,
-        "ns" | "nj" => 1e-9,
-        _ => 1.0,
+fn scale(column: &str) -> Option<f64> {
+    let unit = column.rsplit(['_', ' ', '(']).next().unwrap_or_default().trim_end_matches(')');
+    match unit.to_ascii_lowercase().as_str() {
+        "s" | "j" => Some(1.0),
+        "ms" | "mj" => Some(1e-3),
+        "us" | "uj" => Some(1e-6),
+        "ns" | "nj" => Some(1e-9),
+        _ => None,
     }
 }
 
 fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
-    let numbers = |column: &str| -> Result<Vec<f64>, Failure> {
+    let numbers = |column: &str, scale: f64| -> Result<Vec<f64>, Failure> {
         let values = table.numbers(column).map_err(|error| wrong(error.to_string()))?;
-        Ok(values.into_iter().map(|value| value * scale(column)).collect())
+        Ok(values.into_iter().map(|value| value * scale).collect())
     };
-    let deviations =
-        |column: &Option<String>| column.as_deref().map_or_else(|| Ok(vec![0.0; table.rows()]), &numbers);
+    // A deviation whose name tells no unit has that of what it belongs to.
+    let unit = |column: &str| scale(column).unwrap_or(1.0);
+    let deviations = |column: &Option<String>, of: &str| match column {
+        Some(column) => numbers(column, scale(column).unwrap_or(unit(of))),
+        None => Ok(vec![0.0; table.rows()]),
+    };
     let texts = |column: &String| table.texts(column).map_err(|error| wrong(error.to_string()));
-    let (times, energies) = (numbers(&args.time)?, numbers(&args.energy)?);
-    let (time_sd, energy_sd) = (deviations(&args.time_sd)?, deviations(&args.energy_sd)?);
+    let (times, energies) =
+        (numbers(&args.time, unit(&args.time))?, numbers(&args.energy, unit(&args.energy))?);
+    let (time_sd, energy_sd) =
+        (deviations(&args.time_sd, &args.time)?, deviations(&args.energy_sd, &args.energy)?);
     let labels = args.label.as_ref().map(texts).transpose()?;
     let keys = args.group.iter().map(texts).collect::<Result<Vec<_>, _>>()?;
     let mut groups: BTreeMap<String, Vec<Point>> = BTreeMap::new();
