@@ -284,7 +284,7 @@ mod tests {
                 assert_eq!((column.low_w, column.high_w), (low, high));
             }
         }
-        std::fs::write(&path, b"changed").unwrap();
+        fs::write(&path, b"changed").unwrap();
         assert!(Pyramid::of_file(&path, &options).is_err());
     }
 }

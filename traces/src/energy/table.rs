@@ -46,6 +46,7 @@ pub enum TableError {
 pub struct FrameTable {
     frames: Vec<FrameEnergy>,
     pixels: Option<u64>,
+    /// One per frame, or none at all.
     truth: Vec<Option<TrueFrame>>,
     outliers: Vec<bool>,
 }
@@ -53,9 +54,8 @@ pub struct FrameTable {
 impl FrameTable {
     /// A table of measured frames; `pixels` per frame where known.
     pub fn new(frames: Vec<FrameEnergy>, pixels: Option<u64>) -> Self {
-        let truth = vec![None; frames.len()];
         let outliers = outliers(&frames.iter().map(|frame| frame.energy_j).collect::<Vec<_>>());
-        Self { frames, pixels, truth, outliers }
+        Self { frames, pixels, truth: Vec::new(), outliers }
     }
 
     /// Puts what really happened beside each frame (`None` for a frame that never was).
@@ -87,8 +87,9 @@ impl FrameTable {
     pub fn write_csv<W: Write>(&self, out: W) -> Result<(), TableError> {
         let mut writer = csv::Writer::from_writer(out);
         writer.write_record(TABLE_COLUMNS)?;
-        for (index, (frame, truth)) in self.frames.iter().zip(&self.truth).enumerate() {
-            writer.write_record(self.record(index, frame, truth.as_ref()))?;
+        for (index, frame) in self.frames.iter().enumerate() {
+            let truth = self.truth.get(index).and_then(Option::as_ref);
+            writer.write_record(self.record(index, frame, truth))?;
         }
         writer.flush()?;
         Ok(())

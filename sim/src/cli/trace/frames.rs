@@ -14,9 +14,9 @@ use crate::output::table::{Table, si, si_digits};
 const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
-    let frames = threads(args.threads)?.install(|| args.find.frames(&args.input))?;
+    let mut frames = threads(args.threads)?.install(|| args.find.frames(&args.input))?;
     let pixels = args.find.pixels.or(frames.metadata.pixels);
-    let table = FrameTable::new(frames.energies.clone(), pixels);
+    let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
     if let Some(out) = &args.out {
         traces::io::atomic::write_file(out, |file| table.write_csv(file))?;
     }
