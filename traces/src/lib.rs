@@ -38,14 +38,19 @@
 //! - Sample `i` starts at `start + i / rate` (left edge) and is the mean over its period, everywhere.
 //! - Input that is not a trace is an error that names file and row, never a panic and never mended silently.
 
+pub mod align;
 pub mod curve;
 pub mod device;
 pub mod energy;
 pub mod frames;
 pub mod io;
 pub mod metadata;
+pub mod pareto;
+pub mod pyramid;
 pub mod score;
+pub mod stream;
 mod sum;
+pub mod table;
 pub mod trace;
 mod warning;
 

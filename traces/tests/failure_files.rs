@@ -180,7 +180,7 @@ fn parquet_errors_name_file_row_and_column() {
 #[test]
 fn a_compression_that_needs_c_is_named_with_the_mend() {
     // The footer ends with its length (4 bytes) and PAR1; in it each column's codec is the thrift i32 field 4, `15 00`
-    // for none, `15 0c` for Zstd (6, zigzag). Only the first such pair after the path `voltage_V` is changed.
+    // for none, `15 08` for Brotli (4, zigzag). Only the first such pair after the path `voltage_V` is changed.
     let ones = || Values::Float(vec![1.0; 3]);
     let mut bytes = parquet_bytes(vec![
         ("time_ns", Values::Int(vec![0, 1000, 2000])),
@@ -193,10 +193,10 @@ fn a_compression_that_needs_c_is_named_with_the_mend() {
     let schema = find(&bytes, 0, b"\x09voltage_V");
     let chunk = find(&bytes, schema + 10, b"\x09voltage_V");
     let codec = find(&bytes, chunk, &[0x15, 0x00]);
-    bytes[codec + 1] = 0x0c;
-    let (_folder, path) = in_folder("zstd.parquet", &bytes);
+    bytes[codec + 1] = 0x08;
+    let (_folder, path) = in_folder("brotli.parquet", &bytes);
     let error = parquet::read(&path).unwrap_err();
-    says(&error, &["zstd.parquet: column voltage_V is compressed with ZSTD", "write it with Snappy"]);
+    says(&error, &["brotli.parquet: column voltage_V is compressed with BROTLI", "write it with Snappy"]);
 }
 
 #[test]

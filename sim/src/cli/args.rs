@@ -9,6 +9,7 @@ use pipeline::Features;
 use pipeline::frame::HeatMap;
 
 use super::parse::{frames, size, tests};
+use super::trace::args::TraceArgs;
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
 #[derive(Debug, Parser)]
@@ -32,6 +33,8 @@ pub enum Command {
     Stress(StressArgs),
     /// Measure and draw a chart of the book
     Chart(ChartArgs),
+    /// Analyse a power trace, recorded or synthetic: frames, energies, alignment, formats, plots, Pareto frontiers
+    Trace(TraceArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
     List(ListArgs),
 }

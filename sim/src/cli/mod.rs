@@ -8,6 +8,7 @@ mod run;
 mod samples;
 mod stress;
 mod terminal;
+mod trace;
 mod visibility;
 
 use std::process::ExitCode;
@@ -73,5 +74,6 @@ fn dispatch(cli: &Cli) -> Result<(), Failure> {
         Command::Samples(args) => samples::run(args),
         Command::Stress(args) => stress::run(args),
         Command::Chart(args) => chart::run(args),
+        Command::Trace(args) => trace::run(args),
     }
 }

@@ -10,7 +10,11 @@ impl Device {
     /// `|V'| e_I + |I'| e_V + e_V e_I`; `e` is half a code plus the f32 rounding of the stored value. The last term
     /// covers the f64 arithmetic of means, rail and integral.
     pub fn quantization_energy_bound_j(&self, sampled: &Sampled) -> Option<f64> {
-        if !self.is_noise_free() || sampled.clipped_currents > 0 || sampled.clipped_voltages > 0 {
+        if !self.is_noise_free()
+            || !self.is_true()
+            || sampled.clipped_currents > 0
+            || sampled.clipped_voltages > 0
+        {
             return None;
         }
         let trace = &sampled.trace;

@@ -10,6 +10,11 @@ mod spec;
 pub use sample::{SampleError, Sampled};
 pub use spec::{DeviceError, DeviceSpec};
 
+/// Two independent standard normal numbers, a pure function of seed and counter.
+pub(crate) fn normal_pair(seed: u64, counter: u64) -> (f64, f64) {
+    noise::Noise::new(seed, 0).pair(counter)
+}
+
 use quantizer::Quantizer;
 use rail::Rail;
 
@@ -50,6 +55,16 @@ impl Device {
         quiet.spec.voltage_noise_v = 0.0;
         quiet.spec.low_pass_s = None;
         quiet
+    }
+
+    /// Whether gain, offset and the source of the voltage leave nothing but quantization.
+    fn is_true(&self) -> bool {
+        let spec = &self.spec;
+        let straight = spec.current_gain == 1.0 && spec.voltage_gain == 1.0;
+        straight
+            && spec.current_offset_a == 0.0
+            && spec.voltage_offset_v == 0.0
+            && spec.specified_voltage_v.is_none()
     }
 
     fn is_noise_free(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use super::Device;
 use super::noise::Noise;
-use crate::curve::Curve;
+use crate::curve::{Curve, CurveError};
 use crate::metadata::Metadata;
 use crate::trace::{Trace, TraceError};
 use thiserror::Error;
@@ -49,6 +49,9 @@ pub enum SampleError {
         /// The limit, W.
         limit_w: f64,
     },
+    /// The trace that is to be sampled is no curve of power.
+    #[error("the trace cannot be sampled again: {0}")]
+    Curve(#[from] CurveError),
     /// The result is no valid trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -99,6 +102,28 @@ impl Device {
         })
     }
 
+    /// Samples a trace as if its power were drawn from the device's rail: what a coarser recorder would have shown.
+    ///
+    /// # Errors
+    /// [`SampleError`] as [`Device::sample`], and where the trace's power is negative.
+    pub fn resample(&self, trace: &Trace) -> Result<Sampled, SampleError> {
+        let edges_s = (0..=trace.samples()).map(|index| trace.time_s(index)).collect();
+        let curve = Curve::new(edges_s, trace.powers_w().collect())?;
+        let mut sampled = self.sample(&curve, trace.start_s(), curve.end_s())?;
+        let of_device = std::mem::replace(&mut sampled.trace.metadata, trace.metadata.clone());
+        sampled.trace.metadata.device = of_device.device;
+        sampled.trace.metadata.seed = of_device.seed;
+        Ok(sampled)
+    }
+
+    fn amperes(&self, current_a: f64) -> f64 {
+        self.spec.current_gain * current_a + self.spec.current_offset_a
+    }
+
+    fn volts(&self, voltage_v: f64) -> f64 {
+        self.spec.voltage_gain * voltage_v + self.spec.voltage_offset_v
+    }
+
     fn periods_in(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<usize, SampleError> {
         let (curve_start_s, curve_end_s) = (curve.start_s(), curve.end_s());
         if !(start_s >= curve_start_s && end_s <= curve_end_s && start_s <= end_s) {
@@ -128,9 +153,11 @@ impl Device {
                 return Err(SampleError::Overload { time_s, power_w, limit_w: self.rail.limit_w() });
             };
             let (a, v) = if noisy { noise.pair(index as u64) } else { (0.0, 0.0) };
-            let (voltage, voltage_clipped) = self.voltage.quantize(volts + self.spec.voltage_noise_v * v);
-            let (current, current_clipped) = self.current.quantize(amperes + self.spec.current_noise_a * a);
-            channels.voltage_v.push(voltage);
+            let (voltage, voltage_clipped) =
+                self.voltage.quantize(self.volts(volts) + self.spec.voltage_noise_v * v);
+            let (current, current_clipped) =
+                self.current.quantize(self.amperes(amperes) + self.spec.current_noise_a * a);
+            channels.voltage_v.push(self.spec.specified_voltage_v.map_or(voltage, |volts| volts as f32));
             channels.current_a.push(current);
             channels.clipped_voltages += usize::from(voltage_clipped);
             channels.clipped_currents += usize::from(current_clipped);

@@ -36,6 +36,16 @@ pub struct DeviceSpec {
     pub voltage_range_v: [f64; 2],
     /// Resolution of both converters, 1 to 24 bits.
     pub bits: u32,
+    /// What the current is multiplied by on the way: 1 for a device without error of gain.
+    pub current_gain: f64,
+    /// What is added to the current, A.
+    pub current_offset_a: f64,
+    /// What the voltage is multiplied by on the way.
+    pub voltage_gain: f64,
+    /// What is added to the voltage, V.
+    pub voltage_offset_v: f64,
+    /// A voltage by specification, V, recorded in place of a measured one: what the rail sags is then missed.
+    pub specified_voltage_v: Option<f64>,
     /// Noise of the current, A rms, white and Gaussian.
     pub current_noise_a: f64,
     /// Noise of the voltage, V rms, white and Gaussian.
@@ -58,6 +68,11 @@ impl Default for DeviceSpec {
             current_range_a: [-30.0, 30.0],
             voltage_range_v: [-20.0, 20.0],
             bits: 14,
+            current_gain: 1.0,
+            current_offset_a: 0.0,
+            voltage_gain: 1.0,
+            voltage_offset_v: 0.0,
+            specified_voltage_v: None,
             current_noise_a: 0.005,
             voltage_noise_v: 0.002,
             low_pass_s: None,
@@ -84,6 +99,16 @@ impl DeviceSpec {
             ("bits", f64::from(self.bits), (1..=24).contains(&self.bits), "between 1 and 24"),
             ("current_noise_a", self.current_noise_a, quiet(self.current_noise_a), not_negative),
             ("voltage_noise_v", self.voltage_noise_v, quiet(self.voltage_noise_v), not_negative),
+            ("current_gain", self.current_gain, self.current_gain.is_finite(), "a finite number"),
+            ("current_offset_a", self.current_offset_a, self.current_offset_a.is_finite(), "a finite number"),
+            ("voltage_gain", self.voltage_gain, self.voltage_gain.is_finite(), "a finite number"),
+            ("voltage_offset_v", self.voltage_offset_v, self.voltage_offset_v.is_finite(), "a finite number"),
+            (
+                "specified_voltage_v",
+                self.specified_voltage_v.unwrap_or(1.0),
+                self.specified_voltage_v.is_none_or(f64::is_finite),
+                "a finite number, or absent",
+            ),
             (
                 "low_pass_s",
                 low_pass_s,
@@ -109,7 +134,9 @@ mod tests {
     #[test]
     fn the_default_is_valid_and_every_bad_field_is_named() {
         assert_eq!(DeviceSpec::default().check(), Ok(()));
-        let spoils: [(&str, Spoil); 9] = [
+        let spoils: [(&str, Spoil); 11] = [
+            ("current_gain", |s| s.current_gain = f64::NAN),
+            ("specified_voltage_v", |s| s.specified_voltage_v = Some(f64::INFINITY)),
             ("rate_hz", |s| s.rate_hz = -1.0),
             ("rail_v", |s| s.rail_v = 0.0),
             ("rail_ohm", |s| s.rail_ohm = f64::NAN),

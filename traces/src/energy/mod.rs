@@ -1,11 +1,19 @@
 //! Energy between any two times, and per frame.
 
 mod frame;
+mod idle;
 mod integral;
+mod outliers;
+mod pooled;
 mod summary;
 mod table;
+mod warm_up;
 
 pub use frame::{FrameEnergy, TrueFrame};
+pub use idle::{Idle, finish_s};
 pub use integral::PowerIntegral;
+pub use outliers::outliers;
+pub use pooled::{Pooled, pooled};
 pub use summary::{Spread, Summary};
 pub use table::{FrameTable, TABLE_COLUMNS, TableError};
+pub use warm_up::{WarmUp, mean_over_discarded, warm_up};

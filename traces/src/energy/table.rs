@@ -1,13 +1,13 @@
 //! `frames.csv`.
 
-use super::{FrameEnergy, TrueFrame};
+use super::{FrameEnergy, TrueFrame, outliers};
 use std::io::Write;
 use thiserror::Error;
 
 /// The columns of `frames.csv`, in order. Later versions only add columns at the end.
 ///
 /// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a simulator.
-pub const TABLE_COLUMNS: [&str; 11] = [
+pub const TABLE_COLUMNS: [&str; 12] = [
     "frame",
     "start_s",
     "end_s",
@@ -19,6 +19,7 @@ pub const TABLE_COLUMNS: [&str; 11] = [
     "flags",
     "true_start_s",
     "true_energy_J",
+    "outlier",
 ];
 
 /// Why a table could not be built or written.
@@ -45,14 +46,16 @@ pub enum TableError {
 pub struct FrameTable {
     frames: Vec<FrameEnergy>,
     pixels: Option<u64>,
+    /// One per frame, or none at all.
     truth: Vec<Option<TrueFrame>>,
+    outliers: Vec<bool>,
 }
 
 impl FrameTable {
     /// A table of measured frames; `pixels` per frame where known.
     pub fn new(frames: Vec<FrameEnergy>, pixels: Option<u64>) -> Self {
-        let truth = vec![None; frames.len()];
-        Self { frames, pixels, truth }
+        let outliers = outliers(&frames.iter().map(|frame| frame.energy_j).collect::<Vec<_>>());
+        Self { frames, pixels, truth: Vec::new(), outliers }
     }
 
     /// Puts what really happened beside each frame (`None` for a frame that never was).
@@ -71,6 +74,11 @@ impl FrameTable {
         &self.frames
     }
 
+    /// Which frames differ in energy from those around them.
+    pub fn outliers(&self) -> &[bool] {
+        &self.outliers
+    }
+
     /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads back the
     /// same.
     ///
@@ -79,14 +87,15 @@ impl FrameTable {
     pub fn write_csv<W: Write>(&self, out: W) -> Result<(), TableError> {
         let mut writer = csv::Writer::from_writer(out);
         writer.write_record(TABLE_COLUMNS)?;
-        for (index, (frame, truth)) in self.frames.iter().zip(&self.truth).enumerate() {
-            writer.write_record(self.record(index, frame, truth.as_ref()))?;
+        for (index, frame) in self.frames.iter().enumerate() {
+            let truth = self.truth.get(index).and_then(Option::as_ref);
+            writer.write_record(self.record(index, frame, truth))?;
         }
         writer.flush()?;
         Ok(())
     }
 
-    fn record(&self, index: usize, frame: &FrameEnergy, truth: Option<&TrueFrame>) -> [String; 11] {
+    fn record(&self, index: usize, frame: &FrameEnergy, truth: Option<&TrueFrame>) -> [String; 12] {
         let per_pixel_j = self.pixels.and_then(|pixels| frame.energy_per_pixel_j(pixels));
         let or_empty = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
         [
@@ -101,6 +110,7 @@ impl FrameTable {
             frame.flags.to_string(),
             or_empty(truth.map(|truth| truth.start_s)),
             or_empty(truth.map(|truth| truth.energy_j)),
+            u8::from(self.outliers[index]).to_string(),
         ]
     }
 }
@@ -126,9 +136,9 @@ mod tests {
         table.write_csv(&mut out).unwrap();
         assert_eq!(
             String::from_utf8(out).unwrap(),
-            "frame,start_s,end_s,duration_s,energy_J,power_W,energy_per_pixel_J,confidence,flags,true_start_s,true_energy_J\n\
-             0,0.25,0.75,0.5,0.125,0.25,0.000125,1,marked+last,0.25,0.124\n\
-             1,0.25,0.75,0.5,0.125,0.25,0.000125,1,marked+last,,\n"
+            "frame,start_s,end_s,duration_s,energy_J,power_W,energy_per_pixel_J,confidence,flags,true_start_s,true_energy_J,outlier\n\
+             0,0.25,0.75,0.5,0.125,0.25,0.000125,1,marked+last,0.25,0.124,0\n\
+             1,0.25,0.75,0.5,0.125,0.25,0.000125,1,marked+last,,,0\n"
         );
     }
 

@@ -14,7 +14,7 @@ const IRREGULAR: f64 = 0.1;
 
 /// 1 at or below the mean distance of the matches, 0 at or above that of the rest, linear in the logarithm between;
 /// scaled down where neither the populations are distinct nor the starts evenly spaced.
-pub(super) fn confidence(distance_w2: f64, threshold: &Threshold) -> f64 {
+pub(crate) fn confidence(distance_w2: f64, threshold: &Threshold) -> f64 {
     let low = libm::log(threshold.matched.mean_w2.max(f64::MIN_POSITIVE));
     let high = libm::log(threshold.rest.mean_w2.max(f64::MIN_POSITIVE));
     if high <= low {
@@ -32,8 +32,19 @@ pub(super) fn conclude(
     starts: Vec<FrameStart>,
     threshold: Threshold,
 ) -> Found {
+    conclude_at(trace.rate_hz(), marks, placement, starts, threshold)
+}
+
+/// As [`conclude`], of samples at `rate_hz` that need not be at hand.
+pub(crate) fn conclude_at(
+    rate_hz: f64,
+    marks: &Marks,
+    placement: &Placement,
+    starts: Vec<FrameStart>,
+    threshold: Threshold,
+) -> Found {
     let frames = spans(&starts, marks.end_s);
-    let period_s = trace.period_s();
+    let period_s = 1.0 / rate_hz;
     let pre_s = placement.marks.first().map_or(0.0, |mark| libm::round(mark.anchor) * period_s);
     let window = Window { pre_s, post_s: placement.samples as f64 * period_s - pre_s };
     let mut found = Found {
@@ -51,7 +62,7 @@ pub(super) fn conclude(
         weak_separation(&found),
         irregular(&found),
         window_too_long(&found),
-        few_samples(&found, trace.rate_hz()),
+        few_samples(&found, rate_hz),
     ]
     .into_iter()
     .flatten()

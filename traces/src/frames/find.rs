@@ -97,6 +97,18 @@ impl View<'_> {
     }
 }
 
+/// [`View::start_after_idle`] for samples that are not all of a trace.
+pub(crate) fn start_after_idle(
+    trace: &Trace,
+    power: &[f64],
+    placement: &Placement,
+    threshold: &Threshold,
+    starts: &[FrameStart],
+    spacing: usize,
+) -> Option<FrameStart> {
+    View { trace, power, placement, threshold }.start_after_idle(starts, spacing)
+}
+
 /// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end mark, by
 /// [`Method::Auto`].
 ///
@@ -257,7 +269,7 @@ fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<FrameStart> {
 }
 
 /// The largest distance of a marked window to itself half a sample on, W^2, in between taken to be linear.
-fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
+pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
     let windows = placement.marks.iter().map(|mark| &power[mark.first..mark.first + placement.samples]);
     let half_steps =
         windows.map(|window| window.windows(2).map(|pair| 0.25 * (pair[1] - pair[0]).powi(2)).sum());

@@ -86,7 +86,7 @@ pub struct Marks {
 
 /// The window of one mark in samples of one trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Placed {
+pub(crate) struct Placed {
     /// First sample of the window.
     pub first: usize,
     /// The mark's position relative to `first`, in samples, fractional.
@@ -97,7 +97,7 @@ pub(super) struct Placed {
 
 /// All windows of the marks on one trace; they have the same length.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Placement {
+pub(crate) struct Placement {
     pub marks: Vec<Placed>,
     pub samples: usize,
     /// Whether the trace's ends cut the window.
@@ -112,21 +112,25 @@ impl Marks {
 
     /// Puts the windows on the samples of a trace, cutting them where the trace ends.
     pub(super) fn place(&self, trace: &Trace) -> Result<Placement, MarkError> {
-        self.check(trace)?;
-        let rate_hz = trace.rate_hz();
+        self.place_on(trace.start_s(), trace.rate_hz(), trace.samples() as u64)
+    }
+
+    /// As [`Marks::place`], on samples that need not be at hand. An end mark may be infinite: the end of the samples.
+    pub(crate) fn place_on(&self, start_s: f64, rate_hz: f64, samples: u64) -> Result<Placement, MarkError> {
+        let room = Room { start_s, rate_hz, samples: samples as f64 };
+        self.check(&room)?;
         let wanted = [libm::round(self.window.pre_s * rate_hz), libm::round(self.window.post_s * rate_hz)];
-        let centre = |mark_s: f64| libm::round(trace.position(mark_s));
+        let centre = |mark_s: f64| libm::round(room.position(mark_s));
         let room_before = self.starts_s.iter().map(|&s| centre(s)).fold(f64::INFINITY, f64::min);
-        let room_after =
-            trace.samples() as f64 - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
+        let room_after = room.samples - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
         let pre = wanted[0].min(room_before);
         let post = wanted[1].min(room_after);
         if pre + post < LEAST_SAMPLES as f64 {
-            return Err(self.no_room(trace, wanted[0] + wanted[1]));
+            return Err(self.no_room(&room, wanted[0] + wanted[1]));
         }
         let place = |&mark_s: &f64| {
             let first = centre(mark_s) - pre;
-            Placed { first: first as usize, anchor: trace.position(mark_s) - first, mark_s }
+            Placed { first: first as usize, anchor: room.position(mark_s) - first, mark_s }
         };
         let cut = pre < wanted[0] || post < wanted[1];
         Ok(Placement {
@@ -136,16 +140,16 @@ impl Marks {
         })
     }
 
-    fn no_room(&self, trace: &Trace, wanted_samples: f64) -> MarkError {
+    fn no_room(&self, room: &Room, wanted_samples: f64) -> MarkError {
         if wanted_samples < LEAST_SAMPLES as f64 {
             let window_s = self.window.pre_s + self.window.post_s;
-            return MarkError::TooShort { window_s, rate_hz: trace.rate_hz() };
+            return MarkError::TooShort { window_s, rate_hz: room.rate_hz };
         }
         let mark_s = self.starts_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        MarkError::OutsideTrace { mark_s, start_s: trace.start_s(), end_s: trace.end_s() }
+        MarkError::OutsideTrace { mark_s, start_s: room.start_s, end_s: room.end_s() }
     }
 
-    fn check(&self, trace: &Trace) -> Result<(), MarkError> {
+    fn check(&self, room: &Room) -> Result<(), MarkError> {
         for (what, value_s) in
             [("window before the mark", self.window.pre_s), ("window after the mark", self.window.post_s)]
         {
@@ -156,21 +160,35 @@ impl Marks {
         if self.starts_s.is_empty() {
             return Err(MarkError::NoMark);
         }
-        let half_sample_s = 0.5 * trace.period_s();
+        let (start_s, end_s) = (room.start_s, room.end_s());
         for &mark_s in &self.starts_s {
             // Written so that NaN fails, too.
-            if !(mark_s >= trace.start_s() && mark_s <= trace.end_s()) {
-                return Err(MarkError::OutsideTrace {
-                    mark_s,
-                    start_s: trace.start_s(),
-                    end_s: trace.end_s(),
-                });
+            if !(mark_s >= start_s && mark_s <= end_s) {
+                return Err(MarkError::OutsideTrace { mark_s, start_s, end_s });
             }
-            if !(self.end_s > mark_s && self.end_s <= trace.end_s() + half_sample_s) {
-                return Err(MarkError::End { end_mark_s: self.end_s, mark_s, end_s: trace.end_s() });
+            let within = self.end_s <= end_s + 0.5 / room.rate_hz || self.end_s == f64::INFINITY;
+            if !(self.end_s > mark_s && within) {
+                return Err(MarkError::End { end_mark_s: self.end_s, mark_s, end_s });
             }
         }
         Ok(())
+    }
+}
+
+/// Where samples lie in time.
+struct Room {
+    start_s: f64,
+    rate_hz: f64,
+    samples: f64,
+}
+
+impl Room {
+    fn position(&self, time_s: f64) -> f64 {
+        (time_s - self.start_s) * self.rate_hz
+    }
+
+    fn end_s(&self) -> f64 {
+        self.start_s + self.samples / self.rate_hz
     }
 }
 

@@ -11,6 +11,7 @@ mod marks;
 mod method;
 mod minima;
 pub mod profile;
+mod propose;
 mod refine;
 mod register;
 mod regularity;
@@ -22,4 +23,13 @@ pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_on
 pub use flags::{Flag, Flags};
 pub use marks::{MarkError, Marks, Window, default_window};
 pub use method::Method;
+pub use propose::{Proposal, propose};
 pub use threshold::{Population, Rule, Threshold};
+
+// For the analysis of files in pieces.
+pub(crate) use assess::{conclude_at, confidence};
+pub(crate) use find::{misalignment_w2, start_after_idle};
+pub(crate) use marks::{Placed, Placement};
+pub(crate) use refine::vertex;
+pub(crate) use regularity::regularity;
+pub(crate) use threshold::choose;

@@ -25,7 +25,7 @@ pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) 
 }
 
 /// Where the parabola through three equally spaced values is lowest, relative to the middle one, within half a step.
-fn vertex(before: f64, middle: f64, after: f64) -> f64 {
+pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     let curvature = before - 2.0 * middle + after;
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }

@@ -8,7 +8,7 @@ const LEAST_GAPS: usize = 4;
 /// The share of `span` that lies between neighbours at a regular distance: 1 if all of it is evenly divided, less
 /// where starts are missing (their gap is long), false (short), or absent at the ends. 0 if there are too few.
 /// Offsets in samples, sorted.
-pub(super) fn regularity(offsets: &[usize], span: usize) -> f64 {
+pub(crate) fn regularity(offsets: &[usize], span: usize) -> f64 {
     let gaps: Vec<usize> = offsets.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if gaps.len() < LEAST_GAPS || span == 0 {
         return 0.0;

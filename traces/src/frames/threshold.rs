@@ -102,7 +102,7 @@ impl Threshold {
 /// Chooses the threshold. `distances` are those of the spaced minima, the marks left out; `background_w2` is the
 /// median distance over all offsets, `noise_w2` what the trace's noise is estimated to leave of a perfect match,
 /// `alignment_w2` what half a sample of misalignment does, `regularity` how evenly (0 to 1) the starts below a threshold are spaced.
-pub(super) fn choose(
+pub(crate) fn choose(
     distances: &[f64],
     background_w2: f64,
     noise_w2: f64,

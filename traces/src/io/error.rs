@@ -25,6 +25,24 @@ pub enum ReadError {
         /// What the reader says.
         reason: String,
     },
+    /// A format that is not read.
+    #[error("{path}: this is {found}, which is not read: {mend}", path = path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// A stretch cannot be mended.
+    #[error("{path}: {reason}; cut the stretch out by hand", path = path.display())]
+    Repair {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// A row is damaged or cut off.
     #[error("{path}: row {row}: {reason}: the file is cut off or damaged; mend or drop the row", path = path.display())]
     Row {
@@ -51,7 +69,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
         /// The column.
-        column: &'static str,
+        column: String,
         /// What there is.
         found: String,
     },
@@ -61,7 +79,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
         /// The column.
-        column: &'static str,
+        column: String,
     },
     /// A column is compressed in a way that needs a C library.
     #[error("{path}: column {column} is compressed with {codec}, which is not read: write it with Snappy or uncompressed", path = path.display())]
@@ -79,7 +97,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
         /// The column.
-        column: &'static str,
+        column: String,
         /// Its type.
         found: String,
         /// The types that can be read.
@@ -93,7 +111,7 @@ pub enum ReadError {
         /// The row.
         row: u64,
         /// The column.
-        column: &'static str,
+        column: String,
         /// What stands there.
         value: String,
     },
@@ -167,7 +185,7 @@ impl ReadError {
             TraceError::NotFinite { row, channel, value } => Self::Value {
                 path: path.to_owned(),
                 row: row as u64,
-                column: channel,
+                column: channel.to_owned(),
                 value: value.to_string(),
             },
             source => Self::Trace { path: path.to_owned(), source },

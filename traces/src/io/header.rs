@@ -15,7 +15,7 @@ pub(super) const KEYS: [&str; 2] = ["trace", "power_trace"];
 /// The description: what the columns alone do not say, and the exact rate and start, which rounded time stamps lose.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub(super) struct Header {
+pub(crate) struct Header {
     pub version: u32,
     #[serde(alias = "sample_rate_hz")]
     pub rate_hz: Option<f64>,
@@ -64,7 +64,7 @@ pub(super) fn from_json(path: &Path, json: &str) -> Result<Header, ReadError> {
 
 impl Header {
     /// Holds the stated number of samples against the rows found.
-    pub(super) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
+    pub(crate) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
         match self.samples {
             Some(stated) if stated != found => Err(ReadError::Rows { path: path.to_owned(), found, stated }),
             _ => Ok(()),

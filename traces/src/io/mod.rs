@@ -1,13 +1,28 @@
-//! Trace files: Parquet (native), CSV with a JSON text beside it (interchange), and whole-or-nothing writing.
+//! Trace files.
+//!
+//! [`read`] takes any of them, as [`ReadOptions`] say: Parquet, CSV, TSV, gzip. [`Rows`] reads in pieces what does not fit
+//! into memory. [`csv`] and [`parquet`] write, and read by the native names alone.
 
 pub mod atomic;
+mod columns;
 pub mod csv;
 mod error;
 mod header;
+mod options;
 pub mod parquet;
+mod read;
+mod repair;
+mod rows;
 mod timing;
 
 pub use error::{ReadError, WriteError};
+pub use options::ReadOptions;
+pub use read::{Loaded, read};
+pub use repair::Repair;
+pub use rows::Rows;
 
 /// The names of the columns that files are written with; read without regard to case.
 pub const COLUMNS: [&str; 4] = ["time_ns", "time_s", "voltage_V", "current_A"];
+
+pub(crate) use rows::Chunk;
+pub(crate) use timing::{Stamps, grid};

@@ -12,7 +12,8 @@ const SNAP: f64 = 0.05;
 const GUESS_FROM: usize = 1001;
 
 /// Time stamps as a file has them.
-pub(super) enum Stamps {
+#[derive(Clone, Debug)]
+pub(crate) enum Stamps {
     Nanoseconds(Vec<i64>),
     Seconds(Vec<f64>),
     /// No column of times; the description must state the rate.
@@ -21,13 +22,13 @@ pub(super) enum Stamps {
 
 /// When the first sample begins (s) and the rate (Hz).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     pub start_s: f64,
     pub rate_hz: f64,
 }
 
 impl Stamps {
-    fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::Nanoseconds(times) => times.len(),
             Self::Seconds(times) => times.len(),
@@ -40,7 +41,7 @@ impl Stamps {
         if matches!(self, Self::Nanoseconds(_)) { 1.5e-9 } else { f64::INFINITY }
     }
 
-    fn time_s(&self, row: usize) -> f64 {
+    pub(crate) fn time_s(&self, row: usize) -> f64 {
         match self {
             Self::Nanoseconds(times) => times[row] as f64 / 1e9,
             Self::Seconds(times) => times[row],
@@ -49,7 +50,7 @@ impl Stamps {
     }
 
     /// Seconds since an earlier row; nanoseconds are subtracted as integers, so a large start costs no precision.
-    fn since_s(&self, row: usize, earlier: usize) -> f64 {
+    pub(crate) fn since_s(&self, row: usize, earlier: usize) -> f64 {
         match self {
             Self::Nanoseconds(times) => (i128::from(times[row]) - i128::from(times[earlier])) as f64 / 1e9,
             Self::Seconds(times) => times[row] - times[earlier],
@@ -59,7 +60,7 @@ impl Stamps {
 }
 
 /// The grid all stamps lie on.
-pub(super) fn grid(path: &Path, stamps: &Stamps, header: &Header) -> Result<Grid, ReadError> {
+pub(crate) fn grid(path: &Path, stamps: &Stamps, header: &Header) -> Result<Grid, ReadError> {
     if stamps.len() == 0 {
         let rate_hz = header.rate_hz.ok_or(ReadError::NoRate { path: path.to_owned() })?;
         return Ok(Grid { start_s: header.start_s.unwrap_or(0.0), rate_hz });
@@ -90,7 +91,7 @@ fn check_order(path: &Path, stamps: &Stamps) -> Result<(), ReadError> {
             return Err(ReadError::Value {
                 path: path.to_owned(),
                 row: row as u64 + 1,
-                column: "time_s",
+                column: "time_s".to_owned(),
                 value,
             });
         }

@@ -5,6 +5,7 @@
 //! - [`FrameEnergy`]: energy of each frame, measured against true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
 //! - [`Curves`]: curves on logarithmic axes.
+//! - [`Lines`]: bands, lines, dots and bars over plain axes.
 //! - [`HeatMapPlot`]: where in the image something happens.
 //!
 //! And those of comparisons of methods:
@@ -22,6 +23,7 @@ mod curves;
 mod frame_energy;
 mod frame_power;
 mod heat_map;
+mod lines;
 mod matrix;
 mod palette;
 mod panel;
@@ -36,6 +38,7 @@ pub use curves::{Curve, CurvePanel, Curves};
 pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
 pub use frame_power::{FramePower, PowerPart};
 pub use heat_map::{HeatMapPlot, HeatTile};
+pub use lines::{Lines, Mark, Series};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;

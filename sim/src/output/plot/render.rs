@@ -15,6 +15,7 @@ use super::picture::{Across, Picture, Point, Shape, Text};
 use crate::output::dir::{OutDir, OutputError};
 use crate::output::{font, image};
 
+mod pdf;
 mod raster;
 
 use raster::Raster;

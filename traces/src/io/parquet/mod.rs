@@ -1,7 +1,6 @@
 //! The native format: Parquet with the columns `time_ns`, `voltage_V` and `current_A`, and one JSON text under the
 //! key `trace` in the file's metadata.
 
-mod column;
 mod read;
 mod write;
 

@@ -1,0 +1,52 @@
+//! `quintile trace align`.
+
+use std::io::Write;
+
+use serde_json::json;
+use traces::align::{AlignError, Alignment};
+use traces::io::atomic::write_file;
+
+use super::args::AlignArgs;
+use super::input::{times, wrong};
+use crate::cli::Failure;
+use crate::cli::terminal::{complain, print, print_json};
+
+impl From<AlignError> for Failure {
+    fn from(error: AlignError) -> Self {
+        Self { message: error.to_string(), code: 2 }
+    }
+}
+
+pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
+    let mut stamps = times(&args.stamps)?;
+    stamps.sort_by(f64::total_cmp);
+    let alignment = match args.anchor[..] {
+        [a, b] => Alignment::by_anchors(a, b)?,
+        [] => {
+            let (trace, _) = args.input.load()?;
+            let (found, _) = args.find.found(&trace)?;
+            let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
+            Alignment::by_fit(&stamps, &starts)?
+        }
+        _ => return Err(wrong("--anchor is given twice, or not at all for a fit to the frames found")),
+    };
+    if alignment.ambiguous {
+        complain(
+            "warning ambiguous-alignment: another pairing fits about as well, as frame times are even; give two anchors",
+        );
+    }
+    if let Some(out) = &args.out {
+        write_file(out, |file| {
+            writeln!(file, "stamp_s,time_s")?;
+            stamps.iter().try_for_each(|stamp| writeln!(file, "{stamp},{}", alignment.time_s(*stamp)))
+        })?;
+    }
+    if args.json {
+        let aligned: Vec<f64> = stamps.iter().map(|stamp| alignment.time_s(*stamp)).collect();
+        return print_json(&json!({ "alignment": alignment, "times_s": aligned }), true);
+    }
+    print(&format!(
+        "time = {} s + {} x stamp ({} pairs, {:.3e} s left)",
+        alignment.offset_s, alignment.scale, alignment.pairs, alignment.residual_s
+    ))
+}

@@ -1,0 +1,89 @@
+//! `quintile trace convert`.
+
+use std::path::Path;
+
+use serde_json::json;
+use traces::Trace;
+use traces::io::{atomic, csv, parquet};
+
+use super::args::ConvertArgs;
+use super::input::wrong;
+use crate::cli::Failure;
+use crate::cli::terminal::{complain, print, print_json};
+use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Timeline, decimate};
+
+/// Bytes of a row of CSV, about; larger files than this many are announced.
+const ROW_BYTES: u64 = 50;
+const LARGE_BYTES: u64 = 1 << 30;
+
+pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    check(&args.out)?;
+    let (trace, repairs) = args.input.load()?;
+    save(&trace, &args.out)?;
+    let (samples, rate_hz) = (trace.samples(), trace.rate_hz());
+    if args.json {
+        let out = args.out.display().to_string();
+        return print_json(
+            &json!({ "out": out, "samples": samples, "rate_hz": rate_hz, "repairs": repairs }),
+            true,
+        );
+    }
+    print(&format!("{}: {samples} samples at {rate_hz} Hz", args.out.display()))
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |name| name.to_string_lossy().to_ascii_lowercase())
+}
+
+/// Refuses a file of unknown kind before anything is read.
+pub(super) fn check(path: &Path) -> Result<(), Failure> {
+    let known = [".parquet", ".csv", ".tsv", ".csv.gz", ".tsv.gz", ".perfetto-trace"];
+    if known.iter().any(|end| name(path).ends_with(end)) {
+        return Ok(());
+    }
+    Err(wrong(format!("{}: its ending is none of {}", path.display(), known.join(", "))))
+}
+
+/// Writes a trace in the format its name asks for.
+pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
+    let name = name(path);
+    let plain = name.trim_end_matches(".gz");
+    if name.ends_with(".parquet") {
+        return Ok(parquet::save(trace, path)?);
+    }
+    if name.ends_with(".perfetto-trace") {
+        return perfetto(trace, path);
+    }
+    let bytes = trace.samples() as u64 * ROW_BYTES;
+    if bytes > LARGE_BYTES {
+        complain(&format!(
+            "{}: about {:.1} GB as text; Parquet takes a tenth",
+            path.display(),
+            bytes as f64 * 1e-9
+        ));
+    }
+    let delimiter = if plain.ends_with(".tsv") { b'\t' } else { b',' };
+    Ok(csv::save_as(trace, path, delimiter, name.ends_with(".gz"))?)
+}
+
+/// A counter track of the power, thinned out to what the viewer holds.
+fn perfetto(trace: &Trace, path: &Path) -> Result<(), Failure> {
+    let start_ns = trace.time_ns(0);
+    let points = trace
+        .powers_w()
+        .enumerate()
+        .map(|(index, watts)| ((trace.time_ns(index) - start_ns).unsigned_abs(), watts));
+    let points: Vec<(u64, f64)> = points.collect();
+    let thinned = decimate(&points, MAX_POINTS);
+    if thinned.len() < points.len() {
+        complain(&format!(
+            "{}: {} of {} samples kept, extremes among them",
+            path.display(),
+            thinned.len(),
+            points.len()
+        ));
+    }
+    let counters = vec![CounterTrack { name: "power", unit: "W", points: thinned }];
+    let timeline = Timeline { process: "trace", counters, ..Timeline::default() };
+    Ok(atomic::write_file(path, |out| perfetto::write(&timeline, out))?)
+}

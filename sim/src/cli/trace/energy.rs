@@ -1,0 +1,201 @@
+//! `quintile trace energy`.
+
+use serde_json::json;
+use traces::Trace;
+use traces::energy::{FrameEnergy, Idle, Pooled, PowerIntegral, Spread, finish_s, outliers, pooled, warm_up};
+
+use super::args::{Discard, EnergyArgs, IdleBy};
+use super::input::wrong;
+use crate::cli::Failure;
+use crate::cli::terminal::{complain, print, print_json};
+
+pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
+    let (trace, repairs) = args.input.load()?;
+    let idle = idle(args, &trace)?;
+    if args.from.is_some() || args.to.is_some() {
+        return stretch(args, &trace, idle.as_ref());
+    }
+    let mut runs = vec![one_run(args, &trace, idle.as_ref())?];
+    for path in &args.run {
+        let (other, _) = args.input.load_other(path)?;
+        runs.push(one_run(args, &other, self::idle(args, &other)?.as_ref())?);
+    }
+    let energies: Vec<Vec<f64>> =
+        runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
+    let pool = pooled(&energies).ok_or_else(|| wrong("no frame is left; discard fewer"))?;
+    if args.json {
+        let runs: Vec<_> = runs.iter().map(Run::json).collect();
+        return print_json(&json!({ "runs": runs, "pooled": pool, "repairs": repairs }), true);
+    }
+    let text: String = runs.iter().map(Run::text).collect();
+    print(&(text + &pooled_text(&pool)))
+}
+
+fn pooled_text(pool: &Pooled) -> String {
+    format!(
+        "{} runs, {} frames: {:.4} mJ/frame, pooled standard deviation {:.4} mJ",
+        pool.runs,
+        pool.values,
+        pool.mean * 1e3,
+        pool.deviation * 1e3
+    )
+}
+
+/// Energy between two times.
+fn stretch(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle>) -> Result<(), Failure> {
+    let (from_s, to_s) = (args.from.unwrap_or(trace.start_s()), args.to.unwrap_or(trace.end_s()));
+    check(trace, from_s, to_s, "--from and --to")?;
+    let total_j = PowerIntegral::new(trace).energy_j(from_s, to_s);
+    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(trace.start_s(), from_s, to_s));
+    let (energy_j, power_w) = (total_j - idle_j, (total_j - idle_j) / (to_s - from_s));
+    if args.json {
+        return print_json(
+            &json!({ "from_s": from_s, "to_s": to_s, "energy_J": energy_j, "power_W": power_w, "idle_J": idle_j }),
+            true,
+        );
+    }
+    print(&format!("{from_s} s to {to_s} s: {energy_j:.6} J, {power_w:.4} W (idle taken off: {idle_j:.6} J)"))
+}
+
+fn check(trace: &Trace, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
+    let (start_s, end_s) = (trace.start_s(), trace.end_s());
+    if from_s >= start_s && to_s <= end_s * (1.0 + 1e-12) && from_s < to_s {
+        return Ok(());
+    }
+    Err(wrong(format!("{what}: {from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s")))
+}
+
+fn idle(args: &EnergyArgs, trace: &Trace) -> Result<Option<Idle>, Failure> {
+    if let Some((from_s, to_s)) = args.idle {
+        check(trace, from_s, to_s, "--idle")?;
+        return Ok(Some(Idle::Mean(PowerIntegral::new(trace).energy_j(from_s, to_s) / (to_s - from_s))));
+    }
+    if let Some(path) = &args.idle_trace {
+        let (recording, _) = args.input.load_other(path)?;
+        let length_s = recording.end_s() - recording.start_s();
+        return Ok(Some(match args.idle_by {
+            IdleBy::Mean => Idle::Mean(PowerIntegral::new(&recording).total_j() / length_s),
+            IdleBy::Instant => Idle::Instant(Box::new(recording)),
+        }));
+    }
+    Ok(args.idle_w.map(Idle::Mean))
+}
+
+/// Frames of one run and what was made of them.
+struct Run {
+    kept: Vec<FrameEnergy>,
+    discarded: usize,
+    clearness: f64,
+    outliers: usize,
+    old: Spread,
+    passes: Vec<(String, Spread)>,
+}
+
+fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle>) -> Result<Run, Failure> {
+    let (found, _) = args.find.found(trace)?;
+    for warning in &found.warnings {
+        complain(&format!("warning {}: {}", warning.code, warning.message));
+    }
+    let integral = PowerIntegral::new(trace);
+    let mut frames = integral.frames(&found);
+    let all: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
+    let warm = warm_up(&all);
+    let discarded = match args.discard {
+        Discard::Count(count) => count,
+        Discard::Auto => warm.frames,
+    };
+    let out = outliers(&all);
+    let count = out.iter().skip(discarded).filter(|out| **out).count();
+    let busy_w = busy_above(args, trace, &frames);
+    let begin_to_finish = |frame: &FrameEnergy| {
+        let (a_s, b_s) = (frame.start_s, finish_s(trace, frame, busy_w));
+        integral.energy_j(a_s, b_s) - idle.map_or(0.0, |idle| idle.energy_j(trace.start_s(), a_s, b_s))
+    };
+    let old: Vec<f64> = frames.iter().map(begin_to_finish).collect();
+    if let Some(idle) = idle {
+        idle.take_off(trace.start_s(), &mut frames);
+    }
+    let keep = |index: usize| index >= discarded && !(args.drop_outliers && out[index]);
+    let kept: Vec<FrameEnergy> =
+        frames.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, f)| *f).collect();
+    let old: Vec<f64> = old.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, j)| j).collect();
+    let none = || wrong(format!("of {} frames none is left after {discarded} are discarded", frames.len()));
+    let old = Spread::of(&old).ok_or_else(none)?;
+    let passes = passes(args, &integral, &kept, idle, trace.start_s())?;
+    Ok(Run { kept, discarded, clearness: warm.clearness, outliers: count, old, passes })
+}
+
+/// A tenth of the way from the lowest to the mean power of the frames.
+fn busy_above(args: &EnergyArgs, trace: &Trace, frames: &[FrameEnergy]) -> f64 {
+    args.busy_above.unwrap_or_else(|| {
+        let mut powers: Vec<f64> = trace.powers_w().step_by(trace.samples().div_ceil(65_536)).collect();
+        powers.sort_by(f64::total_cmp);
+        let low = powers[powers.len() / 20];
+        let mean = frames.iter().map(FrameEnergy::power_w).sum::<f64>() / frames.len().max(1) as f64;
+        low + 0.1 * (mean - low).max(0.0)
+    })
+}
+
+/// Energy of each pass, from its mark to the next one, or to the end of the frame; what is before the first is a pass
+/// of its own, so that they add up.
+fn passes(
+    args: &EnergyArgs,
+    integral: &PowerIntegral<'_>,
+    frames: &[FrameEnergy],
+    idle: Option<&Idle>,
+    start_s: f64,
+) -> Result<Vec<(String, Spread)>, Failure> {
+    let mut marks = args.pass.clone();
+    if marks.is_empty() {
+        return Ok(Vec::new());
+    }
+    marks.sort_by(|a, b| a.1.total_cmp(&b.1));
+    if marks[0].1 > 0.0 {
+        marks.insert(0, ("before".to_owned(), 0.0));
+    }
+    let mut passes = Vec::new();
+    for (index, (name, ms)) in marks.iter().enumerate() {
+        let energies: Vec<f64> = frames
+            .iter()
+            .map(|frame| {
+                let at = |ms: f64| (frame.start_s + ms * 1e-3).min(frame.end_s);
+                let (a_s, b_s) = (at(*ms), marks.get(index + 1).map_or(frame.end_s, |next| at(next.1)));
+                integral.energy_j(a_s, b_s) - idle.map_or(0.0, |idle| idle.energy_j(start_s, a_s, b_s))
+            })
+            .collect();
+        passes.extend(Spread::of(&energies).map(|spread| (name.clone(), spread)));
+    }
+    Ok(passes)
+}
+
+impl Run {
+    fn json(&self) -> serde_json::Value {
+        let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
+        let passes: Vec<_> =
+            self.passes.iter().map(|(name, j)| json!({ "pass": name, "energy_J": j })).collect();
+        json!({
+            "frames": self.kept.len(), "discarded": self.discarded, "warm_up_clearness": self.clearness,
+            "outliers": self.outliers, "energy_J": Spread::of(&energies), "begin_to_finish_J": self.old,
+            "passes": passes, "energies_J": energies,
+        })
+    }
+
+    fn text(&self) -> String {
+        let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
+        let spread = Spread::of(&energies).unwrap_or_default();
+        let mut text = format!(
+            "{} frames ({} discarded, {} outliers): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
+            self.kept.len(),
+            self.discarded,
+            self.outliers,
+            spread.mean * 1e3,
+            spread.deviation * 1e3,
+            self.old.mean * 1e3
+        );
+        for (name, spread) in &self.passes {
+            text +=
+                &format!("  {name}: {:.4} mJ (deviation {:.4})\n", spread.mean * 1e3, spread.deviation * 1e3);
+        }
+        text
+    }
+}

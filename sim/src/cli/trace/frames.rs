@@ -1,0 +1,159 @@
+//! `quintile trace frames`.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+use traces::energy::{FrameTable, Summary};
+
+use super::args::FramesArgs;
+use super::input::Frames;
+use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::{Failure, threads};
+use crate::output::table::{Table, si, si_digits};
+
+/// Frames shown on the terminal.
+const SHOWN: usize = 12;
+
+pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
+    let mut frames = threads(args.threads)?.install(|| args.find.frames(&args.input))?;
+    let pixels = args.find.pixels.or(frames.metadata.pixels);
+    let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
+    if let Some(out) = &args.out {
+        traces::io::atomic::write_file(out, |file| table.write_csv(file))?;
+    }
+    if args.json {
+        return print_json(&report(&frames, &table, pixels, args.inverse), true);
+    }
+    frames.warn();
+    print(&text(&frames, &table, pixels))?;
+    if args.inverse {
+        print(&inverse_text(&table, pixels))?;
+    }
+    args.out.as_ref().map_or(Ok(()), |out| print(&format!("frames: {}", out.display())))
+}
+
+#[derive(Serialize)]
+struct Row {
+    start_s: f64,
+    end_s: f64,
+    #[serde(rename = "energy_J")]
+    energy_j: f64,
+    #[serde(rename = "power_W")]
+    power_w: f64,
+    confidence: f64,
+    flags: String,
+    outlier: u8,
+}
+
+fn report(frames: &Frames, table: &FrameTable, pixels: Option<u64>, inverse: bool) -> Value {
+    let rows: Vec<Row> = table
+        .frames()
+        .iter()
+        .zip(table.outliers())
+        .map(|(frame, outlier)| Row {
+            start_s: frame.start_s,
+            end_s: frame.end_s,
+            energy_j: frame.energy_j,
+            power_w: frame.power_w(),
+            confidence: frame.confidence,
+            flags: frame.flags.to_string(),
+            outlier: u8::from(*outlier),
+        })
+        .collect();
+    let window = frames.found.window;
+    let mut report = json!({
+        "samples": frames.samples, "rate_hz": frames.rate_hz, "start_s": frames.start_s, "total_J": frames.total_j,
+        "method": frames.found.method, "threshold": frames.found.threshold,
+        "window_s": [window.pre_s, window.post_s], "end_s": frames.found.end_s,
+        "warnings": frames.found.warnings, "repairs": frames.repairs, "proposal": frames.proposal,
+        "pixels": pixels, "summary": Summary::of(table.frames()), "frames": rows,
+    });
+    if inverse {
+        report["inverse"] = inverse_units(table, pixels);
+    }
+    report
+}
+
+fn text(frames: &Frames, table: &FrameTable, pixels: Option<u64>) -> String {
+    let mut lines = String::new();
+    if let Some(p) = &frames.proposal {
+        lines += &format!(
+            "proposed mark: {} s, the most even of {} rises: {} alike divide {:.0} % of the stretch evenly\n",
+            p.mark_s,
+            p.tried,
+            p.alike,
+            100.0 * p.regularity
+        );
+    }
+    let t = &frames.found.threshold;
+    lines += &format!(
+        "{} samples at {}, {} frames by {}; threshold {:.4e} W^2 ({:?}, separation {:.2})\n",
+        frames.samples,
+        si(frames.rate_hz, "Hz"),
+        table.frames().len(),
+        frames.found.method,
+        t.value_w2,
+        t.rule,
+        t.separation
+    );
+    let mut shown = Table::new(["frame", "start", "time", "energy", "power", "confidence", "flags"]);
+    for (index, (frame, outlier)) in table.frames().iter().zip(table.outliers()).enumerate().take(SHOWN) {
+        let flags = if *outlier { format!("{} outlier", frame.flags) } else { frame.flags.to_string() };
+        shown.row([
+            index.to_string(),
+            format!("{:.6} s", frame.start_s),
+            format!("{:.3} ms", frame.duration_s() * 1e3),
+            format!("{:.4} mJ", frame.energy_j * 1e3),
+            si_digits(frame.power_w(), "W", 4),
+            format!("{:.2}", frame.confidence),
+            flags,
+        ]);
+    }
+    lines += &shown.to_string();
+    if table.frames().len() > SHOWN {
+        lines += &format!("... {} more\n", table.frames().len() - SHOWN);
+    }
+    if let Some(s) = Summary::of(table.frames()) {
+        lines += &format!(
+            "mean: {:.4} mJ/frame (deviation {:.4}), {:.3} ms, {}",
+            s.energy_j.mean * 1e3,
+            s.energy_j.deviation * 1e3,
+            s.duration_s.mean * 1e3,
+            si_digits(s.power_w.mean, "W", 4)
+        );
+        if let Some(pixels) = pixels.filter(|&pixels| pixels > 0) {
+            lines += &format!(", {:.3} nJ/pixel", s.energy_j.mean / pixels as f64 * 1e9);
+        }
+        let outliers = table.outliers().iter().filter(|out| **out).count();
+        lines += &format!("; {outliers} outliers\n");
+    }
+    lines
+}
+
+/// Inverse units from the mean energy, and what their own average would wrongly be (Paper II).
+fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
+    let energies: Vec<f64> = table.frames().iter().map(|frame| frame.energy_j).filter(|j| *j > 0.0).collect();
+    let count = energies.len() as f64;
+    let right = count / energies.iter().sum::<f64>();
+    let naive = energies.iter().map(|j| 1.0 / j).sum::<f64>() / count;
+    let pixels = pixels.map(|pixels| pixels as f64);
+    json!({
+        "frames_per_J": right, "pixels_per_J": pixels.map(|pixels| pixels * right),
+        "wrong_mean_of_frames_per_J": naive,
+        "warning": "inverse units cannot be averaged: the mean of frames per joule is not the inverse of the mean energy",
+    })
+}
+
+fn inverse_text(table: &FrameTable, pixels: Option<u64>) -> String {
+    let units = inverse_units(table, pixels);
+    complain(
+        "warning inverse-units: inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
+    );
+    let number = |key: &str| units[key].as_f64().unwrap_or(f64::NAN);
+    let per_pixel =
+        units["pixels_per_J"].as_f64().map_or(String::new(), |p| format!(", {:.3} Mpixels/J", p * 1e-6));
+    format!(
+        "inverse: {:.4} frames/J{per_pixel} (the mean of the inverses would be {:.4}, which is wrong)",
+        number("frames_per_J"),
+        number("wrong_mean_of_frames_per_J")
+    )
+}

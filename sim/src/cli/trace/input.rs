@@ -1,0 +1,246 @@
+//! Reading a trace, its marks and its frames as asked for.
+
+use std::fs;
+use std::path::Path;
+
+use traces::energy::{FrameEnergy, PowerIntegral};
+use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
+use traces::io::{ReadError, ReadOptions, Repair, Rows, WriteError, read};
+use traces::stream::{self, StreamError};
+use traces::{MarkKind, Metadata, Trace, Warning};
+
+use super::args::{FindArgs, InputArgs};
+use crate::cli::Failure;
+use crate::cli::terminal::complain;
+
+/// Traces of more samples are read in pieces.
+const LONG: u64 = 1 << 24;
+/// So are texts of more bytes.
+const LONG_BYTES: u64 = 1 << 30;
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        let asked = matches!(error, ReadError::MissingColumn { .. } | ReadError::Format { .. })
+            || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
+        Self { message: error.to_string(), code: if asked { 2 } else { 1 } }
+    }
+}
+
+impl From<MarkError> for Failure {
+    fn from(error: MarkError) -> Self {
+        Self { message: error.to_string(), code: 2 }
+    }
+}
+
+impl From<StreamError> for Failure {
+    fn from(error: StreamError) -> Self {
+        match error {
+            StreamError::Read(error) => error.into(),
+            StreamError::Mark(error) => error.into(),
+        }
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self { message: error.to_string(), code: 1 }
+    }
+}
+
+/// A mistake of the caller.
+pub(super) fn wrong(message: impl Into<String>) -> Failure {
+    Failure { message: message.into(), code: 2 }
+}
+
+impl InputArgs {
+    pub(super) fn options(&self) -> Result<ReadOptions, Failure> {
+        if let Some(rate_hz) = self.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            return Err(wrong(format!("--rate {rate_hz}: a rate has to be above 0 Hz")));
+        }
+        Ok(ReadOptions {
+            rails: self.rail.clone(),
+            time: self.time_column.clone(),
+            voltage: self.voltage_column.clone(),
+            current: self.current_column.clone(),
+            power: self.power_column.clone(),
+            fixed_voltage_v: self.voltage,
+            rate_hz: self.rate,
+            start_s: self.start,
+            delimiter: None,
+            header: self.no_header.then_some(false),
+            repair: self.repair,
+        })
+    }
+
+    /// The whole trace in memory; what was mended is told.
+    pub(super) fn load(&self) -> Result<(Trace, Vec<Repair>), Failure> {
+        self.load_other(&self.trace)
+    }
+
+    /// Another trace, read in the same way.
+    pub(super) fn load_other(&self, path: &Path) -> Result<(Trace, Vec<Repair>), Failure> {
+        let loaded = read(path, &self.options()?)?;
+        for repair in &loaded.repairs {
+            complain(&format!("{}: mended: {}", path.display(), repair.message));
+        }
+        Ok((loaded.trace, loaded.repairs))
+    }
+}
+
+/// Frames, however they were found.
+pub(super) struct Frames {
+    pub found: Found,
+    pub energies: Vec<FrameEnergy>,
+    pub metadata: Metadata,
+    pub samples: u64,
+    pub rate_hz: f64,
+    pub start_s: f64,
+    pub total_j: f64,
+    pub proposal: Option<Proposal>,
+    pub repairs: Vec<Repair>,
+}
+
+impl Frames {
+    pub(super) fn warn(&self) {
+        self.found.warnings.iter().for_each(|warning| tell(warning));
+    }
+}
+
+fn tell(warning: &Warning) {
+    complain(&format!("warning {}: {}", warning.code, warning.message));
+}
+
+impl FindArgs {
+    /// Finds frames in memory, or in pieces where the trace is long.
+    pub(super) fn frames(&self, input: &InputArgs) -> Result<Frames, Failure> {
+        if self.streams(input)? {
+            return self.in_pieces(input);
+        }
+        let (trace, repairs) = input.load()?;
+        let (found, proposal) = self.found(&trace)?;
+        let integral = PowerIntegral::new(&trace);
+        let (energies, total_j) = (integral.frames(&found), integral.total_j());
+        let (samples, rate_hz, start_s) = (trace.samples() as u64, trace.rate_hz(), trace.start_s());
+        Ok(Frames {
+            found,
+            energies,
+            samples,
+            rate_hz,
+            start_s,
+            total_j,
+            proposal,
+            repairs,
+            metadata: trace.metadata,
+        })
+    }
+
+    fn streams(&self, input: &InputArgs) -> Result<bool, Failure> {
+        if self.method == Method::Tracking || input.repair {
+            return if self.stream {
+                Err(wrong("--stream goes with the sum of squares and without --repair; leave one out"))
+            } else {
+                Ok(false)
+            };
+        }
+        let rows = Rows::open(&input.trace, &input.options()?)?;
+        let bytes = fs::metadata(&input.trace).map_or(0, |metadata| metadata.len());
+        Ok(self.stream || rows.count().map_or(bytes > LONG_BYTES, |count| count > LONG))
+    }
+
+    fn in_pieces(&self, input: &InputArgs) -> Result<Frames, Failure> {
+        let options = input.options()?;
+        if self.auto {
+            return Err(wrong("--auto looks at traces that fit into memory; mark a frame with --mark"));
+        }
+        let starts_s = self.marks(&Metadata::default())?;
+        let marks = Marks { starts_s, window: self.window_s()?, end_s: self.end.unwrap_or(f64::INFINITY) };
+        let streamed = stream::find(&input.trace, &options, &marks)?;
+        let clock = streamed.clock;
+        Ok(Frames {
+            found: streamed.found,
+            energies: streamed.energies,
+            metadata: streamed.metadata,
+            samples: clock.samples.unwrap_or(0),
+            rate_hz: clock.rate_hz,
+            start_s: clock.start_s,
+            total_j: streamed.total_j,
+            proposal: None,
+            repairs: Vec::new(),
+        })
+    }
+
+    /// Frames of a trace in memory.
+    pub(super) fn found(&self, trace: &Trace) -> Result<(Found, Option<Proposal>), Failure> {
+        let proposal = if self.auto {
+            let none = || wrong("--auto found no rise of power to propose as a start: mark one with --mark");
+            Some(propose(trace).ok_or_else(none)?)
+        } else {
+            None
+        };
+        let starts_s = match &proposal {
+            Some(proposal) => vec![proposal.mark_s],
+            None => self.marks(&trace.metadata)?,
+        };
+        let end_s = self.end.or_else(|| end_mark(&trace.metadata)).unwrap_or(trace.end_s());
+        let marks = Marks { starts_s, window: self.window_s()?, end_s };
+        Ok((find_with(trace, &marks, &Options { method: self.method, ..Options::default() })?, proposal))
+    }
+
+    fn window_s(&self) -> Result<Window, Failure> {
+        let (pre, post) = self.window;
+        if pre < 0.0 || post < 0.0 {
+            return Err(wrong(format!("--window {pre},{post}: both have to be at least 0 ms")));
+        }
+        Ok(Window { pre_s: pre * 1e-3, post_s: post * 1e-3 })
+    }
+
+    fn marks(&self, metadata: &Metadata) -> Result<Vec<f64>, Failure> {
+        let mut marks = self.mark.clone();
+        if let Some(path) = &self.mark_file {
+            marks.extend(times(path)?);
+        }
+        if marks.is_empty() {
+            let of_file = metadata.marks.iter().filter(|mark| mark.kind == MarkKind::FrameStart);
+            marks.extend(of_file.map(|mark| mark.time_s));
+        }
+        if marks.is_empty() {
+            return Err(wrong("no frame start is marked: give --mark SECONDS, --mark-file FILE or --auto"));
+        }
+        marks.sort_by(f64::total_cmp);
+        marks.dedup();
+        Ok(marks)
+    }
+}
+
+fn end_mark(metadata: &Metadata) -> Option<f64> {
+    metadata.marks.iter().rev().find(|mark| mark.kind == MarkKind::End).map(|mark| mark.time_s)
+}
+
+/// Times from a file: a number in each line, or the column `start_s`, `time_s` or `mark_s` of a table.
+pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
+    let text = fs::read_to_string(path)
+        .map_err(|error| wrong(format!("{}: cannot be read: {error}", path.display())))?;
+    let mut column = 0;
+    let mut times = Vec::new();
+    for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let fields: Vec<&str> = line.split([',', '\t', ';']).map(str::trim).collect();
+        match fields.get(column).and_then(|field| field.parse::<f64>().ok()).filter(|time| time.is_finite()) {
+            Some(time) => times.push(time),
+            None if times.is_empty() && index == 0 => {
+                let named = |field: &&str| {
+                    ["start_s", "time_s", "mark_s"].iter().any(|n| field.eq_ignore_ascii_case(n))
+                };
+                column = fields.iter().position(|field| named(&field)).unwrap_or(0);
+            }
+            None => {
+                let message = format!(
+                    "{}: line {}: `{line}` holds no time in seconds; mend it",
+                    path.display(),
+                    index + 1
+                );
+                return Err(wrong(message));
+            }
+        }
+    }
+    if times.is_empty() { Err(wrong(format!("{}: holds no time", path.display()))) } else { Ok(times) }
+}

@@ -1,0 +1,155 @@
+//! `quintile trace pareto`.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+
+use serde_json::json;
+use traces::io::atomic::write_file;
+use traces::pareto::{Point, Standing, frontier};
+use traces::table::Table as Columns;
+
+use super::args::ParetoArgs;
+use super::input::wrong;
+use super::plot::{Ending, write};
+use crate::cli::Failure;
+use crate::cli::terminal::{print, print_json};
+use crate::output::plot::{Lines, Mark, Series};
+use crate::output::table::{Table, si_digits};
+
+type Groups = BTreeMap<String, Vec<Standing>>;
+
+pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
+    let table = Columns::read(&args.table).map_err(|error| wrong(error.to_string()))?;
+    let groups = groups(args, &table)?;
+    if let Some(out) = &args.out {
+        if out.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
+            write_file(out, |file| write_table(&groups, file))?;
+        } else {
+            write(&picture(args, &groups), out, Ending::of(out)?)?;
+        }
+    }
+    if args.json {
+        print_json(&json!({ "idle_W": args.idle_w, "groups": groups }), true)
+    } else {
+        print(&text(&groups))
+    }
+}
+
+/// Unit at the end of a column's name: what to multiply by for s or J.
+fn scale(column: &str) -> Option<f64> {
+    let unit = column.rsplit(['_', ' ', '(']).next().unwrap_or_default().trim_end_matches(')');
+    match unit.to_ascii_lowercase().as_str() {
+        "s" | "j" => Some(1.0),
+        "ms" | "mj" => Some(1e-3),
+        "us" | "uj" => Some(1e-6),
+        "ns" | "nj" => Some(1e-9),
+        _ => None,
+    }
+}
+
+fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
+    let numbers = |column: &str, scale: f64| -> Result<Vec<f64>, Failure> {
+        let values = table.numbers(column).map_err(|error| wrong(error.to_string()))?;
+        Ok(values.into_iter().map(|value| value * scale).collect())
+    };
+    // A deviation whose name tells no unit has that of what it belongs to.
+    let unit = |column: &str| scale(column).unwrap_or(1.0);
+    let deviations = |column: &Option<String>, of: &str| match column {
+        Some(column) => numbers(column, scale(column).unwrap_or(unit(of))),
+        None => Ok(vec![0.0; table.rows()]),
+    };
+    let texts = |column: &String| table.texts(column).map_err(|error| wrong(error.to_string()));
+    let (times, energies) =
+        (numbers(&args.time, unit(&args.time))?, numbers(&args.energy, unit(&args.energy))?);
+    let (time_sd, energy_sd) =
+        (deviations(&args.time_sd, &args.time)?, deviations(&args.energy_sd, &args.energy)?);
+    let labels = args.label.as_ref().map(texts).transpose()?;
+    let keys = args.group.iter().map(texts).collect::<Result<Vec<_>, _>>()?;
+    let mut groups: BTreeMap<String, Vec<Point>> = BTreeMap::new();
+    for row in 0..table.rows() {
+        let named = args.group.iter().zip(&keys).map(|(column, values)| format!("{column}={}", values[row]));
+        let key = named.collect::<Vec<_>>().join(", ");
+        groups.entry(key).or_default().push(Point {
+            label: labels.as_ref().map_or_else(|| (row + 1).to_string(), |labels| labels[row].clone()),
+            time_s: times[row],
+            energy_j: energies[row],
+            time_deviation_s: time_sd[row],
+            energy_deviation_j: energy_sd[row],
+        });
+    }
+    Ok(groups.into_iter().map(|(key, points)| (key, frontier(&points, args.idle_w, args.seed))).collect())
+}
+
+fn text(groups: &Groups) -> String {
+    let mut table = Table::new(["group", "setting", "time", "energy", "power", "frontier", "probability"]);
+    for (group, standings) in groups {
+        for s in standings {
+            table.row([
+                group.clone(),
+                s.point.label.clone(),
+                si_digits(s.point.time_s, "s", 4),
+                si_digits(s.point.energy_j, "J", 4),
+                si_digits(s.point.energy_j / s.point.time_s, "W", 4),
+                if s.on_frontier { "yes" } else { "" }.to_owned(),
+                format!("{:.3}", s.probability),
+            ]);
+        }
+    }
+    let trade = groups.values().filter(|s| s.iter().filter(|s| s.on_frontier).count() > 1).count();
+    format!("{table}{trade} of {} groups have a trade-off", groups.len())
+}
+
+fn write_table(groups: &Groups, out: &mut impl Write) -> std::io::Result<()> {
+    let mut rows = csv::Writer::from_writer(out);
+    rows.write_record([
+        "group",
+        "label",
+        "time_s",
+        "energy_J",
+        "compensated_J",
+        "on_frontier",
+        "probability",
+    ])?;
+    for (group, standings) in groups {
+        for s in standings {
+            rows.write_record([
+                group.clone(),
+                s.point.label.clone(),
+                s.point.time_s.to_string(),
+                s.point.energy_j.to_string(),
+                s.compensated_j.to_string(),
+                u8::from(s.on_frontier).to_string(),
+                s.probability.to_string(),
+            ])?;
+        }
+    }
+    rows.flush()
+}
+
+/// All groups in one picture: points, and each group's frontier as a line.
+fn picture(args: &ParetoArgs, groups: &Groups) -> crate::output::plot::Picture {
+    let all = || groups.values().flatten();
+    let of = |on: bool| {
+        let chosen = all().filter(|s| s.on_frontier == on);
+        let label = |s: &Standing| if on { s.point.label.clone() } else { String::new() };
+        Mark::Dots(chosen.map(|s| (s.point.time_s, s.point.energy_j, label(s))).collect())
+    };
+    let mut series = vec![
+        Series { name: "beaten by another".to_owned(), mark: of(false) },
+        Series { name: "on the frontier".to_owned(), mark: of(true) },
+    ];
+    for (group, standings) in groups {
+        let on = standings.iter().filter(|s| s.on_frontier);
+        let mut line: Vec<(f64, f64)> = on.map(|s| (s.point.time_s, s.point.energy_j)).collect();
+        line.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if line.len() > 1 && series.len() < 8 {
+            series.push(Series {
+                name: if group.is_empty() { "frontier".to_owned() } else { group.clone() },
+                mark: Mark::Line(line),
+            });
+        }
+    }
+    let subject = format!("{} - idle power charged: {} W", args.table.display(), args.idle_w);
+    Lines { title: "Time and energy", subject: &subject, x: ("time", "s"), y: ("energy", "J"), series }
+        .picture()
+}

@@ -1,0 +1,233 @@
+//! `quintile trace plot`.
+
+use std::path::Path;
+
+use serde_json::json;
+use traces::Trace;
+use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
+use traces::pyramid::{Column, Pyramid};
+
+use super::args::{PlotArgs, PlotKind};
+use super::input::wrong;
+use crate::cli::Failure;
+use crate::cli::terminal::{print, print_json};
+use crate::output::plot::{Lines, Mark, Picture, Series};
+use crate::output::table::si;
+
+/// Columns of the curve.
+const COLUMNS: usize = 1050;
+/// Bars of the histogram, at most.
+const BARS: usize = 60;
+/// Frames drawn on top of one another, at most.
+const OVERLAID: usize = 400;
+
+pub(super) fn run(args: &PlotArgs) -> Result<(), Failure> {
+    let kind = Ending::of(&args.out)?;
+    let (picture, shown) = match args.kind {
+        PlotKind::Curve => curve(args)?,
+        _ => framed(args)?,
+    };
+    write(&picture, &args.out, kind)?;
+    if args.json {
+        return print_json(&json!({ "out": args.out.display().to_string(), "shown": shown }), true);
+    }
+    print(&format!("{}: {shown}", args.out.display()))
+}
+
+/// What kind of file a name asks for.
+#[derive(Clone, Copy)]
+pub(super) enum Ending {
+    Svg,
+    Png,
+    Pdf,
+}
+
+impl Ending {
+    pub(super) fn of(path: &Path) -> Result<Self, Failure> {
+        match path.extension().and_then(|end| end.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            Some("pdf") => Ok(Self::Pdf),
+            _ => Err(wrong(format!("{}: a plot has to end in .svg, .png or .pdf", path.display()))),
+        }
+    }
+}
+
+pub(super) fn write(picture: &Picture, path: &Path, ending: Ending) -> Result<(), Failure> {
+    let bytes = match ending {
+        Ending::Svg => picture.svg().map(String::into_bytes),
+        Ending::Png => picture.png(),
+        Ending::Pdf => Ok(picture.pdf()),
+    }
+    .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
+    Ok(traces::io::atomic::write_file(path, |out| std::io::Write::write_all(out, &bytes))?)
+}
+
+fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure> {
+    let (from_s, to_s) = (args.from.unwrap_or(start_s), args.to.unwrap_or(end_s));
+    if from_s < to_s && from_s < end_s && to_s > start_s {
+        return Ok((from_s.max(start_s), to_s.min(end_s)));
+    }
+    Err(wrong(format!("--from {from_s} --to {to_s}: the trace is from {start_s} s to {end_s} s")))
+}
+
+/// Lowest, highest and mean power of each column, from the pyramid beside the file.
+fn curve(args: &PlotArgs) -> Result<(Picture, String), Failure> {
+    let options = args.input.options()?;
+    let pyramid = Pyramid::of_file(&args.input.trace, &options)?;
+    let (from_s, to_s) = span(args, pyramid.start_s(), pyramid.end_s())?;
+    let columns = pyramid.columns(from_s, to_s, COLUMNS);
+    let middle = |column: &Column| 0.5 * (column.from_s + column.to_s);
+    let band = columns.iter().map(|c| (middle(c), f64::from(c.low_w), f64::from(c.high_w))).collect();
+    let width_s = args.low_pass.map_or((to_s - from_s) / 50.0, |ms| ms * 1e-3);
+    let mean = smoothed(&columns, width_s).into_iter().zip(&columns).map(|(w, c)| (middle(c), w)).collect();
+    let shown = format!("{from_s} s to {to_s} s in {} columns", columns.len());
+    let series = vec![
+        Series { name: "lowest to highest".to_owned(), mark: Mark::Band(band) },
+        Series { name: format!("mean over {}", si(width_s, "s")), mark: Mark::Line(mean) },
+    ];
+    let subject = args.input.trace.display().to_string();
+    Ok((
+        Lines { title: "Power", subject: &subject, x: ("time", "s"), y: ("power", "W"), series }.picture(),
+        shown,
+    ))
+}
+
+/// Means of the columns within half a width on either side.
+fn smoothed(columns: &[Column], width_s: f64) -> Vec<f64> {
+    let Some(first) = columns.first() else { return Vec::new() };
+    let reach = libm::round(0.5 * width_s / (first.to_s - first.from_s)) as usize;
+    let mut sums = vec![0.0];
+    for column in columns {
+        sums.push(sums[sums.len() - 1] + f64::from(column.mean_w));
+    }
+    let mean = |index: usize| {
+        let (from, to) = (index.saturating_sub(reach), (index + reach + 1).min(columns.len()));
+        (sums[to] - sums[from]) / (to - from) as f64
+    };
+    (0..columns.len()).map(mean).collect()
+}
+
+/// The kinds that need frames.
+fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
+    let (trace, _) = args.input.load()?;
+    let (found, _) = args.find.found(&trace)?;
+    let frames = PowerIntegral::new(&trace).frames(&found);
+    let energies: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
+    let shown = format!("{} frames", frames.len());
+    let (title, x, y, series) = match args.kind {
+        PlotKind::Frame => one_frame(args, &trace, &frames)?,
+        PlotKind::Overlay => overlay(&trace, &frames),
+        PlotKind::Histogram => histogram(&energies),
+        PlotKind::Discard => {
+            let means = mean_over_discarded(&energies);
+            let kept = means[..means.len().saturating_sub(means.len() / 10).max(1)].iter();
+            let line = kept.enumerate().map(|(index, j)| (index as f64, *j)).collect();
+            (
+                "Mean energy over discarded frames",
+                ("frames discarded", ""),
+                ("energy", "J"),
+                vec![series("mean of the rest", Mark::Line(line))],
+            )
+        }
+        PlotKind::Repeats => repeats(args, energies)?,
+        PlotKind::Energy | PlotKind::Curve => {
+            let out = traces::energy::outliers(&energies);
+            let of = |odd: bool| {
+                let chosen = energies.iter().enumerate().filter(|(index, _)| out[*index] == odd);
+                Mark::Dots(chosen.map(|(index, j)| (index as f64, *j, String::new())).collect())
+            };
+            let series = vec![series("frame", of(false)), series("outlier", of(true))];
+            ("Energy per frame", ("frame", ""), ("energy", "J"), series)
+        }
+    };
+    let subject = format!("{} - {shown}", args.input.trace.display());
+    Ok((Lines { title, subject: &subject, x, y, series }.picture(), shown))
+}
+
+type Drawn = (&'static str, (&'static str, &'static str), (&'static str, &'static str), Vec<Series>);
+
+fn series(name: &str, mark: Mark) -> Series {
+    Series { name: name.to_owned(), mark }
+}
+
+/// Power within a frame, over the time since its start.
+fn within(trace: &Trace, frame: &FrameEnergy) -> Vec<(f64, f64)> {
+    let place = |time_s: f64| trace.position(time_s).clamp(0.0, trace.samples() as f64) as usize;
+    (place(frame.start_s)..place(frame.end_s))
+        .map(|index| (trace.time_s(index) - frame.start_s, trace.power_w(index)))
+        .collect()
+}
+
+fn one_frame(args: &PlotArgs, trace: &Trace, frames: &[FrameEnergy]) -> Result<Drawn, Failure> {
+    let number = args.frame.unwrap_or(frames.len() / 2);
+    let frame = frames
+        .get(number)
+        .ok_or_else(|| wrong(format!("--frame {number}: there are {} frames", frames.len())))?;
+    let name = format!("frame {number}, {}", si(frame.energy_j, "J"));
+    Ok((
+        "Power of one frame",
+        ("time since its start", "s"),
+        ("power", "W"),
+        vec![series(&name, Mark::Line(within(trace, frame)))],
+    ))
+}
+
+fn overlay(trace: &Trace, frames: &[FrameEnergy]) -> Drawn {
+    let step = frames.len().div_ceil(OVERLAID).max(1);
+    let lines: Vec<_> = frames.iter().step_by(step).map(|frame| within(trace, frame)).collect();
+    let name = format!("{} frames", lines.len());
+    (
+        "Frames on top of one another",
+        ("time since the start", "s"),
+        ("power", "W"),
+        vec![series(&name, Mark::Faint(lines))],
+    )
+}
+
+fn histogram(energies: &[f64]) -> Drawn {
+    let low = energies.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = energies.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let bars = ((energies.len() as f64).sqrt() as usize).clamp(1, BARS);
+    let width = ((high - low) / bars as f64).max(1e-12 * high.abs()).max(f64::MIN_POSITIVE);
+    let mut counts = vec![0_u32; bars];
+    for energy in energies {
+        counts[(((energy - low) / width) as usize).min(bars - 1)] += 1;
+    }
+    let at = |index: usize| low + index as f64 * width;
+    let bars = counts.iter().enumerate().map(|(i, &count)| (at(i), at(i + 1), f64::from(count))).collect();
+    (
+        "How often which energy occurs",
+        ("energy", "J"),
+        ("frames", ""),
+        vec![series("frames", Mark::Bars(bars))],
+    )
+}
+
+/// Mean and deviation of the n-th frame over all runs.
+fn repeats(args: &PlotArgs, first: Vec<f64>) -> Result<Drawn, Failure> {
+    let mut runs = vec![first];
+    for path in &args.run {
+        let (trace, _) = args.input.load_other(path)?;
+        let (found, _) = args.find.found(&trace)?;
+        runs.push(PowerIntegral::new(&trace).frames(&found).iter().map(|frame| frame.energy_j).collect());
+    }
+    let frames = runs.iter().map(Vec::len).min().unwrap_or(0);
+    let spreads =
+        (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));
+    let spreads: Vec<Spread> = spreads.collect();
+    let at = |index: usize| index as f64;
+    let band = spreads
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (at(i), s.mean - s.deviation, s.mean + s.deviation))
+        .collect();
+    let mean = spreads.iter().enumerate().map(|(i, s)| (at(i), s.mean)).collect();
+    let name = format!("one deviation over {} runs", runs.len());
+    Ok((
+        "Energy of each frame over repeated runs",
+        ("frame", ""),
+        ("energy", "J"),
+        vec![series(&name, Mark::Band(band)), series("mean", Mark::Line(mean))],
+    ))
+}

@@ -1,0 +1,98 @@
+//! Idle power: measured, and taken off.
+
+use super::{FrameEnergy, PowerIntegral};
+use crate::trace::Trace;
+
+/// Idle power to take off.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Idle {
+    /// The same at all times, W: the mean over a stretch or a recording. Less noisy.
+    Mean(f64),
+    /// Instant by instant: what an idle recording shows as long after its start (repeated where it is shorter); it takes
+    /// periodic patterns off, and adds the noise of both.
+    Instant(Box<Trace>),
+}
+
+impl Idle {
+    /// Energy of idling from `a_s` to `b_s` of a trace that starts at `start_s`, J.
+    pub fn energy_j(&self, start_s: f64, a_s: f64, b_s: f64) -> f64 {
+        match self {
+            Self::Mean(watts) => watts * (b_s - a_s),
+            Self::Instant(trace) => {
+                let integral = PowerIntegral::new(trace);
+                since(&integral, trace, b_s - start_s) - since(&integral, trace, a_s - start_s)
+            }
+        }
+    }
+
+    /// Takes the idle energy off every frame.
+    pub fn take_off(&self, start_s: f64, frames: &mut [FrameEnergy]) {
+        match self {
+            Self::Mean(watts) => {
+                frames.iter_mut().for_each(|frame| frame.energy_j -= watts * frame.duration_s());
+            }
+            Self::Instant(trace) => {
+                let integral = PowerIntegral::new(trace);
+                for frame in frames {
+                    let (a_s, b_s) = (frame.start_s - start_s, frame.end_s - start_s);
+                    frame.energy_j -= since(&integral, trace, b_s) - since(&integral, trace, a_s);
+                }
+            }
+        }
+    }
+}
+
+/// Energy of the recording, repeated, from its start on, J.
+fn since(integral: &PowerIntegral<'_>, trace: &Trace, time_s: f64) -> f64 {
+    let length_s = trace.end_s() - trace.start_s();
+    let whole = libm::floor(time_s / length_s);
+    let rest_s = time_s - whole * length_s;
+    whole * integral.total_j() + integral.energy_j(trace.start_s(), trace.start_s() + rest_s)
+}
+
+/// When a frame's work ends, s: the end of its last sample above `watts`; its start where there is none. What the old
+/// method, from begin to finish, takes as the end of the frame.
+pub fn finish_s(trace: &Trace, frame: &FrameEnergy, watts: f64) -> f64 {
+    let place = |time_s: f64| trace.position(time_s).clamp(0.0, trace.samples() as f64) as usize;
+    let (from, to) = (place(frame.start_s), place(frame.end_s));
+    let last = (from..to).rev().find(|&index| trace.power_w(index) > watts);
+    last.map_or(frame.start_s, |last| trace.time_s(last + 1).clamp(frame.start_s, frame.end_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Flags;
+    use crate::metadata::Metadata;
+
+    fn trace(power: Vec<f32>) -> Trace {
+        Trace::new(vec![1.0; power.len()], power, 10.0, 0.0, Metadata::default()).unwrap()
+    }
+
+    fn frame(start_s: f64, end_s: f64, energy_j: f64) -> FrameEnergy {
+        FrameEnergy { start_s, end_s, energy_j, confidence: 1.0, flags: Flags::default() }
+    }
+
+    #[test]
+    fn a_constant_idle_is_the_same_by_mean_and_by_instant_also_beyond_its_recording() {
+        let recording = trace(vec![2.0; 7]);
+        for (a_s, b_s) in [(0.0, 0.3), (0.55, 3.21)] {
+            let by_instant = Idle::Instant(Box::new(recording.clone())).energy_j(0.0, a_s, b_s);
+            assert!((by_instant - Idle::Mean(2.0).energy_j(0.0, a_s, b_s)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_old_method_leaves_out_the_idle_at_the_end() {
+        let trace = trace(vec![5.0, 5.0, 1.0, 5.0, 1.0, 1.0]);
+        assert!((finish_s(&trace, &frame(0.0, 0.6, 1.8), 2.0) - 0.4).abs() < 1e-12);
+        assert_eq!(finish_s(&trace, &frame(0.4, 0.6, 0.2), 2.0), 0.4);
+    }
+
+    #[test]
+    fn taken_off_every_frame() {
+        let mut frames = [frame(0.0, 0.5, 3.0)];
+        Idle::Mean(2.0).take_off(0.0, &mut frames);
+        assert_eq!(frames[0].energy_j, 2.0);
+    }
+}

@@ -1,0 +1,325 @@
+//! What columns hold, from their names.
+
+use super::{ReadError, ReadOptions};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What a column measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Quantity {
+    Time,
+    Voltage,
+    Current,
+    Power,
+}
+
+/// A column's name, understood.
+#[derive(Clone, Debug, PartialEq)]
+struct Named {
+    quantity: Quantity,
+    /// What to multiply by for s, V, A or W.
+    scale: f64,
+    rail: String,
+}
+
+/// A column that is read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Picked {
+    pub index: usize,
+    pub name: String,
+    pub scale: f64,
+}
+
+/// Where a rail's power comes from; numbers are places in [`Layout::values`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Rail {
+    Measured { voltage: usize, current: usize },
+    Specified { volts: f64, current: usize },
+    Power { power: usize },
+}
+
+/// The columns that make up a trace.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Layout {
+    pub time: Option<Picked>,
+    pub values: Vec<Picked>,
+    pub rails: Vec<Rail>,
+    /// Their names, in order.
+    pub names: Vec<String>,
+}
+
+const UNITS: [(&str, Quantity, f64); 14] = [
+    ("s", Quantity::Time, 1.0),
+    ("ms", Quantity::Time, 1e-3),
+    ("us", Quantity::Time, 1e-6),
+    ("ns", Quantity::Time, 1e-9),
+    ("v", Quantity::Voltage, 1.0),
+    ("mv", Quantity::Voltage, 1e-3),
+    ("uv", Quantity::Voltage, 1e-6),
+    ("a", Quantity::Current, 1.0),
+    ("ma", Quantity::Current, 1e-3),
+    ("ua", Quantity::Current, 1e-6),
+    ("na", Quantity::Current, 1e-9),
+    ("w", Quantity::Power, 1.0),
+    ("mw", Quantity::Power, 1e-3),
+    ("uw", Quantity::Power, 1e-6),
+];
+
+fn quantity(token: &str) -> Option<Quantity> {
+    match token {
+        "time" | "timestamp" | "t" => Some(Quantity::Time),
+        "voltage" | "volts" | "volt" => Some(Quantity::Voltage),
+        "current" | "amps" | "i" => Some(Quantity::Current),
+        "power" | "watts" | "p" => Some(Quantity::Power),
+        _ => None,
+    }
+}
+
+/// `gpu_voltage_V`, `Main(mA)`, `Time (s)`, `voltage_V`: quantity, unit and what is left, the rail. `None` for names of
+/// other things.
+fn understood(name: &str) -> Option<Named> {
+    let lower = name.trim_start_matches('\u{feff}').to_ascii_lowercase().replace('\u{b5}', "u");
+    let tokens: Vec<&str> =
+        lower.split(|c: char| !c.is_alphanumeric()).filter(|token| !token.is_empty()).collect();
+    let told = tokens.iter().find_map(|token| quantity(token));
+    let fits = |(_, (name, of, _)): &(usize, (&str, Quantity, f64)), token: &str| {
+        *name == token && told.is_none_or(|told| told == *of)
+    };
+    let unit = tokens.iter().rev().find_map(|token| {
+        UNITS
+            .iter()
+            .copied()
+            .enumerate()
+            .find(|unit| fits(unit, token))
+            .map(|(_, (_, of, scale))| (*token, of, scale))
+    });
+    let quantity_told = told.or(unit.map(|(_, of, _)| of))?;
+    // A single letter is a unit only where nothing but a rail stands beside it or the quantity is told as well.
+    let scale = unit.map_or(1.0, |(_, _, scale)| scale);
+    let mut unit = unit.map(|(token, _, _)| token);
+    let mut rail: Vec<&str> = Vec::new();
+    for token in tokens.iter().rev() {
+        if unit == Some(*token) {
+            unit = None;
+        } else if quantity(token) != Some(quantity_told) {
+            rail.push(token);
+        }
+    }
+    rail.reverse();
+    Some(Named { quantity: quantity_told, scale, rail: rail.join("_") })
+}
+
+/// Chooses the columns of a trace. `time` is what the native column is called in this format.
+pub(super) fn layout(
+    path: &Path,
+    names: &[String],
+    options: &ReadOptions,
+    time: &'static str,
+) -> Result<Layout, ReadError> {
+    if options.by_hand() { by_hand(path, names, options) } else { by_name(path, names, options, time) }
+}
+
+fn missing(path: &Path, names: &[String], column: &str) -> ReadError {
+    let shown: Vec<&str> = names.iter().take(20).map(String::as_str).collect();
+    let found = if shown.is_empty() { "none".to_owned() } else { shown.join(", ") };
+    ReadError::MissingColumn { path: path.to_owned(), column: column.to_owned(), found }
+}
+
+/// A column by its name, else by its number from 1.
+fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Picked, ReadError> {
+    let named = names.iter().position(|name| name.eq_ignore_ascii_case(column));
+    let numbered =
+        || column.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).filter(|&n| n < names.len());
+    let index = named.or_else(numbered).ok_or_else(|| missing(path, names, column))?;
+    let scale =
+        understood(&names[index]).filter(|named| named.quantity == of).map_or(1.0, |named| named.scale);
+    Ok(Picked { index, name: names[index].clone(), scale })
+}
+
+fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
+    let pick = |column: &Option<String>, of| column.as_deref().map(|c| pick(path, names, c, of)).transpose();
+    let time = match &options.time {
+        Some(column) => Some(self::pick(path, names, column, Quantity::Time)?),
+        None => time_column(path, names)?,
+    };
+    if let Some(power) = pick(&options.power, Quantity::Power)? {
+        return Ok(Layout {
+            time,
+            values: vec![power],
+            rails: vec![Rail::Power { power: 0 }],
+            names: vec![String::new()],
+        });
+    }
+    let current =
+        pick(&options.current, Quantity::Current)?.ok_or_else(|| missing(path, names, "current_A"))?;
+    let (values, rail) = match (options.fixed_voltage_v, pick(&options.voltage, Quantity::Voltage)?) {
+        (Some(volts), _) => (vec![current], Rail::Specified { volts, current: 0 }),
+        (None, Some(voltage)) => (vec![voltage, current], Rail::Measured { voltage: 0, current: 1 }),
+        (None, None) => return Err(missing(path, names, "voltage_V")),
+    };
+    Ok(Layout { time, values, rails: vec![rail], names: vec![String::new()] })
+}
+
+fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadError> {
+    let mut times = names.iter().enumerate().filter_map(|(index, name)| {
+        let named =
+            understood(name).filter(|named| named.quantity == Quantity::Time && named.rail.is_empty())?;
+        Some(Picked { index, name: name.clone(), scale: named.scale })
+    });
+    let first = times.next();
+    // Nanoseconds are whole numbers and thereby exact: of two columns of times, theirs is taken.
+    Ok(match times.find(|other| first.as_ref().is_some_and(|first| other.scale < first.scale)) {
+        Some(finer) => Some(finer),
+        None => {
+            if let Some(first) = &first
+                && names.iter().filter(|name| name.eq_ignore_ascii_case(&first.name)).count() > 1
+            {
+                return Err(ReadError::DuplicateColumn { path: path.to_owned(), column: first.name.clone() });
+            }
+            first
+        }
+    })
+}
+
+fn by_name(
+    path: &Path,
+    names: &[String],
+    options: &ReadOptions,
+    _time: &'static str,
+) -> Result<Layout, ReadError> {
+    let mut rails: BTreeMap<String, BTreeMap<Quantity, Picked>> = BTreeMap::new();
+    for (index, name) in names.iter().enumerate() {
+        let Some(named) = understood(name).filter(|named| named.quantity != Quantity::Time) else { continue };
+        let picked = Picked { index, name: name.clone(), scale: named.scale };
+        if rails.entry(named.rail).or_default().insert(named.quantity, picked).is_some() {
+            return Err(ReadError::DuplicateColumn {
+                path: path.to_owned(),
+                column: native(named.quantity).to_owned(),
+            });
+        }
+    }
+    let time = match &options.time {
+        Some(column) => Some(pick(path, names, column, Quantity::Time)?),
+        None => time_column(path, names)?,
+    };
+    let mut layout = Layout { time, values: Vec::new(), rails: Vec::new(), names: Vec::new() };
+    for (name, columns) in chosen(path, names, options, rails)? {
+        layout.add(path, names, options, &name, columns)?;
+    }
+    Ok(layout)
+}
+
+fn native(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Time => "time_s",
+        Quantity::Voltage => "voltage_V",
+        Quantity::Current => "current_A",
+        Quantity::Power => "power_W",
+    }
+}
+
+type Rails = BTreeMap<String, BTreeMap<Quantity, Picked>>;
+
+/// The rails that were asked for, or all that can be read.
+fn chosen(
+    path: &Path,
+    names: &[String],
+    options: &ReadOptions,
+    mut rails: Rails,
+) -> Result<Rails, ReadError> {
+    if options.rails.is_empty() {
+        // A voltage alone (a sense line) is no rail, unless it is all there is and what is missing is to be told.
+        let whole: Rails = rails
+            .iter()
+            .filter(|(_, columns)| {
+                columns.contains_key(&Quantity::Current) || columns.contains_key(&Quantity::Power)
+            })
+            .map(|(name, columns)| (name.clone(), columns.clone()))
+            .collect();
+        if !whole.is_empty() {
+            return Ok(whole);
+        }
+        let column = if rails.values().any(|c| c.contains_key(&Quantity::Voltage)) {
+            "current_A"
+        } else {
+            "voltage_V"
+        };
+        return Err(missing(path, names, column));
+    }
+    let mut asked = Rails::new();
+    for rail in &options.rails {
+        let key = rail.to_ascii_lowercase();
+        let columns = rails.remove(&key).ok_or_else(|| missing(path, names, &format!("of rail {rail}")))?;
+        asked.insert(key, columns);
+    }
+    Ok(asked)
+}
+
+impl Layout {
+    fn add(
+        &mut self,
+        path: &Path,
+        names: &[String],
+        options: &ReadOptions,
+        rail: &str,
+        mut columns: BTreeMap<Quantity, Picked>,
+    ) -> Result<(), ReadError> {
+        let prefix = if rail.is_empty() { String::new() } else { format!("{rail}_") };
+        let rail_of = match (columns.remove(&Quantity::Current), options.fixed_voltage_v) {
+            (Some(current), Some(volts)) => Rail::Specified { volts, current: self.value(current) },
+            (Some(current), None) => match columns.remove(&Quantity::Voltage) {
+                Some(voltage) => {
+                    Rail::Measured { voltage: self.value(voltage), current: self.value(current) }
+                }
+                None => return Err(missing(path, names, &format!("{prefix}voltage_V"))),
+            },
+            (None, _) => match columns.remove(&Quantity::Power) {
+                Some(power) => Rail::Power { power: self.value(power) },
+                None => return Err(missing(path, names, &format!("{prefix}current_A"))),
+            },
+        };
+        self.rails.push(rail_of);
+        self.names.push(rail.to_owned());
+        Ok(())
+    }
+
+    fn value(&mut self, column: Picked) -> usize {
+        self.values.push(column);
+        self.values.len() - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(name: &str) -> Option<(Quantity, f64, String)> {
+        understood(name).map(|named| (named.quantity, named.scale, named.rail))
+    }
+
+    #[test]
+    fn names_of_recorders_are_understood() {
+        let is = |quantity, scale, rail: &str| Some((quantity, scale, rail.to_owned()));
+        assert_eq!(read("voltage_V"), is(Quantity::Voltage, 1.0, ""));
+        assert_eq!(read("CURRENT_a"), is(Quantity::Current, 1.0, ""));
+        assert_eq!(read("time_ns"), is(Quantity::Time, 1e-9, ""));
+        assert_eq!(read("Timestamp(ms)"), is(Quantity::Time, 1e-3, ""));
+        assert_eq!(read("Main(mA)"), is(Quantity::Current, 1e-3, "main"));
+        assert_eq!(read("Main Voltage(V)"), is(Quantity::Voltage, 1.0, "main"));
+        assert_eq!(read("gpu_power_W"), is(Quantity::Power, 1.0, "gpu"));
+        assert_eq!(read("current_A_cpu"), is(Quantity::Current, 1.0, "cpu"));
+        assert_eq!(read("note"), None);
+    }
+
+    #[test]
+    fn rails_are_added_or_chosen() {
+        let names: Vec<String> =
+            ["time_s", "gpu_voltage_V", "gpu_current_A", "cpu_power_mW"].map(str::to_owned).into();
+        let of = |options: &ReadOptions| layout(Path::new("a"), &names, options, "time_s");
+        assert_eq!(of(&ReadOptions::default()).unwrap().names, ["cpu", "gpu"]);
+        let gpu = ReadOptions { rails: vec!["GPU".to_owned()], ..ReadOptions::default() };
+        assert_eq!(of(&gpu).unwrap().rails, [Rail::Measured { voltage: 0, current: 1 }]);
+        let other = ReadOptions { rails: vec!["ram".to_owned()], ..ReadOptions::default() };
+        assert!(of(&other).unwrap_err().to_string().contains("of rail ram"));
+    }
+}

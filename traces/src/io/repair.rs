@@ -1,0 +1,212 @@
+//! Mending on request. Whatever is mended is told.
+
+use super::ReadError;
+use super::header::Header;
+use super::read::Columns;
+use super::timing::Stamps;
+use serde::Serialize;
+use std::path::Path;
+
+/// How far a stamp may be off its place, in sample periods, to count as there.
+const OFF: f64 = 0.25;
+/// A repair that would make the trace longer than this many times is refused.
+const LONGER: usize = 16;
+
+/// Something that was mended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Repair {
+    /// `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
+    pub code: &'static str,
+    /// The first row (from 1, as rows stand in the file; after sorting, as they stand then).
+    pub row: u64,
+    /// When, s; 0 where the file has no times.
+    pub time_s: f64,
+    /// How many rows or samples.
+    pub count: u64,
+    /// For people.
+    pub message: String,
+}
+
+/// Mends rows in place: drops those without a time, sorts them, fills what is not finite from its neighbours, and puts
+/// samples where some are missing.
+pub(super) fn mend(
+    path: &Path,
+    columns: &mut Columns,
+    header: &mut Header,
+) -> Result<Vec<Repair>, ReadError> {
+    let mut told = Vec::new();
+    let times = seconds(&columns.stamps);
+    let mut times = times.map(|times| order(times, columns, &mut told));
+    fill(path, "voltage_V", &mut columns.voltage_v, times.as_deref(), &mut told)?;
+    fill(path, "current_A", &mut columns.current_a, times.as_deref(), &mut told)?;
+    if let Some(times) = &mut times
+        && times.len() > 1
+    {
+        space(path, times, columns, header, &mut told)?;
+    }
+    if !told.is_empty() {
+        header.samples = None;
+        if let Some(times) = times {
+            columns.stamps = Stamps::Seconds(times);
+        }
+    }
+    Ok(told)
+}
+
+fn seconds(stamps: &Stamps) -> Option<Vec<f64>> {
+    (stamps.len() > 0).then(|| (0..stamps.len()).map(|row| stamps.time_s(row)).collect())
+}
+
+/// Drops rows without a time or with one that was there before, and sorts the rest.
+fn order(times: Vec<f64>, columns: &mut Columns, told: &mut Vec<Repair>) -> Vec<f64> {
+    let mut rows: Vec<usize> = (0..times.len()).filter(|&row| times[row].is_finite()).collect();
+    let lost = times.iter().position(|time| !time.is_finite());
+    let unsorted = rows.windows(2).position(|pair| times[pair[1]] < times[pair[0]]).map(|at| rows[at + 1]);
+    rows.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
+    let before = rows.len();
+    rows.dedup_by(|later, earlier| times[*later] == times[*earlier]);
+    let dropped = times.len() - rows.len();
+    if dropped > 0 {
+        let row = lost.unwrap_or(0) as u64 + 1;
+        let message = format!(
+            "{dropped} rows without a time of their own were dropped ({} repeats)",
+            before - rows.len()
+        );
+        told.push(Repair { code: "dropped-rows", row, time_s: 0.0, count: dropped as u64, message });
+    }
+    if let Some(row) = unsorted {
+        let message = format!("rows were sorted by time; row {} was the first out of order", row + 1);
+        told.push(Repair {
+            code: "sorted-rows",
+            row: row as u64 + 1,
+            time_s: times[row],
+            count: rows.len() as u64,
+            message,
+        });
+    }
+    if dropped > 0 || unsorted.is_some() {
+        columns.voltage_v = rows.iter().map(|&row| columns.voltage_v[row]).collect();
+        columns.current_a = rows.iter().map(|&row| columns.current_a[row]).collect();
+    }
+    rows.iter().map(|&row| times[row]).collect()
+}
+
+/// Puts the straight line between its neighbours in place of every stretch that is not finite.
+fn fill(
+    path: &Path,
+    name: &str,
+    values: &mut [f32],
+    times: Option<&[f64]>,
+    told: &mut Vec<Repair>,
+) -> Result<(), ReadError> {
+    let mut from = 0;
+    while let Some(first) = values[from..].iter().position(|value| !value.is_finite()).map(|at| from + at) {
+        let end =
+            values[first..].iter().position(|value| value.is_finite()).map_or(values.len(), |at| first + at);
+        let (before, after) = (first.checked_sub(1).map(|at| values[at]), values.get(end).copied());
+        let Some((before, after)) = before.or(after).zip(after.or(before)) else {
+            return Err(ReadError::Repair {
+                path: path.to_owned(),
+                reason: format!("{name} has no finite value"),
+            });
+        };
+        for at in first..end {
+            let share = (at + 1 - first) as f32 / (end + 1 - first) as f32;
+            values[at] = before + share * (after - before);
+        }
+        let time_s = times.map_or(0.0, |times| times[first]);
+        let message =
+            format!("{name}: {} values from row {} ({time_s} s) on were not finite", end - first, first + 1);
+        told.push(Repair {
+            code: "filled-values",
+            row: first as u64 + 1,
+            time_s,
+            count: (end - first) as u64,
+            message,
+        });
+        from = end;
+    }
+    Ok(())
+}
+
+/// Puts the rows on an even grid of times; between rows, on the straight line.
+fn space(
+    path: &Path,
+    times: &mut Vec<f64>,
+    columns: &mut Columns,
+    header: &mut Header,
+    told: &mut Vec<Repair>,
+) -> Result<(), ReadError> {
+    let rate_hz = header.rate_hz.unwrap_or_else(|| usual_rate_hz(times));
+    let start_s = times[0];
+    let place = |time: f64| (time - start_s) * rate_hz;
+    let even = times.iter().enumerate().all(|(row, &time)| (place(time) - row as f64).abs() <= OFF);
+    if even {
+        return Ok(());
+    }
+    let slots = libm::round(place(times[times.len() - 1])) + 1.0;
+    if !(slots >= 1.0 && slots <= (LONGER * times.len()) as f64) {
+        let reason = format!(
+            "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
+            times.len()
+        );
+        return Err(ReadError::Repair { path: path.to_owned(), reason });
+    }
+    let off = times.iter().filter(|&&time| (place(time) - libm::round(place(time))).abs() > OFF).count();
+    if off > 0 {
+        let row =
+            times.iter().position(|&time| (place(time) - libm::round(place(time))).abs() > OFF).unwrap_or(0);
+        let message =
+            format!("{off} rows, the first of them {}, were off an even rate of {rate_hz} Hz", row + 1);
+        told.push(Repair {
+            code: "resampled",
+            row: row as u64 + 1,
+            time_s: times[row],
+            count: off as u64,
+            message,
+        });
+    }
+    for (row, pair) in times.windows(2).enumerate() {
+        let missing = libm::round(place(pair[1])) - libm::round(place(pair[0])) - 1.0;
+        if missing >= 1.0 {
+            let message = format!("after row {} ({} s) {missing:.0} samples were missing", row + 1, pair[0]);
+            told.push(Repair {
+                code: "filled-gap",
+                row: row as u64 + 1,
+                time_s: pair[0],
+                count: missing as u64,
+                message,
+            });
+        }
+    }
+    let grid: Vec<f64> = (0..slots as usize).map(|slot| start_s + slot as f64 / rate_hz).collect();
+    columns.voltage_v = interpolated(times, &columns.voltage_v, &grid, OFF / rate_hz);
+    columns.current_a = interpolated(times, &columns.current_a, &grid, OFF / rate_hz);
+    *times = grid;
+    header.rate_hz = Some(rate_hz);
+    Ok(())
+}
+
+fn usual_rate_hz(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    let step_s = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let rate_hz = 1.0 / step_s;
+    if (libm::round(rate_hz) / rate_hz - 1.0).abs() < 1e-4 { libm::round(rate_hz) } else { rate_hz }
+}
+
+/// Values at the grid's times: a row's own within `near_s`, else on the line between the rows around.
+fn interpolated(times: &[f64], values: &[f32], grid: &[f64], near_s: f64) -> Vec<f32> {
+    let mut row = 0;
+    let at = |time: &f64| {
+        while row + 1 < times.len() && times[row + 1] <= *time + near_s {
+            row += 1;
+        }
+        if (times[row] - time).abs() <= near_s || row + 1 >= times.len() {
+            return values[row];
+        }
+        let share = (time - times[row]) / (times[row + 1] - times[row]);
+        (f64::from(values[row]) + share * (f64::from(values[row + 1]) - f64::from(values[row]))) as f32
+    };
+    grid.iter().map(at).collect()
+}

@@ -1,0 +1,194 @@
+//! Rows of CSV and TSV.
+
+use super::Chunk;
+use super::lines::LineLimit;
+use crate::io::columns::{Layout, Picked, layout};
+use crate::io::csv::sidecar_path;
+use crate::io::header::{self, Header};
+use crate::io::timing::Stamps;
+use crate::io::{ReadError, ReadOptions};
+use ::csv::{ByteRecord, Reader, ReaderBuilder};
+use flate2::read::MultiGzDecoder;
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+type Text = Box<dyn Read + Send>;
+
+/// A text being read.
+pub(super) struct CsvRows {
+    path: PathBuf,
+    reader: Reader<Text>,
+    record: ByteRecord,
+    names: Vec<String>,
+    row: u64,
+    /// Whether the first record is in `record` already: it was looked at for names and had none.
+    held: bool,
+}
+
+fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
+    ReadError::Damaged { path: path.to_owned(), format: "CSV", reason: error.to_string() }
+}
+
+/// The description beside a text, where there is one.
+fn description(path: &Path) -> Result<Header, ReadError> {
+    let inner = path.with_extension("");
+    let beside = [Some(sidecar_path(path)), inner.extension().is_some().then(|| sidecar_path(&inner))];
+    for sidecar in beside.into_iter().flatten() {
+        match fs::read_to_string(&sidecar) {
+            Ok(json) => return header::from_json(&sidecar, &json),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(ReadError::io(&sidecar, error)),
+        }
+    }
+    Ok(Header::default())
+}
+
+/// What stands between the fields of the first line: a tab or a semicolon if it has any, else a comma.
+fn delimiter(reader: &mut BufReader<Text>) -> std::io::Result<u8> {
+    let start = reader.fill_buf()?;
+    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    Ok([b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b','))
+}
+
+impl CsvRows {
+    pub fn open(path: &Path, options: &ReadOptions, gzip: bool) -> Result<(Self, Layout, Header), ReadError> {
+        let header = description(path)?;
+        let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+        let text: Text =
+            if gzip { Box::new(MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
+        let mut text = BufReader::with_capacity(1 << 16, Box::new(LineLimit::new(text)) as Text);
+        let guessed = delimiter(&mut text).map_err(|error| ReadError::io(path, error))?;
+        let mut reader = ReaderBuilder::new()
+            .flexible(true)
+            .has_headers(false)
+            .delimiter(options.delimiter.unwrap_or(guessed))
+            .trim(::csv::Trim::All)
+            .buffer_capacity(1 << 16)
+            .from_reader(Box::new(text) as Text);
+        let mut record = ByteRecord::new();
+        let any = reader.read_byte_record(&mut record).map_err(|error| damaged(path, &error))?;
+        let numbers = any && record.iter().all(|field| number::<f64>(field).is_some());
+        let held = any && !options.header.unwrap_or(!numbers);
+        let names: Vec<String> = if held {
+            unnamed(record.len())
+        } else {
+            record
+                .iter()
+                .map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned())
+                .collect()
+        };
+        let layout = layout(path, &names, options, "time_s")?;
+        Ok((Self { path: path.to_owned(), reader, record, names, row: 0, held }, layout, header))
+    }
+
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Moves to the next row; whether there was one.
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        if !std::mem::take(&mut self.held)
+            && !self.reader.read_byte_record(&mut self.record).map_err(|error| damaged(&self.path, &error))?
+        {
+            return Ok(false);
+        }
+        self.row += 1;
+        Ok(true)
+    }
+
+    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        for _ in 0..rows {
+            if !self.advance()? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    pub fn next(
+        &mut self,
+        layout: &Layout,
+        limit: usize,
+        repair: bool,
+        chunk: &mut Chunk,
+    ) -> Result<usize, ReadError> {
+        let mut times = match std::mem::replace(&mut chunk.stamps, Stamps::Absent) {
+            Stamps::Seconds(times) => times,
+            _ => Vec::new(),
+        };
+        times.clear();
+        let mut rows = 0;
+        while rows < limit && self.advance()? {
+            if self.record.len() != self.names.len() && !repair {
+                let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
+                return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
+            }
+            if let Some(time) = &layout.time {
+                times.push(self.field::<f64>(time, repair, f64::NAN)? * time.scale);
+            }
+            for (column, values) in layout.values.iter().zip(&mut chunk.values) {
+                // Parsed as f32 at once: two roundings, decimal to f64 to f32, can differ from one.
+                values.push(self.field::<f32>(column, repair, f32::NAN)?);
+            }
+            rows += 1;
+        }
+        if layout.time.is_some() {
+            chunk.stamps = Stamps::Seconds(times);
+        }
+        Ok(rows)
+    }
+
+    /// A finite number; if it is to be mended later, what stands for none; else the error that names its place.
+    fn field<T: std::str::FromStr + Finite>(
+        &self,
+        column: &Picked,
+        repair: bool,
+        none: T,
+    ) -> Result<T, ReadError> {
+        let field = self.record.get(column.index).unwrap_or_default();
+        match number(field) {
+            Some(value) => Ok(value),
+            None if repair => Ok(none),
+            None => {
+                let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
+                let value = if shown.is_empty() { "empty".to_owned() } else { format!("{shown:?}") };
+                Err(ReadError::Value {
+                    path: self.path.clone(),
+                    row: self.row,
+                    column: column.name.clone(),
+                    value,
+                })
+            }
+        }
+    }
+}
+
+/// Names for columns that have none: time, voltage, current; two columns are voltage and current.
+fn unnamed(columns: usize) -> Vec<String> {
+    let usual: &[&str] =
+        if columns == 2 { &["voltage_V", "current_A"] } else { &["time_s", "voltage_V", "current_A"] };
+    (0..columns)
+        .map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned()))
+        .collect()
+}
+
+fn number<T: std::str::FromStr + Finite>(field: &[u8]) -> Option<T> {
+    std::str::from_utf8(field).ok().and_then(|text| text.parse().ok()).filter(T::finite)
+}
+
+trait Finite {
+    fn finite(&self) -> bool;
+}
+
+impl Finite for f32 {
+    fn finite(&self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Finite for f64 {
+    fn finite(&self) -> bool {
+        self.is_finite()
+    }
+}

@@ -1,0 +1,210 @@
+//! Rows of a file in pieces, so that no file has to fit into memory.
+
+mod csv;
+mod lines;
+mod parquet;
+mod zstd;
+
+use super::columns::{Layout, Rail};
+use super::header::Header;
+use super::timing::Stamps;
+use super::{ReadError, ReadOptions};
+use std::fs::File;
+use std::io::Read;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// The first bytes of formats that are not read, and what to do about them.
+const FOREIGN: [(&[u8], &str, &str); 3] = [
+    (b"jlsfmt\r\n", "a JLS recording", "export it with pyjls or the Joulescope UI to CSV or Parquet"),
+    (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
+    (
+        b"PK\x03\x04",
+        "an archive (sigrok .sr, .ppk2 or a spreadsheet)",
+        "export it to CSV from its own program",
+    ),
+];
+
+/// Some rows.
+#[derive(Debug)]
+pub(crate) struct Chunk {
+    /// When they were taken, empty where the file does not say.
+    pub stamps: Stamps,
+    /// One list per column of the layout, as they stand in the file.
+    values: Vec<Vec<f32>>,
+}
+
+impl Default for Chunk {
+    fn default() -> Self {
+        Self { stamps: Stamps::Absent, values: Vec::new() }
+    }
+}
+
+enum Source {
+    Csv(csv::CsvRows),
+    Parquet(parquet::ParquetRows),
+}
+
+/// A file being read.
+pub struct Rows {
+    path: PathBuf,
+    source: Source,
+    layout: Layout,
+    pub(crate) header: Header,
+    repair: bool,
+}
+
+impl Rows {
+    /// Opens Parquet, CSV, TSV, or the latter two compressed with gzip; which it is, its first bytes tell.
+    ///
+    /// # Errors
+    /// [`ReadError`] if there is no such file, it is of no known format, or columns are missing.
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        match first_bytes(path)? {
+            start if start.starts_with(b"PAR1") => Self::parquet(path, options),
+            start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
+                Some((_, found, mend)) => Err(ReadError::Format { path: path.to_owned(), found, mend }),
+                None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),
+            },
+        }
+    }
+
+    pub(crate) fn parquet(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let opened = catch_unwind(AssertUnwindSafe(|| parquet::ParquetRows::open(path, options)));
+        let (source, layout, header) = opened.unwrap_or_else(|_| Err(gave_up(path)))?;
+        Self::new(path, Source::Parquet(source), layout, header, options, "time_ns")
+    }
+
+    pub(crate) fn csv(path: &Path, options: &ReadOptions, gzip: bool) -> Result<Self, ReadError> {
+        let (source, layout, header) = csv::CsvRows::open(path, options, gzip)?;
+        Self::new(path, Source::Csv(source), layout, header, options, "time_s")
+    }
+
+    fn new(
+        path: &Path,
+        source: Source,
+        layout: Layout,
+        mut header: Header,
+        options: &ReadOptions,
+        time: &str,
+    ) -> Result<Self, ReadError> {
+        header.rate_hz = options.rate_hz.or(header.rate_hz);
+        header.start_s = options.start_s.or(header.start_s);
+        if layout.time.is_none() && header.rate_hz.is_none() {
+            let found = source.names().join(", ");
+            return Err(ReadError::MissingColumn { path: path.to_owned(), column: time.to_owned(), found });
+        }
+        if layout.names.len() > 1 {
+            header.metadata.other.insert("rails".to_owned(), layout.names.clone().into());
+        }
+        Ok(Self { path: path.to_owned(), source, layout, header, repair: options.repair })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How many rows there are, where the file says so before it has been read.
+    pub fn count(&self) -> Option<u64> {
+        match &self.source {
+            Source::Csv(_) => None,
+            Source::Parquet(rows) => Some(rows.count()),
+        }
+    }
+
+    /// Names of the columns that are read, in order: of the trace's rails.
+    pub fn rails(&self) -> &[String] {
+        &self.layout.names
+    }
+
+    /// Whether what is wrong is to be mended.
+    pub(crate) fn mends(&self) -> bool {
+        self.repair
+    }
+
+    /// Leaves out the next rows.
+    pub(crate) fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        let path = self.path.clone();
+        match &mut self.source {
+            Source::Csv(source) => source.skip(rows),
+            Source::Parquet(source) => {
+                catch_unwind(AssertUnwindSafe(|| source.skip(rows))).unwrap_or_else(|_| Err(gave_up(&path)))
+            }
+        }
+    }
+
+    /// Reads up to `limit` rows over what `chunk` held before; how many there were, 0 at the end.
+    pub(crate) fn next(&mut self, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
+        chunk.values.resize_with(self.layout.values.len(), Vec::new);
+        chunk.values.iter_mut().for_each(Vec::clear);
+        let path = &self.path;
+        match &mut self.source {
+            Source::Csv(source) => source.next(&self.layout, limit, self.repair, chunk),
+            Source::Parquet(source) => {
+                let read = catch_unwind(AssertUnwindSafe(|| source.next(limit, chunk)));
+                read.unwrap_or_else(|_| Err(gave_up(path)))
+            }
+        }
+    }
+
+    /// Appends a chunk's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
+    /// power is known, the voltage is 1 V and the current stands for the power.
+    pub(crate) fn channels(&self, chunk: &mut Chunk, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
+        for (values, column) in chunk.values.iter_mut().zip(&self.layout.values) {
+            if column.scale != 1.0 {
+                values.iter_mut().for_each(|value| *value = (f64::from(*value) * column.scale) as f32);
+            }
+        }
+        match self.layout.rails[..] {
+            [Rail::Measured { voltage, current }] => {
+                voltage_v.extend_from_slice(&chunk.values[voltage]);
+                current_a.extend_from_slice(&chunk.values[current]);
+            }
+            [Rail::Specified { volts, current }] => {
+                voltage_v.resize(voltage_v.len() + chunk.values[current].len(), volts as f32);
+                current_a.extend_from_slice(&chunk.values[current]);
+            }
+            ref rails => {
+                let rows = chunk.values.first().map_or(0, Vec::len);
+                voltage_v.resize(voltage_v.len() + rows, 1.0);
+                let power_w =
+                    |row: usize| rails.iter().map(|rail| rail.power_w(&chunk.values, row)).sum::<f64>();
+                current_a.extend((0..rows).map(|row| power_w(row) as f32));
+            }
+        }
+    }
+}
+
+impl Rail {
+    fn power_w(&self, values: &[Vec<f32>], row: usize) -> f64 {
+        let value = |column: usize| f64::from(values[column][row]);
+        match *self {
+            Self::Measured { voltage, current } => value(voltage) * value(current),
+            Self::Specified { volts, current } => volts * value(current),
+            Self::Power { power } => value(power),
+        }
+    }
+}
+
+impl Source {
+    fn names(&self) -> &[String] {
+        match self {
+            Self::Csv(rows) => rows.names(),
+            Self::Parquet(rows) => rows.names(),
+        }
+    }
+}
+
+fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let mut start = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(8).read_to_end(&mut start))
+        .map_err(|error| ReadError::io(path, error))?;
+    Ok(start)
+}
+
+/// What is said where the decoder of Parquet panicked: it does on some damaged files.
+fn gave_up(path: &Path) -> ReadError {
+    ReadError::Damaged { path: path.to_owned(), format: "Parquet", reason: "its decoder gave up".to_owned() }
+}

@@ -1,0 +1,290 @@
+//! Overviews of any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks of blocks,
+//! and so on, made once and kept in a file beside the trace.
+
+use crate::io::{Chunk, ReadError, ReadOptions, Rows};
+use crate::stream::{Clock, clock};
+use std::fs::{self, File};
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+/// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample, 2.5 % of
+/// the 8 bytes of voltage and current.
+pub const BLOCK: u64 = 64;
+/// Blocks of a level in one of the next.
+const FAN: usize = 16;
+/// Blocks a column is made of at least, where the level below has them.
+const PER_COLUMN: u64 = 4;
+/// Rows read at once.
+const ROWS: usize = 1 << 20;
+const MAGIC: u64 = 0x3130_5259_505f_5451;
+const HEADER_BYTES: u64 = 64;
+const ENTRY_BYTES: u64 = 12;
+
+/// A stretch of time and the powers in it, W.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Its begin, s.
+    pub from_s: f64,
+    /// Its end, s.
+    pub to_s: f64,
+    /// The lowest power of any sample in it.
+    pub low_w: f32,
+    /// The highest.
+    pub high_w: f32,
+    /// The mean.
+    pub mean_w: f32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    low_w: f32,
+    high_w: f32,
+    mean_w: f32,
+}
+
+/// Blocks of a trace's power.
+#[derive(Debug)]
+pub struct Pyramid {
+    samples: u64,
+    start_s: f64,
+    rate_hz: f64,
+    store: Store,
+}
+
+#[derive(Debug)]
+enum Store {
+    Memory(Vec<Vec<Entry>>),
+    File(PathBuf),
+}
+
+/// Where the pyramid of a trace is kept.
+pub fn pyramid_path(trace: &Path) -> PathBuf {
+    let mut name = trace.as_os_str().to_owned();
+    name.push(".pyramid");
+    name.into()
+}
+
+impl Pyramid {
+    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say; else made
+    /// anew and kept, if the folder lets itself be written to.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the trace cannot be read.
+    pub fn of_file(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let stamp = stamp(path, options);
+        let kept = pyramid_path(path);
+        if let Some(pyramid) = Self::kept(&kept, stamp) {
+            return Ok(pyramid);
+        }
+        let pyramid = Self::build(path, options)?;
+        // Without it the next look takes as long as this one; that is all.
+        let _ = pyramid.keep(&kept, stamp);
+        Ok(pyramid)
+    }
+
+    /// Reads a whole trace, in pieces.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the trace cannot be read.
+    pub fn build(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let Clock { start_s, rate_hz, .. } = clock(path, options)?;
+        let mut rows = Rows::open(path, options)?;
+        let mut chunk = Chunk::default();
+        let (mut voltage_v, mut current_a) = (Vec::new(), Vec::new());
+        let (mut base, mut samples) = (Vec::new(), 0);
+        loop {
+            let read = rows.next(ROWS, &mut chunk)? as u64;
+            rows.channels(&mut chunk, &mut voltage_v, &mut current_a);
+            samples += read;
+            let whole =
+                if read == 0 { voltage_v.len() } else { voltage_v.len() / BLOCK as usize * BLOCK as usize };
+            let blocks =
+                voltage_v[..whole].chunks(BLOCK as usize).zip(current_a[..whole].chunks(BLOCK as usize));
+            base.extend(blocks.map(|(v, i)| Entry::of_samples(v, i)));
+            voltage_v.drain(..whole);
+            current_a.drain(..whole);
+            if read == 0 {
+                break;
+            }
+        }
+        let mut levels = vec![base];
+        while levels[levels.len() - 1].len() > FAN {
+            levels.push(levels[levels.len() - 1].chunks(FAN).map(Entry::of_entries).collect());
+        }
+        Ok(Self { samples, start_s, rate_hz, store: Store::Memory(levels) })
+    }
+
+    /// Left edge of the first sample, s.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    /// Right edge of the last sample, s.
+    pub fn end_s(&self) -> f64 {
+        self.start_s + self.samples as f64 / self.rate_hz
+    }
+
+    /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64 samples.
+    /// Lowest and highest are those of all samples within (as f32), none missed. Empty where nothing can be read.
+    pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Vec<Column> {
+        let place = |time_s: f64| ((time_s - self.start_s) * self.rate_hz).clamp(0.0, self.samples as f64);
+        let (from, to) = (place(from_s) as u64, libm::ceil(place(to_s)) as u64);
+        let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
+        let (mut level, mut size) = (0, BLOCK);
+        while size * FAN as u64 * PER_COLUMN <= wanted {
+            (level, size) = (level + 1, size * FAN as u64);
+        }
+        let per_column = wanted.div_ceil(size).max(1);
+        let (first, last) = (from / size, to.div_ceil(size));
+        let entries = self.entries(level, first, last - first).unwrap_or_default();
+        let column = |(index, entries): (usize, &[Entry])| {
+            let begin = (first + index as u64 * per_column) * size;
+            let end = (begin + entries.len() as u64 * size).min(self.samples);
+            let time_s = |sample: u64| self.start_s + sample as f64 / self.rate_hz;
+            let all = Entry::of_entries(entries);
+            Column {
+                from_s: time_s(begin),
+                to_s: time_s(end),
+                low_w: all.low_w,
+                high_w: all.high_w,
+                mean_w: all.mean_w,
+            }
+        };
+        entries.chunks(per_column as usize).enumerate().map(column).collect()
+    }
+
+    fn entries(&self, level: u32, first: u64, count: u64) -> Option<Vec<Entry>> {
+        match &self.store {
+            Store::Memory(levels) => {
+                let level = levels.get(level as usize)?;
+                let end = ((first + count) as usize).min(level.len());
+                Some(level[(first as usize).min(end)..end].to_vec())
+            }
+            Store::File(path) => {
+                let sizes = sizes(self.samples);
+                let before: u64 = sizes.get(..level as usize)?.iter().sum();
+                let count = count.min(sizes.get(level as usize)?.saturating_sub(first));
+                let mut file = File::open(path).ok()?;
+                file.seek(SeekFrom::Start(HEADER_BYTES + ENTRY_BYTES * (before + first))).ok()?;
+                let mut bytes = vec![0; (ENTRY_BYTES * count) as usize];
+                file.read_exact(&mut bytes).ok()?;
+                Some(bytes.chunks_exact(ENTRY_BYTES as usize).map(Entry::from_bytes).collect())
+            }
+        }
+    }
+
+    fn keep(&self, path: &Path, stamp: u64) -> Result<(), crate::io::WriteError> {
+        let Store::Memory(levels) = &self.store else { return Ok(()) };
+        crate::io::atomic::write_file(path, |out: &mut BufWriter<File>| {
+            let mut header = vec![MAGIC, stamp, self.samples, self.start_s.to_bits(), self.rate_hz.to_bits()];
+            header.resize(HEADER_BYTES as usize / 8, 0);
+            header.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))?;
+            levels.iter().flatten().try_for_each(|entry| out.write_all(&entry.to_bytes()))
+        })
+    }
+
+    fn kept(path: &Path, stamp: u64) -> Option<Self> {
+        let mut bytes = [0; HEADER_BYTES as usize];
+        File::open(path).ok()?.read_exact(&mut bytes).ok()?;
+        let word =
+            |index: usize| bytes[8 * index..8 * index + 8].try_into().map(u64::from_le_bytes).unwrap_or(0);
+        let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
+        let size = samples.checked_add(0).filter(|&samples| samples < 1 << 48)?;
+        let whole = HEADER_BYTES + ENTRY_BYTES * sizes(size).iter().sum::<u64>();
+        let good = word(0) == MAGIC && word(1) == stamp && rate_hz > 0.0 && start_s.is_finite();
+        let long = fs::metadata(path).ok()?.len() == whole;
+        (good && long).then(|| Self { samples, start_s, rate_hz, store: Store::File(path.to_owned()) })
+    }
+}
+
+/// Blocks of each level.
+fn sizes(samples: u64) -> Vec<u64> {
+    let mut sizes = vec![samples.div_ceil(BLOCK)];
+    while sizes[sizes.len() - 1] > FAN as u64 {
+        sizes.push(sizes[sizes.len() - 1].div_ceil(FAN as u64));
+    }
+    sizes
+}
+
+/// Tells a file as it is now, and how it is read, from any other (FNV-1a, Fowler, Noll and Vo).
+fn stamp(path: &Path, options: &ReadOptions) -> u64 {
+    let metadata = fs::metadata(path).ok();
+    let modified = metadata.as_ref().and_then(|m| m.modified().ok()?.duration_since(UNIX_EPOCH).ok());
+    let text = format!("{:?} {modified:?} {options:?}", metadata.map(|m| m.len()));
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+impl Entry {
+    fn of_samples(voltage_v: &[f32], current_a: &[f32]) -> Self {
+        let (mut low_w, mut high_w, mut sum) = (f32::INFINITY, f32::NEG_INFINITY, 0.0_f64);
+        for (v, i) in voltage_v.iter().zip(current_a) {
+            let watts = f64::from(*v) * f64::from(*i);
+            sum += watts;
+            let watts = watts as f32;
+            low_w = low_w.min(watts);
+            high_w = high_w.max(watts);
+        }
+        Self { low_w, high_w, mean_w: (sum / voltage_v.len() as f64) as f32 }
+    }
+
+    fn of_entries(entries: &[Self]) -> Self {
+        let low_w = entries.iter().map(|e| e.low_w).fold(f32::INFINITY, f32::min);
+        let high_w = entries.iter().map(|e| e.high_w).fold(f32::NEG_INFINITY, f32::max);
+        let mean = entries.iter().map(|e| f64::from(e.mean_w)).sum::<f64>() / entries.len().max(1) as f64;
+        Self { low_w, high_w, mean_w: mean as f32 }
+    }
+
+    fn to_bytes(self) -> [u8; ENTRY_BYTES as usize] {
+        let mut bytes = [0; ENTRY_BYTES as usize];
+        for (to, value) in bytes.chunks_exact_mut(4).zip([self.low_w, self.high_w, self.mean_w]) {
+            to.copy_from_slice(&value.to_le_bytes());
+        }
+        bytes
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Self {
+        let value = |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        Self { low_w: value(0), high_w: value(4), mean_w: value(8) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::parquet;
+    use crate::metadata::Metadata;
+    use crate::trace::Trace;
+
+    #[test]
+    fn oracle_extremes_are_exact_at_every_zoom_from_memory_and_from_the_file() {
+        let samples = 300_001_usize;
+        let current = (0..samples).map(|i| ((i * 7919) % 10_007) as f32 / 1000.0).collect();
+        let trace = Trace::new(vec![2.0; samples], current, 50e3, 1.0, Metadata::default()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        parquet::save(&trace, &path).unwrap();
+        let options = ReadOptions::default();
+        let made = Pyramid::of_file(&path, &options).unwrap();
+        let kept = Pyramid::of_file(&path, &options).unwrap();
+        assert!(matches!((&made.store, &kept.store), (Store::Memory(_), Store::File(_))));
+        let bytes = fs::metadata(pyramid_path(&path)).unwrap().len() as f64;
+        assert!(bytes < 0.03 * 8.0 * samples as f64, "{bytes}");
+        for (from_s, to_s, columns) in [(1.0, 7.1, 1000), (1.0, 7.1, 3), (2.5, 2.6, 20), (6.99, 7.00002, 7)] {
+            let found = kept.columns(from_s, to_s, columns);
+            assert_eq!(found, made.columns(from_s, to_s, columns));
+            assert!(
+                found[0].from_s <= from_s && found[found.len() - 1].to_s >= to_s.min(trace.end_s()) - 1e-9
+            );
+            for column in found {
+                let place = |time_s: f64| libm::round(trace.position(time_s)) as usize;
+                let powers = (place(column.from_s)..place(column.to_s)).map(|i| trace.power_w(i) as f32);
+                let (low, high) = powers.fold((f32::MAX, f32::MIN), |(l, h), w| (l.min(w), h.max(w)));
+                assert_eq!((column.low_w, column.high_w), (low, high));
+            }
+        }
+        fs::write(&path, b"changed").unwrap();
+        assert!(Pyramid::of_file(&path, &options).is_err());
+    }
+}

@@ -1,0 +1,309 @@
+//! The one pass over the file.
+
+use super::clock::{Clock, clock};
+use super::conclude::conclude;
+use super::minima::minima;
+use super::piece::Piece;
+use super::screen::{Buffers, Screen};
+use super::{StreamError, Streamed};
+use crate::frames::{MarkError, Marks, Placement, vertex};
+use crate::io::{Chunk, ReadError, ReadOptions, Rows};
+use crate::sum::PairSum;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Rows read at once.
+const ROWS: usize = 1 << 20;
+/// Offsets a thread takes at once, about.
+const TASK: usize = 1 << 16;
+/// How far around the lowest offset of the screen the lowest exact one may lie, and one more for its neighbours.
+const REACH: usize = 2;
+/// Samples kept beside what offsets need: for energies at starts that lie finer than a sample.
+const MARGIN: usize = 8;
+/// Samples at the beginning that are kept: the first frame is looked for in them again.
+pub(super) const HEAD: usize = 1 << 21;
+/// How many values medians are taken from, about.
+const MEDIAN_OF: u64 = 65_536;
+
+/// A minimum of the profile.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub offset: u64,
+    /// Where the template lies best, in samples.
+    pub aligned: f64,
+    pub distance_w2: f64,
+    /// Sum of all powers (W) up to the start it stands for.
+    pub sum_w: PairSum,
+    pub mark: u32,
+}
+
+/// What a pass gathers.
+#[derive(Default)]
+pub(super) struct Gathered {
+    pub candidates: Vec<Candidate>,
+    /// Distances at evenly spaced offsets, W^2, and steps between neighbours, W.
+    pub distances_w2: Vec<f64>,
+    pub steps_w: Vec<f64>,
+    pub head: Piece,
+    /// Sums at the positions asked for.
+    pub sums_w: Vec<Option<PairSum>>,
+    pub total_w: PairSum,
+    pub samples: u64,
+}
+
+/// What does not change on the way.
+pub(super) struct Plan {
+    pub clock: Clock,
+    pub placement: Placement,
+    /// The marks' windows, W.
+    pub templates: Vec<Vec<f64>>,
+    pub spacing: usize,
+    mean_w: f32,
+    screens: Vec<Screen>,
+    stride: u64,
+    /// Marks' positions, then that of the end mark.
+    positions: Vec<f64>,
+}
+
+pub(super) fn run(path: &Path, options: &ReadOptions, marks: &Marks) -> Result<Streamed, StreamError> {
+    let clock = clock(path, options)?;
+    let plan = Plan::new(path, options, marks, clock)?;
+    let mut rows = Rows::open(path, options)?;
+    let gathered = plan.gather(&mut rows)?;
+    rows.header.check_rows(path, gathered.samples)?;
+    Ok(conclude(plan, marks, gathered, rows.header.metadata)?)
+}
+
+impl Plan {
+    fn new(path: &Path, options: &ReadOptions, marks: &Marks, clock: Clock) -> Result<Self, StreamError> {
+        let samples = clock.samples.unwrap_or(u64::MAX >> 12);
+        let placement = marks.place_on(clock.start_s, clock.rate_hz, samples)?;
+        let templates = templates(path, options, &placement, marks, clock)?;
+        let mean_w = (templates[0].iter().sum::<f64>() / templates[0].len() as f64) as f32;
+        let centred = |t: &Vec<f64>| t.iter().map(|watts| watts - f64::from(mean_w)).collect::<Vec<_>>();
+        let screens = templates.iter().map(|template| Screen::new(&centred(template))).collect();
+        let mut positions: Vec<f64> = marks.starts_s.iter().map(|&mark_s| clock.position(mark_s)).collect();
+        positions.push(clock.position(marks.end_s));
+        let spacing = (placement.samples / 2).max(1);
+        let stride = clock.samples.map_or(1024, |samples| samples.div_ceil(MEDIAN_OF).max(1));
+        Ok(Self { clock, placement, templates, spacing, mean_w, screens, stride, positions })
+    }
+
+    fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
+        let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
+        let (mut piece, mut chunk, mut next) = (Piece::default(), Chunk::default(), 0_u64);
+        let mut read = rows.next(ROWS, &mut chunk)?;
+        loop {
+            let fresh = piece.len();
+            self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
+            if read > 0 {
+                rows.channels(&mut chunk, &mut piece.voltage_v, &mut piece.current_a);
+                check_finite(rows, &piece, fresh)?;
+            }
+            gathered.keep_head(&piece, fresh);
+            piece.add_up();
+            self.look_up(&piece, &mut gathered);
+            if read == 0 {
+                self.search(&piece, next, true, &mut gathered);
+                (gathered.total_w, gathered.samples) = (piece.sum_to(piece.end() as f64), piece.end());
+                return Ok(gathered);
+            }
+            // The next rows are decoded while these are searched.
+            let (coming, searched) = rayon::join(
+                || rows.next(ROWS, &mut chunk),
+                || self.search(&piece, next, false, &mut gathered),
+            );
+            (read, next) = (coming?, searched);
+            piece.drop_before(next.saturating_sub((self.spacing + MARGIN) as u64));
+        }
+    }
+
+    /// Sums at the marks and at the end.
+    fn look_up(&self, piece: &Piece, gathered: &mut Gathered) {
+        for (position, sum) in self.positions.iter().zip(&mut gathered.sums_w) {
+            if sum.is_none() && *position < piece.end() as f64 {
+                *sum = Some(piece.sum_to(*position));
+            }
+        }
+    }
+
+    /// Searches the offsets from `from` on for which all samples are at hand; the first one left.
+    fn search(&self, piece: &Piece, from: u64, last: bool, gathered: &mut Gathered) -> u64 {
+        let width = self.placement.samples as u64;
+        let all = (piece.end() + 1).saturating_sub(width);
+        let spacing = self.spacing as u64;
+        let ready = all.saturating_sub(spacing + MARGIN as u64) / spacing * spacing;
+        let to = if last { all } else { ready };
+        if to <= from {
+            return from;
+        }
+        let task = (TASK as u64).div_ceil(spacing) * spacing;
+        let tasks = (to - from).div_ceil(task);
+        let found: Vec<Found> = (0..tasks)
+            .into_par_iter()
+            .map_init(Buffers::default, |buffers, index| {
+                let begin = from + index * task;
+                self.task(piece, begin, to.min(begin + task), all, buffers)
+            })
+            .collect();
+        for found in found {
+            gathered.distances_w2.extend(found.distances_w2);
+            gathered.steps_w.extend(found.steps_w);
+            for candidate in found.candidates {
+                let tied = gathered
+                    .candidates
+                    .last()
+                    .is_some_and(|before| candidate.offset - before.offset < spacing);
+                if !tied {
+                    gathered.candidates.push(candidate);
+                }
+            }
+        }
+        to
+    }
+
+    fn task(&self, piece: &Piece, from: u64, to: u64, all: u64, buffers: &mut Buffers) -> Found {
+        let width = self.placement.samples;
+        let begin = from.saturating_sub(self.spacing as u64 - 1).max(piece.base);
+        let end = all.min(to + self.spacing as u64 - 1);
+        let place = |offset: u64| (offset - piece.base) as usize;
+        let samples = place(begin)..place(end) + width - 1;
+        let (mut signal, mut profile) =
+            (std::mem::take(&mut buffers.signal), std::mem::take(&mut buffers.profile));
+        let powers = piece.voltage_v[samples.clone()].iter().zip(&piece.current_a[samples]);
+        signal.clear();
+        signal.extend(powers.map(|(v, i)| v * i - self.mean_w));
+        profile.clear();
+        profile.resize((end - begin) as usize, f32::INFINITY);
+        self.screens.iter().for_each(|screen| screen.lower(&signal, &mut profile, buffers));
+        let mut found = Found::default();
+        let inside = ((from - begin) as usize, (to - begin) as usize);
+        minima(&profile, inside.0, inside.1, self.spacing, |offset| {
+            found.candidates.push(self.candidate(piece, begin + offset as u64, all));
+        });
+        let first = from.next_multiple_of(self.stride);
+        for offset in (first..to).step_by(self.stride as usize) {
+            found.distances_w2.push(self.nearest(piece, offset).0);
+            let place = place(offset);
+            found.steps_w.push((piece.power_w(place + 1) - piece.power_w(place)).abs());
+        }
+        (buffers.signal, buffers.profile) = (signal, profile);
+        found
+    }
+
+    /// Exact distance and number of the nearest template.
+    fn nearest(&self, piece: &Piece, offset: u64) -> (f64, usize) {
+        let each = (0..self.templates.len()).map(|mark| (self.distance_w2(piece, offset, mark), mark));
+        each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
+    }
+
+    fn distance_w2(&self, piece: &Piece, offset: u64, mark: usize) -> f64 {
+        let from = (offset - piece.base) as usize;
+        let (v, i) = (&piece.voltage_v[from..], &piece.current_a[from..]);
+        difference(v, i, &self.templates[mark])
+    }
+
+    fn candidate(&self, piece: &Piece, offset: u64, all: u64) -> Candidate {
+        let (mut distance_w2, mark) = self.nearest(piece, offset);
+        let at = |offset: u64| self.distance_w2(piece, offset, mark);
+        let mut best = offset;
+        let inside = |offset: u64| offset > piece.base && offset + 1 < all;
+        let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
+        // The screen may be off by its rounding: downhill to the lowest, a few offsets at most.
+        for _ in 0..=REACH {
+            if !inside(best) {
+                break;
+            }
+            (before, after) = (at(best - 1), at(best + 1));
+            match (before < distance_w2, after < distance_w2) {
+                (true, _) if before <= after => (best, distance_w2) = (best - 1, before),
+                (_, true) => (best, distance_w2) = (best + 1, after),
+                _ => break,
+            }
+        }
+        let lowest = inside(best) && before >= distance_w2 && after >= distance_w2;
+        let finer = if lowest { vertex(before, distance_w2, after) } else { 0.0 };
+        let aligned = best as f64 + finer;
+        let sum_w = piece.sum_to(aligned + self.placement.marks[mark].anchor);
+        Candidate { offset, aligned, distance_w2, sum_w, mark: mark as u32 }
+    }
+}
+
+/// What one task finds.
+#[derive(Default)]
+struct Found {
+    candidates: Vec<Candidate>,
+    distances_w2: Vec<f64>,
+    steps_w: Vec<f64>,
+}
+
+impl Gathered {
+    fn keep_head(&mut self, piece: &Piece, fresh: usize) {
+        let room = HEAD - self.head.len();
+        let take = fresh..piece.len().min(fresh + room);
+        self.head.voltage_v.extend_from_slice(&piece.voltage_v[take.clone()]);
+        self.head.current_a.extend_from_slice(&piece.current_a[take]);
+    }
+}
+
+/// Summed squared difference of powers and a template, in eight lanes: always the same order.
+fn difference(voltage_v: &[f32], current_a: &[f32], template: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let whole = template.len() / 8 * 8;
+    let term = |j: usize| {
+        let difference = f64::from(voltage_v[j]) * f64::from(current_a[j]) - template[j];
+        difference * difference
+    };
+    let chunks =
+        template[..whole].chunks_exact(8).zip(voltage_v.chunks_exact(8)).zip(current_a.chunks_exact(8));
+    for ((t, v), i) in chunks {
+        for lane in 0..8 {
+            let difference = f64::from(v[lane]) * f64::from(i[lane]) - t[lane];
+            lanes[lane] += difference * difference;
+        }
+    }
+    lanes.iter().sum::<f64>() + (whole..template.len()).map(term).sum::<f64>()
+}
+
+fn check_finite(rows: &Rows, piece: &Piece, fresh: usize) -> Result<(), ReadError> {
+    for (values, column) in [(&piece.voltage_v, "voltage_V"), (&piece.current_a, "current_A")] {
+        // A sum is not finite if any part is not; the place is looked for only then.
+        let all = values[fresh..].iter().fold(0_u32, |any, value| any | u32::from(!value.is_finite()));
+        if all != 0
+            && let Some(at) = values[fresh..].iter().position(|value| !value.is_finite())
+        {
+            return Err(ReadError::Value {
+                path: rows.path().to_owned(),
+                row: piece.base + (fresh + at) as u64 + 1,
+                column: column.to_owned(),
+                value: values[fresh + at].to_string(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The marks' windows, read by themselves.
+fn templates(
+    path: &Path,
+    options: &ReadOptions,
+    placement: &Placement,
+    marks: &Marks,
+    clock: Clock,
+) -> Result<Vec<Vec<f64>>, StreamError> {
+    let mut templates = Vec::new();
+    for (placed, &mark_s) in placement.marks.iter().zip(&marks.starts_s) {
+        let mut rows = Rows::open(path, options)?;
+        rows.skip(placed.first as u64)?;
+        let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
+        while piece.len() < placement.samples && rows.next(placement.samples - piece.len(), &mut chunk)? > 0 {
+            rows.channels(&mut chunk, &mut piece.voltage_v, &mut piece.current_a);
+        }
+        if piece.len() < placement.samples {
+            let end_s = clock.time_s((placed.first + piece.len()) as f64);
+            return Err(MarkError::OutsideTrace { mark_s, start_s: clock.start_s, end_s }.into());
+        }
+        templates.push((0..placement.samples).map(|place| piece.power_w(place)).collect());
+    }
+    Ok(templates)
+}

@@ -1,0 +1,76 @@
+//! The samples at hand.
+
+use crate::sum::PairSum;
+
+/// Samples per stored sum.
+pub(super) const BLOCK: usize = 256;
+
+/// A stretch of samples with running sums of power, for energies to any place in it.
+#[derive(Default)]
+pub(super) struct Piece {
+    /// Number of the first sample, a multiple of [`BLOCK`].
+    pub base: u64,
+    pub voltage_v: Vec<f32>,
+    pub current_a: Vec<f32>,
+    /// Sum of powers (W) before each block, and before the end of the last whole one.
+    prefix_w: Vec<PairSum>,
+}
+
+impl Piece {
+    pub fn len(&self) -> usize {
+        self.voltage_v.len()
+    }
+
+    /// Number of the sample after the last.
+    pub fn end(&self) -> u64 {
+        self.base + self.len() as u64
+    }
+
+    /// Power of a sample by its place in the piece, W.
+    pub fn power_w(&self, place: usize) -> f64 {
+        f64::from(self.voltage_v[place]) * f64::from(self.current_a[place])
+    }
+
+    /// Brings the sums up to date with samples that were appended.
+    pub fn add_up(&mut self) {
+        if self.prefix_w.is_empty() {
+            self.prefix_w.push(PairSum::default());
+        }
+        let done = self.prefix_w.len() - 1;
+        let whole = self.len() / BLOCK;
+        for block in done..whole {
+            let sum = block_sum(&self.voltage_v[block * BLOCK..], &self.current_a[block * BLOCK..]);
+            self.prefix_w.push(self.prefix_w[block].plus(sum));
+        }
+    }
+
+    /// Sum of powers (W) of all samples up to a position in the file, the last by fraction.
+    pub fn sum_to(&self, position: f64) -> PairSum {
+        let place = (position - self.base as f64).clamp(0.0, self.len() as f64);
+        let whole = (place as usize).min(self.len());
+        let block = (whole / BLOCK).min(self.prefix_w.len() - 1);
+        let rest: f64 = (block * BLOCK..whole).map(|place| self.power_w(place)).sum();
+        let sum = self.prefix_w[block].plus(rest);
+        if whole < self.len() { sum.plus_product(self.power_w(whole), place - whole as f64) } else { sum }
+    }
+
+    /// Lets go of the samples before one, as far as whole blocks go.
+    pub fn drop_before(&mut self, sample: u64) {
+        let blocks = (sample.saturating_sub(self.base) as usize / BLOCK).min(self.prefix_w.len() - 1);
+        self.voltage_v.drain(..blocks * BLOCK);
+        self.current_a.drain(..blocks * BLOCK);
+        self.prefix_w.drain(..blocks);
+        self.base += (blocks * BLOCK) as u64;
+    }
+}
+
+/// Sum of the powers of one block, in eight lanes: always the same order.
+fn block_sum(voltage_v: &[f32], current_a: &[f32]) -> f64 {
+    let mut lanes = [0.0; 8];
+    for (v, i) in voltage_v[..BLOCK].chunks_exact(8).zip(current_a[..BLOCK].chunks_exact(8)) {
+        for lane in 0..8 {
+            lanes[lane] += f64::from(v[lane]) * f64::from(i[lane]);
+        }
+    }
+    lanes.iter().sum()
+}

@@ -1,0 +1,67 @@
+use super::find;
+use crate::CurveBuilder;
+use crate::device::{Device, DeviceSpec};
+use crate::energy::PowerIntegral;
+use crate::frames::{Marks, Method, Options, default_window, find_with};
+use crate::io::{ReadOptions, parquet};
+use crate::trace::Trace;
+
+/// Frames whose length and content vary, over more than one piece.
+fn trace(frames: u32) -> Trace {
+    let mut builder = CurveBuilder::new(0.0).unwrap();
+    builder.push(0.05, 5.0).unwrap();
+    for frame in 0..frames {
+        for draw in 0..40_u32 {
+            builder.push(2e-4 + 1e-7 * f64::from(frame % 17), 8.0 + f64::from(draw * 37 % 29)).unwrap();
+        }
+        builder.push(1.5e-3 + 1e-4 * f64::from(frame * 7 % 13), 5.0).unwrap();
+    }
+    builder.push(0.02, 5.0).unwrap();
+    let curve = builder.build().unwrap();
+    Device::new(DeviceSpec::default()).unwrap().sample(&curve, 0.0, curve.end_s()).unwrap().trace
+}
+
+#[test]
+fn oracle_streamed_frames_are_those_found_in_memory_and_add_up() {
+    let trace = trace(3000);
+    assert!(trace.samples() > 1 << 20);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    parquet::save(&trace, &path).unwrap();
+    let window = default_window(0.01, trace.rate_hz());
+    let found = find_with(&trace, &Marks::one(0.05, window, trace.end_s()), &Options::default()).unwrap();
+    let marks = Marks {
+        starts_s: vec![found.starts[100].time_s, found.starts[2000].time_s],
+        window,
+        end_s: f64::INFINITY,
+    };
+    let in_memory = Marks { end_s: trace.end_s(), ..marks.clone() };
+    let expected = find_with(&trace, &in_memory, &Options { method: Method::SumOfSquares }).unwrap();
+    let streamed = find(&path, &ReadOptions::default(), &marks).unwrap();
+    assert_eq!(streamed.found.starts.len(), expected.starts.len());
+    assert!((streamed.found.threshold.value_w2 / expected.threshold.value_w2 - 1.0).abs() < 1e-2);
+    let integral = PowerIntegral::new(&trace);
+    for (ours, theirs) in streamed.energies.iter().zip(integral.frames(&expected)) {
+        assert!((ours.start_s - theirs.start_s).abs() < 1e-8, "{ours:?} {theirs:?}");
+        assert!((ours.energy_j - integral.energy_j(ours.start_s, ours.end_s)).abs() < 1e-10 * ours.energy_j);
+        assert_eq!(ours.flags, theirs.flags);
+    }
+    let sum: f64 = streamed.energies.iter().map(|frame| frame.energy_j).sum();
+    let whole = integral.energy_j(streamed.energies[0].start_s, trace.end_s());
+    assert!((sum / whole - 1.0).abs() < 1e-12);
+    assert!((streamed.total_j / integral.total_j() - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_same_for_one_thread_and_for_several() {
+    let trace = trace(500);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    parquet::save(&trace, &path).unwrap();
+    let marks = Marks::one(0.05, default_window(0.01, trace.rate_hz()), f64::INFINITY);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| find(&path, &ReadOptions::default(), &marks).unwrap())
+    };
+    assert!(on(1) == on(3));
+}

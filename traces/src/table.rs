@@ -1,0 +1,164 @@
+//! Small tables of text and numbers, from CSV, TSV or Parquet.
+
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use std::fs::File;
+use std::io::Read;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// The most bytes a table may have.
+const LARGEST_BYTES: u64 = 1 << 28;
+
+/// Why a table cannot be used.
+#[derive(Debug, Error)]
+pub enum TableReadError {
+    /// The file.
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A column.
+    #[error("{path}: no column {column} (found: {found})", path = path.display())]
+    Column {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// What there is.
+        found: String,
+    },
+    /// A value.
+    #[error("{path}: row {row}: {column} is {value:?}, not a finite number", path = path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// What stands there.
+        value: String,
+    },
+}
+
+/// A table in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    path: PathBuf,
+    names: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// Reads a table with a header: Parquet by its first bytes, else a text with commas, semicolons or tabs.
+    ///
+    /// # Errors
+    /// [`TableReadError::File`] if it cannot be read.
+    pub fn read(path: &Path) -> Result<Self, TableReadError> {
+        let refuse = |reason: String| TableReadError::File { path: path.to_owned(), reason };
+        let file = File::open(path).map_err(|error| refuse(error.to_string()))?;
+        if file.metadata().map_err(|error| refuse(error.to_string()))?.len() > LARGEST_BYTES {
+            return Err(refuse("a table of settings has to be smaller than 256 MiB".to_owned()));
+        }
+        let mut bytes = Vec::new();
+        (&file).read_to_end(&mut bytes).map_err(|error| refuse(error.to_string()))?;
+        let (names, rows) = if bytes.starts_with(b"PAR1") {
+            let read = catch_unwind(AssertUnwindSafe(|| from_parquet(path)));
+            read.unwrap_or_else(|_| Err("it is damaged".to_owned())).map_err(refuse)?
+        } else {
+            from_text(&bytes).map_err(refuse)?
+        };
+        Ok(Self { path: path.to_owned(), names, rows })
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// A column as text.
+    ///
+    /// # Errors
+    /// [`TableReadError::Column`] if there is none of that name (letter case does not count).
+    pub fn texts(&self, column: &str) -> Result<Vec<String>, TableReadError> {
+        let found = self.names.iter().position(|name| name.eq_ignore_ascii_case(column));
+        let index = found.ok_or_else(|| TableReadError::Column {
+            path: self.path.clone(),
+            column: column.to_owned(),
+            found: self.names.iter().take(20).cloned().collect::<Vec<_>>().join(", "),
+        })?;
+        Ok(self.rows.iter().map(|row| row.get(index).cloned().unwrap_or_default()).collect())
+    }
+
+    /// A column as finite numbers.
+    ///
+    /// # Errors
+    /// [`TableReadError`] if there is none of that name, or a value is no number.
+    pub fn numbers(&self, column: &str) -> Result<Vec<f64>, TableReadError> {
+        let number = |(row, text): (usize, String)| {
+            text.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
+                TableReadError::Value {
+                    path: self.path.clone(),
+                    row: row + 1,
+                    column: column.to_owned(),
+                    value: text,
+                }
+            })
+        };
+        self.texts(column)?.into_iter().enumerate().map(number).collect()
+    }
+}
+
+type Content = (Vec<String>, Vec<Vec<String>>);
+
+fn from_text(bytes: &[u8]) -> Result<Content, String> {
+    let line = bytes.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let delimiter = [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).delimiter(delimiter).from_reader(bytes);
+    let text =
+        |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
+    let names = text(reader.byte_headers().map_err(|error| error.to_string())?);
+    let rows = reader.byte_records().map(|record| record.map(|record| text(&record)));
+    Ok((names, rows.collect::<Result<_, _>>().map_err(|error| error.to_string())?))
+}
+
+fn from_parquet(path: &Path) -> Result<Content, String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let file = SerializedFileReader::new(file).map_err(|error| error.to_string())?;
+    let columns = file.metadata().file_metadata().schema_descr().columns();
+    let names = columns.iter().map(|column| column.path().string()).collect();
+    let mut rows = Vec::new();
+    for row in file.get_row_iter(None).map_err(|error| error.to_string())? {
+        let row = row.map_err(|error| error.to_string())?;
+        let plain = |text: String| text.trim_matches('"').to_owned();
+        rows.push(row.get_column_iter().map(|(_, field)| plain(field.to_string())).collect());
+    }
+    Ok((names, rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_by_name_and_errors_with_their_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        std::fs::write(&path, "Algorithm;time_ms\nVB;1.5\nTF;x\n").unwrap();
+        let table = Table::read(&path).unwrap();
+        assert_eq!(table.texts("algorithm").unwrap(), ["VB", "TF"]);
+        assert!(table.numbers("time_ms").unwrap_err().to_string().contains("row 2: time_ms is \"x\""));
+        assert!(
+            table
+                .numbers("energy")
+                .unwrap_err()
+                .to_string()
+                .contains("no column energy (found: Algorithm, time_ms)")
+        );
+    }
+}
