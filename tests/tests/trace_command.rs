@@ -12,6 +12,13 @@ fn quintile(folder: &Path, args: &[&str]) -> Output {
     Command::new(binary).current_dir(folder).arg("trace").args(args).output().unwrap()
 }
 
+/// What a call that has to succeed prints with `--json`.
+fn json(folder: &Path, args: &[&str]) -> Value {
+    let output = quintile(folder, &[args, &["--json"]].concat());
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
 /// 40 frames of 10 ms at 5 kHz from 0.1 s on: 4 ms at 20 W falling to 12 W, then 2 W; 12 V. One frame has a disturbance.
 fn write_trace(folder: &Path) {
     let mut text = String::from("Time(s),Main Voltage(V),Main(mA)\n");

@@ -110,9 +110,9 @@ fn fill(
                 reason: format!("{name} has no finite value"),
             });
         };
-        for at in first..end {
-            let share = (at + 1 - first) as f32 / (end + 1 - first) as f32;
-            values[at] = before + share * (after - before);
+        for (at, value) in values[first..end].iter_mut().enumerate() {
+            let share = (at + 1) as f32 / (end + 1 - first) as f32;
+            *value = before + share * (after - before);
         }
         let time_s = times.map_or(0.0, |times| times[first]);
         let message =

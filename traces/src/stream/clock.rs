@@ -49,7 +49,7 @@ impl Clock {
         }
         match (0..stamps.len())
             .map(|row| (row, self.off(stamps, row, first)))
-            .find(|(_, off)| !(off.abs() <= OFF))
+            .find(|(_, off)| off.is_nan() || off.abs() > OFF)
         {
             Some((row, off_periods)) => Err(ReadError::Uneven {
                 path: path.to_owned(),

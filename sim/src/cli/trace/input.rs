@@ -102,7 +102,7 @@ pub(super) struct Frames {
 
 impl Frames {
     pub(super) fn warn(&self) {
-        self.found.warnings.iter().for_each(|warning| tell(warning));
+        self.found.warnings.iter().for_each(tell);
     }
 }
 
@@ -183,7 +183,7 @@ impl FindArgs {
         };
         let end_s = self.end.or_else(|| end_mark(&trace.metadata)).unwrap_or(trace.end_s());
         let marks = Marks { starts_s, window: self.window_s()?, end_s };
-        Ok((find_with(trace, &marks, &Options { method: self.method, ..Options::default() })?, proposal))
+        Ok((find_with(trace, &marks, &Options { method: self.method })?, proposal))
     }
 
     fn window_s(&self) -> Result<Window, Failure> {
@@ -230,7 +230,7 @@ pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
                 let named = |field: &&str| {
                     ["start_s", "time_s", "mark_s"].iter().any(|n| field.eq_ignore_ascii_case(n))
                 };
-                column = fields.iter().position(|field| named(&field)).unwrap_or(0);
+                column = fields.iter().position(named).unwrap_or(0);
             }
             None => {
                 let message = format!(

@@ -41,8 +41,8 @@ impl Default for Chunk {
 }
 
 enum Source {
-    Csv(csv::CsvRows),
-    Parquet(parquet::ParquetRows),
+    Csv(Box<csv::CsvRows>),
+    Parquet(Box<parquet::ParquetRows>),
 }
 
 /// A file being read.
@@ -72,12 +72,12 @@ impl Rows {
     pub(crate) fn parquet(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         let opened = catch_unwind(AssertUnwindSafe(|| parquet::ParquetRows::open(path, options)));
         let (source, layout, header) = opened.unwrap_or_else(|_| Err(gave_up(path)))?;
-        Self::new(path, Source::Parquet(source), layout, header, options, "time_ns")
+        Self::new(path, Source::Parquet(Box::new(source)), layout, header, options, "time_ns")
     }
 
     pub(crate) fn csv(path: &Path, options: &ReadOptions, gzip: bool) -> Result<Self, ReadError> {
         let (source, layout, header) = csv::CsvRows::open(path, options, gzip)?;
-        Self::new(path, Source::Csv(source), layout, header, options, "time_s")
+        Self::new(path, Source::Csv(Box::new(source)), layout, header, options, "time_s")
     }
 
     fn new(

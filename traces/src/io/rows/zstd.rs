@@ -244,7 +244,10 @@ impl Thrift<'_> {
                 tell(path, value);
             }
             7 => self.at += 8,
-            8 => self.at = self.at.checked_add(usize::try_from(self.unsigned()?).ok()?)?,
+            8 => {
+                let length = usize::try_from(self.unsigned()?).ok()?;
+                self.at = self.at.checked_add(length)?;
+            }
             12 if path.len() < DEEPEST => self.fields(path, tell)?,
             _ => return None,
         }
