@@ -193,7 +193,7 @@ impl PacketClock {
             Some(behind) => {
                 served = served.max(behind.room_at(1));
                 let leave = served.max(there).max(station.left).max(room);
-                behind.enter(1, leave);
+                behind.enter(1, leave, leave);
                 leave
             }
         }
@@ -201,7 +201,7 @@ impl PacketClock {
         let busy_to = start + station.period * Time::from(job.service[place as usize]);
         station.free = if station.behind.is_some() { served } else { leave };
         station.left = leave;
-        station.queue.enter(1, start + 1);
+        station.queue.enter(1, start + 1, start + 1);
         let (from, to) = (self.clocks.ps(start), self.clocks.ps(busy_to));
         self.recorder.record(place.unit(), counts, from, to);
         leave
@@ -220,7 +220,7 @@ impl PacketClock {
     ) -> Time {
         let kind = usize::from(place == Place::Pixel);
         let run = self.cores.run(kind, job, lines, arrive, room, &self.makes, &mut self.memory);
-        self.stations[place as usize].queue.enter(1, run.taken + 1);
+        self.stations[place as usize].queue.enter(1, run.taken + 1, run.taken + 1);
         let (from, to) = (self.clocks.ps(run.taken), self.clocks.ps(run.done));
         self.recorder.count(Unit::Shader, counts, from, to);
         if kind == 1 {

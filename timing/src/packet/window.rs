@@ -4,13 +4,32 @@ use std::collections::VecDeque;
 
 use crate::clock::Time;
 
-/// When each of the last so many went. Groups go in at once, each member counted.
+/// When each of the last so many went. Groups are noted as one: their members go one after another.
 #[derive(Clone, Debug)]
 pub(super) struct Window {
     capacity: u64,
     entered: u64,
-    /// The number of the last of a group, and when the group was gone.
-    gone: VecDeque<(u64, Time)>,
+    gone: VecDeque<Group>,
+}
+
+/// The number of its last member, how many it has, and when its first and its last member were gone.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    last: u64,
+    count: u32,
+    from: Time,
+    to: Time,
+}
+
+impl Group {
+    /// When member `number` of all was gone.
+    fn gone_at(&self, number: u64) -> Time {
+        let behind = self.last.saturating_sub(number).min(u64::from(self.count) - 1);
+        if behind == 0 {
+            return self.to;
+        }
+        self.to - (self.to - self.from) * behind / (u64::from(self.count) - 1)
+    }
 }
 
 impl Window {
@@ -18,20 +37,23 @@ impl Window {
         Self { capacity: u64::from(capacity), entered: 0, gone: VecDeque::new() }
     }
 
-    /// When there is room for the last of `count` more.
+    /// When there is room for the last of `count` more. For a group larger than the window that is when the window is empty, as
+    /// it is not known when its own first members will make room for its last.
     pub fn room_at(&mut self, count: u32) -> Time {
-        let Some(must_go) = (self.entered + u64::from(count)).checked_sub(self.capacity).filter(|&n| n > 0) else { return 0 };
-        while self.gone.len() > 1 && self.gone[0].0 < must_go {
+        let must_go = (self.entered + u64::from(count)).saturating_sub(self.capacity).min(self.entered);
+        if must_go == 0 {
+            return 0;
+        }
+        while self.gone.len() > 1 && self.gone[0].last < must_go {
             self.gone.pop_front();
         }
-        // Of a group larger than the window, its own first members make room for its last; that is not known here.
-        self.gone.front().map_or(0, |&(_, at)| at)
+        self.gone.front().map_or(0, |group| group.gone_at(must_go))
     }
 
-    /// `count` more went in, and are gone at `at`.
-    pub fn enter(&mut self, count: u32, at: Time) {
+    /// `count` (at least 1) more went in; the first is gone at `from`, the last at `to`.
+    pub fn enter(&mut self, count: u32, from: Time, to: Time) {
         self.entered += u64::from(count);
-        self.gone.push_back((self.entered, at));
+        self.gone.push_back(Group { last: self.entered, count, from: from.min(to), to });
         while self.gone.len() as u64 > self.capacity {
             self.gone.pop_front();
         }
@@ -47,10 +69,11 @@ mod tests {
         let mut window = Window::new(3);
         for at in [10, 20, 30] {
             assert_eq!(window.room_at(1), 0);
-            window.enter(1, at);
+            window.enter(1, at, at);
         }
         assert_eq!((window.room_at(1), window.room_at(2)), (10, 20));
-        window.enter(2, 40);
-        assert_eq!(window.room_at(1), 30);
+        window.enter(2, 35, 40);
+        assert_eq!((window.room_at(1), window.room_at(2), window.room_at(3)), (30, 35, 40));
+        assert_eq!(window.room_at(9), 40);
     }
 }
