@@ -118,6 +118,7 @@ fn remove_stale(dir: &OutDir) -> Result<(), RunError> {
     dir.remove_stale("", "report.", &["html"])?;
     dir.remove_stale("", "frames.", &["csv"])?;
     dir.remove_stale("", "trace.", &["csv", "json", "parquet"])?;
+    dir.remove_stale("plots", "stalls", &["svg", "png"])?;
     dir.remove_stale("", "timeline.", &["perfetto-trace"])?;
     for (figure, _) in super::FIGURES {
         dir.remove_stale("plots", figure, &["svg", "png"])?;

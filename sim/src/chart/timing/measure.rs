@@ -1,8 +1,7 @@
 //! One stream at every level: how far from the reference, and how fast.
 
-use std::time::Instant;
-
 use activity::{Event, Timeline, Unit};
+use cpu_time::ThreadTime;
 use power_model::{EnergyTable, FramePower, Platform, PowerModel};
 use serde::Serialize;
 use timing::{Recorder, Timed};
@@ -48,7 +47,7 @@ pub struct Row {
     pub power_shape_error_1us_percent: f64,
     /// The unit that the reference finds busiest over the frame, and its share.
     pub busiest: (&'static str, f64),
-    /// Seconds of the host.
+    /// Seconds of the host's processor.
     pub host_s: f64,
     /// Seconds of the host for the reference over these.
     pub speedup_over_stepped: f64,
@@ -107,7 +106,7 @@ pub(super) fn rows(scene: &str, gpu: &GpuSpec, stream: &Packets, speed: &mut Spe
 }
 
 fn timed(level: Level, gpu: &GpuSpec, stream: &Packets) -> Result<(Timed, f64), RunError> {
-    let started = Instant::now();
+    let started = ThreadTime::now();
     let mut clock = FrameClock::new(level, gpu, Recorder::new(BIN_PS, MOST_BINS))?;
     stream.each(|packet, lines| clock.push(packet, lines));
     let timed = clock.finish()?;
