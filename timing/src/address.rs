@@ -39,7 +39,11 @@ impl Map {
         let chunk = line / self.lines_per_chunk;
         let within = chunk / self.channels * self.lines_per_chunk + line % self.lines_per_chunk;
         let row = within / self.lines_per_row;
-        RowPlace { channel: (chunk % self.channels) as usize, bank: (row % self.banks) as usize, row: row / self.banks }
+        RowPlace {
+            channel: (chunk % self.channels) as usize,
+            bank: (row % self.banks) as usize,
+            row: row / self.banks,
+        }
     }
 }
 
@@ -54,7 +58,10 @@ mod tests {
             let RowPlace { channel, bank, row } = map.place(line);
             (channel, bank, row)
         };
-        assert_eq!([0, 3, 4, 7, 8, 16].map(at), [(0, 0, 0), (0, 0, 0), (1, 0, 0), (1, 0, 0), (0, 0, 0), (0, 1, 0)]);
+        assert_eq!(
+            [0, 3, 4, 7, 8, 16].map(at),
+            [(0, 0, 0), (0, 0, 0), (1, 0, 0), (1, 0, 0), (0, 0, 0), (0, 1, 0)]
+        );
         assert_eq!(at(32), (0, 0, 1));
     }
 }

@@ -56,7 +56,15 @@ pub struct BoundClock {
 
 const PATHS: [&[Place]; 2] = [
     &[Place::Command, Place::Vertex, Place::Setup],
-    &[Place::Traversal, Place::ZCull, Place::SampleTest, Place::Depth, Place::ShadingCache, Place::Pixel, Place::Colour],
+    &[
+        Place::Traversal,
+        Place::ZCull,
+        Place::SampleTest,
+        Place::Depth,
+        Place::ShadingCache,
+        Place::Pixel,
+        Place::Colour,
+    ],
 ];
 
 impl BoundClock {
@@ -104,7 +112,8 @@ impl BoundClock {
         let texels = self.makes.texture_cycles(counts[Event::TextureFetches], counts[Event::TextureLines]);
         owed[Unit::Texture as usize] += u64::from(texels);
         owed[Unit::L2 as usize] += lines.len() as u64;
-        owed[Unit::Dram as usize] += u64::from((counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]) / LINE_BYTES);
+        owed[Unit::Dram as usize] +=
+            u64::from((counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]) / LINE_BYTES);
         self.stretches[path].packets += 1;
         self.phase(phase).counts += counts;
     }

@@ -25,7 +25,8 @@ impl Clocks {
         if core == 0 || memory == 0 {
             return None;
         }
-        let grains_per_ms = (core / gcd(core, memory)).checked_mul(memory).filter(|&g| g <= MOST_GRAINS_PER_MS)?;
+        let grains_per_ms =
+            (core / gcd(core, memory)).checked_mul(memory).filter(|&g| g <= MOST_GRAINS_PER_MS)?;
         Some(Self { grains_per_ms, periods: khz.map(|khz| grains_per_ms / khz) })
     }
 

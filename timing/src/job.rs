@@ -129,7 +129,9 @@ impl Jobs {
             let rates = machine.common(place.unit()).rates;
             rates.iter().flat_map(|rates| rates.iter()).map(|(event, rate)| (event, rate.recip())).collect()
         });
-        let cycles = |event| machine.texture.rates.iter().find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip());
+        let cycles = |event| {
+            machine.texture.rates.iter().find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip())
+        };
         Self {
             costs,
             texel_cycles: [Event::TextureFetches, Event::TextureLines].map(cycles),
@@ -162,7 +164,8 @@ impl Jobs {
             job.lines[port] = (store.len() - before) as u32;
         }
         for place in &Place::ALL[places] {
-            let used = counts.uses(place.unit()) || port(place.unit()).is_some_and(|port| job.lines[port] > 0);
+            let used =
+                counts.uses(place.unit()) || port(place.unit()).is_some_and(|port| job.lines[port] > 0);
             if used {
                 job.last = *place;
                 job.service[*place as usize] = self.cycles(*place, counts);
@@ -184,7 +187,8 @@ impl Jobs {
 
     /// The parts of a unit work side by side: the slowest sets the pace.
     fn cycles(&self, place: Place, counts: &PacketCounts) -> u32 {
-        let parts = self.costs[place as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);
+        let parts =
+            self.costs[place as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);
         whole(parts.fold(0.0, f64::max))
     }
 
@@ -216,6 +220,9 @@ mod tests {
 
     #[test]
     fn cycles_round_up_and_not_too_far() {
-        assert_eq!([0.0, 0.2, 1.0, 3.0 * (1.0 / 3.0), 49.0 * (1.0 / 49.0), 2.1].map(whole), [0, 1, 1, 1, 1, 3]);
+        assert_eq!(
+            [0.0, 0.2, 1.0, 3.0 * (1.0 / 3.0), 49.0 * (1.0 / 49.0), 2.1].map(whole),
+            [0, 1, 1, 1, 1, 3]
+        );
     }
 }

@@ -64,7 +64,8 @@ impl Recorder {
     pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
         for (bin, from, to) in self.span(start_ps, end_ps) {
             let up_to = |at: u64| (u128::from(at) * u128::from(busy) / u128::from(of)) as u64;
-            self.bins[bin].busy_ps[unit as usize] += if busy == of { to - from } else { up_to(to) - up_to(from) };
+            self.bins[bin].busy_ps[unit as usize] +=
+                if busy == of { to - from } else { up_to(to) - up_to(from) };
         }
     }
 

@@ -167,7 +167,13 @@ impl ClientSpec {
 impl MachineSpec {
     /// What `unit` has in common with the others.
     pub fn common(&self, unit: Unit) -> Common<'_> {
-        let bare = |clock, latency_cycles, queue, in_flight| Common { clock, latency_cycles, queue, in_flight, rates: None };
+        let bare = |clock, latency_cycles, queue, in_flight| Common {
+            clock,
+            latency_cycles,
+            queue,
+            in_flight,
+            rates: None,
+        };
         match unit {
             Unit::Command => self.command.common(),
             Unit::Shader => {
@@ -199,7 +205,9 @@ impl MachineSpec {
                 return Err(format!("`units.{name}.queue` is 0; a queue holds at least 1 packet"));
             }
             if common.latency_cycles == 0 {
-                return Err(format!("`units.{name}.latency_cycles` is 0; nothing is seen before the next cycle, so it is at least 1"));
+                return Err(format!(
+                    "`units.{name}.latency_cycles` is 0; nothing is seen before the next cycle, so it is at least 1"
+                ));
             }
             let foreign = common.rates.and_then(|rates| rates.iter().find(|(event, _)| event.unit() != unit));
             if let Some((event, _)) = foreign {
@@ -232,7 +240,9 @@ impl MachineSpec {
             ("dram.interleave_bytes", dram.interleave_bytes, crate::LINE_BYTES),
         ];
         match sizes.iter().find(|(_, value, least)| !(*least..=1 << 20).contains(value)) {
-            Some((field, value, least)) => Err(format!("`units.{field}` is {value}; it has to be {least} to 1048576")),
+            Some((field, value, least)) => {
+                Err(format!("`units.{field}` is {value}; it has to be {least} to 1048576"))
+            }
             None => Ok(()),
         }
     }

@@ -36,6 +36,7 @@ impl LineAccess {
 
     /// Lines that memory transfers for it.
     pub fn transfers(&self) -> u32 {
-        u32::from(matches!(self.kind, LineKind::Fetch | LineKind::Drain)) + u32::from(self.victim != Self::NONE)
+        u32::from(matches!(self.kind, LineKind::Fetch | LineKind::Drain))
+            + u32::from(self.victim != Self::NONE)
     }
 }

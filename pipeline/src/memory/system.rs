@@ -50,7 +50,9 @@ impl MemorySystem {
     /// # Errors
     /// When one of them cannot be built.
     pub fn new(spec: &MemorySpec) -> Result<Self, CacheError> {
-        let client = |spec, lines: Event, misses| Ok(Client { unit: lines.unit(), cache: Cache::new(spec)?, lines, misses });
+        let client = |spec, lines: Event, misses| {
+            Ok(Client { unit: lines.unit(), cache: Cache::new(spec)?, lines, misses })
+        };
         Ok(Self {
             depth: client(spec.depth, Event::DepthLines, Event::DepthMisses)?,
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
@@ -165,7 +167,12 @@ fn shared(l2: &mut Shared, client: Unit, line: u64, write: bool, counts: &mut Pa
 
 /// Line numbers are small: what an image, its vertices and its textures take is far below 2^38 bytes.
 fn access_to(client: Unit, line: u64, kind: LineKind, victim: Option<u64>) -> LineAccess {
-    LineAccess { line: line as u32, victim: victim.map_or(LineAccess::NONE, |line| line as u32), client, kind }
+    LineAccess {
+        line: line as u32,
+        victim: victim.map_or(LineAccess::NONE, |line| line as u32),
+        client,
+        kind,
+    }
 }
 
 #[cfg(test)]

@@ -63,8 +63,12 @@ pub(super) fn picture(frame: &SimulatedFrame, subject: &str) -> Option<Picture> 
     let bottlenecks = stalls.bottlenecks();
     let of = |unit: Unit| {
         let shares: Vec<[f64; 3]> = lane(stalls, unit).collect();
-        let mean = |group: &[[f64; 3]]| [0, 1, 2].map(|kind| group.iter().map(|s| s[kind]).sum::<f64>() / group.len() as f64);
-        let most = |group: &[(Unit, f64)]| 2 * group.iter().filter(|(busiest, _)| *busiest == unit).count() > group.len();
+        let mean = |group: &[[f64; 3]]| {
+            [0, 1, 2].map(|kind| group.iter().map(|s| s[kind]).sum::<f64>() / group.len() as f64)
+        };
+        let most = |group: &[(Unit, f64)]| {
+            2 * group.iter().filter(|(busiest, _)| *busiest == unit).count() > group.len()
+        };
         let bottleneck = bottlenecks.chunks(group).map(most).collect();
         StallLane { name: unit.name(), shares: shares.chunks(group).map(mean).collect(), bottleneck }
     };
@@ -100,7 +104,11 @@ pub(super) fn tracks(simulated: &Simulated, starts: &[u64]) -> Vec<CounterTrack<
                 let Some(stalls) = &frame.stalls else { continue };
                 let interval_ns = stalls.interval_ps() as f64 * 1e-3;
                 let at = |place: usize| start + (place as f64 * interval_ns) as u64;
-                points.extend(lane(stalls, unit).enumerate().map(|(place, shares)| (at(place), 100.0 * shares[kind + 1])));
+                points.extend(
+                    lane(stalls, unit)
+                        .enumerate()
+                        .map(|(place, shares)| (at(place), 100.0 * shares[kind + 1])),
+                );
                 points.push((start + (frame.power.duration_s() * 1e9) as u64, 0.0));
             }
             if points.iter().any(|(_, share)| *share > 0.0) {

@@ -67,7 +67,9 @@ impl<'a> FrameClock<'a> {
         let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
         let batch = gpu.pipeline.batch_triangles;
         let state = match level {
-            Level::Stepped => State::Stepped(Box::new((Jobs::new(&gpu.units, batch), Stream::default(), recorder))),
+            Level::Stepped => {
+                State::Stepped(Box::new((Jobs::new(&gpu.units, batch), Stream::default(), recorder)))
+            }
             Level::Packet => State::Packet(Box::new(PacketClock::new(&gpu.units, clocks, batch, recorder))),
             Level::Bound => State::Bound(Box::new(BoundClock::new(&gpu.units, clocks, batch, recorder))),
         };

@@ -18,7 +18,12 @@ pub(super) struct Calendar {
 impl Calendar {
     /// Stretches of `cycles` cycles of `period`, each of which does `rate` units of work.
     pub fn new(cycles: u32, period: Time, rate: u32) -> Self {
-        Self { length: Time::from(cycles) * period, room: u64::from(cycles) * u64::from(rate), used: Vec::new(), free: Vec::new() }
+        Self {
+            length: Time::from(cycles) * period,
+            room: u64::from(cycles) * u64::from(rate),
+            used: Vec::new(),
+            free: Vec::new(),
+        }
     }
 
     /// Does `work` from `at` on and says when it begins and when it is done.
@@ -78,7 +83,9 @@ impl Calendar {
     /// Every stretch in which anything was done: from, to, work done and work that fits.
     pub fn stretches(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
         let used = self.used.iter().zip(0..).filter(|(used, _)| **used > 0);
-        used.map(|(&used, at): (&u32, Time)| (at * self.length, (at + 1) * self.length, u64::from(used), self.room))
+        used.map(|(&used, at): (&u32, Time)| {
+            (at * self.length, (at + 1) * self.length, u64::from(used), self.room)
+        })
     }
 }
 

@@ -99,7 +99,16 @@ impl Cores {
 
     /// A packet of vertices (`kind` 0) or pixels that arrives at `arrive` and may leave from `room` on.
     #[allow(clippy::too_many_arguments, reason = "a packet at a place, and what it may do there")]
-    pub fn run(&mut self, kind: usize, job: &Job, lines: &[LineAccess], arrive: Time, room: Time, makes: &Jobs, memory: &mut Memory) -> Run {
+    pub fn run(
+        &mut self,
+        kind: usize,
+        job: &Job,
+        lines: &[LineAccess],
+        arrive: Time,
+        room: Time,
+        makes: &Jobs,
+        memory: &mut Memory,
+    ) -> Run {
         let warps = job.warps(self.warp_lanes);
         let way = &mut self.ways[kind];
         let taken = arrive.max(way.sent).max(way.flights.room_at(1));
@@ -138,7 +147,16 @@ impl Cores {
 
     /// The texels of some warps. Says when the first and the last warp have theirs.
     #[allow(clippy::too_many_arguments, reason = "warps at the texture units, and what they may do there")]
-    fn texels(&mut self, job: &Job, chunk: &Chunk, lines: &[LineAccess], sent: (Time, Time), makes: &Jobs, memory: &mut Memory, run: &mut Run) -> (Time, Time) {
+    fn texels(
+        &mut self,
+        job: &Job,
+        chunk: &Chunk,
+        lines: &[LineAccess],
+        sent: (Time, Time),
+        makes: &Jobs,
+        memory: &mut Memory,
+        run: &mut Run,
+    ) -> (Time, Time) {
         let cycles = |part: u32| {
             let [fetches, lines] = job.texels.map(|whole| share(whole, part, chunk.of).len() as u32);
             self.texture_period * Time::from(makes.texture_cycles(fetches, lines))
@@ -165,7 +183,11 @@ impl Cores {
         let gone = served.max(there).max(self.texture_gone);
         self.texture_free = served;
         self.texture_gone = gone;
-        self.texture_queue.enter(chunk.count, start + self.period, served.saturating_sub(each).max(start) + self.period);
+        self.texture_queue.enter(
+            chunk.count,
+            start + self.period,
+            served.saturating_sub(each).max(start) + self.period,
+        );
         let first = (start + each).max(gone.saturating_sub(served.saturating_sub(start + each))).min(gone);
         self.texture_behind.enter(chunk.count, first, gone);
         run.texture = (run.texture.0.min(start), run.texture.1.max(busy_to));
@@ -179,7 +201,8 @@ impl Cores {
         let threads = part(chunk.first + chunk.count) - part(chunk.first);
         let operations = u64::from(threads) * u64::from(job.ops);
         // An operation of a warp wider than a core takes more than one cycle of its lanes.
-        let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1)) * self.period;
+        let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1))
+            * self.period;
         let alone = Time::from(job.ops.max(1)) * (self.alu + wide);
         let issued = if operations > 0 { self.lanes.take(ready.0, operations).1 } else { 0 };
         let last = (ready.1 + alone).max(issued + self.alu.saturating_sub(self.period));

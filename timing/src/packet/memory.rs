@@ -44,7 +44,6 @@ struct Bank {
 struct Channel {
     bus: Calendar,
     banks: Vec<Bank>,
-    issued: Ring,
 }
 
 /// When some lines were asked for, taken and there.
@@ -80,11 +79,8 @@ impl Memory {
         let (period, l2_period) = (clocks.period(spec.clock), clocks.period(machine.l2.clock));
         let stretch = STRETCH * spec.burst_cycles;
         let bank = Bank { open: u32::MAX, time: Calendar::new(stretch, period, 1) };
-        let channel = Channel {
-            bus: Calendar::new(stretch, period, 1),
-            banks: vec![bank; spec.banks as usize],
-            issued: Ring::new(spec.queue),
-        };
+        let channel =
+            Channel { bus: Calendar::new(stretch, period, 1), banks: vec![bank; spec.banks as usize] };
         Self {
             map: Map::new(&spec),
             channels: vec![channel; spec.channels as usize],
@@ -117,16 +113,18 @@ impl Memory {
     /// One line through the L2, from `seen` on. Says when it was taken.
     fn take(&mut self, access: &LineAccess, seen: Time, fetched: &mut Fetched) -> Time {
         let fetch = matches!(access.kind, LineKind::Fetch | LineKind::Drain);
-        let moved = [fetch.then_some(access.line), (access.victim != LineAccess::NONE).then_some(access.victim)];
-        let room = moved.iter().flatten().map(|&line| self.channels[self.map.place(line).channel].issued.room_at());
-        let seen = room.fold(seen, Time::max);
-        let taken = self.l2.take(seen, 1).0;
+        let moved =
+            [fetch.then_some(access.line), (access.victim != LineAccess::NONE).then_some(access.victim)];
+        let mut taken = self.l2.take(seen, 1).0;
+        let backlog = self.period * Time::from(self.spec.queue * self.spec.burst_cycles);
         if access.kind == LineKind::Hit {
             fetched.there = fetched.there.max(taken + self.l2_latency);
         }
         for (line, read) in moved.into_iter().zip([access.kind == LineKind::Fetch, false]) {
             let Some(line) = line else { continue };
-            let data = self.transfer(line, taken + self.l2_period);
+            let (issued, data) = self.transfer(line, taken + self.l2_period);
+            // The queue of the channel holds no more than this: the request waits in front of the L2 for the rest.
+            taken = taken.max(issued.saturating_sub(backlog));
             fetched.moved = fetched.moved.max(data);
             if read {
                 let back = self.period * Time::from(self.spec.latency_cycles) + self.l2_latency;
@@ -138,8 +136,8 @@ impl Memory {
         taken
     }
 
-    /// A line over the bus of its channel, from `seen` on. Says when its last data have passed.
-    fn transfer(&mut self, line: u32, seen: Time) -> Time {
+    /// A line over the bus of its channel, from `seen` on. Says when it is issued and when its last data have passed.
+    fn transfer(&mut self, line: u32, seen: Time) -> (Time, Time) {
         let place = self.map.place(line);
         let cycles = |count: u32| self.period * Time::from(count);
         let DramSpec { burst_cycles, cas_cycles, activate_cycles, precharge_cycles, .. } = self.spec;
@@ -153,10 +151,9 @@ impl Memory {
         bank.open = place.row;
         let seen = if opens > 0 { bank.time.take(seen, u64::from(opens)).0 } else { seen };
         let (issued, _) = channel.bus.take(seen + cycles(opens), u64::from(burst_cycles));
-        channel.issued.note(issued + self.period);
         let bus_free = issued + cycles(burst_cycles);
         self.end = self.end.max(bus_free);
-        bus_free + cycles(cas_cycles)
+        (issued, bus_free + cycles(cas_cycles))
     }
 
     /// When the last line is taken and the last transfer over.

@@ -129,7 +129,8 @@ impl PacketClock {
     fn catch_up(&mut self, batch: Option<u32>) {
         while let Some((job, ..)) = self.ahead.front() {
             let needed = batch.is_none_or(|batch| job.batch <= batch);
-            let behind = self.stations[0].free.max(self.gates.opens(job)) <= self.stations[Place::Traversal as usize].free;
+            let behind = self.stations[0].free.max(self.gates.opens(job))
+                <= self.stations[Place::Traversal as usize].free;
             if !(needed || behind) {
                 return;
             }
@@ -179,7 +180,8 @@ impl PacketClock {
         let start = arrive.max(station.free);
         let mut served = start + station.period * Time::from(job.service[place as usize]);
         let mut there = 0;
-        let asked = port(place.unit()).map(|port| (port, job.lines_of(port))).filter(|(_, range)| !range.is_empty());
+        let asked =
+            port(place.unit()).map(|port| (port, job.lines_of(port))).filter(|(_, range)| !range.is_empty());
         if let Some((port, range)) = asked {
             let range = range.start - job.first_line..range.end - job.first_line;
             let fetched = self.memory.ask(port, &lines[range], start.max(station.asks), station.period);
@@ -248,7 +250,12 @@ impl PacketClock {
         for bus in memory.buses() {
             write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }
-        Timed { timeline: recorder.finish(), cycles: clocks.cycles(Clock::Core, end), stalls: None, unit_cycles: 0 }
+        Timed {
+            timeline: recorder.finish(),
+            cycles: clocks.cycles(Clock::Core, end),
+            stalls: None,
+            unit_cycles: 0,
+        }
     }
 }
 
@@ -259,7 +266,14 @@ fn note(memory: &mut Option<(Time, Time)>, from: Time, to: Time) {
 
 /// The busy time of one of `servers` of a unit from its calendar. What the calendar put beyond the end of the frame by its
 /// stretches is moved before it.
-fn write(recorder: &mut Recorder, clocks: &Clocks, unit: Unit, calendar: &Calendar, servers: u64, end_ps: u64) {
+fn write(
+    recorder: &mut Recorder,
+    clocks: &Clocks,
+    unit: Unit,
+    calendar: &Calendar,
+    servers: u64,
+    end_ps: u64,
+) {
     for (from, to, used, room) in calendar.stretches() {
         let (from, to) = (clocks.ps(from), clocks.ps(to));
         let done = (u128::from(to - from) * u128::from(used) / u128::from(room)) as u64;

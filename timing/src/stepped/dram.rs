@@ -85,18 +85,33 @@ impl Dram {
         let channels = [moved, victim].map(|line| line.map(|line| self.map.place(line).channel));
         match channels {
             [Some(a), Some(b)] if a == b => self.channels[a].room(self.queue, now) >= 2,
-            _ => channels.into_iter().flatten().all(|channel| self.channels[channel].room(self.queue, now) >= 1),
+            _ => channels
+                .into_iter()
+                .flatten()
+                .all(|channel| self.channels[channel].room(self.queue, now) >= 1),
         }
     }
 
     /// Queues a line to be seen from `seen_at` on; `reader` as in [`Entry`].
     pub fn push(&mut self, line: u32, reader: Option<(u32, Time)>, seen_at: Time) {
         let place = self.map.place(line);
-        self.channels[place.channel].entries.push(Entry { seen_at, bank: place.bank, row: place.row, reader });
+        self.channels[place.channel].entries.push(Entry {
+            seen_at,
+            bank: place.bank,
+            row: place.row,
+            reader,
+        });
     }
 
     /// In each channel, a column command and a row command where they can be given. Says whether any was.
-    pub fn tick(&mut self, now: Time, waits: &mut Waits, meter: &mut Meter, recorder: &mut Recorder, clocks: &Clocks) -> bool {
+    pub fn tick(
+        &mut self,
+        now: Time,
+        waits: &mut Waits,
+        meter: &mut Meter,
+        recorder: &mut Recorder,
+        clocks: &Clocks,
+    ) -> bool {
         let mut acted = false;
         for at in 0..self.channels.len() {
             if let Some(entry) = self.channels[at].column(now, self.burst) {
@@ -159,10 +174,17 @@ impl Channel {
 
     /// The oldest line whose row is not open opens it, unless another waits for the one that is.
     fn row(&mut self, now: Time, activate: Time, precharge: Time) -> bool {
-        let wanted = |bank: usize| self.entries.iter().any(|e| e.bank == bank && e.seen_at <= now && self.banks[bank].open == Some(e.row));
+        let wanted = |bank: usize| {
+            self.entries
+                .iter()
+                .any(|e| e.bank == bank && e.seen_at <= now && self.banks[bank].open == Some(e.row))
+        };
         let closed = |entry: &&Entry| {
             let bank = &self.banks[entry.bank];
-            entry.seen_at <= now && bank.open != Some(entry.row) && bank.ready_at <= now && !wanted(entry.bank)
+            entry.seen_at <= now
+                && bank.open != Some(entry.row)
+                && bank.ready_at <= now
+                && !wanted(entry.bank)
         };
         let Some(&Entry { bank, row, .. }) = self.entries.iter().find(closed) else { return false };
         let bank = &mut self.banks[bank];
@@ -173,7 +195,9 @@ impl Channel {
 
     fn wakes(&self, now: Time) -> impl Iterator<Item = Time> {
         let entries = self.entries.iter();
-        let own = entries.flat_map(|entry| [entry.seen_at, self.banks[entry.bank].ready_at]).filter(move |&at| at > now);
+        let own = entries
+            .flat_map(|entry| [entry.seen_at, self.banks[entry.bank].ready_at])
+            .filter(move |&at| at > now);
         own.chain([self.bus_free_at])
     }
 }

@@ -5,10 +5,10 @@ use activity::{Event, LineAccess, LineKind, Unit};
 use super::dram::Dram;
 use super::meter::{Meter, Rest};
 use super::queue::Queue;
+use crate::Recorder;
 use crate::clock::{Clocks, Time};
 use crate::job::CLIENTS;
 use crate::spec::MachineSpec;
-use crate::Recorder;
 
 /// Nobody waits.
 pub(super) const NOBODY: u32 = u32::MAX;
@@ -108,7 +108,15 @@ impl L2 {
     }
 
     /// Takes as many requests as it can, the ports in turn. Says whether it took any.
-    pub fn tick(&mut self, now: Time, dram: &mut Dram, waits: &mut Waits, meter: &mut Meter, recorder: &mut Recorder, clocks: &Clocks) -> bool {
+    pub fn tick(
+        &mut self,
+        now: Time,
+        dram: &mut Dram,
+        waits: &mut Waits,
+        meter: &mut Meter,
+        recorder: &mut Recorder,
+        clocks: &Clocks,
+    ) -> bool {
         let mut taken = 0;
         let mut stuck = false;
         while taken < self.lines_per_cycle {
@@ -180,5 +188,6 @@ fn l2_events(access: &LineAccess) -> [(Event, u64); 3] {
     let reads = matches!(access.kind, LineKind::Hit | LineKind::Fetch);
     let writes = matches!(access.kind, LineKind::Write | LineKind::Allocate);
     let misses = matches!(access.kind, LineKind::Fetch | LineKind::Allocate);
-    [(Event::L2Reads, reads), (Event::L2Writes, writes), (Event::L2Misses, misses)].map(|(event, yes)| (event, u64::from(yes)))
+    [(Event::L2Reads, reads), (Event::L2Writes, writes), (Event::L2Misses, misses)]
+        .map(|(event, yes)| (event, u64::from(yes)))
 }

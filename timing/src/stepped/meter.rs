@@ -2,9 +2,9 @@
 
 use activity::Unit;
 
+use crate::Recorder;
 use crate::clock::{Clocks, Time};
 use crate::stalls::{Reason, Stalls};
-use crate::Recorder;
 
 pub(super) use crate::stalls::Reason as Rest;
 

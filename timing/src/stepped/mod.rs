@@ -71,7 +71,14 @@ impl Stream {
 ///
 /// # Errors
 /// [`Stalled`] where the model has a fault.
-pub fn run(machine: &MachineSpec, clocks: Clocks, makes: &Jobs, stream: &Stream, recorder: Recorder, manner: &Manner) -> Result<Timed, Stalled> {
+pub fn run(
+    machine: &MachineSpec,
+    clocks: Clocks,
+    makes: &Jobs,
+    stream: &Stream,
+    recorder: Recorder,
+    manner: &Manner,
+) -> Result<Timed, Stalled> {
     Machine::new(machine, clocks, makes, stream, recorder).run(manner)
 }
 
@@ -172,7 +179,8 @@ impl Outside for Cores<'_, '_> {
     }
 
     fn leave(&mut self, kind: usize, job: u32, now: Time) -> Result<(), Unit> {
-        let (place, next) = if kind == 0 { (Place::Vertex, &mut *self.setup) } else { (Place::Pixel, &mut *self.colour) };
+        let (place, next) =
+            if kind == 0 { (Place::Vertex, &mut *self.setup) } else { (Place::Pixel, &mut *self.colour) };
         self.world.leave(place, job, now, Some(next))
     }
 }
@@ -208,11 +216,18 @@ impl Around for Texels<'_, '_> {
 }
 
 impl<'a> Machine<'a> {
-    fn new(machine: &MachineSpec, clocks: Clocks, makes: &'a Jobs, stream: &'a Stream, recorder: Recorder) -> Self {
+    fn new(
+        machine: &MachineSpec,
+        clocks: Clocks,
+        makes: &'a Jobs,
+        stream: &'a Stream,
+        recorder: Recorder,
+    ) -> Self {
         let common = Place::ALL.map(|place| machine.common(place.unit()));
         let period = |place: Place| clocks.period(common[place as usize].clock);
         let stage = |place: Place| {
-            (place.unit() != Unit::Shader).then(|| Stage::new(period(place), common[place as usize].in_flight))
+            (place.unit() != Unit::Shader)
+                .then(|| Stage::new(period(place), common[place as usize].in_flight))
         };
         let mut servers = [1; Unit::COUNT];
         servers[Unit::Shader as usize] = machine.shader.cores * machine.shader.lanes;
@@ -222,7 +237,8 @@ impl<'a> Machine<'a> {
             clocks,
             makes,
             stream,
-            latency: Place::ALL.map(|place| period(place) * Time::from(common[place as usize].latency_cycles)),
+            latency: Place::ALL
+                .map(|place| period(place) * Time::from(common[place as usize].latency_cycles)),
             sources: Sources::new(&stream.jobs),
             recorder,
             end: 0,
@@ -234,7 +250,8 @@ impl<'a> Machine<'a> {
             shader: Shader::new(machine, &clocks),
             texture: Stage::new(clocks.period(machine.texture.clock), machine.texture.in_flight),
             textures: Queue::new(machine.texture.queue),
-            texture_latency: clocks.period(machine.texture.clock) * Time::from(machine.texture.latency_cycles),
+            texture_latency: clocks.period(machine.texture.clock)
+                * Time::from(machine.texture.latency_cycles),
             l2: L2::new(machine, &clocks),
             dram: Dram::new(machine, &clocks),
             waits: Waits::default(),
@@ -258,19 +275,17 @@ impl<'a> Machine<'a> {
             }
             if acted {
                 quiet_since = now + 1;
+                now = self.world.clocks.next_edge(now);
+                continue;
             }
-            // Every unit has had a cycle since anything happened: nothing will until the next moment that one waits for.
+            // Once every unit has had a cycle since anything happened, nothing will until the next moment that one waits for.
+            // A moment just gone may belong to a unit whose cycle is still to come.
             let quiet = now >= quiet_since + longest - 1;
-            let wakes = self.wakes_at(now);
-            now = match wakes {
+            now = match self.wakes_at(now.saturating_sub(longest)) {
                 None if quiet => break,
-                Some(at) if quiet && manner.skip => self.world.clocks.edge_from(at),
+                Some(at) if quiet && manner.skip && at > now => self.world.clocks.edge_from(at),
                 _ => self.world.clocks.next_edge(now),
             };
-            // Who waits for that moment may have its cycle later, by another clock.
-            if wakes.is_some_and(|at| at <= now) {
-                quiet_since = now;
-            }
         }
         self.finish(now)
     }
@@ -278,7 +293,10 @@ impl<'a> Machine<'a> {
     fn finish(mut self, now: Time) -> Result<Timed, Stalled> {
         let clocks = self.world.clocks;
         if self.world.sources.left() > 0 || !self.l2.is_empty() || !self.dram.is_empty() {
-            return Err(Stalled { cycles: clocks.cycles(crate::Clock::Core, now), left: self.world.sources.left() });
+            return Err(Stalled {
+                cycles: clocks.cycles(crate::Clock::Core, now),
+                left: self.world.sources.left(),
+            });
         }
         let end = self.world.end.max(self.l2.ends_at()).max(self.dram.ends_at());
         self.meter.finish(end, &mut self.world.recorder);
@@ -305,7 +323,9 @@ impl<'a> Machine<'a> {
         match unit {
             Unit::Shader => self.tick_shader(now),
             Unit::Texture => self.tick_texture(now),
-            Unit::L2 => self.l2.tick(now, &mut self.dram, &mut self.waits, &mut self.meter, recorder, &clocks),
+            Unit::L2 => {
+                self.l2.tick(now, &mut self.dram, &mut self.waits, &mut self.meter, recorder, &clocks)
+            }
             Unit::Dram => self.dram.tick(now, &mut self.waits, &mut self.meter, recorder, &clocks),
             _ => self.tick_stage(place(unit), now),
         }
@@ -328,14 +348,16 @@ impl<'a> Machine<'a> {
         let [_, vertex, setup, _, _, _, _, _, pixel, colour] = &mut self.queues;
         let mut cores = Cores { world: &mut self.world, setup, colour };
         let jobs = &cores.world.stream.jobs;
-        let (acted, busy, rest) = self.shader.tick(now, jobs, [vertex, pixel], &mut self.textures, &mut cores);
+        let (acted, busy, rest) =
+            self.shader.tick(now, jobs, [vertex, pixel], &mut self.textures, &mut cores);
         let rest = rest.unwrap_or_else(|| self.world.sources.without(Place::Pixel, now));
         self.meter.set(Unit::Shader, now, busy, rest, &mut self.world.recorder);
         acted
     }
 
     fn tick_texture(&mut self, now: Time) -> bool {
-        let mut texels = Texels { world: &self.world, shader: &mut self.shader, latency: self.texture_latency };
+        let mut texels =
+            Texels { world: &self.world, shader: &mut self.shader, latency: self.texture_latency };
         let port = Some(&mut self.l2.ports[2]);
         let ticked = self.texture.tick(now, &mut self.textures, port, &mut self.waits, &mut texels);
         let idle = self.texture.is_free() && self.world.sources.left_at(Place::Pixel) == 0;
@@ -348,7 +370,7 @@ impl<'a> Machine<'a> {
         ticked.acted
     }
 
-    /// The first moment after `now` for which any unit waits.
+    /// The first moment after `now` for which any unit waits or waited.
     fn wakes_at(&self, now: Time) -> Option<Time> {
         let stages = self.stages.iter().zip(&self.queues);
         let stages = stages.filter_map(|(stage, input)| stage.as_ref()?.wakes_at(now, input, &self.waits));

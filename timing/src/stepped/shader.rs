@@ -127,7 +127,14 @@ impl Shader {
     }
 
     /// One cycle. Says whether anything was done, how many lanes were busy, and why the others were not.
-    pub fn tick(&mut self, now: Time, jobs: &[Job], inputs: [&mut Queue<u32>; 2], textures: &mut Queue<u32>, outside: &mut impl Outside) -> (bool, u32, Option<Rest>) {
+    pub fn tick(
+        &mut self,
+        now: Time,
+        jobs: &[Job],
+        inputs: [&mut Queue<u32>; 2],
+        textures: &mut Queue<u32>,
+        outside: &mut impl Outside,
+    ) -> (bool, u32, Option<Rest>) {
         let mut acted = false;
         let mut busy = 0;
         for at in 0..self.cores.len() {
@@ -205,7 +212,13 @@ impl Shader {
         (acted, (core.lane.min(end) - cycle * self.lanes) as u32)
     }
 
-    fn retire(&mut self, kind: usize, now: Time, outside: &mut impl Outside, rest: &mut Option<Rest>) -> bool {
+    fn retire(
+        &mut self,
+        kind: usize,
+        now: Time,
+        outside: &mut impl Outside,
+        rest: &mut Option<Rest>,
+    ) -> bool {
         let way = &mut self.ways[kind];
         let Some(&flight) = way.flights.front() else { return false };
         if flight.left > 0 {
@@ -238,7 +251,9 @@ impl Shader {
     /// One warp a cycle, of vertices and of pixels in turn, to the core that has most room.
     fn send(&mut self, now: Time, jobs: &[Job], textures: &mut Queue<u32>) -> bool {
         let turns = [self.turn, 1 - self.turn];
-        let Some(kind) = turns.into_iter().find(|&kind| self.ways[kind].sending.is_some()) else { return false };
+        let Some(kind) = turns.into_iter().find(|&kind| self.ways[kind].sending.is_some()) else {
+            return false;
+        };
         let Some((job, part, parts)) = self.ways[kind].sending else { return false };
         let most = self.cores.iter().map(|core| core.slots).max().unwrap_or(0);
         let textured = kind == 1 && jobs[job as usize].is_textured();
@@ -279,7 +294,8 @@ impl Shader {
             let queues = [&core.fresh, &core.textured, &core.cooling];
             let arrives = queues.into_iter().filter_map(|queue| queue.front()).map(|(at, _)| *at);
             // Lanes that are taken beyond this cycle are free again, whether or not a warp is ready then.
-            arrives.chain([core.lane.div_ceil(self.lanes) * self.period, core.lane / self.lanes * self.period])
+            arrives
+                .chain([core.lane.div_ceil(self.lanes) * self.period, core.lane / self.lanes * self.period])
         });
         inputs.chain(cores).filter(|&at| at > now).min()
     }

@@ -54,7 +54,13 @@ pub(super) struct Stage {
 
 impl Stage {
     pub fn new(period: Time, in_flight: u32) -> Self {
-        Self { period, in_flight: in_flight as usize, serving: None, waiting: VecDeque::new(), asked_at: None }
+        Self {
+            period,
+            in_flight: in_flight as usize,
+            serving: None,
+            waiting: VecDeque::new(),
+            asked_at: None,
+        }
     }
 
     pub fn period(&self) -> Time {
@@ -110,7 +116,13 @@ impl Stage {
         true
     }
 
-    fn finish(&mut self, now: Time, waits: &Waits, around: &mut impl Around, blocked: &mut Option<Unit>) -> bool {
+    fn finish(
+        &mut self,
+        now: Time,
+        waits: &Waits,
+        around: &mut impl Around,
+        blocked: &mut Option<Unit>,
+    ) -> bool {
         let Some(serving) = &self.serving else { return false };
         if now < serving.done_at || !serving.lines.is_empty() {
             return false;
@@ -127,7 +139,10 @@ impl Stage {
         } else if self.waiting.len() < self.in_flight {
             self.waiting.push_back((id, wait));
         } else {
-            let head = self.waiting.front().filter(|(_, wait)| *wait != NOBODY && waits.ready_at(*wait).is_none_or(|at| at > now));
+            let head = self
+                .waiting
+                .front()
+                .filter(|(_, wait)| *wait != NOBODY && waits.ready_at(*wait).is_none_or(|at| at > now));
             *blocked = head.map(|(_, wait)| waits.blame(*wait, now)).or(*blocked);
             return false;
         }
@@ -137,7 +152,13 @@ impl Stage {
     }
 
     /// Those whose lines are there go on, in order.
-    fn release(&mut self, now: Time, waits: &mut Waits, around: &mut impl Around, blocked: &mut Option<Unit>) -> bool {
+    fn release(
+        &mut self,
+        now: Time,
+        waits: &mut Waits,
+        around: &mut impl Around,
+        blocked: &mut Option<Unit>,
+    ) -> bool {
         let Some(&(id, wait)) = self.waiting.front() else { return false };
         if wait != NOBODY && waits.ready_at(wait).is_none_or(|at| at > now) {
             return false;
@@ -171,7 +192,11 @@ impl Stage {
     /// When it may have something to do next, if nobody else does anything.
     pub fn wakes_at(&self, now: Time, input: &Queue<u32>, waits: &Waits) -> Option<Time> {
         let serving = self.serving.as_ref().map(|serving| serving.done_at);
-        let waiting = self.waiting.front().filter(|(_, wait)| *wait != NOBODY).and_then(|(_, wait)| waits.ready_at(*wait));
+        let waiting = self
+            .waiting
+            .front()
+            .filter(|(_, wait)| *wait != NOBODY)
+            .and_then(|(_, wait)| waits.ready_at(*wait));
         [serving, waiting, input.head_at()].into_iter().flatten().filter(|&at| at > now).min()
     }
 }

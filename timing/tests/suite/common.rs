@@ -2,7 +2,10 @@
 
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::stepped::{self, Manner, Stream};
-use timing::{ClientSpec, Clock, Clocks, DramSpec, Jobs, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec, Timed, UnitSpec};
+use timing::{
+    ClientSpec, Clock, Clocks, DramSpec, Jobs, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec, Timed,
+    UnitSpec,
+};
 
 pub const BATCH: u32 = 1000;
 

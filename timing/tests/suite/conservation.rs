@@ -8,7 +8,12 @@ use timing::{Clocks, MachineSpec};
 use crate::common::{BATCH, Packets, plain, stepped_as};
 
 fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
-    let kind = prop_oneof![Just(LineKind::Hit), Just(LineKind::Fetch), Just(LineKind::Write), Just(LineKind::Allocate)];
+    let kind = prop_oneof![
+        Just(LineKind::Hit),
+        Just(LineKind::Fetch),
+        Just(LineKind::Write),
+        Just(LineKind::Allocate)
+    ];
     (0u32..4096, kind, prop::option::weighted(0.2, 0u32..4096))
 }
 
@@ -30,7 +35,11 @@ fn add_lines(packet: &mut Packet, client: Unit, lines: &[(u32, LineKind, Option<
 
 type Some5 = (u32, u32, u32, u32, u32);
 
-fn tile_packet((tiles, samples, reads, threads, fetches): Some5, depth: &[(u32, LineKind, Option<u32>)], batch: u32) -> (Packet, Vec<LineAccess>) {
+fn tile_packet(
+    (tiles, samples, reads, threads, fetches): Some5,
+    depth: &[(u32, LineKind, Option<u32>)],
+    batch: u32,
+) -> (Packet, Vec<LineAccess>) {
     let mut packet = Packet::new(PacketKind::Tile, 0, 0, batch * BATCH);
     let counts = &mut packet.counts;
     counts[Event::TilesVisited] = tiles;
@@ -49,7 +58,11 @@ fn tile_packet((tiles, samples, reads, threads, fetches): Some5, depth: &[(u32, 
     (packet, lines)
 }
 
-fn vertices_packet(triangles: u32, lines: &[(u32, LineKind, Option<u32>)], batch: u32) -> (Packet, Vec<LineAccess>) {
+fn vertices_packet(
+    triangles: u32,
+    lines: &[(u32, LineKind, Option<u32>)],
+    batch: u32,
+) -> (Packet, Vec<LineAccess>) {
     let mut packet = Packet::new(PacketKind::Vertices, 0, 0, batch * BATCH);
     packet.counts[Event::Indices] = 3 * triangles;
     packet.counts[Event::VertexInvocations] = triangles;
@@ -87,14 +100,16 @@ pub fn machine() -> impl Strategy<Value = MachineSpec> {
     let memory = (2u32..9, 1u32..4, 1u32..5, 1u32..5, 1u32..4);
     (small, shader, memory).prop_map(|((queue, latency, in_flight, port), s, d)| {
         let mut m = plain();
-        for unit in [&mut m.setup, &mut m.traversal, &mut m.z_cull, &mut m.sample_test, &mut m.shading_cache] {
+        for unit in [&mut m.setup, &mut m.traversal, &mut m.z_cull, &mut m.sample_test, &mut m.shading_cache]
+        {
             (unit.queue, unit.latency_cycles) = (queue, latency);
         }
         for unit in [&mut m.command, &mut m.depth, &mut m.texture, &mut m.colour] {
             (unit.queue, unit.latency_cycles, unit.in_flight) = (queue, latency, in_flight);
         }
         (m.shader.queue, m.shader.in_flight, m.l2.queue) = (queue, in_flight, port);
-        (m.shader.cores, m.shader.lanes, m.shader.warp_lanes, m.shader.warps, m.shader.alu_latency_cycles) = s;
+        (m.shader.cores, m.shader.lanes, m.shader.warp_lanes, m.shader.warps, m.shader.alu_latency_cycles) =
+            s;
         (m.dram.queue, m.dram.channels, m.dram.banks, m.dram.burst_cycles, m.l2.lines_per_cycle) = d;
         m
     })
@@ -108,7 +123,8 @@ fn total(packets: &Packets) -> Counts {
 }
 
 fn two_clocks() -> impl Strategy<Value = Clocks> {
-    prop_oneof![Just((1e9, 1e9)), Just((925e6, 1375e6)), Just((3e8, 1e8))].prop_map(|(a, b)| Clocks::new(a, b).unwrap())
+    prop_oneof![Just((1e9, 1e9)), Just((925e6, 1375e6)), Just((3e8, 1e8))]
+        .prop_map(|(a, b)| Clocks::new(a, b).unwrap())
 }
 
 proptest! {

@@ -4,7 +4,9 @@ use activity::{Event, LineKind, Unit};
 use proptest::prelude::*;
 use timing::stepped::Manner;
 
-use crate::common::{Packets, bound_level, clocks, packet_level, plain, read, stepped, stepped_as, tile, tiles};
+use crate::common::{
+    Packets, bound_level, clocks, packet_level, plain, read, stepped, stepped_as, tile, tiles,
+};
 use crate::conservation::{machine, packets};
 
 proptest! {
@@ -51,7 +53,8 @@ fn error(machine: &timing::MachineSpec, packets: &Packets) -> f64 {
 fn what_is_shared_is_close_where_it_is_the_bottleneck() {
     let mut machine = plain();
     machine.shader.alu_latency_cycles = 4;
-    let shaded = |n: u32| (tile(&[(Event::PixelInvocations, 4 * n), (Event::ShaderOps, 4 * n * 10)]), Vec::new());
+    let shaded =
+        |n: u32| (tile(&[(Event::PixelInvocations, 4 * n), (Event::ShaderOps, 4 * n * 10)]), Vec::new());
     let cores: Packets = (0..200).map(|k| shaded(1 + k % 7)).collect();
     assert!(error(&machine, &cores).abs() < 1.0, "cores: {}", error(&machine, &cores));
     let lines = |k: u32, stride: u32| {

@@ -64,14 +64,25 @@ pub(super) struct Speed {
 impl Speed {
     pub fn figures(&self) -> Reference {
         let per_s = |count: u64| count as f64 / self.host_s.max(1e-12);
-        Reference { unit_cycles_per_s: per_s(self.unit_cycles), cycles_per_s: per_s(self.cycles), host_s: self.host_s }
+        Reference {
+            unit_cycles_per_s: per_s(self.unit_cycles),
+            cycles_per_s: per_s(self.cycles),
+            host_s: self.host_s,
+        }
     }
 }
 
 /// A row for each level but the reference.
-pub(super) fn rows(scene: &str, gpu: &GpuSpec, stream: &Packets, speed: &mut Speed) -> Result<Vec<Row>, RunError> {
+pub(super) fn rows(
+    scene: &str,
+    gpu: &GpuSpec,
+    stream: &Packets,
+    speed: &mut Speed,
+) -> Result<Vec<Row>, RunError> {
     let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
-    let power = |timed: &Timed| model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source });
+    let power = |timed: &Timed| {
+        model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source })
+    };
     let (truth, stepped_s) = timed(Level::Stepped, gpu, stream)?;
     speed.unit_cycles += truth.unit_cycles;
     speed.cycles += truth.cycles;

@@ -105,7 +105,8 @@ fn figures(level: Level, rows: &[Row]) -> Figures {
             values.get((quantile * last as f64).ceil() as usize).copied().unwrap_or(0.0)
         }
     };
-    let (cycles, energy) = (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
+    let (cycles, energy) =
+        (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
     let (busy, speedup) = (of(|row| row.busy_error_percent), of(|row| row.speedup_over_stepped));
     Figures {
         cycle_error_median_percent: cycles(0.5),
@@ -127,7 +128,14 @@ impl TimingChart {
     /// The levels as a table for the terminal and the book.
     pub fn text(&self) -> Table {
         let mut table = Table::new([
-            "level", "cycles: median", "95 %", "worst", "energy: median", "worst", "power shape", "times as fast",
+            "level",
+            "cycles: median",
+            "95 %",
+            "worst",
+            "energy: median",
+            "worst",
+            "power shape",
+            "times as fast",
         ]);
         for (name, f) in &self.levels {
             let percent = |value: f64| format!("{value:.2} %");

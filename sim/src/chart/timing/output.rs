@@ -18,8 +18,20 @@ impl TimingChart {
         dir.write_atomic("timing.csv", |out| {
             let mut table = csv::Writer::from_writer(out);
             table.write_record([
-                "scene", "gpu", "level", "packets", "cycles", "stepped_cycles", "cycle_error_percent", "energy_error_percent",
-                "busy_error_percent", "power_shape_error_percent", "busiest", "busiest_share", "host_s", "speedup_over_stepped",
+                "scene",
+                "gpu",
+                "level",
+                "packets",
+                "cycles",
+                "stepped_cycles",
+                "cycle_error_percent",
+                "energy_error_percent",
+                "busy_error_percent",
+                "power_shape_error_percent",
+                "busiest",
+                "busiest_share",
+                "host_s",
+                "speedup_over_stepped",
             ])?;
             for row in &self.rows {
                 table.serialize((
@@ -63,7 +75,10 @@ impl TimingChart {
     fn markdown(&self) -> String {
         let mut text = String::new();
         // Writing into a string cannot fail.
-        let _ = writeln!(text, "| level | cycles: median | 95 % | worst | energy: median | worst | power shape | times as fast: median | least |");
+        let _ = writeln!(
+            text,
+            "| level | cycles: median | 95 % | worst | energy: median | worst | power shape | times as fast: median | least |"
+        );
         let _ = writeln!(text, "|---|---|---|---|---|---|---|---|---|");
         for (name, f) in &self.levels {
             let _ = writeln!(
@@ -79,7 +94,8 @@ impl TimingChart {
                 f.speedup_over_stepped_least
             );
         }
-        let _ = writeln!(text, "\n| scene | GPU | level | cycles | error | energy | busiest | times as fast |");
+        let _ =
+            writeln!(text, "\n| scene | GPU | level | cycles | error | energy | busiest | times as fast |");
         let _ = writeln!(text, "|---|---|---|---|---|---|---|---|");
         self.rows.iter().for_each(|row| line(&mut text, row));
         text

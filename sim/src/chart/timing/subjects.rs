@@ -16,7 +16,8 @@ use crate::run::RunError;
 /// Built-in scenes.
 const SCENES: [&str; 2] = ["default", "tiny"];
 /// Families of the failure catalogue, each at one value: large and tiny triangles, lens and motion, behind the camera.
-const FAMILIES: [(&str, f64); 4] = [("lens-and-motion", 2.0), ("micro", 1.0), ("behind", 0.0), ("diagonals", 128.0)];
+const FAMILIES: [(&str, f64); 4] =
+    [("lens-and-motion", 2.0), ("micro", 1.0), ("behind", 0.0), ("diagonals", 128.0)];
 
 /// The packets of a frame, each with the end of its lines.
 #[derive(Default)]
@@ -65,7 +66,10 @@ fn of_scene(name: &str, quick: bool) -> Result<Subject, RunError> {
     let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::Setting("size: none".to_owned()))?;
     let samples = SampleTable::low_discrepancy(8, 1, LensShape::Disk)?;
     let label = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
-    Ok(Subject { name: label.into_owned(), what: What::Scene { scene: Box::new(scene), frame, viewport, samples } })
+    Ok(Subject {
+        name: label.into_owned(),
+        what: What::Scene { scene: Box::new(scene), frame, viewport, samples },
+    })
 }
 
 fn of_family(name: &'static str, value: f64) -> Result<Subject, RunError> {
@@ -96,7 +100,14 @@ impl Subject {
         }
     }
 
-    fn packets(&self, camera: &Camera, viewport: Viewport, samples: &dyn SampleSource, draws: &[Draw<'_>], gpu: &GpuSpec) -> Result<Packets, RunError> {
+    fn packets(
+        &self,
+        camera: &Camera,
+        viewport: Viewport,
+        samples: &dyn SampleSource,
+        draws: &[Draw<'_>],
+        gpu: &GpuSpec,
+    ) -> Result<Packets, RunError> {
         let settings = Settings { spec: &gpu.pipeline, viewport, samples, background: glam::Vec3::ZERO };
         let mut stream = Packets::default();
         let emit = |packet: &Packet, lines: &[LineAccess]| {

@@ -44,7 +44,8 @@ impl StallLanes<'_> {
         if intervals == 0 || !(duration_s > 0.0 && is_drawable(0.0, duration_s)) {
             return picture.nothing("no units to show");
         }
-        let keys = KEYS.iter().enumerate().map(|(at, name)| (Key::Dot(part_colour(at, false)), (*name).to_owned()));
+        let keys =
+            KEYS.iter().enumerate().map(|(at, name)| (Key::Dot(part_colour(at, false)), (*name).to_owned()));
         let keys: Vec<_> = keys.chain([(Key::Dot(INK), "underlined: the bottleneck".to_owned())]).collect();
         legend_line(&mut picture, (150.0, 84.0), &keys);
         let (x, y) = (Axis::new("time in the frame", "s", 0.0, duration_s), Axis::new("", "", 0.0, 1.0));
