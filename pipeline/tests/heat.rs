@@ -14,7 +14,7 @@ fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera
     let viewport = Viewport::new(size[0], size[1]).unwrap();
     let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
     let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
-    let (rendered, heat) = render_with_heat(camera, draws, &settings, &Event::ALL, |_| ()).unwrap();
+    let (rendered, heat) = render_with_heat(camera, draws, &settings, &Event::ALL, |_, _| ()).unwrap();
     let plain = render(camera, draws, &settings, |_| ()).unwrap();
     assert_eq!((plain.image, plain.counts), (rendered.image, rendered.counts), "looking changes nothing");
     (heat, rendered.counts)

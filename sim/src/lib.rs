@@ -2,7 +2,7 @@
 //! have seen of it (`traces`).
 //!
 //! - [`gpu`]: a GPU as a file.
-//! - [`timing`]: work packets become activity over time.
+//! - [`timing`]: which model of time a run uses.
 //! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
 //! - [`stress`]: the failure catalogue, each tile test on each family of triangles.
 //! - [`chart`]: charts of the book, measured and drawn.

@@ -8,13 +8,14 @@ use cargo_metadata::{Metadata, MetadataCommand};
 use tests::root;
 
 /// Which crates of the house each may use, in builds and in tests.
-const ARROWS: [(&str, &[&str]); 6] = [
+const ARROWS: [(&str, &[&str]); 7] = [
     ("activity", &[]),
     ("pipeline", &["activity"]),
     ("workloads", &["activity", "pipeline"]),
     ("traces", &[]),
     ("power-model", &["activity", "traces"]),
-    ("sim", &["activity", "pipeline", "power-model", "traces", "workloads"]),
+    ("timing", &["activity"]),
+    ("sim", &["activity", "pipeline", "power-model", "timing", "traces", "workloads"]),
 ];
 
 fn workspace() -> Metadata {
@@ -56,7 +57,7 @@ fn the_arrows_that_the_design_draws_are_there() {
         ("power-model", "activity"),
         ("power-model", "traces"),
     ];
-    let of_sim = ARROWS[5].1.iter().map(|used| ("sim", *used));
+    let of_sim = ARROWS[6].1.iter().map(|used| ("sim", *used));
     for (name, used) in drawn.into_iter().chain(of_sim) {
         assert!(arrows[name].contains(used), "{name} is to use {used}");
     }

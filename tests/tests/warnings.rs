@@ -92,7 +92,8 @@ fn frames_too_short_for_the_recorder() {
 
 #[test]
 fn frames_that_are_not_found() {
-    let results = quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20"]);
+    let results =
+        quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "30000"]);
     assert_warns(&results, "frames-missed");
     assert_warns(&results, "few-samples");
 }

@@ -34,6 +34,12 @@ impl Counts {
         self.iter().any(|(event, count)| count > 0 && event.unit() == unit)
     }
 
+    /// The counts of the events of `unit`, in declaration order, to be added to.
+    pub fn of_mut(&mut self, unit: Unit) -> &mut [u64] {
+        let (first, end) = crate::packet::EVENTS[unit as usize];
+        &mut self.0[first..end]
+    }
+
     /// `numerator / denominator` as a ratio, or `None` when nothing was counted below the line.
     pub fn ratio(&self, numerator: Event, denominator: Event) -> Option<f64> {
         let below = self[denominator];

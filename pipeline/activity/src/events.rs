@@ -1,5 +1,7 @@
 //! Units and events, declared once.
 
+use std::ops::Range;
+
 /// Declares the units and, under each, its events: `Name "column" "what one of it is"`.
 macro_rules! activity {
     ($($unit:ident $unit_name:literal $unit_doc:literal {
@@ -149,6 +151,18 @@ impl Unit {
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|unit| unit.name() == name)
     }
+
+    /// The places of its events in [`Event::ALL`].
+    pub const fn events(self) -> Range<usize> {
+        let (mut first, mut end) = (0, Event::COUNT);
+        while Event::ALL[first].unit() as u8 != self as u8 {
+            first += 1;
+        }
+        while Event::ALL[end - 1].unit() as u8 != self as u8 {
+            end -= 1;
+        }
+        first..end
+    }
 }
 
 impl Event {
@@ -183,6 +197,16 @@ mod tests {
         }
         for (index, unit) in Unit::ALL.into_iter().enumerate() {
             assert_eq!(unit as usize, index);
+        }
+    }
+
+    #[test]
+    fn events_of_a_unit_lie_side_by_side() {
+        for unit in Unit::ALL {
+            let range = unit.events();
+            for (at, event) in Event::ALL.into_iter().enumerate() {
+                assert_eq!(event.unit() == unit, range.contains(&at), "{event:?}");
+            }
         }
     }
 

@@ -4,6 +4,7 @@
 //!   declaration gives the enum, the docs, the column in a file and the key of an energy table.
 //! - [`Counts`]: one integer per event; workers own theirs and add them up.
 //! - [`Packet`]: a piece of work that moves through the units as one, with the events it causes.
+//! - [`LineAccess`]: a line of memory a packet asks the L2 for, in order.
 //! - [`Timeline`]: counts over time, made by a timing model, read by a power model.
 //! - [`Warning`]: a coded remark that a run has entered a regime its methods are bad at.
 //! - [`spec`]: reading RON files with the place of every mistake and a suggestion.
@@ -12,6 +13,7 @@
 
 mod counts;
 mod events;
+mod lines;
 mod packet;
 pub mod spec;
 mod timeline;
@@ -19,6 +21,7 @@ mod warning;
 
 pub use counts::Counts;
 pub use events::{Event, Unit};
+pub use lines::{LineAccess, LineKind};
 pub use packet::{Packet, PacketCounts, PacketKind};
 pub use timeline::{Bin, Timeline};
 pub use warning::Warning;

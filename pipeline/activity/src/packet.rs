@@ -35,9 +35,26 @@ impl PacketCounts {
 
     /// Whether the packet causes anything in `unit`.
     pub fn uses(&self, unit: Unit) -> bool {
-        self.iter().any(|(event, count)| count > 0 && event.unit() == unit)
+        self.of(unit).iter().any(|&count| count > 0)
+    }
+
+    /// The counts of the events of `unit`, in declaration order.
+    pub fn of(&self, unit: Unit) -> &[u32] {
+        &self.0[EVENTS[unit as usize].0..EVENTS[unit as usize].1]
     }
 }
+
+/// First event and one past the last, by unit.
+pub(crate) const EVENTS: [(usize, usize); Unit::COUNT] = {
+    let mut ranges = [(0, 0); Unit::COUNT];
+    let mut at = 0;
+    while at < Unit::COUNT {
+        let range = Unit::ALL[at].events();
+        ranges[at] = (range.start, range.end);
+        at += 1;
+    }
+    ranges
+};
 
 impl Index<Event> for PacketCounts {
     type Output = u32;

@@ -14,7 +14,7 @@ mod tile_tests;
 mod vertices;
 mod worker;
 
-use activity::{Counts, Event, Packet, PacketKind};
+use activity::{Counts, Event, LineAccess, Packet, PacketKind};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -47,12 +47,12 @@ pub fn render(
     camera: &Camera,
     draws: &[Draw<'_>],
     settings: &Settings<'_>,
-    emit: impl FnMut(&Packet),
+    mut emit: impl FnMut(&Packet),
 ) -> Result<Rendered, CacheError> {
-    render_with_heat(camera, draws, settings, &[], emit).map(|(rendered, _)| rendered)
+    render_with_heat(camera, draws, settings, &[], |packet, _| emit(packet)).map(|(rendered, _)| rendered)
 }
 
-/// The same, and where in the image each of `events` happened.
+/// The same, each packet with the lines it asks the L2 for, and where in the image each of `events` happened.
 ///
 /// # Errors
 /// When a cache of the settings cannot be built.
@@ -61,7 +61,7 @@ pub fn render_with_heat(
     draws: &[Draw<'_>],
     settings: &Settings<'_>,
     events: &[Event],
-    mut emit: impl FnMut(&Packet),
+    mut emit: impl FnMut(&Packet, &[LineAccess]),
 ) -> Result<(Rendered, Vec<HeatMap>), CacheError> {
     let mut pass = Pass::new(camera, draws, settings);
     pass.heat = !events.is_empty();
@@ -69,22 +69,22 @@ pub fn render_with_heat(
     let mut counts = Counts::default();
     let mut replay = Replay::new(&pass)?;
     let mut emit = |work: Done<'_>| match work {
-        Done::Packet(packet) => {
+        Done::Packet(packet, lines) => {
             counts += &packet.counts;
             heat.iter_mut().for_each(|map| map.packet(packet));
-            emit(packet);
+            emit(packet, lines);
         }
         Done::Tests(number, bin, log) => heat.iter_mut().for_each(|map| map.tests(&pass, number, bin, log)),
     };
     let bins = rasterize(&pass, &mut replay, &mut emit);
-    replay.finish(&mut |packet: &Packet| emit(Done::Packet(packet)));
+    replay.finish(&mut |packet: &Packet, lines: &[LineAccess]| emit(Done::Packet(packet, lines)));
     Ok((Rendered { image: resolve::resolve(&pass, &bins), counts }, heat))
 }
 
 /// Something that was done, told in order.
 enum Done<'a> {
-    /// A packet.
-    Packet(&'a Packet),
+    /// A packet and its lines.
+    Packet(&'a Packet, &'a [LineAccess]),
     /// The work of a batch in a bin, with the bin's number.
     Tests(usize, &'a Bin, &'a BinLog),
 }
@@ -107,17 +107,18 @@ pub fn visibility(
 /// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch. Bins are double
 /// buffered: the front end works on the next batch while tiles are traversed, so its packets come one batch ahead. After
 /// the last batch each bin is resolved at once, while its samples are still in the caches.
-fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut impl FnMut(Done<'_>)) -> Vec<Bin> {
+fn rasterize<F: FnMut(Done<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut F) -> Vec<Bin> {
     let mut bins = Bin::all(pass);
     let mut batches = pass.batches();
     // Without a single triangle there is still an image to resolve.
     let first = batches.next().unwrap_or(0..0);
-    let mut next =
-        Some(vertices::front_end(pass, first, replay, &mut |packet: &Packet| done(Done::Packet(packet))));
+    let front_end = |batch, replay: &mut Replay<'_>, done: &mut F| {
+        let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Done::Packet(packet, lines));
+        vertices::front_end(pass, batch, replay, emit)
+    };
+    let mut next = Some(front_end(first, replay, done));
     while let Some(ready) = next {
-        next = batches.next().map(|batch| {
-            vertices::front_end(pass, batch, replay, &mut |packet: &Packet| done(Done::Packet(packet)))
-        });
+        next = batches.next().map(|batch| front_end(batch, replay, done));
         let lists = distribute(
             (0..).zip(ready.iter().map(|ready| ready.pixels)),
             pass.settings.viewport,
@@ -132,7 +133,7 @@ fn rasterize(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut impl FnMut(Don
             .collect();
         for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
             done(Done::Tests(number, bin, log));
-            let emit = &mut |packet: &Packet| done(Done::Packet(packet));
+            let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Done::Packet(packet, lines));
             replay.bin(log, emit);
             if next.is_none() {
                 replay.resolve(bin, emit);

@@ -1,6 +1,6 @@
 //! The replay: what workers logged is walked in the order of the modelled hardware, through its caches.
 
-use activity::{Event, Packet, PacketCounts, PacketKind};
+use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 
 use super::Shading;
 use super::bin::Bin;
@@ -75,13 +75,20 @@ impl<'a> Replay<'a> {
         }
     }
 
+    /// Hands a packet on, with the lines that the L2 was asked for since the one before.
+    pub fn tell(&mut self, packet: &Packet, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
+        emit(packet, self.memory.log());
+        self.memory.forget();
+    }
+
     /// The packets of one bin in one batch.
-    pub fn bin(&mut self, log: &BinLog, emit: &mut impl FnMut(&Packet)) {
+    pub fn bin(&mut self, log: &BinLog, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut first_quad = 0;
         for work in &log.work {
             let quads = &log.quads[first_quad..work.quads_end as usize];
             first_quad = work.quads_end as usize;
-            emit(&self.tile(work, quads));
+            let packet = self.tile(work, quads);
+            self.tell(&packet, emit);
         }
     }
 
@@ -183,19 +190,20 @@ impl<'a> Replay<'a> {
     }
 
     /// The packets that resolve the tiles of a bin.
-    pub fn resolve(&mut self, bin: &Bin, emit: &mut impl FnMut(&Packet)) {
+    pub fn resolve(&mut self, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
-            emit(&self.resolve_tile(tile, pixels, touched));
+            let packet = self.resolve_tile(tile, pixels, touched);
+            self.tell(&packet, emit);
         }
     }
 
     /// The end of the frame: the image leaves the caches.
-    pub fn finish(&mut self, emit: &mut impl FnMut(&Packet)) {
+    pub fn finish(&mut self, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
         let image = self.pass.addresses.image;
         let end = self.pass.addresses.vertices.first().copied().unwrap_or(u64::MAX);
         self.memory.finish(image..end, &mut last.counts);
-        emit(&last);
+        self.tell(&last, emit);
     }
 
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use activity::{Event, Packet, PacketKind};
+use activity::{Event, LineAccess, Packet, PacketKind};
 use rayon::prelude::*;
 
 use super::Features;
@@ -36,7 +36,7 @@ pub(super) fn front_end(
     pass: &Pass<'_>,
     batch: Range<u32>,
     replay: &mut Replay<'_>,
-    emit: &mut impl FnMut(&Packet),
+    emit: &mut impl FnMut(&Packet, &[LineAccess]),
 ) -> Vec<Ready> {
     let outcomes: Vec<_> =
         batch.clone().into_par_iter().with_min_len(256).map(|id| outcome(pass, id)).collect();
@@ -80,7 +80,7 @@ fn emit_packet(
     first: u32,
     outcomes: &[(Event, Option<Ready>)],
     replay: &mut Replay<'_>,
-    emit: &mut impl FnMut(&Packet),
+    emit: &mut impl FnMut(&Packet, &[LineAccess]),
 ) {
     let mut packet = super::packet(PacketKind::Vertices, 0, first);
     let Features { still_px, in_focus_px, .. } = pass.settings.spec.features;
@@ -89,7 +89,7 @@ fn emit_packet(
         if place == 0 {
             let mut start = super::packet(PacketKind::Draw, 0, id);
             start.counts[Event::Draws] = 1;
-            emit(&start);
+            emit(&start, &[]);
         }
         let corners = pass.images(id);
         packet.counts[*event] += 1;
@@ -104,5 +104,5 @@ fn emit_packet(
             + ready.as_ref().map_or(0, Ready::line_madds);
         replay.vertices(draw, id, &mut packet.counts);
     }
-    emit(&packet);
+    replay.tell(&packet, emit);
 }

@@ -1,6 +1,6 @@
 //! The caches between the units and the memory chips, walked in the order of the modelled hardware.
 
-use activity::{Event, PacketCounts};
+use activity::{Event, LineAccess, LineKind, PacketCounts, Unit};
 use serde::Deserialize;
 
 use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES};
@@ -22,6 +22,7 @@ pub struct MemorySpec {
 /// A unit's own cache above the L2, and the events it counts.
 #[derive(Clone, Debug)]
 struct Client {
+    unit: Unit,
     cache: Cache,
     lines: Event,
     misses: Event,
@@ -33,7 +34,14 @@ pub struct MemorySystem {
     depth: Client,
     colour: Client,
     texture: Client,
-    l2: Cache,
+    l2: Shared,
+}
+
+/// The L2 and what it was asked for since that was last taken note of.
+#[derive(Clone, Debug)]
+struct Shared {
+    cache: Cache,
+    log: Vec<LineAccess>,
 }
 
 impl MemorySystem {
@@ -42,13 +50,25 @@ impl MemorySystem {
     /// # Errors
     /// When one of them cannot be built.
     pub fn new(spec: &MemorySpec) -> Result<Self, CacheError> {
-        let client = |spec, lines, misses| Ok(Client { cache: Cache::new(spec)?, lines, misses });
+        let client = |spec, lines: Event, misses| {
+            Ok(Client { unit: lines.unit(), cache: Cache::new(spec)?, lines, misses })
+        };
         Ok(Self {
             depth: client(spec.depth, Event::DepthLines, Event::DepthMisses)?,
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
             texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
-            l2: Cache::new(spec.l2)?,
+            l2: Shared { cache: Cache::new(spec.l2)?, log: Vec::new() },
         })
+    }
+
+    /// The lines the L2 was asked for since they were last forgotten, in order.
+    pub fn log(&self) -> &[LineAccess] {
+        &self.l2.log
+    }
+
+    /// Forgets them.
+    pub fn forget(&mut self) {
+        self.l2.log.clear();
     }
 
     /// The depth unit reads, and where `write` changes, the line at `address`. A `fresh` line was cleared and never
@@ -66,7 +86,7 @@ impl MemorySystem {
     /// rather than written back.
     pub fn discard(&mut self, address: u64) {
         let line = address / LINE_BYTES;
-        for cache in [&mut self.depth.cache, &mut self.colour.cache, &mut self.l2] {
+        for cache in [&mut self.depth.cache, &mut self.colour.cache, &mut self.l2.cache] {
             cache.discard(line);
         }
     }
@@ -80,24 +100,27 @@ impl MemorySystem {
     pub fn vertices(&mut self, address: u64, bytes: u64, counts: &mut PacketCounts) {
         let first = address / LINE_BYTES;
         let last = (address + bytes.max(1) - 1) / LINE_BYTES;
-        (first..=last).for_each(|line| shared(&mut self.l2, line, false, counts));
+        (first..=last).for_each(|line| shared(&mut self.l2, Unit::Command, line, false, counts));
     }
 
     /// The end of the frame: what the display will read leaves the L2; depths and sample colours are not needed again.
     pub fn finish(&mut self, image: std::ops::Range<u64>, counts: &mut PacketCounts) {
         for line in self.colour.cache.flush() {
             if image.contains(&(line * LINE_BYTES)) {
-                shared(&mut self.l2, line, true, counts);
+                shared(&mut self.l2, Unit::Colour, line, true, counts);
             }
         }
-        let written = self.l2.flush().into_iter().filter(|line| image.contains(&(line * LINE_BYTES))).count();
-        counts[Event::DramWriteBytes] += written as u32 * LINE_BYTES as u32;
+        let written = self.l2.cache.flush().into_iter().filter(|line| image.contains(&(line * LINE_BYTES)));
+        for line in written {
+            counts[Event::DramWriteBytes] += LINE_BYTES as u32;
+            self.l2.log.push(access_to(Unit::Colour, line, LineKind::Drain, None));
+        }
     }
 }
 
 fn access(
     client: &mut Client,
-    l2: &mut Cache,
+    l2: &mut Shared,
     address: u64,
     write: bool,
     fresh: bool,
@@ -111,26 +134,44 @@ fn access(
     }
     counts[client.misses] += 1;
     if let Access::MissEvicting(victim) = found {
-        shared(l2, victim, true, counts);
+        shared(l2, client.unit, victim, true, counts);
     }
     if !fresh {
-        shared(l2, line, false, counts);
+        shared(l2, client.unit, line, false, counts);
     }
 }
 
 /// One line through the L2. A line written whole is not fetched first.
-fn shared(l2: &mut Cache, line: u64, write: bool, counts: &mut PacketCounts) {
+fn shared(l2: &mut Shared, client: Unit, line: u64, write: bool, counts: &mut PacketCounts) {
     counts[if write { Event::L2Writes } else { Event::L2Reads }] += 1;
-    let found = l2.access(line, write);
+    let found = l2.cache.access(line, write);
+    let kind = match (found, write) {
+        (Access::Hit, false) => LineKind::Hit,
+        (Access::Hit, true) => LineKind::Write,
+        (_, false) => LineKind::Fetch,
+        (_, true) => LineKind::Allocate,
+    };
+    let victim = if let Access::MissEvicting(victim) = found { Some(victim) } else { None };
+    l2.log.push(access_to(client, line, kind, victim));
     if found == Access::Hit {
         return;
     }
     counts[Event::L2Misses] += 1;
-    if matches!(found, Access::MissEvicting(_)) {
+    if victim.is_some() {
         counts[Event::DramWriteBytes] += LINE_BYTES as u32;
     }
     if !write {
         counts[Event::DramReadBytes] += LINE_BYTES as u32;
+    }
+}
+
+/// Line numbers are small: what an image, its vertices and its textures take is far below 2^38 bytes.
+fn access_to(client: Unit, line: u64, kind: LineKind, victim: Option<u64>) -> LineAccess {
+    LineAccess {
+        line: line as u32,
+        victim: victim.map_or(LineAccess::NONE, |line| line as u32),
+        client,
+        kind,
     }
 }
 

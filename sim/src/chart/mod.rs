@@ -8,6 +8,7 @@ mod error;
 pub mod fit;
 pub mod sampling;
 pub mod tile_tests;
+pub mod timing;
 
 pub use error::ChartError;
 

@@ -10,6 +10,7 @@ use pipeline::frame::HeatMap;
 
 use super::parse::{frames, size, tests};
 use super::trace::args::TraceArgs;
+use crate::timing::Level;
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
 #[derive(Debug, Parser)]
@@ -93,6 +94,9 @@ pub struct RunArgs {
     /// Which values of the energy table to use
     #[arg(long, value_enum, default_value_t)]
     pub bound: BoundArg,
+    /// How time is modelled; `quintile chart timing` says how well
+    #[arg(long, value_enum, default_value_t)]
+    pub timing: Level,
     /// When the next frame starts
     #[arg(long, value_enum, default_value_t)]
     pub pacing: PacingArg,
@@ -211,7 +215,7 @@ pub struct ChartArgs {
     /// Which chart
     #[arg(value_enum, value_name = "NAME")]
     pub chart: ChartArg,
-    /// Another scene for `tile-tests`, by name or file; may be given several times
+    /// Another scene for `tile-tests` or `timing`, by name or file; may be given several times
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
     /// Smaller images, fewer samples and a coarser reference: seconds instead of minutes
@@ -235,6 +239,8 @@ pub enum ChartArg {
     Sampling,
     /// Every combination of tile tests: efficiency and tightness over multiply-adds
     TileTests,
+    /// Every level of timing: error against the reference over host time
+    Timing,
 }
 
 /// Arguments of `list`.

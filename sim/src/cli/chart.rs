@@ -8,6 +8,7 @@ use super::terminal::{print, print_json};
 use crate::chart::ChartError;
 use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::tile_tests::tile_tests;
+use crate::chart::timing::timing;
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -25,13 +26,14 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
     match args.chart {
         ChartArg::Sampling => pool.install(|| chart_sampling(args, &progress)),
         ChartArg::TileTests => pool.install(|| chart_tile_tests(args, &progress)),
+        ChartArg::Timing => pool.install(|| chart_timing(args, &progress)),
     }
 }
 
 fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
     if !args.scene.is_empty() {
         return Err(Failure {
-            message: "--scene goes with `chart tile-tests`; leave it out".to_owned(),
+            message: "--scene goes with `chart tile-tests` and `chart timing`; leave it out".to_owned(),
             code: 2,
         });
     }
@@ -57,6 +59,25 @@ fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<(), Failure
     let lost = chart.samples_lost();
     let message = format!("{lost} samples were lost: a test is not conservative; please report it");
     if lost == 0 { Ok(()) } else { Err(Failure { message, code: 1 }) }
+}
+
+fn chart_timing(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    let started = Instant::now();
+    let chart = timing(&args.scene, args.quick, progress)?;
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    chart.write(&dir).map_err(RunError::from)?;
+    if args.json {
+        return print_json(&chart, true);
+    }
+    let speed = &chart.reference;
+    print(&format!(
+        "{}the reference: {:.1} million unit-cycles, {:.2} million cycles a second\nresults: {}\ntook {:.1} s",
+        chart.text(),
+        speed.unit_cycles_per_s / 1e6,
+        speed.cycles_per_s / 1e6,
+        args.out.display(),
+        started.elapsed().as_secs_f64()
+    ))
 }
 
 /// Exponents and errors, a row for each scene and table.

@@ -48,6 +48,7 @@ fn options(args: &RunArgs) -> RunOptions {
             BoundArg::Nominal => Bound::Nominal,
             BoundArg::High => Bound::High,
         },
+        timing: args.timing,
         pacing: match args.pacing {
             PacingArg::Vsync => PacingChoice::Vsync,
             PacingArg::Free => PacingChoice::Free,

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use activity::{Unit, spec};
+use activity::spec;
 use pipeline::PipelineSpec;
 use serde::Deserialize;
-
-use super::Rates;
+use timing::{Clocks, MachineSpec};
 
 /// A GPU. `docs/gpu.md` documents every field.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -22,72 +21,8 @@ pub struct GpuSpec {
     pub memory_hz: f64,
     /// Sizes of the pipeline.
     pub pipeline: PipelineSpec,
-    /// Rates, latencies and queues of each unit.
-    pub units: Units,
-}
-
-/// A clock domain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum Clock {
-    /// `core_hz`.
-    #[default]
-    Core,
-    /// `memory_hz`.
-    Memory,
-}
-
-/// How fast one unit works.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct UnitSpec {
-    /// The clock its cycles are counted in.
-    #[serde(default)]
-    pub clock: Clock,
-    /// Cycles from the end of its work on a packet until the next unit sees it.
-    pub latency_cycles: u32,
-    /// Packets that may wait in front of it, at least 1.
-    pub queue: u32,
-    /// Events per cycle. The parts of a unit work side by side: the slowest sets the pace.
-    pub rates: Rates,
-}
-
-/// The spec of every unit.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the fields are the units, documented there")]
-pub struct Units {
-    pub command: UnitSpec,
-    pub shader: UnitSpec,
-    pub setup: UnitSpec,
-    pub traversal: UnitSpec,
-    pub z_cull: UnitSpec,
-    pub sample_test: UnitSpec,
-    pub depth: UnitSpec,
-    pub shading_cache: UnitSpec,
-    pub texture: UnitSpec,
-    pub colour: UnitSpec,
-    pub l2: UnitSpec,
-    pub dram: UnitSpec,
-}
-
-impl Units {
-    /// The spec of `unit`.
-    pub fn get(&self, unit: Unit) -> &UnitSpec {
-        match unit {
-            Unit::Command => &self.command,
-            Unit::Shader => &self.shader,
-            Unit::Setup => &self.setup,
-            Unit::Traversal => &self.traversal,
-            Unit::ZCull => &self.z_cull,
-            Unit::SampleTest => &self.sample_test,
-            Unit::Depth => &self.depth,
-            Unit::ShadingCache => &self.shading_cache,
-            Unit::Texture => &self.texture,
-            Unit::Colour => &self.colour,
-            Unit::L2 => &self.l2,
-            Unit::Dram => &self.dram,
-        }
-    }
+    /// Rates, latencies, queues and clocks of each unit.
+    pub units: MachineSpec,
 }
 
 /// Why a GPU cannot be used.
@@ -115,7 +50,11 @@ pub enum GpuError {
 }
 
 /// The GPUs that come with the program: name and file.
-const BUILTIN: [(&str, &str); 1] = [("reference", include_str!("../../gpus/reference.ron"))];
+const BUILTIN: [(&str, &str); 3] = [
+    ("reference", include_str!("../../gpus/reference.ron")),
+    ("mobile", include_str!("../../gpus/mobile.ron")),
+    ("discrete", include_str!("../../gpus/discrete.ron")),
+];
 
 impl GpuSpec {
     /// Names of the GPUs that come with the program.
@@ -147,12 +86,9 @@ impl GpuSpec {
         spec::parse::<Self>(text, file)?.validated(file)
     }
 
-    /// Cycles of `clock` in a second.
-    pub fn clock_hz(&self, clock: Clock) -> f64 {
-        match clock {
-            Clock::Core => self.core_hz,
-            Clock::Memory => self.memory_hz,
-        }
+    /// Both clocks in one time.
+    pub fn clocks(&self) -> Option<Clocks> {
+        Clocks::new(self.core_hz, self.memory_hz)
     }
 
     fn validated(self, file: &str) -> Result<Self, GpuError> {
@@ -162,18 +98,14 @@ impl GpuSpec {
                 return wrong(format!("`{field}` is {value}; a clock has to be 1e3 to 1e12 hertz"));
             }
         }
-        for unit in Unit::ALL {
-            let spec = self.units.get(unit);
-            if spec.queue == 0 {
-                return wrong(format!("`units.{}.queue` is 0; a queue holds at least 1 packet", unit.name()));
-            }
-            if let Some((event, _)) = spec.rates.iter().find(|(event, _)| event.unit() != unit) {
-                let (event, owner) = (event.name(), event.unit().name());
-                return wrong(format!(
-                    "`units.{}.rates` has `{event}`; it belongs in `units.{owner}`",
-                    unit.name()
-                ));
-            }
+        if self.clocks().is_none() {
+            return wrong(format!(
+                "`core_hz` {} and `memory_hz` {} have no common cycle in reach; round them to megahertz",
+                self.core_hz, self.memory_hz
+            ));
+        }
+        if let Err(message) = self.units.validate() {
+            return wrong(message);
         }
         match self.pipeline.validate() {
             Ok(()) => Ok(self),

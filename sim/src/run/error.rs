@@ -4,6 +4,7 @@ use crate::gpu::GpuError;
 use crate::output::OutputError;
 use crate::output::image::ImageError;
 use crate::output::plot::PlotError;
+use crate::timing::TimingError;
 
 /// Why a run did not finish.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,8 @@ pub enum RunError {
         "frame {frame}: the timing model broke its promise: {source}. This is a fault of the program; please report it"
     )]
     Timeline { frame: u32, source: power_model::TimelineError },
+    #[error("timing: {0}")]
+    Timing(#[from] TimingError),
     #[error("pacing: {0}")]
     Pacing(#[from] power_model::PacingError),
     #[error(transparent)]

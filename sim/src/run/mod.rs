@@ -17,6 +17,7 @@ mod regime;
 mod regime_warnings;
 mod report;
 mod simulate;
+mod stalls;
 mod summary;
 mod timeline;
 mod warnings;
@@ -35,6 +36,7 @@ pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};
 pub use regime::Regime;
 pub use simulate::{Simulated, SimulatedFrame};
+pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};
 
 /// Everything a run found out.

@@ -36,8 +36,7 @@ impl Modelled {
         let mut limits = vec![
             "one opaque pass; no blending",
             "one voltage and clock state; no governor, no temperature change",
-            "memory is bandwidth and latency; no banks and rows",
-            "shader cores serve vertex and pixel work in the order of the stream",
+            "caches are walked in the order of the stream, whenever it is timed",
         ];
         if !plan.scene.is_animated() && simulated.frames.len() > 1 {
             limits.push("the scene is still: one frame was simulated and repeated");
@@ -49,7 +48,7 @@ impl Modelled {
             distinct_frames: simulated.distinct.len(),
             units: used.into_iter().map(Unit::name).collect(),
             units_not_modelled: unused.into_iter().map(Unit::name).collect(),
-            timing: "packet",
+            timing: plan.options.timing.name(),
             limits,
         }
     }

@@ -11,6 +11,7 @@ use workloads::{Overrides, SampleChoice, Scene};
 use super::RunError;
 use super::limits::Size;
 use crate::gpu::GpuSpec;
+use crate::timing::Level;
 
 /// When the next frame starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,6 +38,8 @@ pub struct RunOptions {
     pub energy: String,
     /// Which of the table's values is used.
     pub bound: Bound,
+    /// How time is modelled.
+    pub timing: Level,
     /// When the next frame starts.
     pub pacing: PacingChoice,
     /// Samples per second of the recorder.
@@ -58,6 +61,7 @@ impl Default for RunOptions {
             platform: "reference".to_owned(),
             energy: "28nm".to_owned(),
             bound: Bound::Nominal,
+            timing: Level::default(),
             pacing: PacingChoice::default(),
             trace_rate_hz: 50e3,
             seed: 1,

@@ -3,7 +3,7 @@
 use activity::Unit;
 use power_model::Part;
 
-use super::{Outcome, SimulatedFrame};
+use super::{Outcome, SimulatedFrame, stalls};
 use crate::output::MeanSd;
 use crate::output::plot::{
     FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitBusy, UnitLane,
@@ -20,7 +20,7 @@ pub(super) struct Plot {
 pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
     let subject = format!("{} on {}", outcome.plan.scene.name(), outcome.plan.gpu.name);
     let shown = shown_frame(outcome);
-    vec![
+    let mut plots = vec![
         Plot {
             stem: "plots/power_run",
             caption: "Power over the run as recorded, lowest and highest sample of each column, with the frame starts \
@@ -46,7 +46,13 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
             caption: "Energy of each frame, start to start: measured in the trace and true.".to_owned(),
             picture: frame_energy(outcome, &subject),
         },
-    ]
+    ];
+    plots.extend(stalls::picture(shown.1, &subject).map(|picture| Plot {
+        stem: "plots/stalls",
+        caption: format!("Frame {}: what each unit waited for, and which held it up.", shown.1.index),
+        picture,
+    }));
+    plots
 }
 
 /// The frame shown in detail, the marked one: its place in the run and what is known of it.

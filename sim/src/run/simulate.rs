@@ -5,6 +5,7 @@ use glam::Vec3;
 use pipeline::frame::{HeatMap, render_with_heat};
 use power_model::FramePower;
 use rayon::prelude::*;
+use timing::{Recorder, Stalls};
 use workloads::Frame;
 
 use super::heat::{self, HeatPicture};
@@ -13,7 +14,7 @@ use super::{Plan, RunError};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
 use crate::output::progress::Progress;
-use crate::timing::{PacketClock, Recorder};
+use crate::timing::FrameClock;
 
 /// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
 const BIN_PS: u64 = 1_000_000;
@@ -42,6 +43,10 @@ pub struct SimulatedFrame {
     pub busy_ps: [u64; Unit::COUNT],
     /// The busy share of each unit in each bin of [`FramePower::bin_s`].
     pub busy: Vec<[f32; Unit::COUNT]>,
+    /// Cycles of the core clock.
+    pub cycles: u64,
+    /// Why units did not work, where the level of timing knows.
+    pub stalls: Option<Stalls>,
 }
 
 /// All frames of a run.
@@ -113,6 +118,7 @@ fn remove_stale(dir: &OutDir) -> Result<(), RunError> {
     dir.remove_stale("", "report.", &["html"])?;
     dir.remove_stale("", "frames.", &["csv"])?;
     dir.remove_stale("", "trace.", &["csv", "json", "parquet"])?;
+    dir.remove_stale("plots", "stalls", &["svg", "png"])?;
     dir.remove_stale("", "timeline.", &["perfetto-trace"])?;
     for (figure, _) in super::FIGURES {
         dir.remove_stale("plots", figure, &["svg", "png"])?;
@@ -133,12 +139,13 @@ fn simulate_frame(
         background: plan.scene.background(),
     };
     let draws = frame.draws(&plan.scene)?;
-    let mut clock = PacketClock::new(&plan.gpu, Recorder::new(BIN_PS, most_bins));
+    let mut clock = FrameClock::new(plan.options.timing, &plan.gpu, Recorder::new(BIN_PS, most_bins))?;
     let events = &plan.options.heat;
-    let emit = |packet: &_| clock.push(packet);
+    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
     let (rendered, heat) = render_with_heat(&frame.camera, &draws, &settings, events, emit)
         .map_err(|error| RunError::Setting(error.to_string()))?;
-    let timeline = clock.finish();
+    let timed = clock.finish()?;
+    let timeline = timed.timeline;
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
     let moving = is_moving(&frame);
     let simulated = SimulatedFrame {
@@ -151,6 +158,8 @@ fn simulate_frame(
         power,
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
+        cycles: timed.cycles,
+        stalls: timed.stalls,
     };
     Ok((simulated, rendered.image, heat))
 }

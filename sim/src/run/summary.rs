@@ -11,6 +11,7 @@ use super::checks::Checks;
 use super::measure::mean_parts_w;
 use super::modelled::Modelled;
 use super::simulate::image_name;
+use super::stalls::{self, StallShares};
 use super::{Measurement, Plan, Simulated, warnings};
 use crate::output::MeanSd;
 use crate::output::report::Headline;
@@ -48,6 +49,8 @@ pub struct Summary {
     pub power_by_part_w: BTreeMap<&'static str, f64>,
     /// Share of the run's frame time for which each unit in use was busy.
     pub unit_busy: BTreeMap<&'static str, f64>,
+    /// What each unit did and waited for, in shares of its time; where the level of timing knows.
+    pub stalls: BTreeMap<&'static str, StallShares>,
     /// Samples hit over samples tested.
     pub sample_test_efficiency: Option<f64>,
     /// How often each event happened.
@@ -136,6 +139,8 @@ pub struct FrameRow {
     pub image: String,
     /// True start in seconds from the start of the recording.
     pub start_s: f64,
+    /// Cycles of the core clock for which the GPU worked on it.
+    pub cycles: u64,
     /// For how long the GPU worked on it, in milliseconds.
     pub busy_ms: f64,
     /// From start to start, in milliseconds.
@@ -198,10 +203,11 @@ impl Summary {
                 .map(|part| (part.name(), by_part[part.index()]))
                 .collect(),
             unit_busy: unit_busy(simulated),
+            stalls: stalls::shares(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
             counts_hash: format!("{:016x}", hash(simulated)),
-            frames: rows(plan, measurement),
+            frames: rows(plan, simulated, measurement),
         }
     }
 }
@@ -274,20 +280,22 @@ fn hash(simulated: &Simulated) -> u64 {
     })
 }
 
-fn rows(plan: &Plan, measurement: &Measurement) -> Vec<FrameRow> {
+fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
     let first = plan.scene.settings().frames.start;
     measurement
         .run
         .frames
         .iter()
         .zip(measurement.by_true_frame())
+        .zip(simulated.in_order())
         .zip(first..)
-        .map(|((paced, measured), frame)| {
+        .map(|(((paced, measured), known), frame)| {
             let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
             FrameRow {
                 frame,
                 image: format!("{}.png", image_name(frame)),
                 start_s: paced.start_s,
+                cycles: known.cycles,
                 busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
                 duration_ms: duration_s * 1e3,
                 energy_mj: energy_j * 1e3,

@@ -3,7 +3,7 @@
 use activity::Unit;
 use power_model::Part;
 
-use super::Outcome;
+use super::{Outcome, stalls};
 use crate::output::perfetto::{CounterTrack, FrameSpan, MAX_SLICES, Timeline, UnitTrack, slices_of_bins};
 
 const NS: f64 = 1e9;
@@ -18,8 +18,9 @@ pub(super) fn timeline<'a>(outcome: &'a Outcome, process: &'a str) -> Timeline<'
         .collect();
     let energy = outcome.measurement.run.energy();
     let parts = Part::ALL.into_iter().filter(|part| energy[*part] > 0.0);
-    let counters =
-        std::iter::once(total_power(outcome)).chain(parts.map(|part| part_power(outcome, part))).collect();
+    let starts: Vec<u64> = outcome.measurement.run.frames.iter().map(|paced| ns(paced.start_s)).collect();
+    let power = std::iter::once(total_power(outcome)).chain(parts.map(|part| part_power(outcome, part)));
+    let counters = power.chain(stalls::tracks(&outcome.simulated, &starts)).collect();
     Timeline { process, frames: frames(outcome), units, counters }
 }
 

@@ -1,12 +1,7 @@
-//! When it happens: work packets become activity over time.
+//! Which model of time a run uses.
 //!
-//! One level so far, [`PacketClock`]: a recurrence over packets and units with bounded queues, no clock ticking. Time is
-//! counted in integer picoseconds, so that sums are exact and the same everywhere.
+//! The models are in the package `timing`; here a level is a name and a clock that packets are pushed into.
 
-mod packet_clock;
-mod recorder;
-mod service;
+mod level;
 
-pub use packet_clock::PacketClock;
-pub use recorder::Recorder;
-pub use service::Service;
+pub use level::{FrameClock, Level, TimingError};

@@ -1,6 +1,6 @@
 //! Writes down when events happen, in bins.
 
-use activity::{Bin, Event, PacketCounts, Timeline, Unit};
+use activity::{Bin, Counts, Event, PacketCounts, Timeline, Unit};
 
 /// Collects activity into equal bins. Where a frame outgrows the most bins allowed, pairs of bins are merged, so memory
 /// stays bounded.
@@ -9,43 +9,82 @@ pub struct Recorder {
     bin_ps: u64,
     bins: Vec<Bin>,
     most_bins: usize,
-    events: [Vec<Event>; Unit::COUNT],
     end_ps: u64,
 }
 
 impl Recorder {
     /// A recorder with bins of `bin_ps` picoseconds to begin with and at most `most_bins` of them; both at least 2.
     pub fn new(bin_ps: u64, most_bins: usize) -> Self {
-        let of = |unit| Event::ALL.into_iter().filter(|event| event.unit() == unit).collect();
-        Self {
-            bin_ps: bin_ps.max(2),
-            bins: Vec::new(),
-            most_bins: most_bins.max(2),
-            events: Unit::ALL.map(of),
-            end_ps: 0,
+        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), most_bins: most_bins.max(2), end_ps: 0 }
+    }
+
+    /// `unit` did its share of `counts` evenly from `start_ps` to `end_ps`, and was busy meanwhile.
+    pub fn record(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
+        self.count(unit, counts, start_ps, end_ps);
+        self.busy(unit, start_ps, end_ps, 1, 1);
+    }
+
+    /// `unit` did its share of `counts` evenly from `start_ps` to `end_ps`; nothing is said of how busy it was.
+    pub fn count(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
+        let counts = counts.of(unit);
+        self.spread(unit, start_ps, end_ps, |at| u64::from(counts[at]));
+    }
+
+    /// The same for counts of many packets together.
+    pub fn count_all(&mut self, unit: Unit, counts: &Counts, start_ps: u64, end_ps: u64) {
+        let first = unit.events().start;
+        self.spread(unit, start_ps, end_ps, |at| counts[Event::ALL[first + at]]);
+    }
+
+    fn spread(&mut self, unit: Unit, start_ps: u64, end_ps: u64, counts: impl Fn(usize) -> u64) {
+        let length = end_ps - start_ps;
+        // The share up to a time is rounded down, so that the shares add up to the whole.
+        let up_to = |count: u64, at: u64| match count.checked_mul(at) {
+            Some(product) => product / length,
+            None => (u128::from(count) * u128::from(at) / u128::from(length)) as u64,
+        };
+        for (bin, from, to) in self.span(start_ps, end_ps) {
+            let whole = to - from == length;
+            for (target, at) in self.bins[bin].counts.of_mut(unit).iter_mut().zip(0..) {
+                let count = counts(at);
+                *target += if whole { count } else { up_to(count, to) - up_to(count, from) };
+            }
         }
     }
 
-    /// `unit` did its share of `counts` evenly from `start_ps` to `end_ps`.
-    pub fn record(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
-        self.end_ps = self.end_ps.max(end_ps);
-        self.reach(end_ps.max(start_ps + 1) - 1);
-        let (first, last) = (start_ps / self.bin_ps, (end_ps.max(start_ps + 1) - 1) / self.bin_ps);
-        let length = end_ps - start_ps;
-        for bin in first..=last {
-            let from = (bin * self.bin_ps).max(start_ps) - start_ps;
-            let to = ((bin + 1) * self.bin_ps).min(end_ps.max(start_ps)) - start_ps;
-            let target = &mut self.bins[bin as usize];
-            target.busy_ps[unit as usize] += to - from;
-            for &event in &self.events[unit as usize] {
-                let count = u64::from(counts[event]);
-                if count > 0 {
-                    // The share up to a time is rounded down, so that the shares add up to the whole.
-                    target.counts[event] +=
-                        if first == last { count } else { count * to / length - count * from / length };
-                }
-            }
+    /// `event` happened `times` times at `at_ps`.
+    pub fn event(&mut self, event: Event, times: u64, at_ps: u64) {
+        self.end_ps = self.end_ps.max(at_ps);
+        self.reach(at_ps);
+        let bin = (at_ps / self.bin_ps) as usize;
+        self.bins[bin].counts[event] += times;
+    }
+
+    /// `busy` of the `of` servers of `unit` worked from `start_ps` to `end_ps`.
+    pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
+        for (bin, from, to) in self.span(start_ps, end_ps) {
+            let up_to = |at: u64| (u128::from(at) * u128::from(busy) / u128::from(of)) as u64;
+            self.bins[bin].busy_ps[unit as usize] +=
+                if busy == of { to - from } else { up_to(to) - up_to(from) };
         }
+    }
+
+    /// The frame lasts until `end_ps` at least.
+    pub fn lasts(&mut self, end_ps: u64) {
+        self.end_ps = self.end_ps.max(end_ps);
+    }
+
+    /// The bins from `start_ps` to `end_ps`, each with the part of that time it holds, counted from `start_ps`; at least one.
+    fn span(&mut self, start_ps: u64, end_ps: u64) -> impl Iterator<Item = (usize, u64, u64)> + use<> {
+        self.end_ps = self.end_ps.max(end_ps);
+        let last_ps = end_ps.max(start_ps + 1) - 1;
+        self.reach(last_ps);
+        let bin_ps = self.bin_ps;
+        (start_ps / bin_ps..=last_ps / bin_ps).map(move |bin| {
+            let from = (bin * bin_ps).max(start_ps) - start_ps;
+            let to = ((bin + 1) * bin_ps).min(end_ps) - start_ps;
+            (bin as usize, from, to)
+        })
     }
 
     /// Makes room for what happens at `at_ps`.

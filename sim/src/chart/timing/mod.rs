@@ -1,0 +1,155 @@
+//! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
+
+mod measure;
+mod output;
+mod subjects;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::gpu::GpuSpec;
+use crate::output::progress::Progress;
+use crate::output::table::Table;
+use crate::run::RunError;
+use crate::timing::Level;
+
+pub use measure::Row;
+
+/// GPUs in the chart: small, integrated, large.
+const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
+
+/// A level in a few numbers. Errors are against `stepped`, in percent, over all rows.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Figures {
+    /// Of the cycles of a frame: median, 95th percentile and worst.
+    pub cycle_error_median_percent: f64,
+    /// See above.
+    pub cycle_error_p95_percent: f64,
+    /// See above.
+    pub cycle_error_worst_percent: f64,
+    /// Of the energy of a frame.
+    pub energy_error_median_percent: f64,
+    /// See above.
+    pub energy_error_worst_percent: f64,
+    /// Busy time of the unit that is worst, over the time of the frame: median and worst.
+    pub busy_error_median_percent: f64,
+    /// See above.
+    pub busy_error_worst_percent: f64,
+    /// Bytes to and from memory, worst.
+    pub dram_error_worst_percent: f64,
+    /// RMS of the difference of power at 50 kHz over mean power, median; and at 1 us.
+    pub power_shape_error_percent: f64,
+    /// See above.
+    pub power_shape_error_1us_percent: f64,
+    /// Host time of the reference over that of the level, timing alone: median, and least of all rows.
+    pub speedup_over_stepped: f64,
+    /// See above.
+    pub speedup_over_stepped_least: f64,
+}
+
+/// The reference itself.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reference {
+    /// Units visited in a second of host time.
+    pub unit_cycles_per_s: f64,
+    /// Cycles of the core clock, those that were skipped included, in a second of host time.
+    pub cycles_per_s: f64,
+    /// Host seconds of all rows.
+    pub host_s: f64,
+}
+
+/// The whole chart.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimingChart {
+    /// Whether it is the short one.
+    pub quick: bool,
+    /// The levels by name.
+    pub levels: BTreeMap<&'static str, Figures>,
+    /// How fast the reference is.
+    pub reference: Reference,
+    /// A row for each scene, GPU and level but the reference.
+    pub rows: Vec<Row>,
+}
+
+/// Measures built-in scenes, families of triangles and the scenes in `files`.
+///
+/// # Errors
+/// When a scene cannot be loaded or a GPU fails.
+pub fn timing(files: &[String], quick: bool, progress: &Progress) -> Result<TimingChart, RunError> {
+    let gpus: Vec<GpuSpec> = GPUS.iter().map(|name| GpuSpec::load(name)).collect::<Result<_, _>>()?;
+    let subjects = subjects::all(files, quick)?;
+    let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
+    // One after another: host times are part of what is measured.
+    let (mut rows, mut reference) = (Vec::new(), measure::Speed::default());
+    for subject in &subjects {
+        for gpu in &gpus {
+            let stream = subject.stream(gpu)?;
+            rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
+            bar.inc();
+        }
+    }
+    let levels = Level::ALL.into_iter().map(|level| (level.name(), figures(level, &rows))).collect();
+    Ok(TimingChart { quick, levels, reference: reference.figures(), rows })
+}
+
+fn figures(level: Level, rows: &[Row]) -> Figures {
+    if level == Level::Stepped {
+        return Figures { speedup_over_stepped: 1.0, speedup_over_stepped_least: 1.0, ..Figures::default() };
+    }
+    let of = |pick: fn(&Row) -> f64| {
+        let mut values: Vec<f64> = rows.iter().filter(|row| row.level == level).map(pick).collect();
+        values.sort_by(f64::total_cmp);
+        move |quantile: f64| {
+            let last = values.len().saturating_sub(1);
+            values.get((quantile * last as f64).ceil() as usize).copied().unwrap_or(0.0)
+        }
+    };
+    let (cycles, energy) =
+        (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
+    let (busy, speedup) = (of(|row| row.busy_error_percent), of(|row| row.speedup_over_stepped));
+    Figures {
+        cycle_error_median_percent: cycles(0.5),
+        cycle_error_p95_percent: cycles(0.95),
+        cycle_error_worst_percent: cycles(1.0),
+        energy_error_median_percent: energy(0.5),
+        energy_error_worst_percent: energy(1.0),
+        busy_error_median_percent: busy(0.5),
+        busy_error_worst_percent: busy(1.0),
+        dram_error_worst_percent: of(|row| row.dram_error_percent.abs())(1.0),
+        power_shape_error_percent: of(|row| row.power_shape_error_percent)(0.5),
+        power_shape_error_1us_percent: of(|row| row.power_shape_error_1us_percent)(0.5),
+        speedup_over_stepped: speedup(0.5),
+        speedup_over_stepped_least: speedup(0.0),
+    }
+}
+
+impl TimingChart {
+    /// The levels as a table for the terminal and the book.
+    pub fn text(&self) -> Table {
+        let mut table = Table::new([
+            "level",
+            "cycles: median",
+            "95 %",
+            "worst",
+            "energy: median",
+            "worst",
+            "power shape",
+            "times as fast",
+        ]);
+        for (name, f) in &self.levels {
+            let percent = |value: f64| format!("{value:.2} %");
+            table.row([
+                (*name).to_owned(),
+                percent(f.cycle_error_median_percent),
+                percent(f.cycle_error_p95_percent),
+                percent(f.cycle_error_worst_percent),
+                percent(f.energy_error_median_percent),
+                percent(f.energy_error_worst_percent),
+                percent(f.power_shape_error_percent),
+                format!("{:.1}", f.speedup_over_stepped),
+            ]);
+        }
+        table
+    }
+}

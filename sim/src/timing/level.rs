@@ -1,0 +1,102 @@
+//! The levels, and a clock of any of them.
+
+use activity::{LineAccess, Packet};
+use serde::Serialize;
+use timing::stepped::{self, Manner, Stalled, Stream};
+use timing::{BoundClock, Clocks, Jobs, PacketClock, Recorder, Timed};
+
+use crate::gpu::GpuSpec;
+
+/// How time is modelled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// Every unit from cycle to cycle: the reference, slow
+    Stepped,
+    /// A recurrence over packets
+    #[default]
+    Packet,
+    /// The busiest unit of each batch, fill and drain
+    Bound,
+}
+
+impl Level {
+    /// Every level, the most exact first.
+    pub const ALL: [Self; 3] = [Self::Stepped, Self::Packet, Self::Bound];
+
+    /// Its name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stepped => "stepped",
+            Self::Packet => "packet",
+            Self::Bound => "bound",
+        }
+    }
+}
+
+/// Why a frame has no time.
+#[derive(Debug, thiserror::Error)]
+pub enum TimingError {
+    /// The reference came to a stop.
+    #[error(transparent)]
+    Stalled(#[from] Stalled),
+    /// The clocks have no common cycle; validated GPUs have one.
+    #[error("the clocks of GPU `{0}` have no common cycle")]
+    Clocks(String),
+}
+
+/// A clock that takes the packets of a frame.
+pub struct FrameClock<'a> {
+    gpu: &'a GpuSpec,
+    clocks: Clocks,
+    state: State,
+}
+
+enum State {
+    Stepped(Box<(Jobs, Stream, Recorder)>),
+    Packet(Box<PacketClock>),
+    Bound(Box<BoundClock>),
+}
+
+impl<'a> FrameClock<'a> {
+    /// A clock at zero.
+    ///
+    /// # Errors
+    /// When the GPU was not validated.
+    pub fn new(level: Level, gpu: &'a GpuSpec, recorder: Recorder) -> Result<Self, TimingError> {
+        let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
+        let batch = gpu.pipeline.batch_triangles;
+        let state = match level {
+            Level::Stepped => {
+                State::Stepped(Box::new((Jobs::new(&gpu.units, batch), Stream::default(), recorder)))
+            }
+            Level::Packet => State::Packet(Box::new(PacketClock::new(&gpu.units, clocks, batch, recorder))),
+            Level::Bound => State::Bound(Box::new(BoundClock::new(&gpu.units, clocks, batch, recorder))),
+        };
+        Ok(Self { gpu, clocks, state })
+    }
+
+    /// The next packet of the stream and the lines it asks the L2 for.
+    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        match &mut self.state {
+            State::Stepped(state) => state.1.push(&mut state.0, packet, lines),
+            State::Packet(clock) => clock.push(packet, lines),
+            State::Bound(clock) => clock.push(packet, lines),
+        }
+    }
+
+    /// The frame in time.
+    ///
+    /// # Errors
+    /// When the reference came to a stop, which would be a fault of the model.
+    pub fn finish(self) -> Result<Timed, TimingError> {
+        Ok(match self.state {
+            State::Stepped(state) => {
+                let (makes, stream, recorder) = *state;
+                stepped::run(&self.gpu.units, self.clocks, &makes, &stream, recorder, &Manner::default())?
+            }
+            State::Packet(clock) => clock.finish(),
+            State::Bound(clock) => clock.finish(),
+        })
+    }
+}

@@ -1,0 +1,88 @@
+//! Time in grains: whole numbers in which the cycles of every clock are whole.
+
+use crate::spec::Clock;
+
+/// A moment or a length of time in grains.
+pub type Time = u64;
+
+const PS_PER_MS: u64 = 1_000_000_000;
+/// Grains in a millisecond beyond which a frame of some seconds would not be counted any more.
+const MOST_GRAINS_PER_MS: u64 = 1_000_000_000_000_000;
+
+/// Two clocks and the grain in which both have whole periods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clocks {
+    grains_per_ms: u64,
+    periods: [Time; 2],
+}
+
+impl Clocks {
+    /// Clocks of the given frequencies, each rounded to a kilohertz; `None` where they have no common grain that is coarse
+    /// enough, or one of them is below a kilohertz.
+    pub fn new(core_hz: f64, memory_hz: f64) -> Option<Self> {
+        let khz = [core_hz, memory_hz].map(|hz| (hz / 1e3).round() as u64);
+        let [core, memory] = khz;
+        if core == 0 || memory == 0 {
+            return None;
+        }
+        let grains_per_ms =
+            (core / gcd(core, memory)).checked_mul(memory).filter(|&g| g <= MOST_GRAINS_PER_MS)?;
+        Some(Self { grains_per_ms, periods: khz.map(|khz| grains_per_ms / khz) })
+    }
+
+    /// Grains of a cycle of `clock`.
+    pub fn period(&self, clock: Clock) -> Time {
+        self.periods[clock as usize]
+    }
+
+    /// The first edge of any of the clocks after `now`.
+    pub fn next_edge(&self, now: Time) -> Time {
+        let [core, memory] = self.periods.map(|period| now - now % period + period);
+        core.min(memory)
+    }
+
+    /// The first edge of any of the clocks at or after `at`.
+    pub fn edge_from(&self, at: Time) -> Time {
+        let [core, memory] = self.periods.map(|period| at.next_multiple_of(period));
+        core.min(memory)
+    }
+
+    /// Picoseconds from 0 to `at`, rounded up.
+    pub fn ps(&self, at: Time) -> u64 {
+        if PS_PER_MS.is_multiple_of(self.grains_per_ms) {
+            return at * (PS_PER_MS / self.grains_per_ms);
+        }
+        (u128::from(at) * u128::from(PS_PER_MS)).div_ceil(u128::from(self.grains_per_ms)) as u64
+    }
+
+    /// Whole cycles of `clock` that begin before `at`.
+    pub fn cycles(&self, clock: Clock, at: Time) -> u64 {
+        at.div_ceil(self.period(clock))
+    }
+}
+
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_periods_are_whole() {
+        let clocks = Clocks::new(925e6, 1375e6).unwrap();
+        assert_eq!([Clock::Core, Clock::Memory].map(|c| clocks.period(c)), [55, 37]);
+        assert_eq!(clocks.next_edge(0), 37);
+        assert_eq!(clocks.next_edge(37), 55);
+        // 925 cycles of the core are a microsecond.
+        assert_eq!(clocks.ps(925 * 55), 1_000_000);
+        assert_eq!(clocks.cycles(Clock::Core, 56), 2);
+    }
+
+    #[test]
+    fn clocks_without_a_coarse_grain_are_refused() {
+        assert!(Clocks::new(1e12, 999_999_999e3).is_none());
+        assert!(Clocks::new(400e6, 10.0).is_none());
+    }
+}

@@ -1,0 +1,47 @@
+//! When it happens. One description of a machine, one stream of packets, and a ladder of models of the time they take.
+//!
+//! - [`MachineSpec`]: the units of the block diagram, with throughput, latency, queues and clocks.
+//! - [`Jobs`] and [`Job`]: what a packet owes each unit, in cycles; every level reads the same.
+//! - [`stepped`]: the reference, from cycle to cycle.
+//! - [`PacketClock`]: packets, not cycles: a recurrence, with calendars for what is shared.
+//! - [`BoundClock`]: no packets: the busiest unit of each batch, fill and drain.
+//! - [`Recorder`]: events and busy time over time; [`Stalls`]: why units did not work.
+//!
+//! The crate knows no triangle and no joule, and what happens is decided before it is asked: caches are walked in the order
+//! of the stream, here they take their time.
+
+mod address;
+mod bound;
+mod clock;
+mod job;
+mod packet;
+mod rates;
+mod recorder;
+mod spec;
+mod stalls;
+pub mod stepped;
+
+pub use bound::BoundClock;
+pub use clock::{Clocks, Time};
+pub use job::{CLIENTS, Job, Jobs, Place};
+pub use packet::PacketClock;
+pub use rates::Rates;
+pub use recorder::Recorder;
+pub use spec::{ClientSpec, Clock, Common, DramSpec, L2Spec, MachineSpec, ShaderSpec, UnitSpec};
+pub use stalls::{Reason, Stalls, UnitTime};
+
+/// Bytes of a line of memory.
+pub const LINE_BYTES: u32 = 64;
+
+/// A frame in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timed {
+    /// Events and busy time over time.
+    pub timeline: activity::Timeline,
+    /// Cycles of the core clock.
+    pub cycles: u64,
+    /// Why units did not work, where the level knows.
+    pub stalls: Option<Stalls>,
+    /// Units visited, summed over cycles; 0 where the level has no cycles.
+    pub unit_cycles: u64,
+}

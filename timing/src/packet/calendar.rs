@@ -1,0 +1,115 @@
+//! A shared resource as a calendar: how much of each stretch of time is taken, whoever asks first.
+
+use crate::clock::Time;
+
+/// Stretches of equal length, each with room for so much work. Packets ask in the order of the stream, not in that of time;
+/// a stretch that one of them left free can be taken by another that comes later in the stream and earlier in time.
+#[derive(Clone, Debug)]
+pub(super) struct Calendar {
+    /// Length of a stretch.
+    length: Time,
+    /// Work that fits in one.
+    room: u64,
+    used: Vec<u32>,
+    /// For each stretch the first one from it on that may have room.
+    free: Vec<u32>,
+}
+
+impl Calendar {
+    /// Stretches of `cycles` cycles of `period`, each of which does `rate` units of work.
+    pub fn new(cycles: u32, period: Time, rate: u32) -> Self {
+        Self {
+            length: Time::from(cycles) * period,
+            room: u64::from(cycles) * u64::from(rate),
+            used: Vec::new(),
+            free: Vec::new(),
+        }
+    }
+
+    /// Does `work` from `at` on and says when it begins and when it is done.
+    pub fn take(&mut self, at: Time, work: u64) -> (Time, Time) {
+        let mut stretch = self.first_free((at / self.length) as usize);
+        let begin = self.moment(stretch, at);
+        let mut left = work;
+        loop {
+            let here = left.min(self.room - u64::from(self.used[stretch]));
+            self.used[stretch] += here as u32;
+            left -= here;
+            if u64::from(self.used[stretch]) == self.room {
+                self.free[stretch] = stretch as u32 + 1;
+            }
+            if left == 0 {
+                let end = self.moment(stretch, at).max(begin + self.span(work));
+                return (begin, end);
+            }
+            stretch = self.first_free(stretch + 1);
+        }
+    }
+
+    /// When the work put into a stretch so far is done, if none of it is done before `at`.
+    fn moment(&self, stretch: usize, at: Time) -> Time {
+        let filled = stretch as Time * self.length + u64::from(self.used[stretch]) * self.length / self.room;
+        filled.max(at)
+    }
+
+    /// How long `work` takes alone.
+    fn span(&self, work: u64) -> Time {
+        (work * self.length).div_ceil(self.room)
+    }
+
+    fn first_free(&mut self, from: usize) -> usize {
+        self.reach(from);
+        let mut at = from;
+        while self.free[at] as usize != at {
+            at = self.free[at] as usize;
+            self.reach(at);
+        }
+        // Whoever comes this way again goes straight there.
+        let mut passed = from;
+        while passed != at {
+            passed = std::mem::replace(&mut self.free[passed], at as u32) as usize;
+        }
+        at
+    }
+
+    fn reach(&mut self, stretch: usize) {
+        let known = self.used.len();
+        if stretch >= known {
+            self.used.resize(stretch + 1, 0);
+            self.free.extend(known as u32..=stretch as u32);
+        }
+    }
+
+    /// Every stretch in which anything was done: from, to, work done and work that fits.
+    pub fn stretches(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
+        let used = self.used.iter().zip(0..).filter(|(used, _)| **used > 0);
+        used.map(|(&used, at): (&u32, Time)| {
+            (at * self.length, (at + 1) * self.length, u64::from(used), self.room)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_fills_stretches_whoever_comes_first() {
+        let mut calendar = Calendar::new(10, 1, 1);
+        assert_eq!(calendar.take(20, 10), (20, 30));
+        // Earlier in time, later in the stream.
+        assert_eq!(calendar.take(3, 4), (3, 7));
+        assert_eq!(calendar.take(21, 2), (30, 32));
+        // 6 units fit before 10 is over, as far as the calendar knows; the next stretch is free, the one after full.
+        assert_eq!(calendar.take(0, 18), (4, 34));
+        assert_eq!(calendar.stretches().map(|(_, _, used, _)| used).sum::<u64>(), 34);
+    }
+
+    #[test]
+    fn a_saturated_calendar_is_a_queue() {
+        let mut calendar = Calendar::new(8, 3, 2);
+        let ends: Vec<_> = (0..40).map(|_| calendar.take(0, 4).1).collect();
+        assert_eq!(*ends.last().unwrap(), 40 * 4 * 3 / 2);
+        assert!(ends.windows(2).all(|pair| pair[1] > pair[0]));
+    }
+}

@@ -1,0 +1,117 @@
+//! Machines and streams for tests.
+
+use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use timing::stepped::{self, Manner, Stream};
+use timing::{
+    ClientSpec, Clock, Clocks, DramSpec, Jobs, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec, Timed,
+    UnitSpec,
+};
+
+pub const BATCH: u32 = 1000;
+
+pub fn rates(text: &str) -> Rates {
+    activity::spec::parse(text, "test").unwrap()
+}
+
+fn unit(text: &str) -> UnitSpec {
+    UnitSpec { clock: Clock::Core, latency_cycles: 1, queue: 64, rates: rates(text) }
+}
+
+fn client(text: &str) -> ClientSpec {
+    ClientSpec { clock: Clock::Core, latency_cycles: 1, queue: 64, in_flight: 64, rates: rates(text) }
+}
+
+/// Every rate is 1 in a cycle, every latency 1, every queue deep.
+pub fn plain() -> MachineSpec {
+    MachineSpec {
+        command: client("{\"indices\": 1}"),
+        shader: ShaderSpec {
+            clock: Clock::Core,
+            latency_cycles: 1,
+            queue: 64,
+            in_flight: 64,
+            cores: 1,
+            lanes: 4,
+            warp_lanes: 4,
+            warps: 8,
+            alu_latency_cycles: 1,
+        },
+        setup: unit("{\"triangles_in\": 1}"),
+        traversal: unit("{\"tiles_visited\": 1}"),
+        z_cull: unit("{\"z_cull_tests\": 1}"),
+        sample_test: unit("{\"samples_tested\": 1}"),
+        depth: client("{\"depth_reads\": 1}"),
+        shading_cache: unit("{\"shading_lookups\": 1}"),
+        texture: client("{\"texture_fetches\": 1}"),
+        colour: client("{\"colour_writes\": 1}"),
+        l2: L2Spec { clock: Clock::Core, latency_cycles: 1, queue: 64, lines_per_cycle: 1 },
+        dram: DramSpec {
+            clock: Clock::Memory,
+            latency_cycles: 1,
+            queue: 64,
+            channels: 1,
+            banks: 2,
+            row_bytes: 512,
+            interleave_bytes: 64,
+            burst_cycles: 2,
+            cas_cycles: 3,
+            activate_cycles: 4,
+            precharge_cycles: 5,
+        },
+    }
+}
+
+pub fn packet(kind: PacketKind, counts: &[(Event, u32)]) -> Packet {
+    let mut packet = Packet::new(kind, 0, 0, 0);
+    counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
+    packet
+}
+
+pub fn tile(counts: &[(Event, u32)]) -> Packet {
+    packet(PacketKind::Tile, counts)
+}
+
+pub fn read(client: Unit, line: u32, kind: LineKind) -> LineAccess {
+    LineAccess { line, victim: LineAccess::NONE, client, kind }
+}
+
+pub type Packets = Vec<(Packet, Vec<LineAccess>)>;
+
+pub fn clocks() -> Clocks {
+    Clocks::new(1e9, 1e9).unwrap()
+}
+
+pub fn recorder() -> Recorder {
+    Recorder::new(100_000, 1 << 12)
+}
+
+pub fn stepped_as(machine: &MachineSpec, clocks: Clocks, packets: &Packets, manner: &Manner) -> Timed {
+    machine.validate().unwrap();
+    let mut makes = Jobs::new(machine, BATCH);
+    let mut stream = Stream::default();
+    packets.iter().for_each(|(packet, lines)| stream.push(&mut makes, packet, lines));
+    stepped::run(machine, clocks, &makes, &stream, recorder(), manner).unwrap()
+}
+
+pub fn stepped(machine: &MachineSpec, packets: &Packets) -> Timed {
+    stepped_as(machine, clocks(), packets, &Manner::default())
+}
+
+/// Tiles that cause the given events and ask for no line.
+pub fn tiles(counts: impl IntoIterator<Item = Vec<(Event, u32)>>) -> Packets {
+    counts.into_iter().map(|counts| (tile(&counts), Vec::new())).collect()
+}
+
+/// The same at the level `packet`.
+pub fn packet_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
+    let mut clock = timing::PacketClock::new(machine, clocks, BATCH, recorder());
+    packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
+    clock.finish()
+}
+
+/// The same at the level `bound`.
+pub fn bound_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
+    let mut clock = timing::BoundClock::new(machine, clocks, BATCH, recorder());
+    packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
+    clock.finish()
+}

@@ -1,0 +1,162 @@
+//! What enters leaves, time adds up, and nothing depends on the order of visits.
+
+use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use proptest::prelude::*;
+use timing::stepped::Manner;
+use timing::{Clocks, MachineSpec};
+
+use crate::common::{BATCH, Packets, plain, stepped_as};
+
+fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
+    let kind = prop_oneof![
+        Just(LineKind::Hit),
+        Just(LineKind::Fetch),
+        Just(LineKind::Write),
+        Just(LineKind::Allocate)
+    ];
+    (0u32..4096, kind, prop::option::weighted(0.2, 0u32..4096))
+}
+
+/// The lines of `client`, counted in `packet` as the pipeline would.
+fn add_lines(packet: &mut Packet, client: Unit, lines: &[(u32, LineKind, Option<u32>)]) -> Vec<LineAccess> {
+    let counts = &mut packet.counts;
+    let access = |&(line, kind, victim): &(u32, LineKind, Option<u32>)| {
+        let miss = matches!(kind, LineKind::Fetch | LineKind::Allocate);
+        let read = matches!(kind, LineKind::Hit | LineKind::Fetch);
+        let victim = victim.filter(|_| miss);
+        counts[if read { Event::L2Reads } else { Event::L2Writes }] += 1;
+        counts[Event::L2Misses] += u32::from(miss);
+        counts[Event::DramReadBytes] += 64 * u32::from(kind == LineKind::Fetch);
+        counts[Event::DramWriteBytes] += 64 * u32::from(victim.is_some());
+        LineAccess { line, victim: victim.unwrap_or(LineAccess::NONE), client, kind }
+    };
+    lines.iter().map(access).collect()
+}
+
+type Some5 = (u32, u32, u32, u32, u32);
+
+fn tile_packet(
+    (tiles, samples, reads, threads, fetches): Some5,
+    depth: &[(u32, LineKind, Option<u32>)],
+    batch: u32,
+) -> (Packet, Vec<LineAccess>) {
+    let mut packet = Packet::new(PacketKind::Tile, 0, 0, batch * BATCH);
+    let counts = &mut packet.counts;
+    counts[Event::TilesVisited] = tiles;
+    counts[Event::SamplesTested] = samples;
+    counts[Event::DepthReads] = reads;
+    counts[Event::ShadingLookups] = reads;
+    counts[Event::PixelInvocations] = 4 * threads;
+    counts[Event::ShaderOps] = 4 * threads * 7;
+    counts[Event::TextureFetches] = if threads > 0 { fetches } else { 0 };
+    counts[Event::ColourWrites] = reads;
+    let (first, rest) = depth.split_at(depth.len() / 3);
+    let (second, third) = rest.split_at(rest.len() / 2);
+    let mut lines = add_lines(&mut packet, Unit::Depth, first);
+    lines.extend(add_lines(&mut packet, Unit::Texture, if threads > 0 { second } else { &[] }));
+    lines.extend(add_lines(&mut packet, Unit::Colour, third));
+    (packet, lines)
+}
+
+fn vertices_packet(
+    triangles: u32,
+    lines: &[(u32, LineKind, Option<u32>)],
+    batch: u32,
+) -> (Packet, Vec<LineAccess>) {
+    let mut packet = Packet::new(PacketKind::Vertices, 0, 0, batch * BATCH);
+    packet.counts[Event::Indices] = 3 * triangles;
+    packet.counts[Event::VertexInvocations] = triangles;
+    packet.counts[Event::ShaderOps] = 5 * triangles;
+    packet.counts[Event::TrianglesIn] = triangles;
+    let lines = add_lines(&mut packet, Unit::Command, lines);
+    (packet, lines)
+}
+
+/// Four batches, the front end one ahead, as the pipeline has it.
+pub fn packets() -> impl Strategy<Value = Packets> {
+    let tile = ((0u32..9, 0u32..30, 0u32..9, 0u32..5, 0u32..20), prop::collection::vec(line(), 0..12));
+    let front = (1u32..20, prop::collection::vec(line(), 0..6));
+    let batch = (prop::collection::vec(front, 1..6), prop::collection::vec(tile, 0..25));
+    prop::collection::vec(batch, 4).prop_map(|batches| {
+        let mut stream = Packets::new();
+        let front = |stream: &mut Packets, b: usize| {
+            if let Some((fronts, _)) = batches.get(b) {
+                stream.extend(fronts.iter().map(|(n, lines)| vertices_packet(*n, lines, b as u32)));
+            }
+        };
+        front(&mut stream, 0);
+        for (b, (_, tiles)) in batches.iter().enumerate() {
+            front(&mut stream, b + 1);
+            stream.extend(tiles.iter().map(|(some, lines)| tile_packet(*some, lines, b as u32)));
+        }
+        stream
+    })
+}
+
+/// Machines with anything from narrow to wide.
+pub fn machine() -> impl Strategy<Value = MachineSpec> {
+    let small = (1u32..6, 1u32..4, 1u32..4, 1u32..4);
+    let shader = (1u32..4, 1u32..9, 1u32..9, 1u32..5, 1u32..9);
+    let memory = (2u32..9, 1u32..4, 1u32..5, 1u32..5, 1u32..4);
+    (small, shader, memory).prop_map(|((queue, latency, in_flight, port), s, d)| {
+        let mut m = plain();
+        for unit in [&mut m.setup, &mut m.traversal, &mut m.z_cull, &mut m.sample_test, &mut m.shading_cache]
+        {
+            (unit.queue, unit.latency_cycles) = (queue, latency);
+        }
+        for unit in [&mut m.command, &mut m.depth, &mut m.texture, &mut m.colour] {
+            (unit.queue, unit.latency_cycles, unit.in_flight) = (queue, latency, in_flight);
+        }
+        (m.shader.queue, m.shader.in_flight, m.l2.queue) = (queue, in_flight, port);
+        (m.shader.cores, m.shader.lanes, m.shader.warp_lanes, m.shader.warps, m.shader.alu_latency_cycles) =
+            s;
+        (m.dram.queue, m.dram.channels, m.dram.banks, m.dram.burst_cycles, m.l2.lines_per_cycle) = d;
+        m
+    })
+}
+
+fn total(packets: &Packets) -> Counts {
+    packets.iter().fold(Counts::default(), |mut sum, (packet, _)| {
+        sum += &packet.counts;
+        sum
+    })
+}
+
+fn two_clocks() -> impl Strategy<Value = Clocks> {
+    prop_oneof![Just((1e9, 1e9)), Just((925e6, 1375e6)), Just((3e8, 1e8))]
+        .prop_map(|(a, b)| Clocks::new(a, b).unwrap())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn everything_that_enters_leaves_and_time_adds_up(packets in packets(), machine in machine(), clocks in two_clocks()) {
+        let timed = stepped_as(&machine, clocks, &packets, &Manner::default());
+        prop_assert_eq!(timed.timeline.total(), total(&packets));
+        let stalls = timed.stalls.unwrap();
+        for unit in Unit::ALL {
+            let whole = stalls.frame() * u64::from(stalls.servers(unit));
+            prop_assert_eq!(stalls.of(unit).total(), whole, "{:?}", unit);
+        }
+        let bins = timed.timeline.bins.iter();
+        prop_assert!(bins.clone().all(|bin| bin.busy_ps.iter().all(|&busy| busy <= timed.timeline.bin_ps)));
+    }
+
+    #[test]
+    fn neither_the_order_of_visits_nor_skipping_matters(
+        packets in packets(),
+        machine in machine(),
+        clocks in two_clocks(),
+        order in Just(Unit::ALL.to_vec()).prop_shuffle(),
+    ) {
+        let plainly = stepped_as(&machine, clocks, &packets, &Manner { skip: false, ..Manner::default() });
+        let order = std::array::from_fn(|at| order[at]);
+        for skip in [false, true] {
+            let other = stepped_as(&machine, clocks, &packets, &Manner { order, skip });
+            prop_assert_eq!(other.cycles, plainly.cycles);
+            prop_assert_eq!(&other.timeline, &plainly.timeline);
+            prop_assert_eq!(&other.stalls, &plainly.stalls);
+        }
+    }
+}

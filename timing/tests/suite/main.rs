@@ -1,0 +1,8 @@
+//! The ladder, level by level.
+
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod closed_forms;
+mod common;
+mod conservation;
+mod ladder;
