@@ -15,6 +15,10 @@ pub enum ChartError {
     Samples(#[from] pipeline::sampling::TableError),
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Soup(#[from] workloads::stress::StressError),
+    #[error("starting the thread that is timed: {0}")]
+    Thread(#[from] rayon::ThreadPoolBuildError),
     #[error("the pipeline does not take the scene: {0}")]
     Pipeline(String),
     #[error(transparent)]

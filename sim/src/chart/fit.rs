@@ -13,6 +13,11 @@ pub fn exponent(points: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {
     (logs.len() > 1 && spread > 0.0).then(|| joint / spread)
 }
 
+/// Where the upper half of a range begins on a logarithmic axis, ends above zero: at the root of their product.
+pub fn upper_half(low: f64, high: f64) -> f64 {
+    libm::sqrt(low) * libm::sqrt(high)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -23,6 +28,16 @@ mod tests {
             let points = [1.0_f64, 2.0, 7.0, 64.0].map(|x| (x, 3.0 * x.powf(p)));
             assert!((exponent(points).unwrap() - p).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn the_upper_half_leaves_a_floor_out() {
+        let from = upper_half(1.0, 256.0);
+        assert_eq!(from, 16.0);
+        let curve = [1.0, 4.0, 16.0, 64.0, 256.0].map(|x: f64| (x, 2.0 * x.powf(0.75).max(8.0)));
+        let upper = curve.into_iter().filter(|(x, _)| *x >= from);
+        assert!((exponent(upper).unwrap() - 0.75).abs() < 1e-12);
+        assert!(exponent(curve).unwrap() < 0.7, "the floor would flatten the fit");
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Charts of the book: each measured, drawn and written in one go, one module for each.
 //!
+//! - [`growth`]: time of the visibility engine over triangles, samples and blur.
 //! - [`sampling`]: image error over samples per pixel and over host time.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`fit`]: exponents of curves.
 
 mod error;
 pub mod fit;
+pub mod growth;
 pub mod sampling;
 pub mod tile_tests;
 pub mod timing;
@@ -13,7 +15,8 @@ pub mod timing;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 2] = [
+pub const CHARTS: [(&str, &str); 3] = [
+    ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
     ("sampling", "image error over samples per pixel and over host time, for every sample table"),
     ("tile-tests", "every combination of tile tests: efficiency and tightness over multiply-adds"),
 ];

@@ -235,6 +235,8 @@ pub struct ChartArgs {
 /// The charts there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ChartArg {
+    /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
+    Growth,
     /// Image error over samples per pixel and over host time, for every sample table
     Sampling,
     /// Every combination of tile tests: efficiency and tightness over multiply-adds

@@ -6,6 +6,7 @@ use super::Failure;
 use super::args::{ChartArg, ChartArgs};
 use super::terminal::{print, print_json};
 use crate::chart::ChartError;
+use crate::chart::growth;
 use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
@@ -23,20 +24,25 @@ impl From<ChartError> for Failure {
 pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
+    if !args.scene.is_empty() && !matches!(args.chart, ChartArg::TileTests | ChartArg::Timing) {
+        let message = "--scene goes with `chart tile-tests` and `chart timing`; leave it out".to_owned();
+        return Err(Failure { message, code: 2 });
+    }
     match args.chart {
+        ChartArg::Growth => pool.install(|| chart_growth(args, &progress)),
         ChartArg::Sampling => pool.install(|| chart_sampling(args, &progress)),
         ChartArg::TileTests => pool.install(|| chart_tile_tests(args, &progress)),
         ChartArg::Timing => pool.install(|| chart_timing(args, &progress)),
     }
 }
 
+fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
+    let chart = growth::chart(effort, &args.out, progress)?;
+    if args.json { print_json(&chart, true) } else { print(&chart.text()) }
+}
+
 fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
-    if !args.scene.is_empty() {
-        return Err(Failure {
-            message: "--scene goes with `chart tile-tests` and `chart timing`; leave it out".to_owned(),
-            code: 2,
-        });
-    }
     let started = Instant::now();
     let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
     let chart = sampling::chart(effort, &args.out, progress)?;

@@ -9,6 +9,7 @@ mod lens;
 mod mesh;
 mod motion;
 mod shape;
+mod soup;
 
 use pipeline::sampling::TableError;
 use pipeline::{
@@ -17,6 +18,7 @@ use pipeline::{
 
 pub use brute::{brute_force, set_up_all, within_bounds};
 use easel::Easel;
+pub use soup::Soup;
 
 /// Triangles of one kind of trouble, and how to have more or less of it.
 #[derive(Clone, Copy, Debug)]

@@ -44,6 +44,8 @@ pub struct Curves<'a> {
 }
 
 const PANEL_WIDTH: f64 = 400.0;
+/// What a panel leaves for its axis and its neighbour.
+const ASIDE: f64 = 76.0;
 const TOP: f64 = 128.0;
 const BOTTOM: f64 = 500.0;
 
@@ -71,7 +73,7 @@ fn key(index: usize) -> Key {
 
 impl CurvePanel {
     fn draw(&self, picture: &mut Picture, left: f64) {
-        let right = left + PANEL_WIDTH - 76.0;
+        let right = left + PANEL_WIDTH - ASIDE;
         picture.text(Text { bold: true, ..text(&self.title, (left, TOP - 18.0)) });
         let Some([x, y]) = self.axes() else {
             picture.text(Text {
@@ -98,12 +100,22 @@ impl CurvePanel {
         self.notes(picture, right);
     }
 
-    /// The notes of the curves in the upper right corner, which falling curves leave free.
+    /// The notes of the curves in the upper corner that they leave free: right where they fall, left where they rise.
     fn notes(&self, picture: &mut Picture, right: f64) {
         let noted = self.curves.iter().enumerate().filter(|(_, curve)| !curve.note.is_empty());
         let entries: Vec<_> =
             noted.map(|(index, curve)| (key(index), curve.name.clone(), curve.note.clone())).collect();
+        let right = if self.rises() { right - (PANEL_WIDTH - ASIDE) + 176.0 } else { right };
         legend_column(picture, (right - 160.0, TOP + 14.0), right - 6.0, &entries);
+    }
+
+    /// Whether the curves end higher than they begin, all in all.
+    fn rises(&self) -> bool {
+        let rise = |curve: &Curve| {
+            let mut heights = curve.logarithms().map(|(_, y)| y);
+            heights.next().zip(heights.last()).map_or(0.0, |(first, last)| last - first)
+        };
+        self.curves.iter().map(rise).sum::<f64>() > 0.0
     }
 
     /// Axes of the logarithms, or `None` where there is nothing to show.
