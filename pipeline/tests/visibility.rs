@@ -151,14 +151,17 @@ fn coordinates_out_of_all_proportion_are_seen_as_brute_force_sees_them() {
 /// one with the lower number is seen all the same.
 #[test]
 fn of_two_at_one_depth_the_lower_number_is_seen_whichever_is_tested_first() {
-    let wall = |depth: f32| [(-40.0, -40.0), (40.0, -40.0), (0.0, 60.0)].map(|(x, y)| glam::Vec3::new(x, y, depth));
+    let wall =
+        |depth: f32| [(-40.0, -40.0), (40.0, -40.0), (0.0, 60.0)].map(|(x, y)| glam::Vec3::new(x, y, depth));
     let (still, first, last) = (wall(4.0), wall(2.0), wall(6.0));
     let open = [still, first].concat();
     let close = [still, last].concat();
     let soup = Soup { open, close, triangles: vec![[0, 1, 2], [3, 4, 5]] };
     let viewport = Viewport::new(32, 32).unwrap();
-    let at_half = (0..64).map(|i| Sample { x: 0.5, y: i as f32 / 64.0, u: 0.0, v: 0.0, t: 0.5 }).collect();
-    let table = SampleTable::programmed(16, 1, at_half).unwrap();
+    let at_half = (0..64 * 64 * 4)
+        .map(|i| Sample { x: 0.5, y: (i % 4) as f32 / 4.0, u: 0.0, v: 0.0, t: 0.5 })
+        .collect();
+    let table = SampleTable::programmed(4, 1, at_half).unwrap();
     let expected = brute_force(&soup, Cull::None, false, viewport, &table);
     assert!(expected.iter().all(|&(id, depth)| (id, f32::from_bits(depth)) == (0, 4.0)), "{:?}", expected[0]);
     assert!(seen(&soup, Cull::None, false, viewport, &table, Width::widest()) == expected);
