@@ -20,7 +20,7 @@ pub fn write<W: Write>(trace: &Trace, out: W) -> Result<(), WriteError> {
     write_with(trace, out, b',')
 }
 
-/// As [`write`], with something else than a comma between the fields: a tab for TSV.
+/// As [`write()`], with something else than a comma between the fields: a tab for TSV.
 ///
 /// # Errors
 /// [`WriteError::Encode`] if the writer fails.
