@@ -24,7 +24,8 @@ impl Picture {
                  /F0 5 0 R /F1 6 0 R >> /ExtGState << {states}>> >> >>",
                 self.width, self.height
             ),
-            format!("<< /Length {} >>\nstream\n{}endstream", page.content.len(), page.content),
+            // A letter is a byte in the file.
+            format!("<< /Length {} >>\nstream\n{}endstream", page.content.chars().count(), page.content),
             font("Helvetica"),
             font("Helvetica-Bold"),
         ];
@@ -180,12 +181,12 @@ mod tests {
         assert!(text.starts_with("%PDF-1.4") && text.ends_with("%%EOF\n") && text.contains("A \\(title\\)"));
         let start: usize =
             text.rsplit("startxref\n").next().unwrap().lines().next().unwrap().parse().unwrap();
-        let table: Vec<&str> = text[start..].lines().skip(3).take(6).collect();
-        for (index, line) in table.iter().enumerate() {
+        let table: String = bytes[start..].iter().map(|&byte| char::from(byte)).collect();
+        for (index, line) in table.lines().skip(3).take(6).enumerate() {
             let offset: usize = line[..10].parse().unwrap();
-            assert!(text[offset..].starts_with(&format!("{} 0 obj", index + 1)));
+            assert!(bytes[offset..].starts_with(format!("{} 0 obj", index + 1).as_bytes()));
         }
         let stream = text.split("stream\n").nth(1).unwrap().trim_end_matches("end");
-        assert!(text.contains(&format!("/Length {}", stream.len())));
+        assert!(text.contains(&format!("/Length {} ", stream.chars().count())));
     }
 }
