@@ -16,7 +16,9 @@ mod worker;
 
 use activity::{Counts, Event, LineAccess, Packet, PacketKind};
 use glam::Vec3;
+use judge::Judge;
 use rayon::prelude::*;
+use vertices::Ready;
 
 use crate::geometry::{Camera, Draw};
 use crate::memory::CacheError;
@@ -124,13 +126,7 @@ fn rasterize<F: FnMut(Done<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done:
             pass.settings.viewport,
             pass.settings.spec.coarse_tile_px,
         );
-        let logs: Vec<_> = bins
-            .par_iter_mut()
-            .zip(&lists)
-            .map_init(worker::Scratch::default, |scratch, (bin, list)| {
-                bin.rasterize(pass, &ready, list, scratch)
-            })
-            .collect();
+        let logs = rasterize_bins(pass, &mut bins, &ready, &lists);
         for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
             done(Done::Tests(number, bin, log));
             let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Done::Packet(packet, lines));
@@ -141,6 +137,35 @@ fn rasterize<F: FnMut(Done<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done:
         }
     }
     bins
+}
+
+/// The logs of a batch, by bin. Where `auto` has learnt nothing yet some bins go first, and the others know what they have learnt.
+fn rasterize_bins(pass: &Pass<'_>, bins: &mut [Bin], ready: &[Ready], lists: &[Vec<u32>]) -> Vec<BinLog> {
+    const FIRST_OF: usize = 4;
+    let mut logs = vec![BinLog::default(); bins.len()];
+    let mut run = |bins: &mut [Bin], chosen: &(dyn Fn(usize) -> bool + Sync)| {
+        let all = bins.par_iter_mut().zip(lists).zip(&mut logs).enumerate();
+        all.filter(|(number, _)| chosen(*number)).for_each_init(
+            worker::Scratch::default,
+            |scratch, (_, ((bin, list), log))| {
+                *log = bin.rasterize(pass, ready, list, scratch);
+            },
+        );
+    };
+    if !pass.settings.spec.features.auto || bins.iter().any(|bin| bin.judge.has_learnt()) {
+        run(bins, &|_| true);
+        return logs;
+    }
+    let mut busiest: Vec<_> = (0..bins.len()).collect();
+    busiest.sort_by_key(|&bin| std::cmp::Reverse(lists[bin].len()));
+    let mut first = vec![false; bins.len()];
+    busiest.iter().take(bins.len().div_ceil(FIRST_OF)).for_each(|&bin| first[bin] = true);
+    run(bins, &|bin| first[bin]);
+    let mut known = Judge::new();
+    bins.iter().for_each(|bin| known.join(&bin.judge));
+    bins.iter_mut().zip(&first).filter(|(_, first)| !**first).for_each(|(bin, _)| bin.judge = known);
+    run(bins, &|bin| !first[bin]);
+    logs
 }
 
 /// A packet of the only pass there is so far.

@@ -1,13 +1,14 @@
 //! The tile tests that are switched on, in order of price: what of lens and time one triangle leaves over one tile.
 
 use super::counters::TileWork;
-use super::judge::{Judge, Test};
+use super::judge::{Did, Judge, Plan, Stake};
 use super::settings::Features;
 use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
-    self, Box5, Edges, Facing, LensLines, Piece, Screen, TileRect, Timeline, View, narrow_counted,
+    self, Box5, Edges, Facing, LensLines, Piece, SCREEN_GAIN_MADDS as GAIN, Screen, TileRect, Timeline, View,
+    narrow_counted,
 };
 
 /// A triangle with what set-up found for its tile tests.
@@ -41,22 +42,38 @@ pub(super) struct Left {
     pub within: Box5,
     pub times: Timeline,
     edges: Option<Edges>,
+    /// Whether facing was found.
+    pub facing: bool,
+    /// Whether screens were set up.
+    pub screened: bool,
 }
 
 impl Left {
     /// Nothing is ruled out in `within`.
     pub fn all(within: Box5) -> Self {
-        Self { within, times: Timeline::one(Piece { t: within.t, faces: [true; 2] }), edges: None }
+        Self {
+            within,
+            times: Timeline::one(Piece { t: within.t, faces: [true; 2] }),
+            edges: None,
+            facing: false,
+            screened: false,
+        }
     }
 
     /// The same in the box `within`, or `None` where nothing is left.
     pub fn narrowed(&self, within: Box5) -> Option<Self> {
         let times = self.times.meet(&Timeline::one(Piece { t: within.t, faces: [true; 2] }));
-        Some(Self { within: Box5 { t: times.hull()?, ..within }, times, edges: None })
+        Some(Self {
+            within: Box5 { t: times.hull()?, ..within },
+            times,
+            edges: None,
+            facing: self.facing,
+            screened: self.screened,
+        })
     }
 
     /// The share of all of lens and time that is left; samples are spread evenly over them.
-    fn volume(&self, moving: bool) -> f64 {
+    pub fn volume(&self, moving: bool) -> f64 {
         let length = |[lo, hi]: [f32; 2]| f64::from((hi - lo).max(0.0));
         let time: f64 = self.times.pieces().iter().map(|piece| length(piece.t)).sum();
         let lens = if self.within.lens { 0.25 * length(self.within.u) * length(self.within.v) } else { 1.0 };
@@ -67,100 +84,114 @@ impl Left {
 impl Subject<'_> {
     /// What is left at `place` of what was `left` before, or `None` where the triangle is not seen there.
     pub fn test(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> Option<Left> {
-        let Features { side_planes, facing, edges, coarse, lens_lines, .. } = *run.features;
-        let (moving, lens) = (self.triangle.moving, left.within.lens);
         // Edges found over a coarser tile are those of that tile.
-        let mut left = Left { edges: None, ..*left };
-        let lines = self.lines.filter(|_| lens_lines && lens);
+        let mut left = Left { edges: None, facing: false, ..*left };
+        let lines = self.lines.filter(|_| run.features.lens_lines && left.within.lens);
         if let Some(lines) = lines {
-            let price = traversal::lens_line_madds(0);
-            left = self.judged(Test::LensLines, price, place, left, run, |left, work| {
-                left.narrowed(lens_lines_over(lines, &place.rect, left.within, work)?)
-            })?;
+            left = left.narrowed(lens_lines_over(lines, &place.rect, left.within, run.work)?)?;
         }
-        if side_planes && (moving || lens || self.triangle.behind) {
-            let price = 4 * traversal::side_madds(moving, lens, self.triangle.behind);
-            left = self.judged(Test::SidePlanes, price, place, left, run, |left, work| {
-                left.narrowed(self.side_planes(&place.rect, left.within, work)?)
-            })?;
+        let allowed = self.allowed(place, &left, run.features);
+        if !run.features.auto || allowed == Plan(0) {
+            return self.plan(allowed, place, left, run);
         }
-        if (facing || edges) && (coarse || place.tiles.is_none()) {
-            let (splits, price) = (run.features.facing_splits, self.edge_price(place, &left, run));
-            left = self.judged(Test::Edges, price, place, left, run, |mut left, work| {
-                if facing {
-                    self.facing(&place.rect, &mut left, splits, work)?;
-                }
-                if edges {
-                    self.edge_bounds(&place.rect, &mut left, work)?;
-                }
-                Some(left)
-            })?;
+        let stake = self.stake(allowed, place, &left);
+        match run.judge.plan(&stake) {
+            Some(plan) => self.watched(&stake, plan, place, left, run),
+            None => self.trial(&stake, place, left, run),
+        }
+    }
+
+    /// The tests that are switched on and can help here.
+    fn allowed(&self, place: &Place, left: &Left, features: &Features) -> Plan {
+        let here = features.coarse || place.tiles.is_none();
+        let sides =
+            features.side_planes && (self.triangle.moving || left.within.lens || self.triangle.behind);
+        let bits = [
+            (sides, Plan::SIDES),
+            (features.facing && here, Plan::FACING),
+            (features.edges && here, Plan::EDGES),
+        ];
+        Plan(bits.iter().map(|&(on, bit)| if on { bit } else { 0 }).sum())
+    }
+
+    fn plan(&self, plan: Plan, place: &Place, left: Left, run: &mut Run<'_>) -> Option<Left> {
+        let tests = [Plan::SIDES, Plan::FACING, Plan::EDGES];
+        tests
+            .into_iter()
+            .filter(|&test| plan.has(test))
+            .try_fold(left, |left, test| self.step(test, place, left, run))
+    }
+
+    /// The same, learning from it.
+    fn watched(
+        &self,
+        stake: &Stake,
+        plan: Plan,
+        place: &Place,
+        left: Left,
+        run: &mut Run<'_>,
+    ) -> Option<Left> {
+        let Some((_, parent)) = plan.last() else { return Some(left) };
+        let left = self.watched(stake, parent, place, left, run)?;
+        self.watched_step(stake, plan, place, left, run)
+    }
+
+    /// The last test of a plan on what those before it have left.
+    fn watched_step(
+        &self,
+        stake: &Stake,
+        plan: Plan,
+        place: &Place,
+        left: Left,
+        run: &mut Run<'_>,
+    ) -> Option<Left> {
+        let Some((test, _)) = plan.last() else { return Some(left) };
+        let (volume, madds) = (left.volume(self.triangle.moving), run.work.tile_madds());
+        let rest = self.step(test, place, left, run);
+        let after = rest.map_or(0.0, |rest| rest.volume(self.triangle.moving));
+        let left = if volume > 0.0 { after / volume } else { f64::from(u8::from(rest.is_some())) };
+        let samples = f64::from(place.samples) * volume;
+        run.judge.learn(stake, plan, &Did { madds: run.work.tile_madds() - madds, samples, left });
+        rest
+    }
+
+    /// Every plan on what is `left`; the rest of the fullest one is kept.
+    fn trial(&self, stake: &Stake, place: &Place, left: Left, run: &mut Run<'_>) -> Option<Left> {
+        let before = run.work.tile_madds();
+        let mut lefts = [Some(left); Plan::COUNT];
+        for plan in stake.allowed.within() {
+            let Some((_, parent)) = plan.last() else { continue };
+            let parent = lefts[parent.0 as usize];
+            lefts[plan.0 as usize] = parent.and_then(|left| self.watched_step(stake, plan, place, left, run));
+        }
+        run.judge.learn_trial(stake, run.work.tile_madds() - before);
+        lefts[stake.allowed.0 as usize]
+    }
+
+    fn step(&self, test: u8, place: &Place, mut left: Left, run: &mut Run<'_>) -> Option<Left> {
+        match test {
+            Plan::SIDES => return left.narrowed(self.side_planes(&place.rect, left.within, run.work)?),
+            Plan::FACING => {
+                self.facing(&place.rect, &mut left, run.features.facing_splits, run.work)?;
+                left.facing = true;
+            }
+            _ => self.edge_bounds(&place.rect, &mut left, run.work)?,
         }
         Some(left)
     }
 
-    /// Runs a test, under `auto` only where it is wanted.
-    fn judged(
-        &self,
-        test: Test,
-        price: u32,
-        place: &Place,
-        left: Left,
-        run: &mut Run<'_>,
-        kernel: impl FnOnce(Left, &mut TileWork) -> Option<Left>,
-    ) -> Option<Left> {
-        if !run.features.auto {
-            return kernel(left, run.work);
+    /// What `auto` has to know of `place` and what is `left` there.
+    fn stake(&self, allowed: Plan, place: &Place, left: &Left) -> Stake {
+        let (moving, lens) = (self.triangle.moving, left.within.lens);
+        Stake {
+            allowed,
+            moving,
+            samples: f64::from(place.samples) * left.volume(moving),
+            tiles: place.tiles,
+            found: f64::from(traversal::edge_madds(moving, lens)),
+            screen: f64::from(traversal::screen_setup_madds(moving, lens, true) + GAIN),
+            full: f64::from(sample_test::madds(moving, lens)),
         }
-        let at_stake = self.at_stake(place, &left, run);
-        if !run.judge.wants(test, place.tiles.is_some(), price, at_stake) {
-            return Some(left);
-        }
-        let before = (left.volume(self.triangle.moving), run.work.tile_madds());
-        let after = kernel(left, run.work);
-        let left = after.map_or(0.0, |left| left.volume(self.triangle.moving) / before.0);
-        let share = if left.is_finite() { 1.0 - left } else { 0.0 };
-        let dearer = f64::from(run.work.tile_madds() - before.1) / f64::from(price);
-        run.judge.learn(test, place.tiles.is_some(), share, dearer);
-        after
-    }
-
-    /// The multiply-adds to be expected at `place` for what is `left`.
-    fn at_stake(&self, place: &Place, left: &Left, run: &Run<'_>) -> f64 {
-        let (moving, lens) = (self.triangle.moving, left.within.lens);
-        let full = f64::from(sample_test::madds(moving, lens));
-        let screened =
-            f64::from(traversal::screen_madds(moving, lens)) + (1.0 - run.judge.share(Test::Screen)) * full;
-        let price = if run.features.screen { screened.min(full) } else { full };
-        let samples = f64::from(place.samples) * left.volume(moving);
-        let tiles = place.tiles.map_or(0.0, |tiles| {
-            f64::from(
-                tiles
-                    * (4 * traversal::side_madds(moving, lens, false) + traversal::edge_madds(moving, lens)),
-            )
-        });
-        // A finer tile costs no more than testing all its samples.
-        samples * price + tiles.min(samples * full)
-    }
-
-    /// The price of facing and edge bounds; where a screen follows, the edges are found anyway.
-    fn edge_price(&self, place: &Place, left: &Left, run: &Run<'_>) -> u32 {
-        let (moving, lens) = (self.triangle.moving, left.within.lens);
-        let facing = if run.features.facing { traversal::facing_madds(moving, lens, 0) } else { 0 };
-        let bounds = if run.features.edges { traversal::edge_bound_madds(moving, lens) } else { 0 };
-        let found = traversal::edge_madds(moving, lens);
-        let screen = f64::from(found + traversal::screen_setup_madds(moving, lens, true));
-        let shared =
-            run.features.screen && place.tiles.is_none() && self.saved_by_screen(place, left, run) > screen;
-        facing + bounds + if shared { 0 } else { found }
-    }
-
-    /// The multiply-adds a screen saves as a rule, but for its set-up.
-    fn saved_by_screen(&self, place: &Place, left: &Left, run: &Run<'_>) -> f64 {
-        let (moving, lens) = (self.triangle.moving, left.within.lens);
-        let (full, screen) = (sample_test::madds(moving, lens), traversal::screen_madds(moving, lens));
-        let each = run.judge.share(Test::Screen) * f64::from(full) - f64::from(screen);
-        f64::from(place.samples) * left.volume(moving) * each
     }
 
     fn side_planes(&self, rect: &TileRect, within: Box5, work: &mut TileWork) -> Option<Box5> {
@@ -195,20 +226,31 @@ impl Subject<'_> {
         Some(())
     }
 
-    /// Whether to screen the samples of what is left on a fine tile.
+    /// Whether to set up screens for the samples of what is left on a fine tile.
     pub fn wants_screen(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> bool {
         if !run.features.auto || !run.features.screen {
             return run.features.screen;
         }
         let (moving, lens) = (self.triangle.moving, left.within.lens);
         let found = if left.edges.is_some() { 0 } else { traversal::edge_madds(moving, lens) };
-        let screened =
-            f64::from(place.samples) * left.volume(moving) * f64::from(traversal::screen_madds(moving, lens));
         let full =
             f64::from(place.samples) * left.volume(moving) * f64::from(sample_test::madds(moving, lens));
         let pieces = left.times.pieces().len() as u32;
-        let set_up = found + pieces * traversal::screen_setup_madds(moving, lens, pieces == 1);
-        run.judge.wants(Test::Screen, false, set_up + screened as u32, full)
+        let set_up = found + pieces * (traversal::screen_setup_madds(moving, lens, pieces == 1) + GAIN);
+        let wants = run.judge.wants_screen(f64::from(set_up), full);
+        run.judge.learn_screened(wants);
+        wants
+    }
+
+    /// Whether a screen saves more than it costs, by what it is expected to take away.
+    pub fn pays(&self, screen: &Screen, lens: bool, run: &mut Run<'_>) -> bool {
+        if !run.features.auto {
+            return true;
+        }
+        run.work.screen_setup_madds += GAIN;
+        let moving = self.triangle.moving;
+        let (full, price) = (sample_test::madds(moving, lens), traversal::screen_madds(moving, lens));
+        run.judge.wants_samples_screened(screen.gain(), f64::from(price), f64::from(full))
     }
 
     /// The screen for the samples of a piece of the time that is left.

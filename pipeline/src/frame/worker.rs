@@ -2,19 +2,23 @@
 
 use super::bin::Bin;
 use super::counters::{BinLog, TestsHere, TileWork, Work};
-use super::judge::Test;
 use super::pass::Pass;
 use super::surface::{Grid, own_pixel};
 use super::tile_tests::{Left, Place, Run, Subject};
 use super::vertices::Ready;
 use super::{Settings, Shading};
-use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
+use crate::depth::{Bounder, BoxGrid, DepthTile};
 use crate::geometry::Shear;
 use crate::sample_test::{self, Hits, Target, test_screened};
 use crate::sampling::TileSamples;
 use crate::setup::{PixelRect, Triangle};
 use crate::shading::QuadSet;
 use crate::traversal::{self, Box5, TileRect};
+
+mod gain;
+mod in_sight;
+
+use gain::Gain;
 
 /// Memory a worker uses over and over.
 #[derive(Default)]
@@ -74,7 +78,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             for column in tiles.x0..tiles.x1 {
                 let before = (self.tests, self.log.work.len());
                 self.tests.visited += 1;
-                self.tile(&subject, &left, [column * side, row * side]);
+                self.fine(&subject, &left, [column * side, row * side]);
                 if self.pass.heat {
                     self.note_tests(before, [column * side, row * side]);
                 }
@@ -107,6 +111,17 @@ impl<'a, 'p> Worker<'a, 'p> {
         self.log.tests[place].add(&before, &after);
     }
 
+    /// One triangle in one tile; `auto` learns what that takes where nothing is hit.
+    fn fine(&mut self, subject: &Subject<'_>, left: &Left, origin: [u32; 2]) {
+        let before = (self.tests.tile_madds(), self.log.work.len());
+        self.tile(subject, left, origin);
+        let packet = self.log.work[before.1..].last();
+        let madds = packet.map_or(self.tests.tile_madds(), |work| {
+            work.tests.tile_madds() + work.screen_madds + work.sample_madds
+        });
+        self.bin.judge.learn_tile(madds.saturating_sub(before.0), packet.is_none_or(|work| work.hit == 0));
+    }
+
     /// One triangle in one tile, as far as the tests let it.
     fn tile(&mut self, subject: &Subject<'_>, left: &Left, origin: [u32; 2]) {
         let rect = TileRect::new(self.pass.settings.viewport, origin, self.pass.settings.spec.tile_px);
@@ -127,50 +142,10 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
     }
 
-    /// Where the depths stored in the tile leave the triangle to be seen, and whether none of them has to be read for it.
-    fn in_sight(
-        &mut self,
-        triangle: &Triangle,
-        rect: &TileRect,
-        within: &Box5,
-        place: usize,
-    ) -> Option<(Box5, bool)> {
-        let (features, depth) = (&self.pass.settings.spec.features, &self.pass.settings.spec.depth);
-        if !features.z_max && !depth.z_min {
-            return Some((*within, false));
-        }
-        self.prepare(triangle);
-        let mut visible = Visible::unknown(within);
-        if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[place]) {
-            self.tests.z_updates += if features.z_max { tile.renew() } else { 0 };
-            visible = tile.boxes.look(within, |part| bounder.over(rect, part));
-        }
-        self.tests.z_tests += visible.compared;
-        self.tests.interval_madds +=
-            visible.compared * interval_madds(depth.bound, triangle.moving, within.lens);
-        if !features.z_max {
-            return Some((*within, visible.in_front && visible.behind == 0));
-        }
-        self.tests.boxes_culled += visible.behind;
-        self.tests.z_culled += u32::from(visible.within.is_none());
-        // The sample test takes a still triangle at all times.
-        let time = |rest: Box5| Box5 { t: if triangle.moving { rest.t } else { within.t }, ..rest };
-        let front = depth.z_min && visible.in_front && (triangle.moving || visible.behind == 0);
-        visible.within.map(|rest| (time(rest), front))
-    }
-
-    /// Finds what is known of the depth of a triangle, once in a bin.
-    fn prepare(&mut self, triangle: &Triangle) {
-        if self.bounder.as_ref().is_none_or(|(id, _)| *id != triangle.id) {
-            let bound = self.pass.settings.spec.depth.bound;
-            self.tests.interval_madds += set_up_madds(bound, triangle.moving);
-            self.bounder = Some((triangle.id, Bounder::new(triangle, &self.pass.projection.shear, bound)));
-        }
-    }
-
     /// The samples of a tile in each piece of the time that is left. Says in which dimensions they were tested.
     fn samples(&mut self, subject: &Subject<'_>, tile: &Place, left: &mut Left, place: usize) -> [bool; 2] {
         let screened = subject.wants_screen(tile, left, &mut self.run());
+        left.screened = screened;
         let Scratch { samples, sharp, hits, .. } = &mut *self.scratch;
         let drawn_sharp = self.pass.lens && !left.within.lens;
         let samples = if drawn_sharp { &sharp[place] } else { &samples[place] };
@@ -180,18 +155,22 @@ impl<'a, 'p> Worker<'a, 'p> {
         let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
         let (times, near) = (left.times, self.pass.projection.near);
         let (triangle, within) = unclipped(subject.triangle, left.within);
+        let mut gain = Gain::default();
         for piece in times.pieces() {
             let within = Box5 { t: piece.t, ..within };
             let screen = screened.then(|| subject.screen(&tile.rect, left, piece, &mut self.tests));
+            let features = &self.pass.settings.spec.features;
+            let mut run = Run { features, work: &mut self.tests, judge: &mut self.bin.judge };
+            let screen = screen.filter(|screen| subject.pays(screen, within.lens, &mut run));
+            let before = [hits.screened, hits.tested];
             test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
+            let did = [hits.screened - before[0], hits.tested - before[1]];
+            gain.add(did, screen.as_ref(), &mut self.bin.judge);
         }
+        gain.learn(hits, [triangle.moving, within.lens], left, &mut self.bin.judge);
         if !hits.written.is_empty() {
             let lowered = stored.wrote(&hits.written);
             self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
-        }
-        if hits.screened > 0 {
-            let passed = f64::from(hits.tested) / f64::from(hits.screened);
-            self.bin.judge.learn(Test::Screen, false, 1.0 - passed, 1.0);
         }
         [triangle.moving, within.lens]
     }

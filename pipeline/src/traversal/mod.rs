@@ -31,7 +31,7 @@ pub use facing::Facing;
 pub use lens_lines::LensLines;
 pub use number::Number;
 pub use quadratic::{Pieces, Quadratic};
-pub use screen::{Screen, screen_madds};
+pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
 pub use timeline::{Piece, Timeline};

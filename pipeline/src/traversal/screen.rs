@@ -18,6 +18,25 @@ pub struct Screen {
     pub gradient: [[f32; 5]; 3],
     /// For each edge how far the linear value may be off.
     pub margin: [f32; 3],
+    /// For each edge how far it may be from its value in the middle, but for the margin.
+    pub extent: [f32; 3],
+}
+
+/// Multiply-adds of [`Screen::gain`]: for each edge a reciprocal, two places on it and two products; the product of both.
+pub const SCREEN_GAIN_MADDS: u32 = 3 * 5 + 1;
+
+impl Screen {
+    /// The share of samples that it takes away, were the edges spread evenly over their extents and independent.
+    pub fn gain(&self) -> f32 {
+        let mut kept = [1.0_f32; 2];
+        for k in 0..3 {
+            let per = 0.5 / self.extent[k].max(f32::MIN_POSITIVE);
+            let [below, above] = [-self.value[k], self.value[k]]
+                .map(|value| ((value - self.margin[k] + self.extent[k]) * per).clamp(0.0, 1.0));
+            (kept[0], kept[1]) = (kept[0] * (1.0 - below), kept[1] * (1.0 - above));
+        }
+        (1.0 - kept[0]) * (1.0 - kept[1])
+    }
 }
 
 /// `value + slopes . d` over a box, right to within `remainder` of what the sample test computes.
@@ -43,12 +62,14 @@ pub(super) fn linearized<N: Number>(edges: &Edges<N>, t: [f32; 2], faces: Faces,
     let part = (view.moving && t != view.t).then(|| t.map(|t| view.phase(t)));
     let half_t = (N::from(t[1]) - N::from(t[0])) * N::from(0.5);
     let linear = edges.edges.map(|edge| edge.linear(view, part, half_t, skew));
-    let mut screen = Screen { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3] };
+    let mut screen =
+        Screen { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3], extent: [0.0; 3] };
     for (k, linear) in linear.iter().enumerate() {
         // The middle of the times is rounded; what it moves by goes into the margin.
         let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle[4].abs());
         let [value, margin] = one_sided(linear, off, faces);
         (screen.value[k], screen.margin[k]) = (value, margin);
+        screen.extent[k] = Into::<f64>::into(linear.extent) as f32;
         screen.gradient[k] = linear.slopes.map(|slope| Into::<f64>::into(slope) as f32);
     }
     screen

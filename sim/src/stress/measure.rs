@@ -86,7 +86,7 @@ pub fn measure(
     methods: &[Method],
 ) -> Result<Vec<Row>, RunError> {
     let failed = |message: String| RunError::Setting(format!("{} at {value}: {message}", family.name));
-    let scene = family.scene(value, size, 1).map_err(|error| failed(error.to_string()))?;
+    let scene = family.scene(value, size, super::SEED).map_err(|error| failed(error.to_string()))?;
     let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
     let (camera, viewport, samples) = (&scene.camera, scene.viewport, &scene.samples);
     let subject = Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline };

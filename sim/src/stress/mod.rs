@@ -5,8 +5,10 @@
 //! - [`sweep`], [`truth`]: when a triangle truly touches a tile.
 //! - [`intervals`]: the boxes of tile tests against that.
 //! - [`measure`]: all of it for one value of a family.
+//! - [`choice`]: `auto` against every fixed choice of tests.
 //! - [`report`]: every row, as table, CSV and pictures.
 
+pub mod choice;
 pub mod intervals;
 pub mod measure;
 pub mod methods;
@@ -22,8 +24,12 @@ use workloads::stress::{Family, Size, families, family};
 use crate::gpu::GpuSpec;
 use crate::output::progress::Progress;
 use crate::run::RunError;
+use choice::{Choices, Trial};
 use measure::Row;
 pub use report::Report;
+
+/// The seed of the scenes.
+const SEED: u64 = 1;
 
 /// Sweeps the family called `only`, or all of them.
 ///
@@ -38,15 +44,22 @@ pub fn stress(only: Option<&str>, quick: bool, progress: &Progress) -> Result<Re
         .flat_map(|&family| family.sweep(quick).iter().map(move |&value| (family, value)))
         .collect();
     let bar = progress.bar("values", cases.len() as u64);
-    let rows: Vec<Vec<Row>> = cases
+    let measured: Vec<(Vec<Row>, Trial)> = cases
         .par_iter()
         .map(|&(family, value)| {
-            let rows = measure::measure(family, value, size, &gpu, &methods::METHODS);
+            let rows = measure::measure(family, value, size, &gpu, &methods::METHODS)?;
+            let trial = choice::trial(family, value, size, SEED, &gpu)?;
             bar.inc();
-            rows
+            Ok((rows, trial))
         })
         .collect::<Result<_, RunError>>()?;
-    Ok(Report { families: chosen, size, rows: rows.into_iter().flatten().collect() })
+    let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
+    Ok(Report {
+        families: chosen,
+        size,
+        rows: rows.into_iter().flatten().collect(),
+        auto: Choices::new(&trials),
+    })
 }
 
 fn choose(only: Option<&str>) -> Result<Vec<&'static Family>, RunError> {

@@ -2,6 +2,7 @@
 
 use workloads::stress::Family;
 
+use super::choice::{Choice, Choices};
 use super::measure::Row;
 use super::methods::METHODS;
 use super::report::Report;
@@ -31,6 +32,34 @@ pub(super) fn matrix(report: &Report) -> Picture {
         panels: vec![
             panel("at the harmless end of each family", true),
             panel("at the value of each family that is worst for the method", false),
+        ],
+    }
+    .picture()
+}
+
+/// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that is worst for it.
+pub(super) fn auto(choices: &Choices) -> Picture {
+    type Cost = fn(&Choice) -> f64;
+    let costs: [(&str, Cost); 2] = [
+        ("auto", |choice| choice.over_best),
+        ("all", |choice| choice.all_madds.max(1) as f64 / choice.best_madds.max(1) as f64),
+    ];
+    let worst = |family: &Choice, cost: Cost| {
+        let values = choices.values.iter().filter(|value| value.family == family.family);
+        values.map(cost).reduce(f64::max)
+    };
+    let whole = costs.map(|(name, cost)| (name, choices.families.iter().map(|f| Some(cost(f))).collect()));
+    let values = costs.map(|(name, cost)| (name, choices.families.iter().map(|f| worst(f, cost)).collect()));
+    Matrix {
+        title: "What auto takes beside the best fixed choice of tests",
+        subject: "multiply-adds over those of the best of all combinations of tests",
+        columns: choices.families.iter().map(|family| family.family).collect(),
+        panels: vec![
+            MatrixPanel {
+                name: "each family as a whole, one choice for all its values",
+                rows: whole.to_vec(),
+            },
+            MatrixPanel { name: "the worst value, with a choice for it alone", rows: values.to_vec() },
         ],
     }
     .picture()

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use workloads::stress::{Family, Size};
 
+use super::choice::Choices;
 use super::measure::Row;
 use super::methods::METHODS;
 use super::picture;
@@ -17,6 +18,8 @@ pub struct Report {
     pub size: Size,
     /// A row for each family, value and method, in this order.
     pub rows: Vec<Row>,
+    /// `auto` against every fixed choice of tests.
+    pub auto: Choices,
 }
 
 /// What goes into `summary.json`.
@@ -28,6 +31,8 @@ pub struct Summary<'a> {
     pub pairs_wrong: u64,
     /// Side of the images in pixels.
     pub side_px: u32,
+    /// `auto` against the best fixed choice of tests.
+    pub auto: &'a Choices,
     /// Every row.
     pub rows: &'a [Row],
 }
@@ -39,6 +44,7 @@ impl Report {
             samples_lost: self.rows.iter().map(|row| row.samples_lost).sum(),
             pairs_wrong: self.rows.iter().map(|row| row.intervals.pairs_wrong).sum(),
             side_px: self.size.side_px,
+            auto: &self.auto,
             rows: &self.rows,
         }
     }
@@ -73,8 +79,11 @@ impl Report {
         let summary = self.summary();
         let rows = self.rows.len();
         format!(
-            "{table}\n{} samples lost and {} boxes too small in {rows} sweeps of {} pixels a side\n",
-            summary.samples_lost, summary.pairs_wrong, self.size.side_px
+            "{table}\n{} samples lost and {} boxes too small in {rows} sweeps of {} pixels a side\n{}",
+            summary.samples_lost,
+            summary.pairs_wrong,
+            self.size.side_px,
+            self.auto.text()
         )
     }
 
@@ -139,12 +148,19 @@ impl Report {
         dir.remove_stale("plots", "stress_", &["svg", "png"])?;
         if self.families.len() > 1 {
             picture::matrix(self).write(&dir, "plots/stress_matrix")?;
+            picture::auto(&self.auto).write(&dir, "plots/stress_auto")?;
         }
         for family in &self.families {
             let stem = format!("plots/stress_{}", family.name.replace('-', "_"));
             picture::family(self, family).write(&dir, &stem)?;
         }
         dir.write_atomic("stress.csv", |out| self.csv(out))?;
+        dir.write_atomic("auto.csv", |out| {
+            let mut csv = csv::Writer::from_writer(out);
+            let choices = self.auto.families.iter().chain(&self.auto.values);
+            choices.into_iter().try_for_each(|choice| csv.serialize(choice))?;
+            Ok(csv.flush()?)
+        })?;
         dir.complete(|out| Ok(serde_json::to_writer_pretty(out, &self.summary())?))?;
         Ok(())
     }

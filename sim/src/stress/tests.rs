@@ -64,7 +64,7 @@ fn lost_samples_are_counted_and_the_report_is_not_clean() {
     let family = family("speed").unwrap();
     let gpu = GpuSpec::load("reference").unwrap();
     let rows = measure::measure(family, 0.1, SIZE, &gpu, &METHODS).unwrap();
-    let mut report = Report { families: vec![family], size: SIZE, rows };
+    let mut report = Report { families: vec![family], size: SIZE, rows, auto: Choices::default() };
     assert!(report.is_clean(), "{}", report.text());
     assert_eq!(report.rows[0].held_against, "brute force");
     let scene = family.scene(0.1, SIZE, 1).unwrap();
@@ -88,6 +88,19 @@ fn the_best_method_is_the_measure_of_all() {
         assert_eq!(least, 1.0);
         assert!(rows[0].over_best > 1.0, "the bounding box alone is not the best on {name}");
         assert!(rows.iter().all(|row| row.work.samples_hit > 0));
+    }
+}
+
+/// Families on which no set of tests is best at all values, and some that were hard to choose on; `quintile stress` has all.
+#[test]
+fn auto_is_as_good_as_the_best_fixed_choice_on_a_family() {
+    let gpu = GpuSpec::load("reference").unwrap();
+    for (name, seed) in [("shared-edges", 4), ("slivers", 5), ("through-lens", 6), ("speed", 7)] {
+        let family = family(name).unwrap();
+        let values = family.sweep(true).par_iter();
+        let trials = values.map(|&value| choice::trial(family, value, Size::QUICK, seed, &gpu).unwrap());
+        let choices = Choices::new(&trials.collect::<Vec<_>>());
+        assert_eq!(choices.families_over(), 0, "{}", choices.text());
     }
 }
 

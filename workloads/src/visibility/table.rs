@@ -42,7 +42,8 @@ impl FixedSamples {
                 "{width}x{height} pixels of {per_pixel} samples; sides start at 1, and a pixel takes 1 to 256"
             )));
         }
-        let count = u64::from(width) * u64::from(height) * u64::from(per_pixel);
+        // Sides of 2^32 make more samples than a u64 counts; no file holds so many either way.
+        let count = (u64::from(width) * u64::from(height)).saturating_mul(u64::from(per_pixel));
         bytes.expect_records(count, SAMPLE_BYTES)?;
         let mut samples = Vec::new();
         for index in 0..count {
@@ -120,6 +121,18 @@ mod tests {
             data.extend(number.to_le_bytes());
         }
         data
+    }
+
+    #[test]
+    fn more_samples_than_can_be_counted_are_refused() {
+        // 2^31 by 2^31 pixels of 16 samples are 2^66, which is 0 in 64 bits.
+        let mut data = file(0.125);
+        for (word, value) in [1_u32 << 31, 1 << 31, 16].into_iter().enumerate() {
+            data[8 + 4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+        }
+        data.truncate(24);
+        let error = FixedSamples::parse(Path::new("a.smp"), &data).unwrap_err();
+        assert!(error.to_string().contains("0 bytes follow"), "{error}");
     }
 
     #[test]

@@ -88,7 +88,9 @@ fn shade(over_best: f64) -> f64 {
 
 /// A cost in at most four letters.
 fn number(value: f64) -> String {
-    if value < 9.95 {
+    if value < 1.995 {
+        format!("{value:.2}")
+    } else if value < 9.95 {
         format!("{value:.1}")
     } else if value < 9_999.5 {
         format!("{value:.0}")
