@@ -41,7 +41,8 @@ struct Run {
 }
 
 /// Finds what the samples of `source` see of `scene`, `runs` times: with tile tests as the modelled hardware does it, or
-/// without as fast as it goes; the engine that goes fastest takes no orthographic camera, so that is modelled with all tests. Uses the threads of the pool it is called in.
+/// without as fast as it goes; the engine that goes fastest takes no orthographic camera, so that is modelled with all tests. Uses
+/// the threads of the pool it is called in.
 ///
 /// # Errors
 /// When the mesh cannot be drawn, in words.
@@ -69,8 +70,7 @@ fn fastest(
     runs: u16,
 ) -> Option<Found> {
     let before = Instant::now();
-    let moving = scene.open != scene.close;
-    let layout = SampleLayout::new(&scene.camera, scene.viewport, source, moving)?;
+    let layout = SampleLayout::new(&scene.camera, scene.viewport, source, !geometry.is_still())?;
     let mut visibility = Visibility::new(&layout);
     let before_s = before.elapsed().as_secs_f64();
     let timed =

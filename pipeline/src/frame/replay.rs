@@ -60,8 +60,7 @@ impl<'a> Replay<'a> {
     pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
         let geometry = &self.pass.draws[draw].geometry;
         let bytes = geometry.vertex_bytes();
-        let ends =
-            if std::ptr::eq(geometry.open(), geometry.close()) && self.pass.still_camera { 1 } else { 2 };
+        let ends = if geometry.is_still() && self.pass.still_camera { 1 } else { 2 };
         for vertex in self.pass.corners(triangle).1 {
             if self.reuse.knows((draw, vertex as u32)) {
                 continue;

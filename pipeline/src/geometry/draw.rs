@@ -122,6 +122,11 @@ impl<'a> Geometry<'a> {
         self.close
     }
 
+    /// Whether the positions at both ends are one array, so that nothing moves.
+    pub fn is_still(&self) -> bool {
+        std::ptr::eq(self.open, self.close)
+    }
+
     /// Normals, or nothing where faces are flat.
     pub fn normals(&self) -> &'a [Vec3] {
         self.normals
@@ -140,7 +145,7 @@ impl<'a> Geometry<'a> {
     /// Bytes of one vertex as fetched: positions at both ends where they differ, and the attributes.
     pub fn vertex_bytes(&self) -> u32 {
         let vec3 = |present: bool| if present { 12 } else { 0 };
-        12 + vec3(!std::ptr::eq(self.open, self.close))
+        12 + vec3(!self.is_still())
             + vec3(!self.normals.is_empty())
             + if self.uvs.is_empty() { 0 } else { 8 }
     }

@@ -172,7 +172,7 @@ impl Projection {
 
     /// The images of all vertices of `geometry`.
     pub(crate) fn images(&self, geometry: &Geometry<'_>) -> Vec<MovingVertex> {
-        if self.open == self.close && std::ptr::eq(geometry.open(), geometry.close()) {
+        if self.open == self.close && geometry.is_still() {
             let still = |&world: &Vec3| {
                 let open = self.image(&self.open, world);
                 MovingVertex { open, close: open }

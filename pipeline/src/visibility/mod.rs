@@ -6,8 +6,10 @@
 //!
 //! 1. triangles are set up, sorted front to back and handed to the bins they may touch;
 //! 2. in a bin each is bounded over sixteen boxes of lens and time at once (`cells`);
-//! 3. in each cell where it may be seen, sixteen packets at once are tested against its edges and the depths they hold;
-//! 4. what is left is tested sample by sample, by the very kernel of [`crate::sample_test`].
+//! 3. in each cell where it may be seen, blocks and then their packets are tested sixteen at once: against its box, the depths
+//!    they hold and, where that leaves something, its edges;
+//! 4. what is left waits in a queue while its samples are fetched, and is tested sample by sample, by the very kernel of
+//!    [`crate::sample_test`].
 //!
 //! The result is that of the sample test on all samples, bit for bit.
 

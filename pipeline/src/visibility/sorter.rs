@@ -161,8 +161,7 @@ impl Sorter<'_> {
         for (lane, s) in samples.iter().enumerate() {
             bin.places[number][lane] = s.place;
             for (axis, (at, lens)) in [(s.x, s.u), (s.y, s.v)].into_iter().enumerate() {
-                packet.slope[axis].0[lane] = at - lens * self.shear.a[axis];
-                packet.lens[axis].0[lane] = lens * self.shear.s[axis];
+                [packet.slope[axis].0[lane], packet.lens[axis].0[lane]] = self.shear.ray(axis, at, lens);
             }
             packet.t.0[lane] = s.t;
             boxes.include(lane_in_cell, s.x, s.y);

@@ -66,11 +66,11 @@ impl<'a> Timer<'a> {
         let refused = |what: &str| ChartError::Pipeline(what.to_owned());
         let samples = HashedSamples::new(SEED, self.effort.side_px, samples, LensShape::Disk)
             .ok_or_else(|| refused("1 to 256 samples a pixel"))?;
-        let moving = scene.open != scene.close;
-        let layout = SampleLayout::new(&scene.camera, scene.viewport, &samples, moving)
-            .ok_or_else(|| refused("an orthographic camera"))?;
-        let close = if moving { &scene.close } else { &scene.open };
+        // One array twice is a still mesh.
+        let close = if scene.open == scene.close { &scene.open } else { &scene.close };
         let geometry = Geometry::new(&scene.open, close, &scene.triangles).map_err(StressError::from)?;
+        let layout = SampleLayout::new(&scene.camera, scene.viewport, &samples, !geometry.is_still())
+            .ok_or_else(|| refused("an orthographic camera"))?;
         let mut visibility = Visibility::new(&layout);
         let once = || {
             let start = ThreadTime::now();

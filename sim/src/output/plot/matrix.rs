@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(shade(1e9), 1.0);
         assert_eq!(
             [number(1.0), number(12.34), number(9999.0), number(123_456.0)],
-            ["1.0", "12", "9999", "123k"]
+            ["1.00", "12", "9999", "123k"]
         );
     }
 
