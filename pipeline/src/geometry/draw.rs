@@ -145,9 +145,7 @@ impl<'a> Geometry<'a> {
     /// Bytes of one vertex as fetched: positions at both ends where they differ, and the attributes.
     pub fn vertex_bytes(&self) -> u32 {
         let vec3 = |present: bool| if present { 12 } else { 0 };
-        12 + vec3(!self.is_still())
-            + vec3(!self.normals.is_empty())
-            + if self.uvs.is_empty() { 0 } else { 8 }
+        12 + vec3(!self.is_still()) + vec3(!self.normals.is_empty()) + if self.uvs.is_empty() { 0 } else { 8 }
     }
 }
 
