@@ -13,6 +13,33 @@ struct Known {
     stale: bool,
     /// Whether what is being written lowered the nearest depth.
     lowered: bool,
+    /// Where its slots begin and end among those sorted by box.
+    slots: [u32; 2],
+    /// The first of these that was the farthest when last looked for.
+    witness: u32,
+}
+
+impl Known {
+    /// Nothing stored, and no slots yet of those that will be sorted from `first` on.
+    fn cleared(first: u32, farthest: f32) -> Self {
+        let (nearest, slots, witness) = (f32::INFINITY, [first; 2], first);
+        Self { farthest, nearest, stale: false, lowered: false, slots, witness }
+    }
+
+    /// Finds the farthest depth anew. As depths only come nearer, it is what it was where any slot still has it, and slots
+    /// before the witness do not: most often one look is enough.
+    fn renew(&mut self, depth: &[f32], slots: &[u16]) {
+        self.stale = false;
+        let [first, end] = self.slots.map(|at| at as usize);
+        let is = |farthest: f32| move |&slot: &u16| depth[slot as usize] == farthest;
+        if let Some(step) = slots[self.witness as usize..end].iter().position(is(self.farthest)) {
+            self.witness += step as u32;
+            return;
+        }
+        let own = &slots[first..end];
+        self.farthest = own.iter().map(|&slot| depth[slot as usize]).fold(f32::NEG_INFINITY, f32::max);
+        self.witness = (first + own.iter().position(is(self.farthest)).unwrap_or(0)) as u32;
+    }
 }
 
 /// Where a triangle may be seen, as far as depths tell.
@@ -45,6 +72,8 @@ pub struct DepthBoxes {
     boxes: Vec<Known>,
     /// The box of each slot; empty where there is one only.
     places: Vec<u16>,
+    /// The slots sorted by box.
+    slots: Vec<u16>,
 }
 
 impl DepthBoxes {
@@ -53,17 +82,26 @@ impl DepthBoxes {
         let place = |slot| grid.of_sample(samples.u[slot], samples.v[slot], samples.t[slot]) as u16;
         let places = if grid.len() == 1 { Vec::new() } else { (0..samples.len).map(place).collect() };
         let mut counts = vec![0; grid.len()];
-        places.iter().for_each(|&place| counts[place as usize] += 1);
-        // A box without samples hides everything and is hidden by nothing.
-        let farthest =
-            |count: u32| if count == 0 && !places.is_empty() { f32::NEG_INFINITY } else { f32::INFINITY };
-        let known = |&count: &u32| Known {
-            farthest: farthest(count),
-            nearest: f32::INFINITY,
-            stale: false,
-            lowered: false,
-        };
-        Self { grid, boxes: counts.iter().map(known).collect(), places }
+        (0..samples.len).for_each(|slot| counts[places.get(slot).map_or(0, |&place| place as usize)] += 1);
+        let mut first = 0;
+        let boxes = counts.into_iter().map(|count| {
+            first += count;
+            // A box without samples hides everything and is hidden by nothing.
+            let hides = count == 0 && samples.len > 0;
+            Known::cleared(first - count, if hides { f32::NEG_INFINITY } else { f32::INFINITY })
+        });
+        let mut boxes = Self { grid, boxes: boxes.collect(), places, slots: vec![0; samples.len] };
+        boxes.sort_slots();
+        boxes
+    }
+
+    fn sort_slots(&mut self) {
+        for slot in 0..self.slots.len() {
+            let place = self.place(slot);
+            let end = &mut self.boxes[place].slots[1];
+            self.slots[*end as usize] = slot as u16;
+            *end += 1;
+        }
     }
 
     /// Of a tile whose samples have these depths.
@@ -143,18 +181,9 @@ impl DepthBoxes {
         if stale == 0 {
             return 0;
         }
-        self.boxes
-            .iter_mut()
-            .filter(|known| known.stale)
-            .for_each(|known| known.farthest = f32::NEG_INFINITY);
-        for (slot, &depth) in depth.iter().enumerate() {
-            let place = self.place(slot);
-            let known = &mut self.boxes[place];
-            if known.stale {
-                known.farthest = known.farthest.max(depth);
-            }
+        for known in self.boxes.iter_mut().filter(|known| known.stale) {
+            known.renew(depth, &self.slots);
         }
-        self.boxes.iter_mut().for_each(|known| known.stale = false);
         stale as u32
     }
 }
@@ -209,6 +238,33 @@ mod tests {
             assert_eq!(depths.renew(&depth), 0);
             let anew = DepthBoxes::of(*depths.grid(), &samples, &depth);
             assert!(boxes().iter().all(|within| anew.farthest(within) == depths.farthest(within)));
+        }
+    }
+
+    #[test]
+    fn the_farthest_is_exact_in_every_box_after_every_write() {
+        let samples = samples();
+        for counts in [[1, 1, 1], [1, 1, 4], [2, 3, 4]] {
+            let mut depths = DepthBoxes::cleared(BoxGrid::new(counts, true).unwrap(), &samples);
+            let mut depth = vec![f32::INFINITY; samples.len];
+            for round in 0..400 {
+                let chosen = |slot: u16| mix(u32::from(slot), round).is_multiple_of(7);
+                let slots: Vec<u16> = (0..samples.len as u16).filter(|&slot| chosen(slot)).collect();
+                // Few values, so that several samples of a box are the farthest.
+                slots.iter().for_each(|&slot| {
+                    depth[slot as usize] =
+                        depth[slot as usize].min(1e3) - (mix(u32::from(slot), round) % 3) as f32
+                });
+                depths.write(&depth, &slots);
+                let written: std::collections::HashSet<usize> =
+                    slots.iter().map(|&slot| depths.place(slot as usize)).collect();
+                assert_eq!(depths.renew(&depth) as usize, written.len());
+                for (index, known) in depths.boxes.iter().enumerate() {
+                    let own = (0..samples.len).filter(|&slot| depths.place(slot) == index);
+                    let farthest = own.map(|slot| depth[slot]).fold(f32::NEG_INFINITY, f32::max);
+                    assert_eq!(known.farthest, farthest, "box {index} of {counts:?}, round {round}");
+                }
+            }
         }
     }
 
