@@ -77,7 +77,9 @@ impl Pairs {
                 let origin = [(rect.x0 + column) * side, (rect.y0 + row) * side];
                 let place = Place::new(subject.viewport, projection.shear, projection.near, origin, side);
                 let truth = Truth::new(triangle, &projection.shear, &place.tile, projection.near);
-                pairs.push((truth.is_exact(), Pair { triangle: *triangle, place, truth: truth.hulls() }));
+                // The truth asks where a triangle is, not which face it shows; so must the tests.
+                let triangle = Triangle { faces: [true; 2], ..*triangle };
+                pairs.push((truth.is_exact(), Pair { triangle, place, truth: truth.hulls() }));
             }
             passed += here;
         }
