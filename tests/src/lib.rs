@@ -6,12 +6,14 @@ mod command;
 mod glb;
 mod inputs;
 mod picture;
+mod refusals;
 mod results;
 
 pub use command::{Ended, Quintile};
 pub use glb::Glb;
 pub use inputs::{Inputs, real_scenes, root};
 pub use picture::{Bounds, lit_bounds, mean_where};
+pub use refusals::Refusals;
 pub use results::{FrameRow, Results, number};
 
 /// The command under test, built by cargo from the source of `quintile`.

@@ -1,109 +1,18 @@
 //! Bad input: one clear message that names file, place and mend; exit code 2 for what was asked wrongly, 1 for what
-//! failed; no panic; and nothing left that looks like a whole result.
+//! failed; no panic.
 
 use std::fs;
-use std::path::Path;
 
 use serde_json::json;
-use tests::{Ended, Glb, Inputs, quintile, real_scenes};
+use tests::{Glb, Inputs, Refusals, quintile, real_scenes};
 
-/// What a mend begins with: a message has to say what to do, not only what is wrong.
-const MENDS: [&str; 34] = [
-    "--help",
-    "0 to 1",
-    "; up to ",
-    "above zero",
-    "add ",
-    "ask for",
-    "at least",
-    "built in:",
-    "check ",
-    "did you mean",
-    "due",
-    "end of RON",
-    "Expected ",
-    "export it",
-    "finite",
-    "from ",
-    "get it again",
-    "get the file again",
-    "give ",
-    "go up to",
-    "has to",
-    "have to",
-    "known here",
-    "leave it out",
-    "mend ",
-    "move one",
-    "name another",
-    "needs",
-    "put ",
-    "remove ",
-    "takes",
-    "to 256",
-    "with anything in it",
-    "write it as",
-];
-
-/// What is wrong with the refusals seen, all of them, so that one bad message does not hide the next.
-#[derive(Default)]
-struct Refusals {
-    complaints: Vec<String>,
-}
-
-impl Refusals {
-    /// Holds `ended` against what is due: it failed with `code` and one message that has every part of `says` and a mend.
-    fn check(&mut self, ended: &Ended, code: i32, says: &[&str]) {
-        let Ended { stdout, stderr, .. } = ended;
-        let mut complain = |holds: bool, what: &str| {
-            if !holds {
-                self.complaints.push(format!("{what}: {}", stderr.trim_end()));
-            }
-        };
-        complain(ended.code == Some(code), &format!("exit code {code} is due, not {:?}", ended.code));
-        complain(stdout.is_empty(), "standard output has to stay empty");
-        for part in says {
-            complain(stderr.contains(part), &format!("it does not say `{part}`"));
-        }
-        for part in ["panicked", "fault of the program", "backtrace", "RUST_BACKTRACE", "unwrap", "Err("] {
-            complain(!stderr.contains(part), part);
-        }
-        let own = stderr.lines().filter(|line| line.starts_with("quintile: ")).count();
-        let parser = stderr.lines().filter(|line| line.starts_with("error: ")).count();
-        complain(own + parser == 1, "one message is due");
-        complain(own == 0 || stderr.lines().count() == 1, "one line is due");
-        complain(MENDS.iter().any(|mend| stderr.contains(mend)), "it does not say how to mend it");
-    }
-
-    /// Runs `quintile run ARGS` into a fresh folder; refused there, it leaves nothing.
-    fn call(&mut self, args: &[&str], code: i32, says: &[&str]) {
-        let inputs = Inputs::new();
-        let out = inputs.path("out");
-        let ended = quintile!().call(["run"].iter().chain(args).chain(&["--out", &out]));
-        self.check(&ended, code, says);
-        if fs::read_dir(&out).is_ok_and(|mut left| left.next().is_some()) {
-            self.complaints.push(format!("{args:?} left files in its folder"));
-        }
-    }
-
-    /// The same with a scene file of these bytes; its name has to be in the message.
-    fn file(&mut self, name: &str, bytes: impl AsRef<[u8]>, code: i32, says: &[&str]) {
-        let inputs = Inputs::new();
-        let scene = inputs.put(name, bytes);
-        self.call(&[&scene], code, &[&[scene.as_str()], says].concat());
-    }
-}
-
-impl Drop for Refusals {
-    fn drop(&mut self) {
-        let complaints = self.complaints.join("\n");
-        assert!(complaints.is_empty() || std::thread::panicking(), "{complaints}");
-    }
+fn refusals() -> Refusals {
+    Refusals::of(|| quintile!())
 }
 
 #[test]
 fn flags() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     let cases: [(&[&str], &[&str]); 27] = [
         (&["--size", "0x48"], &["size", "0x48", "1 to 16384 pixels"]),
         (&["--size", "64x0"], &["size", "64x0"]),
@@ -140,7 +49,7 @@ fn flags() {
 
 #[test]
 fn a_frame_rate_that_cannot_be() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     for rate in ["-60", "0", "NaN", "1e9", "1e-9"] {
         refusals.call(&["tiny", "--rate", rate], 2, &["rate"]);
     }
@@ -148,7 +57,7 @@ fn a_frame_rate_that_cannot_be() {
 
 #[test]
 fn names_of_nothing() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     refusals.call(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
     refusals.call(&["scene.blend"], 2, &["scene.blend", ".gltf"]);
     refusals.call(&[""], 2, &["scene"]);
@@ -161,7 +70,7 @@ fn names_of_nothing() {
 
 #[test]
 fn files_that_are_not_there() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     for scene in ["gone.glb", "gone.gltf", "gone.ron", "gone.ply", "gone.ply.gz", "gone.obj"] {
         refusals.call(&[scene], 1, &[scene, "No such file"]);
     }
@@ -179,7 +88,7 @@ fn files_that_are_not_there() {
 #[cfg(unix)]
 #[test]
 fn names_that_are_no_text() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let name = OsStr::from_bytes(b"sc\xffene.glb");
@@ -189,7 +98,7 @@ fn names_that_are_no_text() {
 
 #[test]
 fn a_glb_cut_anywhere() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     let whole = Glb::square().bytes();
     for length in [4, 11, 12, 19, 40, whole.len() / 2, whole.len() - 60, whole.len() - 1] {
         refusals.file("cut.glb", &whole[..length], 1, &["truncated", "get the file again"]);
@@ -203,7 +112,7 @@ fn a_glb_cut_anywhere() {
 
 #[test]
 fn indices_out_of_range() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     let mut glb = Glb::square();
     let indices = glb.binary.len() - 2;
     glb.binary[indices] = 77;
@@ -231,7 +140,7 @@ fn ply(vertices: &str, body: &str) -> String {
 
 #[test]
 fn vertices_that_are_no_numbers() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     for (bad, word) in [(f32::NAN, "NaN"), (f32::INFINITY, "infinite")] {
         let corners = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, bad, 0.0], [0.0, 1.0, 0.0]];
         let glb = Glb::with_positions(&corners);
@@ -243,7 +152,7 @@ fn vertices_that_are_no_numbers() {
 
 #[test]
 fn geometry_files_that_are_something_else() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     for name in ["a.glb", "a.gltf", "a.ply", "a.obj", "a.ply.gz", "a.obj.gz"] {
         refusals.file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 1, &[]);
         refusals.file(name, b"", 1, &[]);
@@ -257,7 +166,7 @@ fn geometry_files_that_are_something_else() {
 
 #[test]
 fn scenes_with_nothing_in_them() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     refusals.file("a.ron", "(objects: [])", 2, &["objects", "add a `file` or a `shape`"]);
     refusals.file("a.obj", "v 0 0 0\n", 1, &[]);
     let mut glb = Glb::square();
@@ -267,7 +176,7 @@ fn scenes_with_nothing_in_them() {
 
 #[test]
 fn scene_files_with_mistakes() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     let sphere = "objects: [(shape: Sphere(radius: 1))]";
     let cases = [
         (format!("(\n  settings: (widht: 640),\n  {sphere})"), ":2:", "did you mean `width`?"),
@@ -290,7 +199,7 @@ fn scene_files_with_mistakes() {
 
 #[test]
 fn gpu_and_platform_files_with_mistakes() {
-    let mut refusals = Refusals::default();
+    let mut refusals = refusals();
     let source = |path: &str| fs::read_to_string(tests::root().join(path)).expect("a file of the repository");
     let gpu = source("sim/gpus/reference.ron");
     let platform = source("power-model/platforms/reference.ron");
@@ -310,94 +219,5 @@ fn gpu_and_platform_files_with_mistakes() {
         let file = inputs.put("bad.ron", &text);
         assert!(text != gpu && text != platform && text != table, "{flag}: nothing was broken");
         refusals.call(&["tiny", flag, &file], 2, &[&file, says]);
-    }
-}
-
-/// The tests may run as root, whom no permission stops: a file stands where the folder should be.
-#[test]
-fn results_that_cannot_be_written() {
-    let mut refusals = Refusals::default();
-    let inputs = Inputs::new();
-    let file = inputs.put("taken", "not a folder");
-    for out in [file.clone(), inputs.path("taken/below")] {
-        let ended = quintile!().call(["run", "tiny", "--out", &out]);
-        refusals.check(&ended, 1, &[&out, "--out"]);
-    }
-    assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
-}
-
-/// Whatever stops a run on its way, early or at the last file: the summary of the run before is gone.
-#[test]
-fn a_run_that_dies_on_the_way_does_not_look_whole() {
-    let mut refusals = Refusals::default();
-    for (name, is_folder) in [
-        ("images", false),
-        ("plots", false),
-        ("trace.parquet", true),
-        ("frames.csv", true),
-        ("report.html", true),
-    ] {
-        let inputs = Inputs::new();
-        let out = inputs.path("out");
-        let arguments = ["run", "tiny", "--out", &out];
-        assert_eq!(quintile!().call(arguments).code, Some(0));
-        let (path, summary) = (Path::new(&out).join(name), Path::new(&out).join("summary.json"));
-        assert!(summary.exists());
-        block(&path, is_folder);
-        let ended = quintile!().call(arguments);
-        refusals.check(&ended, 1, &[name]);
-        assert!(!summary.exists(), "{name}: the old summary makes the broken run look whole");
-        let temporary = fs::read_dir(&out).into_iter().flatten().flatten();
-        let temporary: Vec<_> = temporary.map(|entry| entry.file_name()).collect();
-        assert!(!temporary.iter().any(|name| name.to_string_lossy().ends_with(".tmp")), "{temporary:?}");
-    }
-}
-
-/// Puts something into the place of `path` that no run can write over.
-fn block(path: &Path, with_folder: bool) {
-    if path.is_dir() {
-        fs::remove_dir_all(path).expect("results can be removed");
-    } else {
-        fs::remove_file(path).expect("results can be removed");
-    }
-    if with_folder {
-        fs::create_dir_all(path.join("taken")).expect("a folder can be made");
-    } else {
-        fs::write(path, "taken").expect("a file can be written");
-    }
-}
-
-/// A mistake that is noticed before anything is written leaves the results of the run before whole.
-#[test]
-fn a_mistake_in_the_call_leaves_old_results_alone() {
-    let mut refusals = Refusals::default();
-    let results = quintile!().run("tiny", &[]);
-    let out = results.folder().display().to_string();
-    let before = results.files();
-    let ended = quintile!().call(["run", "tiny", "--samples", "0", "--out", &out]);
-    refusals.check(&ended, 2, &["samples"]);
-    assert!(before == results.files());
-}
-
-/// Runs that no machine holds in memory are refused at once instead of ending in an abort. The limits are those of a
-/// small machine: 4 GB and 20 s.
-#[cfg(target_os = "linux")]
-#[test]
-fn runs_beyond_all_memory() {
-    let mut refusals = Refusals::default();
-    let inputs = Inputs::new();
-    let still =
-        inputs.put("still.ron", "(settings: (width: 16, height: 16), objects: [(shape: Sphere(radius: 1))])");
-    let cases: [(&[&str], &str); 3] = [
-        (&[&still, "--frames", "0..10000000"], "frames"),
-        (&[&still, "--size", "16384x16384", "--samples", "256"], "size"),
-        (&["tiny", "--rate", "0.2", "--trace-rate", "1e7"], "trace rate"),
-    ];
-    for (args, says) in cases {
-        let out = inputs.path("out");
-        let program = env!("CARGO_BIN_EXE_quintile-e2e");
-        let limited = ["-c", "ulimit -v 4000000; exec timeout 20 \"$0\" run \"$@\"", program];
-        let ended = tests::Quintile::new("sh").call(limited.iter().chain(args).chain(&["--out", &out]));
-        refusals.check(&ended, 2, &[says]);
     }
 }
