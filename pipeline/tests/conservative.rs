@@ -64,7 +64,7 @@ const VIEWS: [View; 6] = [
     View::Perspective { s: [3.0, -1.0], a: [2.0, -0.25], near: 0.0 },
 ];
 
-const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: 1.0, columns: 16, rows: 16 };
+const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
 
 fn triangle(kind: Kind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
     let middle = [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(1.0, 8.0)];
@@ -153,7 +153,7 @@ fn aimed(
     let (u, v) = (r.odd(within.u[0], within.u[1]), r.odd(within.v[0], within.v[1]));
     let t = r.odd(within.t[0], within.t[1]);
     let mut place = |axis: usize, count: u32| {
-        grid.origin[axis] + grid.tile * ((r.bits() % u64::from(count)) as f64 + r.within(0.01, 0.99))
+        grid.origin[axis] + grid.tile[axis] * ((r.bits() % u64::from(count)) as f64 + r.within(0.01, 0.99))
     };
     let at = [place(0, grid.columns), place(1, grid.rows)];
     let [s, a] = lens(view);
@@ -177,9 +177,9 @@ fn aimed(
 
 /// The tiles, at most four, that hold a seen point; borders count.
 fn tiles(grid: &Grid, point: &Point) -> impl Iterator<Item = [u32; 2]> + use<> {
-    let along = |at: f64, w: f64, origin: f64, count: u32| {
-        let place = ((at / w - origin) / grid.tile).floor();
-        let (tile, origin) = (grid.tile, origin);
+    let along = |at: f64, w: f64, axis: usize, count: u32| {
+        let (tile, origin) = (grid.tile[axis], grid.origin[axis]);
+        let place = ((at / w - origin) / tile).floor();
         [-1.0, 0.0, 1.0].map(|step| {
             let index = place + step;
             let [lo, hi] = [origin + index * tile, origin + (index + 1.0) * tile];
@@ -187,8 +187,8 @@ fn tiles(grid: &Grid, point: &Point) -> impl Iterator<Item = [u32; 2]> + use<> {
             holds.then_some(index as u32)
         })
     };
-    let columns = along(point.x, point.w, grid.origin[0], grid.columns);
-    let rows = along(point.y, point.w, grid.origin[1], grid.rows);
+    let columns = along(point.x, point.w, 0, grid.columns);
+    let rows = along(point.y, point.w, 1, grid.rows);
     columns.into_iter().flatten().flat_map(move |x| rows.into_iter().flatten().map(move |y| [x, y]))
 }
 
@@ -264,8 +264,8 @@ fn no_tile_is_missed_and_nothing_lies_outside() {
                 };
                 let rasterizer = Rasterizer::new(view).clipped(clip).halving(round % 4);
                 let grid = match round % 5 {
-                    0 => Grid { tile: 0.25, columns: 64, rows: 33, ..GRID },
-                    1 => Grid { tile: 5.0, columns: 3, rows: 4, ..GRID },
+                    0 => Grid { tile: [0.25; 2], columns: 64, rows: 33, ..GRID },
+                    1 => Grid { tile: [5.0; 2], columns: 3, rows: 4, ..GRID },
                     _ => GRID,
                 };
                 let ends = triangle(kind, &view, &mut r);

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
 
-const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: 1.0, columns: 16, rows: 16 };
+const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
 
 fn all(rasterizer: &Rasterizer, triangle: &MovingTriangle, grid: &Grid) -> Vec<([u32; 2], Touch)> {
     let mut tiles = Vec::new();

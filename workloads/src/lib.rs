@@ -4,6 +4,7 @@
 //! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]), and
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
+//! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
 //! ```
@@ -22,6 +23,7 @@
 //! deterministic: the same file gives the same bits on every machine.
 
 pub mod builtin;
+pub mod collision;
 mod error;
 mod import;
 mod load;

@@ -18,7 +18,7 @@
 //!
 //! let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
 //! let triangle = MovingTriangle::new(corners, corners).unwrap();
-//! let grid = Grid { origin: [0.0, 0.0], tile: 1.0, columns: 8, rows: 8 };
+//! let grid = Grid { origin: [0.0, 0.0], tile: [1.0; 2], columns: 8, rows: 8 };
 //! let mut tiles = Vec::new();
 //! Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, touch| tiles.push((tile, touch.z)));
 //! // Four in the first row, two in the second, and one that is touched at its corner (2, 1).

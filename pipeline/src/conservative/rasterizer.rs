@@ -13,8 +13,8 @@ use crate::depth::plane::{Beam, MovingPlane, normal, tightest};
 pub struct Grid {
     /// Where the first tile begins.
     pub origin: [f64; 2],
-    /// The side of a tile, above zero.
-    pub tile: f64,
+    /// Width and height of a tile, above zero.
+    pub tile: [f64; 2],
     /// Tiles in a row.
     pub columns: u32,
     /// Tiles in a column.
@@ -24,7 +24,7 @@ pub struct Grid {
 impl Grid {
     /// What the tiles in these columns and rows cover; neighbours share the number of their border.
     pub fn rect(&self, columns: &Range<u32>, rows: &Range<u32>) -> Rect {
-        let border = |axis: usize, index: u32| self.origin[axis] + f64::from(index) * self.tile;
+        let border = |axis: usize, index: u32| self.origin[axis] + f64::from(index) * self.tile[axis];
         Rect {
             x: [border(0, columns.start), border(0, columns.end)],
             y: [border(1, rows.start), border(1, rows.end)],
