@@ -6,3 +6,4 @@ mod closed_forms;
 mod common;
 mod conservation;
 mod ladder;
+mod waiting;
