@@ -2,6 +2,17 @@
 
 use activity::{Bin, Counts, Event, PacketCounts, Timeline, Unit};
 
+/// The first event of each unit: found once, as finding it is a walk through all events.
+const FIRST: [usize; Unit::COUNT] = {
+    let mut first = [0; Unit::COUNT];
+    let mut at = 0;
+    while at < Unit::COUNT {
+        first[at] = Unit::ALL[at].events().start;
+        at += 1;
+    }
+    first
+};
+
 /// Collects activity into equal bins. Where a frame outgrows the most bins allowed, pairs of bins are merged, so memory
 /// stays bounded.
 #[derive(Clone, Debug)]
@@ -32,8 +43,8 @@ impl Recorder {
 
     /// The same for counts of many packets together.
     pub fn count_all(&mut self, unit: Unit, counts: &Counts, start_ps: u64, end_ps: u64) {
-        let counts = counts.of(unit);
-        self.spread(unit, start_ps, end_ps, |at| counts[at]);
+        let first = FIRST[unit as usize];
+        self.spread(unit, start_ps, end_ps, |at| counts[Event::ALL[first + at]]);
     }
 
     /// Events of `unit` that happened in the bin of `at_ps`, by their place among its events.
@@ -53,7 +64,7 @@ impl Recorder {
             let targets = self.bins[first].counts.of_mut(unit).iter_mut();
             return targets.zip(0..).for_each(|(target, at)| *target += counts(at));
         }
-        let events = self.bins[first].counts.of(unit).len();
+        let events = self.bins[first].counts.of_mut(unit).len();
         for at in (0..events).filter(|&at| counts(at) > 0) {
             let mut shares = Shares::new(counts(at), end_ps - start_ps, self.bin_ps);
             for (bin, from, to) in span.clone() {

@@ -31,16 +31,10 @@ impl Counts {
 
     /// Whether `unit` did anything at all; a unit that did not is not modelled.
     pub fn uses(&self, unit: Unit) -> bool {
-        self.of(unit).iter().any(|&count| count > 0)
+        self.iter().any(|(event, count)| count > 0 && event.unit() == unit)
     }
 
-    /// The counts of the events of `unit`, in declaration order.
-    pub fn of(&self, unit: Unit) -> &[u64] {
-        let (first, end) = crate::packet::EVENTS[unit as usize];
-        &self.0[first..end]
-    }
-
-    /// The same, to be added to.
+    /// The counts of the events of `unit`, in declaration order, to be added to.
     pub fn of_mut(&mut self, unit: Unit) -> &mut [u64] {
         let (first, end) = crate::packet::EVENTS[unit as usize];
         &mut self.0[first..end]

@@ -15,6 +15,8 @@ const ROWS: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Open {
     row: u32,
+    /// When it was asked for.
+    since: Time,
     /// When the last line of it so far goes.
     until: Time,
     /// Lines of its channel that came before it was opened or are its own.
@@ -22,7 +24,7 @@ struct Open {
 }
 
 impl Open {
-    const NONE: Self = Self { row: u32::MAX, until: 0, own: 0 };
+    const NONE: Self = Self { row: u32::MAX, since: 0, until: 0, own: 0 };
 }
 
 /// A bank: when it opened rows, and those it opened last, the latest first.
@@ -111,9 +113,10 @@ impl Dram {
         let opens = opens.map(|closes| self.activate + if closes { self.precharge } else { 0 });
         // The next row can be opened when the last line has been asked for.
         let held = work - self.burst;
-        let ready = opens.map_or(seen.0, |opens| bank.time.take(seen.0, opens + held).0 + opens);
+        let closes = bank.closes_at(seen.0).min(seen.0 + self.backlog);
+        let ready = opens.map_or(seen.0, |opens| bank.time.take(closes, opens + held).0 + opens);
         let end = channel.bus.take(ready, work).1.max(seen.1 + self.burst);
-        bank.note(place.row, end, opens.is_some(), (channel.lines, u64::from(count)));
+        bank.note(place.row, (seen.0, end), opens.is_some(), (channel.lines, u64::from(count)));
         channel.lines += u64::from(count);
         self.end = self.end.max(end);
         Moved { issued: end - self.burst, data: end + self.cas }
@@ -142,8 +145,15 @@ impl Bank {
         (latest != row && !self.rows.iter().any(goes_along)).then_some(latest != u32::MAX)
     }
 
-    /// `count` lines of `row` go until `at`, after `lines` lines of the channel.
-    fn note(&mut self, row: u32, at: Time, opened: bool, (lines, count): (u64, u64)) {
+    /// When the row that is open can be closed for a line that is seen at `seen`: when its own lines have gone. One that is asked
+    /// for later in time, though earlier in the stream, does not matter.
+    fn closes_at(&self, seen: Time) -> Time {
+        let open = &self.rows[0];
+        if open.since <= seen { open.until.max(seen) } else { seen }
+    }
+
+    /// `count` lines of `row` are seen and go between two moments, after `lines` lines of the channel.
+    fn note(&mut self, row: u32, (seen, at): (Time, Time), opened: bool, (lines, count): (u64, u64)) {
         let known = self.rows.iter().position(|open| open.row == row);
         match known {
             Some(known) if !opened => {
@@ -154,7 +164,7 @@ impl Bank {
             _ => {
                 let until = known.map_or(at, |known| self.rows[known].until.max(at));
                 self.rows.copy_within(..known.unwrap_or(ROWS - 1), 1);
-                self.rows[0] = Open { row, until, own: lines + count };
+                self.rows[0] = Open { row, since: seen, until, own: lines + count };
             }
         }
     }
@@ -168,15 +178,16 @@ mod tests {
     fn a_line_goes_along_with_others_of_its_row_that_have_not_gone() {
         let mut bank = Bank { time: Calendar::new(16, 1), rows: [Open::NONE; ROWS] };
         assert_eq!(bank.opens(7, 0, 0, 4), Some(false));
-        bank.note(7, 10, true, (0, 1));
+        bank.note(7, (0, 10), true, (0, 1));
         assert_eq!((bank.opens(7, 50, 9, 4), bank.opens(8, 5, 1, 4)), (None, Some(true)));
-        bank.note(8, 20, true, (1, 1));
+        bank.note(8, (5, 20), true, (1, 1));
         assert_eq!((bank.opens(7, 9, 2, 4), bank.opens(7, 10, 2, 4)), (None, Some(true)));
-        bank.note(7, 30, false, (2, 1));
+        bank.note(7, (9, 30), false, (2, 1));
         let [latest, before, ..] = bank.rows.map(|open| (open.row, open.until));
         assert_eq!((latest, before), ((8, 20), (7, 30)));
+        assert_eq!([3, 6, 25].map(|seen| bank.closes_at(seen)), [3, 20, 25]);
         // Four lines of others have come since.
-        bank.note(8, 60, false, (3, 3));
+        bank.note(8, (40, 60), false, (3, 3));
         assert_eq!((bank.opens(7, 9, 5, 4), bank.opens(7, 9, 6, 4)), (None, Some(true)));
     }
 }
