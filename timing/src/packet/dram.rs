@@ -17,7 +17,7 @@ struct Open {
     row: u32,
     /// When it was asked for.
     since: Time,
-    /// When the last line of it so far goes.
+    /// When the last line of it so far is issued.
     until: Time,
     /// Lines of its channel that came before it was opened or are its own.
     own: u64,
@@ -116,7 +116,7 @@ impl Dram {
         let closes = bank.closes_at(seen.0).min(seen.0 + self.backlog);
         let ready = opens.map_or(seen.0, |opens| bank.time.take(closes, opens + held).0 + opens);
         let end = channel.bus.take(ready, work).1.max(seen.1 + self.burst);
-        bank.note(place.row, (seen.0, end), opens.is_some(), (channel.lines, u64::from(count)));
+        bank.note(place.row, (seen.0, end - self.burst), opens.is_some(), (channel.lines, u64::from(count)));
         channel.lines += u64::from(count);
         self.end = self.end.max(end);
         Moved { issued: end - self.burst, data: end + self.cas }

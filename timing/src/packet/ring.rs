@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn groups_go_one_after_another() {
         let mut ring = Ring::new(3);
-        [10, 20, 30].map(|gone| ring.note(gone));
+        [10, 20, 30].into_iter().for_each(|gone| ring.note(gone));
         assert_eq!((ring.room_for(1), ring.room_for(2)), (10, 20));
         ring.note_all(2, 35, 40);
         assert_eq!([1, 2, 3, 9].map(|count| ring.room_for(count)), [30, 35, 40, 40]);

@@ -65,6 +65,13 @@ impl Stream {
         self.jobs.push(makes.job(packet, lines, &mut self.lines));
         self.counts.push(packet.counts);
     }
+
+    /// Adds the packet that was pushed last to `totals`.
+    pub fn add_last(&self, makes: &Jobs, totals: &mut crate::Totals) {
+        if let (Some(job), Some(counts)) = (self.jobs.last(), self.counts.last()) {
+            totals.add(makes, job, counts);
+        }
+    }
 }
 
 /// Runs `stream` through `machine`, from the first cycle to the last.
