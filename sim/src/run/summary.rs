@@ -10,9 +10,10 @@ use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
 use super::checks::Checks;
 use super::measure::mean_parts_w;
 use super::modelled::Modelled;
+use super::sampled::SampledSummary;
 use super::simulate::image_name;
 use super::stalls::{self, StallShares};
-use super::{Measurement, Plan, Simulated, warnings};
+use super::{Choice, Measurement, Plan, Simulated, Verified, warnings};
 use crate::output::MeanSd;
 use crate::output::report::Headline;
 
@@ -53,10 +54,16 @@ pub struct Summary {
     pub stalls: BTreeMap<&'static str, StallShares>,
     /// Samples hit over samples tested.
     pub sample_test_efficiency: Option<f64>,
-    /// How often each event happened.
+    /// How often each event happened in the frames that were simulated.
     pub counts: Counts,
-    /// A hash of the counts of every frame: equal runs have equal hashes.
+    /// A hash of the counts of every frame that was simulated: equal runs have equal hashes.
     pub counts_hash: String,
+    /// What was chosen for the accuracy or the time that was asked for.
+    pub choice: Option<Choice>,
+    /// Actual errors, where they were asked for.
+    pub verified: Option<Verified>,
+    /// Which frames were simulated and how sure the others are, where not all were.
+    pub sampled: Option<SampledSummary>,
     /// Every frame of the run.
     pub frames: Vec<FrameRow>,
 }
@@ -135,8 +142,12 @@ pub struct Detection {
 pub struct FrameRow {
     /// Its number in the scene.
     pub frame: u32,
-    /// Its image.
-    pub image: String,
+    /// Its image; a frame that was predicted has none.
+    pub image: Option<String>,
+    /// Whether it was predicted from others.
+    pub predicted: bool,
+    /// A hash of its counts, the same at every level of timing; a frame that was predicted has none.
+    pub counts_hash: Option<String>,
     /// True start in seconds from the start of the recording.
     pub start_s: f64,
     /// Cycles of the core clock for which the GPU worked on it.
@@ -153,6 +164,10 @@ pub struct FrameRow {
     pub power_w: f64,
     /// True energy by part in joules; summed in this order it is the frame's, exactly.
     pub energy_by_part_j: Energy,
+    /// Where it was predicted: the ends of the interval in which its cycles lie.
+    pub cycles_interval: Option<[f64; 2]>,
+    /// The same for its energy, in millijoules.
+    pub energy_mj_interval: Option<[f64; 2]>,
     /// True energy in joules.
     pub energy_j: f64,
     /// Energy as measured in the trace, in millijoules, where the frame was found.
@@ -177,6 +192,22 @@ impl Summary {
             row("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
             row("power", "W", |f| f.power_w, 1.0),
         ]
+    }
+
+    /// What was chosen, what was predicted and how wrong it was, in words; nothing where nothing of that was asked for.
+    pub fn judgement(&self) -> Vec<(&'static str, String)> {
+        let mut rows: Vec<(&'static str, String)> = Vec::new();
+        rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
+        rows.extend(self.sampled.as_ref().map(|sampled| ("predicted", sampled.line())));
+        rows.extend(self.verified.as_ref().map(|verified| ("actual error", verified.line())));
+        rows
+    }
+
+    /// With a warning where what was asked for is not met.
+    pub(super) fn warned(mut self) -> Self {
+        self.warnings.extend(self.choice.iter().flat_map(warnings::missed));
+        self.warnings.sort();
+        self
     }
 
     pub(super) fn new(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Self {
@@ -206,7 +237,13 @@ impl Summary {
             stalls: stalls::shares(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
-            counts_hash: format!("{:016x}", hash(simulated)),
+            counts_hash: format!(
+                "{:016x}",
+                simulated.known().fold(0, |seed, frame| hash(seed, &frame.counts))
+            ),
+            choice: None,
+            verified: None,
+            sampled: simulated.sampled.clone(),
             frames: rows(plan, simulated, measurement),
         }
     }
@@ -272,12 +309,15 @@ fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
 }
 
-fn hash(simulated: &Simulated) -> u64 {
-    simulated.in_order().fold(0, |hash, frame| {
-        Event::ALL.iter().fold(hash, |hash: u64, &event| {
-            pipeline::sampling::mix(hash.rotate_left(1) ^ frame.counts[event].wrapping_add(event as u64))
-        })
+fn hash(seed: u64, counts: &Counts) -> u64 {
+    Event::ALL.iter().fold(seed, |hash: u64, &event| {
+        pipeline::sampling::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
     })
+}
+
+/// The interval of `half` the width around a value.
+fn around(value: f64, half: Option<f64>) -> Option<[f64; 2]> {
+    half.map(|half| [(value - half).max(0.0), value + half])
 }
 
 fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
@@ -293,12 +333,16 @@ fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Fr
             let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
             FrameRow {
                 frame,
-                image: format!("{}.png", image_name(frame)),
+                image: known.predicted.is_none().then(|| format!("{}.png", image_name(frame))),
+                predicted: known.predicted.is_some(),
+                counts_hash: known.predicted.is_none().then(|| format!("{:016x}", hash(0, &known.counts))),
                 start_s: paced.start_s,
                 cycles: known.cycles,
                 busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
                 duration_ms: duration_s * 1e3,
                 energy_mj: energy_j * 1e3,
+                cycles_interval: around(known.cycles as f64, known.predicted.map(|half| half.cycles)),
+                energy_mj_interval: around(energy_j * 1e3, known.predicted.map(|half| half.energy_j * 1e3)),
                 energy_by_part_j: paced.energy,
                 energy_j,
                 energy_nj_per_pixel: energy_j * 1e9 / plan.pixels() as f64,
