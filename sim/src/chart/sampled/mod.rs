@@ -23,8 +23,8 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// Hundreds of frames at the size of a run: minutes.
-    pub const FULL: Self = Self { frames: 300, size: (1280, 720), samples: 8, seeds: 100 };
+    /// Hundreds of frames: minutes.
+    pub const FULL: Self = Self { frames: 300, size: (640, 360), samples: 8, seeds: 100 };
     /// Fewer and smaller ones: seconds.
     pub const QUICK: Self = Self { frames: 100, size: (320, 180), samples: 4, seeds: 100 };
 }
