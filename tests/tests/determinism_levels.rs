@@ -12,7 +12,7 @@ const LEVELS: [&str; 4] = ["stepped", "packet", "bound", "sampled"];
 const SMALL: [&str; 6] = ["--size", "96x54", "--samples", "2", "--frames", "0..12"];
 
 fn run(level: &str, args: &[&str]) -> Results {
-    quintile!().run("default", &[&SMALL, &["--timing", level], args].concat())
+    quintile!().run("default", &[&SMALL[..], &["--timing", level], args].concat())
 }
 
 fn assert_same(one: &Results, other: &BTreeMap<PathBuf, Vec<u8>>, what: &str) {

@@ -1,7 +1,7 @@
 //! `--timing sampled`, `--accuracy`, `--budget` and `--verify` as a user meets them.
 
 use serde_json::Value;
-use tests::{Results, number, quintile};
+use tests::{Inputs, Results, number, quintile};
 
 const SMALL: [&str; 4] = ["--size", "160x90", "--samples", "2"];
 
@@ -78,7 +78,10 @@ fn totals_are_near_the_truth_and_sums_agree() {
 
 #[test]
 fn a_still_scene_and_a_short_one_need_no_prediction() {
-    let still = quintile!().run("tiny", &["--timing", "sampled"]);
+    let inputs = Inputs::new();
+    let scene = "(settings: (width: 48, height: 32, samples: 2, frames: (0, 30)), \
+                 camera: (position: (0, 0, 5), target: (0, 0, 0)), objects: [(shape: Sphere(radius: 1, segments: 12))])";
+    let still = quintile!().run(&inputs.put("still.ron", scene), &["--timing", "sampled"]);
     assert!(still.summary()["sampled"].is_null());
     let short = run(&["--timing", "sampled", "--frames", "0..4"]);
     assert_eq!(number(&short.summary(), "/modelled/predicted_frames"), 0.0);
