@@ -13,10 +13,10 @@ const EVEN: f64 = 0.1;
 /// Added to the norm of every window, as a share of the whole trace's deviation, so that steady windows resemble nothing.
 const FLOOR: f64 = 1e-3;
 
-/// The core of a window: so much of its length on either side of the start. Where content or clock change, what is farther away
-/// moves more.
+/// The core of a window: so much of its length after the start and a quarter of that before it, where the first frame after a
+/// pause is like no other. Where content or clock change, what is farther away moves more.
 const CORE: f64 = 0.1;
-/// What a sample of the core weighs beyond the 1 that every sample does: half of all weight, with the core a fifth of the window.
+/// What a sample of the core weighs beyond the 1 that every sample does: with the core an eighth of the window, two fifths of all weight.
 const EXTRA: f64 = 5.0;
 
 /// The templates' distances to the trace.
@@ -45,7 +45,7 @@ impl Bank {
         let centre = power.iter().sum::<f64>() / power.len() as f64;
         let signal: Vec<f64> = power.iter().map(|watts| watts - centre).collect();
         let half = ((CORE * width as f64) as usize).max(1);
-        let core = anchor.saturating_sub(half)..(anchor + half).min(width);
+        let core = anchor.saturating_sub(half / 4)..(anchor + half).min(width);
         let (mean, norm) = windows(&signal, width, &core);
         let total: f64 = signal.iter().map(|x| x * x).sum();
         let floor = FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;

@@ -13,7 +13,7 @@ const TIGHT: f64 = 0.04;
 /// What a jump of the gap costs, nats, however far: clock steps, missed ticks.
 const JUMP: f64 = -3.5;
 /// What going back to the beat after one odd gap costs more: it would be another phase of the same frames.
-const SLIP: f64 = 20.0;
+const SLIP: f64 = 4.0;
 /// What a new stretch costs, nats.
 const BREAK: f64 = 12.0;
 /// What the likeness of neighbours may say, nats: much against, hardly anything for, as any phase of the frame is alike to itself.
