@@ -99,10 +99,10 @@ pub struct RunArgs {
     #[arg(long, value_enum, default_value_t)]
     pub timing: Method,
     /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%
-    #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_negative_numbers = true)]
+    #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
     pub accuracy: Option<f64>,
     /// Let a probe choose the most exact that takes no longer than this, for example 30s, 500ms or 2min
-    #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_negative_numbers = true)]
+    #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_hyphen_values = true)]
     pub budget: Option<f64>,
     /// Simulate every frame at the reference as well, and say how wrong the run was
     #[arg(long)]
