@@ -348,7 +348,9 @@ fn tiles_can_be_walked_by_hand() {
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
     let prepared = rasterizer.prepare(&moving);
     let mut reported = HashMap::new();
-    rasterizer.rasterize(&moving, &GRID, |tile, touch| drop(reported.insert(tile, *touch)));
+    rasterizer.rasterize(&moving, &GRID, |tile, touch| {
+        reported.insert(tile, *touch);
+    });
     let whole = Rect { x: [-8.0, 8.0], y: [-8.0, 8.0] };
     let coarse = rasterizer.touch(&prepared, &whole, &Region::WHOLE).unwrap();
     for ([column, row], touch) in &reported {

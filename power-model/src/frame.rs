@@ -60,6 +60,26 @@ impl FramePower {
         self.energy.by_part_j.map(|joules| if duration_s > 0.0 { joules / duration_s } else { 0.0 })
     }
 
+    /// The same course of power over a frame of another length and another energy, of which each part keeps its share of every
+    /// bin. The bins are as many, and the last one may lose or gain a little of its share to whole picoseconds.
+    #[must_use]
+    pub fn reshaped(&self, duration_ps: u64, energy_j: f64) -> Self {
+        let stretch = duration_ps as f64 / self.duration_ps.max(1) as f64;
+        let bin_ps = ((self.bin_ps as f64 * stretch).ceil() as u64).max(1);
+        let lengths: Vec<f64> =
+            bin_lengths_ps(bin_ps, duration_ps).map(|length_ps| length_ps as f64 * S_PER_PS).collect();
+        let joules = |watts: &[f64; PARTS], length_s: f64| watts.iter().sum::<f64>() * length_s;
+        let before_j: f64 =
+            self.watts.iter().zip(&lengths).map(|(watts, &length_s)| joules(watts, length_s)).sum();
+        let scale = if before_j > 0.0 { energy_j / before_j } else { 0.0 };
+        let watts: Vec<[f64; PARTS]> = self.watts.iter().map(|bin| bin.map(|watts| watts * scale)).collect();
+        let mut energy = Energy::ZERO;
+        for (watts, length_s) in watts.iter().zip(lengths) {
+            energy += &Energy { by_part_j: watts.map(|watts| watts * length_s) };
+        }
+        Self { bin_ps, duration_ps, watts, energy }
+    }
+
     /// The highest watts of any bin, all parts together; zero for a frame of no length.
     pub fn peak_w(&self) -> f64 {
         self.watts.iter().map(|watts| watts.iter().sum()).fold(0.0, f64::max)
@@ -79,6 +99,29 @@ pub(crate) fn bin_lengths_ps(bin_ps: u64, duration_ps: u64) -> impl Iterator<Ite
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_length_and_energy_are_met_and_shares_kept() {
+        let mut watts = vec![[0.0; PARTS]; 3];
+        for (bin, level) in watts.iter_mut().zip([1.0, 3.0, 2.0]) {
+            bin[0] = level;
+            bin[1] = 2.0 * level;
+        }
+        let energy = Energy {
+            by_part_j: std::array::from_fn(|part| [55e-12, 110e-12].get(part).copied().unwrap_or(0.0)),
+        };
+        let frame = FramePower { bin_ps: 10, duration_ps: 25, watts, energy };
+        for (duration_ps, energy_j) in [(25, 165e-12), (50, 1e-9), (7, 2e-12), (1_000_001, 3e-6)] {
+            let other = frame.reshaped(duration_ps, energy_j);
+            assert_eq!((other.duration_ps, other.watts.len()), (duration_ps, 3));
+            assert!((other.energy.total_j() / energy_j - 1.0).abs() < 1e-12);
+            let spent: f64 = other.bins().map(|(length_s, watts)| length_s * watts.iter().sum::<f64>()).sum();
+            assert!((spent / energy_j - 1.0).abs() < 1e-12);
+            let parts = other.energy.by_part_j;
+            assert!((parts[1] / parts[0] - 2.0).abs() < 1e-12 && parts[2] == 0.0);
+        }
+        assert_eq!(frame.reshaped(0, 1.0).energy.total_j(), 0.0);
+    }
 
     #[test]
     fn only_the_last_bin_is_partial() {

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use activity::Warning;
 use cpu_time::ProcessTime;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::{SampleLayout, Sighting, Visibility, resolve};
@@ -10,6 +11,7 @@ use serde::Serialize;
 use workloads::visibility::{Unshaded, VisibilityScene};
 
 use crate::gpu::GpuSpec;
+use crate::run::Regime;
 
 /// How fast, in samples of the image per second.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -60,6 +62,25 @@ pub fn find(
         Some(found) => Ok(found),
         None => modelled(scene, source, geometry, tests.unwrap_or(Features::ALL), runs),
     }
+}
+
+/// What a user should know of what is seen: nothing at all, or lengths that f32 cannot multiply.
+pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
+    let Ok(geometry) = Geometry::new(&scene.open, &scene.close, &scene.triangles) else { return Vec::new() };
+    let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+    let regime = Regime::of(&scene.camera, &draws, scene.viewport, scene.per_pixel);
+    let extreme = format!(
+        "{} of {} triangles in view have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at \
+         wrong depths; scale mesh and camera to ordinary lengths",
+        regime.extreme, regime.in_view
+    );
+    let empty =
+        "no triangle is in view, so no sample can see one; look at the mesh and where the camera points";
+    let found = [
+        (regime.extreme > 0).then(|| Warning::new("coordinates-out-of-range", extreme)),
+        (regime.in_view == 0).then(|| Warning::new("empty-frame", empty)),
+    ];
+    found.into_iter().flatten().collect()
 }
 
 /// `None` where the camera is one the engine does not take.

@@ -231,3 +231,48 @@ fn wrong_inputs_are_told_from_failures() {
         }
     }
 }
+
+#[test]
+fn an_input_is_not_written_over() {
+    let inputs = Inputs::new();
+    let scene = inputs.put("a.m5d", m5d(&soup()));
+    let before = std::fs::read(&scene).unwrap_or_default();
+    let ended = quintile!().call(["visibility", &scene, "--out", &scene]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("--out") && ended.stderr.contains("name another file"), "{}", ended.stderr);
+    assert!(std::fs::read(&scene).is_ok_and(|after| after == before));
+}
+
+#[test]
+fn what_does_not_fit_into_memory_is_refused_at_once() {
+    let inputs = Inputs::new();
+    let mut data = m5d(&soup());
+    for (word, value) in [(2, 16384_u32), (3, 16384), (4, 256)] {
+        data[8 + 4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+    }
+    let scene = inputs.put("huge.m5d", data);
+    let ended = quintile!().call(["visibility", &scene]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("GiB") && ended.stderr.contains("ask for fewer"), "{}", ended.stderr);
+}
+
+#[test]
+fn lengths_beyond_the_range_and_empty_views_are_warned_of() {
+    let inputs = Inputs::new();
+    let codes = |name: &str, soup: &Soup| {
+        let scene = inputs.put(name, m5d(soup));
+        let json: serde_json::Value =
+            serde_json::from_str(&quintile!().call(["visibility", &scene, "--json"]).stdout)
+                .unwrap_or_default();
+        json["warnings"].to_string()
+    };
+    let scaled = |factor: f32| -> Soup {
+        soup()
+            .into_iter()
+            .map(|ends| ends.map(|end| end.map(|corner| corner.map(|at| at * factor))))
+            .collect()
+    };
+    assert_eq!(codes("plain.m5d", &soup()), "[]");
+    assert!(codes("far.m5d", &scaled(1e13)).contains("coordinates-out-of-range"));
+    assert!(codes("none.m5d", &Vec::new()).contains("empty-frame"));
+}

@@ -1,6 +1,7 @@
 //! Which channel, bank and row a line lies in.
 
 use crate::LINE_BYTES;
+use crate::clock::gcd;
 use crate::spec::DramSpec;
 
 /// The place of a line.
@@ -19,6 +20,8 @@ pub struct RowPlace {
 pub struct Map {
     lines_per_chunk: u32,
     lines_per_row: u32,
+    /// Lines side by side that share a chunk and a row.
+    together: u32,
     channels: u32,
     banks: u32,
 }
@@ -26,12 +29,18 @@ pub struct Map {
 impl Map {
     /// The map of these chips.
     pub fn new(spec: &DramSpec) -> Self {
-        Self {
-            lines_per_chunk: (spec.interleave_bytes / LINE_BYTES).max(1),
-            lines_per_row: (spec.row_bytes / LINE_BYTES).max(1),
-            channels: spec.channels,
-            banks: spec.banks,
-        }
+        let [chunk, row] = [spec.interleave_bytes, spec.row_bytes].map(|bytes| (bytes / LINE_BYTES).max(1));
+        Self::with(chunk, row, spec.channels, spec.banks)
+    }
+
+    fn with(lines_per_chunk: u32, lines_per_row: u32, channels: u32, banks: u32) -> Self {
+        let together = gcd(lines_per_chunk.into(), lines_per_row.into()) as u32;
+        Self { lines_per_chunk, lines_per_row, together, channels, banks }
+    }
+
+    /// Lines with the same number here have one place.
+    pub fn chunk(&self, line: u32) -> u32 {
+        line / self.together
     }
 
     /// The place of line number `line`.
@@ -53,7 +62,7 @@ mod tests {
 
     #[test]
     fn lines_go_round_channels_then_along_rows_then_round_banks() {
-        let map = Map { lines_per_chunk: 4, lines_per_row: 8, channels: 2, banks: 2 };
+        let map = Map::with(4, 8, 2, 2);
         let at = |line| {
             let RowPlace { channel, bank, row } = map.place(line);
             (channel, bank, row)
@@ -63,5 +72,16 @@ mod tests {
             [(0, 0, 0), (0, 0, 0), (1, 0, 0), (1, 0, 0), (0, 0, 0), (0, 1, 0)]
         );
         assert_eq!(at(32), (0, 0, 1));
+    }
+
+    #[test]
+    fn lines_of_a_chunk_have_one_place() {
+        for (chunk, row) in [(4, 8), (8, 4), (6, 4), (1, 5)] {
+            let map = Map::with(chunk, row, 3, 2);
+            for line in 1..500 {
+                let same = map.chunk(line) == map.chunk(line - 1);
+                assert!(!same || map.place(line) == map.place(line - 1), "{chunk} {row} {line}");
+            }
+        }
     }
 }

@@ -9,10 +9,10 @@
 //! frame    = front(0) + sum over b of max(tiles(b), front(b + 1), shared(b)) + latencies of one packet of each path
 //! ```
 
-use activity::{Counts, Event, LineAccess, Packet, PacketKind, Unit};
+use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Unit};
 
 use crate::clock::{Clocks, Time};
-use crate::job::{Jobs, Place};
+use crate::job::{Job, Jobs, Place};
 use crate::spec::MachineSpec;
 use crate::{Clock, LINE_BYTES, Recorder, Timed};
 
@@ -22,36 +22,23 @@ type Owed = [u64; Unit::COUNT];
 /// The packets of one path that are in the queues together.
 #[derive(Clone, Debug, Default)]
 struct Stretch {
+    path: usize,
+    phase: usize,
     owed: Owed,
     packets: u32,
 }
 
-/// What happens side by side: the tiles of a batch and the front end of the next.
-#[derive(Clone, Debug, Default)]
-struct Phase {
-    counts: Counts,
-    owed: Owed,
-    /// Grains of the front end and of the tiles.
-    paths: [Time; 2],
-}
-
-/// A clock that adds up.
+/// What is known of a frame when its stream is written: what its stretches owe, and the events of its phases. It does not grow
+/// with packets but with stretches.
 #[derive(Clone, Debug)]
-pub struct BoundClock {
-    machine: MachineSpec,
-    clocks: Clocks,
-    makes: Jobs,
-    batch_triangles: u32,
-    /// Grains that one of what a unit owes takes.
-    each: [f64; Unit::COUNT],
+pub struct Totals {
     /// Packets in a stretch of the front end and of the tiles' way.
     reach: [u32; 2],
-    stretches: [Stretch; 2],
-    /// Phase 0 is the front end of batch 0; phase `b + 1` the tiles of batch `b` and the front end of batch `b + 1`.
-    phases: Vec<Phase>,
-    /// The phase of each path.
-    at: [usize; 2],
-    recorder: Recorder,
+    open: [Stretch; 2],
+    closed: Vec<Stretch>,
+    /// Events of each phase. Phase 0 is the front end of batch 0; phase `b + 1` the tiles of batch `b` and the front end of batch
+    /// `b + 1`.
+    phases: Vec<Counts>,
 }
 
 const PATHS: [&[Place]; 2] = [
@@ -67,74 +54,69 @@ const PATHS: [&[Place]; 2] = [
     ],
 ];
 
-impl BoundClock {
-    /// A clock at zero for packets in batches of `batch_triangles`, writing into `recorder`.
-    pub fn new(machine: &MachineSpec, clocks: Clocks, batch_triangles: u32, recorder: Recorder) -> Self {
+impl Totals {
+    /// Nothing, so far.
+    pub fn new(machine: &MachineSpec) -> Self {
+        let queue = |place: &Place| machine.common(place.unit()).queue;
+        let open = |path| Stretch { path, phase: path, ..Stretch::default() };
+        Self {
+            reach: PATHS.map(|path| path.iter().map(queue).sum()),
+            open: [open(0), open(1)],
+            closed: Vec::new(),
+            phases: Vec::new(),
+        }
+    }
+
+    /// The next packet of the stream, as a job made by `makes`.
+    pub fn add(&mut self, makes: &Jobs, job: &Job, counts: &PacketCounts) {
+        let path = usize::from(!job.front);
+        let phase = job.batch as usize + path;
+        let open = &mut self.open[path];
+        if phase != open.phase || open.packets == self.reach[path] {
+            let full = std::mem::replace(open, Stretch { path, phase, ..Stretch::default() });
+            self.closed.push(full);
+        }
+        let owed = &mut open.owed;
+        for &place in PATHS[path] {
+            owed[place.unit() as usize] += u64::from(job.service[place as usize]);
+        }
+        owed[Unit::Shader as usize] += u64::from(counts[Event::ShaderOps]);
+        if job.is_textured() {
+            owed[Unit::Texture as usize] += u64::from(makes.texture_cycles(job.texels[0], job.texels[1]));
+        }
+        owed[Unit::L2 as usize] += job.lines.iter().map(|&lines| u64::from(lines)).sum::<u64>();
+        let bytes = counts[Event::DramReadBytes] + counts[Event::DramWriteBytes];
+        owed[Unit::Dram as usize] += u64::from(bytes / LINE_BYTES);
+        open.packets += 1;
+        if self.phases.len() <= phase {
+            self.phases.resize(phase + 1, Counts::default());
+        }
+        self.phases[phase] += counts;
+    }
+
+    fn stretches(&self) -> impl Iterator<Item = &Stretch> {
+        self.closed.iter().chain(&self.open)
+    }
+}
+
+/// How fast the units are.
+struct Pace<'a> {
+    machine: &'a MachineSpec,
+    clocks: Clocks,
+    /// Grains that one of what a unit owes takes.
+    each: [f64; Unit::COUNT],
+}
+
+impl<'a> Pace<'a> {
+    fn new(machine: &'a MachineSpec, clocks: Clocks) -> Self {
         let servers = |unit: Unit| match unit {
             Unit::Shader => f64::from(machine.shader.cores) * f64::from(machine.shader.lanes),
             Unit::L2 => f64::from(machine.l2.lines_per_cycle),
             Unit::Dram => f64::from(machine.dram.channels) / f64::from(machine.dram.burst_cycles),
             _ => 1.0,
         };
-        let queue = |place: &Place| machine.common(place.unit()).queue;
-        Self {
-            makes: Jobs::new(machine, batch_triangles),
-            machine: machine.clone(),
-            clocks,
-            batch_triangles: batch_triangles.max(1),
-            each: Unit::ALL.map(|unit| clocks.period(machine.common(unit).clock) as f64 / servers(unit)),
-            reach: PATHS.map(|path| path.iter().map(queue).sum()),
-            stretches: Default::default(),
-            phases: vec![Phase::default()],
-            at: [0, 1],
-            recorder,
-        }
-    }
-
-    /// The next packet of the stream.
-    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
-        let batch = (packet.triangle / self.batch_triangles) as usize;
-        let (path, phase) = match packet.kind {
-            PacketKind::Draw | PacketKind::Vertices => (0, batch),
-            PacketKind::Tile if packet.triangle != u32::MAX => (1, batch + 1),
-            PacketKind::Tile | PacketKind::Resolve => (1, self.at[1]),
-        };
-        if phase != self.at[path] || self.stretches[path].packets == self.reach[path] {
-            self.close(path);
-        }
-        self.at[path] = phase;
-        let counts = &packet.counts;
-        let owed = &mut self.stretches[path].owed;
-        for &place in PATHS[path] {
-            owed[place.unit() as usize] += u64::from(self.makes.service(place, counts));
-        }
-        owed[Unit::Shader as usize] += u64::from(counts[Event::ShaderOps]);
-        let texels = self.makes.texture_cycles(counts[Event::TextureFetches], counts[Event::TextureLines]);
-        owed[Unit::Texture as usize] += u64::from(texels);
-        owed[Unit::L2 as usize] += lines.len() as u64;
-        owed[Unit::Dram as usize] +=
-            u64::from((counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]) / LINE_BYTES);
-        self.stretches[path].packets += 1;
-        self.phase(phase).counts += counts;
-    }
-
-    fn phase(&mut self, phase: usize) -> &mut Phase {
-        if self.phases.len() <= phase {
-            self.phases.resize(phase + 1, Phase::default());
-        }
-        &mut self.phases[phase]
-    }
-
-    /// The stretch of a path is over.
-    fn close(&mut self, path: usize) {
-        let Stretch { owed, packets } = std::mem::take(&mut self.stretches[path]);
-        if packets == 0 {
-            return;
-        }
-        let longest = self.times(&owed).into_iter().max().unwrap_or(0);
-        let phase = self.phase(self.at[path]);
-        phase.paths[path] += longest;
-        phase.owed.iter_mut().zip(owed).for_each(|(sum, part)| *sum += part);
+        let each = Unit::ALL.map(|unit| clocks.period(machine.common(unit).clock) as f64 / servers(unit));
+        Self { machine, clocks, each }
     }
 
     /// Grains for which each unit is busy with what it owes.
@@ -150,31 +132,75 @@ impl BoundClock {
         };
         places.iter().map(|place| of(place.unit())).sum()
     }
+}
 
-    /// The activity of everything pushed.
-    pub fn finish(mut self) -> Timed {
-        (0..PATHS.len()).for_each(|path| self.close(path));
-        let fill = PATHS.map(|path| self.latency(path));
-        let mut now: Time = 0;
-        for (phase, number) in std::mem::take(&mut self.phases).into_iter().zip(0..) {
-            let busy = self.times(&phase.owed);
-            let length = busy.into_iter().chain(phase.paths).max().unwrap_or(0);
-            let end = now + length + if number < 2 { fill[number] } else { 0 };
-            self.write(&phase.counts, &busy, now, end);
-            now = end;
+/// The time of a frame of which the totals are known.
+pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorder: Recorder) -> Timed {
+    let pace = Pace::new(machine, clocks);
+    let mut owed = vec![Owed::default(); totals.phases.len()];
+    let mut paths = vec![[0; 2]; totals.phases.len()];
+    for stretch in totals.stretches().filter(|stretch| stretch.packets > 0) {
+        let longest = pace.times(&stretch.owed).into_iter().max().unwrap_or(0);
+        paths[stretch.phase][stretch.path] += longest;
+        owed[stretch.phase].iter_mut().zip(stretch.owed).for_each(|(sum, part)| *sum += part);
+    }
+    let fill = PATHS.map(|path| pace.latency(path));
+    let mut now: Time = 0;
+    for (number, counts) in totals.phases.iter().enumerate() {
+        let busy = pace.times(&owed[number]);
+        let length = busy.into_iter().chain(paths[number]).max().unwrap_or(0);
+        let end = now + length + if number < 2 { fill[number] } else { 0 };
+        write(&mut recorder, &clocks, counts, &busy, [now, end]);
+        now = end;
+    }
+    recorder.lasts(clocks.ps(now));
+    let cycles = clocks.cycles(Clock::Core, now);
+    Timed { timeline: recorder.finish(), cycles, stalls: None, unit_cycles: 0 }
+}
+
+fn write(
+    recorder: &mut Recorder,
+    clocks: &Clocks,
+    counts: &Counts,
+    busy: &[Time; Unit::COUNT],
+    [from, to]: [Time; 2],
+) {
+    let (start, end) = (clocks.ps(from), clocks.ps(to));
+    for unit in Unit::ALL.into_iter().filter(|&unit| counts.uses(unit)) {
+        recorder.count_all(unit, counts, start, end);
+        if to > from {
+            recorder.busy(unit, start, end, busy[unit as usize], to - from);
         }
-        self.recorder.lasts(self.clocks.ps(now));
-        let cycles = self.clocks.cycles(Clock::Core, now);
-        Timed { timeline: self.recorder.finish(), cycles, stalls: None, unit_cycles: 0 }
+    }
+}
+
+/// A clock that adds up.
+#[derive(Clone, Debug)]
+pub struct BoundClock {
+    machine: MachineSpec,
+    clocks: Clocks,
+    makes: Jobs,
+    totals: Totals,
+    recorder: Recorder,
+    lines: Vec<LineAccess>,
+}
+
+impl BoundClock {
+    /// A clock at zero for packets in batches of `batch_triangles`, writing into `recorder`.
+    pub fn new(machine: &MachineSpec, clocks: Clocks, batch_triangles: u32, recorder: Recorder) -> Self {
+        let (makes, totals) = (Jobs::new(machine, batch_triangles), Totals::new(machine));
+        Self { machine: machine.clone(), clocks, makes, totals, recorder, lines: Vec::new() }
     }
 
-    fn write(&mut self, counts: &Counts, busy: &[Time; Unit::COUNT], from: Time, to: Time) {
-        let (start, end) = (self.clocks.ps(from), self.clocks.ps(to));
-        for unit in Unit::ALL.into_iter().filter(|&unit| counts.uses(unit)) {
-            self.recorder.count_all(unit, counts, start, end);
-            if to > from {
-                self.recorder.busy(unit, start, end, busy[unit as usize], to - from);
-            }
-        }
+    /// The next packet of the stream.
+    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        self.lines.clear();
+        let job = self.makes.job(packet, lines, &mut self.lines);
+        self.totals.add(&self.makes, &job, &packet.counts);
+    }
+
+    /// The activity of everything pushed.
+    pub fn finish(self) -> Timed {
+        bound(&self.machine, self.clocks, &self.totals, self.recorder)
     }
 }

@@ -52,7 +52,25 @@ impl Clocks {
         if PS_PER_MS.is_multiple_of(self.grains_per_ms) {
             return at * (PS_PER_MS / self.grains_per_ms);
         }
-        (u128::from(at) * u128::from(PS_PER_MS)).div_ceil(u128::from(self.grains_per_ms)) as u64
+        match at.checked_mul(PS_PER_MS) {
+            Some(product) => product.div_ceil(self.grains_per_ms),
+            None => (u128::from(at) * u128::from(PS_PER_MS)).div_ceil(u128::from(self.grains_per_ms)) as u64,
+        }
+    }
+
+    /// Picoseconds of a length of time, rounded down.
+    pub(crate) fn ps_below(&self, length: Time) -> u64 {
+        (u128::from(length) * u128::from(PS_PER_MS) / u128::from(self.grains_per_ms)) as u64
+    }
+
+    /// The first moment that is at `ps` or later.
+    pub(crate) fn grain_from(&self, ps: u64) -> Time {
+        ps.checked_sub(1).map_or(0, |before| self.grain_up_to(before) + 1)
+    }
+
+    /// The last moment that is at `ps` or before.
+    pub(crate) fn grain_up_to(&self, ps: u64) -> Time {
+        (u128::from(ps) * u128::from(self.grains_per_ms) / u128::from(PS_PER_MS)) as Time
     }
 
     /// Whole cycles of `clock` that begin before `at`.
@@ -61,7 +79,7 @@ impl Clocks {
     }
 }
 
-fn gcd(a: u64, b: u64) -> u64 {
+pub(crate) fn gcd(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
@@ -78,6 +96,17 @@ mod tests {
         // 925 cycles of the core are a microsecond.
         assert_eq!(clocks.ps(925 * 55), 1_000_000);
         assert_eq!(clocks.cycles(Clock::Core, 56), 2);
+    }
+
+    #[test]
+    fn grains_and_picoseconds_meet() {
+        let clocks = Clocks::new(925e6, 1375e6).unwrap();
+        for ps in [0, 1, 19, 20, 1_000_000, 1_000_001] {
+            let (first, last) = (clocks.grain_from(ps), clocks.grain_up_to(ps));
+            assert!(clocks.ps(first) >= ps && clocks.ps(last) <= ps && clocks.ps(last + 1) > ps, "{ps}");
+            assert!(first == 0 || clocks.ps(first - 1) < ps, "{ps}");
+        }
+        assert_eq!([55, 37].map(|grains| clocks.ps_below(grains)), [1081, 727]);
     }
 
     #[test]

@@ -59,6 +59,9 @@ impl Place {
 /// The units that ask the L2 for lines, in the order of its ports.
 pub const CLIENTS: [Unit; 4] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour];
 
+/// The port of the texture units.
+pub const TEXTURE_PORT: usize = 2;
+
 /// The port of a client of the L2.
 pub fn port(unit: Unit) -> Option<usize> {
     CLIENTS.iter().position(|&client| client == unit)
@@ -97,7 +100,7 @@ impl Job {
 
     /// Whether its threads go by the texture units.
     pub fn is_textured(&self) -> bool {
-        self.texels != [0; 2] || self.lines[2] > 0
+        self.texels != [0; 2] || self.lines[TEXTURE_PORT] > 0
     }
 
     /// Warps of at most `lanes` threads.
@@ -158,10 +161,8 @@ impl Jobs {
             lines: [0; 4],
         };
         job.ops = counts[Event::ShaderOps].div_ceil(job.threads.max(1));
-        for (port, client) in CLIENTS.into_iter().enumerate() {
-            let before = store.len();
-            store.extend(lines.iter().filter(|access| access.client == client));
-            job.lines[port] = (store.len() - before) as u32;
+        if !lines.is_empty() {
+            job.lines = sorted(lines, store);
         }
         for place in &Place::ALL[places] {
             let used =
@@ -202,9 +203,21 @@ impl Jobs {
     }
 }
 
+/// Puts `lines` into `store`, those of each client side by side in the order of the ports, and counts them.
+fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; 4] {
+    CLIENTS.map(|client| {
+        let before = store.len();
+        store.extend(lines.iter().filter(|access| access.client == client));
+        (store.len() - before) as u32
+    })
+}
+
 /// Rounded up, but for what is rounding itself.
 fn whole(cycles: f64) -> u32 {
-    (cycles - 1e-6).ceil().max(0.0) as u32
+    let cycles = (cycles - 1e-6).max(0.0);
+    // `ceil` is a call where the processor is taken for an old one.
+    let below = cycles as u32;
+    below + u32::from(f64::from(below) < cycles)
 }
 
 #[cfg(test)]
@@ -216,6 +229,11 @@ mod tests {
         for (whole, parts) in [(0, 1), (7, 3), (100, 7), (3, 5)] {
             assert_eq!((0..parts).map(|part| share(whole, part, parts).len() as u32).sum::<u32>(), whole);
         }
+    }
+
+    #[test]
+    fn the_port_of_the_texture_units_is_theirs() {
+        assert_eq!(port(Unit::Texture), Some(TEXTURE_PORT));
     }
 
     #[test]

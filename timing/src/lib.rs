@@ -4,7 +4,8 @@
 //! - [`Jobs`] and [`Job`]: what a packet owes each unit, in cycles; every level reads the same.
 //! - [`stepped`]: the reference, from cycle to cycle.
 //! - [`PacketClock`]: packets, not cycles: a recurrence, with calendars for what is shared.
-//! - [`BoundClock`]: no packets: the busiest unit of each batch, fill and drain.
+//! - [`BoundClock`]: no packets: the busiest unit of each stretch, from [`Totals`] gathered while packets come by.
+//! - [`sampled`]: which frames of many to simulate, and what they say of the others.
 //! - [`Recorder`]: events and busy time over time; [`Stalls`]: why units did not work.
 //!
 //! The crate knows no triangle and no joule, and what happens is decided before it is asked: caches are walked in the order
@@ -17,11 +18,12 @@ mod job;
 mod packet;
 mod rates;
 mod recorder;
+pub mod sampled;
 mod spec;
 mod stalls;
 pub mod stepped;
 
-pub use bound::BoundClock;
+pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use job::{CLIENTS, Job, Jobs, Place};
 pub use packet::PacketClock;

@@ -2,6 +2,17 @@
 
 use activity::{Bin, Counts, Event, PacketCounts, Timeline, Unit};
 
+/// The first event of each unit: found once, as finding it is a walk through all events.
+const FIRST: [usize; Unit::COUNT] = {
+    let mut first = [0; Unit::COUNT];
+    let mut at = 0;
+    while at < Unit::COUNT {
+        first[at] = Unit::ALL[at].events().start;
+        at += 1;
+    }
+    first
+};
+
 /// Collects activity into equal bins. Where a frame outgrows the most bins allowed, pairs of bins are merged, so memory
 /// stays bounded.
 #[derive(Clone, Debug)]
@@ -32,22 +43,32 @@ impl Recorder {
 
     /// The same for counts of many packets together.
     pub fn count_all(&mut self, unit: Unit, counts: &Counts, start_ps: u64, end_ps: u64) {
-        let first = unit.events().start;
+        let first = FIRST[unit as usize];
         self.spread(unit, start_ps, end_ps, |at| counts[Event::ALL[first + at]]);
     }
 
+    /// Events of `unit` that happened in the bin of `at_ps`, by their place among its events.
+    pub(crate) fn add(&mut self, unit: Unit, at_ps: u64, counts: impl Fn(usize) -> u64) {
+        self.spread(unit, at_ps, at_ps, counts);
+    }
+
+    /// The length of a bin, so far.
+    pub(crate) fn bin_ps(&self) -> u64 {
+        self.bin_ps
+    }
+
     fn spread(&mut self, unit: Unit, start_ps: u64, end_ps: u64, counts: impl Fn(usize) -> u64) {
-        let length = end_ps - start_ps;
-        // The share up to a time is rounded down, so that the shares add up to the whole.
-        let up_to = |count: u64, at: u64| match count.checked_mul(at) {
-            Some(product) => product / length,
-            None => (u128::from(count) * u128::from(at) / u128::from(length)) as u64,
-        };
-        for (bin, from, to) in self.span(start_ps, end_ps) {
-            let whole = to - from == length;
-            for (target, at) in self.bins[bin].counts.of_mut(unit).iter_mut().zip(0..) {
-                let count = counts(at);
-                *target += if whole { count } else { up_to(count, to) - up_to(count, from) };
+        let span = self.span(start_ps, end_ps);
+        let Some((first, ..)) = span.clone().next() else { return };
+        if span.clone().nth(1).is_none() {
+            let targets = self.bins[first].counts.of_mut(unit).iter_mut();
+            return targets.zip(0..).for_each(|(target, at)| *target += counts(at));
+        }
+        let events = self.bins[first].counts.of_mut(unit).len();
+        for at in (0..events).filter(|&at| counts(at) > 0) {
+            let mut shares = Shares::new(counts(at), end_ps - start_ps, self.bin_ps);
+            for (bin, from, to) in span.clone() {
+                self.bins[bin].counts.of_mut(unit)[at] += shares.next(to - from);
             }
         }
     }
@@ -62,11 +83,14 @@ impl Recorder {
 
     /// `busy` of the `of` servers of `unit` worked from `start_ps` to `end_ps`.
     pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
-        for (bin, from, to) in self.span(start_ps, end_ps) {
-            let up_to = |at: u64| (u128::from(at) * u128::from(busy) / u128::from(of)) as u64;
-            self.bins[bin].busy_ps[unit as usize] +=
-                if busy == of { to - from } else { up_to(to) - up_to(from) };
+        let span = self.span(start_ps, end_ps);
+        let bin_ps = self.bin_ps;
+        let mut add = |bin: usize, share: u64| self.bins[bin].busy_ps[unit as usize] += share;
+        if busy == of {
+            return span.for_each(|(bin, from, to)| add(bin, to - from));
         }
+        let mut shares = Shares::new(busy, of, bin_ps);
+        span.for_each(|(bin, from, to)| add(bin, shares.next(to - from)));
     }
 
     /// The frame lasts until `end_ps` at least.
@@ -75,7 +99,11 @@ impl Recorder {
     }
 
     /// The bins from `start_ps` to `end_ps`, each with the part of that time it holds, counted from `start_ps`; at least one.
-    fn span(&mut self, start_ps: u64, end_ps: u64) -> impl Iterator<Item = (usize, u64, u64)> + use<> {
+    fn span(
+        &mut self,
+        start_ps: u64,
+        end_ps: u64,
+    ) -> impl Iterator<Item = (usize, u64, u64)> + Clone + use<> {
         self.end_ps = self.end_ps.max(end_ps);
         let last_ps = end_ps.max(start_ps + 1) - 1;
         self.reach(last_ps);
@@ -119,6 +147,49 @@ impl Recorder {
         let duration_ps = self.end_ps.max(1);
         self.reach(duration_ps - 1);
         Timeline { bin_ps: self.bin_ps, duration_ps, bins: self.bins }
+    }
+}
+
+/// The shares of a whole that fall to parts of a length, one after another. What falls to all parts up to one is rounded down, so
+/// the shares add up to the whole.
+struct Shares {
+    whole: u64,
+    length: u64,
+    /// Of the parts so far, what was rounded away, in parts of `length`.
+    rest: u64,
+    /// The length most parts have, and quotient and remainder of their share.
+    usual: (u64, u64, u64),
+}
+
+impl Shares {
+    fn new(whole: u64, length: u64, usual: u64) -> Self {
+        let mut shares = Self { whole, length, rest: 0, usual: (usual, 0, 0) };
+        let (quotient, remainder) = shares.divide(usual);
+        shares.usual = (usual, quotient, remainder);
+        shares
+    }
+
+    fn divide(&self, part: u64) -> (u64, u64) {
+        // A moment has no parts: it takes all.
+        let Some(length) = std::num::NonZeroU64::new(self.length) else { return (self.whole, 0) };
+        match self.whole.checked_mul(part) {
+            Some(product) => (product / length, product % length),
+            None => {
+                let (product, length) = (u128::from(self.whole) * u128::from(part), u128::from(length.get()));
+                ((product / length) as u64, (product % length) as u64)
+            }
+        }
+    }
+
+    fn next(&mut self, part: u64) -> u64 {
+        let (usual, quotient, remainder) = self.usual;
+        let (quotient, remainder) = if part == usual { (quotient, remainder) } else { self.divide(part) };
+        if self.rest >= self.length - remainder {
+            self.rest -= self.length - remainder;
+            return quotient + u64::from(self.length > 0);
+        }
+        self.rest += remainder;
+        quotient
     }
 }
 

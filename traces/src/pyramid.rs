@@ -46,9 +46,8 @@ struct Entry {
 /// Blocks of a trace's power.
 #[derive(Debug)]
 pub struct Pyramid {
+    clock: Clock,
     samples: u64,
-    start_s: f64,
-    rate_hz: f64,
     store: Store,
 }
 
@@ -88,7 +87,7 @@ impl Pyramid {
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
     pub fn build(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let Clock { start_s, rate_hz, .. } = clock(path, options)?;
+        let clock = clock(path, options)?;
         let mut rows = Rows::open(path, options)?;
         let mut chunk = Chunk::default();
         let (mut voltage_v, mut current_a) = (Vec::new(), Vec::new());
@@ -112,23 +111,23 @@ impl Pyramid {
         while levels[levels.len() - 1].len() > FAN {
             levels.push(levels[levels.len() - 1].chunks(FAN).map(Entry::of_entries).collect());
         }
-        Ok(Self { samples, start_s, rate_hz, store: Store::Memory(levels) })
+        Ok(Self { clock, samples, store: Store::Memory(levels) })
     }
 
     /// Left edge of the first sample, s.
     pub fn start_s(&self) -> f64 {
-        self.start_s
+        self.clock.start_s
     }
 
     /// Right edge of the last sample, s.
     pub fn end_s(&self) -> f64 {
-        self.start_s + self.samples as f64 / self.rate_hz
+        self.clock.time_s(self.samples as f64)
     }
 
     /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64 samples.
     /// Lowest and highest are those of all samples within (as f32), none missed. Empty where nothing can be read.
     pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Vec<Column> {
-        let place = |time_s: f64| ((time_s - self.start_s) * self.rate_hz).clamp(0.0, self.samples as f64);
+        let place = |time_s: f64| self.clock.position(time_s).clamp(0.0, self.samples as f64);
         let (from, to) = (place(from_s) as u64, libm::ceil(place(to_s)) as u64);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
         let (mut level, mut size) = (0, BLOCK);
@@ -141,11 +140,10 @@ impl Pyramid {
         let column = |(index, entries): (usize, &[Entry])| {
             let begin = (first + index as u64 * per_column) * size;
             let end = (begin + entries.len() as u64 * size).min(self.samples);
-            let time_s = |sample: u64| self.start_s + sample as f64 / self.rate_hz;
             let all = Entry::of_entries(entries);
             Column {
-                from_s: time_s(begin),
-                to_s: time_s(end),
+                from_s: self.clock.time_s(begin as f64),
+                to_s: self.clock.time_s(end as f64),
                 low_w: all.low_w,
                 high_w: all.high_w,
                 mean_w: all.mean_w,
@@ -177,7 +175,8 @@ impl Pyramid {
     fn keep(&self, path: &Path, stamp: u64) -> Result<(), crate::io::WriteError> {
         let Store::Memory(levels) = &self.store else { return Ok(()) };
         crate::io::atomic::write_file(path, |out: &mut BufWriter<File>| {
-            let mut header = vec![MAGIC, stamp, self.samples, self.start_s.to_bits(), self.rate_hz.to_bits()];
+            let mut header =
+                vec![MAGIC, stamp, self.samples, self.clock.start_s.to_bits(), self.clock.rate_hz.to_bits()];
             header.resize(HEADER_BYTES as usize / 8, 0);
             header.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))?;
             levels.iter().flatten().try_for_each(|entry| out.write_all(&entry.to_bytes()))
@@ -190,11 +189,14 @@ impl Pyramid {
         let word =
             |index: usize| bytes[8 * index..8 * index + 8].try_into().map(u64::from_le_bytes).unwrap_or(0);
         let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
-        let size = samples.checked_add(0).filter(|&samples| samples < 1 << 48)?;
-        let whole = HEADER_BYTES + ENTRY_BYTES * sizes(size).iter().sum::<u64>();
+        if samples >= 1 << 48 {
+            return None;
+        }
+        let whole = HEADER_BYTES + ENTRY_BYTES * sizes(samples).iter().sum::<u64>();
         let good = word(0) == MAGIC && word(1) == stamp && rate_hz > 0.0 && start_s.is_finite();
         let long = fs::metadata(path).ok()?.len() == whole;
-        (good && long).then(|| Self { samples, start_s, rate_hz, store: Store::File(path.to_owned()) })
+        let clock = Clock { start_s, rate_hz, samples: Some(samples) };
+        (good && long).then(|| Self { clock, samples, store: Store::File(path.to_owned()) })
     }
 }
 

@@ -116,10 +116,11 @@ impl Table {
 type Content = (Vec<String>, Vec<Vec<String>>);
 
 fn from_text(bytes: &[u8]) -> Result<Content, String> {
-    let line = bytes.split(|&byte| byte == b'\n').next().unwrap_or_default();
-    let delimiter = [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
-    let mut reader =
-        csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).delimiter(delimiter).from_reader(bytes);
+    let mut reader = csv::ReaderBuilder::new()
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .delimiter(crate::io::csv::delimiter(bytes))
+        .from_reader(bytes);
     let text =
         |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
     let names = text(reader.byte_headers().map_err(|error| error.to_string())?);

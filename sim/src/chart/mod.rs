@@ -1,6 +1,7 @@
 //! Charts of the book: each measured, drawn and written in one go, one module for each.
 //!
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
+//! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`fit`]: exponents of curves.
@@ -8,6 +9,7 @@
 mod error;
 pub mod fit;
 pub mod growth;
+pub mod sampled;
 pub mod sampling;
 pub mod tile_tests;
 pub mod timing;
@@ -15,8 +17,9 @@ pub mod timing;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 3] = [
+pub const CHARTS: [(&str, &str); 4] = [
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
+    ("sampled", "frames predicted from few: errors, how often intervals hold the truth, host time"),
     ("sampling", "image error over samples per pixel and over host time, for every sample table"),
     ("tile-tests", "every combination of tile tests: efficiency and tightness over multiply-adds"),
 ];

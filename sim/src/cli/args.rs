@@ -8,9 +8,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use pipeline::Features;
 use pipeline::frame::HeatMap;
 
-use super::parse::{frames, size, tests};
+use super::parse::{duration, frames, percent, size, tests};
 use super::trace::args::TraceArgs;
-use crate::timing::Level;
+use crate::timing::Method;
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
 #[derive(Debug, Parser)]
@@ -43,7 +43,8 @@ pub enum Command {
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n\n\
+    after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
+    quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
     timeline.perfetto-trace (open it at ui.perfetto.dev). summary.json is written last: where it is, all is there."
 )]
@@ -96,7 +97,16 @@ pub struct RunArgs {
     pub bound: BoundArg,
     /// How time is modelled; `quintile chart timing` says how well
     #[arg(long, value_enum, default_value_t)]
-    pub timing: Level,
+    pub timing: Method,
+    /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%
+    #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
+    pub accuracy: Option<f64>,
+    /// Let a probe choose the most exact that takes no longer than this, for example 30s, 500ms or 2min
+    #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_hyphen_values = true)]
+    pub budget: Option<f64>,
+    /// Simulate every frame at the reference as well, and say how wrong the run was
+    #[arg(long)]
+    pub verify: bool,
     /// When the next frame starts
     #[arg(long, value_enum, default_value_t)]
     pub pacing: PacingArg,
@@ -215,7 +225,7 @@ pub struct ChartArgs {
     /// Which chart
     #[arg(value_enum, value_name = "NAME")]
     pub chart: ChartArg,
-    /// Another scene for `tile-tests` or `timing`, by name or file; may be given several times
+    /// Another scene for `sampled`, `tile-tests` or `timing`, by name or file; may be given several times
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
     /// Smaller images, fewer samples and a coarser reference: seconds instead of minutes
@@ -237,6 +247,8 @@ pub struct ChartArgs {
 pub enum ChartArg {
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
+    /// Frames predicted from few: errors, how often intervals hold the truth, host time
+    Sampled,
     /// Image error over samples per pixel and over host time, for every sample table
     Sampling,
     /// Every combination of tile tests: efficiency and tightness over multiply-adds

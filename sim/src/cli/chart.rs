@@ -6,10 +6,10 @@ use super::Failure;
 use super::args::{ChartArg, ChartArgs};
 use super::terminal::{print, print_json};
 use crate::chart::ChartError;
-use crate::chart::growth;
 use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
+use crate::chart::{growth, sampled};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -24,12 +24,17 @@ impl From<ChartError> for Failure {
 pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
-    if !args.scene.is_empty() && !matches!(args.chart, ChartArg::TileTests | ChartArg::Timing) {
-        let message = "--scene goes with `chart tile-tests` and `chart timing`; leave it out".to_owned();
+    if !args.scene.is_empty()
+        && !matches!(args.chart, ChartArg::Sampled | ChartArg::TileTests | ChartArg::Timing)
+    {
+        let message =
+            "--scene goes with `chart sampled`, `chart tile-tests` and `chart timing`; leave it out"
+                .to_owned();
         return Err(Failure { message, code: 2 });
     }
     match args.chart {
         ChartArg::Growth => pool.install(|| chart_growth(args, &progress)),
+        ChartArg::Sampled => pool.install(|| chart_sampled(args, &progress)),
         ChartArg::Sampling => pool.install(|| chart_sampling(args, &progress)),
         ChartArg::TileTests => pool.install(|| chart_tile_tests(args, &progress)),
         ChartArg::Timing => pool.install(|| chart_timing(args, &progress)),
@@ -51,6 +56,17 @@ fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> 
     }
     let took_s = started.elapsed().as_secs_f64();
     print(&format!("{}results: {}\ntook {took_s:.1} s", text(&chart), args.out.display()))
+}
+
+fn chart_sampled(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    let effort = if args.quick { sampled::Effort::QUICK } else { sampled::Effort::FULL };
+    let chart = sampled::sampled(&args.scene, effort, progress)?;
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    chart.write(&dir).map_err(RunError::from)?;
+    if args.json {
+        return print_json(&chart, true);
+    }
+    print(&format!("{}\n{}results: {}", chart.text(), chart.cost_text(), args.out.display()))
 }
 
 fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {

@@ -33,6 +33,31 @@ pub(super) fn tests(text: &str) -> Result<Features, String> {
     Ok(features)
 }
 
+/// A share in percent, more than none and at most all, as a fraction.
+pub(super) fn percent(text: &str) -> Result<f64, String> {
+    let number =
+        text.trim_end().strip_suffix('%').ok_or_else(|| format!("`{text}` has no %; write it as 2%"))?;
+    let value: f64 = number.trim().parse().map_err(|_| format!("`{text}` is not a share; write it as 2%"))?;
+    if value > 0.0 && value <= 100.0 {
+        return Ok(value / 100.0);
+    }
+    Err(format!("`{text}` cannot be met; it has to be more than 0% and at most 100%, for example 2%"))
+}
+
+/// Units of time and their seconds, those that end like another first.
+const TIMES: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("h", 3600.0), ("s", 1.0)];
+
+/// A length of time in seconds.
+pub(super) fn duration(text: &str) -> Result<f64, String> {
+    let wrong = || format!("`{text}` is not a time; write it as 30s, 500ms, 2min or 1h");
+    let (number, unit_s) = TIMES
+        .iter()
+        .find_map(|(unit, seconds)| Some((text.trim().strip_suffix(unit)?, seconds)))
+        .ok_or_else(wrong)?;
+    let value: f64 = number.trim().parse().map_err(|_| wrong())?;
+    if value > 0.0 && value.is_finite() { Ok(value * unit_s) } else { Err(wrong()) }
+}
+
 /// Width and height.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("`{text}` is not a size; write it as 1280x720");
@@ -55,6 +80,22 @@ mod tests {
                 .contains("`hiz` is no tile test; there are lens_lines, side_planes")
         );
         assert!(tests("").is_err());
+    }
+
+    #[test]
+    fn shares_and_times() {
+        assert_eq!([percent("2%"), percent("0.5 %"), percent("100%")], [Ok(0.02), Ok(0.005), Ok(1.0)]);
+        assert!(percent("2").unwrap_err().contains("write it as 2%"));
+        for wrong in ["0%", "-1%", "101%", "NaN%", "%", "two%"] {
+            assert!(percent(wrong).unwrap_err().contains("2%"), "{wrong}");
+        }
+        assert_eq!(
+            [duration("30s"), duration("500ms"), duration("2 min"), duration("1h")].map(Result::unwrap),
+            [30.0, 0.5, 120.0, 3600.0]
+        );
+        for wrong in ["30", "s", "-1s", "0s", "infs", "NaNs", "3 days"] {
+            assert!(duration(wrong).unwrap_err().contains("30s"), "{wrong}");
+        }
     }
 
     #[test]

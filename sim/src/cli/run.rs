@@ -12,7 +12,7 @@ use super::terminal::{print, print_json};
 use crate::output::MeanSd;
 use crate::output::progress::Progress;
 use crate::output::table::{Table, si, si_mean_sd};
-use crate::run::{Detection, Outcome, PacingChoice, RunOptions, Summary};
+use crate::run::{Detection, Outcome, PacingChoice, RunOptions, Summary, Wish};
 
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let started = Instant::now();
@@ -48,7 +48,10 @@ fn options(args: &RunArgs) -> RunOptions {
             BoundArg::Nominal => Bound::Nominal,
             BoundArg::High => Bound::High,
         },
-        timing: args.timing,
+        timing: args.timing.level(),
+        sampling: args.timing.sampling(),
+        wish: Wish { accuracy: args.accuracy, budget_s: args.budget },
+        verify: args.verify,
         pacing: match args.pacing {
             PacingArg::Vsync => PacingChoice::Vsync,
             PacingArg::Free => PacingChoice::Free,
@@ -82,7 +85,8 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
             settings.frames,
             settings.triangles
         ),
-        format!("modelled: {}\n", summary.modelled.line()),
+        format!("modelled: {}", summary.modelled.line()),
+        judged(summary),
         figures(outcome).to_string(),
         found(&summary.detection),
     ];
@@ -93,6 +97,12 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
     lines.push(format!("results: {}", args.out.display()));
     lines.push(format!("report:  {}\n", args.out.join("report.html").display()));
     lines.join("\n")
+}
+
+/// What was chosen, predicted and verified; a line each.
+fn judged(summary: &Summary) -> String {
+    let lines = summary.judgement().into_iter().map(|(name, value)| format!("{name}: {value}\n"));
+    lines.collect()
 }
 
 fn found(detection: &Detection) -> String {

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use std::path::Path;
 
 use pipeline::Viewport;
 use serde::Serialize;
@@ -24,6 +25,7 @@ struct Written {
 }
 
 pub(super) fn run(args: &SamplesArgs) -> Result<(), Failure> {
+    super::not_an_input(Some(&args.out), [Path::new(&args.table)])?;
     let (width, height) = args.size;
     let wrong = |message: String| Failure { message, code: 2 };
     let viewport = Viewport::new(width, height)

@@ -8,6 +8,8 @@ use crate::output::progress::Progress;
 use crate::run::RunError;
 
 pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
+    // The folder first: that it cannot be made is better known before the work than after it.
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
     let report = pool.install(|| crate::stress::stress(args.family.as_deref(), args.quick, &progress))?;
@@ -17,7 +19,6 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
         print(&report.text())?;
     }
     let clean = report.is_clean();
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     report.write(dir).map_err(RunError::from)?;
     if !args.json {
         print(&format!("results: {}", args.out.display()))?;

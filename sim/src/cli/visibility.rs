@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use activity::Warning;
 use pipeline::SampleTable;
@@ -34,6 +34,8 @@ struct Found {
 }
 
 pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
+    let inputs = args.files.iter().chain(&args.camera).map(PathBuf::as_path);
+    super::not_an_input(args.out.as_deref(), inputs.chain([Path::new(&args.samples)]))?;
     let scene = visibility::load(&args.files, args.camera.as_deref())?;
     if args.print_camera {
         return print_camera(args, &scene);
@@ -67,6 +69,25 @@ fn print_camera(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<(), Fa
     print(&camera.to_ron())
 }
 
+/// Bytes that a sample takes on its way, and how many all of them may.
+const BYTES_PER_SAMPLE: u64 = 48;
+const MOST_BYTES: u64 = 8 << 30;
+
+/// Refuses images that would not fit into memory.
+fn fits(args: &VisibilityArgs, scene: &VisibilityScene, per_pixel: u32) -> Result<(), Failure> {
+    let samples = scene.viewport.pixels() as u64 * u64::from(per_pixel);
+    if samples * BYTES_PER_SAMPLE <= MOST_BYTES {
+        return Ok(());
+    }
+    let [needed, limit] = [samples * BYTES_PER_SAMPLE, MOST_BYTES].map(|bytes| bytes >> 30);
+    let message = format!(
+        "{}: {} pixels of {per_pixel} samples take {needed} GiB, more than {limit} GiB; ask for fewer",
+        named(args),
+        scene.viewport.pixels()
+    );
+    Err(Failure { message, code: 2 })
+}
+
 /// The mesh in messages.
 fn named(args: &VisibilityArgs) -> String {
     args.files.first().map_or_else(String::new, |file| file.display().to_string())
@@ -74,7 +95,9 @@ fn named(args: &VisibilityArgs) -> String {
 
 fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> {
     let samples = samples(args, &scene)?;
+    fits(args, &scene, samples.per_pixel())?;
     let mut warnings = scene.warnings.clone();
+    warnings.extend(crate::visibility::warnings(&scene));
     warnings.extend((args.tests.is_none() && scene.camera.is_orthographic()).then(slow_view));
     let found = find(&scene, &*samples, args.tests, args.repeat)
         .map_err(|message| Failure { message: format!("{}: {message}", named(args)), code: 1 })?;

@@ -9,7 +9,7 @@ use crate::output::table::{grouped, si};
 /// What was run.
 pub(super) fn facts(outcome: &Outcome) -> Vec<FactRow> {
     let (plan, summary) = (&outcome.plan, &outcome.summary);
-    vec![
+    let mut facts = vec![
         FactRow::new("scene", plan.scene.name()),
         FactRow::new("triangles", grouped(summary.settings.triangles as u64)),
         FactRow::new("GPU", format!("{}: {}", plan.gpu.name, plan.gpu.doc)),
@@ -19,7 +19,9 @@ pub(super) fn facts(outcome: &Outcome) -> Vec<FactRow> {
         FactRow::new("limits", summary.modelled.limits.join("; ")),
         FactRow::new("counts hash", summary.counts_hash.clone()),
         FactRow::new("Quintile", summary.version),
-    ]
+    ];
+    facts.extend(summary.judgement().into_iter().map(|(name, value)| FactRow::new(name, value)));
+    facts
 }
 
 fn bound(bound: Bound) -> &'static str {
@@ -79,7 +81,7 @@ pub(super) fn files(outcome: &Outcome) -> Vec<FileLink> {
         ("trace.parquet", "the recorded trace: time, voltage, current"),
         ("trace.csv", "the same as text"),
         ("timeline.perfetto-trace", "units and power over time, for ui.perfetto.dev"),
-        ("images/", "every frame"),
+        ("images/", "every frame that was simulated"),
         ("plots/", "the plots as SVG and PNG"),
     ]
     .into_iter()

@@ -1,12 +1,14 @@
 //! A run: scene, pipeline, clock, watts, trace, frames, files.
 //!
 //! ```text
-//! RunOptions -> Plan -> simulate -> measure -> Outcome -> write
+//! RunOptions -> Plan -> choose -> simulate -> measure -> Outcome -> write
 //! ```
 
 mod checks;
+mod choice;
 mod error;
 mod facts;
+mod frame_rows;
 mod heat;
 mod limits;
 mod measure;
@@ -16,6 +18,7 @@ mod pictures;
 mod regime;
 mod regime_warnings;
 mod report;
+mod sampled;
 mod simulate;
 mod stalls;
 mod summary;
@@ -29,13 +32,16 @@ use crate::output::OutDir;
 use crate::output::progress::Progress;
 
 pub use checks::Checks;
+pub use choice::{Choice, Verified, Wish};
 pub use error::RunError;
+pub use frame_rows::FrameRow;
 pub use heat::HeatPicture;
 pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};
 pub use regime::Regime;
-pub use simulate::{Simulated, SimulatedFrame};
+pub use sampled::{Forecast, Glimpse, Preview, Quantity, SampledSummary, Scout, Signatures, Taken, taken};
+pub use simulate::{Simulated, SimulatedFrame, frames_of};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};
 
@@ -57,11 +63,16 @@ pub struct Outcome {
 /// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures. Whatever was written before is not
 /// marked as whole: `summary.json` comes last.
 pub fn run(options: RunOptions, out: &Path, progress: &Progress) -> Result<Outcome, RunError> {
-    let plan = Plan::resolve(options)?;
+    let mut plan = Plan::resolve(options)?;
     let dir = OutDir::create(out)?;
+    let mut choice = choice::choose(&mut plan, progress)?;
     let simulated = simulate::simulate(&plan, &dir, progress)?;
+    if let Some(choice) = &mut choice {
+        choice.settle(&simulated);
+    }
+    let verified = plan.options.verify.then(|| choice::verify(&plan, &simulated, progress)).transpose()?;
     let measurement = measure::measure(&plan, &simulated)?;
-    let summary = Summary::new(&plan, &simulated, &measurement);
+    let summary = Summary { choice, verified, ..Summary::new(&plan, &simulated, &measurement) }.warned();
     let outcome = Outcome { plan, simulated, measurement, summary };
     write::write(&outcome, dir, progress)?;
     Ok(outcome)

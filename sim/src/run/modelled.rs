@@ -16,6 +16,8 @@ pub struct Modelled {
     pub lens: bool,
     /// Frames that were simulated; equal ones are simulated once.
     pub distinct_frames: usize,
+    /// Frames that were predicted from those.
+    pub predicted_frames: usize,
     /// Units that did something.
     pub units: Vec<&'static str>,
     /// Units that nothing in the scene asks for.
@@ -33,6 +35,7 @@ impl Modelled {
         let lens = simulated.distinct.iter().any(|frame| frame.lens);
         let (used, unused): (Vec<Unit>, Vec<Unit>) =
             Unit::ALL.into_iter().partition(|&unit| total.uses(unit));
+        let predicted = simulated.distinct.iter().filter(|frame| frame.predicted.is_some()).count();
         let mut limits = vec![
             "one opaque pass; no blending",
             "one voltage and clock state; no governor, no temperature change",
@@ -41,11 +44,17 @@ impl Modelled {
         if !plan.scene.is_animated() && simulated.frames.len() > 1 {
             limits.push("the scene is still: one frame was simulated and repeated");
         }
+        if predicted > 0 {
+            limits.push(
+                "counters, heat and images are of the frames that were simulated; the others are predicted",
+            );
+        }
         Self {
             dimensions: 2 + u32::from(motion) + 2 * u32::from(lens),
             motion,
             lens,
-            distinct_frames: simulated.distinct.len(),
+            distinct_frames: simulated.distinct.len() - predicted,
+            predicted_frames: predicted,
             units: used.into_iter().map(Unit::name).collect(),
             units_not_modelled: unused.into_iter().map(Unit::name).collect(),
             timing: plan.options.timing.name(),
@@ -66,6 +75,10 @@ impl Modelled {
         } else {
             format!("; not needed and not modelled: {}", self.units_not_modelled.join(", "))
         };
-        format!("{dimensions}, timing level {}{unused}", self.timing)
+        let predicted = match self.predicted_frames {
+            0 => String::new(),
+            count => format!(", {} frames simulated and {count} predicted", self.distinct_frames),
+        };
+        format!("{dimensions}, timing level {}{predicted}{unused}", self.timing)
     }
 }

@@ -8,10 +8,10 @@ use pipeline::sampling::SampleSource;
 use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
 use workloads::{Overrides, SampleChoice, Scene};
 
-use super::RunError;
 use super::limits::Size;
+use super::{RunError, Wish};
 use crate::gpu::GpuSpec;
-use crate::timing::Level;
+use crate::timing::{Level, Sampling};
 
 /// When the next frame starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,6 +40,12 @@ pub struct RunOptions {
     pub bound: Bound,
     /// How time is modelled.
     pub timing: Level,
+    /// How many frames are simulated.
+    pub sampling: Sampling,
+    /// What is wanted instead: then level and frames are chosen.
+    pub wish: Wish,
+    /// Whether the run is held against every frame at the reference.
+    pub verify: bool,
     /// When the next frame starts.
     pub pacing: PacingChoice,
     /// Samples per second of the recorder.
@@ -62,6 +68,9 @@ impl Default for RunOptions {
             energy: "28nm".to_owned(),
             bound: Bound::Nominal,
             timing: Level::default(),
+            sampling: Sampling::default(),
+            wish: Wish::default(),
+            verify: false,
             pacing: PacingChoice::default(),
             trace_rate_hz: 50e3,
             seed: 1,

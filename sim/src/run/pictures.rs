@@ -55,10 +55,13 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
     plots
 }
 
-/// The frame shown in detail, the marked one: its place in the run and what is known of it.
+/// The frame shown in detail, the marked one or the one next to it that was simulated: its place in the run and what is known of it.
 fn shown_frame(outcome: &Outcome) -> (usize, &SimulatedFrame) {
-    let place = outcome.simulated.frames.len() / 2;
-    (place, &outcome.simulated.distinct[outcome.simulated.frames[place]])
+    let middle = outcome.simulated.frames.len() / 2;
+    let known = outcome.simulated.in_order().enumerate().filter(|(_, frame)| frame.predicted.is_none());
+    let (place, frame) =
+        known.min_by_key(|(place, _)| place.abs_diff(middle)).unwrap_or((0, &outcome.simulated.distinct[0]));
+    (place, frame)
 }
 
 fn power_run(outcome: &Outcome, subject: &str) -> Picture {

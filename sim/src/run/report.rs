@@ -99,9 +99,17 @@ fn frames(outcome: &Outcome) -> Vec<FrameRow> {
             energy_j: row.energy_mj * 1e-3,
             power_w: row.power_w,
         }),
-        flags: measured.map_or("missed".to_owned(), |m| m.flags.to_string()),
+        flags: remarks(row.predicted, measured.map_or("missed".to_owned(), |m| m.flags.to_string())),
     })
     .collect()
+}
+
+fn remarks(predicted: bool, flags: String) -> String {
+    match (predicted, flags.is_empty()) {
+        (false, _) => flags,
+        (true, true) => "predicted".to_owned(),
+        (true, false) => format!("predicted, {flags}"),
+    }
 }
 
 fn units(outcome: &Outcome) -> Vec<UnitRow> {
@@ -120,7 +128,7 @@ fn units(outcome: &Outcome) -> Vec<UnitRow> {
 }
 
 fn counters(outcome: &Outcome) -> Vec<CounterRow> {
-    let frames = outcome.simulated.frames.len().max(1) as f64;
+    let frames = outcome.simulated.known().count().max(1) as f64;
     let pixels = outcome.plan.pixels() as f64;
     let row = |event: Event| {
         let total = outcome.summary.counts[event];

@@ -10,18 +10,19 @@ use workloads::Frame;
 
 use super::heat::{self, HeatPicture};
 use super::regime::Regime;
+use super::sampled::{self, SampledSummary, Taken};
 use super::{Plan, RunError};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
 use crate::output::progress::Progress;
-use crate::timing::FrameClock;
+use crate::timing::{FrameClock, Sampling};
 
 /// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
-const BIN_PS: u64 = 1_000_000;
+pub(super) const BIN_PS: u64 = 1_000_000;
 /// Most bins of all frames that are kept, about 200 bytes each; where there would be more they are made longer.
 const MOST_BINS: usize = 8_000_000;
 /// Fewest bins of a frame, however many frames there are.
-const FEWEST_BINS: usize = 1024;
+pub(super) const FEWEST_BINS: usize = 1024;
 
 /// One frame as the simulator knows it.
 pub struct SimulatedFrame {
@@ -47,6 +48,9 @@ pub struct SimulatedFrame {
     pub cycles: u64,
     /// Why units did not work, where the level of timing knows.
     pub stalls: Option<Stalls>,
+    /// For a frame that was predicted from others: half the widths of the intervals in which its cycles and its energy lie. Its
+    /// power, its busy times and its cycles are then predicted, and nothing is known of its counts.
+    pub predicted: Option<Taken>,
 }
 
 /// All frames of a run.
@@ -59,6 +63,8 @@ pub struct Simulated {
     pub pictures: Vec<(u32, Vec<Vec3>)>,
     /// The heat maps of the frame in the middle.
     pub heat: Vec<HeatPicture>,
+    /// Which frames were predicted, and how sure that is.
+    pub sampled: Option<SampledSummary>,
 }
 
 impl Simulated {
@@ -67,48 +73,106 @@ impl Simulated {
         self.frames.iter().map(|&place| &self.distinct[place])
     }
 
-    /// The counts of the whole run.
+    /// Those that were simulated rather than predicted.
+    pub fn known(&self) -> impl Iterator<Item = &SimulatedFrame> {
+        self.in_order().filter(|frame| frame.predicted.is_none())
+    }
+
+    /// The counts of the frames of the run that were simulated.
     pub fn total(&self) -> Counts {
-        self.in_order().fold(Counts::default(), |mut sum, frame| {
+        self.known().fold(Counts::default(), |mut sum, frame| {
             sum += &frame.counts;
             sum
         })
     }
 }
 
-/// Simulates every frame that differs, writing its image as soon as it is done.
+/// Simulates the frames that the plan asks for, writing the image of each as soon as it is done.
 pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result<Simulated, RunError> {
     remove_stale(dir)?;
     let range = plan.scene.settings().frames.clone();
-    let numbers: Vec<u32> =
-        if plan.scene.is_animated() { range.clone().collect() } else { vec![range.start] };
+    let animated = plan.scene.is_animated();
+    let numbers: Vec<u32> = if animated { range.collect() } else { vec![range.start] };
+    let stage = Stage { plan, dir: Some(dir), most_bins: (MOST_BINS / numbers.len()).max(FEWEST_BINS) };
+    if animated && plan.options.sampling != Sampling::Every {
+        return sampled::simulate(&stage, &numbers, progress);
+    }
+    every(&stage, &numbers, progress)
+}
+
+/// Simulates every frame that differs. Pictures are kept of the first, the middle and the last.
+pub(super) fn every(stage: &Stage<'_>, numbers: &[u32], progress: &Progress) -> Result<Simulated, RunError> {
     let middle = numbers[numbers.len() / 2];
     let shown = [middle, numbers[0], numbers[numbers.len() - 1]];
-    let most_bins = (MOST_BINS / numbers.len()).max(FEWEST_BINS);
     let bar = progress.bar("frames", numbers.len() as u64);
-    let done: Vec<_> = numbers
-        .par_iter()
-        .map(|&number| {
-            let (frame, image, heat) = simulate_frame(plan, number, most_bins)?;
-            let maps = heat.iter().map(|map| heat::write(plan, dir, number, map));
-            let maps: Vec<HeatPicture> = maps.collect::<Result<_, _>>()?;
-            // A still scene is simulated once; every frame of the run has its image all the same.
-            let mut shown_as = if numbers.len() == 1 { range.clone() } else { number..number + 1 };
-            shown_as.try_for_each(|frame| write_image(plan, dir, frame, &image))?;
-            bar.inc();
-            let maps = if number == middle { maps } else { Vec::new() };
-            Ok((frame, shown.contains(&number).then_some((number, image)), maps))
-        })
-        .collect::<Result<_, RunError>>()?;
+    let simulate = |&number: &u32| {
+        let done = stage.whole(number, shown.contains(&number))?;
+        bar.inc();
+        Ok(done)
+    };
+    let done: Vec<Whole> = numbers.par_iter().map(simulate).collect::<Result<_, RunError>>()?;
     let (mut distinct, mut pictures, mut heat) = (Vec::new(), Vec::new(), Vec::new());
-    for (frame, picture, maps) in done {
-        distinct.push(frame);
-        pictures.extend(picture);
-        heat.extend(maps);
+    for done in done {
+        if done.frame.index == middle {
+            heat = done.heat;
+        }
+        pictures.extend(done.picture.map(|picture| (done.frame.index, picture)));
+        distinct.push(done.frame);
     }
+    let frames = stage.plan.scene.settings().frames.clone();
     let frames =
-        range.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
-    Ok(Simulated { distinct, frames, pictures, heat })
+        frames.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
+    Ok(Simulated { distinct, frames, pictures, heat, sampled: None })
+}
+
+/// Simulates the frames called `numbers` and writes nothing.
+///
+/// # Errors
+/// When a frame cannot be made or timed.
+pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Vec<SimulatedFrame>, RunError> {
+    let most_bins = (MOST_BINS / numbers.len().max(1)).max(FEWEST_BINS);
+    let stage = Stage { plan, dir: None, most_bins };
+    let bar = progress.bar("frames", numbers.len() as u64);
+    let simulate = |&number: &u32| {
+        let done = stage.whole(number, false)?;
+        bar.inc();
+        Ok(done.frame)
+    };
+    numbers.par_iter().map(simulate).collect()
+}
+
+/// Where frames are simulated.
+pub(super) struct Stage<'a> {
+    pub plan: &'a Plan,
+    /// Where images and heat maps go; nowhere without it.
+    pub dir: Option<&'a OutDir>,
+    /// Bins of a frame at most.
+    pub most_bins: usize,
+}
+
+/// A frame simulated whole.
+pub(super) struct Whole {
+    pub frame: SimulatedFrame,
+    /// Its linear image, where it is wanted.
+    pub picture: Option<Vec<Vec3>>,
+    pub heat: Vec<HeatPicture>,
+}
+
+impl Stage<'_> {
+    /// Simulates frame `number` and writes its image.
+    pub fn whole(&self, number: u32, picture: bool) -> Result<Whole, RunError> {
+        let plan = self.plan;
+        let (frame, image, maps) = simulate_frame(plan, number, self.most_bins)?;
+        let mut heat = Vec::new();
+        if let Some(dir) = self.dir {
+            heat = maps.iter().map(|map| heat::write(plan, dir, number, map)).collect::<Result<_, _>>()?;
+            // A still scene is simulated once; every frame of the run has its image all the same.
+            let range = plan.scene.settings().frames.clone();
+            let mut shown_as = if plan.scene.is_animated() { number..number + 1 } else { range };
+            shown_as.try_for_each(|frame| write_image(plan, dir, frame, &image))?;
+        }
+        Ok(Whole { frame, picture: picture.then_some(image), heat })
+    }
 }
 
 /// What an earlier run left: should this one die on the way, nothing old may stand in for it.
@@ -160,11 +224,12 @@ fn simulate_frame(
         busy: busy_shares(&timeline),
         cycles: timed.cycles,
         stalls: timed.stalls,
+        predicted: None,
     };
     Ok((simulated, rendered.image, heat))
 }
 
-fn is_moving(frame: &Frame) -> bool {
+pub(super) fn is_moving(frame: &Frame) -> bool {
     frame.camera.open() != frame.camera.close() || frame.meshes.iter().any(|mesh| !mesh.is_still())
 }
 

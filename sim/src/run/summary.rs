@@ -2,17 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Event, Unit, Warning};
+use activity::{Counts, Unit, Warning};
 use power_model::Energy;
 use serde::Serialize;
 use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
 
 use super::checks::Checks;
+use super::frame_rows::{FrameRow, hash, rows};
 use super::measure::mean_parts_w;
 use super::modelled::Modelled;
-use super::simulate::image_name;
+use super::sampled::SampledSummary;
 use super::stalls::{self, StallShares};
-use super::{Measurement, Plan, Simulated, warnings};
+use super::{Choice, Measurement, Plan, Simulated, Verified, warnings};
 use crate::output::MeanSd;
 use crate::output::report::Headline;
 
@@ -53,10 +54,16 @@ pub struct Summary {
     pub stalls: BTreeMap<&'static str, StallShares>,
     /// Samples hit over samples tested.
     pub sample_test_efficiency: Option<f64>,
-    /// How often each event happened.
+    /// How often each event happened in the frames that were simulated.
     pub counts: Counts,
-    /// A hash of the counts of every frame: equal runs have equal hashes.
+    /// A hash of the counts of every frame that was simulated: equal runs have equal hashes.
     pub counts_hash: String,
+    /// What was chosen for the accuracy or the time that was asked for.
+    pub choice: Option<Choice>,
+    /// Actual errors, where they were asked for.
+    pub verified: Option<Verified>,
+    /// Which frames were simulated and how sure the others are, where not all were.
+    pub sampled: Option<SampledSummary>,
     /// Every frame of the run.
     pub frames: Vec<FrameRow>,
 }
@@ -130,37 +137,6 @@ pub struct Detection {
     pub worst_energy_error: Option<f64>,
 }
 
-/// One frame of a run.
-#[derive(Clone, Debug, Serialize)]
-pub struct FrameRow {
-    /// Its number in the scene.
-    pub frame: u32,
-    /// Its image.
-    pub image: String,
-    /// True start in seconds from the start of the recording.
-    pub start_s: f64,
-    /// Cycles of the core clock for which the GPU worked on it.
-    pub cycles: u64,
-    /// For how long the GPU worked on it, in milliseconds.
-    pub busy_ms: f64,
-    /// From start to start, in milliseconds.
-    pub duration_ms: f64,
-    /// True energy in millijoules.
-    pub energy_mj: f64,
-    /// True energy in nanojoules per pixel.
-    pub energy_nj_per_pixel: f64,
-    /// True mean power in watts.
-    pub power_w: f64,
-    /// True energy by part in joules; summed in this order it is the frame's, exactly.
-    pub energy_by_part_j: Energy,
-    /// True energy in joules.
-    pub energy_j: f64,
-    /// Energy as measured in the trace, in millijoules, where the frame was found.
-    pub measured_energy_mj: Option<f64>,
-    /// Error of the found start in seconds.
-    pub start_error_s: Option<f64>,
-}
-
 impl Summary {
     /// The quantities that people compare, measured beside true, mean and standard deviation over frames in SI units.
     pub fn headline(&self) -> Vec<Headline> {
@@ -177,6 +153,22 @@ impl Summary {
             row("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
             row("power", "W", |f| f.power_w, 1.0),
         ]
+    }
+
+    /// What was chosen, what was predicted and how wrong it was, in words; nothing where nothing of that was asked for.
+    pub fn judgement(&self) -> Vec<(&'static str, String)> {
+        let mut rows: Vec<(&'static str, String)> = Vec::new();
+        rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
+        rows.extend(self.sampled.as_ref().map(|sampled| ("predicted", sampled.line())));
+        rows.extend(self.verified.as_ref().map(|verified| ("actual error", verified.line())));
+        rows
+    }
+
+    /// With a warning where what was asked for is not met.
+    pub(super) fn warned(mut self) -> Self {
+        self.warnings.extend(self.choice.iter().flat_map(warnings::missed));
+        self.warnings.sort();
+        self
     }
 
     pub(super) fn new(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Self {
@@ -206,7 +198,13 @@ impl Summary {
             stalls: stalls::shares(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
-            counts_hash: format!("{:016x}", hash(simulated)),
+            counts_hash: format!(
+                "{:016x}",
+                simulated.known().fold(0, |seed, frame| hash(seed, &frame.counts))
+            ),
+            choice: None,
+            verified: None,
+            sampled: simulated.sampled.clone(),
             frames: rows(plan, simulated, measurement),
         }
     }
@@ -270,42 +268,4 @@ fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
         ps as f64 * 1e-12 / time
     };
     Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
-}
-
-fn hash(simulated: &Simulated) -> u64 {
-    simulated.in_order().fold(0, |hash, frame| {
-        Event::ALL.iter().fold(hash, |hash: u64, &event| {
-            pipeline::sampling::mix(hash.rotate_left(1) ^ frame.counts[event].wrapping_add(event as u64))
-        })
-    })
-}
-
-fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
-    let first = plan.scene.settings().frames.start;
-    measurement
-        .run
-        .frames
-        .iter()
-        .zip(measurement.by_true_frame())
-        .zip(simulated.in_order())
-        .zip(first..)
-        .map(|(((paced, measured), known), frame)| {
-            let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
-            FrameRow {
-                frame,
-                image: format!("{}.png", image_name(frame)),
-                start_s: paced.start_s,
-                cycles: known.cycles,
-                busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
-                duration_ms: duration_s * 1e3,
-                energy_mj: energy_j * 1e3,
-                energy_by_part_j: paced.energy,
-                energy_j,
-                energy_nj_per_pixel: energy_j * 1e9 / plan.pixels() as f64,
-                power_w: energy_j / duration_s,
-                measured_energy_mj: measured.map(|m| m.energy_j * 1e3),
-                start_error_s: measured.map(|m| m.start_s - paced.start_s),
-            }
-        })
-        .collect()
 }

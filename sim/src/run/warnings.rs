@@ -3,7 +3,7 @@
 use activity::{Counts, Event, Warning};
 use traces::frames::Flag;
 
-use super::{Measurement, Plan, Simulated, regime_warnings};
+use super::{Choice, Measurement, Plan, Simulated, regime_warnings};
 
 /// A frame shorter than this many samples cannot be integrated well: each end is uncertain by a good part of a sample.
 const FEWEST_SAMPLES: f64 = 50.0;
@@ -21,6 +21,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(short_frames(measurement));
     all.extend(detection(measurement));
     all.extend(clipped(measurement));
+    all.extend(unsure(simulated));
     all.extend(regime_warnings::gather(simulated));
     all.sort();
     all.dedup();
@@ -45,11 +46,54 @@ fn degenerate(simulated: &Simulated) -> Option<Warning> {
 }
 
 fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
-    let empty = simulated.in_order().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
+    let empty = simulated.known().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
     (empty > 0).then(|| {
         Warning::new(
             "empty-frame",
-            format!("{empty} of {} frames show nothing: check the camera", simulated.frames.len()),
+            format!("{empty} of {} frames show nothing: check the camera", simulated.known().count()),
+        )
+    })
+}
+
+/// A choice that is not as good, or not as fast, as was asked for.
+pub(super) fn missed(choice: &Choice) -> Vec<Warning> {
+    let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
+    let late = late.map(|(budget_s, expected_s)| {
+        let message = format!(
+            "simulating was expected to take {expected_s:.1} s, more than the {budget_s} s of --budget, at the cheapest \
+             there is; give more time, or fewer frames, samples or pixels"
+        );
+        Warning::new("budget-missed", message)
+    });
+    let inexact = (choice.meets_accuracy == Some(false)).then(|| {
+        Warning::new(
+            "accuracy-missed",
+            format!(
+                "the error is expected to be {:.2} %, more than the {} % of --accuracy: --budget allows no more, or all \
+                 frames would have to be simulated; give more time, or less accuracy",
+                choice.expected_error_percent,
+                choice.accuracy_percent.unwrap_or_default()
+            ),
+        )
+    });
+    late.into_iter().chain(inexact).collect()
+}
+
+/// Intervals wider than this share of their value either way are worth a word.
+const WIDE_PERCENT: f64 = 5.0;
+
+fn unsure(simulated: &Simulated) -> Option<Warning> {
+    let sampled = simulated.sampled.as_ref()?;
+    let worst = sampled.worst_percent();
+    (worst > WIDE_PERCENT).then(|| {
+        Warning::new(
+            "prediction-unsure",
+            format!(
+                "{} of {} frames were simulated, and totals predicted from them are good to {worst:.1} % only: frames differ in \
+                 ways that their previews do not show; give --accuracy, or simulate all",
+                sampled.simulated_frames.len(),
+                simulated.frames.len()
+            ),
         )
     })
 }
@@ -102,4 +146,33 @@ fn clipped(measurement: &Measurement) -> Option<Warning> {
             format!("{} samples are beyond the recorder's range", measurement.clipped),
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Quantity, SampledSummary};
+    use super::*;
+
+    #[test]
+    fn wide_intervals_are_told_and_narrow_ones_are_not() {
+        let of = |half_width_percent: f64| {
+            let quantity =
+                |half_width_percent| Quantity { value: 1.0, low: 0.9, high: 1.1, half_width_percent };
+            let sampled = SampledSummary {
+                simulated_frames: vec![0, 7, 30],
+                frames_per_simulated: 12.0,
+                strata: 2,
+                preview: [160, 90, 1],
+                confidence: 0.95,
+                cycles_per_frame: quantity(1.0),
+                busy_energy_per_frame_j: quantity(half_width_percent),
+                busy_power_w: quantity(1.0),
+            };
+            let (distinct, pictures, heat) = (Vec::new(), Vec::new(), Vec::new());
+            unsure(&Simulated { distinct, frames: vec![0; 36], pictures, heat, sampled: Some(sampled) })
+        };
+        assert_eq!(of(WIDE_PERCENT), None);
+        let message = of(7.25).map(|warning| warning.to_string()).unwrap_or_default();
+        assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
+    }
 }

@@ -1,10 +1,12 @@
 //! The files of a run. `summary.json` comes last: where it is, all is there.
 
+use std::io::Write;
+
 use traces::energy::FrameTable;
 use traces::score::{TOLERANCE_S, truth_beside};
 
 use super::{Outcome, RunError, pictures, report, timeline};
-use crate::output::dir::OutDir;
+use crate::output::dir::{BoxError, OutDir};
 use crate::output::perfetto;
 use crate::output::progress::Progress;
 
@@ -39,6 +41,38 @@ fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
     let measurement = &outcome.measurement;
     let truth = truth_beside(&measurement.frames, &measurement.truth, TOLERANCE_S);
     let table = FrameTable::new(measurement.frames.clone(), Some(outcome.plan.pixels())).with_truth(truth)?;
-    dir.write_atomic("frames.csv", |out| Ok(table.write_csv(out)?))?;
+    dir.write_atomic("frames.csv", |out| {
+        if outcome.simulated.sampled.is_none() {
+            return Ok(table.write_csv(out)?);
+        }
+        let mut plain = Vec::new();
+        table.write_csv(&mut plain)?;
+        marked(outcome, &plain, out)
+    })?;
     Ok(())
+}
+
+/// The table with columns that say which frames were predicted, and the ends of the intervals in which their energies lie.
+fn marked(outcome: &Outcome, plain: &[u8], out: &mut dyn Write) -> Result<(), BoxError> {
+    let mut reader = csv::Reader::from_reader(plain);
+    let mut writer = csv::Writer::from_writer(out);
+    let mut header = reader.headers()?.clone();
+    for column in ["predicted", "predicted_energy_low_J", "predicted_energy_high_J"] {
+        header.push_field(column);
+    }
+    writer.write_record(&header)?;
+    let measurement = &outcome.measurement;
+    let by_truth = measurement.by_true_frame();
+    for (record, found) in reader.records().zip(&measurement.frames) {
+        let mut record = record?;
+        let truth = by_truth.iter().position(|matched| *matched == Some(found));
+        let row = truth.map(|place| &outcome.summary.frames[place]);
+        record.push_field(row.map_or("", |row| if row.predicted { "1" } else { "0" }));
+        let interval = row.and_then(|row| row.energy_mj_interval);
+        for end in 0..2 {
+            record.push_field(&interval.map_or(String::new(), |ends| (ends[end] * 1e-3).to_string()));
+        }
+        writer.write_record(&record)?;
+    }
+    Ok(writer.flush()?)
 }

@@ -3,5 +3,7 @@
 //! The models are in the package `timing`; here a level is a name and a clock that packets are pushed into.
 
 mod level;
+mod method;
 
 pub use level::{FrameClock, Level, TimingError};
+pub use method::{Method, Sampling};

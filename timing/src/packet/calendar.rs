@@ -4,23 +4,29 @@ use crate::clock::Time;
 
 /// Stretches of equal length, each with room for so much work. Packets ask in the order of the stream, not in that of time;
 /// a stretch that one of them left free can be taken by another that comes later in the stream and earlier in time.
+///
+/// Work is counted in grains of one server, so that a server alone needs no division.
 #[derive(Clone, Debug)]
 pub(super) struct Calendar {
-    /// Length of a stretch.
-    length: Time,
-    /// Work that fits in one.
+    /// Binary logarithm of the length of a stretch.
+    shift: u32,
+    servers: u64,
+    /// Work that fits in a stretch.
     room: u64,
-    used: Vec<u32>,
+    used: Vec<u64>,
     /// For each stretch the first one from it on that may have room.
     free: Vec<u32>,
 }
 
 impl Calendar {
-    /// Stretches of `cycles` cycles of `period`, each of which does `rate` units of work.
-    pub fn new(cycles: u32, period: Time, rate: u32) -> Self {
+    /// Stretches of `length` grains or a little more, with so many servers.
+    pub fn new(length: Time, servers: u32) -> Self {
+        let length = length.next_power_of_two();
+        let servers = u64::from(servers);
         Self {
-            length: Time::from(cycles) * period,
-            room: u64::from(cycles) * u64::from(rate),
+            shift: length.trailing_zeros(),
+            servers,
+            room: length * servers,
             used: Vec::new(),
             free: Vec::new(),
         }
@@ -28,19 +34,19 @@ impl Calendar {
 
     /// Does `work` from `at` on and says when it begins and when it is done.
     pub fn take(&mut self, at: Time, work: u64) -> (Time, Time) {
-        let mut stretch = self.first_free((at / self.length) as usize);
+        let mut stretch = self.first_free((at >> self.shift) as usize);
         let begin = self.moment(stretch, at);
         let mut left = work;
         loop {
-            let here = left.min(self.room - u64::from(self.used[stretch]));
-            self.used[stretch] += here as u32;
+            let here = left.min(self.room - self.used[stretch]);
+            self.used[stretch] += here;
             left -= here;
-            if u64::from(self.used[stretch]) == self.room {
+            if self.used[stretch] == self.room {
                 self.free[stretch] = stretch as u32 + 1;
             }
             if left == 0 {
-                let end = self.moment(stretch, at).max(begin + self.span(work));
-                return (begin, end);
+                let alone = begin + self.alone(work + self.servers - 1);
+                return (begin, self.moment(stretch, at).max(alone));
             }
             stretch = self.first_free(stretch + 1);
         }
@@ -48,13 +54,12 @@ impl Calendar {
 
     /// When the work put into a stretch so far is done, if none of it is done before `at`.
     fn moment(&self, stretch: usize, at: Time) -> Time {
-        let filled = stretch as Time * self.length + u64::from(self.used[stretch]) * self.length / self.room;
-        filled.max(at)
+        (((stretch as Time) << self.shift) + self.alone(self.used[stretch])).max(at)
     }
 
-    /// How long `work` takes alone.
-    fn span(&self, work: u64) -> Time {
-        (work * self.length).div_ceil(self.room)
+    /// How long all servers need for `work`.
+    fn alone(&self, work: u64) -> Time {
+        if self.servers == 1 { work } else { work / self.servers }
     }
 
     fn first_free(&mut self, from: usize) -> usize {
@@ -83,9 +88,7 @@ impl Calendar {
     /// Every stretch in which anything was done: from, to, work done and work that fits.
     pub fn stretches(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
         let used = self.used.iter().zip(0..).filter(|(used, _)| **used > 0);
-        used.map(|(&used, at): (&u32, Time)| {
-            (at * self.length, (at + 1) * self.length, u64::from(used), self.room)
-        })
+        used.map(|(&used, at): (&u64, Time)| (at << self.shift, (at + 1) << self.shift, used, self.room))
     }
 }
 
@@ -95,20 +98,20 @@ mod tests {
 
     #[test]
     fn work_fills_stretches_whoever_comes_first() {
-        let mut calendar = Calendar::new(10, 1, 1);
-        assert_eq!(calendar.take(20, 10), (20, 30));
+        let mut calendar = Calendar::new(16, 1);
+        assert_eq!(calendar.take(32, 16), (32, 48));
         // Earlier in time, later in the stream.
         assert_eq!(calendar.take(3, 4), (3, 7));
-        assert_eq!(calendar.take(21, 2), (30, 32));
-        // 6 units fit before 10 is over, as far as the calendar knows; the next stretch is free, the one after full.
-        assert_eq!(calendar.take(0, 18), (4, 34));
-        assert_eq!(calendar.stretches().map(|(_, _, used, _)| used).sum::<u64>(), 34);
+        assert_eq!(calendar.take(33, 2), (48, 50));
+        // 12 fit before 16 is over, as far as the calendar knows; the next stretch is free, the one after full.
+        assert_eq!(calendar.take(0, 30), (4, 52));
+        assert_eq!(calendar.stretches().map(|(_, _, used, _)| used).sum::<u64>(), 52);
     }
 
     #[test]
     fn a_saturated_calendar_is_a_queue() {
-        let mut calendar = Calendar::new(8, 3, 2);
-        let ends: Vec<_> = (0..40).map(|_| calendar.take(0, 4).1).collect();
+        let mut calendar = Calendar::new(32, 2);
+        let ends: Vec<_> = (0..40).map(|_| calendar.take(0, 4 * 3).1).collect();
         assert_eq!(*ends.last().unwrap(), 40 * 4 * 3 / 2);
         assert!(ends.windows(2).all(|pair| pair[1] > pair[0]));
     }

@@ -1,12 +1,12 @@
 //! Shader cores and texture units at the level `packet`.
 
-use activity::LineAccess;
-
 use super::calendar::Calendar;
 use super::memory::Memory;
-use super::window::Window;
+use super::ring::Ring;
+use super::station::aligned;
+use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
-use crate::job::{Job, Jobs, share};
+use crate::job::{Job, Jobs, Place, TEXTURE_PORT, share};
 use crate::spec::MachineSpec;
 
 /// Cycles in a stretch of the lanes' calendar.
@@ -33,9 +33,9 @@ pub(super) struct Run {
     /// See above.
     pub left: Time,
     /// When the texture units worked on it.
-    pub texture: (Time, Time),
+    pub texture: Span,
     /// When its lines went through the L2 and memory.
-    pub memory: Option<(Time, Time)>,
+    pub memory: Span,
 }
 
 /// One way through the cores, in order.
@@ -43,7 +43,7 @@ pub(super) struct Run {
 struct Way {
     sent: Time,
     left: Time,
-    flights: Window,
+    flights: Ring,
 }
 
 /// All cores and all texture units.
@@ -53,7 +53,7 @@ pub(super) struct Cores {
     /// Warps that are sent, one a cycle.
     sends: Calendar,
     lanes: Calendar,
-    slots: Window,
+    slots: Ring,
     period: Time,
     alu: Time,
     lanes_of_core: u32,
@@ -63,8 +63,8 @@ pub(super) struct Cores {
     texture_free: Time,
     texture_gone: Time,
     texture_asks: Time,
-    texture_queue: Window,
-    texture_behind: Window,
+    texture_queue: Ring,
+    texture_behind: Ring,
 }
 
 impl Cores {
@@ -72,12 +72,12 @@ impl Cores {
         let (spec, texture) = (&machine.shader, &machine.texture);
         let period = clocks.period(spec.clock);
         let texture_period = clocks.period(texture.clock);
-        let way = Way { sent: 0, left: 0, flights: Window::new(spec.in_flight) };
+        let way = Way { sent: 0, left: 0, flights: Ring::new(spec.in_flight) };
         Self {
             ways: [way.clone(), way],
-            sends: Calendar::new(STRETCH, period, 1),
-            lanes: Calendar::new(STRETCH, period, spec.cores * spec.lanes),
-            slots: Window::new(spec.cores * spec.warps),
+            sends: Calendar::new(Time::from(STRETCH) * period, 1),
+            lanes: Calendar::new(Time::from(STRETCH) * period, spec.cores * spec.lanes),
+            slots: Ring::new(spec.cores * spec.warps),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
             lanes_of_core: spec.lanes,
@@ -87,8 +87,8 @@ impl Cores {
             texture_free: 0,
             texture_gone: 0,
             texture_asks: 0,
-            texture_queue: Window::new(texture.queue),
-            texture_behind: Window::new(texture.in_flight),
+            texture_queue: Ring::new(texture.queue),
+            texture_behind: Ring::new(texture.in_flight),
         }
     }
 
@@ -97,22 +97,14 @@ impl Cores {
         &self.lanes
     }
 
-    /// A packet of vertices (`kind` 0) or pixels that arrives at `arrive` and may leave from `room` on.
-    #[allow(clippy::too_many_arguments, reason = "a packet at a place, and what it may do there")]
-    pub fn run(
-        &mut self,
-        kind: usize,
-        job: &Job,
-        lines: &[LineAccess],
-        arrive: Time,
-        room: Time,
-        makes: &Jobs,
-        memory: &mut Memory,
-    ) -> Run {
+    /// A packet of vertices or pixels comes by.
+    pub fn run(&mut self, visit: &Visit<'_>, makes: &Jobs, memory: &mut Memory) -> Run {
+        let job = visit.job;
+        let kind = usize::from(visit.place == Place::Pixel);
         let warps = job.warps(self.warp_lanes);
         let way = &mut self.ways[kind];
-        let taken = arrive.max(way.sent).max(way.flights.room_at(1));
-        let mut run = Run { taken, done: taken, left: taken, texture: (Time::MAX, 0), memory: None };
+        let taken = visit.arrive.max(way.sent).max(way.flights.room_at());
+        let mut run = Run { taken, done: taken, left: taken, texture: Span::NONE, memory: Span::NONE };
         let textured = kind == 1 && job.is_textured();
         for first in (0..warps).step_by(CHUNK as usize) {
             let chunk = Chunk { first, count: CHUNK.min(warps - first), of: warps };
@@ -120,77 +112,80 @@ impl Cores {
             self.ways[kind].sent = sent.1 + self.period;
             let mut ready = (sent.0 + self.period, sent.1 + self.period);
             if textured {
-                ready = self.texels(job, &chunk, lines, ready, makes, memory, &mut run);
+                ready = self.texels(visit, &chunk, ready, makes, memory, &mut run);
             }
             let done = self.operate(job, &chunk, ready);
-            self.slots.enter(chunk.count, done.0, done.1);
+            self.slots.note_all(chunk.count, done.0, done.1);
             run.done = run.done.max(done.1);
         }
         let way = &mut self.ways[kind];
-        run.left = run.done.max(way.left).max(room).next_multiple_of(self.period);
+        run.left = aligned(run.done.max(way.left).max(visit.room), self.period);
         way.left = run.left;
-        way.flights.enter(1, run.left, run.left);
+        way.flights.note(run.left);
         run
     }
 
     /// Sends warps, one a cycle, as places on the cores and in front of the texture units come free. Says when the first and the
     /// last are sent.
     fn send(&mut self, from: Time, warps: u32, textured: bool) -> (Time, Time) {
-        let mut room = |count| {
-            let slots = self.slots.room_at(count);
-            slots.max(if textured { self.texture_queue.room_at(count) } else { 0 })
+        let room = |count| {
+            let slots = self.slots.room_for(count);
+            slots.max(if textured { self.texture_queue.room_for(count) } else { 0 })
         };
         let (first, last) = (room(1), room(warps));
-        let (begin, sent) = self.sends.take(from.max(first), u64::from(warps));
+        let (begin, sent) = self.sends.take(from.max(first), u64::from(warps) * self.period);
         (begin, sent.saturating_sub(self.period).max(begin).max(last))
     }
 
     /// The texels of some warps. Says when the first and the last warp have theirs.
-    #[allow(clippy::too_many_arguments, reason = "warps at the texture units, and what they may do there")]
     fn texels(
         &mut self,
-        job: &Job,
+        visit: &Visit<'_>,
         chunk: &Chunk,
-        lines: &[LineAccess],
         sent: (Time, Time),
         makes: &Jobs,
         memory: &mut Memory,
         run: &mut Run,
     ) -> (Time, Time) {
+        let job = visit.job;
         let cycles = |part: u32| {
             let [fetches, lines] = job.texels.map(|whole| share(whole, part, chunk.of).len() as u32);
             self.texture_period * Time::from(makes.texture_cycles(fetches, lines))
         };
         let service: Time = (chunk.first..chunk.first + chunk.count).map(cycles).sum();
         let each = service / Time::from(chunk.count);
-        let start = sent.0.max(self.texture_free).next_multiple_of(self.texture_period);
+        let start = aligned(sent.0.max(self.texture_free), self.texture_period);
         let mut served = (start + service).max(sent.1 + each);
         let busy_to = start + service;
-        let all = job.lines_of(2);
+        let all = job.lines_of(TEXTURE_PORT);
         let part = |part: u32| share(all.len() as u32, part, chunk.of).start as usize;
         let base = all.start - job.first_line;
         let range = base + part(chunk.first)..base + part(chunk.first + chunk.count);
         let mut there = 0;
         if !range.is_empty() {
-            let fetched = memory.ask(2, &lines[range], start.max(self.texture_asks), self.texture_period);
+            let fetched = memory.ask(
+                TEXTURE_PORT,
+                &visit.lines[range],
+                start.max(self.texture_asks),
+                self.texture_period,
+            );
             self.texture_asks = fetched.asked + self.texture_period;
             served = served.max(fetched.asked);
             there = fetched.there;
-            let (from, to) = run.memory.unwrap_or((fetched.first, fetched.moved));
-            run.memory = Some((from.min(fetched.first), to.max(fetched.moved)));
+            run.memory = run.memory.with(fetched.first, fetched.moved);
         }
-        served = served.max(self.texture_behind.room_at(chunk.count));
+        served = served.max(self.texture_behind.room_for(chunk.count));
         let gone = served.max(there).max(self.texture_gone);
         self.texture_free = served;
         self.texture_gone = gone;
-        self.texture_queue.enter(
+        self.texture_queue.note_all(
             chunk.count,
             start + self.period,
             served.saturating_sub(each).max(start) + self.period,
         );
         let first = (start + each).max(gone.saturating_sub(served.saturating_sub(start + each))).min(gone);
-        self.texture_behind.enter(chunk.count, first, gone);
-        run.texture = (run.texture.0.min(start), run.texture.1.max(busy_to));
+        self.texture_behind.note_all(chunk.count, first, gone);
+        run.texture = run.texture.with(start, busy_to);
         (first + self.texture_latency, gone + self.texture_latency)
     }
 
@@ -204,7 +199,7 @@ impl Cores {
         let wide = Time::from(threads.div_ceil(chunk.count).div_ceil(self.lanes_of_core).saturating_sub(1))
             * self.period;
         let alone = Time::from(job.ops.max(1)) * (self.alu + wide);
-        let issued = if operations > 0 { self.lanes.take(ready.0, operations).1 } else { 0 };
+        let issued = if operations > 0 { self.lanes.take(ready.0, operations * self.period).1 } else { 0 };
         let last = (ready.1 + alone).max(issued + self.alu.saturating_sub(self.period));
         (last - (ready.1 - ready.0).min(last - ready.0), last)
     }

@@ -1,50 +1,16 @@
-//! L2 and memory at the level `packet`: calendars that lines are entered into.
+//! L2 and memory at the level `packet`: calendars that runs of lines are entered into.
 
 use activity::{LineAccess, LineKind};
 
 use super::calendar::Calendar;
-use crate::address::Map;
+use super::dram::Dram;
+use super::ring::Ring;
 use crate::clock::{Clocks, Time};
 use crate::job::CLIENTS;
-use crate::spec::{DramSpec, MachineSpec};
+use crate::spec::MachineSpec;
 
-/// Cycles in a stretch of a calendar.
+/// Cycles in a stretch of the calendar.
 const STRETCH: u32 = 32;
-
-/// A ring of the last moments at which something was taken from a queue.
-#[derive(Clone, Debug)]
-struct Ring {
-    moments: Vec<Time>,
-    at: usize,
-}
-
-impl Ring {
-    fn new(capacity: u32) -> Self {
-        Self { moments: vec![0; capacity as usize], at: 0 }
-    }
-
-    /// When the queue had room for one more.
-    fn room_at(&self) -> Time {
-        self.moments[self.at]
-    }
-
-    fn note(&mut self, moment: Time) {
-        self.moments[self.at] = moment;
-        self.at = (self.at + 1) % self.moments.len();
-    }
-}
-
-#[derive(Clone, Debug)]
-struct Bank {
-    open: u32,
-    time: Calendar,
-}
-
-#[derive(Clone, Debug)]
-struct Channel {
-    bus: Calendar,
-    banks: Vec<Bank>,
-}
 
 /// When some lines were asked for, taken and there.
 #[derive(Clone, Copy, Debug)]
@@ -59,37 +25,47 @@ pub(super) struct Fetched {
     pub moved: Time,
 }
 
+/// Lines side by side that go the same way.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    head: LineAccess,
+    count: u32,
+    /// From the moment the first is asked for to that of the last.
+    last: Time,
+}
+
+/// The lines that memory reads or drains, and writes back, for one.
+fn moved(line: &LineAccess) -> (Option<u32>, Option<u32>) {
+    let fetch = matches!(line.kind, LineKind::Fetch | LineKind::Drain).then_some(line.line);
+    (fetch, (line.victim != LineAccess::NONE).then_some(line.victim))
+}
+
 /// The L2 with its ports, and memory behind it.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
-    map: Map,
-    channels: Vec<Channel>,
+    dram: Dram,
     l2: Calendar,
     ports: [Ring; CLIENTS.len()],
-    l2_period: Time,
-    l2_latency: Time,
+    /// When the last request of each port was taken: none passes another of its port.
+    order: [Time; CLIENTS.len()],
     period: Time,
-    spec: DramSpec,
+    latency: Time,
+    queue: u32,
     end: Time,
 }
 
 impl Memory {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
-        let spec = machine.dram.clone();
-        let (period, l2_period) = (clocks.period(spec.clock), clocks.period(machine.l2.clock));
-        let stretch = STRETCH * spec.burst_cycles;
-        let bank = Bank { open: u32::MAX, time: Calendar::new(stretch, period, 1) };
-        let channel =
-            Channel { bus: Calendar::new(stretch, period, 1), banks: vec![bank; spec.banks as usize] };
+        let spec = &machine.l2;
+        let period = clocks.period(spec.clock);
         Self {
-            map: Map::new(&spec),
-            channels: vec![channel; spec.channels as usize],
-            l2: Calendar::new(STRETCH, l2_period, machine.l2.lines_per_cycle),
-            ports: std::array::from_fn(|_| Ring::new(machine.l2.queue)),
-            l2_period,
-            l2_latency: l2_period * Time::from(machine.l2.latency_cycles),
+            dram: Dram::new(&machine.dram, clocks),
+            l2: Calendar::new(Time::from(STRETCH) * period, spec.lines_per_cycle),
+            ports: std::array::from_fn(|_| Ring::new(spec.queue)),
+            order: [0; CLIENTS.len()],
             period,
-            spec,
+            latency: period * Time::from(spec.latency_cycles),
+            queue: spec.queue,
             end: 0,
         }
     }
@@ -98,67 +74,61 @@ impl Memory {
     pub fn ask(&mut self, port: usize, lines: &[LineAccess], start: Time, step: Time) -> Fetched {
         let mut fetched = Fetched { asked: start, first: Time::MAX, there: 0, moved: 0 };
         let mut at = start;
-        for access in lines {
+        let mut rest = lines;
+        while let Some(&head) = rest.first() {
+            // A run is no longer than what the port holds: its lines go the same way.
+            let longest = rest.len().min(self.queue as usize);
+            let way = self.way(&head);
+            let count = 1 + rest[1..longest].iter().take_while(|&line| self.way(line) == way).count();
+            let run = Run { head, count: count as u32, last: Time::from(count as u32 - 1) * step };
+            rest = &rest[count..];
             // The port has room a cycle after the L2 took the request so many before.
-            at = at.max(self.ports[port].room_at());
-            fetched.asked = at;
-            let taken = self.take(access, at + step, &mut fetched);
-            self.ports[port].note(taken + self.l2_period);
-            fetched.first = fetched.first.min(taken);
-            at += step;
+            let ring = &self.ports[port];
+            at = at.max(ring.room_at()).max(ring.room_for(run.count).saturating_sub(run.last));
+            fetched.asked = at + run.last;
+            let seen = (at + step).max(self.order[port]);
+            let (first, last) = self.take(&run, seen, &mut fetched);
+            self.order[port] = last;
+            self.ports[port].note_all(run.count, first + self.period, last + self.period);
+            fetched.first = fetched.first.min(first);
+            at = fetched.asked + step;
         }
         fetched
     }
 
-    /// One line through the L2, from `seen` on. Says when it was taken.
-    fn take(&mut self, access: &LineAccess, seen: Time, fetched: &mut Fetched) -> Time {
-        let fetch = matches!(access.kind, LineKind::Fetch | LineKind::Drain);
-        let moved =
-            [fetch.then_some(access.line), (access.victim != LineAccess::NONE).then_some(access.victim)];
-        let mut taken = self.l2.take(seen, 1).0;
-        let backlog = self.period * Time::from(self.spec.queue * self.spec.burst_cycles);
-        if access.kind == LineKind::Hit {
-            fetched.there = fetched.there.max(taken + self.l2_latency);
-        }
-        for (line, read) in moved.into_iter().zip([access.kind == LineKind::Fetch, false]) {
-            let Some(line) = line else { continue };
-            let (issued, data) = self.transfer(line, taken + self.l2_period);
-            // The queue of the channel holds no more than this: the request waits in front of the L2 for the rest.
-            taken = taken.max(issued.saturating_sub(backlog));
-            fetched.moved = fetched.moved.max(data);
-            if read {
-                let back = self.period * Time::from(self.spec.latency_cycles) + self.l2_latency;
-                fetched.there = fetched.there.max(data + back);
-            }
-        }
-        fetched.moved = fetched.moved.max(taken + self.l2_period);
-        self.end = self.end.max(taken + self.l2_period);
-        taken
+    /// What tells a line from another that goes elsewhere: whether it is read, and where what it moves lies.
+    fn way(&self, line: &LineAccess) -> (bool, Option<u32>, Option<u32>) {
+        let (moved, victim) = moved(line);
+        let chunk = |line: u32| self.dram.chunk(line);
+        (matches!(line.kind, LineKind::Hit | LineKind::Fetch), moved.map(chunk), victim.map(chunk))
     }
 
-    /// A line over the bus of its channel, from `seen` on. Says when it is issued and when its last data have passed.
-    fn transfer(&mut self, line: u32, seen: Time) -> (Time, Time) {
-        let place = self.map.place(line);
-        let cycles = |count: u32| self.period * Time::from(count);
-        let DramSpec { burst_cycles, cas_cycles, activate_cycles, precharge_cycles, .. } = self.spec;
-        let channel = &mut self.channels[place.channel];
-        let bank = &mut channel.banks[place.bank];
-        let opens = match bank.open {
-            open if open == place.row => 0,
-            u32::MAX => activate_cycles,
-            _ => activate_cycles + precharge_cycles,
-        };
-        bank.open = place.row;
-        let seen = if opens > 0 { bank.time.take(seen, u64::from(opens)).0 } else { seen };
-        let (issued, _) = channel.bus.take(seen + cycles(opens), u64::from(burst_cycles));
-        let bus_free = issued + cycles(burst_cycles);
-        self.end = self.end.max(bus_free);
-        (issued, bus_free + cycles(cas_cycles))
+    /// A run through the L2, the first seen from `seen` on. Says when the first and the last were taken.
+    fn take(&mut self, run: &Run, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
+        let Run { head, count, last: later } = *run;
+        let (first, end) = self.l2.take(seen, u64::from(count) * self.period);
+        let mut last = end.saturating_sub(self.period).max(first + later);
+        if head.kind == LineKind::Hit {
+            fetched.there = fetched.there.max(last + self.latency);
+        }
+        let (fetch, victim) = moved(&head);
+        for line in [fetch, victim].into_iter().flatten() {
+            let moved = self.dram.transfer(line, count, (first + self.period, last + self.period));
+            // The queue of the channel holds no more than this: the request waits in front of the L2 for the rest.
+            last = last.max(moved.issued.saturating_sub(self.dram.backlog()));
+            fetched.moved = fetched.moved.max(moved.data);
+            if head.kind == LineKind::Fetch && line == head.line {
+                fetched.there = fetched.there.max(moved.data + self.dram.latency() + self.latency);
+            }
+        }
+        fetched.moved = fetched.moved.max(last + self.period);
+        self.end = self.end.max(last + self.period);
+        (first, last)
     }
 
     /// When the last line is taken and the last transfer over.
     pub fn ends_at(&self) -> Time {
-        self.end
+        self.end.max(self.dram.ends_at())
     }
 
     /// Stretches of the L2's time.
@@ -168,6 +138,6 @@ impl Memory {
 
     /// The buses of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
-        self.channels.iter().map(|channel| &channel.bus)
+        self.dram.buses()
     }
 }

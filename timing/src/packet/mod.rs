@@ -15,34 +15,52 @@
 
 mod calendar;
 mod cores;
+mod dram;
 mod memory;
-mod window;
+mod ring;
+mod station;
+mod tally;
 
 use std::collections::VecDeque;
 
 use activity::{LineAccess, Packet, PacketCounts, Unit};
 
 use crate::clock::{Clocks, Time};
-use crate::job::{Job, Jobs, Place, port};
+use crate::job::{Job, Jobs, Place};
 use crate::spec::MachineSpec;
+use crate::stepped::Stream;
 use crate::{Clock, Recorder, Timed};
 use calendar::Calendar;
 use cores::Cores;
 use memory::Memory;
-use window::Window;
+use station::Station;
+use tally::Tally;
 
-/// A unit at its place.
-#[derive(Clone, Debug)]
-struct Station {
-    period: Time,
-    latency: Time,
-    /// When it can begin with the next packet, and when it can ask for the next line.
-    free: Time,
-    asks: Time,
-    left: Time,
-    /// The queue in front, and those that wait behind for their lines.
-    queue: Window,
-    behind: Option<Window>,
+/// A packet comes to a place.
+#[derive(Clone, Copy, Debug)]
+struct Visit<'a> {
+    place: Place,
+    job: &'a Job,
+    /// All its lines, those of each client side by side.
+    lines: &'a [LineAccess],
+    /// When it is there, and when the place after has room for it.
+    arrive: Time,
+    room: Time,
+}
+
+/// The first and the last moment of something that has several parts.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    from: Time,
+    to: Time,
+}
+
+impl Span {
+    const NONE: Self = Self { from: Time::MAX, to: 0 };
+
+    fn with(self, from: Time, to: Time) -> Self {
+        Self { from: self.from.min(from), to: self.to.max(to) }
+    }
 }
 
 /// A clock that advances by packets.
@@ -51,9 +69,11 @@ pub struct PacketClock {
     clocks: Clocks,
     makes: Jobs,
     stations: Vec<Station>,
+    /// Whether the clocks of some places differ.
+    mixed: bool,
     cores: Cores,
     memory: Memory,
-    recorder: Recorder,
+    tally: Tally,
     gates: Gates,
     /// Packets of the front end that the tiles have not caught up with.
     ahead: VecDeque<(Job, PacketCounts, Vec<LineAccess>)>,
@@ -90,20 +110,16 @@ impl Gates {
 impl PacketClock {
     /// A clock at zero for packets in batches of `batch_triangles`, writing into `recorder`.
     pub fn new(machine: &MachineSpec, clocks: Clocks, batch_triangles: u32, recorder: Recorder) -> Self {
-        let station = |place: Place| {
-            let common = machine.common(place.unit());
-            let period = clocks.period(common.clock);
-            let behind = port(place.unit()).map(|_| Window::new(common.in_flight));
-            let latency = period * Time::from(common.latency_cycles);
-            Station { period, latency, free: 0, asks: 0, left: 0, queue: Window::new(common.queue), behind }
-        };
+        let stations: Vec<_> =
+            Place::ALL.into_iter().map(|place| Station::new(place, machine, &clocks)).collect();
         Self {
             clocks,
             makes: Jobs::new(machine, batch_triangles),
-            stations: Place::ALL.into_iter().map(station).collect(),
+            mixed: stations.iter().any(|station| station.period() != stations[0].period()),
+            stations,
             cores: Cores::new(machine, &clocks),
             memory: Memory::new(machine, &clocks),
-            recorder,
+            tally: Tally::new(recorder, clocks),
             gates: Gates::default(),
             ahead: VecDeque::new(),
             lines: Vec::new(),
@@ -111,26 +127,41 @@ impl PacketClock {
         }
     }
 
+    /// Runs a stream that is written already.
+    pub fn run(mut self, stream: &Stream) -> Timed {
+        for (job, counts) in stream.jobs.iter().zip(&stream.counts) {
+            let all: u32 = job.lines.iter().sum();
+            self.next(job, counts, &stream.lines[job.first_line..job.first_line + all as usize]);
+        }
+        self.finish()
+    }
+
     /// The next packet of the stream and the lines it asks for.
     pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
-        self.lines.clear();
-        let job = self.makes.job(packet, lines, &mut self.lines);
+        let mut sorted = std::mem::take(&mut self.lines);
+        sorted.clear();
+        let job = self.makes.job(packet, lines, &mut sorted);
+        self.next(&job, &packet.counts, &sorted);
+        self.lines = sorted;
+    }
+
+    fn next(&mut self, job: &Job, counts: &PacketCounts, lines: &[LineAccess]) {
         if job.front {
-            self.ahead.push_back((job, packet.counts, self.lines.clone()));
+            self.ahead.push_back((job.clone(), *counts, lines.to_vec()));
             return;
         }
-        self.catch_up(Some(job.batch));
-        let lines = std::mem::take(&mut self.lines);
-        self.walk(&job, &packet.counts, &lines);
-        self.lines = lines;
+        if !self.ahead.is_empty() {
+            self.catch_up(Some(job.batch));
+        }
+        self.walk(job, counts, lines);
     }
 
     /// The front end up to the batch that tiles need, and as far as it is behind them in time.
     fn catch_up(&mut self, batch: Option<u32>) {
         while let Some((job, ..)) = self.ahead.front() {
             let needed = batch.is_none_or(|batch| job.batch <= batch);
-            let behind = self.stations[0].free.max(self.gates.opens(job))
-                <= self.stations[Place::Traversal as usize].free;
+            let behind = self.stations[0].free().max(self.gates.opens(job))
+                <= self.stations[Place::Traversal as usize].free();
             if !(needed || behind) {
                 return;
             }
@@ -144,95 +175,45 @@ impl PacketClock {
     fn walk(&mut self, job: &Job, counts: &PacketCounts, lines: &[LineAccess]) {
         let first = if job.front { Place::Command } else { Place::Traversal };
         let mut arrive = self.gates.opens(job);
-        let mut memory: Option<(Time, Time)> = None;
+        let mut memory = Span::NONE;
         for &place in &Place::ALL[first as usize..=job.last as usize] {
-            let period = self.stations[place as usize].period;
-            let arrived = arrive.next_multiple_of(period);
+            if self.mixed {
+                arrive = self.stations[place as usize].edge(arrive);
+            }
             // A packet leaves when the next queue has room, which it sees a cycle later.
-            let room = if place == job.last { 0 } else { self.stations[place as usize + 1].queue.room_at(1) };
+            let room = if place == job.last { 0 } else { self.stations[place as usize + 1].queue.room_at() };
+            let visit = Visit { place, job, lines, arrive, room };
             let leave = match place.unit() {
-                Unit::Shader => self.cores(place, job, counts, lines, arrived, room, &mut memory),
-                _ => self.station(place, job, counts, lines, arrived, room, &mut memory),
+                Unit::Shader => self.cores(&visit, counts, &mut memory),
+                _ => self.station(&visit, counts, &mut memory),
             };
             arrive = leave + self.stations[place as usize].latency;
         }
         self.end = self.end.max(arrive);
         self.gates.note(job, arrive);
-        if let Some((from, to)) = memory {
-            let (from, to) = (self.clocks.ps(from), self.clocks.ps(to));
-            self.recorder.count(Unit::L2, counts, from, to);
-            self.recorder.count(Unit::Dram, counts, from, to);
+        if memory.from <= memory.to {
+            self.tally.count(Unit::L2, counts, memory.from, memory.to);
+            self.tally.count(Unit::Dram, counts, memory.from, memory.to);
         }
+        self.tally.through(counts);
     }
 
-    #[allow(clippy::too_many_arguments, reason = "a packet at a place, and what it may do there")]
-    fn station(
-        &mut self,
-        place: Place,
-        job: &Job,
-        counts: &PacketCounts,
-        lines: &[LineAccess],
-        arrive: Time,
-        room: Time,
-        memory: &mut Option<(Time, Time)>,
-    ) -> Time {
-        let station = &mut self.stations[place as usize];
-        let start = arrive.max(station.free);
-        let mut served = start + station.period * Time::from(job.service[place as usize]);
-        let mut there = 0;
-        let asked =
-            port(place.unit()).map(|port| (port, job.lines_of(port))).filter(|(_, range)| !range.is_empty());
-        if let Some((port, range)) = asked {
-            let range = range.start - job.first_line..range.end - job.first_line;
-            let fetched = self.memory.ask(port, &lines[range], start.max(station.asks), station.period);
-            station.asks = fetched.asked + station.period;
-            served = served.max(fetched.asked);
-            there = fetched.there.next_multiple_of(station.period);
-            note(memory, fetched.first, fetched.moved);
+    fn station(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
+        let served = self.stations[visit.place as usize].serve(visit, &mut self.memory);
+        if let Some(fetched) = served.fetched {
+            *memory = memory.with(fetched.first, fetched.moved);
         }
-        let leave = match &mut station.behind {
-            None => served.max(room),
-            Some(behind) => {
-                served = served.max(behind.room_at(1));
-                let leave = served.max(there).max(station.left).max(room);
-                behind.enter(1, leave, leave);
-                leave
-            }
-        }
-        .next_multiple_of(station.period);
-        let busy_to = start + station.period * Time::from(job.service[place as usize]);
-        station.free = if station.behind.is_some() { served } else { leave };
-        station.left = leave;
-        station.queue.enter(1, start + 1, start + 1);
-        let (from, to) = (self.clocks.ps(start), self.clocks.ps(busy_to));
-        self.recorder.record(place.unit(), counts, from, to);
-        leave
+        self.tally.serve(visit.place.unit(), counts, served.start, served.busy_to);
+        served.leave
     }
 
-    #[allow(clippy::too_many_arguments, reason = "a packet at a place, and what it may do there")]
-    fn cores(
-        &mut self,
-        place: Place,
-        job: &Job,
-        counts: &PacketCounts,
-        lines: &[LineAccess],
-        arrive: Time,
-        room: Time,
-        memory: &mut Option<(Time, Time)>,
-    ) -> Time {
-        let kind = usize::from(place == Place::Pixel);
-        let run = self.cores.run(kind, job, lines, arrive, room, &self.makes, &mut self.memory);
-        self.stations[place as usize].queue.enter(1, run.taken + 1, run.taken + 1);
-        let (from, to) = (self.clocks.ps(run.taken), self.clocks.ps(run.done));
-        self.recorder.count(Unit::Shader, counts, from, to);
-        if kind == 1 {
-            if let Some((from, to)) = run.memory {
-                note(memory, from, to);
-            }
-            if job.is_textured() {
-                let (start, end) = (self.clocks.ps(run.texture.0), self.clocks.ps(run.texture.1));
-                self.recorder.record(Unit::Texture, counts, start, end);
-            }
+    fn cores(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
+        let run = self.cores.run(visit, &self.makes, &mut self.memory);
+        self.stations[visit.place as usize].queue.note(run.taken + 1);
+        self.tally.count(Unit::Shader, counts, run.taken, run.done);
+        *memory = memory.with(run.memory.from, run.memory.to);
+        if run.texture.from <= run.texture.to {
+            self.tally.serve(Unit::Texture, counts, run.texture.from, run.texture.to);
         }
         run.left
     }
@@ -243,7 +224,8 @@ impl PacketClock {
         let end = self.end.max(self.memory.ends_at());
         let end_ps = self.clocks.ps(end);
         let channels = self.memory.buses().count() as u64;
-        let Self { mut recorder, clocks, cores, memory, .. } = self;
+        let Self { tally, clocks, cores, memory, .. } = self;
+        let mut recorder = tally.finish();
         recorder.lasts(end_ps);
         write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
         write(&mut recorder, &clocks, Unit::L2, memory.l2(), 1, end_ps);
@@ -257,11 +239,6 @@ impl PacketClock {
             unit_cycles: 0,
         }
     }
-}
-
-fn note(memory: &mut Option<(Time, Time)>, from: Time, to: Time) {
-    let (first, last) = memory.unwrap_or((from, to));
-    *memory = Some((first.min(from), last.max(to)));
 }
 
 /// The busy time of one of `servers` of a unit from its calendar. What the calendar put beyond the end of the frame by its

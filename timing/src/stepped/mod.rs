@@ -15,7 +15,7 @@ mod stage;
 use activity::{LineAccess, PacketCounts, Unit};
 
 use crate::clock::{Clocks, Time};
-use crate::job::{Job, Jobs, Place, port};
+use crate::job::{Job, Jobs, Place, TEXTURE_PORT, port};
 use crate::spec::MachineSpec;
 use crate::{Recorder, Timed};
 use dram::Dram;
@@ -64,6 +64,13 @@ impl Stream {
     pub fn push(&mut self, makes: &mut Jobs, packet: &activity::Packet, lines: &[LineAccess]) {
         self.jobs.push(makes.job(packet, lines, &mut self.lines));
         self.counts.push(packet.counts);
+    }
+
+    /// Adds the packet that was pushed last to `totals`.
+    pub fn add_last(&self, makes: &Jobs, totals: &mut crate::Totals) {
+        if let (Some(job), Some(counts)) = (self.jobs.last(), self.counts.last()) {
+            totals.add(makes, job, counts);
+        }
     }
 }
 
@@ -197,7 +204,7 @@ impl Around for Texels<'_, '_> {
         let warp = self.shader.warp(id);
         let job = &self.world.stream.jobs[warp.job as usize];
         let [fetches, lines] = warp.texels(job);
-        let all = job.lines_of(2);
+        let all = job.lines_of(TEXTURE_PORT);
         let part = crate::job::share(all.len() as u32, warp.part, warp.parts);
         let range = all.start + part.start as usize..all.start + part.end as usize;
         (self.world.makes.texture_cycles(fetches, lines), range)
@@ -358,7 +365,7 @@ impl<'a> Machine<'a> {
     fn tick_texture(&mut self, now: Time) -> bool {
         let mut texels =
             Texels { world: &self.world, shader: &mut self.shader, latency: self.texture_latency };
-        let port = Some(&mut self.l2.ports[2]);
+        let port = Some(&mut self.l2.ports[TEXTURE_PORT]);
         let ticked = self.texture.tick(now, &mut self.textures, port, &mut self.waits, &mut texels);
         let idle = self.texture.is_free() && self.world.sources.left_at(Place::Pixel) == 0;
         let rest = match (self.texture.is_free(), idle) {

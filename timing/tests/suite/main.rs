@@ -6,3 +6,5 @@ mod closed_forms;
 mod common;
 mod conservation;
 mod ladder;
+mod rates;
+mod waiting;

@@ -1,5 +1,6 @@
 //! Frames that differ from those around them: touched by something that is not theirs.
 
+use crate::median::median;
 use rayon::prelude::*;
 
 /// How many frames on either side tell what is usual.
@@ -40,11 +41,6 @@ fn deviation(values: &[f64], index: usize) -> f64 {
     around.iter_mut().for_each(|value| *value = (*value - usual).abs());
     let spread = (NORMAL * median(&mut around)).max(LEAST * usual.abs()).max(f64::MIN_POSITIVE);
     (values[index] - usual) / spread
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

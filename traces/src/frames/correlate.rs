@@ -1,10 +1,8 @@
 //! Correlation of a template with a whole trace by the Fourier transform, block by block.
 
 use super::profile::summed_squared_difference;
+use crate::overlap::{Buffers, OverlapSave};
 use rayon::prelude::*;
-use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use std::sync::Arc;
 
 /// Least length of a block: long enough that little is computed twice, short enough to stay in the caches.
 const LEAST_BLOCK: usize = 1 << 14;
@@ -41,85 +39,29 @@ pub(super) fn squares(power: &[f64], template: &[f64]) -> Vec<f64> {
 /// Offsets after which a running sum is begun anew.
 const RESTART: usize = 1 << 14;
 
-/// The transform of one template and what is needed to apply it.
+/// One template, ready to be correlated with whole traces.
 pub(super) struct Correlator {
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
-    spectrum: Vec<Complex<f64>>,
+    overlap: OverlapSave<f64>,
     width: usize,
-    block: usize,
 }
 
 impl Correlator {
     /// Prepares a template.
     pub fn new(template: &[f64]) -> Self {
-        let width = template.len();
-        let block = (8 * width).next_power_of_two().max(LEAST_BLOCK);
-        let mut planner = RealFftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(block), planner.plan_fft_inverse(block));
-        let mut padded = forward.make_input_vec();
-        let mut spectrum = forward.make_output_vec();
-        for (to, from) in padded.iter_mut().zip(template) {
-            *to = from / block as f64;
-        }
-        // Only a wrong length is refused, and the lengths are the plan's own.
-        let _ = forward.process(&mut padded, &mut spectrum);
-        for value in &mut spectrum {
-            *value = value.conj();
-        }
-        Self { forward, inverse, spectrum, width, block }
+        let block = (8 * template.len()).next_power_of_two().max(LEAST_BLOCK);
+        Self { overlap: OverlapSave::new(template, 1.0, block), width: template.len() }
     }
 
     /// `c[k] = sum over j of signal[k + j] template[j]`, at every offset at which the template fits.
     pub fn correlate(&self, signal: &[f64]) -> Vec<f64> {
         let Some(last) = signal.len().checked_sub(self.width) else { return Vec::new() };
         let mut out = vec![0.0; last + 1];
-        let step = self.block - self.width + 1;
-        out.par_chunks_mut(step).enumerate().for_each_init(
-            || Buffers::new(self),
-            |buffers, (index, out)| {
-                let from = &signal[index * step..signal.len().min(index * step + self.block)];
-                out.copy_from_slice(&self.block(from, buffers)[..out.len()]);
-            },
-        );
+        let step = self.overlap.step();
+        out.par_chunks_mut(step).enumerate().for_each_init(Buffers::default, |buffers, (index, out)| {
+            let stretch = self.overlap.stretch(signal, index * step);
+            out.copy_from_slice(&self.overlap.block(stretch, buffers)[..out.len()]);
+        });
         out
-    }
-
-    /// The correlation with one block, cyclic beyond its end. Every block is worked out alike by whichever thread.
-    fn block<'a>(&self, from: &[f64], buffers: &'a mut Buffers) -> &'a [f64] {
-        let Buffers { real, complex, forward, inverse } = buffers;
-        real[..from.len()].copy_from_slice(from);
-        real[from.len()..].fill(0.0);
-        // Only wrong lengths are refused, here and below, and the lengths are the plan's own.
-        let _ = self.forward.process_with_scratch(real, complex, forward);
-        for (value, factor) in complex.iter_mut().zip(&self.spectrum) {
-            *value *= factor;
-        }
-        // The first and the last bin of a real signal are real; rounding may leave them not quite so, which would be refused.
-        for bin in [0, complex.len() - 1] {
-            complex[bin].im = 0.0;
-        }
-        let _ = self.inverse.process_with_scratch(complex, real, inverse);
-        real
-    }
-}
-
-/// What a thread works in.
-struct Buffers {
-    real: Vec<f64>,
-    complex: Vec<Complex<f64>>,
-    forward: Vec<Complex<f64>>,
-    inverse: Vec<Complex<f64>>,
-}
-
-impl Buffers {
-    fn new(of: &Correlator) -> Self {
-        Self {
-            real: of.forward.make_input_vec(),
-            complex: of.forward.make_output_vec(),
-            forward: of.forward.make_scratch_vec(),
-            inverse: of.inverse.make_scratch_vec(),
-        }
     }
 }
 

@@ -10,6 +10,7 @@ use super::regularity::regularity;
 use super::threshold::{Threshold, choose};
 use super::track::{Start, track};
 use super::{assess, refine};
+use crate::median::median;
 use crate::trace::Trace;
 use crate::warning::Warning;
 
@@ -181,7 +182,7 @@ fn find_squares(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let candidates = candidates(&profile, &placement, spacing);
     let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
     let noise_w2 = 2.0 * placement.samples as f64 * noise_variance(&power);
-    let background_w2 = median(profile.iter().copied(), profile.len());
+    let background_w2 = median_of(profile.iter().copied(), profile.len());
     let threshold =
         choose(&distances, background_w2, noise_w2, misalignment_w2(&power, &placement), |value_w2| {
             evenness(&candidates, &placement, value_w2)
@@ -280,16 +281,12 @@ pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
 /// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a median.
 fn noise_variance(power: &[f64]) -> f64 {
     let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let sigma = median(steps, power.len().saturating_sub(1)) / (0.674_489_75 * core::f64::consts::SQRT_2);
+    let sigma = median_of(steps, power.len().saturating_sub(1)) / (0.674_489_75 * core::f64::consts::SQRT_2);
     sigma * sigma
 }
 
 /// The (upper) median of at most [`MEDIAN_OF`] of `count` values, evenly picked; 0 for none.
-fn median(values: impl Iterator<Item = f64>, count: usize) -> f64 {
+fn median_of(values: impl Iterator<Item = f64>, count: usize) -> f64 {
     let mut picked: Vec<f64> = values.step_by(count.div_ceil(MEDIAN_OF).max(1)).collect();
-    if picked.is_empty() {
-        return 0.0;
-    }
-    let middle = picked.len() / 2;
-    *picked.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(&mut picked)
 }

@@ -8,10 +8,11 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on any
-/// failure the temporary file is removed and what stood at `path` before is untouched.
+/// failure the temporary file is removed and what stood at `path` before is untouched. A link is followed, so that it stays one.
 ///
 /// # Errors
-/// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`].
+/// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`]. What is there and is no file (a folder, a device)
+/// is left alone.
 pub fn write_file<E>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
@@ -19,6 +20,7 @@ pub fn write_file<E>(
 where
     E: Into<Box<dyn Error + Send + Sync>>,
 {
+    let path = &destination(path)?;
     let temporary = temporary_name(path)?;
     let written = write_whole(path, &temporary, fill);
     if written.is_err() {
@@ -43,6 +45,15 @@ where
     writer.get_ref().sync_all().map_err(io)?;
     drop(writer);
     fs::rename(temporary, path).map_err(io)
+}
+
+/// Where a file called `path` is or is to be.
+fn destination(path: &Path) -> Result<PathBuf, WriteError> {
+    match fs::metadata(path) {
+        Ok(there) if !there.is_file() => Err(WriteError::NoName { path: path.to_owned() }),
+        Ok(_) => fs::canonicalize(path).map_err(|source| WriteError::Io { path: path.to_owned(), source }),
+        Err(_) => Ok(path.to_owned()),
+    }
 }
 
 /// `.name.PID.part` beside the file: the process id keeps two runs apart.
@@ -77,6 +88,23 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.txt"]);
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links_and_what_is_no_file_stays_what_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link] = ["a.txt", "link.txt"].map(|name| folder.path().join(name));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_file(&link, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        for taken in [Path::new("/dev/null"), folder.path()] {
+            let error = write_file(taken, |w| w.write_all(b"new")).unwrap_err().to_string();
+            assert!(error.contains("name a file"), "{error}");
+        }
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    }
+
     #[test]
     fn failures_name_the_path() {
         let folder = tempfile::tempdir().unwrap();
@@ -85,8 +113,6 @@ mod tests {
         assert!(
             write_file(&missing, none).unwrap_err().to_string().contains("no/such/a.txt: cannot be written")
         );
-        assert!(
-            write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: not the name of a file")
-        );
+        assert!(write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: is no file"));
     }
 }

@@ -68,6 +68,12 @@ pub fn save(trace: &Trace, path: &Path) -> Result<(), WriteError> {
     atomic::write_file(&sidecar_path(path), |out| write_sidecar(trace, out))
 }
 
+/// What stands between the fields of a text's first line: a tab or a semicolon if it has any, else a comma.
+pub(crate) fn delimiter(text: &[u8]) -> u8 {
+    let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
+}
+
 /// As [`save`], with another delimiter and compressed with gzip if asked.
 ///
 /// # Errors

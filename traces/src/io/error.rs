@@ -197,7 +197,7 @@ impl ReadError {
 #[derive(Debug, Error)]
 pub enum WriteError {
     /// The file system refused.
-    #[error("{path}: cannot be written: {source}", path = path.display())]
+    #[error("{path}: cannot be written: {source}; name a file in a folder that is there and may be written to", path = path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -205,7 +205,7 @@ pub enum WriteError {
         source: std::io::Error,
     },
     /// A path that names no file.
-    #[error("{path}: not the name of a file", path = path.display())]
+    #[error("{path}: is no file that could be written over; name a file", path = path.display())]
     NoName {
         /// The path.
         path: PathBuf,

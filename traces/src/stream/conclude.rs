@@ -7,6 +7,7 @@ use crate::frames::{
     FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, misalignment_w2, regularity,
     start_after_idle,
 };
+use crate::median::median;
 use crate::metadata::Metadata;
 use crate::sum::PairSum;
 use crate::trace::Trace;
@@ -145,10 +146,4 @@ impl Plan {
         };
         self.placement.marks.iter().zip(&gathered.sums_w).map(start).collect()
     }
-}
-
-/// The (upper) median; 0 for no values.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }

@@ -11,6 +11,7 @@ mod minima;
 mod pass;
 mod piece;
 mod screen;
+mod template;
 
 pub use clock::{Clock, clock};
 pub use error::StreamError;

@@ -5,8 +5,9 @@ use super::conclude::conclude;
 use super::minima::minima;
 use super::piece::Piece;
 use super::screen::{Buffers, Screen};
+use super::template::{difference, templates};
 use super::{StreamError, Streamed};
-use crate::frames::{MarkError, Marks, Placement, vertex};
+use crate::frames::{Marks, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
 use crate::sum::PairSum;
 use rayon::prelude::*;
@@ -141,9 +142,9 @@ impl Plan {
         let tasks = (to - from).div_ceil(task);
         let found: Vec<Found> = (0..tasks)
             .into_par_iter()
-            .map_init(Buffers::default, |buffers, index| {
+            .map_init(Workspace::default, |workspace, index| {
                 let begin = from + index * task;
-                self.task(piece, begin, to.min(begin + task), all, buffers)
+                self.task(piece, begin, to.min(begin + task), all, workspace)
             })
             .collect();
         for found in found {
@@ -162,23 +163,22 @@ impl Plan {
         to
     }
 
-    fn task(&self, piece: &Piece, from: u64, to: u64, all: u64, buffers: &mut Buffers) -> Found {
+    fn task(&self, piece: &Piece, from: u64, to: u64, all: u64, workspace: &mut Workspace) -> Found {
         let width = self.placement.samples;
         let begin = from.saturating_sub(self.spacing as u64 - 1).max(piece.base);
         let end = all.min(to + self.spacing as u64 - 1);
         let place = |offset: u64| (offset - piece.base) as usize;
         let samples = place(begin)..place(end) + width - 1;
-        let (mut signal, mut profile) =
-            (std::mem::take(&mut buffers.signal), std::mem::take(&mut buffers.profile));
+        let Workspace { signal, profile, buffers } = workspace;
         let powers = piece.voltage_v[samples.clone()].iter().zip(&piece.current_a[samples]);
         signal.clear();
         signal.extend(powers.map(|(v, i)| v * i - self.mean_w));
         profile.clear();
         profile.resize((end - begin) as usize, f32::INFINITY);
-        self.screens.iter().for_each(|screen| screen.lower(&signal, &mut profile, buffers));
+        self.screens.iter().for_each(|screen| screen.lower(signal, profile, buffers));
         let mut found = Found::default();
         let inside = ((from - begin) as usize, (to - begin) as usize);
-        minima(&profile, inside.0, inside.1, self.spacing, |offset| {
+        minima(profile, inside.0, inside.1, self.spacing, |offset| {
             found.candidates.push(self.candidate(piece, begin + offset as u64, all));
         });
         let first = from.next_multiple_of(self.stride);
@@ -187,7 +187,6 @@ impl Plan {
             let place = place(offset);
             found.steps_w.push((piece.power_w(place + 1) - piece.power_w(place)).abs());
         }
-        (buffers.signal, buffers.profile) = (signal, profile);
         found
     }
 
@@ -229,6 +228,14 @@ impl Plan {
     }
 }
 
+/// What a thread works in: the signal and the profile of one task.
+#[derive(Default)]
+struct Workspace {
+    signal: Vec<f32>,
+    profile: Vec<f32>,
+    buffers: Buffers,
+}
+
 /// What one task finds.
 #[derive(Default)]
 struct Found {
@@ -244,25 +251,6 @@ impl Gathered {
         self.head.voltage_v.extend_from_slice(&piece.voltage_v[take.clone()]);
         self.head.current_a.extend_from_slice(&piece.current_a[take]);
     }
-}
-
-/// Summed squared difference of powers and a template, in eight lanes: always the same order.
-fn difference(voltage_v: &[f32], current_a: &[f32], template: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let whole = template.len() / 8 * 8;
-    let term = |j: usize| {
-        let difference = f64::from(voltage_v[j]) * f64::from(current_a[j]) - template[j];
-        difference * difference
-    };
-    let chunks =
-        template[..whole].chunks_exact(8).zip(voltage_v.chunks_exact(8)).zip(current_a.chunks_exact(8));
-    for ((t, v), i) in chunks {
-        for lane in 0..8 {
-            let difference = f64::from(v[lane]) * f64::from(i[lane]) - t[lane];
-            lanes[lane] += difference * difference;
-        }
-    }
-    lanes.iter().sum::<f64>() + (whole..template.len()).map(term).sum::<f64>()
 }
 
 fn check_finite(rows: &Rows, piece: &Piece, fresh: usize) -> Result<(), ReadError> {
@@ -281,29 +269,4 @@ fn check_finite(rows: &Rows, piece: &Piece, fresh: usize) -> Result<(), ReadErro
         }
     }
     Ok(())
-}
-
-/// The marks' windows, read by themselves.
-fn templates(
-    path: &Path,
-    options: &ReadOptions,
-    placement: &Placement,
-    marks: &Marks,
-    clock: Clock,
-) -> Result<Vec<Vec<f64>>, StreamError> {
-    let mut templates = Vec::new();
-    for (placed, &mark_s) in placement.marks.iter().zip(&marks.starts_s) {
-        let mut rows = Rows::open(path, options)?;
-        rows.skip(placed.first as u64)?;
-        let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
-        while piece.len() < placement.samples && rows.next(placement.samples - piece.len(), &mut chunk)? > 0 {
-            rows.channels(&mut chunk, &mut piece.voltage_v, &mut piece.current_a);
-        }
-        if piece.len() < placement.samples {
-            let end_s = clock.time_s((placed.first + piece.len()) as f64);
-            return Err(MarkError::OutsideTrace { mark_s, start_s: clock.start_s, end_s }.into());
-        }
-        templates.push((0..placement.samples).map(|place| piece.power_w(place)).collect());
-    }
-    Ok(templates)
 }

@@ -2,6 +2,7 @@
 
 use super::super::correlate::Correlator;
 use super::FEATURES;
+use core::ops::Range;
 
 /// At most so many templates are added in one round.
 const MOST_A_ROUND: usize = 6;
@@ -12,9 +13,17 @@ const EVEN: f64 = 0.1;
 /// Added to the norm of every window, as a share of the whole trace's deviation, so that steady windows resemble nothing.
 const FLOOR: f64 = 1e-3;
 
+/// The core of a window: so much of its length after the start and a quarter of that before it, where the first frame after a
+/// pause is like no other. Where content or clock change, what is farther away moves more.
+const CORE: f64 = 0.1;
+/// What a sample of the core weighs beyond the 1 that every sample does: with the core an eighth of the window, two fifths of all weight.
+const EXTRA: f64 = 5.0;
+
 /// The templates' distances to the trace.
 pub(super) struct Bank {
     width: usize,
+    /// The part of the window about the start, which counts more.
+    core: Range<usize>,
     /// Power less its mean over the trace, W.
     signal: Vec<f64>,
     /// Of each window.
@@ -22,9 +31,9 @@ pub(super) struct Bank {
     /// Of each window, about its mean.
     norm: Vec<f64>,
     floor: f64,
-    /// One less the correlation coefficient with the nearest template, at every offset.
+    /// One less the weighted correlation coefficient with the nearest template, at every offset.
     pub shape: Vec<f64>,
-    /// Summed squared difference to the nearest template, W^2, at every offset.
+    /// Weighted summed squared difference to the nearest template, W^2, at every offset.
     pub squares_w2: Vec<f64>,
     /// Starts that templates were made of.
     pub own: Vec<usize>,
@@ -32,14 +41,16 @@ pub(super) struct Bank {
 
 impl Bank {
     /// The windows at `marks` are the first templates.
-    pub fn new(power: &[f64], width: usize, marks: &[usize]) -> Self {
+    pub fn new(power: &[f64], width: usize, anchor: usize, marks: &[usize]) -> Self {
         let centre = power.iter().sum::<f64>() / power.len() as f64;
         let signal: Vec<f64> = power.iter().map(|watts| watts - centre).collect();
-        let (mean, norm) = windows(&signal, width);
+        let half = ((CORE * width as f64) as usize).max(1);
+        let core = anchor.saturating_sub(half / 4)..(anchor + half).min(width);
+        let (mean, norm) = windows(&signal, width, &core);
         let total: f64 = signal.iter().map(|x| x * x).sum();
         let floor = FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;
         let (shape, squares_w2) = (vec![2.0; mean.len()], vec![f64::INFINITY; mean.len()]);
-        let mut bank = Self { width, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
+        let mut bank = Self { width, core, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
         for &mark in marks {
             bank.add(&[mark]);
         }
@@ -48,17 +59,21 @@ impl Bank {
 
     /// Adds the mean of the windows at `starts` as a template.
     fn add(&mut self, starts: &[usize]) {
-        let width = self.width as f64;
+        let width = weight(self.width, &self.core);
         let mut template = vec![0.0; self.width];
         for &start in starts {
             for (sum, value) in template.iter_mut().zip(&self.signal[start..]) {
                 *sum += value / starts.len() as f64;
             }
         }
-        let mean = template.iter().sum::<f64>() / width;
+        let weighted =
+            |of: &[f64]| of.iter().sum::<f64>() + EXTRA * of[self.core.clone()].iter().sum::<f64>();
+        let mean = weighted(&template) / width;
         template.iter_mut().for_each(|x| *x -= mean);
-        let norm = libm::sqrt(template.iter().map(|x| x * x).sum()) + f64::MIN_POSITIVE;
+        let squares: Vec<f64> = template.iter().map(|x| x * x).collect();
+        let norm = libm::sqrt(weighted(&squares)) + f64::MIN_POSITIVE;
         template.iter_mut().for_each(|x| *x /= norm);
+        template[self.core.clone()].iter_mut().for_each(|x| *x *= 1.0 + EXTRA);
         for (k, c) in Correlator::new(&template).correlate(&self.signal).into_iter().enumerate() {
             let offset = self.mean[k] - mean;
             let squares =
@@ -75,19 +90,12 @@ impl Bank {
         [libm::log(self.shape[offset].max(1e-4)), libm::log(self.squares_w2[offset].max(least_w2))]
     }
 
-    /// Correlation coefficient of two windows of the trace.
+    /// Weighted correlation coefficient of two windows of the trace.
     pub fn alike(&self, a: usize, b: usize) -> f64 {
         let (x, y) = (&self.signal[a..a + self.width], &self.signal[b..b + self.width]);
-        let mut lanes = [0.0; 8];
-        let (x8, y8) = (x.chunks_exact(8), y.chunks_exact(8));
-        let rest: f64 = x8.remainder().iter().zip(y8.remainder()).map(|(p, q)| p * q).sum();
-        for (p, q) in x8.zip(y8) {
-            for (lane, (p, q)) in lanes.iter_mut().zip(p.iter().zip(q)) {
-                *lane += p * q;
-            }
-        }
-        let dot = lanes.iter().sum::<f64>() + rest - self.width as f64 * self.mean[a] * self.mean[b];
-        dot / ((self.norm[a] + self.floor) * (self.norm[b] + self.floor))
+        let inner = dot(x, y) + EXTRA * dot(&x[self.core.clone()], &y[self.core.clone()]);
+        let about = inner - weight(self.width, &self.core) * self.mean[a] * self.mean[b];
+        about / ((self.norm[a] + self.floor) * (self.norm[b] + self.floor))
     }
 
     /// Makes templates of starts that sit in an even beat and that their neighbours resemble more than any template does.
@@ -108,19 +116,44 @@ impl Bank {
     }
 }
 
-/// Mean and norm about the mean of every window, by running sums.
-fn windows(signal: &[f64], width: usize) -> (Vec<f64>, Vec<f64>) {
-    let count = signal.len() - width + 1;
-    let (mut means, mut norms) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let mut sum: f64 = signal[..width].iter().sum();
-    let mut squares: f64 = signal[..width].iter().map(|x| x * x).sum();
-    for first in 0..count {
-        means.push(sum / width as f64);
-        norms.push(libm::sqrt((squares - sum * sum / width as f64).max(0.0)));
-        if let Some(next) = signal.get(first + width) {
-            sum += next - signal[first];
-            squares += next * next - signal[first] * signal[first];
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (x8, y8) = (x.chunks_exact(8), y.chunks_exact(8));
+    let rest: f64 = x8.remainder().iter().zip(y8.remainder()).map(|(p, q)| p * q).sum();
+    for (p, q) in x8.zip(y8) {
+        for (lane, (p, q)) in lanes.iter_mut().zip(p.iter().zip(q)) {
+            *lane += p * q;
         }
     }
-    (means, norms)
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// The sum of all weights of a window.
+fn weight(width: usize, core: &Range<usize>) -> f64 {
+    width as f64 + EXTRA * core.len() as f64
+}
+
+/// Weighted mean and norm about the mean of every window, by running sums.
+fn windows(signal: &[f64], width: usize, core: &Range<usize>) -> (Vec<f64>, Vec<f64>) {
+    let weight = weight(width, core);
+    let squares: Vec<f64> = signal.iter().map(|x| x * x).collect();
+    let (means, powers) = (boxes(signal, width, core), boxes(&squares, width, core));
+    let norms =
+        means.iter().zip(&powers).map(|(sum, squares)| libm::sqrt((squares - sum * sum / weight).max(0.0)));
+    let norms = norms.collect();
+    (means.into_iter().map(|sum| sum / weight).collect(), norms)
+}
+
+/// The weighted sum of every window.
+fn boxes(of: &[f64], width: usize, core: &Range<usize>) -> Vec<f64> {
+    let count = of.len() - width + 1;
+    let mut sum = of[..width].iter().sum::<f64>() + EXTRA * of[core.clone()].iter().sum::<f64>();
+    let mut sums = Vec::with_capacity(count);
+    for first in 0..count {
+        sums.push(sum);
+        if let Some(next) = of.get(first + width) {
+            sum += next - of[first] + EXTRA * (of[first + core.end] - of[first + core.start]);
+        }
+    }
+    sums
 }

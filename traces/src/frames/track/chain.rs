@@ -2,6 +2,7 @@
 
 use super::Candidate;
 use super::bank::Bank;
+use super::doubt::slip;
 
 /// Least and greatest distance of neighbours, in periods. What is farther apart begins a new stretch.
 const REACH: [f64; 2] = [0.45, 2.3];
@@ -11,6 +12,8 @@ const EVEN: f64 = 3.0;
 const TIGHT: f64 = 0.04;
 /// What a jump of the gap costs, nats, however far: clock steps, missed ticks.
 const JUMP: f64 = -3.5;
+/// What going back to the beat after one odd gap costs more: it would be another phase of the same frames.
+const SLIP: f64 = 4.0;
 /// What a new stretch costs, nats.
 const BREAK: f64 = 12.0;
 /// What the likeness of neighbours may say, nats: much against, hardly anything for, as any phase of the frame is alike to itself.
@@ -46,6 +49,8 @@ struct Solution {
     score: Vec<f64>,
     /// The pair before it, or none where a stretch begins.
     back: Vec<usize>,
+    /// The candidate that each pair begins with.
+    begin: Vec<usize>,
     /// The last pair of the stretch before the one that begins with each candidate.
     entry: Vec<usize>,
     last: usize,
@@ -144,8 +149,13 @@ impl<'a> Graph<'a> {
 
     fn solve(&self) -> Solution {
         let total = self.likeness.len();
-        let mut solution =
-            Solution { score: vec![0.0; total], back: vec![NONE; total], entry: Vec::new(), last: NONE };
+        let mut solution = Solution {
+            score: vec![0.0; total],
+            back: vec![NONE; total],
+            begin: vec![0; total],
+            entry: Vec::new(),
+            last: NONE,
+        };
         // The best of all sequences that end before each candidate.
         let mut ended = vec![(0.0, NONE)];
         let mut until = 0;
@@ -157,6 +167,7 @@ impl<'a> Graph<'a> {
             solution.entry.push(begins.1);
             let mut best = ended[end];
             for (pair, begin) in self.pairs(end) {
+                solution.begin[pair] = begin;
                 let (value, from) = self.extend(&solution, begin, end);
                 solution.score[pair] = value + self.likeness[pair] + candidate.weight;
                 solution.back[pair] = from;
@@ -176,7 +187,10 @@ impl<'a> Graph<'a> {
         let mut best = (self.candidates[begin].weight + before, NONE);
         let gap = self.gap(begin, end);
         for (pair, earlier) in self.pairs(begin) {
-            let value = solution.score[pair] + beat(self.gap(earlier, begin), gap);
+            let between = self.gap(earlier, begin);
+            let back = solution.back[pair];
+            let slipped = back != NONE && slip(self.gap(solution.begin[back], earlier), between, gap);
+            let value = solution.score[pair] + beat(between, gap) - if slipped { SLIP } else { 0.0 };
             if value > best.0 {
                 best = (value, pair);
             }

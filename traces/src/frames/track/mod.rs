@@ -11,6 +11,7 @@
 
 mod bank;
 mod chain;
+mod doubt;
 mod evidence;
 mod guess;
 
@@ -41,7 +42,7 @@ pub(super) struct Tracked {
 pub(super) struct Start {
     /// First sample of its window.
     pub offset: usize,
-    /// Least difference of the window to a template, W^2.
+    /// Least weighted difference of the window to a template, W^2.
     pub distance_w2: f64,
     /// Whether the evidence is for it, 0 to 1.
     pub confidence: f64,
@@ -89,7 +90,8 @@ struct Tracker {
 impl Tracker {
     fn new(power: &[f64], placement: &Placement) -> Self {
         let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
-        let bank = Bank::new(power, placement.samples, &marks);
+        let anchor = placement.marks.first().map_or(0, |mark| libm::round(mark.anchor) as usize);
+        let bank = Bank::new(power, placement.samples, anchor, &marks);
         let (period, starts) = guess::first(&bank, (placement.samples / 2).max(1), &marks);
         let mut tracker = Self {
             bank,
@@ -186,13 +188,14 @@ impl Tracker {
     }
 
     fn conclude(self) -> Tracked {
-        let start = |(&node, &support): (&usize, &f64)| {
+        let left = doubt::left(&self.starts(), &self.marks);
+        let start = |((&node, &support), left): ((&usize, &f64), f64)| {
             let offset = self.candidates[node].offset;
             let marked = self.marks.contains(&offset);
-            let confidence = if marked { 1.0 } else { 1.0 / (1.0 + libm::exp(-support)) };
+            let confidence = if marked { 1.0 } else { left / (1.0 + libm::exp(-support)) };
             Start { offset, distance_w2: self.bank.squares_w2[offset], confidence }
         };
-        let starts = self.chain.nodes.iter().zip(&self.chain.support).map(start).collect();
+        let starts = self.chain.nodes.iter().zip(&self.chain.support).zip(left).map(start).collect();
         Tracked { starts }
     }
 }

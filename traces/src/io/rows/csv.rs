@@ -3,7 +3,7 @@
 use super::Chunk;
 use super::lines::LineLimit;
 use crate::io::columns::{Layout, Picked, layout};
-use crate::io::csv::sidecar_path;
+use crate::io::csv::{delimiter, sidecar_path};
 use crate::io::header::{self, Header};
 use crate::io::timing::Stamps;
 use crate::io::{ReadError, ReadOptions};
@@ -44,13 +44,6 @@ fn description(path: &Path) -> Result<Header, ReadError> {
     Ok(Header::default())
 }
 
-/// What stands between the fields of the first line: a tab or a semicolon if it has any, else a comma.
-fn delimiter(reader: &mut BufReader<Text>) -> std::io::Result<u8> {
-    let start = reader.fill_buf()?;
-    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
-    Ok([b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b','))
-}
-
 impl CsvRows {
     pub fn open(path: &Path, options: &ReadOptions, gzip: bool) -> Result<(Self, Layout, Header), ReadError> {
         let header = description(path)?;
@@ -58,7 +51,7 @@ impl CsvRows {
         let text: Text =
             if gzip { Box::new(MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
         let mut text = BufReader::with_capacity(1 << 16, Box::new(LineLimit::new(text)) as Text);
-        let guessed = delimiter(&mut text).map_err(|error| ReadError::io(path, error))?;
+        let guessed = delimiter(text.fill_buf().map_err(|error| ReadError::io(path, error))?);
         let mut reader = ReaderBuilder::new()
             .flexible(true)
             .has_headers(false)
@@ -78,7 +71,7 @@ impl CsvRows {
                 .map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned())
                 .collect()
         };
-        let layout = layout(path, &names, options, "time_s")?;
+        let layout = layout(path, &names, options)?;
         Ok((Self { path: path.to_owned(), reader, record, names, row: 0, held }, layout, header))
     }
 

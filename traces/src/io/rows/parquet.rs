@@ -61,7 +61,7 @@ impl ParquetRows {
         let schema = file.metadata().file_metadata().schema_descr();
         let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
         let header = description(path, &file)?;
-        let layout = layout(path, &names, options, "time_ns")?;
+        let layout = layout(path, &names, options)?;
         check_chunks(path, &file, size_bytes, &layout)?;
         let rows = file.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
         let column = |picked| Column::open(path, picked);

@@ -1,26 +1,12 @@
 //! What columns hold, from their names.
 
+mod names;
+
 use super::{ReadError, ReadOptions};
+pub(super) use names::Quantity;
+use names::understood;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// What a column measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Quantity {
-    Time,
-    Voltage,
-    Current,
-    Power,
-}
-
-/// A column's name, understood.
-#[derive(Clone, Debug, PartialEq)]
-struct Named {
-    quantity: Quantity,
-    /// What to multiply by for s, V, A or W.
-    scale: f64,
-    rail: String,
-}
 
 /// A column that is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,75 +34,12 @@ pub(super) struct Layout {
     pub names: Vec<String>,
 }
 
-const UNITS: [(&str, Quantity, f64); 14] = [
-    ("s", Quantity::Time, 1.0),
-    ("ms", Quantity::Time, 1e-3),
-    ("us", Quantity::Time, 1e-6),
-    ("ns", Quantity::Time, 1e-9),
-    ("v", Quantity::Voltage, 1.0),
-    ("mv", Quantity::Voltage, 1e-3),
-    ("uv", Quantity::Voltage, 1e-6),
-    ("a", Quantity::Current, 1.0),
-    ("ma", Quantity::Current, 1e-3),
-    ("ua", Quantity::Current, 1e-6),
-    ("na", Quantity::Current, 1e-9),
-    ("w", Quantity::Power, 1.0),
-    ("mw", Quantity::Power, 1e-3),
-    ("uw", Quantity::Power, 1e-6),
-];
+/// The columns of each rail, by what they measure.
+type Rails = BTreeMap<String, BTreeMap<Quantity, Picked>>;
 
-fn quantity(token: &str) -> Option<Quantity> {
-    match token {
-        "time" | "timestamp" | "t" => Some(Quantity::Time),
-        "voltage" | "volts" | "volt" => Some(Quantity::Voltage),
-        "current" | "amps" | "i" => Some(Quantity::Current),
-        "power" | "watts" | "p" => Some(Quantity::Power),
-        _ => None,
-    }
-}
-
-/// `gpu_voltage_V`, `Main(mA)`, `Time (s)`, `voltage_V`: quantity, unit and what is left, the rail. `None` for names of
-/// other things.
-fn understood(name: &str) -> Option<Named> {
-    let lower = name.trim_start_matches('\u{feff}').to_ascii_lowercase().replace('\u{b5}', "u");
-    let tokens: Vec<&str> =
-        lower.split(|c: char| !c.is_alphanumeric()).filter(|token| !token.is_empty()).collect();
-    let told = tokens.iter().find_map(|token| quantity(token));
-    let fits = |(_, (name, of, _)): &(usize, (&str, Quantity, f64)), token: &str| {
-        *name == token && told.is_none_or(|told| told == *of)
-    };
-    let unit = tokens.iter().rev().find_map(|token| {
-        UNITS
-            .iter()
-            .copied()
-            .enumerate()
-            .find(|unit| fits(unit, token))
-            .map(|(_, (_, of, scale))| (*token, of, scale))
-    });
-    let quantity_told = told.or(unit.map(|(_, of, _)| of))?;
-    // A single letter is a unit only where nothing but a rail stands beside it or the quantity is told as well.
-    let scale = unit.map_or(1.0, |(_, _, scale)| scale);
-    let mut unit = unit.map(|(token, _, _)| token);
-    let mut rail: Vec<&str> = Vec::new();
-    for token in tokens.iter().rev() {
-        if unit == Some(*token) {
-            unit = None;
-        } else if quantity(token) != Some(quantity_told) {
-            rail.push(token);
-        }
-    }
-    rail.reverse();
-    Some(Named { quantity: quantity_told, scale, rail: rail.join("_") })
-}
-
-/// Chooses the columns of a trace. `time` is what the native column is called in this format.
-pub(super) fn layout(
-    path: &Path,
-    names: &[String],
-    options: &ReadOptions,
-    time: &'static str,
-) -> Result<Layout, ReadError> {
-    if options.by_hand() { by_hand(path, names, options) } else { by_name(path, names, options, time) }
+/// Chooses the columns of a trace.
+pub(super) fn layout(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
+    if options.by_hand() { by_hand(path, names, options) } else { by_name(path, names, options) }
 }
 
 fn missing(path: &Path, names: &[String], column: &str) -> ReadError {
@@ -181,13 +104,8 @@ fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadErro
     })
 }
 
-fn by_name(
-    path: &Path,
-    names: &[String],
-    options: &ReadOptions,
-    _time: &'static str,
-) -> Result<Layout, ReadError> {
-    let mut rails: BTreeMap<String, BTreeMap<Quantity, Picked>> = BTreeMap::new();
+fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
+    let mut rails = Rails::new();
     for (index, name) in names.iter().enumerate() {
         let Some(named) = understood(name).filter(|named| named.quantity != Quantity::Time) else { continue };
         let picked = Picked { index, name: name.clone(), scale: named.scale };
@@ -217,8 +135,6 @@ fn native(quantity: Quantity) -> &'static str {
         Quantity::Power => "power_W",
     }
 }
-
-type Rails = BTreeMap<String, BTreeMap<Quantity, Picked>>;
 
 /// The rails that were asked for, or all that can be read.
 fn chosen(
@@ -293,29 +209,11 @@ impl Layout {
 mod tests {
     use super::*;
 
-    fn read(name: &str) -> Option<(Quantity, f64, String)> {
-        understood(name).map(|named| (named.quantity, named.scale, named.rail))
-    }
-
-    #[test]
-    fn names_of_recorders_are_understood() {
-        let is = |quantity, scale, rail: &str| Some((quantity, scale, rail.to_owned()));
-        assert_eq!(read("voltage_V"), is(Quantity::Voltage, 1.0, ""));
-        assert_eq!(read("CURRENT_a"), is(Quantity::Current, 1.0, ""));
-        assert_eq!(read("time_ns"), is(Quantity::Time, 1e-9, ""));
-        assert_eq!(read("Timestamp(ms)"), is(Quantity::Time, 1e-3, ""));
-        assert_eq!(read("Main(mA)"), is(Quantity::Current, 1e-3, "main"));
-        assert_eq!(read("Main Voltage(V)"), is(Quantity::Voltage, 1.0, "main"));
-        assert_eq!(read("gpu_power_W"), is(Quantity::Power, 1.0, "gpu"));
-        assert_eq!(read("current_A_cpu"), is(Quantity::Current, 1.0, "cpu"));
-        assert_eq!(read("note"), None);
-    }
-
     #[test]
     fn rails_are_added_or_chosen() {
         let names: Vec<String> =
             ["time_s", "gpu_voltage_V", "gpu_current_A", "cpu_power_mW"].map(str::to_owned).into();
-        let of = |options: &ReadOptions| layout(Path::new("a"), &names, options, "time_s");
+        let of = |options: &ReadOptions| layout(Path::new("a"), &names, options);
         assert_eq!(of(&ReadOptions::default()).unwrap().names, ["cpu", "gpu"]);
         let gpu = ReadOptions { rails: vec!["GPU".to_owned()], ..ReadOptions::default() };
         assert_eq!(of(&gpu).unwrap().rails, [Rail::Measured { voltage: 0, current: 1 }]);

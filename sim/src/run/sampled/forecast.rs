@@ -1,0 +1,101 @@
+//! What the representatives say of all frames.
+
+use serde::Serialize;
+use timing::sampled::{Design, Estimate, Interval};
+
+use super::Signatures;
+
+/// How sure an interval is to hold the truth.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// What a simulated frame took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taken {
+    /// Cycles of the core clock.
+    pub cycles: f64,
+    /// Joules while busy.
+    pub energy_j: f64,
+}
+
+/// A quantity of the whole run with its interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quantity {
+    /// The most likely value.
+    pub value: f64,
+    /// The lower end of the 95 % interval.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+    /// Half the width over the value, in percent.
+    pub half_width_percent: f64,
+}
+
+impl From<Interval> for Quantity {
+    fn from(interval: Interval) -> Self {
+        let Interval { value, low, high } = interval;
+        Self { value, low, high, half_width_percent: interval.relative() * 100.0 }
+    }
+}
+
+impl Quantity {
+    /// Whether `truth` is inside.
+    pub fn holds(&self, truth: f64) -> bool {
+        (self.low..=self.high).contains(&truth)
+    }
+}
+
+/// Cycles and energy of every frame, as the representatives and the previews have it.
+pub struct Forecast {
+    design: Design,
+    cycles: Estimate,
+    energy: Estimate,
+}
+
+impl Forecast {
+    /// From the signatures of all frames and what those that `design` chose took.
+    pub fn new(design: Design, signatures: &Signatures, taken: impl Fn(usize) -> Taken) -> Self {
+        let cycles = Estimate::new(&design, &signatures.cycles, |frame| taken(frame).cycles);
+        let energy = Estimate::new(&design, &signatures.energy_j, |frame| taken(frame).energy_j);
+        Self { design, cycles, energy }
+    }
+
+    /// Which frames were simulated.
+    pub fn design(&self) -> &Design {
+        &self.design
+    }
+
+    /// Mean cycles of a frame.
+    pub fn cycles_per_frame(&self) -> Quantity {
+        self.cycles.total(CONFIDENCE).scaled(1.0 / self.frames()).into()
+    }
+
+    /// Mean joules of a frame while busy.
+    pub fn energy_per_frame_j(&self) -> Quantity {
+        self.energy.total(CONFIDENCE).scaled(1.0 / self.frames()).into()
+    }
+
+    /// Mean watts while busy.
+    pub fn busy_power_w(&self, core_hz: f64) -> Quantity {
+        self.energy.ratio(&self.cycles, CONFIDENCE).scaled(core_hz).into()
+    }
+
+    /// The half-width of the widest interval, relative to its value.
+    pub fn relative(&self) -> f64 {
+        let all = [self.cycles_per_frame(), self.energy_per_frame_j(), self.busy_power_w(1.0)];
+        all.iter().map(|quantity| quantity.half_width_percent / 100.0).fold(0.0, f64::max)
+    }
+
+    /// What frame `place` takes, most likely, and half the width of the intervals in which its own values lie.
+    pub fn frame(&self, place: usize) -> [Taken; 2] {
+        let stratum = self.design.stratum_of(place);
+        let half = |estimate: &Estimate| estimate.half_width_of_one(stratum, CONFIDENCE);
+        [
+            Taken { cycles: self.cycles.predicted(place), energy_j: self.energy.predicted(place) },
+            Taken { cycles: half(&self.cycles), energy_j: half(&self.energy) },
+        ]
+    }
+
+    fn frames(&self) -> f64 {
+        self.design.units() as f64
+    }
+}

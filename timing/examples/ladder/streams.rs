@@ -1,0 +1,249 @@
+//! Streams and machines: those that break levels of timing, and microbenchmarks of one rate each.
+
+use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use timing::stepped::{self, Manner, Stream};
+use timing::{Clocks, Jobs, MachineSpec, PacketClock, Recorder, Timed, Totals, bound};
+
+/// Packets with their lines.
+pub type Packets = Vec<(Packet, Vec<LineAccess>)>;
+
+/// Triangles of a batch.
+const BATCH: u32 = 512;
+
+/// A machine as its GPU file has it; the rest of the file is not needed here.
+#[derive(Clone, serde::Deserialize)]
+pub struct Gpu {
+    pub name: String,
+    core_hz: f64,
+    memory_hz: f64,
+    pub units: MachineSpec,
+}
+
+impl Gpu {
+    /// The GPU file `name` that comes with the simulator.
+    pub fn builtin(name: &str) -> Result<Self, activity::spec::SpecError> {
+        let path = format!("{}/../sim/gpus/{name}.ron", env!("CARGO_MANIFEST_DIR"));
+        activity::spec::load(path.as_ref())
+    }
+
+    /// A frame at every level: `stepped`, `packet`, `bound`.
+    pub fn run(&self, packets: &Packets) -> Result<[Timed; 3], String> {
+        let clocks = Clocks::new(self.core_hz, self.memory_hz).ok_or("the clocks have no common cycle")?;
+        let recorder = || Recorder::new(1_000_000, 1 << 16);
+        let mut makes = Jobs::new(&self.units, BATCH);
+        let (mut stream, mut totals) = (Stream::default(), Totals::new(&self.units));
+        for (packet, lines) in packets {
+            stream.push(&mut makes, packet, lines);
+            stream.add_last(&makes, &mut totals);
+        }
+        let truth = stepped::run(&self.units, clocks, &makes, &stream, recorder(), &Manner::default());
+        Ok([
+            truth.map_err(|stalled| stalled.to_string())?,
+            PacketClock::new(&self.units, clocks, BATCH, recorder()).run(&stream),
+            bound(&self.units, clocks, &totals, recorder()),
+        ])
+    }
+}
+
+/// A packet of triangle `triangle` with its events and lines, the lines counted as the pipeline would.
+fn packet(
+    kind: PacketKind,
+    triangle: u32,
+    counts: &[(Event, u32)],
+    lines: Vec<LineAccess>,
+) -> (Packet, Vec<LineAccess>) {
+    let mut packet = Packet::new(kind, 0, 0, triangle);
+    counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
+    for line in &lines {
+        let reads = matches!(line.kind, LineKind::Hit | LineKind::Fetch);
+        packet.counts[if reads { Event::L2Reads } else { Event::L2Writes }] += 1;
+        packet.counts[Event::L2Misses] += u32::from(line.kind == LineKind::Fetch);
+        packet.counts[Event::DramReadBytes] += 64 * u32::from(line.kind == LineKind::Fetch);
+        packet.counts[Event::DramWriteBytes] += 64 * u32::from(line.victim != LineAccess::NONE);
+    }
+    (packet, lines)
+}
+
+/// `count` lines from `first` on, `stride` apart, each with the line `victim` further on that makes room where there is one.
+fn lines(
+    client: Unit,
+    first: u32,
+    count: u32,
+    stride: u32,
+    kind: LineKind,
+    victim: Option<u32>,
+) -> Vec<LineAccess> {
+    let line = |n: u32| first + n * stride;
+    let victim = |n: u32| victim.map_or(LineAccess::NONE, |far| line(n) + far);
+    (0..count).map(|n| LineAccess { line: line(n), victim: victim(n), client, kind }).collect()
+}
+
+fn vertices(triangle: u32, triangles: u32, ops: u32) -> (Packet, Vec<LineAccess>) {
+    let counts = [
+        (Event::Indices, 3 * triangles),
+        (Event::VerticesFetched, triangles),
+        (Event::VertexInvocations, triangles),
+        (Event::ShaderOps, ops * triangles),
+        (Event::TrianglesIn, triangles),
+    ];
+    packet(
+        PacketKind::Vertices,
+        triangle,
+        &counts,
+        lines(Unit::Command, triangle, triangles / 2, 1, LineKind::Fetch, None),
+    )
+}
+
+/// A tile in which so many pixels are shaded with so many operations.
+fn tile(triangle: u32, pixels: u32, ops: u32, lines: Vec<LineAccess>) -> (Packet, Vec<LineAccess>) {
+    let counts = [
+        (Event::TilesVisited, 1),
+        (Event::TileMadds, 96),
+        (Event::ZCullTests, 1),
+        (Event::SamplesTested, 8 * pixels),
+        (Event::DepthReads, 8 * pixels),
+        (Event::ShadingLookups, pixels),
+        (Event::PixelInvocations, pixels),
+        (Event::ShaderOps, ops * pixels),
+        (Event::ColourWrites, 8 * pixels),
+    ];
+    packet(PacketKind::Tile, triangle, &counts, lines)
+}
+
+/// A stream that breaks some level, and the machine it does it on.
+pub struct Failure {
+    pub name: &'static str,
+    pub packets: Packets,
+    pub gpu: Gpu,
+}
+
+/// Every stream of the chapter "Where methods fail".
+pub fn failures(gpu: &Gpu) -> Vec<Failure> {
+    let with = |change: fn(&mut MachineSpec)| {
+        let mut gpu = gpu.clone();
+        change(&mut gpu.units);
+        gpu
+    };
+    let on = |name, packets, gpu| Failure { name, packets, gpu };
+    vec![
+        on("one giant triangle", giant(), gpu.clone()),
+        on("many tiny triangles", tiny(), gpu.clone()),
+        on("vertex and pixel work in turn", alternating(), gpu.clone()),
+        on("queues of one packet", tiny(), with(shallow)),
+        on("thrashing caches", thrashing(1), gpu.clone()),
+        on("every line another row", thrashing(4096), gpu.clone()),
+        on(
+            "shorter than the pipeline is deep",
+            vec![vertices(0, 1, 8), tile(0, 4, 8, Vec::new())],
+            gpu.clone(),
+        ),
+    ]
+}
+
+fn giant() -> Packets {
+    let fetched = |n: u32| lines(Unit::Colour, (1u32 << 20) + n * 8, 8, 1, LineKind::Fetch, Some(1 << 18));
+    std::iter::once(vertices(0, 1, 20)).chain((0..4000).map(|n| tile(0, 64, 20, fetched(n)))).collect()
+}
+
+fn tiny() -> Packets {
+    let batch = |b: u32| {
+        let fronts = (0..BATCH / 32).map(move |n| vertices(b * BATCH + 32 * n, 32, 20));
+        let tiles = (0..BATCH).map(move |n| tile(b * BATCH + n, n % 3, 20, Vec::new()));
+        (fronts.collect::<Packets>(), tiles.collect::<Packets>())
+    };
+    in_batches((0..12).map(batch).collect())
+}
+
+/// Long vertex programs, then long pixel programs, on the same cores.
+fn alternating() -> Packets {
+    let batch = |b: u32| {
+        let fronts = (0..BATCH / 32).map(move |n| vertices(b * BATCH + 32 * n, 32, 400));
+        let tiles = (0..40).map(move |n| tile(b * BATCH + n, 64, 400, Vec::new()));
+        (fronts.collect::<Packets>(), tiles.collect::<Packets>())
+    };
+    in_batches((0..12).map(batch).collect())
+}
+
+/// The front end one batch ahead of the tiles.
+fn in_batches(batches: Vec<(Packets, Packets)>) -> Packets {
+    let (mut all, mut waiting) = (Packets::new(), Packets::new());
+    for (fronts, tiles) in batches {
+        all.extend(fronts);
+        all.append(&mut waiting);
+        waiting = tiles;
+    }
+    all.extend(waiting);
+    all
+}
+
+/// Depth, texture and colour miss with every line, each `stride` lines from the one before.
+fn thrashing(stride: u32) -> Packets {
+    let tiles = (0..1500).map(|n| {
+        let of = |client, base: u32, victim| {
+            lines(client, base + n * 4 * stride, 4, stride, LineKind::Fetch, victim)
+        };
+        let all = [
+            of(Unit::Depth, 0, Some(77 * stride)),
+            of(Unit::Texture, 33 * stride, None),
+            of(Unit::Colour, 55 * stride, Some(99 * stride)),
+        ];
+        tile(0, 16, 20, all.concat())
+    });
+    std::iter::once(vertices(0, 1, 20)).chain(tiles).collect()
+}
+
+fn shallow(units: &mut MachineSpec) {
+    for unit in [
+        &mut units.setup,
+        &mut units.traversal,
+        &mut units.z_cull,
+        &mut units.sample_test,
+        &mut units.shading_cache,
+    ] {
+        unit.queue = 1;
+    }
+    for unit in [&mut units.command, &mut units.depth, &mut units.texture, &mut units.colour] {
+        (unit.queue, unit.in_flight) = (1, 1);
+    }
+    (units.shader.queue, units.shader.in_flight, units.l2.queue, units.dram.queue) = (1, 1, 1, 2);
+}
+
+/// One rate of a machine: a stream that asks for nothing else.
+pub struct Rate {
+    pub name: &'static str,
+    pub packets: Packets,
+    /// How many of it the stream has in all.
+    pub amount: f64,
+    pub unit: &'static str,
+}
+
+const TILES: u32 = 3000;
+
+/// Fill, triangles, texels and bandwidth.
+pub fn rates() -> Vec<Rate> {
+    let of = |name, unit, each: f64, of: &dyn Fn(u32) -> (Packet, Vec<LineAccess>)| Rate {
+        name,
+        packets: (0..TILES).map(of).collect(),
+        amount: each * f64::from(TILES),
+        unit,
+    };
+    let fill = |lines| packet(PacketKind::Tile, 0, &[(Event::ColourWrites, 256)], lines);
+    // Pixels of 8 bytes, read and written: 32 lines a packet, and as many go back.
+    let blended = |n: u32| lines(Unit::Colour, n * 32, 32, 1, LineKind::Fetch, Some(1 << 22));
+    vec![
+        of("colour fill, nothing to memory", "pixel/s", 256.0, &|_| fill(Vec::new())),
+        of("colour fill, 8 bytes blended", "pixel/s", 256.0, &|n| fill(blended(n))),
+        of("triangles", "triangle/s", 32.0, &|_| {
+            packet(PacketKind::Vertices, 0, &[(Event::TrianglesIn, 32)], Vec::new())
+        }),
+        of("texels", "texel/s", 1024.0, &|_| {
+            let counts =
+                [(Event::PixelInvocations, 256), (Event::ShaderOps, 256), (Event::TextureFetches, 1024)];
+            packet(PacketKind::Tile, 0, &counts, Vec::new())
+        }),
+        of("bandwidth, reads side by side", "byte/s", 64.0 * 64.0, &|n| {
+            let read = lines(Unit::Depth, n * 64, 64, 1, LineKind::Fetch, None);
+            packet(PacketKind::Tile, 0, &[(Event::DepthReads, 1)], read)
+        }),
+    ]
+}

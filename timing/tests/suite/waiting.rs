@@ -1,0 +1,94 @@
+//! What has to be waited for is waited for, at the reference and at `packet` alike.
+
+use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use timing::MachineSpec;
+
+use crate::common::{BATCH, Packets, clocks, packet_level, plain, read, stepped, tile};
+
+type Level = fn(&MachineSpec, &Packets) -> u64;
+
+const LEVELS: [(&str, Level); 2] = [
+    ("stepped", |machine, packets| stepped(machine, packets).cycles),
+    ("packet", |machine, packets| packet_level(machine, clocks(), packets).cycles),
+];
+
+/// A packet of the batch `batch`.
+fn of(batch: u32, kind: PacketKind, counts: &[(Event, u32)]) -> (Packet, Vec<LineAccess>) {
+    let mut packet = Packet::new(kind, 0, 0, batch * BATCH);
+    counts.iter().for_each(|&(event, count)| packet.counts[event] = count);
+    (packet, Vec::new())
+}
+
+fn front(batch: u32, cycles: u32) -> (Packet, Vec<LineAccess>) {
+    of(batch, PacketKind::Vertices, &[(Event::Indices, cycles), (Event::TrianglesIn, 1)])
+}
+
+fn traversed(batch: u32, cycles: u32) -> (Packet, Vec<LineAccess>) {
+    of(batch, PacketKind::Tile, &[(Event::TilesVisited, cycles)])
+}
+
+#[test]
+fn tiles_wait_for_the_set_up_of_their_whole_batch() {
+    let machine = plain();
+    for (name, cycles) in LEVELS {
+        let fronts = vec![front(0, 30), front(0, 50)];
+        let alone = cycles(&machine, &fronts);
+        let with_tile: Packets = fronts.into_iter().chain([traversed(0, 7)]).collect();
+        // Its service, and the latency of traversal.
+        assert_eq!(cycles(&machine, &with_tile), alone + 7 + 1, "{name}");
+    }
+}
+
+#[test]
+fn the_front_end_waits_for_the_tiles_of_the_batch_before_the_last() {
+    let machine = plain();
+    for (name, cycles) in LEVELS {
+        let begun = vec![front(0, 5), front(1, 5), traversed(0, 400)];
+        let then = cycles(&machine, &begun);
+        let alone = cycles(&machine, &vec![front(0, 60)]);
+        let all: Packets =
+            begun.into_iter().chain([front(2, 60), traversed(1, 3), traversed(2, 7)]).collect();
+        // The third batch is set up when the first has been traversed, and traversed when it is set up.
+        assert_eq!(cycles(&machine, &all), then + alone + 7 + 1, "{name}");
+    }
+}
+
+#[test]
+fn a_packet_waits_for_its_lines() {
+    let mut machine = plain();
+    machine.dram.latency_cycles = 500;
+    let packet = |line| {
+        (
+            tile(&[(Event::DepthReads, 1), (Event::ColourWrites, 1)]),
+            vec![read(Unit::Depth, line, LineKind::Fetch)],
+        )
+    };
+    let one = vec![packet(0)];
+    let many: Packets = (0..64).map(packet).collect();
+    let taken = LEVELS.map(|(name, cycles)| {
+        let [first, last] = [&one, &many].map(|packets| cycles(&machine, packets));
+        assert!(first > 500, "{name}: {first}");
+        // All wait at once: the lines of the others come while the first is waited for.
+        assert!(last < first + 64 * 4, "{name}: {last}");
+        // Where only one may wait, each waits by itself.
+        let mut narrow = machine.clone();
+        narrow.depth.in_flight = 1;
+        let in_turn = cycles(&narrow, &many);
+        assert!(in_turn > 31 * 500, "{name}: {in_turn}");
+        [first, last, in_turn]
+    });
+    for (truth, found) in taken[0].into_iter().zip(taken[1]) {
+        assert!(truth.abs_diff(found) * 50 <= truth, "{truth} {found}");
+    }
+}
+
+#[test]
+fn warps_wait_for_their_texels() {
+    let mut machine = plain();
+    machine.dram.latency_cycles = 500;
+    let counts = [(Event::PixelInvocations, 4), (Event::ShaderOps, 4), (Event::TextureFetches, 4)];
+    let packets = vec![(tile(&counts), vec![read(Unit::Texture, 0, LineKind::Fetch)])];
+    for (name, cycles) in LEVELS {
+        assert!(cycles(&machine, &packets) > 500, "{name}");
+    }
+}

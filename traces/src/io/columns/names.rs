@@ -1,0 +1,97 @@
+//! What a column's name says.
+
+/// What a column measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(in crate::io) enum Quantity {
+    Time,
+    Voltage,
+    Current,
+    Power,
+}
+
+/// A column's name, understood.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Named {
+    pub quantity: Quantity,
+    /// What to multiply by for s, V, A or W.
+    pub scale: f64,
+    pub rail: String,
+}
+
+const UNITS: [(&str, Quantity, f64); 14] = [
+    ("s", Quantity::Time, 1.0),
+    ("ms", Quantity::Time, 1e-3),
+    ("us", Quantity::Time, 1e-6),
+    ("ns", Quantity::Time, 1e-9),
+    ("v", Quantity::Voltage, 1.0),
+    ("mv", Quantity::Voltage, 1e-3),
+    ("uv", Quantity::Voltage, 1e-6),
+    ("a", Quantity::Current, 1.0),
+    ("ma", Quantity::Current, 1e-3),
+    ("ua", Quantity::Current, 1e-6),
+    ("na", Quantity::Current, 1e-9),
+    ("w", Quantity::Power, 1.0),
+    ("mw", Quantity::Power, 1e-3),
+    ("uw", Quantity::Power, 1e-6),
+];
+
+fn quantity(token: &str) -> Option<Quantity> {
+    match token {
+        "time" | "timestamp" | "t" => Some(Quantity::Time),
+        "voltage" | "volts" | "volt" => Some(Quantity::Voltage),
+        "current" | "amps" | "i" => Some(Quantity::Current),
+        "power" | "watts" | "p" => Some(Quantity::Power),
+        _ => None,
+    }
+}
+
+/// `gpu_voltage_V`, `Main(mA)`, `Time (s)`, `voltage_V`: quantity, unit and what is left, the rail. `None` for names of
+/// other things.
+pub(super) fn understood(name: &str) -> Option<Named> {
+    let lower = name.trim_start_matches('\u{feff}').to_ascii_lowercase().replace('\u{b5}', "u");
+    let tokens: Vec<&str> =
+        lower.split(|c: char| !c.is_alphanumeric()).filter(|token| !token.is_empty()).collect();
+    let told = tokens.iter().find_map(|token| quantity(token));
+    let unit = tokens.iter().rev().find_map(|token| {
+        let fits =
+            |(name, of, _): &&(&str, Quantity, f64)| name == token && told.is_none_or(|told| told == *of);
+        UNITS.iter().find(fits).map(|(_, of, scale)| (*token, *of, *scale))
+    });
+    let quantity_told = told.or(unit.map(|(_, of, _)| of))?;
+    // A single letter is a unit only where nothing but a rail stands beside it or the quantity is told as well.
+    let scale = unit.map_or(1.0, |(_, _, scale)| scale);
+    let mut unit = unit.map(|(token, _, _)| token);
+    let mut rail: Vec<&str> = Vec::new();
+    for token in tokens.iter().rev() {
+        if unit == Some(*token) {
+            unit = None;
+        } else if quantity(token) != Some(quantity_told) {
+            rail.push(token);
+        }
+    }
+    rail.reverse();
+    Some(Named { quantity: quantity_told, scale, rail: rail.join("_") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(name: &str) -> Option<(Quantity, f64, String)> {
+        understood(name).map(|named| (named.quantity, named.scale, named.rail))
+    }
+
+    #[test]
+    fn names_of_recorders_are_understood() {
+        let is = |quantity, scale, rail: &str| Some((quantity, scale, rail.to_owned()));
+        assert_eq!(read("voltage_V"), is(Quantity::Voltage, 1.0, ""));
+        assert_eq!(read("CURRENT_a"), is(Quantity::Current, 1.0, ""));
+        assert_eq!(read("time_ns"), is(Quantity::Time, 1e-9, ""));
+        assert_eq!(read("Timestamp(ms)"), is(Quantity::Time, 1e-3, ""));
+        assert_eq!(read("Main(mA)"), is(Quantity::Current, 1e-3, "main"));
+        assert_eq!(read("Main Voltage(V)"), is(Quantity::Voltage, 1.0, "main"));
+        assert_eq!(read("gpu_power_W"), is(Quantity::Power, 1.0, "gpu"));
+        assert_eq!(read("current_A_cpu"), is(Quantity::Current, 1.0, "cpu"));
+        assert_eq!(read("note"), None);
+    }
+}

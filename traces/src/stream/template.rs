@@ -1,0 +1,52 @@
+//! The marks' windows, and the exact distance to them.
+
+use super::StreamError;
+use super::clock::Clock;
+use super::piece::Piece;
+use crate::frames::{MarkError, Marks, Placement};
+use crate::io::{Chunk, ReadOptions, Rows};
+use std::path::Path;
+
+/// The marks' windows, read by themselves.
+pub(super) fn templates(
+    path: &Path,
+    options: &ReadOptions,
+    placement: &Placement,
+    marks: &Marks,
+    clock: Clock,
+) -> Result<Vec<Vec<f64>>, StreamError> {
+    let mut templates = Vec::new();
+    for (placed, &mark_s) in placement.marks.iter().zip(&marks.starts_s) {
+        let mut rows = Rows::open(path, options)?;
+        rows.skip(placed.first as u64)?;
+        let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
+        while piece.len() < placement.samples && rows.next(placement.samples - piece.len(), &mut chunk)? > 0 {
+            rows.channels(&mut chunk, &mut piece.voltage_v, &mut piece.current_a);
+        }
+        if piece.len() < placement.samples {
+            let end_s = clock.time_s((placed.first + piece.len()) as f64);
+            return Err(MarkError::OutsideTrace { mark_s, start_s: clock.start_s, end_s }.into());
+        }
+        templates.push((0..placement.samples).map(|place| piece.power_w(place)).collect());
+    }
+    Ok(templates)
+}
+
+/// Summed squared difference of powers and a template, in eight lanes: always the same order.
+pub(super) fn difference(voltage_v: &[f32], current_a: &[f32], template: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let whole = template.len() / 8 * 8;
+    let term = |j: usize| {
+        let difference = f64::from(voltage_v[j]) * f64::from(current_a[j]) - template[j];
+        difference * difference
+    };
+    let chunks =
+        template[..whole].chunks_exact(8).zip(voltage_v.chunks_exact(8)).zip(current_a.chunks_exact(8));
+    for ((t, v), i) in chunks {
+        for lane in 0..8 {
+            let difference = f64::from(v[lane]) * f64::from(i[lane]) - t[lane];
+            lanes[lane] += difference * difference;
+        }
+    }
+    lanes.iter().sum::<f64>() + (whole..template.len()).map(term).sum::<f64>()
+}
