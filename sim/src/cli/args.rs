@@ -28,6 +28,8 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Find the triangle each sample sees and its depth, to be held against another program sample by sample
     Visibility(VisibilityArgs),
+    /// Find the pairs of moving objects that may collide
+    Ccd(super::ccd::CcdArgs),
     /// Write a sample table into a file
     Samples(SamplesArgs),
     /// Try each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, width of intervals, cost

@@ -1,6 +1,7 @@
 //! The command `quintile`: what was typed, what it means, what is printed.
 
 mod args;
+mod ccd;
 mod chart;
 mod list;
 mod parse;
@@ -84,6 +85,7 @@ fn dispatch(cli: &Cli) -> Result<(), Failure> {
         Command::Run(args) => run::run(args),
         Command::List(args) => list::list(args),
         Command::Visibility(args) => visibility::run(args),
+        Command::Ccd(args) => ccd::run(args),
         Command::Samples(args) => samples::run(args),
         Command::Stress(args) => stress::run(args),
         Command::Chart(args) => chart::run(args),

@@ -109,10 +109,8 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
+    /// Without time, as the method knows none.
     fn by_depth(&mut self, scratch: &mut Scratch) -> Verdict {
-        if !self.tighten() {
-            return Verdict::Apart;
-        }
         let tiles =
             depth_only::tiles(self.parts(), &self.window, self.search.resolution, &mut scratch.buffers);
         tiles.map_or(Verdict::Apart, |tiles| Verdict::Maybe { bounds: self.window, tiles, seen: false })

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use super::camera::CameraSpec;
+use super::mesh::MovingMesh;
 use super::scene::{Subject, VisibilityScene};
 use super::{m5d, mts, pair};
+use crate::collision::components;
 use crate::error::LoadError;
 use crate::import::{Format, reader};
 
@@ -73,6 +75,61 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&Path>) -> Result<Visibil
         _ => return Err(wrong_number(&files, &kinds)),
     };
     VisibilityScene::seen(Subject { path, objects }, &spec.unwrap_or_default())
+}
+
+/// Loads cases of collision detection: an `.mts` each with its objects, or two PLY or OBJ files as the two instants of a mesh, whose
+/// parts that hang together are the objects. Coordinates of the latter are rounded to f32, and how far that may be is
+/// given with them.
+///
+/// # Errors
+/// As [`load`], and where a PLY or OBJ file has no partner.
+pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, LoadError> {
+    let mut files = files.iter().map(AsRef::as_ref);
+    let mut cases = Vec::new();
+    while let Some(file) = files.next() {
+        let case = match Kind::of(file)? {
+            Kind::Mts => CollisionCase { id: stem(file), objects: mts::load_mts(file)?, uncertainty: 0.0 },
+            Kind::Surface(format) => {
+                let other =
+                    files.next().map(|other| Ok::<_, LoadError>((other, Kind::of(other)?))).transpose()?;
+                let Some((other, Kind::Surface(other_format))) = other else { return Err(no_partner(file)) };
+                let mesh = pair::moving((file, format), (other, other_format))?;
+                let largest =
+                    mesh.open.iter().chain(&mesh.close).map(|p| p.abs().max_element()).fold(0.0, f64::max);
+                let uncertainty = largest * f64::from(f32::EPSILON);
+                CollisionCase { id: stem(file), objects: components(&mesh), uncertainty }
+            }
+            Kind::M5d => return Err(no_partner(file)),
+        };
+        cases.push(case);
+    }
+    Ok(cases)
+}
+
+/// Objects that may collide, and where they came from.
+#[derive(Clone, Debug)]
+pub struct CollisionCase {
+    /// The name of the file without its ending.
+    pub id: String,
+    /// An object each.
+    pub objects: Vec<MovingMesh>,
+    /// How far a coordinate may be from that of the file.
+    pub uncertainty: f64,
+}
+
+/// The name of a file without `.mts`, `.mts.gz` and the like.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let bare = name.strip_suffix(".gz").unwrap_or(&name);
+    bare.rsplit_once('.').map_or(bare, |(stem, _)| stem).to_owned()
+}
+
+fn no_partner(file: &Path) -> LoadError {
+    let message = format!(
+        "{}: give .mts files, or .ply and .obj files two by two: the mesh at time 0 and at time 1",
+        file.display()
+    );
+    LoadError::Setting { setting: "files", message }
 }
 
 fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {

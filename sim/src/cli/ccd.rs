@@ -1,0 +1,170 @@
+//! `quintile ccd`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use workloads::collision::{Answer, Method, Object, Search, Verdict, detect};
+use workloads::visibility::{CollisionCase, load_cases};
+
+use super::Failure;
+use super::terminal::{print, print_json};
+use crate::output::table::{Table, grouped};
+
+/// Arguments of `ccd`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  quintile ccd armadillo-rollers.mts.gz --json\n  \
+    quintile ccd cases/*.mts --resolution 128 --csv pairs.csv\n  quintile ccd start.ply end.ply\n\n\
+    Every vertex moves on a straight line from time 0 to time 1. A pair that is not reported does not collide; one that is may.")]
+pub struct CcdArgs {
+    /// .mts files (gzipped or not), a case each, or .ply or .obj files two by two: a mesh at time 0 and at time 1
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Pixels across each of the three images
+    #[arg(long, value_name = "N", default_value_t = 128, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub resolution: u32,
+    /// Bins of time in a pixel
+    #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub bins: u32,
+    /// What is compared in a pixel
+    #[arg(long, value_enum, default_value_t)]
+    pub method: MethodArg,
+    /// Look once at the resolution asked for, and not closer at what is left
+    #[arg(long)]
+    pub no_zoom: bool,
+    /// File for every pair of every case: case_id,a,b,may_collide
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Worker threads; all cores without it. The results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print what was found as one line of JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is compared in a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Each fragment of one object with the box of the other
+    #[default]
+    FragmentBox,
+    /// The boxes of time and depth of both
+    BoxBox,
+    /// Depths alone, in six passes (Govindaraju et al. 2003)
+    DepthOnly,
+}
+
+impl CcdArgs {
+    fn search(&self) -> Search {
+        let method = match self.method {
+            MethodArg::FragmentBox => Method::FragmentBox,
+            MethodArg::BoxBox => Method::BoxBox,
+            MethodArg::DepthOnly => Method::DepthOnly,
+        };
+        Search { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_zoom }
+    }
+}
+
+/// A pair that may collide.
+#[derive(Serialize)]
+struct Pair {
+    a: usize,
+    b: usize,
+    /// First and last time of possible contact.
+    time: [f64; 2],
+    /// Where it may be: least and greatest x, y, z.
+    space: [[f64; 2]; 3],
+    /// Pixels that are left, in the last image looked at.
+    pixels: u64,
+    /// Whether two triangles were seen to cross.
+    seen: bool,
+}
+
+/// What is known of a case.
+#[derive(Serialize)]
+struct Found {
+    case_id: String,
+    objects: usize,
+    triangles: usize,
+    /// Pairs whose swept boxes touch.
+    candidates: usize,
+    may_collide: Vec<Pair>,
+}
+
+impl Found {
+    fn new(case: &CollisionCase, search: &Search) -> Result<Self, Failure> {
+        let object = |(number, mesh)| {
+            Object::new(mesh, case.uncertainty).ok_or_else(|| Failure {
+                message: format!(
+                    "{}: object {number}: a coordinate is beyond 1e60 or not a number; scale it",
+                    case.id
+                ),
+                code: 1,
+            })
+        };
+        let objects = case.objects.iter().enumerate().map(object).collect::<Result<Vec<_>, _>>()?;
+        let answers = detect(&objects, search);
+        Ok(Self {
+            case_id: case.id.clone(),
+            objects: objects.len(),
+            triangles: objects.iter().map(Object::len).sum(),
+            candidates: answers.len(),
+            may_collide: answers.iter().filter_map(pair).collect(),
+        })
+    }
+
+    /// A line for each pair of objects.
+    fn lines(&self, csv: &mut csv::Writer<impl Write>) -> csv::Result<()> {
+        let mut left = self.may_collide.iter().map(|pair| (pair.a, pair.b)).peekable();
+        for (a, b) in (0..self.objects).flat_map(|a| (a + 1..self.objects).map(move |b| (a, b))) {
+            let may = left.next_if_eq(&(a, b)).is_some();
+            csv.serialize((&self.case_id, a, b, u8::from(may)))?;
+        }
+        Ok(())
+    }
+}
+
+fn pair(answer: &Answer) -> Option<Pair> {
+    let Verdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
+    Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels: tiles, seen })
+}
+
+pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
+    super::not_an_input(args.csv.as_deref(), args.files.iter().map(PathBuf::as_path))?;
+    let (search, cases) = (args.search(), load_cases(&args.files)?);
+    let pool = super::threads(args.threads)?;
+    let found: Vec<Found> =
+        pool.install(|| cases.iter().map(|case| Found::new(case, &search)).collect::<Result<_, _>>())?;
+    if let Some(path) = &args.csv {
+        write_csv(path, &found)?;
+    }
+    if args.json { print_json(&found, false) } else { print(&text(&found)) }
+}
+
+fn write_csv(path: &Path, found: &[Found]) -> Result<(), Failure> {
+    let written = traces::io::atomic::write_file(path, |out| {
+        let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(out);
+        csv.write_record(["case_id", "a", "b", "may_collide"])?;
+        found.iter().try_for_each(|case| case.lines(&mut csv))?;
+        Ok::<(), csv::Error>(csv.flush()?)
+    });
+    written.map_err(|error| Failure { message: error.to_string(), code: 1 })
+}
+
+fn text(found: &[Found]) -> String {
+    let mut table =
+        Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "seen to cross"]);
+    for case in found {
+        table.row([
+            case.case_id.clone(),
+            case.objects.to_string(),
+            grouped(case.triangles as u64),
+            case.candidates.to_string(),
+            case.may_collide.len().to_string(),
+            case.may_collide.iter().filter(|pair| pair.seen).count().to_string(),
+        ]);
+    }
+    table.to_string()
+}
