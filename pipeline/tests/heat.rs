@@ -54,6 +54,27 @@ fn a_triangle_is_hot_where_it_is() {
     assert_eq!(map(Event::Indices).elsewhere, 6);
 }
 
+/// What happens to samples is known by pixel: a triangle over part of a tile is hit there and nowhere else.
+#[test]
+fn samples_are_hot_in_their_own_pixels() {
+    let (viewport, corners) = (Viewport::new(64, 32).unwrap(), rectangle([-15.5, -10.5], [0.5, 4.5], 2.0));
+    let (heat, counts) =
+        maps([64, 32], &spec(Features::ALL), &[still(&corners, &RED)], &pixel_camera(viewport, 0.25));
+    let map = |event| heat.iter().find(|map| map.event == event).unwrap();
+    let hit = map(Event::SamplesHit).pixels();
+    let covered: Vec<_> =
+        hit.iter().enumerate().filter(|(_, hits)| **hits > 0.0).map(|(at, _)| [at % 64, at / 64]).collect();
+    assert!(!covered.is_empty() && covered.len() <= 6 * 5, "{covered:?}");
+    let columns = covered.iter().map(|at| at[0]);
+    assert!(columns.clone().max().unwrap() - columns.min().unwrap() <= 5);
+    for event in [Event::SamplesTested, Event::SampleMadds, Event::SamplesHit, Event::DepthWrites] {
+        let sum: f64 = map(event).pixels().iter().map(|&count| f64::from(count)).sum();
+        assert_eq!(sum, counts[event] as f64, "{event:?}");
+    }
+    let tested = map(Event::SamplesTested).pixels();
+    assert!(hit.iter().zip(&tested).all(|(hit, tested)| hit <= tested));
+}
+
 #[test]
 fn tests_that_lead_to_no_packet_are_where_they_were_done() {
     // A sliver along the diagonal: its box visits every tile, its edges cull those beside the diagonal.

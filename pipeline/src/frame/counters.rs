@@ -2,6 +2,7 @@
 
 use activity::{Counts, Event, PacketCounts};
 
+use crate::sample_test::PixelHits;
 use crate::shading::QuadAccess;
 
 /// Tile tests done since the last packet of the bin.
@@ -95,6 +96,49 @@ impl TestsHere {
     }
 }
 
+/// What happened to the samples of each pixel of a tile.
+#[derive(Clone, Debug)]
+pub(super) struct SamplesHere {
+    counts: Vec<PacketCounts>,
+}
+
+impl SamplesHere {
+    /// Events of samples, which have a pixel each.
+    pub const EVENTS: [Event; 7] = [
+        Event::SamplesScreened,
+        Event::ScreenMadds,
+        Event::SamplesTested,
+        Event::SampleMadds,
+        Event::SamplesHit,
+        Event::DepthWrites,
+        Event::ColourWrites,
+    ];
+
+    /// Nothing yet.
+    pub fn new() -> Self {
+        Self { counts: vec![PacketCounts::default(); 64] }
+    }
+
+    /// Adds what was found, with the multiply-adds of a screen and of a test.
+    pub fn add(&mut self, found: &PixelHits, [screen_madds, test_madds]: [u32; 2]) {
+        for (pixel, counts) in self.counts.iter_mut().enumerate() {
+            let (screened, tested) = (found.screened[pixel], found.tested[pixel]);
+            counts[Event::SamplesScreened] += screened;
+            counts[Event::ScreenMadds] += screened * screen_madds;
+            counts[Event::SamplesTested] += tested;
+            counts[Event::SampleMadds] += tested * test_madds;
+            counts[Event::SamplesHit] += found.hit[pixel];
+            counts[Event::DepthWrites] += found.written[pixel];
+            counts[Event::ColourWrites] += found.written[pixel];
+        }
+    }
+
+    /// How often `event` happened in a pixel, row by row of eight or what the side of a tile is.
+    pub fn of(&self, event: Event) -> impl Iterator<Item = u32> + '_ {
+        self.counts.iter().map(move |counts| counts[event])
+    }
+}
+
 /// One triangle in one tile, or tile tests that led to none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Work {
@@ -122,4 +166,6 @@ pub(super) struct BinLog {
     pub quads: Vec<QuadAccess>,
     /// The tile tests in each tile of the bin, kept for heat maps only.
     pub tests: Vec<TestsHere>,
+    /// What happened to the samples of each tile of the bin, kept for heat maps only.
+    pub samples: Vec<Option<SamplesHere>>,
 }

@@ -3,7 +3,7 @@
 use activity::{Event, Packet, PacketKind, Unit};
 
 use super::bin::Bin;
-use super::counters::BinLog;
+use super::counters::{BinLog, SamplesHere};
 use super::pass::Pass;
 
 /// How often an event happened in each tile of the image.
@@ -17,6 +17,8 @@ pub struct HeatMap {
     pub coarse: Vec<TileHeat>,
     /// What happened nowhere in the image: to vertices, or when the caches were emptied at the end.
     pub elsewhere: u64,
+    /// Every pixel, row by row, where the event is one of samples, which have a pixel each; else nothing.
+    pub samples: Vec<u32>,
     width: u32,
     height: u32,
 }
@@ -62,6 +64,10 @@ impl HeatMap {
             tiles: tiles(spec.tile_px),
             coarse: tiles(spec.coarse_tile_px),
             elsewhere: 0,
+            samples: vec![
+                0;
+                if SamplesHere::EVENTS.contains(&event) { (width * height) as usize } else { 0 }
+            ],
             width,
             height,
         }
@@ -84,6 +90,9 @@ impl HeatMap {
 
     /// Counts the tile tests of a bin, `number` row by row.
     pub(super) fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
+        if !self.samples.is_empty() {
+            self.by_pixel(pass, bin, log);
+        }
         if !is_tile_test(self.event) {
             return;
         }
@@ -98,8 +107,26 @@ impl HeatMap {
         self.coarse[number].count += all - in_tiles;
     }
 
-    /// The value of every pixel, row by row: events there, a tile's spread evenly over its pixels.
+    /// Counts what happened to the samples of a bin, pixel by pixel.
+    fn by_pixel(&mut self, pass: &Pass<'_>, bin: &Bin, log: &BinLog) {
+        let side = pass.settings.spec.tile_px;
+        for (place, samples) in log.samples.iter().enumerate() {
+            let Some(samples) = samples else { continue };
+            let [x, y] = bin.tile_origin(pass, place);
+            for (pixel, count) in (0..side * side).zip(samples.of(self.event)) {
+                let (column, row) = (x + pixel % side, y + pixel / side);
+                if column < self.width && row < self.height {
+                    self.samples[(row * self.width + column) as usize] += count;
+                }
+            }
+        }
+    }
+
+    /// The value of every pixel, row by row: events there. What has a tile but no pixel is spread evenly over the tile.
     pub fn pixels(&self) -> Vec<f32> {
+        if !self.samples.is_empty() {
+            return self.samples.iter().map(|&count| count as f32).collect();
+        }
         let mut pixels = vec![0.0_f32; (self.width * self.height) as usize];
         for tile in self.tiles.iter().chain(&self.coarse) {
             let value = tile.per_pixel() as f32;

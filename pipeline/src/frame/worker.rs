@@ -1,7 +1,7 @@
 //! One worker at one bin: each triangle through the tile tests, the samples and the shading grid.
 
 use super::bin::Bin;
-use super::counters::{BinLog, TestsHere, TileWork, Work};
+use super::counters::{BinLog, SamplesHere, TestsHere, TileWork, Work};
 use super::pass::Pass;
 use super::surface::{Grid, own_pixel};
 use super::tile_tests::{Left, Place, Run, Subject};
@@ -151,6 +151,9 @@ impl<'a, 'p> Worker<'a, 'p> {
         let samples = if drawn_sharp { &sharp[place] } else { &samples[place] };
         let grid = self.grid;
         let stored = self.bin.tiles[place].get_or_insert_with(|| DepthTile::cleared(grid, samples));
+        if self.pass.heat {
+            hits.by_pixel.get_or_insert_default();
+        }
         hits.clear();
         let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
         let (times, near) = (left.times, self.pass.projection.near);
@@ -221,7 +224,13 @@ impl<'a, 'p> Worker<'a, 'p> {
     }
 
     fn record(&mut self, triangle: u32, [moving, lens]: [bool; 2], in_front: bool, origin: [u32; 2]) {
+        let place = self.place(origin);
         let hits = &self.scratch.hits;
+        if let Some(found) = hits.by_pixel.as_deref().filter(|_| self.pass.heat) {
+            let madds = [traversal::screen_madds(moving, lens), sample_test::madds(moving, lens)];
+            self.log.samples.resize(self.bin.tiles.len(), None);
+            self.log.samples[place].get_or_insert_with(SamplesHere::new).add(found, madds);
+        }
         self.log.work.push(Work {
             triangle,
             tile: Bin::tile_number(self.pass, origin),

@@ -35,13 +35,38 @@ pub struct Hits {
     pub read_pixels: u64,
     /// Pixels of the tile whose stored depth was written.
     pub written_pixels: u64,
+    /// The same by pixel of the tile, where somebody asks for it.
+    pub by_pixel: Option<Box<PixelHits>>,
+}
+
+/// What happened to the samples of each pixel of a tile, row by row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PixelHits {
+    /// Samples screened.
+    pub screened: [u32; 64],
+    /// Samples tested.
+    pub tested: [u32; 64],
+    /// Samples inside the triangle and beyond the near depth.
+    pub hit: [u32; 64],
+    /// Samples that now see the triangle.
+    pub written: [u32; 64],
+}
+
+impl Default for PixelHits {
+    fn default() -> Self {
+        Self { screened: [0; 64], tested: [0; 64], hit: [0; 64], written: [0; 64] }
+    }
 }
 
 impl Hits {
     /// Forgets what was found, keeping the memory.
     pub fn clear(&mut self) {
         self.written.clear();
-        *self = Self { written: std::mem::take(&mut self.written), ..Self::default() };
+        let by_pixel = self.by_pixel.take().map(|mut pixels| {
+            *pixels = PixelHits::default();
+            pixels
+        });
+        *self = Self { written: std::mem::take(&mut self.written), by_pixel, ..Self::default() };
     }
 }
 
@@ -124,10 +149,12 @@ impl<const MOTION: bool, const LENS: bool, const PARALLEL: bool> Kernel
                 && let Some(screen) = job.screen
             {
                 job.hits.screened += active.count_ones();
+                job.note(base, active, |pixels| &mut pixels.screened);
                 active &= job.pass::<V, MOTION, LENS>(screen, base);
             }
             if active != 0 {
                 job.hits.tested += active.count_ones();
+                job.note(base, active, |pixels| &mut pixels.tested);
                 let view = View::<V, MOTION, LENS, PARALLEL>::load(&job.rows(base));
                 job.store(base, &Crossing::new(&job.triangle.corners, &view), active);
             }
@@ -204,6 +231,23 @@ impl Job<'_, '_> {
         }
     }
 
+    /// Notes in which pixels samples are, where somebody asks.
+    #[inline(always)]
+    fn note(&mut self, base: usize, active: Mask, of: fn(&mut PixelHits) -> &mut [u32; 64]) {
+        if self.hits.by_pixel.is_some() {
+            self.note_pixels(base, active, of);
+        }
+    }
+
+    #[cold]
+    fn note_pixels(&mut self, base: usize, active: Mask, of: fn(&mut PixelHits) -> &mut [u32; 64]) {
+        let Some(pixels) = &mut self.hits.by_pixel else { return };
+        let counts = of(pixels);
+        (0..LANES).filter(|lane| active >> lane & 1 == 1).for_each(|lane| {
+            counts[usize::from(self.samples.pixel[base + lane])] += 1;
+        });
+    }
+
     #[cold]
     fn keep_exact(&mut self, base: usize, lane: usize) {
         let seen = exact::seen(&self.triangle.corners, &self.rows(base), lane);
@@ -220,12 +264,18 @@ impl Job<'_, '_> {
         let pixel = 1_u64 << self.samples.pixel[slot];
         self.hits.hit += 1;
         self.hits.read_pixels |= pixel;
+        if let Some(pixels) = &mut self.hits.by_pixel {
+            pixels.hit[usize::from(self.samples.pixel[slot])] += 1;
+        }
         let (stored, owner) = (self.target.depth[slot], self.target.triangle[slot]);
         if depth < stored || (depth == stored && self.triangle.id < owner) {
             self.target.depth[slot] = depth;
             self.target.triangle[slot] = self.triangle.id;
             self.hits.written.push(slot as u16);
             self.hits.written_pixels |= pixel;
+            if let Some(pixels) = &mut self.hits.by_pixel {
+                pixels.written[usize::from(self.samples.pixel[slot])] += 1;
+            }
         }
     }
 }

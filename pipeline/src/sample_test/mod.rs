@@ -26,5 +26,5 @@ mod kernel;
 mod madds;
 
 pub use crate::simd::Width;
-pub use kernel::{Hits, Target, test_run, test_run_at, test_screened};
+pub use kernel::{Hits, PixelHits, Target, test_run, test_run_at, test_screened};
 pub use madds::madds;

@@ -39,8 +39,9 @@ pub(super) fn write(plan: &Plan, dir: &OutDir, frame: u32, map: &HeatMap) -> Res
 
 fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> {
     let side = plan.gpu.pipeline.tile_px;
+    let by_pixel = side == 1 || is_drawn_by_pixel(map);
     let spread =
-        if side == 1 { String::new() } else { format!(", the mean over tiles of {side}x{side} pixels") };
+        if by_pixel { String::new() } else { format!(", the mean over tiles of {side}x{side} pixels") };
     let elsewhere = match map.elsewhere {
         0 => String::new(),
         count => format!(", of which {} happened nowhere in the image", grouped(count)),
@@ -55,9 +56,25 @@ fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> 
         ),
         label: "events per pixel",
         size: [plan.viewport.width(), plan.viewport.height()],
-        tiles: &tiles(plan, map),
+        tiles: &if is_drawn_by_pixel(map) { pixels(plan, map) } else { tiles(plan, map) },
     };
     Ok(plot.picture().png()?)
+}
+
+/// The most pixels that are drawn one by one; larger pictures would show no more of them.
+const MOST_PIXELS: usize = 1 << 19;
+
+/// Whether the event has a place in pixels, and few enough for each to be drawn.
+fn is_drawn_by_pixel(map: &HeatMap) -> bool {
+    (1..=MOST_PIXELS).contains(&map.samples.len())
+}
+
+/// Every pixel as a tile of its own.
+fn pixels(plan: &Plan, map: &HeatMap) -> Vec<HeatTile> {
+    let width = plan.viewport.width();
+    let place = |at: u32| [at % width, at / width];
+    let tile = |(at, &count)| HeatTile { origin: place(at), size: [1, 1], value: f64::from(count) };
+    (0..).zip(&map.samples).map(tile).collect()
 }
 
 /// The fine tiles, each with its own events and its share of those of the coarse tile it is in.
