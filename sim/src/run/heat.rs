@@ -38,10 +38,8 @@ pub(super) fn write(plan: &Plan, dir: &OutDir, frame: u32, map: &HeatMap) -> Res
 }
 
 fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> {
-    let side = plan.gpu.pipeline.tile_px;
-    let by_pixel = side == 1 || is_drawn_by_pixel(map);
-    let spread =
-        if by_pixel { String::new() } else { format!(", the mean over tiles of {side}x{side} pixels") };
+    let side = if map.samples.is_empty() { plan.gpu.pipeline.tile_px } else { block_px(map) };
+    let spread = if side == 1 { String::new() } else { format!(", the mean over {side}x{side} pixels") };
     let elsewhere = match map.elsewhere {
         0 => String::new(),
         count => format!(", of which {} happened nowhere in the image", grouped(count)),
@@ -56,25 +54,34 @@ fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> 
         ),
         label: "events per pixel",
         size: [plan.viewport.width(), plan.viewport.height()],
-        tiles: &if is_drawn_by_pixel(map) { pixels(plan, map) } else { tiles(plan, map) },
+        tiles: &if map.samples.is_empty() { tiles(plan, map) } else { blocks(plan, map, side) },
     };
     Ok(plot.picture().png()?)
 }
 
-/// The most pixels that are drawn one by one; larger pictures would show no more of them.
-const MOST_PIXELS: usize = 1 << 19;
+/// The most blocks that are drawn; larger pictures would show no more of them.
+const MOST_BLOCKS: usize = 1 << 19;
 
-/// Whether the event has a place in pixels, and few enough for each to be drawn.
-fn is_drawn_by_pixel(map: &HeatMap) -> bool {
-    (1..=MOST_PIXELS).contains(&map.samples.len())
+/// The side of the blocks of pixels that are drawn as one.
+fn block_px(map: &HeatMap) -> u32 {
+    (1..).find(|side| map.samples.len() / (side * side) as usize <= MOST_BLOCKS).unwrap_or(1)
 }
 
-/// Every pixel as a tile of its own.
-fn pixels(plan: &Plan, map: &HeatMap) -> Vec<HeatTile> {
-    let width = plan.viewport.width();
-    let place = |at: u32| [at % width, at / width];
-    let tile = |(at, &count)| HeatTile { origin: place(at), size: [1, 1], value: f64::from(count) };
-    (0..).zip(&map.samples).map(tile).collect()
+/// Blocks of `side` pixels, cut to the image, each with the mean of its pixels.
+fn blocks(plan: &Plan, map: &HeatMap, side: u32) -> Vec<HeatTile> {
+    let [width, height] = [plan.viewport.width(), plan.viewport.height()];
+    let across = width.div_ceil(side);
+    let block = |number: u32| {
+        let origin = [number % across * side, number / across * side];
+        let size = [side.min(width - origin[0]), side.min(height - origin[1])];
+        let row = |y: u32| {
+            let first = (y * width + origin[0]) as usize;
+            map.samples[first..first + size[0] as usize].iter().map(|&count| u64::from(count)).sum::<u64>()
+        };
+        let sum: u64 = (origin[1]..origin[1] + size[1]).map(row).sum();
+        HeatTile { origin, size, value: sum as f64 / f64::from(size[0] * size[1]) }
+    };
+    (0..across * height.div_ceil(side)).map(block).collect()
 }
 
 /// The fine tiles, each with its own events and its share of those of the coarse tile it is in.
