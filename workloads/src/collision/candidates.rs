@@ -31,7 +31,7 @@ mod tests {
         let at = |n: u64| (mix(n) % 1000) as f64;
         let object = |n: u64| {
             let [x, y, z] = [at(3 * n), at(3 * n + 1), at(3 * n + 2)];
-            let near = [[x, y, z], [x + 120.0, y, z], [x, y + 90.0, z + 150.0]];
+            let near = [[x, y, z], [x + 220.0, y, z], [x, y + 190.0, z + 250.0]];
             Object::from_ends(vec![[near, near]], 0.0).unwrap()
         };
         let objects: Vec<_> = (0..60).map(object).chain(Object::from_ends(vec![], 0.0)).collect();
