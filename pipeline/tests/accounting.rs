@@ -92,22 +92,19 @@ proptest! {
     }
 
     /// Tests save work and change nothing: one more of them leaves no more samples to be looked at, and what is written is the
-    /// same. (How many a screen lets pass is not compared where both have one: it linearizes over the box it is given, and over a
-    /// smaller box the linear edges are others, better as a rule and not for every sample.)
+    /// same. (Edges and screens linearize over the box that they are given. Over a smaller one the linear edges are others, better as
+    /// a rule and not for every sample, so counts of one frame are compared where at most one of the two has them.)
     #[test]
     fn switching_a_test_on_costs_no_sample(
         kind in kinds(), lens: bool, count in 1..100_u32, seed: u64, pairs in prop::collection::vec((0..SWITCHES, 0..SWITCHES.ilog2()), 10),
     ) {
         let soup = Soup::new(kind, count, seed);
-        let counts = |switches: u32| {
-            let features = switched(switches);
-            (features, frame(&[soup.draw(&Plain, Cull::None)], lens, features).counts)
-        };
         for (switches, bit) in pairs {
-            let ((more, a), (less, b)) = (counts(switches | 1 << bit), counts(switches & !(1 << bit)));
-            let looked_at = |f: &Features, c: &Counts| c[if f.screen { Event::SamplesScreened } else { Event::SamplesTested }];
-            prop_assert!(looked_at(&more, &a) <= looked_at(&less, &b), "{:?} {:?}", more, less);
+            let ((more, a), (less, b)) = one_apart(&soup, lens, switches, bit);
             prop_assert!(a[Event::SamplesTested] <= looked_at(&more, &a));
+            if !(more.edges && less.edges) || more.z_max != less.z_max {
+                prop_assert!(looked_at(&more, &a) <= looked_at(&less, &b), "{:?} {:?}", more, less);
+            }
             if more.screen != less.screen {
                 prop_assert!(a[Event::SamplesTested] <= b[Event::SamplesTested], "{:?} {:?}", more, less);
             }
@@ -116,6 +113,37 @@ proptest! {
                 prop_assert_eq!(a[Event::SamplesHit], b[Event::SamplesHit], "{:?} {:?}", more, less);
             }
         }
+    }
+}
+
+/// Counts of a soup with the test of `bit` and without it.
+fn one_apart(soup: &Soup, lens: bool, switches: u32, bit: u32) -> ((Features, Counts), (Features, Counts)) {
+    let counts = |switches: u32| {
+        let features = switched(switches);
+        (features, frame(&[soup.draw(&Plain, Cull::None)], lens, features).counts)
+    };
+    (counts(switches | 1 << bit), counts(switches & !(1 << bit)))
+}
+
+/// Samples that were left after the tile tests.
+fn looked_at(features: &Features, counts: &Counts) -> u64 {
+    counts[if features.screen { Event::SamplesScreened } else { Event::SamplesTested }]
+}
+
+/// Where edges linearize over the boxes that other tests leave, those save samples over many frames, if not in each one.
+#[test]
+fn beside_edges_a_test_saves_samples_over_many_frames() {
+    let edges = switched(SWITCHES - 1);
+    assert!(edges.edges && edges.screen);
+    for bit in (0..SWITCHES.ilog2()).filter(|&bit| switched(1 << bit).z_max || !switched(1 << bit).edges) {
+        let mut totals = [0; 2];
+        for (seed, kind) in Kind::ALL.iter().copied().cycle().take(10 * Kind::ALL.len()).enumerate() {
+            let (more, less) = one_apart(&Soup::new(kind, 60, seed as u64), seed % 2 == 0, SWITCHES - 1, bit);
+            for (total, (features, counts)) in totals.iter_mut().zip([more, less]) {
+                *total += looked_at(&features, &counts);
+            }
+        }
+        assert!(totals[0] <= totals[1], "{:?}: {totals:?}", switched(1 << bit));
     }
 }
 

@@ -69,16 +69,13 @@ pub enum Kind {
     Layers,
 }
 
+impl Kind {
+    pub const ALL: [Self; 6] = [Self::Still, Self::Moving, Self::Crossing, Self::Slivers, Self::Grid, Self::Layers];
+}
+
 /// Every kind, each as likely.
 pub fn kinds() -> impl Strategy<Value = Kind> {
-    prop_oneof![
-        Just(Kind::Still),
-        Just(Kind::Moving),
-        Just(Kind::Crossing),
-        Just(Kind::Slivers),
-        Just(Kind::Grid),
-        Just(Kind::Layers)
-    ]
+    prop::sample::select(&Kind::ALL[..])
 }
 
 impl Soup {
