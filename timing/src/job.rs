@@ -181,12 +181,8 @@ impl Jobs {
         whole((f64::from(fetches) * fetch).max(f64::from(lines) * line))
     }
 
-    /// Cycles that a packet with `counts` occupies `place` for, lines not counted.
-    pub fn service(&self, place: Place, counts: &PacketCounts) -> u32 {
-        self.cycles(place, counts)
-    }
-
-    /// The parts of a unit work side by side: the slowest sets the pace.
+    /// Cycles that a packet with `counts` occupies `place` for, lines not counted. The parts of a unit work side by side: the
+    /// slowest sets the pace.
     fn cycles(&self, place: Place, counts: &PacketCounts) -> u32 {
         let parts =
             self.costs[place as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);

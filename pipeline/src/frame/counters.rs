@@ -96,11 +96,9 @@ impl TestsHere {
     }
 }
 
-/// What happened to the samples of each pixel of a tile.
+/// What happened to the samples of each pixel of a tile: [`Self::EVENTS`] in their order.
 #[derive(Clone, Debug)]
-pub(super) struct SamplesHere {
-    counts: Vec<PacketCounts>,
-}
+pub(super) struct SamplesHere(Vec<[u32; 7]>);
 
 impl SamplesHere {
     /// Events of samples, which have a pixel each.
@@ -116,26 +114,24 @@ impl SamplesHere {
 
     /// Nothing yet.
     pub fn new() -> Self {
-        Self { counts: vec![PacketCounts::default(); 64] }
+        Self(vec![[0; 7]; 64])
     }
 
     /// Adds what was found, with the multiply-adds of a screen and of a test.
     pub fn add(&mut self, found: &PixelHits, [screen_madds, test_madds]: [u32; 2]) {
-        for (pixel, counts) in self.counts.iter_mut().enumerate() {
+        for (pixel, counts) in self.0.iter_mut().enumerate() {
             let (screened, tested) = (found.screened[pixel], found.tested[pixel]);
-            counts[Event::SamplesScreened] += screened;
-            counts[Event::ScreenMadds] += screened * screen_madds;
-            counts[Event::SamplesTested] += tested;
-            counts[Event::SampleMadds] += tested * test_madds;
-            counts[Event::SamplesHit] += found.hit[pixel];
-            counts[Event::DepthWrites] += found.written[pixel];
-            counts[Event::ColourWrites] += found.written[pixel];
+            let (hit, written) = (found.hit[pixel], found.written[pixel]);
+            let here =
+                [screened, screened * screen_madds, tested, tested * test_madds, hit, written, written];
+            counts.iter_mut().zip(here).for_each(|(sum, count)| *sum += count);
         }
     }
 
-    /// How often `event` happened in a pixel, row by row of eight or what the side of a tile is.
+    /// How often `event` happened in each pixel, row by row; nothing for events that are not of samples.
     pub fn of(&self, event: Event) -> impl Iterator<Item = u32> + '_ {
-        self.counts.iter().map(move |counts| counts[event])
+        let place = Self::EVENTS.iter().position(|known| *known == event);
+        self.0.iter().filter_map(move |counts| Some(counts[place?]))
     }
 }
 

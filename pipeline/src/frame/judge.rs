@@ -213,17 +213,15 @@ impl Judge {
 
     /// Takes over what another bin has learnt.
     pub fn join(&mut self, other: &Self) {
-        let records = |judge: &Self| judge.plans.as_flattened().as_flattened().to_vec();
-        for (ours, theirs) in self.plans.as_flattened_mut().as_flattened_mut().iter_mut().zip(records(other))
-        {
+        let theirs = other.plans.as_flattened().as_flattened();
+        for (ours, theirs) in self.plans.as_flattened_mut().as_flattened_mut().iter_mut().zip(theirs) {
             ours.madds.join(&theirs.madds);
             ours.left.join(&theirs.left);
             ours.alive.join(&theirs.alive);
         }
-        let means = |judge: &mut Self| -> Vec<Mean> { judge.means().into_iter().map(|mean| *mean).collect() };
-        let theirs = means(&mut other.clone());
-        for (ours, theirs) in self.means().into_iter().zip(theirs) {
-            ours.join(&theirs);
+        let mut other = *other;
+        for (ours, theirs) in self.means().into_iter().zip(other.means()) {
+            ours.join(theirs);
         }
         for (ours, theirs) in self.trials.as_flattened_mut().iter_mut().zip(other.trials.as_flattened()) {
             *ours += theirs;

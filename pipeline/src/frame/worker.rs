@@ -113,6 +113,9 @@ impl<'a, 'p> Worker<'a, 'p> {
 
     /// One triangle in one tile; `auto` learns what that takes where nothing is hit.
     fn fine(&mut self, subject: &Subject<'_>, left: &Left, origin: [u32; 2]) {
+        if !self.pass.settings.spec.features.auto {
+            return self.tile(subject, left, origin);
+        }
         let before = (self.tests.tile_madds(), self.log.work.len());
         self.tile(subject, left, origin);
         let packet = self.log.work[before.1..].last();
@@ -167,10 +170,14 @@ impl<'a, 'p> Worker<'a, 'p> {
             let screen = screen.filter(|screen| subject.pays(screen, within.lens, &mut run));
             let before = [hits.screened, hits.tested];
             test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
-            let did = [hits.screened - before[0], hits.tested - before[1]];
-            gain.add(did, screen.as_ref(), &mut self.bin.judge);
+            if features.auto {
+                let did = [hits.screened - before[0], hits.tested - before[1]];
+                gain.add(did, screen.as_ref(), &mut self.bin.judge);
+            }
         }
-        gain.learn(hits, [triangle.moving, within.lens], left, &mut self.bin.judge);
+        if self.pass.settings.spec.features.auto {
+            gain.learn(hits, [triangle.moving, within.lens], left, &mut self.bin.judge);
+        }
         if !hits.written.is_empty() {
             let lowered = stored.wrote(&hits.written);
             self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };

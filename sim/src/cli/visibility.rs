@@ -14,6 +14,7 @@ use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, wri
 use super::Failure;
 use super::args::VisibilityArgs;
 use super::terminal::{print, print_json};
+use crate::run::fits_memory;
 use crate::visibility::{Rates, find};
 
 /// What was found.
@@ -69,24 +70,8 @@ fn print_camera(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<(), Fa
     print(&camera.to_ron())
 }
 
-/// Bytes that a sample takes on its way, and how many all of them may.
+/// Bytes that a sample takes on its way.
 const BYTES_PER_SAMPLE: u64 = 48;
-const MOST_BYTES: u64 = 8 << 30;
-
-/// Refuses images that would not fit into memory.
-fn fits(args: &VisibilityArgs, scene: &VisibilityScene, per_pixel: u32) -> Result<(), Failure> {
-    let samples = scene.viewport.pixels() as u64 * u64::from(per_pixel);
-    if samples * BYTES_PER_SAMPLE <= MOST_BYTES {
-        return Ok(());
-    }
-    let [needed, limit] = [samples * BYTES_PER_SAMPLE, MOST_BYTES].map(|bytes| bytes >> 30);
-    let message = format!(
-        "{}: {} pixels of {per_pixel} samples take {needed} GiB, more than {limit} GiB; ask for fewer",
-        named(args),
-        scene.viewport.pixels()
-    );
-    Err(Failure { message, code: 2 })
-}
 
 /// The mesh in messages.
 fn named(args: &VisibilityArgs) -> String {
@@ -95,7 +80,8 @@ fn named(args: &VisibilityArgs) -> String {
 
 fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> {
     let samples = samples(args, &scene)?;
-    fits(args, &scene, samples.per_pixel())?;
+    let pixels = scene.viewport.pixels() as u64;
+    fits_memory(&named(args), pixels, samples.per_pixel(), BYTES_PER_SAMPLE)?;
     let mut warnings = scene.warnings.clone();
     warnings.extend(crate::visibility::warnings(&scene));
     warnings.extend((args.tests.is_none() && scene.camera.is_orthographic()).then(slow_view));

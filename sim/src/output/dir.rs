@@ -145,6 +145,16 @@ impl OutDir {
         })
     }
 
+    /// Writes `value` as a JSON file for people to read, a line end after it.
+    ///
+    /// # Errors
+    /// As [`Self::write_atomic`].
+    pub fn write_json(&self, relative: &str, value: &impl serde::Serialize) -> Result<PathBuf, OutputError> {
+        // Text first: what is written has to be sendable, what is described need not.
+        let text = serde_json::to_string_pretty(value);
+        self.write_atomic(relative, |out| Ok(writeln!(out, "{}", text?)?))
+    }
+
     /// Like [`Self::write_atomic`] for writers that want a path: `write` makes the file at the path it is given.
     ///
     /// # Errors

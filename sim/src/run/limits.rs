@@ -12,6 +12,21 @@ const TRACE_LIMIT: f64 = 1e8;
 /// Frames of one run.
 const FRAMES_LIMIT: u32 = 100_000;
 
+/// Refuses `pixels` of `samples`, each of so many bytes, where they would not fit into memory; `what` begins the message.
+///
+/// # Errors
+/// [`RunError::Setting`] with what would be needed.
+pub fn fits_memory(what: &str, pixels: u64, samples: u32, bytes_per_sample: u64) -> Result<(), RunError> {
+    let bytes = pixels * u64::from(samples) * bytes_per_sample;
+    let (needed, limit) = (bytes >> 30, SAMPLE_BYTES_LIMIT >> 30);
+    let message = || {
+        format!(
+            "{what}: {pixels} pixels of {samples} samples take {needed} GiB, more than {limit} GiB; ask for fewer"
+        )
+    };
+    if bytes > SAMPLE_BYTES_LIMIT { Err(RunError::Setting(message())) } else { Ok(()) }
+}
+
 /// What decides the size of a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size {
@@ -27,14 +42,7 @@ impl Size {
     /// Refuses what would not fit.
     pub fn check(&self) -> Result<(), RunError> {
         let refuse = |message| Err(RunError::Setting(message));
-        let bytes = self.pixels * u64::from(self.samples) * BYTES_PER_SAMPLE;
-        if bytes > SAMPLE_BYTES_LIMIT {
-            let (needed, limit) = (bytes >> 30, SAMPLE_BYTES_LIMIT >> 30);
-            return refuse(format!(
-                "size and samples: {} pixels of {} samples take {needed} GiB, more than {limit} GiB; ask for fewer",
-                self.pixels, self.samples
-            ));
-        }
+        fits_memory("size and samples", self.pixels, self.samples, BYTES_PER_SAMPLE)?;
         if self.frames > FRAMES_LIMIT {
             return refuse(format!(
                 "frames: {} in one run; at most {FRAMES_LIMIT}, ask for fewer",

@@ -36,6 +36,7 @@ pub use choice::{Choice, Verified, Wish};
 pub use error::RunError;
 pub use frame_rows::FrameRow;
 pub use heat::HeatPicture;
+pub use limits::fits_memory;
 pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};

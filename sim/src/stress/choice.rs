@@ -1,14 +1,12 @@
 //! What `auto` takes beside every fixed choice of tests.
 
 use pipeline::Features;
-use pipeline::memory::CacheError;
 use serde::Serialize;
 use workloads::stress::{Family, Size};
-use workloads::visibility::Unshaded;
 
 use super::measure::Work;
 use super::methods::combinations;
-use super::subject::Subject;
+use super::subject;
 use crate::gpu::GpuSpec;
 use crate::run::RunError;
 
@@ -58,15 +56,12 @@ pub fn trial(
     seed: u64,
     gpu: &GpuSpec,
 ) -> Result<Trial, RunError> {
-    let failed = |message: String| RunError::Setting(format!("{} at {value}: {message}", family.name));
-    let scene = family.scene(value, size, seed).map_err(|error| failed(error.to_string()))?;
-    let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
-    let (camera, viewport, samples) = (&scene.camera, scene.viewport, &scene.samples);
-    let subject = Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline };
-    let madds = |features| Ok::<_, CacheError>(Work::new(&subject.counts(features)?).madds());
-    let auto = madds(Features { auto: true, ..Features::ALL }).map_err(|error| failed(error.to_string()))?;
-    let fixed = fixed(camera.lens().is_some(), madds).map_err(|error| failed(error.to_string()))?;
-    Ok(Trial { family: family.name, value, auto, fixed })
+    subject::on(family, value, (size, seed), gpu, |subject| {
+        let madds = |features| Ok(Work::new(&subject.counts(features)?).madds());
+        let auto = madds(Features { auto: true, ..Features::ALL })?;
+        let fixed = fixed(subject.camera.lens().is_some(), madds)?;
+        Ok(Trial { family: family.name, value, auto, fixed })
+    })
 }
 
 /// What each combination takes; those that cannot differ are measured once.

@@ -3,11 +3,10 @@
 use activity::{Counts, Event};
 use serde::Serialize;
 use workloads::stress::{Family, Size};
-use workloads::visibility::Unshaded;
 
 use super::intervals::{Intervals, Pairs};
 use super::methods::Method;
-use super::subject::{Subject, differing};
+use super::subject::{self, differing};
 use crate::gpu::GpuSpec;
 use crate::run::RunError;
 
@@ -85,30 +84,26 @@ pub fn measure(
     gpu: &GpuSpec,
     methods: &[Method],
 ) -> Result<Vec<Row>, RunError> {
-    let failed = |message: String| RunError::Setting(format!("{} at {value}: {message}", family.name));
-    let scene = family.scene(value, size, super::SEED).map_err(|error| failed(error.to_string()))?;
-    let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
-    let (camera, viewport, samples) = (&scene.camera, scene.viewport, &scene.samples);
-    let subject = Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline };
-    let pairs = Pairs::of(&subject, PAIRS[usize::from(size != Size::FULL)]);
-    let (reference, brute) = subject.reference().map_err(|error| failed(error.to_string()))?;
-    let row = |method: &Method| {
-        let seen = subject.seen(method.features)?;
-        Ok(Row {
-            family: family.name,
-            value,
-            method: method.name,
-            triangles: subject.triangles(),
-            samples_lost: differing(&seen, &reference),
-            held_against: if brute { "brute force" } else { "no tests" },
-            work: Work::new(&subject.counts(method.features)?),
-            over_best: 1.0,
-            truth: pairs.source(),
-            intervals: pairs.under(&method.features),
-        })
-    };
-    let rows: Result<Vec<_>, pipeline::memory::CacheError> = methods.iter().map(row).collect();
-    Ok(compared(rows.map_err(|error| failed(error.to_string()))?))
+    subject::on(family, value, (size, super::SEED), gpu, |subject| {
+        let pairs = Pairs::of(subject, PAIRS[usize::from(size != Size::FULL)]);
+        let (reference, brute) = subject.reference()?;
+        let row = |method: &Method| {
+            let seen = subject.seen(method.features)?;
+            Ok(Row {
+                family: family.name,
+                value,
+                method: method.name,
+                triangles: subject.triangles(),
+                samples_lost: differing(&seen, &reference),
+                held_against: if brute { "brute force" } else { "no tests" },
+                work: Work::new(&subject.counts(method.features)?),
+                over_best: 1.0,
+                truth: pairs.source(),
+                intervals: pairs.under(&method.features),
+            })
+        };
+        Ok(compared(methods.iter().map(row).collect::<Result<_, _>>()?))
+    })
 }
 
 /// With the cost of each over that of the best.

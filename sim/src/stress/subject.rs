@@ -6,7 +6,11 @@ use pipeline::frame::{render, visibility};
 use pipeline::memory::CacheError;
 use pipeline::sampling::SampleSource;
 use pipeline::{Camera, Draw, Features, PipelineSpec, Settings, Viewport};
-use workloads::stress::brute_force;
+use workloads::stress::{Family, Size, brute_force};
+use workloads::visibility::Unshaded;
+
+use crate::gpu::GpuSpec;
+use crate::run::RunError;
 
 /// Draws with what looks at them.
 #[derive(Clone, Copy)]
@@ -21,6 +25,25 @@ pub struct Subject<'a> {
     pub draws: &'a [Draw<'a>],
     /// The hardware; its features are those of each method in turn.
     pub spec: &'a PipelineSpec,
+}
+
+/// Calls `run` with the scene of `family` at `value`.
+///
+/// # Errors
+/// When the scene cannot be made or the hardware cannot be built.
+pub fn on<T>(
+    family: &Family,
+    value: f64,
+    (size, seed): (Size, u64),
+    gpu: &GpuSpec,
+    run: impl FnOnce(&Subject<'_>) -> Result<T, CacheError>,
+) -> Result<T, RunError> {
+    let failed = |message: String| RunError::Setting(format!("{} at {value}: {message}", family.name));
+    let scene = family.scene(value, size, seed).map_err(|error| failed(error.to_string()))?;
+    let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
+    let (camera, viewport, samples) = (&scene.camera, scene.viewport, &scene.samples);
+    let subject = Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline };
+    run(&subject).map_err(|error| failed(error.to_string()))
 }
 
 /// The triangle of each sample and the bits of its depth.

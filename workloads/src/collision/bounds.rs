@@ -24,6 +24,16 @@ pub(super) fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 pub(super) const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 impl Bounds {
+    /// Holds nothing yet.
+    pub(super) const NOTHING: Self = Self { space: [NOTHING; 3], time: NOTHING };
+
+    /// The box that holds both.
+    #[must_use]
+    pub(super) fn hull(&self, other: &Self) -> Self {
+        let space = [0, 1, 2].map(|axis| hull(self.space[axis], other.space[axis]));
+        Self { space, time: hull(self.time, other.time) }
+    }
+
     /// The box of points at any time.
     pub fn of(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut space = [NOTHING; 3];

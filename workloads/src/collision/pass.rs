@@ -2,7 +2,7 @@
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
 
-use super::bounds::{Bounds, NOTHING, hull, meet};
+use super::bounds::{Bounds, meet};
 use super::buffer::{TzBox, TzBuffer};
 use super::object::{Ends, Object};
 use super::window::times_inside;
@@ -124,11 +124,8 @@ impl Survivors {
 
     /// Notes that both may touch within `found`.
     pub fn add(&mut self, bin: usize, found: &Bounds, triangles: [u32; 2]) {
-        let known = self.bins[bin].get_or_insert(Bounds { space: [NOTHING; 3], time: NOTHING });
-        known.time = hull(known.time, found.time);
-        for (known, found) in known.space.iter_mut().zip(found.space) {
-            *known = hull(*known, found);
-        }
+        let known = self.bins[bin].get_or_insert(Bounds::NOTHING);
+        *known = known.hull(found);
         self.tiles += 1;
         if self.suspects.len() < MOST_SUSPECTS {
             self.suspects.push((triangles, 0.5 * (found.time[0] + found.time[1])));

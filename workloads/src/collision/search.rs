@@ -1,6 +1,6 @@
 //! One pair of objects, looked at closer and closer.
 
-use super::bounds::{Bounds, NOTHING, hull};
+use super::bounds::Bounds;
 use super::buffer::TzBuffer;
 use super::crossing::cross;
 use super::depth_only;
@@ -166,15 +166,12 @@ impl Pair<'_> {
     fn tighten(&mut self) -> bool {
         for which in 0..2 {
             let (object, window) = (self.objects[which], self.window);
-            let mut within = Bounds { space: [NOTHING; 3], time: NOTHING };
+            let mut within = Bounds::NOTHING;
             self.lists[which].retain(|&triangle| {
                 let Some(part) = object.boxes[triangle as usize].meet(&window) else { return false };
                 let ends = &object.triangles[triangle as usize];
                 let Some(times) = times_inside(ends, &window, object.uncertainty) else { return false };
-                within.time = hull(within.time, times);
-                for (known, found) in within.space.iter_mut().zip(part.space) {
-                    *known = hull(*known, found);
-                }
+                within = within.hull(&Bounds { time: times, ..part });
                 true
             });
             match self.window.meet(&within) {
@@ -227,8 +224,5 @@ fn slices(window: &Bounds, bins: u32) -> Vec<Option<Bounds>> {
 
 /// The box around what is left of all bins.
 fn joined(bins: &[Option<Bounds>]) -> Option<Bounds> {
-    bins.iter().flatten().copied().reduce(|a, b| Bounds {
-        space: [0, 1, 2].map(|axis| hull(a.space[axis], b.space[axis])),
-        time: hull(a.time, b.time),
-    })
+    bins.iter().flatten().copied().reduce(|a, b| a.hull(&b))
 }

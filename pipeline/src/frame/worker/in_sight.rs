@@ -32,7 +32,9 @@ impl Worker<'_, '_> {
         self.tests.z_tests += visible.compared;
         self.tests.interval_madds +=
             visible.compared * interval_madds(depth.bound, triangle.moving, within.lens);
-        self.learn_depth(triangle, within, &visible);
+        if features.auto {
+            self.learn_depth(triangle, within, &visible);
+        }
         if !features.z_max {
             return Some((*within, visible.in_front && visible.behind == 0));
         }
@@ -64,12 +66,10 @@ impl Worker<'_, '_> {
     }
 
     fn learn_depth(&mut self, triangle: &Triangle, within: &Box5, visible: &Visible) {
-        let samples = f64::from(self.samples_of_a_tile()) * Left::all(*within).volume(triangle.moving);
-        let rest = visible.within.map_or(0.0, |rest| {
-            Left::all(rest).volume(triangle.moving) / Left::all(*within).volume(triangle.moving)
-        });
+        let before = Left::all(*within).volume(triangle.moving);
+        let rest = visible.within.map_or(0.0, |rest| Left::all(rest).volume(triangle.moving) / before);
         let share = if rest.is_finite() { 1.0 - rest } else { 0.0 };
-        self.bin.judge.learn_depth(share, samples);
+        self.bin.judge.learn_depth(share, f64::from(self.samples_of_a_tile()) * before);
     }
 
     /// Finds what is known of the depth of a triangle, once in a bin.

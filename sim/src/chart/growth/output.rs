@@ -21,10 +21,7 @@ pub(super) fn write(chart: &GrowthChart, dir: &OutDir) -> Result<(), OutputError
     Curves { title, subject: &subject, panels }.picture().write(dir, "growth")?;
     dir.write_atomic("growth.csv", |out| chart.csv(out))?;
     dir.write_atomic("growth.md", |out| Ok(out.write_all(chart.markdown().as_bytes())?))?;
-    dir.write_atomic("growth.json", |out| {
-        serde_json::to_writer_pretty(&mut *out, chart)?;
-        Ok(writeln!(out)?)
-    })?;
+    dir.write_json("growth.json", chart)?;
     Ok(())
 }
 

@@ -41,10 +41,7 @@ impl SampledChart {
             Ok(table.flush()?)
         })?;
         dir.write_atomic("sampled.md", |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
-        dir.write_atomic("sampled.json", |out| {
-            serde_json::to_writer_pretty(&mut *out, self)?;
-            Ok(writeln!(out)?)
-        })?;
+        dir.write_json("sampled.json", self)?;
         Ok(())
     }
 

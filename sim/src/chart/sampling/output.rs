@@ -36,10 +36,7 @@ pub(super) fn write(chart: &SamplingChart, dir: &OutDir) -> Result<(), OutputErr
         Ok(table.flush()?)
     })?;
     dir.write_atomic("sampling.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
-    dir.write_atomic("sampling.json", |out| {
-        serde_json::to_writer_pretty(&mut *out, chart)?;
-        Ok(writeln!(out)?)
-    })?;
+    dir.write_json("sampling.json", chart)?;
     Ok(())
 }
 

@@ -45,10 +45,7 @@ impl TimingChart {
             Ok(table.flush()?)
         })?;
         dir.write_atomic("timing.md", |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
-        dir.write_atomic("timing.json", |out| {
-            serde_json::to_writer_pretty(&mut *out, self)?;
-            Ok(writeln!(out)?)
-        })?;
+        dir.write_json("timing.json", self)?;
         Ok(())
     }
 
