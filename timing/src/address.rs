@@ -18,12 +18,33 @@ pub struct RowPlace {
 /// Addresses go round the channels in chunks, then along a row, then round the banks.
 #[derive(Clone, Copy, Debug)]
 pub struct Map {
-    lines_per_chunk: u32,
-    lines_per_row: u32,
+    lines_per_chunk: Divisor,
+    lines_per_row: Divisor,
     /// Lines side by side that share a chunk and a row.
-    together: u32,
-    channels: u32,
-    banks: u32,
+    together: Divisor,
+    channels: Divisor,
+    banks: Divisor,
+}
+
+/// A number at least 1 to divide by, most often a power of two.
+#[derive(Clone, Copy, Debug)]
+struct Divisor {
+    by: u32,
+    shift: Option<u32>,
+}
+
+impl Divisor {
+    fn new(by: u32) -> Self {
+        Self { by, shift: by.is_power_of_two().then(|| by.trailing_zeros()) }
+    }
+
+    /// Quotient and remainder.
+    fn divide(self, value: u32) -> (u32, u32) {
+        match self.shift {
+            Some(shift) => (value >> shift, value & (self.by - 1)),
+            None => (value / self.by, value % self.by),
+        }
+    }
 }
 
 impl Map {
@@ -35,24 +56,23 @@ impl Map {
 
     fn with(lines_per_chunk: u32, lines_per_row: u32, channels: u32, banks: u32) -> Self {
         let together = gcd(lines_per_chunk.into(), lines_per_row.into()) as u32;
+        let [lines_per_chunk, lines_per_row, together, channels, banks] =
+            [lines_per_chunk, lines_per_row, together, channels, banks].map(Divisor::new);
         Self { lines_per_chunk, lines_per_row, together, channels, banks }
     }
 
     /// Lines with the same number here have one place.
     pub fn chunk(&self, line: u32) -> u32 {
-        line / self.together
+        self.together.divide(line).0
     }
 
     /// The place of line number `line`.
     pub fn place(&self, line: u32) -> RowPlace {
-        let chunk = line / self.lines_per_chunk;
-        let within = chunk / self.channels * self.lines_per_chunk + line % self.lines_per_chunk;
-        let row = within / self.lines_per_row;
-        RowPlace {
-            channel: (chunk % self.channels) as usize,
-            bank: (row % self.banks) as usize,
-            row: row / self.banks,
-        }
+        let (chunk, rest) = self.lines_per_chunk.divide(line);
+        let (round, channel) = self.channels.divide(chunk);
+        let row = self.lines_per_row.divide(round * self.lines_per_chunk.by + rest).0;
+        let (row, bank) = self.banks.divide(row);
+        RowPlace { channel: channel as usize, bank: bank as usize, row }
     }
 }
 

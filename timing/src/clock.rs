@@ -60,7 +60,10 @@ impl Clocks {
 
     /// Picoseconds of a length of time, rounded down.
     pub(crate) fn ps_below(&self, length: Time) -> u64 {
-        (u128::from(length) * u128::from(PS_PER_MS) / u128::from(self.grains_per_ms)) as u64
+        match length.checked_mul(PS_PER_MS) {
+            Some(product) => product / self.grains_per_ms,
+            None => (u128::from(length) * u128::from(PS_PER_MS) / u128::from(self.grains_per_ms)) as u64,
+        }
     }
 
     /// The first moment that is at `ps` or later.
@@ -70,7 +73,10 @@ impl Clocks {
 
     /// The last moment that is at `ps` or before.
     pub(crate) fn grain_up_to(&self, ps: u64) -> Time {
-        (u128::from(ps) * u128::from(self.grains_per_ms) / u128::from(PS_PER_MS)) as Time
+        match ps.checked_mul(self.grains_per_ms) {
+            Some(product) => product / PS_PER_MS,
+            None => (u128::from(ps) * u128::from(self.grains_per_ms) / u128::from(PS_PER_MS)) as Time,
+        }
     }
 
     /// Whole cycles of `clock` that begin before `at`.

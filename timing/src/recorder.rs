@@ -13,6 +13,19 @@ const FIRST: [usize; Unit::COUNT] = {
     first
 };
 
+/// The most events of a unit.
+const MOST_EVENTS: usize = {
+    let (mut most, mut at) = (0, 0);
+    while at < Unit::COUNT {
+        let events = Unit::ALL[at].events();
+        if events.end - events.start > most {
+            most = events.end - events.start;
+        }
+        at += 1;
+    }
+    most
+};
+
 /// Collects activity into equal bins. Where a frame outgrows the most bins allowed, pairs of bins are merged, so memory
 /// stays bounded.
 #[derive(Clone, Debug)]
@@ -65,10 +78,14 @@ impl Recorder {
             return targets.zip(0..).for_each(|(target, at)| *target += counts(at));
         }
         let events = self.bins[first].counts.of_mut(unit).len();
-        for at in (0..events).filter(|&at| counts(at) > 0) {
-            let mut shares = Shares::new(counts(at), end_ps - start_ps, self.bin_ps);
-            for (bin, from, to) in span.clone() {
-                self.bins[bin].counts.of_mut(unit)[at] += shares.next(to - from);
+        let mut written = [0; MOST_EVENTS];
+        for (bin, _, to) in span {
+            let part = fraction(to, end_ps - start_ps);
+            let targets = self.bins[bin].counts.of_mut(unit).iter_mut().zip(&mut written);
+            for ((target, written), at) in targets.zip(0..events) {
+                let so_far = share(counts(at), part);
+                *target += so_far - *written;
+                *written = so_far;
             }
         }
     }
@@ -147,6 +164,25 @@ impl Recorder {
         let duration_ps = self.end_ps.max(1);
         self.reach(duration_ps - 1);
         Timeline { bin_ps: self.bin_ps, duration_ps, bins: self.bins }
+    }
+}
+
+/// Binary places of a [`fraction`].
+const PLACES: u32 = 32;
+
+/// `part` of `length` (at least `part`), rounded down but for all of it.
+fn fraction(part: u64, length: u64) -> u64 {
+    match part {
+        _ if part == length => 1 << PLACES,
+        _ => ((u128::from(part) << PLACES) / u128::from(length)) as u64,
+    }
+}
+
+/// That fraction of `whole`, rounded down.
+fn share(whole: u64, fraction: u64) -> u64 {
+    match whole.checked_mul(fraction) {
+        Some(product) => product >> PLACES,
+        None => ((u128::from(whole) * u128::from(fraction)) >> PLACES) as u64,
     }
 }
 

@@ -253,8 +253,16 @@ fn write(
 ) {
     for (from, to, used, room) in calendar.stretches() {
         let (from, to) = (clocks.ps(from), clocks.ps(to));
-        let done = (u128::from(to - from) * u128::from(used) / u128::from(room)) as u64;
+        let done = part(to - from, used, room);
         let to = to.min(end_ps.max(from + done));
         recorder.busy(unit, from, to, done, (to - from).max(1) * servers);
+    }
+}
+
+/// `whole` times `used` over `room`, rounded down.
+fn part(whole: u64, used: u64, room: u64) -> u64 {
+    match whole.checked_mul(used) {
+        Some(product) => product / room,
+        None => (u128::from(whole) * u128::from(used) / u128::from(room)) as u64,
     }
 }
