@@ -12,7 +12,7 @@
 use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Unit};
 
 use crate::clock::{Clocks, Time};
-use crate::job::{Job, Jobs, Place};
+use crate::job::{CLIENTS, Job, Jobs, Place, TEXTURE_PORT, port};
 use crate::spec::MachineSpec;
 use crate::{Clock, LINE_BYTES, Recorder, Timed};
 
@@ -34,6 +34,8 @@ struct Stretch {
 pub struct Totals {
     /// Packets in a stretch of the front end and of the tiles' way.
     reach: [u32; 2],
+    /// Lines that each client of the L2 asks for in a cycle.
+    lines_per_cycle: [u32; CLIENTS.len()],
     open: [Stretch; 2],
     closed: Vec<Stretch>,
     /// Events of each phase. Phase 0 is the front end of batch 0; phase `b + 1` the tiles of batch `b` and the front end of batch
@@ -61,6 +63,7 @@ impl Totals {
         let open = |path| Stretch { path, phase: path, ..Stretch::default() };
         Self {
             reach: PATHS.map(|path| path.iter().map(queue).sum()),
+            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
             open: [open(0), open(1)],
             closed: Vec::new(),
             phases: Vec::new(),
@@ -77,12 +80,16 @@ impl Totals {
             self.closed.push(full);
         }
         let owed = &mut open.owed;
+        // A client is busy until it has asked for its last line.
+        let asks = |port: usize| job.lines[port].div_ceil(self.lines_per_cycle[port]);
         for &place in PATHS[path] {
-            owed[place.unit() as usize] += u64::from(job.service[place as usize]);
+            let asks = port(place.unit()).map_or(0, asks);
+            owed[place.unit() as usize] += u64::from(job.service[place as usize].max(asks));
         }
         owed[Unit::Shader as usize] += u64::from(counts[Event::ShaderOps]);
         if job.is_textured() {
-            owed[Unit::Texture as usize] += u64::from(makes.texture_cycles(job.texels[0], job.texels[1]));
+            let cycles = makes.texture_cycles(job.texels[0], job.texels[1]);
+            owed[Unit::Texture as usize] += u64::from(cycles.max(asks(TEXTURE_PORT)));
         }
         owed[Unit::L2 as usize] += job.lines.iter().map(|&lines| u64::from(lines)).sum::<u64>();
         let bytes = counts[Event::DramReadBytes] + counts[Event::DramWriteBytes];

@@ -43,8 +43,15 @@ pub struct ClientSpec {
     pub queue: u32,
     /// Packets (warps) that may wait behind it for their lines, at least 1.
     pub in_flight: u32,
+    /// Lines it can ask the L2 for in a cycle.
+    #[serde(default = "one")]
+    pub lines_per_cycle: u32,
     /// Events per cycle.
     pub rates: Rates,
+}
+
+fn one() -> u32 {
+    1
 }
 
 /// The shader cores.
@@ -146,6 +153,8 @@ pub struct Common<'a> {
     pub queue: u32,
     /// Packets that may wait for lines; 0 where it asks for none.
     pub in_flight: u32,
+    /// Lines it asks for in a cycle; 0 where it asks for none.
+    pub lines_per_cycle: u32,
     /// Events per cycle.
     pub rates: Option<&'a Rates>,
 }
@@ -153,14 +162,14 @@ pub struct Common<'a> {
 impl UnitSpec {
     fn common(&self) -> Common<'_> {
         let Self { clock, latency_cycles, queue, ref rates } = *self;
-        Common { clock, latency_cycles, queue, in_flight: 0, rates: Some(rates) }
+        Common { clock, latency_cycles, queue, in_flight: 0, lines_per_cycle: 0, rates: Some(rates) }
     }
 }
 
 impl ClientSpec {
     fn common(&self) -> Common<'_> {
-        let Self { clock, latency_cycles, queue, in_flight, ref rates } = *self;
-        Common { clock, latency_cycles, queue, in_flight, rates: Some(rates) }
+        let Self { clock, latency_cycles, queue, in_flight, lines_per_cycle, ref rates } = *self;
+        Common { clock, latency_cycles, queue, in_flight, lines_per_cycle, rates: Some(rates) }
     }
 }
 
@@ -172,6 +181,7 @@ impl MachineSpec {
             latency_cycles,
             queue,
             in_flight,
+            lines_per_cycle: 0,
             rates: None,
         };
         match unit {
@@ -225,6 +235,10 @@ impl MachineSpec {
             ("depth.in_flight", self.depth.in_flight, 1),
             ("texture.in_flight", self.texture.in_flight, 1),
             ("colour.in_flight", self.colour.in_flight, 1),
+            ("command.lines_per_cycle", self.command.lines_per_cycle, 1),
+            ("depth.lines_per_cycle", self.depth.lines_per_cycle, 1),
+            ("texture.lines_per_cycle", self.texture.lines_per_cycle, 1),
+            ("colour.lines_per_cycle", self.colour.lines_per_cycle, 1),
             ("shader.in_flight", shader.in_flight, 1),
             ("shader.cores", shader.cores, 1),
             ("shader.lanes", shader.lanes, 1),

@@ -34,6 +34,35 @@ struct Run {
     last: Time,
 }
 
+/// A client asks for so many lines a cycle: when for the next, and how many of its cycle are gone.
+#[derive(Clone, Copy, Debug)]
+struct Asking {
+    at: Time,
+    gone: u32,
+    lines_per_cycle: u32,
+    period: Time,
+}
+
+impl Asking {
+    /// How long after the next line the last of `count` is asked for.
+    fn last(&self, count: u32) -> Time {
+        Time::from((self.gone + count - 1) / self.lines_per_cycle) * self.period
+    }
+
+    /// The next line is asked for at `at` or, where its cycle began before, in that.
+    fn waits(&mut self, at: Time) {
+        if at > self.at {
+            (self.at, self.gone) = (at, 0);
+        }
+    }
+
+    /// `count` lines have been asked for, the last of them at `last`.
+    fn asked(&mut self, count: u32, last: Time) {
+        self.gone = (self.gone + count) % self.lines_per_cycle;
+        self.at = if self.gone == 0 { last + self.period } else { last };
+    }
+}
+
 /// The lines that memory reads or drains, and writes back, for one.
 fn moved(line: &LineAccess) -> (Option<u32>, Option<u32>) {
     let fetch = matches!(line.kind, LineKind::Fetch | LineKind::Drain).then_some(line.line);
@@ -46,6 +75,8 @@ pub(super) struct Memory {
     dram: Dram,
     l2: Calendar,
     ports: [Ring; CLIENTS.len()],
+    /// Lines that each port's client asks for in a cycle.
+    lines_per_cycle: [u32; CLIENTS.len()],
     /// When the last request of each port was taken: none passes another of its port.
     order: [Time; CLIENTS.len()],
     period: Time,
@@ -62,6 +93,7 @@ impl Memory {
             dram: Dram::new(&machine.dram, clocks),
             l2: Calendar::new(Time::from(STRETCH) * period, spec.lines_per_cycle),
             ports: std::array::from_fn(|_| Ring::new(spec.queue)),
+            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
             order: [0; CLIENTS.len()],
             period,
             latency: period * Time::from(spec.latency_cycles),
@@ -70,28 +102,29 @@ impl Memory {
         }
     }
 
-    /// A client asks for `lines` one after another, every `step`, from `start` on.
-    pub fn ask(&mut self, port: usize, lines: &[LineAccess], start: Time, step: Time) -> Fetched {
+    /// A client whose cycles are of `period` asks for `lines` one after another, from `start` on.
+    pub fn ask(&mut self, port: usize, lines: &[LineAccess], start: Time, period: Time) -> Fetched {
         let mut fetched = Fetched { asked: start, first: Time::MAX, there: 0, moved: 0 };
-        let mut at = start;
+        let mut asking = Asking { at: start, gone: 0, lines_per_cycle: self.lines_per_cycle[port], period };
         let mut rest = lines;
         while let Some(&head) = rest.first() {
             // A run is no longer than what the port holds: its lines go the same way.
             let longest = rest.len().min(self.queue as usize);
             let way = self.way(&head);
             let count = 1 + rest[1..longest].iter().take_while(|&line| self.way(line) == way).count();
-            let run = Run { head, count: count as u32, last: Time::from(count as u32 - 1) * step };
-            rest = &rest[count..];
+            let count = count as u32;
+            rest = &rest[count as usize..];
             // The port has room a cycle after the L2 took the request so many before.
             let ring = &self.ports[port];
-            at = at.max(ring.room_at()).max(ring.room_for(run.count).saturating_sub(run.last));
-            fetched.asked = at + run.last;
-            let seen = (at + step).max(self.order[port]);
+            asking.waits(ring.room_at().max(ring.room_for(count).saturating_sub(asking.last(count))));
+            let run = Run { head, count, last: asking.last(count) };
+            fetched.asked = asking.at + run.last;
+            let seen = (asking.at + period).max(self.order[port]);
             let (first, last) = self.take(&run, seen, &mut fetched);
             self.order[port] = last;
             self.ports[port].note_all(run.count, first + self.period, last + self.period);
             fetched.first = fetched.first.min(first);
-            at = fetched.asked + step;
+            asking.asked(count, fetched.asked);
         }
         fetched
     }

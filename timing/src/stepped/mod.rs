@@ -16,7 +16,7 @@ use activity::{LineAccess, PacketCounts, Unit};
 
 use crate::clock::{Clocks, Time};
 use crate::job::{Job, Jobs, Place, TEXTURE_PORT, port};
-use crate::spec::MachineSpec;
+use crate::spec::{Common, MachineSpec};
 use crate::{Recorder, Timed};
 use dram::Dram;
 use memory::{L2, Waits};
@@ -233,8 +233,10 @@ impl<'a> Machine<'a> {
         let common = Place::ALL.map(|place| machine.common(place.unit()));
         let period = |place: Place| clocks.period(common[place as usize].clock);
         let stage = |place: Place| {
-            (place.unit() != Unit::Shader)
-                .then(|| Stage::new(period(place), common[place as usize].in_flight))
+            (place.unit() != Unit::Shader).then(|| {
+                let Common { in_flight, lines_per_cycle, .. } = common[place as usize];
+                Stage::new(period(place), in_flight, lines_per_cycle)
+            })
         };
         let mut servers = [1; Unit::COUNT];
         servers[Unit::Shader as usize] = machine.shader.cores * machine.shader.lanes;
@@ -255,7 +257,11 @@ impl<'a> Machine<'a> {
             queues: Place::ALL.map(|place| Queue::new(common[place as usize].queue)),
             stages: Place::ALL.map(stage),
             shader: Shader::new(machine, &clocks),
-            texture: Stage::new(clocks.period(machine.texture.clock), machine.texture.in_flight),
+            texture: Stage::new(
+                clocks.period(machine.texture.clock),
+                machine.texture.in_flight,
+                machine.texture.lines_per_cycle,
+            ),
             textures: Queue::new(machine.texture.queue),
             texture_latency: clocks.period(machine.texture.clock)
                 * Time::from(machine.texture.latency_cycles),

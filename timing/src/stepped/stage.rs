@@ -49,17 +49,21 @@ pub(super) struct Stage {
     in_flight: usize,
     serving: Option<Serving>,
     waiting: VecDeque<(u32, u32)>,
-    asked_at: Option<Time>,
+    /// Lines that it can ask for in a cycle, and when it last asked, for how many.
+    lines_per_cycle: u32,
+    asked: (Time, u32),
 }
 
 impl Stage {
-    pub fn new(period: Time, in_flight: u32) -> Self {
+    /// A stage that asks for lines only where `lines_per_cycle` is not 0.
+    pub fn new(period: Time, in_flight: u32, lines_per_cycle: u32) -> Self {
         Self {
             period,
             in_flight: in_flight as usize,
             serving: None,
             waiting: VecDeque::new(),
-            asked_at: None,
+            lines_per_cycle,
+            asked: (0, 0),
         }
     }
 
@@ -67,7 +71,7 @@ impl Stage {
         self.period
     }
 
-    /// One cycle: ask for a line, finish, let go, begin, until nothing more can be done.
+    /// One cycle: ask for lines, finish, let go, begin, until nothing more can be done.
     pub fn tick(
         &mut self,
         now: Time,
@@ -90,13 +94,13 @@ impl Stage {
         }
         let busy = self.serving.as_ref().is_some_and(|serving| now < serving.done_at);
         let asks = self.serving.as_ref().is_some_and(|serving| !serving.lines.is_empty());
-        // One line a cycle is its pace: asking for one is work, a port without room is not.
+        // So many lines a cycle are its pace: asking for any is work, a port without room is not.
         let rest = match (&self.serving, blocked) {
             (Some(_), _) if asks => Rest::Blocked(Unit::L2),
             (Some(_), Some(by)) => Rest::Blocked(by),
             _ => Rest::Idle,
         };
-        Ticked { acted, busy: busy || (asks && self.asked_at == Some(now)), rest }
+        Ticked { acted, busy: busy || (asks && self.asked_at(now) > 0), rest }
     }
 
     /// Whether it serves nothing, so that it is for others to say why.
@@ -104,15 +108,21 @@ impl Stage {
         self.serving.is_none()
     }
 
-    /// One line a cycle.
+    /// Lines it has asked for in the cycle that begins at `now`.
+    fn asked_at(&self, now: Time) -> u32 {
+        if self.asked.0 == now { self.asked.1 } else { 0 }
+    }
+
+    /// One of the lines of a cycle.
     fn ask(&mut self, now: Time, port: &mut Queue<Request>, around: &impl Around) -> bool {
+        let asked = self.asked_at(now);
         let Some(serving) = &mut self.serving else { return false };
-        if serving.lines.is_empty() || self.asked_at == Some(now) || port.room(now) == 0 {
+        if serving.lines.is_empty() || asked == self.lines_per_cycle || port.room(now) == 0 {
             return false;
         }
         let Some(at) = serving.lines.next() else { return false };
         port.push(Request { access: around.line(at), wait: serving.wait }, now + self.period);
-        self.asked_at = Some(now);
+        self.asked = (now, asked + 1);
         true
     }
 

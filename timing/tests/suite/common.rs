@@ -18,7 +18,8 @@ fn unit(text: &str) -> UnitSpec {
 }
 
 fn client(text: &str) -> ClientSpec {
-    ClientSpec { clock: Clock::Core, latency_cycles: 1, queue: 64, in_flight: 64, rates: rates(text) }
+    let rates = rates(text);
+    ClientSpec { clock: Clock::Core, latency_cycles: 1, queue: 64, in_flight: 64, lines_per_cycle: 1, rates }
 }
 
 /// Every rate is 1 in a cycle, every latency 1, every queue deep.
