@@ -6,6 +6,7 @@
 //! - [`PacketClock`]: packets, not cycles: a recurrence, with calendars for what is shared.
 //! - [`BoundClock`]: no packets: the busiest unit of each stretch, from [`Totals`] gathered while packets come by.
 //! - [`sampled`]: which frames of many to simulate, and what they say of the others.
+//! - [`streams`]: packets that break levels, and packets that ask for one rate alone.
 //! - [`Recorder`]: events and busy time over time; [`Stalls`]: why units did not work.
 //!
 //! The crate knows no triangle and no joule, and what happens is decided before it is asked: caches are walked in the order
@@ -22,6 +23,7 @@ pub mod sampled;
 mod spec;
 mod stalls;
 pub mod stepped;
+pub mod streams;
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
@@ -46,4 +48,9 @@ pub struct Timed {
     pub stalls: Option<Stalls>,
     /// Units visited, summed over cycles; 0 where the level has no cycles.
     pub unit_cycles: u64,
+    /// Packets of the stream.
+    pub packets: u64,
+    /// The share of the frame for which the bank of memory that is busiest with it opens and closes rows, where the level
+    /// knows. Levels differ most where it is large, as they reorder lines differently.
+    pub rows: Option<f64>,
 }

@@ -127,6 +127,13 @@ impl Dram {
         self.end
     }
 
+    /// For how long the bank that is busiest with it opens and closes rows.
+    pub fn rows(&self) -> Time {
+        let banks = self.channels.iter().flat_map(|channel| &channel.banks);
+        let busy = |bank: &Bank| bank.time.stretches().map(|(_, _, used, _)| used).sum();
+        banks.map(busy).max().unwrap_or(0)
+    }
+
     /// The buses of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.channels.iter().map(|channel| &channel.bus)

@@ -169,6 +169,11 @@ impl Memory {
         &self.l2
     }
 
+    /// For how long the bank that is busiest with it opens and closes rows.
+    pub fn rows(&self) -> Time {
+        self.dram.rows()
+    }
+
     /// The buses of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.dram.buses()

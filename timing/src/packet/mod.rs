@@ -78,6 +78,8 @@ pub struct PacketClock {
     /// Packets of the front end that the tiles have not caught up with.
     ahead: VecDeque<(Job, PacketCounts, Vec<LineAccess>)>,
     lines: Vec<LineAccess>,
+    /// Packets so far.
+    packets: u64,
     end: Time,
 }
 
@@ -123,6 +125,7 @@ impl PacketClock {
             gates: Gates::default(),
             ahead: VecDeque::new(),
             lines: Vec::new(),
+            packets: 0,
             end: 0,
         }
     }
@@ -146,6 +149,7 @@ impl PacketClock {
     }
 
     fn next(&mut self, job: &Job, counts: &PacketCounts, lines: &[LineAccess]) {
+        self.packets += 1;
         if job.front {
             self.ahead.push_back((job.clone(), *counts, lines.to_vec()));
             return;
@@ -224,7 +228,7 @@ impl PacketClock {
         let end = self.end.max(self.memory.ends_at());
         let end_ps = self.clocks.ps(end);
         let channels = self.memory.buses().count() as u64;
-        let Self { tally, clocks, cores, memory, .. } = self;
+        let Self { tally, clocks, cores, memory, packets, .. } = self;
         let mut recorder = tally.finish();
         recorder.lasts(end_ps);
         write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
@@ -237,6 +241,8 @@ impl PacketClock {
             cycles: clocks.cycles(Clock::Core, end),
             stalls: None,
             unit_cycles: 0,
+            packets,
+            rows: Some(memory.rows() as f64 / end.max(1) as f64),
         }
     }
 }

@@ -69,7 +69,7 @@ impl Stream {
     /// Adds the packet that was pushed last to `totals`.
     pub fn add_last(&self, makes: &Jobs, totals: &mut crate::Totals) {
         if let (Some(job), Some(counts)) = (self.jobs.last(), self.counts.last()) {
-            totals.add(makes, job, counts);
+            totals.add(makes, job, counts, &self.lines[job.first_line..]);
         }
     }
 }
@@ -317,7 +317,14 @@ impl<'a> Machine<'a> {
         recorder.lasts(clocks.ps(end));
         let timeline = recorder.finish();
         let cycles = clocks.cycles(crate::Clock::Core, end);
-        Ok(Timed { timeline, cycles, stalls: Some(self.meter.stalls), unit_cycles: self.visited })
+        Ok(Timed {
+            timeline,
+            cycles,
+            stalls: Some(self.meter.stalls),
+            unit_cycles: self.visited,
+            packets: self.world.stream.jobs.len() as u64,
+            rows: None,
+        })
     }
 
     fn period(&self, unit: Unit) -> Time {

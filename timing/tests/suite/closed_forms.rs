@@ -3,7 +3,7 @@
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use proptest::prelude::*;
 
-use crate::common::{Packets, packet, plain, read, stepped, tile, tiles};
+use crate::common::{Packets, bound_level, clocks, packet, packet_level, plain, read, stepped, tile, tiles};
 
 fn cycles(packets: &Packets) -> u64 {
     stepped(&plain(), packets).cycles
@@ -117,6 +117,50 @@ fn a_shared_resource_serves_n_clients_in_turn() {
     second.triangle = super::common::BATCH;
     let both = vec![(vertices, lines(Unit::Command, m)), (second, lines(Unit::Depth, m))];
     assert_eq!(cycles(&both), 2 * u64::from(m) + 1 + 1);
+}
+
+#[test]
+fn a_client_asks_for_so_many_lines_a_cycle() {
+    let mut machine = plain();
+    for (lines, m) in (1..6).flat_map(|lines| [1, 2, 7, 40].map(|m| (lines, m))) {
+        machine.command.lines_per_cycle = lines;
+        machine.l2.lines_per_cycle = lines;
+        let asks: Vec<_> = (0..m).map(|n| read(Unit::Command, n, LineKind::Hit)).collect();
+        let alone = vec![(packet(PacketKind::Vertices, &[(Event::Indices, 1)]), asks)];
+        // The first is seen at 1, the last taken in its cycle; its line is there a cycle later and the packet done after one more.
+        let cycles = u64::from(m.div_ceil(lines)) + 1 + 1;
+        assert_eq!(stepped(&machine, &alone).cycles, cycles, "{m} lines, {lines} a cycle");
+        assert_eq!(packet_level(&machine, clocks(), &alone).cycles, cycles, "{m} lines, {lines} a cycle");
+        // The L2 as the bottleneck.
+        machine.l2.lines_per_cycle = 1;
+        assert_eq!(stepped(&machine, &alone).cycles, u64::from(m) + 2);
+        assert_eq!(packet_level(&machine, clocks(), &alone).cycles, u64::from(m) + 2);
+    }
+}
+
+#[test]
+fn the_roofline_knows_programs_that_nobody_hides() {
+    let mut machine = plain();
+    machine.shader.alu_latency_cycles = 6;
+    // A warp of ten operations alone, and sixteen of them where the cores hold one packet at a time.
+    let of = |n: usize| vec![(pixels(4, 10), Vec::new()); n];
+    let bound = |machine: &_, packets: &_| bound_level(machine, clocks(), packets).cycles;
+    assert!((60..=stepped(&machine, &of(1)).cycles).contains(&bound(&machine, &of(1))));
+    machine.shader.in_flight = 1;
+    assert!((16 * 60..=stepped(&machine, &of(16)).cycles).contains(&bound(&machine, &of(16))));
+    machine.shader.in_flight = 64;
+    assert!(bound(&machine, &of(16)) < 200);
+}
+
+#[test]
+fn the_roofline_knows_rows() {
+    // Every line of another row of one bank: opened and closed for each, tRP + tRCD + burst.
+    let machine = plain();
+    let lines = (0..40).map(|n| read(Unit::Depth, 16 * n, LineKind::Fetch)).collect();
+    let packets = vec![(tile(&[(Event::DepthReads, 1)]), lines)];
+    let (truth, found) = (stepped(&machine, &packets).cycles, bound_level(&machine, clocks(), &packets));
+    assert!((0.9..1.1).contains(&(found.cycles as f64 / truth as f64)), "{} of {truth}", found.cycles);
+    assert!(found.rows.unwrap() > 0.9);
 }
 
 #[test]

@@ -135,7 +135,7 @@ impl Written {
         let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
         let started = ThreadTime::now();
         let mut makes = Jobs::new(&gpu.units, gpu.pipeline.batch_triangles);
-        let (mut stream, mut totals) = (Stream::default(), Totals::new(&gpu.units));
+        let (mut stream, mut totals) = (Stream::default(), Totals::new(&gpu.units, &clocks));
         packets.each(|packet, lines| {
             stream.push(&mut makes, packet, lines);
             stream.add_last(&makes, &mut totals);

@@ -1,49 +1,12 @@
-//! Streams and machines: those that break levels of timing, and microbenchmarks of one rate each.
+//! Streams made to break levels of timing, and microbenchmarks of one rate each. They are made of packets, not of triangles, so
+//! that each breaks one thing.
 
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
-use timing::stepped::{self, Manner, Stream};
-use timing::{Clocks, Jobs, MachineSpec, PacketClock, Recorder, Timed, Totals, bound};
+
+use crate::spec::MachineSpec;
 
 /// Packets with their lines.
 pub type Packets = Vec<(Packet, Vec<LineAccess>)>;
-
-/// Triangles of a batch.
-const BATCH: u32 = 512;
-
-/// A machine as its GPU file has it; the rest of the file is not needed here.
-#[derive(Clone, serde::Deserialize)]
-pub struct Gpu {
-    pub name: String,
-    core_hz: f64,
-    memory_hz: f64,
-    pub units: MachineSpec,
-}
-
-impl Gpu {
-    /// The GPU file `name` that comes with the simulator.
-    pub fn builtin(name: &str) -> Result<Self, activity::spec::SpecError> {
-        let path = format!("{}/../sim/gpus/{name}.ron", env!("CARGO_MANIFEST_DIR"));
-        activity::spec::load(path.as_ref())
-    }
-
-    /// A frame at every level: `stepped`, `packet`, `bound`.
-    pub fn run(&self, packets: &Packets) -> Result<[Timed; 3], String> {
-        let clocks = Clocks::new(self.core_hz, self.memory_hz).ok_or("the clocks have no common cycle")?;
-        let recorder = || Recorder::new(1_000_000, 1 << 16);
-        let mut makes = Jobs::new(&self.units, BATCH);
-        let (mut stream, mut totals) = (Stream::default(), Totals::new(&self.units));
-        for (packet, lines) in packets {
-            stream.push(&mut makes, packet, lines);
-            stream.add_last(&makes, &mut totals);
-        }
-        let truth = stepped::run(&self.units, clocks, &makes, &stream, recorder(), &Manner::default());
-        Ok([
-            truth.map_err(|stalled| stalled.to_string())?,
-            PacketClock::new(&self.units, clocks, BATCH, recorder()).run(&stream),
-            bound(&self.units, clocks, &totals, recorder()),
-        ])
-    }
-}
 
 /// A packet of triangle `triangle` with its events and lines, the lines counted as the pipeline would.
 fn packet(
@@ -111,32 +74,29 @@ fn tile(triangle: u32, pixels: u32, ops: u32, lines: Vec<LineAccess>) -> (Packet
 }
 
 /// A stream that breaks some level, and the machine it does it on.
+#[derive(Clone, Debug)]
 pub struct Failure {
+    /// What is wrong with it.
     pub name: &'static str,
+    /// The stream.
     pub packets: Packets,
-    pub gpu: Gpu,
+    /// The machine.
+    pub units: MachineSpec,
 }
 
-/// Every stream of the chapter "Where methods fail".
-pub fn failures(gpu: &Gpu) -> Vec<Failure> {
-    let with = |change: fn(&mut MachineSpec)| {
-        let mut gpu = gpu.clone();
-        change(&mut gpu.units);
-        gpu
-    };
-    let on = |name, packets, gpu| Failure { name, packets, gpu };
+/// Every stream that breaks a level on `units`, in batches of `batch` triangles.
+pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
+    let on = |name, packets| Failure { name, packets, units: units.clone() };
+    let mut narrow = on("queues of one packet", tiny(batch));
+    shallow(&mut narrow.units);
     vec![
-        on("one giant triangle", giant(), gpu.clone()),
-        on("many tiny triangles", tiny(), gpu.clone()),
-        on("vertex and pixel work in turn", alternating(), gpu.clone()),
-        on("queues of one packet", tiny(), with(shallow)),
-        on("thrashing caches", thrashing(1), gpu.clone()),
-        on("every line another row", thrashing(4096), gpu.clone()),
-        on(
-            "shorter than the pipeline is deep",
-            vec![vertices(0, 1, 8), tile(0, 4, 8, Vec::new())],
-            gpu.clone(),
-        ),
+        on("one giant triangle", giant()),
+        on("many tiny triangles", tiny(batch)),
+        on("vertex and pixel work in turn", alternating(batch)),
+        narrow,
+        on("thrashing caches", thrashing(1)),
+        on("every line another row", thrashing(4096)),
+        on("shorter than the pipeline is deep", vec![vertices(0, 1, 8), tile(0, 4, 8, Vec::new())]),
     ]
 }
 
@@ -145,20 +105,20 @@ fn giant() -> Packets {
     std::iter::once(vertices(0, 1, 20)).chain((0..4000).map(|n| tile(0, 64, 20, fetched(n)))).collect()
 }
 
-fn tiny() -> Packets {
+fn tiny(triangles: u32) -> Packets {
     let batch = |b: u32| {
-        let fronts = (0..BATCH / 32).map(move |n| vertices(b * BATCH + 32 * n, 32, 20));
-        let tiles = (0..BATCH).map(move |n| tile(b * BATCH + n, n % 3, 20, Vec::new()));
+        let fronts = (0..triangles / 32).map(move |n| vertices(b * triangles + 32 * n, 32, 20));
+        let tiles = (0..triangles).map(move |n| tile(b * triangles + n, n % 3, 20, Vec::new()));
         (fronts.collect::<Packets>(), tiles.collect::<Packets>())
     };
     in_batches((0..12).map(batch).collect())
 }
 
 /// Long vertex programs, then long pixel programs, on the same cores.
-fn alternating() -> Packets {
+fn alternating(triangles: u32) -> Packets {
     let batch = |b: u32| {
-        let fronts = (0..BATCH / 32).map(move |n| vertices(b * BATCH + 32 * n, 32, 400));
-        let tiles = (0..40).map(move |n| tile(b * BATCH + n, 64, 400, Vec::new()));
+        let fronts = (0..triangles / 32).map(move |n| vertices(b * triangles + 32 * n, 32, 400));
+        let tiles = (0..40).map(move |n| tile(b * triangles + n, 64, 400, Vec::new()));
         (fronts.collect::<Packets>(), tiles.collect::<Packets>())
     };
     in_batches((0..12).map(batch).collect())
@@ -209,11 +169,15 @@ fn shallow(units: &mut MachineSpec) {
 }
 
 /// One rate of a machine: a stream that asks for nothing else.
+#[derive(Clone, Debug)]
 pub struct Rate {
+    /// What it is the rate of.
     pub name: &'static str,
+    /// The stream.
     pub packets: Packets,
     /// How many of it the stream has in all.
     pub amount: f64,
+    /// One of it, over a second.
     pub unit: &'static str,
 }
 
