@@ -76,7 +76,7 @@ fn tile(triangle: u32, pixels: u32, ops: u32, lines: Vec<LineAccess>) -> (Packet
 /// A stream that breaks some level, and the machine it does it on.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// What is wrong with it.
+    /// What is wrong with it, in a few words.
     pub name: &'static str,
     /// The stream.
     pub packets: Packets,
@@ -87,16 +87,16 @@ pub struct Failure {
 /// Every stream that breaks a level on `units`, in batches of `batch` triangles.
 pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
     let on = |name, packets| Failure { name, packets, units: units.clone() };
-    let mut narrow = on("queues of one packet", tiny(batch));
+    let mut narrow = on("queues of one", tiny(batch));
     shallow(&mut narrow.units);
     vec![
         on("one giant triangle", giant()),
-        on("many tiny triangles", tiny(batch)),
-        on("vertex and pixel work in turn", alternating(batch)),
+        on("tiny triangles", tiny(batch)),
+        on("work in turn", alternating(batch)),
         narrow,
         on("thrashing caches", thrashing(1)),
-        on("every line another row", thrashing(4096)),
-        on("shorter than the pipeline is deep", vec![vertices(0, 1, 8), tile(0, 4, 8, Vec::new())]),
+        on("row after row", thrashing(4096)),
+        on("a short frame", vec![vertices(0, 1, 8), tile(0, 4, 8, Vec::new())]),
     ]
 }
 
@@ -105,13 +105,18 @@ fn giant() -> Packets {
     std::iter::once(vertices(0, 1, 20)).chain((0..4000).map(|n| tile(0, 64, 20, fetched(n)))).collect()
 }
 
+/// As many batches of `triangles` as make some thousand of them.
+fn batches(triangles: u32) -> u32 {
+    (6144 / triangles).max(2)
+}
+
 fn tiny(triangles: u32) -> Packets {
     let batch = |b: u32| {
         let fronts = (0..triangles / 32).map(move |n| vertices(b * triangles + 32 * n, 32, 20));
         let tiles = (0..triangles).map(move |n| tile(b * triangles + n, n % 3, 20, Vec::new()));
         (fronts.collect::<Packets>(), tiles.collect::<Packets>())
     };
-    in_batches((0..12).map(batch).collect())
+    in_batches((0..batches(triangles)).map(batch).collect())
 }
 
 /// Long vertex programs, then long pixel programs, on the same cores.
@@ -121,7 +126,7 @@ fn alternating(triangles: u32) -> Packets {
         let tiles = (0..40).map(move |n| tile(b * triangles + n, 64, 400, Vec::new()));
         (fronts.collect::<Packets>(), tiles.collect::<Packets>())
     };
-    in_batches((0..12).map(batch).collect())
+    in_batches((0..batches(triangles)).map(batch).collect())
 }
 
 /// The front end one batch ahead of the tiles.

@@ -32,7 +32,7 @@ use crate::output::OutDir;
 use crate::output::progress::Progress;
 
 pub use checks::Checks;
-pub use choice::{Choice, Verified, Wish};
+pub use choice::{Choice, Verified, Wish, cheapest_level};
 pub use error::RunError;
 pub use frame_rows::FrameRow;
 pub use heat::HeatPicture;

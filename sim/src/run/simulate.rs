@@ -15,7 +15,7 @@ use super::{Plan, RunError};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
 use crate::output::progress::Progress;
-use crate::timing::{FrameClock, Sampling};
+use crate::timing::{Doubt, FrameClock, Sampling};
 
 /// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
 pub(super) const BIN_PS: u64 = 1_000_000;
@@ -48,6 +48,8 @@ pub struct SimulatedFrame {
     pub cycles: u64,
     /// Why units did not work, where the level of timing knows.
     pub stalls: Option<Stalls>,
+    /// Why its time is not to be trusted.
+    pub doubts: Vec<Doubt>,
     /// For a frame that was predicted from others: half the widths of the intervals in which its cycles and its energy lie. Its
     /// power, its busy times and its cycles are then predicted, and nothing is known of its counts.
     pub predicted: Option<Taken>,
@@ -209,6 +211,7 @@ fn simulate_frame(
     let (rendered, heat) = render_with_heat(&frame.camera, &draws, &settings, events, emit)
         .map_err(|error| RunError::Setting(error.to_string()))?;
     let timed = clock.finish()?;
+    let doubts = Doubt::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
     let moving = is_moving(&frame);
@@ -223,6 +226,7 @@ fn simulate_frame(
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
         cycles: timed.cycles,
+        doubts,
         stalls: timed.stalls,
         predicted: None,
     };

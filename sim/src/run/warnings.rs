@@ -4,6 +4,7 @@ use activity::{Counts, Event, Warning};
 use traces::frames::Flag;
 
 use super::{Choice, Measurement, Plan, Simulated, regime_warnings};
+use crate::timing::Doubt;
 
 /// A frame shorter than this many samples cannot be integrated well: each end is uncertain by a good part of a sample.
 const FEWEST_SAMPLES: f64 = 50.0;
@@ -16,6 +17,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     let alone = simulated.frames.len() == 1;
     let told = measurement.found.warnings.iter().filter(|w| !(alone && w.code == "only-mark"));
     all.extend(told.map(|w| Warning::new(w.code, w.message.clone())));
+    all.extend(doubted(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
     all.extend(short_frames(measurement));
@@ -26,6 +28,22 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.sort();
     all.dedup();
     all
+}
+
+/// Of each reason not to trust times, the frame that gives most of it.
+fn doubted(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
+    let mut worst: Vec<(u32, Doubt)> = Vec::new();
+    for (frame, &doubt) in
+        simulated.distinct.iter().flat_map(|f| f.doubts.iter().map(|doubt| (f.index, doubt)))
+    {
+        match worst.iter_mut().find(|(_, known)| known.code() == doubt.code()) {
+            Some(known) if known.1.extent() < doubt.extent() => *known = (frame, doubt),
+            Some(_) => {}
+            None => worst.push((frame, doubt)),
+        }
+    }
+    let level = plan.options.timing;
+    worst.iter().map(|(frame, doubt)| Warning::new(doubt.code(), doubt.message(*frame, level))).collect()
 }
 
 fn degenerate(simulated: &Simulated) -> Option<Warning> {

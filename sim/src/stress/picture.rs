@@ -28,6 +28,7 @@ pub(super) fn matrix(report: &Report) -> Picture {
     Matrix {
         title: "Which test pays where",
         subject: &subject,
+        scale: ["the best", "32 times as much"],
         columns: report.families.iter().map(|family| family.name).collect(),
         panels: vec![
             panel("at the harmless end of each family", true),
@@ -53,6 +54,7 @@ pub(super) fn auto(choices: &Choices) -> Picture {
     Matrix {
         title: "What auto takes beside the best fixed choice of tests",
         subject: "multiply-adds over those of the best of all combinations of tests",
+        scale: ["the best", "32 times as much"],
         columns: choices.families.iter().map(|family| family.family).collect(),
         panels: vec![
             MatrixPanel {

@@ -2,8 +2,10 @@
 //!
 //! The models are in the package `timing`; here a level is a name and a clock that packets are pushed into.
 
+mod doubt;
 mod level;
 mod method;
 
+pub use doubt::Doubt;
 pub use level::{FrameClock, Level, TimingError};
 pub use method::{Method, Sampling};

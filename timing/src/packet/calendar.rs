@@ -85,6 +85,11 @@ impl Calendar {
         }
     }
 
+    /// How many work side by side.
+    pub fn servers(&self) -> u64 {
+        self.servers
+    }
+
     /// Every stretch in which anything was done: from, to, work done and work that fits.
     pub fn stretches(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
         let used = self.used.iter().zip(0..).filter(|(used, _)| **used > 0);

@@ -44,6 +44,8 @@ struct Way {
     sent: Time,
     left: Time,
     flights: Ring,
+    /// Places for warps on the cores. Those of the other way are not in it, as their times come in another order.
+    slots: Ring,
 }
 
 /// All cores and all texture units.
@@ -53,7 +55,6 @@ pub(super) struct Cores {
     /// Warps that are sent, one a cycle.
     sends: Calendar,
     lanes: Calendar,
-    slots: Ring,
     period: Time,
     alu: Time,
     lanes_of_core: u32,
@@ -72,12 +73,12 @@ impl Cores {
         let (spec, texture) = (&machine.shader, &machine.texture);
         let period = clocks.period(spec.clock);
         let texture_period = clocks.period(texture.clock);
-        let way = Way { sent: 0, left: 0, flights: Ring::new(spec.in_flight) };
+        let slots = Ring::new(spec.cores * spec.warps);
+        let way = Way { sent: 0, left: 0, flights: Ring::new(spec.in_flight), slots };
         Self {
             ways: [way.clone(), way],
             sends: Calendar::new(Time::from(STRETCH) * period, 1),
             lanes: Calendar::new(Time::from(STRETCH) * period, spec.cores * spec.lanes),
-            slots: Ring::new(spec.cores * spec.warps),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
             lanes_of_core: spec.lanes,
@@ -108,14 +109,14 @@ impl Cores {
         let textured = kind == 1 && job.is_textured();
         for first in (0..warps).step_by(CHUNK as usize) {
             let chunk = Chunk { first, count: CHUNK.min(warps - first), of: warps };
-            let sent = self.send(taken.max(self.ways[kind].sent), chunk.count, textured);
+            let sent = self.send(kind, taken.max(self.ways[kind].sent), chunk.count, textured);
             self.ways[kind].sent = sent.1 + self.period;
             let mut ready = (sent.0 + self.period, sent.1 + self.period);
             if textured {
                 ready = self.texels(visit, &chunk, ready, makes, memory, &mut run);
             }
             let done = self.operate(job, &chunk, ready);
-            self.slots.note_all(chunk.count, done.0, done.1);
+            self.ways[kind].slots.note_all(chunk.count, done.0, done.1);
             run.done = run.done.max(done.1);
         }
         let way = &mut self.ways[kind];
@@ -127,9 +128,9 @@ impl Cores {
 
     /// Sends warps, one a cycle, as places on the cores and in front of the texture units come free. Says when the first and the
     /// last are sent.
-    fn send(&mut self, from: Time, warps: u32, textured: bool) -> (Time, Time) {
+    fn send(&mut self, kind: usize, from: Time, warps: u32, textured: bool) -> (Time, Time) {
         let room = |count| {
-            let slots = self.slots.room_for(count);
+            let slots = self.ways[kind].slots.room_for(count);
             slots.max(if textured { self.texture_queue.room_for(count) } else { 0 })
         };
         let (first, last) = (room(1), room(warps));

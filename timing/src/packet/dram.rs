@@ -5,8 +5,11 @@ use crate::address::Map;
 use crate::clock::{Clocks, Time};
 use crate::spec::DramSpec;
 
-/// Lines in a stretch of a bus's calendar.
-const STRETCH: u32 = 32;
+/// Lines in a stretch of a bus's calendar. Where it waits for a row it is idle in between: longer stretches would lend that time
+/// to lines that come too late for it.
+const STRETCH: u32 = 4;
+/// The same of a bank, which waits for nobody.
+const BANK_STRETCH: u32 = 32;
 
 /// Rows of a bank that are remembered.
 const ROWS: usize = 4;
@@ -71,9 +74,9 @@ impl Dram {
         let period = clocks.period(spec.clock);
         let cycles = |count: u32| period * Time::from(count);
         let burst = cycles(spec.burst_cycles);
-        let calendar = Calendar::new(burst * Time::from(STRETCH), 1);
-        let bank = Bank { time: calendar.clone(), rows: [Open::NONE; ROWS] };
-        let channel = Channel { bus: calendar, banks: vec![bank; spec.banks as usize], lines: 0 };
+        let [bus, time] = [STRETCH, BANK_STRETCH].map(|lines| Calendar::new(burst * Time::from(lines), 1));
+        let bank = Bank { time, rows: [Open::NONE; ROWS] };
+        let channel = Channel { bus, banks: vec![bank; spec.banks as usize], lines: 0 };
         Self {
             map: Map::new(spec),
             channels: vec![channel; spec.channels as usize],

@@ -10,7 +10,7 @@ use crate::job::CLIENTS;
 use crate::spec::MachineSpec;
 
 /// Cycles in a stretch of the calendar.
-const STRETCH: u32 = 32;
+const STRETCH: u32 = 8;
 
 /// When some lines were asked for, taken and there.
 #[derive(Clone, Copy, Debug)]

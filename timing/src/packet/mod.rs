@@ -247,8 +247,8 @@ impl PacketClock {
     }
 }
 
-/// The busy time of one of `servers` of a unit from its calendar. What the calendar put beyond the end of the frame by its
-/// stretches is moved before it.
+/// The busy time of one of `servers` of a unit from its calendar: all that lies in a bin at once. What the calendar put beyond the
+/// end of the frame by its stretches is moved before it.
 fn write(
     recorder: &mut Recorder,
     clocks: &Clocks,
@@ -257,12 +257,27 @@ fn write(
     servers: u64,
     end_ps: u64,
 ) {
+    // Work in the bin of `at_ps` that is not written, and where that bin ends.
+    let (mut work, mut at_ps, mut end) = (0, 0, 0);
+    let flush = |recorder: &mut Recorder, work: u64, at_ps| {
+        let busy_ps = clocks.ps_below(work / (calendar.servers() * servers));
+        recorder.busy(unit, at_ps, at_ps + busy_ps, 1, 1);
+    };
     for (from, to, used, room) in calendar.stretches() {
-        let (from, to) = (clocks.ps(from), clocks.ps(to));
-        let done = part(to - from, used, room);
-        let to = to.min(end_ps.max(from + done));
-        recorder.busy(unit, from, to, done, (to - from).max(1) * servers);
+        if to <= end {
+            work += used;
+            continue;
+        }
+        flush(recorder, std::mem::take(&mut work), at_ps);
+        let (from_ps, to_ps) = (clocks.ps(from), clocks.ps(to));
+        let done = part(to_ps - from_ps, used, room);
+        let last_ps = to_ps.min(end_ps.max(from_ps + done));
+        recorder.busy(unit, from_ps, last_ps, done, (last_ps - from_ps).max(1) * servers);
+        let bin_ps = recorder.bin_ps();
+        at_ps = to_ps / bin_ps * bin_ps;
+        end = if at_ps + bin_ps <= end_ps { clocks.grain_up_to(at_ps + bin_ps) } else { 0 };
     }
+    flush(recorder, work, at_ps);
 }
 
 /// `whole` times `used` over `room`, rounded down.

@@ -6,45 +6,10 @@ use activity::Unit;
 
 use super::meter::Rest;
 use super::queue::Queue;
+use super::warp::{Core, Warp, due};
 use crate::clock::{Clocks, Time};
 use crate::job::{Job, share};
 use crate::spec::MachineSpec;
-
-/// Threads that go through a shader together.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Warp {
-    pub job: u32,
-    /// Which of the warps of its packet.
-    pub part: u32,
-    pub parts: u32,
-    /// 0 for vertices, 1 for pixels.
-    kind: usize,
-    /// The number of its packet among those of its kind.
-    number: u64,
-    threads: u32,
-    /// Operations left.
-    left: u32,
-    core: usize,
-}
-
-impl Warp {
-    /// Its fetches and lines of the texture cache.
-    pub fn texels(&self, job: &Job) -> [u32; 2] {
-        job.texels.map(|whole| share(whole, self.part, self.parts).len() as u32)
-    }
-}
-
-#[derive(Clone, Debug)]
-struct Core {
-    slots: u32,
-    /// The next free lane, counted through all cycles: `lanes` in each.
-    lane: u64,
-    ready: VecDeque<u32>,
-    /// Just sent, back from the texture units, and between two operations; each in the order of time.
-    fresh: VecDeque<(Time, u32)>,
-    textured: VecDeque<(Time, u32)>,
-    cooling: VecDeque<(Time, u32)>,
-}
 
 /// A packet whose warps are on the cores.
 #[derive(Clone, Copy, Debug)]
@@ -299,18 +264,4 @@ impl Shader {
         });
         inputs.chain(cores).filter(|&at| at > now).min()
     }
-}
-
-impl Core {
-    fn is_empty(&self) -> bool {
-        self.ready.is_empty() && self.fresh.is_empty() && self.textured.is_empty() && self.cooling.is_empty()
-    }
-}
-
-fn due(queue: &mut VecDeque<(Time, u32)>, now: Time) -> Option<u32> {
-    let (at, id) = *queue.front()?;
-    (at <= now).then(|| {
-        queue.pop_front();
-        id
-    })
 }

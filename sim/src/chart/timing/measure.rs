@@ -11,11 +11,11 @@ use super::Reference;
 use super::subjects::Packets;
 use crate::gpu::GpuSpec;
 use crate::run::RunError;
-use crate::timing::{Level, TimingError};
+use crate::timing::{Doubt, Level, TimingError};
 
 /// Bins of a microsecond, as in a run.
-const BIN_PS: u64 = 1_000_000;
-const MOST_BINS: usize = 1 << 20;
+pub(super) const BIN_PS: u64 = 1_000_000;
+pub(super) const MOST_BINS: usize = 1 << 20;
 /// Fast levels are timed several times, and the fastest counts.
 const TIMES: usize = 5;
 
@@ -48,6 +48,8 @@ pub struct Row {
     pub power_shape_error_1us_percent: f64,
     /// The unit that the reference finds busiest over the frame, and its share.
     pub busiest: (&'static str, f64),
+    /// Codes of the warnings that a run at this level would give of its time.
+    pub warns: Vec<&'static str>,
     /// Seconds of the host's processor, timing alone: the stream is written.
     pub host_s: f64,
     /// Seconds of the host's processor to turn packets into what units owe, once for all levels.
@@ -113,6 +115,7 @@ pub(super) fn rows(
             power_shape_error_percent: shape_error(&found_power, &true_power, 20e-6),
             power_shape_error_1us_percent: shape_error(&found_power, &true_power, 1e-6),
             busiest: busiest(&truth.timeline),
+            warns: Doubt::all(level, &found).into_iter().map(Doubt::code).collect(),
             host_s,
             written_s: written.host_s,
             speedup_over_stepped: stepped_s / host_s,
@@ -122,7 +125,7 @@ pub(super) fn rows(
 }
 
 /// A frame's packets as what the units of one machine owe, written once for all levels.
-struct Written {
+pub(super) struct Written {
     clocks: Clocks,
     makes: Jobs,
     stream: Stream,
@@ -131,7 +134,7 @@ struct Written {
 }
 
 impl Written {
-    fn new(gpu: &GpuSpec, packets: &Packets) -> Result<Self, RunError> {
+    pub fn new(gpu: &GpuSpec, packets: &Packets) -> Result<Self, RunError> {
         let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
         let started = ThreadTime::now();
         let mut makes = Jobs::new(&gpu.units, gpu.pipeline.batch_triangles);
@@ -145,7 +148,7 @@ impl Written {
 }
 
 /// The frame at a level, and the host's seconds for it: timing alone, as the stream is written.
-fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(Timed, f64), RunError> {
+pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(Timed, f64), RunError> {
     let Written { clocks, makes, stream, totals, .. } = written;
     let started = ThreadTime::now();
     let recorder = Recorder::new(BIN_PS, MOST_BINS);

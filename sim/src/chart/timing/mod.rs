@@ -1,5 +1,8 @@
 //! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
 
+mod added;
+mod failure_output;
+mod failures;
 mod measure;
 mod output;
 mod subjects;
@@ -14,6 +17,8 @@ use crate::output::table::Table;
 use crate::run::RunError;
 use crate::timing::Level;
 
+pub use added::AddedRow;
+pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::Row;
 
 /// GPUs in the chart: small, integrated, large.
@@ -46,6 +51,10 @@ pub struct Figures {
     pub speedup_over_stepped: f64,
     /// See above.
     pub speedup_over_stepped_least: f64,
+    /// What the clock adds to a run that only draws, in processor time: median and worst.
+    pub added_percent: f64,
+    /// See above.
+    pub added_worst_percent: f64,
 }
 
 /// The reference itself.
@@ -70,6 +79,12 @@ pub struct TimingChart {
     pub reference: Reference,
     /// A row for each scene, GPU and level but the reference.
     pub rows: Vec<Row>,
+    /// What the cheap levels add to a run that only draws, scenes by GPUs.
+    pub added: Vec<AddedRow>,
+    /// Streams made to break levels, on each GPU; not in the figures of the levels.
+    pub failures: Vec<FailureRow>,
+    /// Rates of the large GPU from outside.
+    pub rates: Vec<RateRow>,
 }
 
 /// Measures built-in scenes, families of triangles and the scenes in `files`.
@@ -81,30 +96,33 @@ pub fn timing(files: &[String], quick: bool, progress: &Progress) -> Result<Timi
     let subjects = subjects::all(files, quick)?;
     let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
     // One after another: host times are part of what is measured.
-    let (mut rows, mut reference) = (Vec::new(), measure::Speed::default());
+    let (mut rows, mut added, mut reference) = (Vec::new(), Vec::new(), measure::Speed::default());
     for subject in &subjects {
         for gpu in &gpus {
             let stream = subject.stream(gpu)?;
             rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
+            added.extend(added::rows(subject, gpu)?);
             bar.inc();
         }
     }
-    let levels = Level::ALL.into_iter().map(|level| (level.name(), figures(level, &rows))).collect();
-    Ok(TimingChart { quick, levels, reference: reference.figures(), rows })
+    let levels = Level::ALL.into_iter().map(|level| (level.name(), figures(level, &rows, &added))).collect();
+    Ok(TimingChart {
+        quick,
+        levels,
+        reference: reference.figures(),
+        rows,
+        added,
+        failures: failures::failures(&gpus)?,
+        rates: failures::rates()?,
+    })
 }
 
-fn figures(level: Level, rows: &[Row]) -> Figures {
+fn figures(level: Level, rows: &[Row], added: &[AddedRow]) -> Figures {
     if level == Level::Stepped {
         return Figures { speedup_over_stepped: 1.0, speedup_over_stepped_least: 1.0, ..Figures::default() };
     }
-    let of = |pick: fn(&Row) -> f64| {
-        let mut values: Vec<f64> = rows.iter().filter(|row| row.level == level).map(pick).collect();
-        values.sort_by(f64::total_cmp);
-        move |quantile: f64| {
-            let last = values.len().saturating_sub(1);
-            values.get((quantile * last as f64).ceil() as usize).copied().unwrap_or(0.0)
-        }
-    };
+    let of = |pick: fn(&Row) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
+    let added = quantiles(added.iter().filter(|row| row.level == level).map(|row| row.added_percent));
     let (cycles, energy) =
         (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
     let (busy, speedup) = (of(|row| row.busy_error_percent), of(|row| row.speedup_over_stepped));
@@ -121,6 +139,18 @@ fn figures(level: Level, rows: &[Row]) -> Figures {
         power_shape_error_1us_percent: of(|row| row.power_shape_error_1us_percent)(0.5),
         speedup_over_stepped: speedup(0.5),
         speedup_over_stepped_least: speedup(0.0),
+        added_percent: added(0.5),
+        added_worst_percent: added(1.0),
+    }
+}
+
+/// The quantiles of some values.
+fn quantiles(values: impl Iterator<Item = f64>) -> impl Fn(f64) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    move |quantile| {
+        let last = values.len().saturating_sub(1);
+        values.get((quantile * last as f64).ceil() as usize).copied().unwrap_or(0.0)
     }
 }
 
@@ -136,6 +166,7 @@ impl TimingChart {
             "worst",
             "power shape",
             "times as fast",
+            "adds to a run",
         ]);
         for (name, f) in &self.levels {
             let percent = |value: f64| format!("{value:.2} %");
@@ -148,6 +179,11 @@ impl TimingChart {
                 percent(f.energy_error_worst_percent),
                 percent(f.power_shape_error_percent),
                 format!("{:.1}", f.speedup_over_stepped),
+                if *name == Level::Stepped.name() {
+                    "-".to_owned()
+                } else {
+                    format!("{:.0} %", f.added_percent)
+                },
             ]);
         }
         table

@@ -15,6 +15,7 @@ impl TimingChart {
     pub fn write(&self, dir: &OutDir) -> Result<(), OutputError> {
         dir.remove_stale("", "timing", &["svg", "png", "csv", "json", "md"])?;
         self.picture().picture().write(dir, "timing")?;
+        self.write_failures(dir)?;
         dir.write_atomic("timing.csv", |out| {
             let mut table = csv::Writer::from_writer(out);
             table.write_record([
@@ -76,13 +77,13 @@ impl TimingChart {
         // Writing into a string cannot fail.
         let _ = writeln!(
             text,
-            "| level | cycles: median | 95 % | worst | energy: median | worst | power shape | times as fast: median | least |"
+            "| level | cycles: median | 95 % | worst | energy: median | worst | power shape | times as fast: median | least | adds to a run: median | worst |"
         );
-        let _ = writeln!(text, "|---|---|---|---|---|---|---|---|---|");
+        let _ = writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|");
         for (name, f) in &self.levels {
             let _ = writeln!(
                 text,
-                "| `{name}` | {:.2} % | {:.2} % | {:.2} % | {:.2} % | {:.2} % | {:.2} % | {:.1} | {:.1} |",
+                "| `{name}` | {:.2} % | {:.2} % | {:.2} % | {:.2} % | {:.2} % | {:.2} % | {:.1} | {:.1} | {:.0} % | {:.0} % |",
                 f.cycle_error_median_percent,
                 f.cycle_error_p95_percent,
                 f.cycle_error_worst_percent,
@@ -90,13 +91,16 @@ impl TimingChart {
                 f.energy_error_worst_percent,
                 f.power_shape_error_percent,
                 f.speedup_over_stepped,
-                f.speedup_over_stepped_least
+                f.speedup_over_stepped_least,
+                f.added_percent,
+                f.added_worst_percent
             );
         }
         let _ =
             writeln!(text, "\n| scene | GPU | level | cycles | error | energy | busiest | times as fast |");
         let _ = writeln!(text, "|---|---|---|---|---|---|---|---|");
         self.rows.iter().for_each(|row| line(&mut text, row));
+        text.push_str(&self.failure_markdown());
         text
     }
 }

@@ -27,6 +27,16 @@ pub(super) struct Packets {
 }
 
 impl Packets {
+    /// Packets that have their lines with them.
+    pub fn of(packets: &[(Packet, Vec<LineAccess>)]) -> Self {
+        let mut all = Self::default();
+        for (packet, lines) in packets {
+            all.lines.extend_from_slice(lines);
+            all.packets.push((*packet, all.lines.len()));
+        }
+        all
+    }
+
     /// Each packet with its lines.
     pub fn each(&self, mut to: impl FnMut(&Packet, &[LineAccess])) {
         let mut first = 0;
@@ -86,36 +96,41 @@ impl Subject {
 
     /// Its packets as the pipeline of `gpu` emits them.
     pub fn stream(&self, gpu: &GpuSpec) -> Result<Packets, RunError> {
+        let mut stream = Packets::default();
+        self.render(gpu, |packet, lines| {
+            stream.lines.extend_from_slice(lines);
+            stream.packets.push((*packet, stream.lines.len()));
+        })?;
+        Ok(stream)
+    }
+
+    /// Renders the frame, every packet to `emit`.
+    pub fn render(&self, gpu: &GpuSpec, emit: impl FnMut(&Packet, &[LineAccess])) -> Result<(), RunError> {
         match &self.what {
             What::Scene { scene, frame, viewport, samples } => {
                 let frame = scene.frame(*frame)?;
                 let draws = frame.draws(scene)?;
-                self.packets(&frame.camera, *viewport, samples, &draws, gpu)
+                self.draw(&frame.camera, (*viewport, samples), &draws, gpu, emit)
             }
             What::Family(scene) => {
                 let failed = |error: String| RunError::Setting(format!("{}: {error}", self.name));
                 let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
-                self.packets(&scene.camera, scene.viewport, &scene.samples, &draws, gpu)
+                self.draw(&scene.camera, (scene.viewport, &scene.samples), &draws, gpu, emit)
             }
         }
     }
 
-    fn packets(
+    fn draw(
         &self,
         camera: &Camera,
-        viewport: Viewport,
-        samples: &dyn SampleSource,
+        (viewport, samples): (Viewport, &dyn SampleSource),
         draws: &[Draw<'_>],
         gpu: &GpuSpec,
-    ) -> Result<Packets, RunError> {
+        emit: impl FnMut(&Packet, &[LineAccess]),
+    ) -> Result<(), RunError> {
         let settings = Settings { spec: &gpu.pipeline, viewport, samples, background: glam::Vec3::ZERO };
-        let mut stream = Packets::default();
-        let emit = |packet: &Packet, lines: &[LineAccess]| {
-            stream.lines.extend_from_slice(lines);
-            stream.packets.push((*packet, stream.lines.len()));
-        };
         render_with_heat(camera, draws, &settings, &[], emit)
             .map_err(|error| RunError::Setting(format!("{}: {error}", self.name)))?;
-        Ok(stream)
+        Ok(())
     }
 }

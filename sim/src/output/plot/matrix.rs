@@ -1,16 +1,18 @@
-//! Costs of methods by what they were tried on, as shaded cells.
+//! Costs or errors of methods by what they were tried on, as shaded cells.
 
 use super::palette::{BACKGROUND, INK, MUTED, heat};
 use super::panel::shortened;
 use super::picture::{Across, Picture, Text, text};
 
-/// Cells of rows by columns, each a cost over that of the best of its column.
+/// Cells of rows by columns, each a number of which more is worse: a cost over that of the best of its column, say.
 #[derive(Clone, Debug)]
 pub struct Matrix<'a> {
     /// The title.
     pub title: &'a str,
     /// The line below the title.
     pub subject: &'a str,
+    /// What the lightest shade stands for, 1 and all below, and the darkest, 32 and all above.
+    pub scale: [&'a str; 2],
     /// Names of the columns.
     pub columns: Vec<&'a str>,
     /// One block of rows below the other, all with the same columns.
@@ -22,7 +24,7 @@ pub struct Matrix<'a> {
 pub struct MatrixPanel<'a> {
     /// What the block shows.
     pub name: &'a str,
-    /// Name of each row with its cells, 1 and above; a cell without a value stays white.
+    /// Name of each row with its cells; a cell without a value stays white.
     pub rows: Vec<(&'a str, Vec<Option<f64>>)>,
 }
 
@@ -44,7 +46,7 @@ impl Matrix<'_> {
         if rows == 0 || self.columns.is_empty() {
             return picture.nothing("nothing to compare");
         }
-        scale(&mut picture);
+        scale(self.scale, &mut picture);
         let mut top = 92.0;
         for panel in &self.panels {
             picture.text(Text { bold: true, ..text(panel.name, (LEFT, top + 0.5 * HEADING)) });
@@ -99,15 +101,15 @@ fn number(value: f64) -> String {
     }
 }
 
-fn scale(picture: &mut Picture) {
+fn scale([least, most]: [&str; 2], picture: &mut Picture) {
     let (left, top) = (RIGHT - 330.0, 70.0);
     for step in 0..100 {
         let from = left + f64::from(step) * 2.0;
         picture.rect((from, top), (from + 2.0, top + 12.0), heat(f64::from(step) / 99.0));
     }
     let note = |text: Text| Text { size: 12.0, colour: MUTED, ..text };
-    picture.text(note(Text { across: Across::Right, ..text("the best", (left - 8.0, top + 6.0)) }));
-    picture.text(note(text("32 times as much", (left + 208.0, top + 6.0))));
+    picture.text(note(Text { across: Across::Right, ..text(least, (left - 8.0, top + 6.0)) }));
+    picture.text(note(text(most, (left + 208.0, top + 6.0))));
 }
 
 #[cfg(test)]
@@ -127,12 +129,14 @@ mod tests {
 
     #[test]
     fn nothing_is_said_and_cells_are_there() {
-        let empty = Matrix { title: "t", subject: "s", columns: vec![], panels: vec![] };
+        let empty = Matrix { title: "t", subject: "s", scale: ["a", "b"], columns: vec![], panels: vec![] };
         assert!(empty.picture().svg().unwrap().contains("nothing to compare"));
         let rows = vec![("one", vec![Some(1.0), None]), ("two", vec![Some(77.0), Some(f64::NAN)])];
         let panels = vec![MatrixPanel { name: "all", rows }];
-        let svg =
-            Matrix { title: "t", subject: "s", columns: vec!["a", "b"], panels }.picture().svg().unwrap();
+        let svg = Matrix { title: "t", subject: "s", scale: ["a", "b"], columns: vec!["a", "b"], panels }
+            .picture()
+            .svg()
+            .unwrap();
         assert!(svg.contains("77") && svg.contains("one"), "{svg}");
     }
 }

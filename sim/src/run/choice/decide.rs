@@ -85,6 +85,11 @@ pub(super) fn decide(wish: &Wish, findings: &Findings, frames: usize) -> Decisio
     }
 }
 
+/// The cheapest level whose error is within `limit`; the reference is its own.
+pub fn cheapest_level(error: impl Fn(Level) -> f64, limit: f64) -> Level {
+    Level::ALL.into_iter().rev().find(|&level| error(level) <= limit).unwrap_or(Level::Stepped)
+}
+
 /// The cheapest level whose error leaves half of the accuracy to predicting frames; all of it where there are too few.
 /// What dimensions cost comes off first.
 fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
@@ -93,8 +98,7 @@ fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
     let left = accuracy - lost.unwrap_or(0.0);
     let predicts = frames >= FRAMES_WORTH_IT;
     let limit = if predicts { 0.5 * left } else { left };
-    let cheapest = Level::ALL.into_iter().rev().find(|&level| findings.error(level) <= limit);
-    let level = cheapest.unwrap_or(Level::Stepped);
+    let level = cheapest_level(|level| findings.error(level), limit);
     let target = left - findings.error(level);
     let mut decision = every(level, findings, frames);
     decision.fewer_dimensions = lost.is_some();

@@ -19,6 +19,7 @@ use super::{Plan, RunError, Simulated};
 use crate::output::progress::Progress;
 use crate::timing::{Level, Sampling};
 
+pub use decide::cheapest_level;
 pub use verify::Verified;
 pub(super) use verify::verify;
 

@@ -78,6 +78,7 @@ fn predict(
         busy: like.busy.clone(),
         cycles: (like.cycles as f64 * time).round() as u64,
         stalls: None,
+        doubts: Vec::new(),
         predicted: Some(Taken { cycles: half.cycles, energy_j: half.energy_j }),
     }
 }

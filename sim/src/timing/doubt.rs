@@ -1,0 +1,103 @@
+//! What a level is known to be bad at, seen in its own result.
+
+use timing::Timed;
+
+use super::Level;
+
+/// A reason not to trust the time of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Doubt {
+    /// A bank of memory opens and closes rows for this share of the frame: `packet` and `bound` reorder its lines otherwise than
+    /// `stepped` does.
+    MemoryRows(f64),
+    /// A packet comes every so many cycles: at `bound`, short ones wait for a unit each, where no unit is busy for long.
+    ShortPackets(f64),
+}
+
+/// The share of the frame from which rows decide.
+const ROWS: f64 = 0.5;
+/// Cycles of a packet below which packets are short.
+const SHORT: f64 = 2.0;
+
+impl Doubt {
+    /// Those about a frame at `level`.
+    pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
+        let rows = timed.rows.filter(|&share| share >= ROWS).map(Self::MemoryRows);
+        let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
+        let short = (level == Level::Bound && cycles < SHORT).then_some(Self::ShortPackets(cycles));
+        rows.into_iter().chain(short).collect()
+    }
+
+    /// Its code among the warnings.
+    pub const fn code(self) -> &'static str {
+        match self {
+            Self::MemoryRows(_) => "memory-rows",
+            Self::ShortPackets(_) => "short-packets",
+        }
+    }
+
+    /// How bad it is: more than another of its kind is worse.
+    pub fn extent(self) -> f64 {
+        match self {
+            Self::MemoryRows(share) => share,
+            Self::ShortPackets(cycles) => -cycles,
+        }
+    }
+
+    /// What to tell of a frame.
+    pub fn message(self, frame: u32, level: Level) -> String {
+        let name = level.name();
+        match self {
+            Self::MemoryRows(share) => format!(
+                "a bank of memory opens and closes rows for {:.0} % of frame {frame}: in streams made for that `{name}` \
+                 takes up to {} longer than the reference; use --timing stepped, or let --accuracy choose",
+                100.0 * share,
+                if level == Level::Bound { "two thirds" } else { "half" },
+            ),
+            Self::ShortPackets(cycles) => format!(
+                "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a quarter \
+                 too short; use --timing packet, or let --accuracy choose"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::GpuSpec;
+    use crate::timing::FrameClock;
+    use timing::Recorder;
+    use timing::streams::failures;
+
+    /// The codes of every stream that breaks a level, where there are any.
+    fn codes(level: Level) -> Vec<(String, &'static str)> {
+        let mut found = Vec::new();
+        for name in ["mobile", "reference", "discrete"] {
+            let mut gpu = GpuSpec::load(name).unwrap();
+            gpu.pipeline.batch_triangles = 512;
+            for case in failures(&gpu.units.clone(), 512) {
+                gpu.units = case.units;
+                let mut clock = FrameClock::new(level, &gpu, Recorder::new(1_000_000, 1 << 16)).unwrap();
+                case.packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
+                let timed = clock.finish().unwrap();
+                let doubts = Doubt::all(level, &timed).into_iter();
+                found.extend(doubts.map(|doubt| (format!("{} on {name}", case.name), doubt.code())));
+            }
+        }
+        found.sort();
+        found
+    }
+
+    #[test]
+    fn streams_that_break_a_level_are_doubted_and_others_are_not() {
+        let rows =
+            ["discrete", "mobile", "reference"].map(|gpu| (format!("row after row on {gpu}"), "memory-rows"));
+        assert_eq!(codes(Level::Packet), rows);
+        assert_eq!(codes(Level::Stepped), []);
+        let tiny = ("tiny triangles on discrete".to_owned(), "short-packets");
+        let bound = codes(Level::Bound);
+        assert!(rows.iter().chain([&tiny]).all(|case| bound.contains(case)), "{bound:?}");
+        assert!(bound.len() <= 5, "{bound:?}");
+    }
+}
