@@ -247,6 +247,8 @@ pub struct ChartArgs {
 /// The charts there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ChartArg {
+    /// Every chart, the failure catalogue of `quintile stress`, and `index.html`: speed against accuracy on one page
+    All,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
     /// Frames predicted from few: errors, how often intervals hold the truth, host time

@@ -2,11 +2,14 @@
 
 use std::time::Instant;
 
+use serde::Serialize;
+
 use super::Failure;
 use super::args::{ChartArg, ChartArgs};
-use super::terminal::{print, print_json};
+use super::terminal::print;
 use crate::chart::ChartError;
 use crate::chart::sampling::{self, Effort, SamplingChart};
+use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
 use crate::chart::{growth, sampled};
@@ -15,6 +18,8 @@ use crate::output::progress::Progress;
 use crate::output::table::Table;
 use crate::run::RunError;
 
+mod all;
+
 impl From<ChartError> for Failure {
     fn from(error: ChartError) -> Self {
         Self { message: error.to_string(), code: 1 }
@@ -22,84 +27,100 @@ impl From<ChartError> for Failure {
 }
 
 pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
-    let pool = super::threads(args.threads)?;
-    let progress = Progress::new(args.json);
-    if !args.scene.is_empty()
-        && !matches!(args.chart, ChartArg::Sampled | ChartArg::TileTests | ChartArg::Timing)
-    {
+    let takes_scenes =
+        matches!(args.chart, ChartArg::All | ChartArg::Sampled | ChartArg::TileTests | ChartArg::Timing);
+    if !args.scene.is_empty() && !takes_scenes {
         let message =
-            "--scene goes with `chart sampled`, `chart tile-tests` and `chart timing`; leave it out"
-                .to_owned();
+            "--scene goes with `chart all`, `sampled`, `tile-tests` and `timing`; leave it out".to_owned();
         return Err(Failure { message, code: 2 });
     }
-    match args.chart {
-        ChartArg::Growth => pool.install(|| chart_growth(args, &progress)),
-        ChartArg::Sampled => pool.install(|| chart_sampled(args, &progress)),
-        ChartArg::Sampling => pool.install(|| chart_sampling(args, &progress)),
-        ChartArg::TileTests => pool.install(|| chart_tile_tests(args, &progress)),
-        ChartArg::Timing => pool.install(|| chart_timing(args, &progress)),
+    let pool = super::threads(args.threads)?;
+    let progress = Progress::new(args.json);
+    if args.chart == ChartArg::All {
+        return pool.install(|| all::run(args, &progress));
+    }
+    let done = pool.install(|| make(args.chart, args, &progress))?;
+    match args.json {
+        true => print(&done.json)?,
+        false => print(&format!("{}results: {}", done.text, args.out.display()))?,
+    }
+    done.fault.map_or(Ok(()), |message| Err(Failure { message, code: 1 }))
+}
+
+/// A chart that is measured, drawn and written.
+struct Done {
+    /// Its table and what else is to be said of it, in whole lines.
+    text: String,
+    json: String,
+    standings: Vec<Standing>,
+    /// A promise that it found broken.
+    fault: Option<String>,
+}
+
+impl Done {
+    fn new(chart: &(impl Serialize + Standings), text: String) -> Result<Self, Failure> {
+        let json = serde_json::to_string_pretty(chart);
+        let json = json.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })?;
+        Ok(Self { text, json, standings: chart.standings(), fault: None })
     }
 }
 
-fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
-    let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
-    let chart = growth::chart(effort, &args.out, progress)?;
-    if args.json { print_json(&chart, true) } else { print(&chart.text()) }
+fn make(chart: ChartArg, args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    match chart {
+        ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
+        ChartArg::Growth => chart_growth(args, progress),
+        ChartArg::Sampled => chart_sampled(args, progress),
+        ChartArg::Sampling => chart_sampling(args, progress),
+        ChartArg::TileTests => chart_tile_tests(args, progress),
+        ChartArg::Timing => chart_timing(args, progress),
+    }
 }
 
-fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
+    let chart = growth::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
+}
+
+fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let started = Instant::now();
     let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
     let chart = sampling::chart(effort, &args.out, progress)?;
-    if args.json {
-        return print_json(&chart, true);
-    }
     let took_s = started.elapsed().as_secs_f64();
-    print(&format!("{}results: {}\ntook {took_s:.1} s", text(&chart), args.out.display()))
+    Done::new(&chart, format!("{}took {took_s:.1} s\n", text(&chart)))
 }
 
-fn chart_sampled(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+fn chart_sampled(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { sampled::Effort::QUICK } else { sampled::Effort::FULL };
     let chart = sampled::sampled(&args.scene, effort, progress)?;
     let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     chart.write(&dir).map_err(RunError::from)?;
-    if args.json {
-        return print_json(&chart, true);
-    }
-    print(&format!("{}\n{}results: {}", chart.text(), chart.cost_text(), args.out.display()))
+    Done::new(&chart, format!("{}\n{}", chart.text(), chart.cost_text()))
 }
 
-fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let chart = tile_tests(&args.scene, args.quick, progress)?;
-    if args.json {
-        print_json(&chart, true)?
-    } else {
-        print(&chart.text())?
-    }
     let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     chart.write(dir).map_err(RunError::from)?;
     let lost = chart.samples_lost();
-    let message = format!("{lost} samples were lost: a test is not conservative; please report it");
-    if lost == 0 { Ok(()) } else { Err(Failure { message, code: 1 }) }
+    let fault = format!("{lost} samples were lost: a test is not conservative; please report it");
+    Ok(Done { fault: (lost > 0).then_some(fault), ..Done::new(&chart, chart.text())? })
 }
 
-fn chart_timing(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+fn chart_timing(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let started = Instant::now();
     let chart = timing(&args.scene, args.quick, progress)?;
     let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     chart.write(&dir).map_err(RunError::from)?;
-    if args.json {
-        return print_json(&chart, true);
-    }
     let speed = &chart.reference;
-    print(&format!(
-        "{}the reference: {:.1} million unit-cycles, {:.2} million cycles a second\nresults: {}\ntook {:.1} s",
+    let text = format!(
+        "{}the reference: {:.1} million unit-cycles, {:.2} million cycles a second\ntook {:.1} s\n",
         chart.text(),
         speed.unit_cycles_per_s / 1e6,
         speed.cycles_per_s / 1e6,
-        args.out.display(),
         started.elapsed().as_secs_f64()
-    ))
+    );
+    Done::new(&chart, text)
 }
 
 /// Exponents and errors, a row for each scene and table.

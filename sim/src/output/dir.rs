@@ -108,6 +108,29 @@ impl OutDir {
         &self.root
     }
 
+    /// The files in the folder and in `plots/`, by their names relative to the folder, in order.
+    ///
+    /// # Errors
+    /// [`OutputError::Folder`] when it cannot be read.
+    pub fn files(&self) -> Result<Vec<String>, OutputError> {
+        let folder = |source| OutputError::Folder { path: self.root.display().to_string(), source };
+        let mut names = Vec::new();
+        for below in ["", "plots/"] {
+            let path = self.root.join(below);
+            if !path.is_dir() {
+                continue;
+            }
+            for entry in fs::read_dir(path).map_err(folder)? {
+                let entry = entry.map_err(folder)?;
+                if entry.path().is_file() {
+                    names.extend(entry.file_name().to_str().map(|name| format!("{below}{name}")));
+                }
+            }
+        }
+        names.sort();
+        Ok(names)
+    }
+
     /// Removes files directly in `folder` (relative, may be absent; empty for the root) whose name begins with `prefix` and ends with one
     /// of `extensions` (without the dot): what an earlier, longer run left there.
     ///

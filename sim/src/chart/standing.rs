@@ -1,0 +1,105 @@
+//! Speed against accuracy, the same few numbers for every method that has levels.
+
+use serde::Serialize;
+
+use super::growth::GrowthChart;
+use super::sampled::SampledChart;
+use super::sampling::SamplingChart;
+use super::tile_tests::TileTests;
+use super::timing::TimingChart;
+
+/// A level of a method: what it costs and how wrong it is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Standing {
+    /// What is found, for example `time of a frame`.
+    pub subject: String,
+    /// The level, for example `packet`.
+    pub level: String,
+    /// How wrong it is.
+    pub error: String,
+    /// What it costs, or saves.
+    pub cost: String,
+}
+
+/// A chart whose levels stand somewhere between speed and accuracy.
+pub trait Standings {
+    /// A row for each level.
+    fn standings(&self) -> Vec<Standing>;
+}
+
+fn standing(subject: &str, level: &str, error: String, cost: String) -> Standing {
+    Standing { subject: subject.to_owned(), level: level.to_owned(), error, cost }
+}
+
+impl Standings for TimingChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |(name, f): (&&str, &super::timing::Figures)| {
+            let error = format!(
+                "cycles {:.2} % (worst {:.1} %), energy {:.2} % (worst {:.1} %)",
+                f.cycle_error_median_percent,
+                f.cycle_error_worst_percent,
+                f.energy_error_median_percent,
+                f.energy_error_worst_percent
+            );
+            let cost = format!("{:.0} times as fast as stepped", f.speedup_over_stepped);
+            standing("time of a frame", name, error, cost)
+        };
+        self.levels.iter().map(row).collect()
+    }
+}
+
+impl Standings for SampledChart {
+    fn standings(&self) -> Vec<Standing> {
+        let errors = self.figures.iter().map(|f| {
+            format!(
+                "{} {:.2} % (95 %: {:.2} %), {:.0} % of intervals hold the truth",
+                f.quantity, f.error_median_percent, f.error_p95_percent, f.inside_percent
+            )
+        });
+        let errors = errors.collect::<Vec<_>>().join("; ");
+        let row = |cost: &super::sampled::Cost| {
+            let level = format!("{} of {} frames simulated, {}", cost.simulated, cost.frames, cost.scene);
+            let cost = format!("{:.1} times less host time", cost.times_faster);
+            standing("an animation", &level, errors.clone(), cost)
+        };
+        self.costs.iter().map(row).collect()
+    }
+}
+
+impl Standings for SamplingChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::sampling::Row| {
+            let last = row.points.last()?;
+            let level = format!("{}, {} samples a pixel", row.table, last.samples_per_pixel);
+            Some(standing(
+                &format!("an image ({})", row.scene),
+                &level,
+                format!("RMSE {:.5}", last.rmse),
+                format!("{:.2} s", last.host_s),
+            ))
+        };
+        self.rows.iter().filter_map(row).collect()
+    }
+}
+
+impl Standings for TileTests {
+    fn standings(&self) -> Vec<Standing> {
+        let front = self.rows.iter().filter(|row| row.on_efficiency_front);
+        let row = |row: &super::tile_tests::Row| {
+            standing(
+                &format!("samples of a triangle ({})", row.scene),
+                &row.tests,
+                format!("{:.0} % of tested samples hit, {} lost", row.efficiency * 100.0, row.samples_lost),
+                format!("{:.0} multiply-adds a triangle", row.madds_per_triangle),
+            )
+        };
+        front.map(row).collect()
+    }
+}
+
+/// Growth has no error: the engine is exact.
+impl Standings for GrowthChart {
+    fn standings(&self) -> Vec<Standing> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,99 @@
+//! `quintile chart all`.
+
+use std::time::Instant;
+
+use clap::ValueEnum;
+use serde_json::{Map, Value};
+
+use super::{Done, make};
+use crate::chart::CHARTS;
+use crate::chart::index::{Entry, Index};
+use crate::cli::Failure;
+use crate::cli::args::{ChartArg, ChartArgs};
+use crate::cli::terminal::{print, print_json};
+use crate::output::OutDir;
+use crate::output::progress::Progress;
+use crate::run::RunError;
+
+/// The failure catalogue, which has a command of its own.
+const STRESS: &str = "stress";
+
+/// Makes every chart and the page; a broken promise of one does not keep the others.
+pub(super) fn run(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    let (mut json, mut faults) = (Map::new(), Vec::new());
+    let charts: Vec<_> = charts();
+    let mut index = Index { command: command(args), ..Index::default() };
+    for (at, (name, chart)) in charts.iter().enumerate() {
+        index.missing = charts[at + 1..].iter().map(|(name, _)| name.clone()).collect();
+        if !args.json {
+            print(&format!("{name}:"))?;
+        }
+        let started = Instant::now();
+        let done = match chart {
+            Some(chart) => make(*chart, args, progress)?,
+            None => stress(args, progress)?,
+        };
+        if !args.json {
+            print(&done.text)?;
+        }
+        json.insert(name.clone(), serde_json::from_str(&done.json).unwrap_or(Value::Null));
+        faults.extend(done.fault.iter().map(|fault| format!("{name}: {fault}")));
+        index.entries.push(entry(name.clone(), done, started.elapsed().as_secs_f64(), &dir)?);
+        // After each, so that what there is can be looked at while the next one runs.
+        index.write(&dir).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+    }
+    match args.json {
+        true => print_json(&Value::Object(json), true)?,
+        false => print(&format!("results: {}", args.out.join("index.html").display()))?,
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Failure { message: faults.join("; "), code: 1 }) }
+}
+
+/// Every chart by name, and the catalogue.
+fn charts() -> Vec<(String, Option<ChartArg>)> {
+    let charts = ChartArg::value_variants().iter().filter(|&&chart| chart != ChartArg::All);
+    let named =
+        charts.filter_map(|&chart| Some((chart.to_possible_value()?.get_name().to_owned(), Some(chart))));
+    named.chain([(STRESS.to_owned(), None)]).collect()
+}
+
+fn entry(name: String, done: Done, took_s: f64, dir: &OutDir) -> Result<Entry, Failure> {
+    let about = CHARTS.iter().find(|(chart, _)| *chart == name).map_or(
+        "each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, cost",
+        |(_, about)| about,
+    );
+    let stems: &[&str] = if name == STRESS { &["stress", "auto", "plots/stress"] } else { &[&name] };
+    let entry = Entry {
+        about: about.to_owned(),
+        text: done.text,
+        pictures: Vec::new(),
+        files: Vec::new(),
+        took_s,
+        standings: done.standings,
+        name: name.clone(),
+    };
+    Ok(entry.with_files(dir, stems).map_err(RunError::from)?)
+}
+
+/// The failure catalogue as a chart among the others.
+fn stress(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let report = crate::stress::stress(None, args.quick, progress)?;
+    let text = report.text();
+    let json = serde_json::to_string(&report.summary());
+    let json = json.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })?;
+    let fault = "a test is not conservative: samples were lost or boxes are too small; please report it";
+    let fault = (!report.is_clean()).then(|| fault.to_owned());
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    report.write(dir).map_err(RunError::from)?;
+    Ok(Done { text, json, standings: Vec::new(), fault })
+}
+
+/// The command as one would type it again.
+fn command(args: &ChartArgs) -> String {
+    let mut words = vec!["quintile chart all".to_owned()];
+    words.extend(args.scene.iter().map(|scene| format!("--scene {scene}")));
+    words.extend(args.quick.then(|| "--quick".to_owned()));
+    words.push(format!("--out {}", args.out.display()));
+    words.join(" ")
+}
