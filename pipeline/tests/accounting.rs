@@ -9,6 +9,7 @@ use common::*;
 use glam::{Vec2, Vec3, Vec4};
 use pipeline::depth::{DepthBound, DepthSpec};
 use pipeline::frame::visibility;
+use pipeline::memory::{CacheSpec, Compression, MemorySpec};
 use pipeline::*;
 use proptest::prelude::*;
 
@@ -316,4 +317,62 @@ fn vertices_are_reused_first_in_first_out() {
             frame(&[Draw { geometry, shader: &Plain, cull: Cull::None }], false, Features::ALL).counts;
         assert_eq!(counts[Event::VerticesFetched], fetched);
     }
+}
+
+/// Counts of a soup before small caches, with depths and colours compressed or not, and its image.
+fn compressed(soup: &Soup, lens: bool, compression: Compression) -> (Counts, Vec<Vec3>) {
+    let small = CacheSpec::lru(8, 4);
+    let memory =
+        MemorySpec { depth: small, colour: small, texture: small, l2: CacheSpec::lru(32, 4), compression };
+    let spec = PipelineSpec { memory, ..spec(Features::ALL) };
+    let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
+    let viewport = Viewport::new(70, 50).unwrap();
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    let rendered = render(&camera(lens), &[soup.draw(&Plain, Cull::None)], &settings, |_| {}).unwrap();
+    (rendered.counts, rendered.image)
+}
+
+const NOTHING: Compression = Compression { depth: false, colour: false };
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    /// Compression changes what memory moves and nothing else.
+    #[test]
+    fn compression_changes_traffic_alone(kind in kinds(), lens: bool, seed: u64, depth: bool, colour: bool) {
+        let soup = Soup::new(kind, 40, seed);
+        let (plain, image) = compressed(&soup, lens, NOTHING);
+        let (found, same) = compressed(&soup, lens, Compression { depth, colour });
+        prop_assert_eq!(image, same);
+        for event in Event::ALL.into_iter().filter(|event| !matches!(event.unit(), Unit::L2 | Unit::Dram)) {
+            prop_assert_eq!(found[event], plain[event], "{}", event.name());
+        }
+        prop_assert_eq!(found[Event::L2Reads], plain[Event::L2Reads]);
+    }
+}
+
+/// Walls that fill the image, each nearer than the one before, a little tilted; moving to the side or not.
+fn walls(moving: bool) -> Soup {
+    let mut open = Vec::new();
+    for wall in 0..8_u8 {
+        let at = |x, y| Vec3::new(x, y, 12.0 - f32::from(wall) + 0.01 * x);
+        open.extend([at(-40.0, -20.0), at(40.0, -20.0), at(0.0, 60.0)]);
+    }
+    let close = open.iter().map(|p| if moving { *p + Vec3::X } else { *p }).collect();
+    Soup { open, close, triangles: (0..8).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect() }
+}
+
+/// Large still surfaces compress to half, but for the image itself. What moves has another shading in every sample of a pixel.
+#[test]
+fn compression_pays_where_pixels_are_alike() {
+    let moved = |moving, depth, colour| {
+        let bytes = |compression| {
+            let (counts, _) = compressed(&walls(moving), false, compression);
+            counts[Event::DramReadBytes] + counts[Event::DramWriteBytes]
+        };
+        bytes(Compression { depth, colour }) as f64 / bytes(NOTHING) as f64
+    };
+    let [depth, colour, both] = [(true, false), (false, true), (true, true)].map(|(d, c)| moved(false, d, c));
+    assert!((0.7..0.85).contains(&depth) && (0.7..0.85).contains(&colour), "{depth} {colour}");
+    assert!((0.5..0.6).contains(&both), "{both}");
+    assert_eq!(moved(true, false, true), 1.0);
 }

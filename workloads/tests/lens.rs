@@ -94,7 +94,13 @@ fn pixels_hit(scene: &Scene) -> usize {
         vertex_reuse: 16,
         shading_cache: cache,
         shading: Shading::Cached,
-        memory: MemorySpec { depth: cache, colour: cache, texture: cache, l2: cache },
+        memory: MemorySpec {
+            depth: cache,
+            colour: cache,
+            texture: cache,
+            l2: cache,
+            compression: Default::default(),
+        },
         features: Features::ALL,
         depth: pipeline::depth::DepthSpec::default(),
     };

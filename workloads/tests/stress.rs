@@ -48,7 +48,13 @@ fn spec(features: Features) -> PipelineSpec {
         vertex_reuse: 16,
         shading: Shading::default(),
         shading_cache: CacheSpec::lru(1024, 4),
-        memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: lines },
+        memory: MemorySpec {
+            depth: lines,
+            colour: lines,
+            texture: lines,
+            l2: lines,
+            compression: Default::default(),
+        },
         features,
         depth: DepthSpec::default(),
     }

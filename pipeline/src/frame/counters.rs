@@ -151,6 +151,8 @@ pub(super) struct Work {
     pub sample_madds: u32,
     pub read_pixels: u64,
     pub written_pixels: u64,
+    /// Of these, those whose depths and whose colours now fit in half their room; known where memory compresses them.
+    pub small_pixels: [u64; 2],
     /// One past this work's last entry in [`BinLog::quads`].
     pub quads_end: u32,
 }

@@ -23,6 +23,8 @@ pub(super) struct Replay<'a> {
     /// Lines of depth and of colour that hold something else than the clear value.
     depth_used: Vec<bool>,
     colour_used: Vec<bool>,
+    /// Of each tile the pixels whose depths and whose colours fit in half their room; empty where nothing is compressed.
+    small: Vec<[u64; 2]>,
 }
 
 /// Vertices shaded of late, first in first out.
@@ -46,9 +48,18 @@ impl<'a> Replay<'a> {
     pub fn new(pass: &'a Pass<'a>) -> Result<Self, CacheError> {
         let spec = pass.settings.spec;
         let lines = ((pass.addresses.colour - pass.addresses.depth) / LINE_BYTES) as usize;
+        let (mut memory, mut small) = (MemorySystem::new(&spec.memory)?, Vec::new());
+        if spec.memory.compression.is_on() {
+            let at = &pass.addresses;
+            memory = memory.with_compression([at.depth, at.colour, at.image]);
+            let tile_bytes =
+                u64::from(spec.tile_px.pow(2) * pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
+            small = vec![[0; 2]; (at.colour - at.depth).div_ceil(tile_bytes) as usize];
+        }
         Ok(Self {
             pass,
-            memory: MemorySystem::new(&spec.memory)?,
+            memory,
+            small,
             shading: Cache::new(spec.shading_cache)?,
             reuse: Reuse { recent: vec![(usize::MAX, 0); spec.vertex_reuse as usize], next: 0 },
             depth_used: vec![false; lines],
@@ -105,6 +116,7 @@ impl<'a> Replay<'a> {
         counts[Event::DepthReadsSkipped] = work.unread;
         counts[Event::DepthWrites] = work.written;
         counts[Event::ColourWrites] = work.written;
+        self.compress(work);
         let base = self.pass.addresses.depth;
         self.lines(work.tile, work.read_pixels, |this, line, pixels| {
             let write = pixels & work.written_pixels != 0;
@@ -123,6 +135,33 @@ impl<'a> Replay<'a> {
             this.memory.colour(base + line * LINE_BYTES, true, fresh, counts);
         });
         packet
+    }
+
+    /// Notes which lines of the tile fit in half their room after a packet. Where tiles are smaller than a line, the one that was
+    /// written last decides.
+    fn compress(&mut self, work: &Work) {
+        let Some(small) = self.small.get_mut(work.tile as usize) else { return };
+        let now: [u64; 2] =
+            std::array::from_fn(|of| small[of] & !work.written_pixels | work.small_pixels[of]);
+        *small = now;
+        let bases = [self.pass.addresses.depth, self.pass.addresses.colour];
+        self.lines(work.tile, work.written_pixels, |this, line, _| {
+            let pixels = this.pixels_of(work.tile, line);
+            for (base, small) in bases.into_iter().zip(now) {
+                this.memory.fits(base + line * LINE_BYTES, small & pixels == pixels);
+            }
+        });
+    }
+
+    /// The pixels of a tile that have samples in `line`.
+    fn pixels_of(&self, tile: u32, line: u64) -> u64 {
+        let spec = self.pass.settings.spec;
+        let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
+        let all = u64::from(spec.tile_px * spec.tile_px);
+        let first_byte = u64::from(tile) * all * pixel_bytes;
+        let at = |byte: u64| byte.saturating_sub(first_byte) / pixel_bytes;
+        let (first, last) = (at(line * LINE_BYTES), at((line + 1) * LINE_BYTES - 1).min(all - 1));
+        (first..=last).fold(0, |pixels, pixel| pixels | 1 << pixel)
     }
 
     /// The quads of a packet through the shading cache, those that are not there through the shader cores.

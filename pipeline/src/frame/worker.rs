@@ -15,6 +15,7 @@ use crate::setup::{PixelRect, Triangle};
 use crate::shading::QuadSet;
 use crate::traversal::{self, Box5, TileRect};
 
+mod compress;
 mod gain;
 mod in_sight;
 
@@ -140,7 +141,8 @@ impl<'a, 'p> Worker<'a, 'p> {
             let tested = self.samples(subject, &tile, &mut left, place);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
                 self.ask_for_quads(subject.triangle, place, origin);
-                self.record(subject.triangle.id, tested, in_front, origin);
+                let small = self.small_pixels(subject.triangle, place, origin);
+                self.record(subject.triangle.id, (tested, small), in_front, origin);
             }
         }
     }
@@ -230,7 +232,13 @@ impl<'a, 'p> Worker<'a, 'p> {
         }
     }
 
-    fn record(&mut self, triangle: u32, [moving, lens]: [bool; 2], in_front: bool, origin: [u32; 2]) {
+    fn record(
+        &mut self,
+        triangle: u32,
+        ([moving, lens], small_pixels): ([bool; 2], [u64; 2]),
+        in_front: bool,
+        origin: [u32; 2],
+    ) {
         let place = self.place(origin);
         let hits = &self.scratch.hits;
         if let Some(found) = hits.by_pixel.as_deref().filter(|_| self.pass.heat) {
@@ -251,6 +259,7 @@ impl<'a, 'p> Worker<'a, 'p> {
             sample_madds: hits.tested * sample_test::madds(moving, lens),
             read_pixels: hits.read_pixels,
             written_pixels: hits.written_pixels,
+            small_pixels,
             quads_end: self.log.quads.len() as u32,
         });
     }

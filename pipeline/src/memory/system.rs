@@ -3,6 +3,7 @@
 use activity::{Event, LineAccess, LineKind, PacketCounts, Unit};
 use serde::Deserialize;
 
+use super::compress::{Compression, Halves};
 use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES};
 
 /// The caches of memory. Entries are lines of 64 bytes.
@@ -17,6 +18,9 @@ pub struct MemorySpec {
     pub texture: CacheSpec,
     /// The cache shared by all.
     pub l2: CacheSpec,
+    /// What is compressed on its way to it; nothing unless said.
+    #[serde(default)]
+    pub compression: Compression,
 }
 
 /// A unit's own cache above the L2, and the events it counts.
@@ -35,6 +39,7 @@ pub struct MemorySystem {
     colour: Client,
     texture: Client,
     l2: Shared,
+    halves: Halves,
 }
 
 /// The L2 and what it was asked for since that was last taken note of.
@@ -58,7 +63,18 @@ impl MemorySystem {
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
             texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
             l2: Shared { cache: Cache::new(spec.l2)?, log: Vec::new() },
+            halves: Halves::default(),
         })
+    }
+
+    /// The same with depths and colours, which lie between these addresses, compressed where [`Self::fits`] says so.
+    pub fn with_compression(self, buffers: [u64; 3]) -> Self {
+        Self { halves: Halves::new(buffers), ..self }
+    }
+
+    /// Says whether what is now in the line at `address` fits in half of it.
+    pub fn fits(&mut self, address: u64, fits: bool) {
+        self.halves.note(address, fits);
     }
 
     /// The lines the L2 was asked for since they were last forgotten, in order.
@@ -74,26 +90,28 @@ impl MemorySystem {
     /// The depth unit reads, and where `write` changes, the line at `address`. A `fresh` line was cleared and never
     /// written: its contents are known and not fetched.
     pub fn depth(&mut self, address: u64, write: bool, fresh: bool, counts: &mut PacketCounts) {
-        access(&mut self.depth, &mut self.l2, address, write, fresh, counts);
+        access(&mut self.depth, (&mut self.l2, &self.halves), address, write, fresh, counts);
     }
 
     /// The colour unit writes or reads the line at `address`; `fresh` as for depth.
     pub fn colour(&mut self, address: u64, write: bool, fresh: bool, counts: &mut PacketCounts) {
-        access(&mut self.colour, &mut self.l2, address, write, fresh, counts);
+        access(&mut self.colour, (&mut self.l2, &self.halves), address, write, fresh, counts);
     }
 
     /// The line at `address` holds depths or colours of samples that are not needed again: it is dropped wherever it is,
     /// rather than written back.
     pub fn discard(&mut self, address: u64) {
         let line = address / LINE_BYTES;
-        for cache in [&mut self.depth.cache, &mut self.colour.cache, &mut self.l2.cache] {
-            cache.discard(line);
+        self.depth.cache.discard(line);
+        self.colour.cache.discard(line);
+        if self.halves.is_last(line) {
+            self.l2.cache.discard(self.halves.place(line));
         }
     }
 
     /// A texture unit reads the line at `address`.
     pub fn texture(&mut self, address: u64, counts: &mut PacketCounts) {
-        access(&mut self.texture, &mut self.l2, address, false, false, counts);
+        access(&mut self.texture, (&mut self.l2, &self.halves), address, false, false, counts);
     }
 
     /// The vertex fetch reads the lines that hold `bytes` from `address`, straight from the L2.
@@ -120,7 +138,7 @@ impl MemorySystem {
 
 fn access(
     client: &mut Client,
-    l2: &mut Shared,
+    (l2, halves): (&mut Shared, &Halves),
     address: u64,
     write: bool,
     fresh: bool,
@@ -134,10 +152,10 @@ fn access(
     }
     counts[client.misses] += 1;
     if let Access::MissEvicting(victim) = found {
-        shared(l2, client.unit, victim, true, counts);
+        shared(l2, client.unit, halves.place(victim), true, counts);
     }
     if !fresh {
-        shared(l2, client.unit, line, false, counts);
+        shared(l2, client.unit, halves.place(line), false, counts);
     }
 }
 
@@ -182,7 +200,14 @@ mod tests {
     fn system() -> MemorySystem {
         let small = CacheSpec::lru(2, 2);
         let l2 = CacheSpec::lru(64, 4);
-        MemorySystem::new(&MemorySpec { depth: small, colour: small, texture: small, l2 }).unwrap()
+        MemorySystem::new(&MemorySpec {
+            depth: small,
+            colour: small,
+            texture: small,
+            l2,
+            compression: Compression::default(),
+        })
+        .unwrap()
     }
 
     #[test]
@@ -212,6 +237,18 @@ mod tests {
         memory.colour(2048, true, true, &mut counts);
         memory.finish(2048..4096, &mut counts);
         assert_eq!(counts[Event::DramWriteBytes], 64);
+    }
+
+    #[test]
+    fn two_halved_lines_are_moved_as_one() {
+        let moved = |fits: bool| {
+            let (mut memory, mut counts) =
+                (system().with_compression([0, 4096, 8192]), PacketCounts::default());
+            (0..2).for_each(|line| memory.fits(64 * line, fits));
+            (0..2).for_each(|line| memory.depth(64 * line, false, false, &mut counts));
+            (counts[Event::DepthMisses], counts[Event::L2Reads], counts[Event::DramReadBytes])
+        };
+        assert_eq!((moved(false), moved(true)), ((2, 2, 128), (2, 2, 64)));
     }
 
     #[test]

@@ -168,7 +168,13 @@ pub fn spec(features: Features) -> PipelineSpec {
         vertex_reuse: 16,
         shading_cache: CacheSpec::lru(1024, 4),
         shading: Shading::Cached,
-        memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: CacheSpec::lru(4096, 8) },
+        memory: MemorySpec {
+            depth: lines,
+            colour: lines,
+            texture: lines,
+            l2: CacheSpec::lru(4096, 8),
+            compression: Default::default(),
+        },
         features,
         depth: DepthSpec::default(),
     }
