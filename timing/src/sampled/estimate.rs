@@ -39,6 +39,8 @@ impl Interval {
 ///
 /// Its variance is `sum over h of N_h^2 (1 - n_h / N_h) s_h^2 / n_h`, with `s_h^2` the variance of the residuals of the line within
 /// a stratum (Cochran 1977, eqs. 5.13 and 7.56), times `f / (f - r)`: the slope took `r` of the `f` degrees of freedom within strata.
+/// To that comes `(sum over h of N_h (X_h - mean_h(x)))^2 s^2 / S_xx`, what the line carries from the representatives to the units
+/// they stand for, times the variance of its slope (Royall and Cumberland 1981): draws that lie to one side know less.
 /// The interval is that of Student with the effective degrees of freedom of such a sum, spreads taken as equal (Cochran 1977,
 /// eq. 5.16; Satterthwaite 1946), less `r`, rounded down.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +49,8 @@ pub struct Estimate {
     predicted: Vec<f64>,
     /// For each stratum, what the line leaves of its representatives.
     residuals: Vec<Vec<f64>>,
+    /// The square of what the slope is multiplied by in the total, over the spread that it is known from.
+    lever: f64,
     shape: Shape,
 }
 
@@ -66,18 +70,24 @@ impl Estimate {
         let slope = Slope::new(design, covariate, &measured);
         let mut predicted = vec![0.0; design.units()];
         let mut residuals = Vec::new();
+        let mut carried = 0.0;
         for stratum in design.strata() {
             let mean_x = mean(stratum.chosen.iter().map(|&unit| covariate[unit]));
             let mean_y = mean(stratum.chosen.iter().map(|&unit| measured(unit)));
             let at = |unit: usize| mean_y + slope.slope * (covariate[unit] - mean_x);
             stratum.members.iter().for_each(|&unit| predicted[unit] = at(unit));
+            // Where all are measured nothing is carried, whatever rounding says.
+            if stratum.chosen.len() < stratum.members.len() {
+                carried += stratum.members.iter().map(|&unit| covariate[unit] - mean_x).sum::<f64>();
+            }
             residuals.push(stratum.chosen.iter().map(|&unit| measured(unit) - at(unit)).collect());
         }
         let sizes: Vec<[usize; 2]> =
             design.strata().iter().map(|stratum| [stratum.members.len(), stratum.chosen.len()]).collect();
         let within: usize = sizes.iter().map(|[_, chosen]| chosen - 1).sum();
         let shape = Shape { sizes, within: within as f64, slope: slope.within };
-        Self { predicted, residuals, shape }
+        let lever = if slope.spread > 0.0 { carried * carried / slope.spread } else { 0.0 };
+        Self { predicted, residuals, lever, shape }
     }
 
     /// The prediction for a unit.
@@ -88,7 +98,7 @@ impl Estimate {
     /// The sum over all units, with its interval.
     pub fn total(&self, confidence: f64) -> Interval {
         let total = self.predicted.iter().sum();
-        self.shape.interval(total, self.shape.variance(&self.residuals), confidence)
+        self.shape.interval(total, self.shape.variance(&self.residuals, self.lever), confidence)
     }
 
     /// The sum of this quantity over that of another of the same design, with its interval: the variance is that of what is left of
@@ -99,17 +109,14 @@ impl Estimate {
         let left = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
         let left: Vec<Vec<f64>> = self.residuals.iter().zip(&to.residuals).map(left).collect();
         let shape = if self.shape.slope > to.shape.slope { &self.shape } else { &to.shape };
-        shape.interval(ratio, shape.variance(&left) / (below * below), confidence)
+        let lever = self.lever.max(to.lever);
+        shape.interval(ratio, shape.variance(&left, lever) / (below * below), confidence)
     }
 
     /// The interval of a single unit of a stratum, in which its own value lies with the probability `confidence`: half of its width.
     pub fn half_width_of_one(&self, stratum: usize, confidence: f64) -> f64 {
         let [_, chosen] = self.shape.sizes[stratum];
-        let squares: f64 = self.residuals.iter().flatten().map(|left| left * left).sum();
-        if squares == 0.0 {
-            return 0.0;
-        }
-        let variance = squares / (self.shape.within - self.shape.slope) * (1.0 + 1.0 / chosen as f64);
+        let variance = self.shape.pooled(&self.residuals) * (1.0 + 1.0 / chosen as f64);
         student_t(confidence, self.shape.freedom()) * variance.sqrt()
     }
 }
@@ -132,13 +139,20 @@ impl Shape {
         if squares > 0.0 { (sum * sum / squares - self.slope).max(1.0) as u32 } else { 1 }
     }
 
-    fn variance(&self, residuals: &[Vec<f64>]) -> f64 {
+    /// The variance of what the line leaves, over all strata.
+    fn pooled(&self, residuals: &[Vec<f64>]) -> f64 {
+        let squares: f64 = residuals.iter().flatten().map(|left| left * left).sum();
+        if squares == 0.0 { 0.0 } else { squares / (self.within - self.slope) }
+    }
+
+    fn variance(&self, residuals: &[Vec<f64>], lever: f64) -> f64 {
         let of = |(left, [units, chosen]): (&Vec<f64>, &[usize; 2])| {
             let spread = left.iter().map(|left| left * left).sum::<f64>() / (*chosen as f64 - 1.0);
             Self::weight([*units, *chosen]) * spread
         };
         let sum: f64 = residuals.iter().zip(&self.sizes).filter(|(_, [_, chosen])| *chosen > 1).map(of).sum();
-        if sum == 0.0 { 0.0 } else { sum * self.within / (self.within - self.slope) }
+        let drawn = if sum == 0.0 { 0.0 } else { sum * self.within / (self.within - self.slope) };
+        if lever == 0.0 { drawn } else { drawn + lever * self.pooled(residuals) }
     }
 
     fn interval(&self, value: f64, variance: f64, confidence: f64) -> Interval {
@@ -152,6 +166,8 @@ struct Slope {
     slope: f64,
     /// The share of the covariate's spread that lies within strata: the degrees of freedom the slope takes there.
     within: f64,
+    /// The covariate's spread over all representatives.
+    spread: f64,
 }
 
 impl Slope {
@@ -170,7 +186,8 @@ impl Slope {
             }
         }
         // A signature that says nothing: equal for all.
-        if xx > 0.0 { Self { slope: xy / xx, within: within / xx } } else { Self { slope: 0.0, within: 0.0 } }
+        let slope = |by: f64| if xx > 0.0 { by / xx } else { 0.0 };
+        Self { slope: slope(xy), within: slope(within), spread: xx }
     }
 }
 
