@@ -49,6 +49,7 @@ pub struct Disturbance {
     irregularity: Sourced<Share>,
     duration_s: Sourced<Seconds>,
     extra_w: Sourced<Watts>,
+    variation: Sourced<Share>,
 }
 
 #[derive(Deserialize)]
@@ -59,12 +60,13 @@ struct Written {
     irregularity: Sourced<Share>,
     duration_s: Sourced<Seconds>,
     extra_w: Sourced<Watts>,
+    variation: Sourced<Share>,
 }
 
 impl TryFrom<Written> for Disturbance {
     type Error = String;
     fn try_from(written: Written) -> Result<Self, String> {
-        let Written { name, period_s, irregularity, duration_s, extra_w } = written;
+        let Written { name, period_s, irregularity, duration_s, extra_w, variation } = written;
         let (lasts, every) = (duration_s.value(), period_s.value());
         if lasts > every {
             return Err(format!(
@@ -72,7 +74,7 @@ impl TryFrom<Written> for Disturbance {
                  and constant_w"
             ));
         }
-        Ok(Self { name, period_s, irregularity, duration_s, extra_w })
+        Ok(Self { name, period_s, irregularity, duration_s, extra_w, variation })
     }
 }
 
@@ -97,18 +99,24 @@ impl Disturbance {
         self.duration_s.value()
     }
 
-    /// The power on top, W.
+    /// The power on top, on average, W.
     pub fn extra_w(&self) -> f64 {
         self.extra_w.value()
     }
 
-    fn provenance(&self) -> [Provenance<'_>; 4] {
+    /// By which part of it each one may draw more or less: 0 where all are alike.
+    pub fn variation(&self) -> f64 {
+        self.variation.value()
+    }
+
+    fn provenance(&self) -> [Provenance<'_>; 5] {
         let field = |name: &str| format!("system.disturbances.{}.{name}", self.name);
         [
             provenance(&field("period_s"), &self.period_s),
             provenance(&field("irregularity"), &self.irregularity),
             provenance(&field("duration_s"), &self.duration_s),
             provenance(&field("extra_w"), &self.extra_w),
+            provenance(&field("variation"), &self.variation),
         ]
     }
 }

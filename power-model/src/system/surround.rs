@@ -99,15 +99,18 @@ impl System {
 impl Disturbance {
     /// Disturbance `k` begins at `(phase + k + irregularity * u_k) period`, phase and `u_k` uniform in [0, 1): one in each
     /// period, at any time of it where it is wholly irregular (stratified sampling). The one before the first may reach in.
+    /// It draws `extra_w (1 + variation (2 v_k - 1))`, `v_k` uniform likewise.
     fn train(&self, place: usize, from_s: f64, to_s: f64, seed: u64) -> impl Iterator<Item = Pulse> {
         let stream = mix(seed ^ mix(place as u64));
         let phase = uniform(stream, u64::MAX) - 2.0;
         let count = libm::ceil((to_s - from_s) / self.period_s()) as u64 + 2;
         let (irregularity, period_s) = (self.irregularity(), self.period_s());
-        let (duration_s, extra_w) = (self.duration_s(), self.extra_w());
+        let (duration_s, extra_w, variation) = (self.duration_s(), self.extra_w(), self.variation());
+        let sizes = mix(stream);
         (0..count + 1)
             .map(move |k| {
                 let start_s = from_s + (phase + k as f64 + irregularity * uniform(stream, k)) * period_s;
+                let extra_w = extra_w * (1.0 + variation * (2.0 * uniform(sizes, k) - 1.0));
                 Pulse { start_s, end_s: start_s + duration_s, extra_w, cause: Cause::Disturbance(place) }
             })
             .filter(move |pulse| pulse.end_s > from_s && pulse.start_s < to_s)

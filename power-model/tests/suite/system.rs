@@ -136,6 +136,13 @@ fn what_is_irregular_comes_once_in_a_period_of_its_own_and_another_time_with_ano
     // Two numbers uniform in a period differ by a triangular distribution, of variance P^2/6.
     let variance = gaps.iter().map(|gap| (gap - 0.066) * (gap - 0.066)).sum::<f64>() / gaps.len() as f64;
     assert!((variance / (0.066 * 0.066 / 6.0) - 1.0).abs() < 0.4, "{variance}");
+    // 0.2 W, from half to one and a half of it: uniform, so of variance 0.2^2 / 12.
+    let drawn = phone.system.surround(&run, &SETTLED).unwrap().pulses;
+    let powers: Vec<f64> = drawn.iter().map(|pulse| pulse.extra_w).collect();
+    assert!(powers.iter().all(|watts| (0.1..=0.3).contains(watts)));
+    let mean = powers.iter().sum::<f64>() / powers.len() as f64;
+    let variance = powers.iter().map(|w| (w - mean) * (w - mean)).sum::<f64>() / powers.len() as f64;
+    assert!((mean - 0.2).abs() < 0.02 && (variance / (0.04 / 12.0) - 1.0).abs() < 0.4, "{mean} {variance}");
 }
 
 #[test]
@@ -187,7 +194,7 @@ fn a_table_of_another_node_is_scaled_in_the_core_and_nowhere_else() {
 fn too_many_disturbances_are_an_error_and_no_memory() {
     let mut phone = quiet("");
     let text = "(disturbances: [(name: \"x\", period_s: Assumed(0.0001, \"t\"), irregularity: Assumed(0, \"t\"), \
-                duration_s: Assumed(0, \"t\"), extra_w: Assumed(1, \"t\"))])";
+                duration_s: Assumed(0, \"t\"), extra_w: Assumed(1, \"t\"), variation: Assumed(0, \"t\"))])";
     phone.system = activity::spec::parse(text, "x.ron").unwrap();
     let mut run = thirty(&phone, 1);
     run.curve = Curve::new(vec![0.0, 2e4], vec![1.0]).unwrap();

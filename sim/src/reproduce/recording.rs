@@ -1,0 +1,129 @@
+//! Frames as a recorder sees them, and what the analysis finds in the trace.
+
+use power_model::{Circumstances, FramePower, Pacing, Surrounded, pace};
+use traces::Trace;
+use traces::device::{Device, DeviceSpec};
+use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
+use traces::frames::{Flag, Marks, Method, Options, default_window, find_with};
+use traces::score::{self, Score, TOLERANCE_S};
+
+use super::stage::Stage;
+use crate::run::RunError;
+
+/// Samples a second of the papers' station (Paper II, section 3).
+const RATE_HZ: f64 = 40e3;
+
+/// Tracking outright: where frames are all alike but for a clock that touches every fifteenth, the sum of squares takes those
+/// alone to be starts, and `Auto` then leaves it at that.
+const METHOD: Options = Options { method: Method::Tracking };
+
+/// A trace, the truth behind it, and the frames that were found in it.
+pub(super) struct Recording {
+    /// What was drawn, and when: the application's own timestamps.
+    pub truth: Surrounded,
+    /// What was recorded of it.
+    pub trace: Trace,
+    /// Frames found from one mark, with their energies from start to start.
+    pub found: Vec<FrameEnergy>,
+    /// Where the last one ends.
+    pub end_s: f64,
+}
+
+impl Recording {
+    /// Draws `frames` on the stage, records them, and finds them again from one marked start in the middle.
+    pub fn new(
+        stage: &Stage,
+        frames: &[&FramePower],
+        pacing: Pacing,
+        circumstances: Circumstances,
+    ) -> Result<Self, RunError> {
+        let run = pace(frames, &stage.platform, pacing)?;
+        let truth = stage.platform.system.surround(&run, &circumstances)?;
+        let trace =
+            recorder(stage, circumstances.seed)?.sample(&truth.curve, 0.0, truth.curve.end_s())?.trace;
+        let found = find_with(&trace, &marks(&truth, &trace), &METHOD)?;
+        let energies = PowerIntegral::new(&trace).frames(&found);
+        Ok(Self { end_s: found.end_s, found: energies, truth, trace })
+    }
+
+    /// Found against true starts.
+    pub fn score(&self) -> Score {
+        let frames = self.truth.frames.iter();
+        let truth: Vec<_> =
+            frames.map(|frame| TrueFrame { start_s: frame.start_s, energy_j: frame.energy_j }).collect();
+        score::score(&self.found, &truth, TOLERANCE_S)
+    }
+
+    /// Energies of the found frames in order, J.
+    pub fn energies_j(&self) -> Vec<f64> {
+        self.found.iter().map(|frame| frame.energy_j).collect()
+    }
+
+    /// For each frame that was drawn, the energy of the one found in its place, J; none where there is none, or where the
+    /// analysis itself says that it is merged with another or a part of one.
+    pub fn by_true_frame_j(&self) -> Vec<Option<f64>> {
+        let found: Vec<f64> = self.found.iter().map(|frame| frame.start_s).collect();
+        let truth: Vec<f64> = self.truth.frames.iter().map(|frame| frame.start_s).collect();
+        let mut matched = vec![None; truth.len()];
+        for (found, truth) in score::pairs(&found, &truth, TOLERANCE_S) {
+            let frame = &self.found[found];
+            let whole = ![Flag::Merged, Flag::Split, Flag::Long, Flag::Short]
+                .iter()
+                .any(|flag| frame.flags.contains(*flag));
+            matched[truth] = whole.then_some(frame.energy_j);
+        }
+        matched
+    }
+
+    /// From start to start by the application's own timestamps, in the recorded power, J.
+    pub fn by_timestamps_j(&self) -> Vec<f64> {
+        let integral = PowerIntegral::new(&self.trace);
+        self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.end_s)).collect()
+    }
+
+    /// The old method: from begin to finish by the application's timestamps, in the recorded power, J.
+    pub fn begin_to_finish_j(&self) -> Vec<f64> {
+        let integral = PowerIntegral::new(&self.trace);
+        self.truth.frames.iter().map(|frame| integral.energy_j(frame.start_s, frame.finish_s)).collect()
+    }
+
+    /// The recorded power over a stretch of time, as points from its start on.
+    pub fn points(&self, from_s: f64, to_s: f64) -> Vec<(f64, f64)> {
+        let place =
+            |time_s: f64| self.trace.position(time_s).clamp(0.0, self.trace.samples() as f64) as usize;
+        (place(from_s)..place(to_s))
+            .map(|index| (self.trace.time_s(index) - from_s, self.trace.power_w(index)))
+            .collect()
+    }
+}
+
+/// The papers' station on the platform's rail: current and voltage at 40 kHz.
+fn recorder(stage: &Stage, seed: u64) -> Result<Device, RunError> {
+    let default = DeviceSpec::default();
+    let rail_v = stage.platform.rail.voltage_v.value();
+    let (range_a, range_v) = (stage.sensor.range_a, 1.5 * rail_v);
+    Ok(Device::new(DeviceSpec {
+        name: "station of the papers".to_owned(),
+        rate_hz: RATE_HZ,
+        rail_v,
+        current_range_a: [-range_a, range_a],
+        voltage_range_v: [-range_v, range_v],
+        current_noise_a: stage.sensor.noise_a,
+        voltage_noise_v: default.voltage_noise_v * range_v / default.voltage_range_v[1],
+        seed,
+        ..default
+    })?)
+}
+
+/// One start in the steady part is marked, as an analyst would, and the end of the last frame.
+fn marks(truth: &Surrounded, trace: &Trace) -> Marks {
+    let middle = &truth.frames[truth.frames.len() / 2];
+    let lengths = truth.frames.iter().map(|frame| frame.end_s - frame.start_s);
+    let window = default_window(lengths.fold(f64::INFINITY, f64::min), trace.rate_hz());
+    Marks::one(middle.start_s, window, truth.end_s.min(trace.end_s()))
+}
+
+/// `frames` again and again, `count` in all.
+pub(super) fn looped(frames: &[FramePower], count: usize) -> Vec<&FramePower> {
+    frames.iter().cycle().take(count).collect()
+}
