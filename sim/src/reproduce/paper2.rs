@@ -4,7 +4,7 @@ use power_model::{Circumstances, FramePower};
 use traces::energy::PowerIntegral;
 
 use super::figure::{POWER, TIME, line};
-use super::recording::{Recording, looped};
+use super::recording::{MARKED, Recording, looped};
 use super::row::{Kind, Row, Verdict, numbers};
 use super::stage::Stage;
 use super::{Done, Effort, Figure};
@@ -21,7 +21,7 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
     let frames = pc.pc_animation(effort.pc_frames, progress)?;
     let shown = looped(&frames, effort.recorded_frames);
     let circumstances = Circumstances { launch: false, blocking_finish: false, seed: 1 };
-    let recording = Recording::new(&pc, &shown, pc.capped()?, circumstances)?;
+    let recording = Recording::new(&pc, &shown, pc.capped()?, circumstances, MARKED)?;
     let idle_w = pc.platform.idle_w.value();
     Ok(vec![passes(&recording, &frames, idle_w), inverses(&recording)])
 }

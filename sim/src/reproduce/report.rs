@@ -117,3 +117,58 @@ fn letters(row: &Row) -> String {
 fn stem_of(path: &str) -> &str {
     path.strip_suffix(".svg").unwrap_or(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::row::{Kind, numbers};
+    use super::*;
+
+    fn done(id: &'static str, kind: Kind, verdict: Verdict) -> Done {
+        let row = Row {
+            id,
+            kind,
+            claim: "a claim",
+            paper: "one",
+            ours: "two".to_owned(),
+            verdict,
+            note: "because".to_owned(),
+            numbers: numbers([("n", 2.0)]),
+            figure: None,
+            figures: Vec::new(),
+        };
+        let axes = [("x", ""), ("y", "W")];
+        let figure = Figure::lines("III_fig1", "t", "s", axes, Vec::new());
+        Done { row, figures: if kind == Kind::Order { vec![figure] } else { Vec::new() } }
+    }
+
+    fn report(verdict: Verdict) -> Report {
+        let rows = vec![done("III-8", Kind::Equality, verdict), done("III-9", Kind::Order, Verdict::Differs)];
+        Report::new(Paper::Three, Effort::QUICK, rows)
+    }
+
+    #[test]
+    fn an_equality_that_does_not_hold_is_named() {
+        assert!(report(Verdict::Holds).failing().is_empty() && report(Verdict::Holds).equalities_hold);
+        for verdict in [Verdict::Differs, Verdict::NotYet] {
+            assert_eq!(report(verdict).failing(), ["III-8"]);
+            assert!(!report(verdict).equalities_hold);
+        }
+    }
+
+    #[test]
+    fn text_and_json_say_the_same() {
+        let report = report(Verdict::NotYet);
+        let text = report.text();
+        for part in
+            ["III-8  a claim", "O,F  differs", "paper    one", "ours     two", "0 hold, 1 differ, 1 not yet"]
+        {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!(json["rows"][0]["figure"], serde_json::Value::Null);
+        assert_eq!(json["rows"][1]["figure"], "plots/III_fig1.svg");
+        assert_eq!(json["rows"][1]["kind"], "O");
+        assert_eq!(json["paper"], "III");
+        assert!(report.markdown().contains("| III-9 | O,F | one | two | *differs*: because |"));
+    }
+}

@@ -13,7 +13,7 @@ use crate::run::RunError;
 /// Frames of a short repeated measurement for the upper half of Figure 8.
 const SHORT: usize = 24;
 /// How many of them.
-const SHORT_REPEATS: u64 = 40;
+pub(super) const SHORT_REPEATS: u64 = 40;
 
 /// The disturbances of the kind that is listed first: those every five seconds.
 fn five_second_ones(recording: &Recording) -> Vec<&Pulse> {
@@ -112,6 +112,7 @@ fn reason(recording: &Recording, flags: &[bool], same: bool) -> String {
     let overlaps = overlaps_s(recording);
     let wrong =
         overlaps.iter().zip(flags).enumerate().filter(|(_, (overlap_s, flag))| (**overlap_s > 0.0) != **flag);
+    // A frame whose start was missed counts as one without energy, and is flagged.
     let list: Vec<String> =
         wrong.map(|(place, (overlap_s, _))| format!("{place} ({:.2} ms)", 1e3 * overlap_s)).collect();
     format!("frames told wrong, with how long they were disturbed: {}", list.join(", "))

@@ -5,7 +5,7 @@ mod disturbance;
 mod finding;
 mod launch;
 
-use power_model::{Circumstances, FramePower};
+use power_model::{Circumstances, FramePower, Pacing};
 
 use super::recording::{Recording, looped};
 use super::stage::Stage;
@@ -38,17 +38,22 @@ impl Bench<'_> {
         &self.phone_frames[FRAME / self.effort.phone_step as usize]
     }
 
-    /// The phone draws `frames` at its cap.
+    /// The phone draws `frames` at its cap; one start is marked.
     fn on_phone(&self, frames: &[&FramePower], circumstances: Circumstances) -> Result<Recording, RunError> {
         self.bar.inc();
-        Recording::new(&self.phone, frames, self.phone.capped()?, circumstances)
+        Recording::new(&self.phone, frames, self.phone.capped()?, circumstances, 1)
     }
 
-    /// The PC draws its animation at its cap.
-    fn on_pc(&self, circumstances: Circumstances) -> Result<Recording, RunError> {
+    /// The PC draws its animation; so many starts are marked.
+    fn on_pc(
+        &self,
+        pacing: Pacing,
+        circumstances: Circumstances,
+        marked: usize,
+    ) -> Result<Recording, RunError> {
         self.bar.inc();
         let shown = looped(&self.pc_frames, self.effort.recorded_frames);
-        Recording::new(&self.pc, &shown, self.pc.capped()?, circumstances)
+        Recording::new(&self.pc, &shown, pacing, circumstances, marked)
     }
 }
 
@@ -56,12 +61,11 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
     let (pc, phone) = (Stage::pc()?, Stage::phone()?);
     let pc_frames = pc.pc_animation(effort.pc_frames, progress)?;
     let phone_frames = phone.phone_sequence(effort.phone_step, progress)?;
-    let bar = &progress.bar("recordings", 9 + 5 * effort.repeats);
+    let bar = &progress.bar("recordings", 5 + disturbance::SHORT_REPEATS + 7 * effort.repeats);
     let bench = Bench { effort, pc, pc_frames, phone, phone_frames, bar };
-    let capped = bench.on_pc(settled(1))?;
     Ok(vec![
-        finding::found(&bench, &capped)?,
-        finding::sums(&capped),
+        finding::found(&bench)?,
+        finding::sums(&bench)?,
         launch::warm_up(&bench)?,
         blocking::phone(&bench)?,
         blocking::pc(&bench)?,
