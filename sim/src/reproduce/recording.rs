@@ -1,6 +1,6 @@
 //! Frames as a recorder sees them, and what the analysis finds in the trace.
 
-use power_model::{Circumstances, FramePower, Pacing, Surrounded, pace};
+use power_model::{Cause, Circumstances, FramePower, Pacing, Surrounded, pace};
 use traces::Trace;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
@@ -51,12 +51,25 @@ impl Recording {
         Ok(Self { end_s: found.end_s, found: energies, truth, trace })
     }
 
-    /// Found against true starts.
-    pub fn score(&self) -> Score {
-        let frames = self.truth.frames.iter();
+    /// Starts found from one mark by `method` against the true ones, and how many of those missed had a disturbance on them.
+    pub fn score(&self, method: Method) -> Result<(Score, usize), RunError> {
+        let marks = marks(&self.truth, &self.trace, 1);
+        let found = find_with(&self.trace, &marks, &Options { method })?;
+        let frames = PowerIntegral::new(&self.trace).frames(&found);
+        let truth = self.truth.frames.iter();
         let truth: Vec<_> =
-            frames.map(|frame| TrueFrame { start_s: frame.start_s, energy_j: frame.energy_j }).collect();
-        score::score(&self.found, &truth, TOLERANCE_S)
+            truth.map(|frame| TrueFrame { start_s: frame.start_s, energy_j: frame.energy_j }).collect();
+        let beside = score::truth_beside(&frames, &truth, TOLERANCE_S);
+        let missed = truth.iter().filter(|frame| !beside.contains(&Some(**frame)));
+        let window = |start_s: f64| (start_s - marks.window.pre_s, start_s + marks.window.post_s);
+        let disturbed = missed.filter(|frame| self.is_disturbed(window(frame.start_s))).count();
+        Ok((score::score(&frames, &truth, TOLERANCE_S), disturbed))
+    }
+
+    fn is_disturbed(&self, (from_s, to_s): (f64, f64)) -> bool {
+        let disturbances =
+            self.truth.pulses.iter().filter(|pulse| matches!(pulse.cause, Cause::Disturbance(_)));
+        disturbances.into_iter().any(|pulse| pulse.overlap_s(from_s, to_s) > 0.0)
     }
 
     /// Energies of the found frames in order, J.

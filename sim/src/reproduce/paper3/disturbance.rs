@@ -153,24 +153,28 @@ fn flagged(energies: &[f64], flags: &[bool]) -> Figure {
 /// Figure 8, upper half: standard deviation over the number of repetitions, of a frame that is never hit and of one that is.
 fn growing(bench: &Bench<'_>) -> Result<Figure, RunError> {
     let shown = vec![bench.frame(); SHORT];
-    let (mut energies, mut hits) = (vec![Vec::new(); SHORT], [0_u32; SHORT]);
+    let (mut energies, mut first_hits) = (vec![Vec::new(); SHORT], [None; SHORT]);
     for seed in 0..SHORT_REPEATS {
         let recording = bench.on_phone(&shown, settled(100 + seed))?;
         let frames = recording.by_timestamps_j().into_iter().zip(overlaps_s(&recording));
-        for ((energy, overlap_s), (list, hits)) in frames.zip(energies.iter_mut().zip(&mut hits)) {
+        for ((energy, overlap_s), (list, first_hit)) in frames.zip(energies.iter_mut().zip(&mut first_hits)) {
             list.push(energy);
-            *hits += u32::from(overlap_s > 5e-3);
+            if overlap_s > 5e-3 {
+                first_hit.get_or_insert(list.len());
+            }
         }
     }
-    let place = |wanted: fn(u32) -> bool| hits.iter().position(|hits| wanted(*hits));
+    let never = first_hits.iter().position(Option::is_none);
+    // The later it is hit, the better one sees the deviation fall and then rise.
+    let late = (0..SHORT).filter(|&place| first_hits[place].is_some()).max_by_key(|&place| first_hits[place]);
     let deviations = |place: usize| -> Vec<(f64, f64)> {
         let list = &energies[place];
         let of = |count: usize| Spread::of(&list[..count]).map_or(0.0, |spread| spread.deviation);
         (2..=list.len()).map(|count| (count as f64, of(count))).collect()
     };
     let mut series = Vec::new();
-    series.extend(place(|hits| hits == 0).map(|place| line("a frame never hit", deviations(place))));
-    series.extend(place(|hits| hits > 0).map(|place| line("a frame hit at least once", deviations(place))));
+    series.extend(never.map(|place| line("a frame never hit", deviations(place))));
+    series.extend(late.map(|place| line("a frame hit at least once", deviations(place))));
     Ok(Figure::lines(
         "III_fig8_deviation",
         "Standard deviation over repetitions (Paper III, Figure 8, top)",

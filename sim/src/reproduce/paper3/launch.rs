@@ -109,9 +109,15 @@ fn on_pc(recording: &Recording) -> Figure {
     )
 }
 
-/// Figure 5c: mean energy over discarded frames.
+/// Figure 5c: mean energy over discarded frames, outliers left out.
 fn discarded(recording: &Recording, knee: usize) -> Figure {
-    let means = mean_over_discarded(&recording.energies_j());
+    let energies = recording.energies_j();
+    let flags = outliers(&energies);
+    let kept: Vec<f64> =
+        energies.iter().zip(&flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect();
+    // Frames are numbered as kept from here on.
+    let knee = (0..knee).filter(|&place| !flags[place]).count();
+    let means = mean_over_discarded(&kept);
     let shown = &means[..means.len() - means.len() / 4];
     let [low, high] =
         [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| shown.iter().copied().reduce(pick));
@@ -119,7 +125,7 @@ fn discarded(recording: &Recording, knee: usize) -> Figure {
     Figure::lines(
         "III_fig5c",
         "Mean energy over discarded frames (Paper III, Figure 5c)",
-        "the phone draws one frame again and again; the knee as the analysis finds it",
+        "the phone draws one frame again and again; outliers left out; the knee as the analysis finds it",
         [("discarded frames", ""), ("mean energy", "J")],
         vec![
             line("mean of the frames left", by_place(shown)),
