@@ -59,7 +59,7 @@ pub(super) fn phone(frame: u32) -> Result<Scene, LoadError> {
 /// 256 x 256 texels (Paper III, section 4), in stripes.
 fn texture() -> Option<Texture> {
     const SIDE: u32 = 256;
-    let texel = |at: u32| if at / 16 % 2 == 0 { [210, 200, 180, 255] } else { [60, 90, 140, 255] };
+    let texel = |at: u32| if (at / 16).is_multiple_of(2) { [210, 200, 180, 255] } else { [60, 90, 140, 255] };
     let texels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| texel(x + y))).collect();
     Texture::from_srgb8(SIDE, SIDE, texels, [Wrap::Repeat; 2]).ok()
 }
