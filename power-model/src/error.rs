@@ -72,6 +72,16 @@ pub enum PlatformError {
         /// The unit.
         unit: &'static str,
     },
+    /// Two disturbances have one name.
+    #[error(
+        "{path}: disturbance `{name}` is listed more than once under `system`: keep one, or name them apart"
+    )]
+    DuplicateDisturbance {
+        /// The file.
+        path: String,
+        /// The name.
+        name: String,
+    },
     /// An event is overridden twice.
     #[error("{path}: event `{event}` is listed more than once under `energy_rows`: keep one row")]
     DuplicateRow {
@@ -88,12 +98,12 @@ pub enum ModelError {
     /// The platform is made on another process node than the table describes.
     #[error(
         "platform `{platform}` is a {platform_nm} nm part but energy table `{table}` is for {table_nm} nm: \
-         use a table for its node"
+         use a table for its node, or scale one with `energy_from`"
     )]
     Node {
         /// The platform.
         platform: String,
-        /// Its node in nanometres.
+        /// The node of the tables it takes, in nanometres.
         platform_nm: u32,
         /// The table.
         table: String,
@@ -172,6 +182,14 @@ pub enum PacingError {
     /// The run lasts longer than a clock of 64 bits of picoseconds.
     #[error("the run lasts more than 213 days: pace fewer frames")]
     TooLong,
+    /// More disturbances than anyone can look at.
+    #[error("the run of {run_s} s would have more than {most} disturbances: shorten it, or make them rarer")]
+    TooDisturbed {
+        /// Length of the run, s.
+        run_s: f64,
+        /// The most there can be.
+        most: usize,
+    },
     /// The power curve refused a step.
     #[error("the power curve of the run: {0}")]
     Curve(#[from] traces::CurveError),

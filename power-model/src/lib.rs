@@ -5,6 +5,7 @@
 //! - [`Part`] and [`Energy`]: where joules go. The sum over parts *is* a frame's energy, exactly.
 //! - [`PowerModel`]: a [`activity::Timeline`] in, a [`FramePower`] out.
 //! - [`pace`]: frames, one after another under V-sync or free-running, become one power curve.
+//! - [`System::surround`]: what launch, a blocking finish and the operating system add to that curve.
 //!
 //! The equation (design, section 7), for every bin of the timeline:
 //!
@@ -26,6 +27,7 @@ mod parts;
 mod platform;
 mod quantity;
 mod row;
+mod system;
 mod table;
 
 pub use error::{ModelError, PacingError, PlatformError, TableError, TimelineError};
@@ -33,9 +35,13 @@ pub use frame::FramePower;
 pub use model::PowerModel;
 pub use pacing::{PacedFrame, Pacing, Run, pace};
 pub use parts::{Energy, PARTS, Part};
-pub use platform::{Leakage, Platform, Provenance, Rail, UnitPower};
+pub use platform::{Leakage, Platform, Provenance, Rail, ScaledFrom, UnitPower};
 pub use quantity::{
-    Basis, Celsius, Exponent, Hertz, OutOfRange, Picojoules, Quantity, Seconds, Source, Sourced, Volts, Watts,
+    Basis, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds, Share,
+    Source, Sourced, Volts, Watts,
 };
 pub use row::{EnergyRow, Supply};
+pub use system::{
+    Cause, Circumstances, Disturbance, Finish, Launch, Pulse, Surrounded, SurroundedFrame, System, overlay,
+};
 pub use table::{Bound, EnergyTable, Entry};

@@ -103,10 +103,10 @@ impl PowerModel {
 }
 
 fn check_match(table: &EnergyTable, platform: &Platform) -> Result<(), ModelError> {
-    if table.node_nm() != platform.node_nm {
+    if table.node_nm() != platform.table_node().0 {
         return Err(ModelError::Node {
             platform: platform.name.clone(),
-            platform_nm: platform.node_nm,
+            platform_nm: platform.table_node().0,
             table: table.name().to_owned(),
             table_nm: table.node_nm(),
         });
@@ -120,15 +120,20 @@ fn check_match(table: &EnergyTable, platform: &Platform) -> Result<(), ModelErro
 }
 
 /// Joules per event: the table's, the platform's own rows in their place, core rows scaled to the core voltage.
-/// Switching energy goes with C V^2 (Horowitz 2014); a platform's rows are stated at the table's V0, too.
+/// Switching energy goes with C V^2 (Horowitz 2014); a platform's rows are stated at the table's V0, too, but on its own node.
 fn event_energies(table: &EnergyTable, platform: &Platform, bound: Bound) -> [f64; Event::COUNT] {
     let ratio = platform.v_v.value() / table.v0_v();
     let at_voltage = |row: &EnergyRow| match row.supply() {
         Supply::Core => row.joules(bound) * (ratio * ratio),
         Supply::Memory => row.joules(bound),
     };
+    let scale = platform.table_node().1;
     let mut joules = [0.0; Event::COUNT];
-    for row in table.rows().chain(platform.energy_rows()) {
+    for row in table.rows() {
+        let node = if row.supply() == Supply::Core { scale } else { 1.0 };
+        joules[row.event() as usize] = node * at_voltage(row);
+    }
+    for row in platform.energy_rows() {
         joules[row.event() as usize] = at_voltage(row);
     }
     joules

@@ -77,6 +77,12 @@ quantities! {
     Hertz "Hz" 0.1 to 1e5
     /// A junction temperature.
     Celsius "degC" -50.0 to 150.0
+    /// A time from one thing to the next of its kind, 0.1 ms to an hour: nothing repeats without pause.
+    Interval "s" 1e-4 to 3600.0
+    /// A part of a whole.
+    Share "(share)" 0.0 to 1.0
+    /// One number over another of the same kind.
+    Ratio "(ratio)" 0.01 to 100.0
     /// An exponent of a stated law.
     Exponent "(exponent)" 0.0 to 10.0
     /// Energy of one event, at most 1 mJ: more is a mistake of units.

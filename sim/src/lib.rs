@@ -6,6 +6,7 @@
 //! - [`run`]: a scene through the whole line, from triangles to millijoules per frame.
 //! - [`stress`]: the failure catalogue, each tile test on each family of triangles.
 //! - [`chart`]: charts of the book, measured and drawn.
+//! - [`reproduce`]: what the papers report, computed and held against them.
 //! - [`output`]: files, plots, the timeline and the report.
 //! - [`visibility`]: what every sample of a scene sees, and how fast.
 //! - [`cli`]: the command `quintile`.
@@ -14,6 +15,7 @@ pub mod chart;
 pub mod cli;
 pub mod gpu;
 pub mod output;
+pub mod reproduce;
 pub mod run;
 pub mod stress;
 pub mod timing;

@@ -3,10 +3,11 @@
 use activity::{Event, Unit, spec};
 use serde::Deserialize;
 
-use super::{Leakage, Platform, Rail, UnitPower};
+use super::{Leakage, Platform, Rail, ScaledFrom, UnitPower};
 use crate::PlatformError;
 use crate::quantity::{Seconds, Source, Sourced, Volts, Watts};
 use crate::row::EnergyRow;
+use crate::system::System;
 
 /// A platform as it is written in a file.
 #[derive(Deserialize)]
@@ -15,6 +16,8 @@ pub(super) struct Written {
     name: String,
     doc: Source,
     node_nm: u32,
+    #[serde(default)]
+    energy_from: Option<ScaledFrom>,
     rail: Rail,
     v0_v: Sourced<Volts>,
     v_v: Sourced<Volts>,
@@ -25,6 +28,8 @@ pub(super) struct Written {
     submit_gap_s: Sourced<Seconds>,
     lead_in_s: Sourced<Seconds>,
     tail_s: Sourced<Seconds>,
+    #[serde(default)]
+    system: System,
     #[serde(default)]
     energy_rows: Vec<EnergyRow>,
 }
@@ -54,10 +59,12 @@ impl Written {
     /// Puts what is written in order, or says what is there twice or not at all.
     pub(super) fn check(self, file: &str) -> Result<Platform, PlatformError> {
         refuse_repeated_rows(&self.energy_rows, file)?;
+        refuse_repeated_names(&self.system, file)?;
         Ok(Platform {
             name: self.name,
             doc: self.doc.text().to_owned(),
             node_nm: self.node_nm,
+            energy_from: self.energy_from,
             rail: self.rail,
             v0_v: self.v0_v,
             v_v: self.v_v,
@@ -68,6 +75,7 @@ impl Written {
             submit_gap_s: self.submit_gap_s,
             lead_in_s: self.lead_in_s,
             tail_s: self.tail_s,
+            system: self.system,
             energy_rows: self.energy_rows,
         })
     }
@@ -78,6 +86,16 @@ fn refuse_repeated_rows(rows: &[EnergyRow], file: &str) -> Result<(), PlatformEr
     for row in rows {
         if std::mem::replace(&mut seen[row.event() as usize], true) {
             return Err(PlatformError::DuplicateRow { path: file.to_owned(), event: row.event().name() });
+        }
+    }
+    Ok(())
+}
+
+fn refuse_repeated_names(system: &System, file: &str) -> Result<(), PlatformError> {
+    for (at, disturbance) in system.disturbances.iter().enumerate() {
+        if system.disturbances[..at].iter().any(|other| other.name() == disturbance.name()) {
+            let name = disturbance.name().to_owned();
+            return Err(PlatformError::DuplicateDisturbance { path: file.to_owned(), name });
         }
     }
     Ok(())

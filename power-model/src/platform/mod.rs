@@ -9,11 +9,16 @@ use serde::Deserialize;
 
 use self::file::Written;
 use crate::PlatformError;
-use crate::quantity::{Basis, Celsius, Exponent, Quantity, Seconds, Sourced, Volts, Watts};
+use crate::quantity::{Basis, Celsius, Exponent, Quantity, Ratio, Seconds, Sourced, Volts, Watts};
 use crate::row::EnergyRow;
+use crate::system::System;
 
 /// The platforms that come with the crate, by name.
-const BUILTIN: [(&str, &str); 1] = [("reference", include_str!("../../platforms/reference.ron"))];
+const BUILTIN: [(&str, &str); 3] = [
+    ("reference", include_str!("../../platforms/reference.ron")),
+    ("iphone_4s", include_str!("../../platforms/iphone_4s.ron")),
+    ("hd_4000", include_str!("../../platforms/hd_4000.ron")),
+];
 
 /// The supply at which a power meter would be put.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -23,6 +28,17 @@ pub struct Rail {
     pub name: String,
     /// Its voltage, which turns watts into amperes; not the core voltage.
     pub voltage_v: Sourced<Volts>,
+}
+
+/// How energies of another node's table become this node's.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScaledFrom {
+    /// The node of the table, in nanometres.
+    pub node_nm: u32,
+    /// Energy of an event in the core on this platform's node over that on the table's, at one voltage. Memory has nodes of
+    /// its own and is not scaled.
+    pub core_scale: Sourced<Ratio>,
 }
 
 /// Leakage of the powered core: `P = reference_w (V/V0)^voltage_exponent 2^((T - T0) / doubling)`, with V0 the
@@ -62,8 +78,10 @@ pub struct Platform {
     pub name: String,
     /// What it is, in words.
     pub doc: String,
-    /// Its process node in nanometres, which the energy table's must match.
+    /// Its process node in nanometres, which the energy table's must match, or that of `energy_from`.
     pub node_nm: u32,
+    /// The table it uses instead of one for its own node.
+    pub energy_from: Option<ScaledFrom>,
     /// The supply a meter would see.
     pub rail: Rail,
     /// The core voltage at which the watts of this platform are stated.
@@ -84,6 +102,8 @@ pub struct Platform {
     pub lead_in_s: Sourced<Seconds>,
     /// Idle time recorded after the last frame.
     pub tail_s: Sourced<Seconds>,
+    /// What surrounds the GPU and shows in a recording: launch, blocking calls, the operating system.
+    pub system: System,
     /// Rows that replace the energy table's, for devices the table cannot know.
     energy_rows: Vec<EnergyRow>,
 }
@@ -159,6 +179,12 @@ impl Platform {
         reference_w.value() * voltage * libm::exp2(doublings)
     }
 
+    /// The node of the table it uses, and what the table's energies of core events are multiplied with.
+    pub fn table_node(&self) -> (u32, f64) {
+        let from = self.energy_from.as_ref();
+        from.map_or((self.node_nm, 1.0), |from| (from.node_nm, from.core_scale.value()))
+    }
+
     /// V/V0: the core voltage it runs at over the one its watts are stated at.
     pub fn voltage_ratio(&self) -> f64 {
         self.v_v.value() / self.v0_v.value()
@@ -166,7 +192,10 @@ impl Platform {
 
     /// Every number with its source, in the order of the file; energy rows excepted, which carry their own.
     pub fn provenance(&self) -> Vec<Provenance<'_>> {
-        let mut list = vec![
+        let scale =
+            self.energy_from.as_ref().map(|from| provenance("energy_from.core_scale", &from.core_scale));
+        let mut list: Vec<_> = scale.into_iter().collect();
+        list.extend([
             provenance("rail.voltage_v", &self.rail.voltage_v),
             provenance("v0_v", &self.v0_v),
             provenance("v_v", &self.v_v),
@@ -176,7 +205,7 @@ impl Platform {
             provenance("leakage.temperature_c", &self.leakage.temperature_c),
             provenance("leakage.reference_c", &self.leakage.reference_c),
             provenance("leakage.doubling_c", &self.leakage.doubling_c),
-        ];
+        ]);
         for row in &self.units {
             let name = row.unit.name();
             list.push(provenance(&format!("units.{name}.clock_tree_w"), &row.clock_tree_w));
@@ -186,11 +215,12 @@ impl Platform {
         list.push(provenance("submit_gap_s", &self.submit_gap_s));
         list.push(provenance("lead_in_s", &self.lead_in_s));
         list.push(provenance("tail_s", &self.tail_s));
+        list.extend(self.system.provenance());
         list
     }
 }
 
-fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> Provenance<'a> {
+pub(crate) fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> Provenance<'a> {
     Provenance {
         field: field.to_owned(),
         value: number.value(),

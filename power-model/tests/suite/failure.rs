@@ -9,6 +9,7 @@ use super::common::{bare, model, reference, steady, table, volts};
 
 const TABLE: &str = include_str!("../../tables/28nm.ron");
 const PLATFORM: &str = include_str!("../../platforms/reference.ron");
+const PHONE: &str = include_str!("../../platforms/iphone_4s.ron");
 
 /// The message for the table with `from` replaced by `to` once.
 fn table_error(from: &str, to: &str) -> String {
@@ -20,6 +21,12 @@ fn table_error(from: &str, to: &str) -> String {
 fn platform_error(from: &str, to: &str) -> String {
     assert!(PLATFORM.contains(from), "the platform has no `{from}`");
     Platform::parse(&PLATFORM.replacen(from, to, 1), "mine.ron").unwrap_err().to_string()
+}
+
+/// The message for the phone with `from` replaced by `to` once.
+fn phone_error(from: &str, to: &str) -> String {
+    assert!(PHONE.contains(from), "the phone has no `{from}`");
+    Platform::parse(&PHONE.replacen(from, to, 1), "mine.ron").unwrap_err().to_string()
 }
 
 /// The line of `text` on which `what` first stands, from 1.
@@ -100,6 +107,7 @@ fn a_reference_voltage_outside_its_own_range_is_refused() {
 fn unknown_names_come_with_the_nearest_known() {
     assert_says(&EnergyTable::builtin("28mm").unwrap_err().to_string(), &["`28mm`", "did you mean `28nm`?"]);
     assert_says(&Platform::builtin("referenz").unwrap_err().to_string(), &["did you mean `reference`?"]);
+    assert_says(&Platform::builtin("iphone4s").unwrap_err().to_string(), &["did you mean `iphone_4s`?"]);
 }
 
 #[test]
@@ -147,6 +155,44 @@ fn a_platforms_own_rows_are_there_once_each() {
         r#"(event: "draws", low_pj: 1, nominal_pj: 2, high_pj: 3, basis: Assumed, per: "x", source: "y")"#;
     let message = platform_error("    idle_w: ", &format!("    energy_rows: [{row}, {row}],\n    idle_w: "));
     assert_says(&message, &["mine.ron", "event `draws`", "more than once under `energy_rows`"]);
+}
+
+#[test]
+fn what_surrounds_a_platform_is_checked_where_it_stands() {
+    for (from, to, parts) in [
+        ("launch: (", "lunch: (", ["unknown field `lunch`", "did you mean `launch`?"]),
+        ("waiting_w: ", "wating_w: ", ["unknown field `wating_w`", "did you mean `waiting_w`?"]),
+        ("irregularity: ", "iregularity: ", ["unknown field `iregularity`", "did you mean `irregularity`?"]),
+        ("core_scale: ", "scale: ", ["unknown field `scale`", "known here: node_nm, core_scale"]),
+        (
+            "frame_cap_hz: Published(30",
+            "frame_cap_hz: Published(0",
+            ["0 Hz is not a number", "give one in that range"],
+        ),
+        ("extra_w: Published(0.05", "extra_w: Published(-0.05", ["-0.05 W is not", "give one in that range"]),
+        (
+            "period_s: Published(5.0",
+            "period_s: Published(0.0",
+            ["0 s is not a number from 0.0001", "give one in that range"],
+        ),
+        (
+            "irregularity: Published(1.0",
+            "irregularity: Published(1.5",
+            ["1.5 (share) is not", "from 0 to 1 (share)"],
+        ),
+        ("core_scale: Derived(1.96", "core_scale: Derived(0", ["0 (ratio) is not", "from 0.01 to 100"]),
+    ] {
+        let place = format!("mine.ron:{}:", line_of(PHONE, from));
+        assert_says(&phone_error(from, to), &[&place, parts[0], parts[1]]);
+    }
+}
+
+#[test]
+fn a_disturbance_ends_before_it_comes_again_and_has_a_name_of_its_own() {
+    let message = phone_error("duration_s: Published(0.090", "duration_s: Published(6");
+    assert_says(&message, &["mine.ron:", "`five_seconds` lasts 6 s but comes every 5 s", "shorten it"]);
+    let message = phone_error("name: \"stray_spike\"", "name: \"regular_spike\"");
+    assert_says(&message, &["mine.ron", "disturbance `regular_spike`", "more than once"]);
 }
 
 #[test]

@@ -10,3 +10,5 @@ mod derivations;
 mod failure;
 #[cfg(test)]
 mod property;
+#[cfg(test)]
+mod system;

@@ -36,6 +36,8 @@ pub enum Command {
     Stress(StressArgs),
     /// Measure and draw a chart of the book
     Chart(ChartArgs),
+    /// Compute what a paper reports and hold it against that, row by row
+    Reproduce(super::reproduce::ReproduceArgs),
     /// Analyse a power trace, recorded or synthetic: frames, energies, alignment, formats, plots, Pareto frontiers
     Trace(TraceArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program

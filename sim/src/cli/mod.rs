@@ -5,6 +5,7 @@ mod ccd;
 mod chart;
 mod list;
 mod parse;
+mod reproduce;
 mod run;
 mod samples;
 mod stress;
@@ -89,6 +90,7 @@ fn dispatch(cli: &Cli) -> Result<(), Failure> {
         Command::Samples(args) => samples::run(args),
         Command::Stress(args) => stress::run(args),
         Command::Chart(args) => chart::run(args),
+        Command::Reproduce(args) => reproduce::run(args),
         Command::Trace(args) => trace::run(args),
     }
 }

@@ -50,10 +50,11 @@ pub enum GpuError {
 }
 
 /// The GPUs that come with the program: name and file.
-const BUILTIN: [(&str, &str); 3] = [
+const BUILTIN: [(&str, &str); 4] = [
     ("reference", include_str!("../../gpus/reference.ron")),
     ("mobile", include_str!("../../gpus/mobile.ron")),
     ("discrete", include_str!("../../gpus/discrete.ron")),
+    ("hd_4000", include_str!("../../gpus/hd_4000.ron")),
 ];
 
 impl GpuSpec {

@@ -42,6 +42,7 @@ pub use modelled::Modelled;
 pub use options::{PacingChoice, Plan, RunOptions};
 pub use regime::Regime;
 pub use sampled::{Forecast, Glimpse, Preview, Quantity, SampledSummary, Scout, Signatures, Taken, taken};
+pub(crate) use simulate::BIN_PS;
 pub use simulate::{Simulated, SimulatedFrame, frames_of};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};

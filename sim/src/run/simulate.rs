@@ -18,7 +18,7 @@ use crate::output::progress::Progress;
 use crate::timing::{Doubt, FrameClock, Sampling};
 
 /// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
-pub(super) const BIN_PS: u64 = 1_000_000;
+pub(crate) const BIN_PS: u64 = 1_000_000;
 /// Most bins of all frames that are kept, about 200 bytes each; where there would be more they are made longer.
 const MOST_BINS: usize = 8_000_000;
 /// Fewest bins of a frame, however many frames there are.

@@ -1,0 +1,57 @@
+//! Figures of the papers, drawn anew.
+
+use crate::output::plot::{Lines, Mark, Picture, Series};
+
+/// A picture and its name.
+pub struct Figure {
+    /// Its name without ending, for example `III_fig3`.
+    pub name: &'static str,
+    /// What is drawn.
+    pub picture: Picture,
+}
+
+impl Figure {
+    /// Where it is below the folder of results, as SVG.
+    pub(super) fn path(&self) -> String {
+        format!("plots/{}.svg", self.name)
+    }
+
+    /// Series over two axes, each `(what, unit)`.
+    pub(super) fn lines(
+        name: &'static str,
+        title: &str,
+        subject: &str,
+        [x, y]: [(&str, &str); 2],
+        series: Vec<Series>,
+    ) -> Self {
+        Self { name, picture: Lines { title, subject, x, y, series }.picture() }
+    }
+}
+
+/// Time.
+pub(super) const TIME: (&str, &str) = ("time", "s");
+/// Power.
+pub(super) const POWER: (&str, &str) = ("power", "W");
+/// Energy of a frame.
+pub(super) const ENERGY: (&str, &str) = ("energy per frame", "J");
+
+/// A line.
+pub(super) fn line(name: &str, points: Vec<(f64, f64)>) -> Series {
+    Series { name: name.to_owned(), mark: Mark::Line(points) }
+}
+
+/// Dots without names.
+pub(super) fn dots(name: &str, points: Vec<(f64, f64)>) -> Series {
+    let dots = points.into_iter().map(|(x, y)| (x, y, String::new())).collect();
+    Series { name: name.to_owned(), mark: Mark::Dots(dots) }
+}
+
+/// A level line across from one place to another.
+pub(super) fn level(name: &str, from: f64, to: f64, height: f64) -> Series {
+    line(name, vec![(from, height), (to, height)])
+}
+
+/// Values over their place in the list, from 0.
+pub(super) fn by_place(values: &[f64]) -> Vec<(f64, f64)> {
+    values.iter().enumerate().map(|(place, value)| (place as f64, *value)).collect()
+}

@@ -1,0 +1,185 @@
+//! Row III-6: the operating system shows every five seconds.
+
+use power_model::{Cause, Pulse};
+use traces::energy::{Spread, outliers};
+
+use super::super::figure::{ENERGY, POWER, TIME, by_place, dots, line};
+use super::super::recording::Recording;
+use super::super::row::{Kind, Row, Verdict, numbers};
+use super::super::{Done, Figure};
+use super::{Bench, settled};
+use crate::run::RunError;
+
+/// Frames of a short repeated measurement for the upper half of Figure 8.
+const SHORT: usize = 24;
+/// How many of them.
+pub(super) const SHORT_REPEATS: u64 = 40;
+
+/// The disturbances of the kind that is listed first: those every five seconds.
+fn five_second_ones(recording: &Recording) -> Vec<&Pulse> {
+    recording.truth.pulses.iter().filter(|pulse| pulse.cause == Cause::Disturbance(0)).collect()
+}
+
+/// For each true frame, how much of it is disturbed, s.
+fn overlaps_s(recording: &Recording) -> Vec<f64> {
+    let pulses = five_second_ones(recording);
+    let frames = recording.truth.frames.iter();
+    frames.map(|frame| pulses.iter().map(|pulse| pulse.overlap_s(frame.start_s, frame.end_s)).sum()).collect()
+}
+
+/// What the analysis says of the frames against what was done to them.
+struct Tally {
+    touched: usize,
+    flagged: usize,
+    both: usize,
+    /// Frames touched by each whole disturbance, fewest and most.
+    frames: [usize; 2],
+    disturbances: usize,
+}
+
+fn tally(recording: &Recording, flags: &[bool]) -> Tally {
+    let touched: Vec<bool> = overlaps_s(recording).iter().map(|overlap_s| *overlap_s > 0.0).collect();
+    let counts: Vec<usize> = five_second_ones(recording)
+        .into_iter()
+        .filter(|pulse| pulse.start_s > recording.truth.start_s && pulse.end_s < recording.truth.end_s)
+        .map(|pulse| {
+            recording
+                .truth
+                .frames
+                .iter()
+                .filter(|frame| pulse.overlap_s(frame.start_s, frame.end_s) > 0.0)
+                .count()
+        })
+        .collect();
+    Tally {
+        touched: touched.iter().filter(|touched| **touched).count(),
+        flagged: flags.iter().filter(|flag| **flag).count(),
+        both: touched.iter().zip(flags).filter(|(touched, flag)| **touched && **flag).count(),
+        frames: [counts.iter().copied().min().unwrap_or(0), counts.iter().copied().max().unwrap_or(0)],
+        disturbances: counts.len(),
+    }
+}
+
+/// III-6: the frames that the disturbance hits are those flagged, three or four each, and they lift the deviation.
+pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
+    let shown = vec![bench.frame(); bench.effort.still_frames];
+    let recording = bench.on_phone(&shown, settled(5))?;
+    // A frame that was not found counts as one of no energy, which nobody could overlook.
+    let energies: Vec<f64> = recording.by_true_frame_j().iter().map(|energy| energy.unwrap_or(0.0)).collect();
+    let flags = outliers(&energies);
+    let tally = tally(&recording, &flags);
+    let kept: Vec<f64> =
+        energies.iter().zip(&flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect();
+    let deviation_mj = |values: &[f64]| 1e3 * Spread::of(values).map_or(f64::NAN, |spread| spread.deviation);
+    let (all_mj, without_mj) = (deviation_mj(&energies), deviation_mj(&kept));
+    let [fewest, most] = tally.frames;
+    let same = tally.both == tally.touched && tally.both == tally.flagged;
+    let row = Row {
+        id: "III-6",
+        kind: Kind::Number,
+        claim: "a disturbance every 5 s hits 3-4 frames and lifts the standard deviation",
+        paper: "90 ms every 5 s, 3-4 frames at 30 fps; the root cause of rises of the standard deviation (Figure 8)",
+        ours: format!(
+            "{} disturbances of {fewest} to {most} frames; {} frames touched, {} flagged, {} of them both; deviation {all_mj:.3} mJ, {without_mj:.3} mJ \
+             without them",
+            tally.disturbances, tally.touched, tally.flagged, tally.both
+        ),
+        verdict: Verdict::of(same && fewest >= 3 && most <= 4 && all_mj > without_mj),
+        note: reason(&recording, &flags, same),
+        numbers: numbers([
+            ("touched_frames", tally.touched as f64),
+            ("flagged_frames", tally.flagged as f64),
+            ("both_frames", tally.both as f64),
+            ("fewest_frames", fewest as f64),
+            ("most_frames", most as f64),
+            ("deviation_mJ", all_mj),
+            ("deviation_without_outliers_mJ", without_mj),
+        ]),
+        figure: None,
+        figures: Vec::new(),
+    };
+    let mut figures = vec![hit(&recording)];
+    figures.push(flagged(&energies, &flags));
+    figures.push(growing(bench)?);
+    Ok(Done { row, figures })
+}
+
+/// Which frames are not told right, with how much of them was disturbed.
+fn reason(recording: &Recording, flags: &[bool], same: bool) -> String {
+    if same {
+        return "holds as the flagged frames are those touched, all of them and no other".to_owned();
+    }
+    let overlaps = overlaps_s(recording);
+    let wrong =
+        overlaps.iter().zip(flags).enumerate().filter(|(_, (overlap_s, flag))| (**overlap_s > 0.0) != **flag);
+    // A frame whose start was missed counts as one without energy, and is flagged.
+    let list: Vec<String> =
+        wrong.map(|(place, (overlap_s, _))| format!("{place} ({:.2} ms)", 1e3 * overlap_s)).collect();
+    format!("frames told wrong, with how long they were disturbed: {}", list.join(", "))
+}
+
+/// Figure 8, lower right: power over a group of disturbed frames.
+fn hit(recording: &Recording) -> Figure {
+    let inside = |pulse: &&&Pulse| {
+        pulse.start_s > recording.truth.start_s + 0.2 && pulse.end_s < recording.truth.end_s - 0.2
+    };
+    let pulses = five_second_ones(recording);
+    let centre_s = pulses
+        .iter()
+        .find(inside)
+        .map_or(recording.truth.start_s + 0.2, |pulse| 0.5 * (pulse.start_s + pulse.end_s));
+    Figure::lines(
+        "III_fig8_power",
+        "A disturbance on top of identical frames (Paper III, Figure 8, lower right)",
+        "the phone draws one frame again and again",
+        [TIME, POWER],
+        vec![line("recorded", recording.points(centre_s - 0.15, centre_s + 0.15))],
+    )
+}
+
+/// Energies over the frames, with those flagged.
+fn flagged(energies: &[f64], flags: &[bool]) -> Figure {
+    let points = by_place(energies);
+    let out = points.iter().zip(flags).filter(|(_, flag)| **flag).map(|(point, _)| *point).collect();
+    Figure::lines(
+        "III_fig8_frames",
+        "Frames that are flagged as outliers (Paper III, Figure 8)",
+        "the phone draws one frame again and again; each should be the same",
+        [("frame", ""), ENERGY],
+        vec![dots("energy per frame", points.clone()), dots("flagged", out)],
+    )
+}
+
+/// Figure 8, upper half: standard deviation over the number of repetitions, of a frame that is never hit and of one that is.
+fn growing(bench: &Bench<'_>) -> Result<Figure, RunError> {
+    let shown = vec![bench.frame(); SHORT];
+    let (mut energies, mut first_hits) = (vec![Vec::new(); SHORT], [None; SHORT]);
+    for seed in 0..SHORT_REPEATS {
+        let recording = bench.on_phone(&shown, settled(100 + seed))?;
+        let frames = recording.by_timestamps_j().into_iter().zip(overlaps_s(&recording));
+        for ((energy, overlap_s), (list, first_hit)) in frames.zip(energies.iter_mut().zip(&mut first_hits)) {
+            list.push(energy);
+            if overlap_s > 5e-3 {
+                first_hit.get_or_insert(list.len());
+            }
+        }
+    }
+    let never = first_hits.iter().position(Option::is_none);
+    // The later it is hit, the better one sees the deviation fall and then rise.
+    let late = (0..SHORT).filter(|&place| first_hits[place].is_some()).max_by_key(|&place| first_hits[place]);
+    let deviations = |place: usize| -> Vec<(f64, f64)> {
+        let list = &energies[place];
+        let of = |count: usize| Spread::of(&list[..count]).map_or(0.0, |spread| spread.deviation);
+        (2..=list.len()).map(|count| (count as f64, of(count))).collect()
+    };
+    let mut series = Vec::new();
+    series.extend(never.map(|place| line("a frame never hit", deviations(place))));
+    series.extend(late.map(|place| line("a frame hit at least once", deviations(place))));
+    Ok(Figure::lines(
+        "III_fig8_deviation",
+        "Standard deviation over repetitions (Paper III, Figure 8, top)",
+        "the same measurements, two frames of the sequence",
+        [("repetitions", ""), ("standard deviation", "J")],
+        series,
+    ))
+}

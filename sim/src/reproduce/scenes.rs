@@ -1,0 +1,132 @@
+//! What is drawn: the workloads of the papers, as far as they are described.
+
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3, Vec3};
+use pipeline::{ShaderCost, Texture, Wrap};
+use workloads::Material;
+use workloads::scene::{Graph, Local, Node, Parts, Rig, SceneCamera, Settings, Trs, View};
+use workloads::{LoadError, Overrides, Scene, shapes};
+
+/// Frames in the phone's sequence (Paper III, section 4).
+pub(super) const PHONE_FRAMES: u32 = 24;
+/// Objects of a frame, fewest and most (Paper III, section 4).
+const OBJECTS: [u32; 2] = [23, 62];
+/// Quads along an edge of an object: 2048 triangles (Paper III, section 4).
+const CELLS: u32 = 32;
+/// Edge of an object where the image is 2 high and 3 wide. The paper does not say; as its frames keep up with 30 a second, it
+/// is set so that the frame with the most objects takes about nine tenths of a period on the modelled GPU.
+const EDGE: f64 = 0.28;
+
+/// Three 4x4 matrices times a vector in the vertex shader; a dot product of 3, a normalization of 8 and 4 to mix two texels in
+/// the fragment shader. A draw has one texture here, but its look-up is trilinear: two fetches, as many as their two without
+/// mipmaps.
+pub(super) const PHONE_COST: ShaderCost = ShaderCost { vertex_ops: 48, pixel_ops: 15 };
+
+/// How many objects there are in a frame of the phone's sequence: from fewest to most and back.
+pub(super) fn objects(frame: u32) -> u32 {
+    let [fewest, most] = OBJECTS.map(f64::from);
+    let wave = 0.5 - 0.5 * libm::cos(TAU * f64::from(frame) / f64::from(PHONE_FRAMES));
+    libm::round(fewest + (most - fewest) * wave) as u32
+}
+
+/// The synthetic scene of Paper III for the phone, 960x640: textured grids, the nearest drawn last.
+pub(super) fn phone(frame: u32) -> Result<Scene, LoadError> {
+    let mut parts = Parts::new("grids of Paper III");
+    let white = Material::colored("white", Vec3::ONE);
+    let material = Material { double_sided: true, texture: texture().map(Arc::new), ..white };
+    let material = parts.graph.push_material(material);
+    for object in 0..objects(frame) {
+        grid(&mut parts.graph, object, material);
+    }
+    parts.camera = SceneCamera {
+        rig: Rig::look_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO),
+        view: View::Orthographic { half_height: 1.0 },
+        near: None,
+    };
+    parts.settings = Settings {
+        width: 960,
+        height: 640,
+        samples: 1,
+        frame_rate_hz: 30.0,
+        shutter: 0.0,
+        ..Settings::default()
+    };
+    Scene::new(parts)
+}
+
+/// 256 x 256 texels (Paper III, section 4), in stripes.
+fn texture() -> Option<Texture> {
+    const SIDE: u32 = 256;
+    let texel = |at: u32| if (at / 16).is_multiple_of(2) { [210, 200, 180, 255] } else { [60, 90, 140, 255] };
+    let texels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| texel(x + y))).collect();
+    Texture::from_srgb8(SIDE, SIDE, texels, [Wrap::Repeat; 2]).ok()
+}
+
+/// An object that faces the camera, wholly inside the image, at a place of a low-discrepancy sequence (the generalized golden
+/// ratio in two dimensions, Roberts 2018).
+fn grid(graph: &mut Graph, object: u32, material: usize) {
+    const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
+    let place = |step: f64, room: f64| {
+        let at = 0.5 + step * f64::from(object);
+        room * (2.0 * (at - libm::floor(at)) - 1.0)
+    };
+    let at = DVec3::new(
+        place(STEPS[0], 1.5 - 0.5 * EDGE),
+        place(STEPS[1], 1.0 - 0.5 * EDGE),
+        0.01 * f64::from(object),
+    );
+    // A plane looks up; a quarter of a turn makes it look at the camera.
+    let rotation = DQuat::from_xyzw(FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
+    let trs = Trs { translation: at, rotation, ..Trs::default() };
+    let node = graph.push_node(Node::new("grid", None, Local::Trs(trs)));
+    graph.hang(shapes::plane(EDGE, CELLS, 1.0, material), node);
+}
+
+/// 32 spotlights in one forward pass (Paper III, section 4). The paper has the number of lights, the operations of each are
+/// counted from a usual one: difference, length and normalization 13, diffuse 3, half vector and its normalization 13, specular
+/// 11, cone 9, distance 5, colour 6.
+pub(super) const PC_COST: ShaderCost = ShaderCost { vertex_ops: 16, pixel_ops: 43 + 32 * 60 };
+
+/// The PC's animation: the built-in scene without motion blur and lens, as their GPUs drew it, at 30 frames a second.
+/// (Theirs is a path through Sponza, which does not come with this program.)
+pub(super) fn pc() -> Result<Scene, LoadError> {
+    workloads::load("default")?.with_overrides(&Overrides {
+        size: Some((1280, 720)),
+        samples: Some(1),
+        frame_rate_hz: Some(30.0),
+        shutter: Some(0.0),
+        lens_radius: Some(0.0),
+        ..Overrides::default()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_phones_sequence_is_the_papers() {
+        let counts: Vec<u32> = (0..PHONE_FRAMES).map(objects).collect();
+        assert_eq!((counts.iter().min(), counts.iter().max()), (Some(&23), Some(&62)));
+        let scene = phone(9).unwrap();
+        assert_eq!(scene.triangle_count(), 2048 * objects(9) as usize);
+        assert!(!scene.is_animated());
+    }
+
+    /// Nothing is drawn outside the image, where it would cost nothing.
+    #[test]
+    fn every_object_lies_in_the_image() {
+        let scene = phone(12).unwrap();
+        for mesh in scene.frame(0).unwrap().meshes {
+            assert!(
+                mesh.open.iter().all(|p| p.x.abs() <= 1.5001 && p.y.abs() <= 1.0001 && p.z < 1.0),
+                "{:?}",
+                mesh.open[0]
+            );
+            let facing = mesh.open.iter().map(|p| p.z).fold(f32::NEG_INFINITY, f32::max) - mesh.open[0].z;
+            assert!(facing.abs() < 1e-3);
+        }
+    }
+}
