@@ -63,7 +63,7 @@ mod tests {
         }
         assert_eq!(
             "dtw".parse::<Method>(),
-            Err("no method dtw: choose one of squares, tracking, auto".to_owned())
+            Err("no method dtw: choose one of squares, normalized, tracking, auto".to_owned())
         );
     }
 }
