@@ -70,7 +70,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const ALL: [Self; 6] = [Self::Still, Self::Moving, Self::Crossing, Self::Slivers, Self::Grid, Self::Layers];
+    pub const ALL: [Self; 6] =
+        [Self::Still, Self::Moving, Self::Crossing, Self::Slivers, Self::Grid, Self::Layers];
 }
 
 /// Every kind, each as likely.

@@ -247,6 +247,8 @@ pub struct ChartArgs {
 /// The charts there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ChartArg {
+    /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
+    Frames,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
     /// Frames predicted from few: errors, how often intervals hold the truth, host time

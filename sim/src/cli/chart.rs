@@ -9,7 +9,7 @@ use crate::chart::ChartError;
 use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{growth, sampled};
+use crate::chart::{frames, growth, sampled};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -33,12 +33,27 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
         return Err(Failure { message, code: 2 });
     }
     match args.chart {
+        ChartArg::Frames => pool.install(|| chart_frames(args, &progress)),
         ChartArg::Growth => pool.install(|| chart_growth(args, &progress)),
         ChartArg::Sampled => pool.install(|| chart_sampled(args, &progress)),
         ChartArg::Sampling => pool.install(|| chart_sampling(args, &progress)),
         ChartArg::TileTests => pool.install(|| chart_tile_tests(args, &progress)),
         ChartArg::Timing => pool.install(|| chart_timing(args, &progress)),
     }
+}
+
+fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
+    let started = Instant::now();
+    let effort = if args.quick { frames::Effort::QUICK } else { frames::Effort::FULL };
+    let chart = frames::chart(effort, &args.out, progress)?;
+    if args.json {
+        return print_json(&chart, true);
+    }
+    let took_s = started.elapsed().as_secs_f64();
+    let (table, below, out) = (chart.text(), frames::FAILS_BELOW, args.out.display());
+    print(&format!(
+        "{table}*: mean F1 below {below}; in brackets how many scenes are below\nresults: {out}\ntook {took_s:.1} s"
+    ))
 }
 
 fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
