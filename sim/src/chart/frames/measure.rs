@@ -17,7 +17,7 @@ const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
 /// How far off the marks are, s.
 const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
 /// What tells of a wrong frame.
-const TELLING: [Flag; 5] = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split];
+const TELLING: [Flag; 6] = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split, Flag::Odd];
 
 /// What came out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
