@@ -12,6 +12,9 @@ use crate::warning::Warning;
 
 /// With fewer starts than this there is too little to learn from: [`Method::Auto`] keeps the sum of squares.
 const FEW: usize = 16;
+/// With fewer samples in the window shapes are too coarse to be followed: [`Method::Auto`] keeps the sum of squares
+/// (`quintile chart frames`: F1 0.61 against 0.91 with 10 samples, 0.96 against 0.97 with 25, 0.99 against 0.99 with 50).
+const COARSE: usize = 20;
 /// Traces of more samples are tracked by [`Method::Auto`] only where the sum of squares is in doubt.
 const LONG: usize = 1 << 24;
 /// One frame start.
@@ -91,7 +94,8 @@ pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
             let found = find_matched(trace, marks, Method::SumOfSquares)?;
             let few = found.starts.len() < FEW;
             let long_and_clear = trace.samples() > LONG && found.threshold.clarity() >= 1.0;
-            if few || long_and_clear { Ok(found) } else { find_tracked(trace, marks) }
+            let coarse = marks.place(trace)?.samples < COARSE;
+            if few || coarse || long_and_clear { Ok(found) } else { find_tracked(trace, marks) }
         }
     }
 }

@@ -93,6 +93,18 @@ fn noise_is_as_asked_and_the_same_seed_gives_the_same_trace() {
 }
 
 #[test]
+fn auto_tracks_unless_the_window_has_hardly_any_samples() {
+    use crate::frames::{Marks, Method, default_window, find};
+    let scene = SCENARIOS[1].scene(40, 2).unwrap();
+    let method = |rate_hz: f64| {
+        let trace = scene.record(&Recording { rate_hz, ..Recording::default() }).unwrap();
+        let window = default_window(0.0, rate_hz);
+        find(&trace, &Marks::one(scene.truth[15].start_s, window, trace.end_s())).unwrap().method
+    };
+    assert_eq!((method(50e3), method(2e3)), (Method::Tracking, Method::SumOfSquares));
+}
+
+#[test]
 fn no_frames_are_idle_alone() {
     let scene = SCENARIOS[0].scene(0, 1).unwrap();
     assert!(scene.truth.is_empty() && scene.curve.watts() == [0.55]);

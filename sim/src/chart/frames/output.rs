@@ -22,14 +22,15 @@ pub(super) fn write(chart: &FramesChart, dir: &OutDir) -> Result<(), OutputError
         effort.frames
     );
     for axis in Axis::ALL {
-        let values: Vec<String> = chart.values(axis).into_iter().map(|value| axis.shown(value)).collect();
-        let title = match axis {
-            Axis::Rate => "Frames found over sampling rate",
-            Axis::Noise => "Frames found over signal to noise",
-            Axis::Bits => "Frames found over resolution",
+        let (title, x, unit) = match axis {
+            Axis::Rate => ("Frames found over sampling rate", "sampling rate, kHz", 1e3),
+            Axis::Noise => ("Frames found over signal to noise", "signal to noise, dB", 1.0),
+            Axis::Bits => ("Frames found over resolution", "bits", 1.0),
         };
+        let values: Vec<String> =
+            chart.values(axis).into_iter().map(|value| format!("{}", value / unit)).collect();
         let panels = vec![found(chart, axis), energy(chart, axis)];
-        let sweep = Sweep { title, subject: &subject, x: axis.name(), values: &values, panels };
+        let sweep = Sweep { title, subject: &subject, x, values: &values, panels };
         sweep.picture().write(dir, &format!("frames_{}", axis.name()))?;
     }
     let panels = vec![host_time(chart), found_over_time(chart)];
@@ -61,7 +62,7 @@ fn energy(chart: &FramesChart, axis: Axis) -> SweepPanel<'static> {
     let percent: fn(&Outcome) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
     let curve = |way: Way| SweepCurve { name: way.name(), points: along(chart, axis, way, percent) };
     let series = Way::ALL.into_iter().map(curve).collect();
-    SweepPanel { name: "median energy error of frames with both ends, %", log: true, series }
+    SweepPanel { name: "median energy error, %", log: true, series }
 }
 
 fn host_time(chart: &FramesChart) -> CurvePanel {
