@@ -8,7 +8,8 @@
 //! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole;
 //! 4. [`score`] compares the outcome with the truth where there is one.
 //!
-//! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace a recorder would have written.
+//! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace a recorder would have written, and
+//! [`synth`] draws such curves with frames whose starts and energies are known.
 //!
 //! ```
 //! use traces::{device::{Device, DeviceSpec}, energy::PowerIntegral, frames, Curve, CurveBuilder};
@@ -49,9 +50,11 @@ pub mod metadata;
 mod overlap;
 pub mod pareto;
 pub mod pyramid;
+mod random;
 pub mod score;
 pub mod stream;
 mod sum;
+pub mod synth;
 pub mod table;
 pub mod trace;
 mod warning;

@@ -84,7 +84,7 @@ pub fn nondominated(pairs: &[(f64, f64)]) -> Vec<bool> {
 
 /// Two independent standard normal numbers for a draw (Box and Muller 1958).
 fn normal(seed: u64, draw: u64) -> (f64, f64) {
-    crate::device::normal_pair(seed, draw)
+    crate::random::Random::new(seed, 0).normals(draw)
 }
 
 #[cfg(test)]

@@ -17,6 +17,12 @@ pub enum ChartError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Soup(#[from] workloads::stress::StressError),
+    #[error(transparent)]
+    Curve(#[from] traces::CurveError),
+    #[error(transparent)]
+    Recording(#[from] traces::synth::SynthError),
+    #[error(transparent)]
+    Mark(#[from] traces::frames::MarkError),
     #[error("starting the thread that is timed: {0}")]
     Thread(#[from] rayon::ThreadPoolBuildError),
     #[error("the pipeline does not take the scene: {0}")]

@@ -251,6 +251,8 @@ pub struct ChartArgs {
 pub enum ChartArg {
     /// Every chart, the failure catalogue of `quintile stress`, and `index.html`: speed against accuracy on one page
     All,
+    /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
+    Frames,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
     /// Frames predicted from few: errors, how often intervals hold the truth, host time

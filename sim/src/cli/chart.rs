@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{growth, sampled};
+use crate::chart::{frames, growth, sampled};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -68,12 +68,24 @@ impl Done {
 fn make(chart: ChartArg, args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
+        ChartArg::Frames => chart_frames(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
         ChartArg::Sampled => chart_sampled(args, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
         ChartArg::Timing => chart_timing(args, progress),
     }
+}
+
+fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let started = Instant::now();
+    let effort = if args.quick { frames::Effort::QUICK } else { frames::Effort::FULL };
+    let chart = frames::chart(effort, &args.out, progress)?;
+    let (table, below, took_s) = (chart.text(), frames::FAILS_BELOW, started.elapsed().as_secs_f64());
+    let text = format!(
+        "{table}*: mean F1 below {below}; in brackets how many scenes are below\ntook {took_s:.1} s\n"
+    );
+    Done::new(&chart, text)
 }
 
 fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {

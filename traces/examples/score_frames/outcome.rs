@@ -85,7 +85,7 @@ fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize) {
     for (f, t) in pairs(&found_s, &truth_s, TOLERANCE_S) {
         partner[f] = Some(t);
     }
-    let told = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split];
+    let told = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split, Flag::Odd];
     let mut counts = (0, 0);
     for (pair, frame) in partner.windows(2).zip(frames) {
         let right = matches!(pair, [Some(a), Some(b)] if *b == a + 1);

@@ -1,7 +1,6 @@
 //! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
 
 mod bound;
-mod noise;
 mod quantizer;
 mod rail;
 mod sample;
@@ -9,11 +8,6 @@ mod spec;
 
 pub use sample::{SampleError, Sampled};
 pub use spec::{DeviceError, DeviceSpec};
-
-/// Two independent standard normal numbers, a pure function of seed and counter.
-pub(crate) fn normal_pair(seed: u64, counter: u64) -> (f64, f64) {
-    noise::Noise::new(seed, 0).pair(counter)
-}
 
 use quantizer::Quantizer;
 use rail::Rail;

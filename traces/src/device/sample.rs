@@ -1,9 +1,9 @@
 //! Sampling a curve.
 
 use super::Device;
-use super::noise::Noise;
 use crate::curve::{Curve, CurveError};
 use crate::metadata::Metadata;
+use crate::random::Random;
 use crate::trace::{Trace, TraceError};
 use thiserror::Error;
 
@@ -139,7 +139,7 @@ impl Device {
     }
 
     fn convert(&self, means_w: &[f64], start_s: f64) -> Result<Channels, SampleError> {
-        let noise = Noise::new(self.spec.seed, 0);
+        let noise = Random::new(self.spec.seed, 0);
         let noisy = self.spec.current_noise_a > 0.0 || self.spec.voltage_noise_v > 0.0;
         let mut channels = Channels {
             voltage_v: Vec::with_capacity(means_w.len()),
@@ -152,7 +152,7 @@ impl Device {
                 let time_s = start_s + index as f64 / self.spec.rate_hz;
                 return Err(SampleError::Overload { time_s, power_w, limit_w: self.rail.limit_w() });
             };
-            let (a, v) = if noisy { noise.pair(index as u64) } else { (0.0, 0.0) };
+            let (a, v) = if noisy { noise.normals(index as u64) } else { (0.0, 0.0) };
             let (voltage, voltage_clipped) =
                 self.voltage.quantize(self.volts(volts) + self.spec.voltage_noise_v * v);
             let (current, current_clipped) =

@@ -4,6 +4,7 @@ use super::find::{Found, FrameSpan, FrameStart};
 use super::flags::{Flag, Flags};
 use super::marks::{Marks, Placement, Window};
 use super::threshold::{DISTINCT, Rule, Threshold};
+use crate::median::median;
 use crate::trace::Trace;
 use crate::warning::Warning;
 
@@ -11,6 +12,8 @@ use crate::warning::Warning;
 const FEW_SAMPLES: f64 = 50.0;
 /// Share of frames of odd length, by number or by the time they cover, from which the spacing is called irregular.
 const IRREGULAR: f64 = 0.1;
+/// Share of unsure frames from which the whole result is called so.
+const MANY_UNSURE: f64 = 0.1;
 
 /// 1 at or below the mean distance of the matches, 0 at or above that of the rest, linear in the logarithm between;
 /// scaled down where neither the populations are distinct nor the starts evenly spaced.
@@ -61,6 +64,7 @@ pub(crate) fn conclude_at(
         only_marks(&found),
         weak_separation(&found),
         irregular(&found),
+        many_unsure(&found),
         window_too_long(&found),
         few_samples(&found, rate_hz),
     ]
@@ -93,7 +97,7 @@ fn spans(starts: &[FrameStart], end_s: f64) -> Vec<FrameSpan> {
         });
     }
     flag_lengths(&mut frames);
-    flag_merged_and_split(&mut frames);
+    flag_beside_others(&mut frames);
     frames
 }
 
@@ -113,25 +117,29 @@ fn flag_lengths(frames: &mut [FrameSpan]) {
 const AROUND: usize = 4;
 /// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
 const TWICE: f64 = 1.6;
+/// A length that differs from the usual one by more than this share of it, and by more than so many times what the lengths around do,
+/// is odd.
+const ODD: [f64; 2] = [0.1, 6.0];
 
-/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one.
-fn flag_merged_and_split(frames: &mut [FrameSpan]) {
+/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one, or break their beat.
+fn flag_beside_others(frames: &mut [FrameSpan]) {
     let durations_s: Vec<f64> = frames.iter().map(|frame| frame.end_s - frame.start_s).collect();
     let Some(inner) = durations_s.len().checked_sub(1) else { return };
     for index in 0..inner {
-        let mut around: Vec<f64> = (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1))
-            .filter(|&i| i != index)
-            .map(|i| durations_s[i])
-            .collect();
+        let around = (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1)).filter(|&i| i != index);
+        let mut around: Vec<f64> = around.map(|i| durations_s[i]).collect();
         if around.len() < 2 {
             continue;
         }
-        around.sort_by(f64::total_cmp);
-        let usual_s = around[around.len() / 2];
+        let usual_s = median(&mut around);
+        let off_s = (durations_s[index] - usual_s).abs();
+        let mut others_s: Vec<f64> = around.iter().map(|other_s| (other_s - usual_s).abs()).collect();
         if durations_s[index] > TWICE * usual_s {
             frames[index].flags.insert(Flag::Merged);
         } else if durations_s[index] * TWICE < usual_s {
             frames[index].flags.insert(Flag::Split);
+        } else if off_s > (ODD[0] * usual_s).max(ODD[1] * median(&mut others_s)) {
+            frames[index].flags.insert(Flag::Odd);
         }
     }
 }
@@ -189,6 +197,16 @@ fn irregular(found: &Found) -> Option<Warning> {
     })
 }
 
+fn many_unsure(found: &Found) -> Option<Warning> {
+    let unsure = found.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
+    let all = found.frames.len();
+    (unsure as f64 > MANY_UNSURE * all as f64).then(|| {
+        Warning::new("unsure-frames", format!(
+            "{unsure} of {all} frames have a confidence below one half: their starts may be those of something else that \
+             repeats; look at them before their energies are used, mark several frames, or sample faster"))
+    })
+}
+
 fn window_too_long(found: &Found) -> Option<Warning> {
     let window_s = found.window.pre_s + found.window.post_s;
     let median_s = median_duration_s(&found.frames).filter(|_| found.frames.len() > 1)?;
@@ -207,4 +225,61 @@ fn few_samples(found: &Found, rate_hz: f64) -> Option<Warning> {
             "the median frame has {samples:.1} samples, fewer than {FEW_SAMPLES}: starts and energies are coarse; \
              sample faster"))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Starts with gaps of so many seconds, all of one confidence.
+    fn starts(gaps_s: &[f64], confidence: f64) -> Vec<FrameStart> {
+        let mut time_s = 0.0;
+        let mut start = |gap_s: f64| {
+            time_s += gap_s;
+            FrameStart { time_s, distance_w2: 0.0, confidence, marked: false }
+        };
+        core::iter::once(0.0).chain(gaps_s.iter().copied()).map(&mut start).collect()
+    }
+
+    fn flagged(gaps_s: &[f64], flag: Flag) -> Vec<usize> {
+        let starts = starts(gaps_s, 1.0);
+        let end_s = starts.last().map_or(1.0, |last| last.time_s + 1.0);
+        let frames = spans(&starts, end_s);
+        (0..frames.len()).filter(|&index| frames[index].flags.contains(flag)).collect()
+    }
+
+    #[test]
+    fn a_start_misplaced_in_an_even_beat_makes_both_its_frames_odd() {
+        let gaps_s = [1.0, 1.01, 0.99, 1.0, 1.2, 0.8, 1.0, 1.01, 1.0, 0.99];
+        assert_eq!(flagged(&gaps_s, Flag::Odd), [4, 5]);
+    }
+
+    #[test]
+    fn a_clock_step_and_lengths_that_vary_anyway_are_not_odd() {
+        let step_s = [1.0, 1.01, 0.99, 1.0, 1.01, 1.4, 1.41, 1.39, 1.4, 1.4, 1.41];
+        assert!(flagged(&step_s, Flag::Odd).is_empty());
+        let varied_s = [1.0, 1.2, 0.9, 1.15, 0.85, 1.1, 0.95, 1.2, 0.9, 1.0];
+        assert!(flagged(&varied_s, Flag::Odd).is_empty());
+    }
+
+    #[test]
+    fn merged_and_split_frames_are_called_that_and_not_odd() {
+        let gaps_s = [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0, 1.0];
+        assert_eq!((flagged(&gaps_s, Flag::Merged), flagged(&gaps_s, Flag::Split)), (vec![3], vec![6, 7]));
+        assert!(flagged(&gaps_s, Flag::Odd).is_empty());
+    }
+
+    #[test]
+    fn many_unsure_frames_make_the_whole_result_unsure() {
+        let marks = Marks::one(0.0, Window { pre_s: 0.1, post_s: 0.4 }, 21.0);
+        let placement = Placement { marks: Vec::new(), samples: 50, cut: false };
+        let warned = |unsure: usize| {
+            let mut starts = starts(&[1.0; 20], 1.0);
+            starts[..unsure].iter_mut().for_each(|start| start.confidence = 0.2);
+            let nothing = super::super::threshold::choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
+            let found = conclude_at(100.0, &marks, &placement, starts, nothing);
+            found.warnings.iter().any(|warning| warning.code == "unsure-frames")
+        };
+        assert!(!warned(0) && !warned(2) && warned(3));
+    }
 }

@@ -19,12 +19,22 @@ pub enum Flag {
     Merged,
     /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
     Split,
+    /// Its length breaks the even beat of the frames around it: one of its ends may be misplaced.
+    Odd,
 }
 
 impl Flag {
     /// Every flag, in the order in which they are written.
-    pub const ALL: [Self; 7] =
-        [Self::Marked, Self::Last, Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split];
+    pub const ALL: [Self; 8] = [
+        Self::Marked,
+        Self::Last,
+        Self::Long,
+        Self::Short,
+        Self::Unsure,
+        Self::Merged,
+        Self::Split,
+        Self::Odd,
+    ];
 
     /// The word in the `flags` column.
     pub fn name(self) -> &'static str {
@@ -36,6 +46,7 @@ impl Flag {
             Self::Unsure => "unsure",
             Self::Merged => "merged",
             Self::Split => "split",
+            Self::Odd => "odd",
         }
     }
 

@@ -10,21 +10,25 @@ use serde::Serialize;
 pub enum Method {
     /// Sum of squared differences to the marked window, threshold, local minima (Paper III).
     SumOfSquares,
+    /// The same by z-normalized distance: likeness of shape, whatever the level and the scale of power.
+    Normalized,
     /// The sequence of starts that resembles several templates, by shape and by squares, itself, and an even beat best.
     Tracking,
-    /// Tracking; the sum of squares where there are fewer than 16 frames, or more than 16 million samples and no doubt.
+    /// Tracking; the sum of squares where there are fewer than 16 frames, fewer than 20 samples in the window, or more than 16
+    /// million samples and no doubt.
     #[default]
     Auto,
 }
 
 impl Method {
     /// All of them, in order.
-    pub const ALL: [Self; 3] = [Self::SumOfSquares, Self::Tracking, Self::Auto];
+    pub const ALL: [Self; 4] = [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::SumOfSquares => "squares",
+            Self::Normalized => "normalized",
             Self::Tracking => "tracking",
             Self::Auto => "auto",
         }
@@ -60,7 +64,7 @@ mod tests {
         }
         assert_eq!(
             "dtw".parse::<Method>(),
-            Err("no method dtw: choose one of squares, tracking, auto".to_owned())
+            Err("no method dtw: choose one of squares, normalized, tracking, auto".to_owned())
         );
     }
 }

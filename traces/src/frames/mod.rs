@@ -8,8 +8,10 @@ mod find;
 mod first;
 mod flags;
 mod marks;
+mod matched;
 mod method;
 mod minima;
+mod normalized;
 pub mod profile;
 mod propose;
 mod refine;
@@ -18,6 +20,7 @@ mod regularity;
 mod split;
 mod threshold;
 mod track;
+mod tracked;
 
 pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_only};
 pub use flags::{Flag, Flags};
@@ -28,8 +31,8 @@ pub use threshold::{Population, Rule, Threshold};
 
 // For the analysis of files in pieces.
 pub(crate) use assess::{conclude_at, confidence};
-pub(crate) use find::{misalignment_w2, start_after_idle};
 pub(crate) use marks::{Placed, Placement};
+pub(crate) use matched::{misalignment_w2, start_after_idle};
 pub(crate) use refine::vertex;
 pub(crate) use regularity::regularity;
 pub(crate) use threshold::choose;

@@ -135,7 +135,7 @@ impl FindArgs {
     }
 
     fn streams(&self, input: &InputArgs) -> Result<bool, Failure> {
-        if self.method == Method::Tracking || input.repair {
+        if matches!(self.method, Method::Tracking | Method::Normalized) || input.repair {
             return if self.stream {
                 Err(wrong("--stream goes with the sum of squares and without --repair; leave one out"))
             } else {

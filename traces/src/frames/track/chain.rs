@@ -6,7 +6,7 @@ use super::doubt::slip;
 
 /// Least and greatest distance of neighbours, in periods. What is farther apart begins a new stretch.
 const REACH: [f64; 2] = [0.45, 2.3];
-/// What a gap as long as the one before is worth, nats.
+/// What a gap as long as the one before is worth, nats for a period.
 const EVEN: f64 = 3.0;
 /// Change of a gap, in logarithm, that costs a nat.
 const TIGHT: f64 = 0.04;
@@ -35,6 +35,8 @@ pub(super) struct Chain {
 pub(super) struct Graph<'a> {
     candidates: &'a [Candidate],
     least: usize,
+    /// The median distance of starts so far.
+    period: f64,
     /// The earliest that may come before each.
     before: Vec<usize>,
     /// Where the pairs of each begin; one more than there are candidates.
@@ -72,7 +74,8 @@ impl<'a> Graph<'a> {
             before.push(from);
             first.push(first[first.len() - 1] + to.saturating_sub(from));
         }
-        let mut graph = Self { candidates, least, before, first, likeness: Vec::new() };
+        let mut graph =
+            Self { candidates, least, period: period as f64, before, first, likeness: Vec::new() };
         graph.likeness = graph.likenesses(bank);
         graph
     }
@@ -190,7 +193,8 @@ impl<'a> Graph<'a> {
             let between = self.gap(earlier, begin);
             let back = solution.back[pair];
             let slipped = back != NONE && slip(self.gap(solution.begin[back], earlier), between, gap);
-            let value = solution.score[pair] + beat(between, gap) - if slipped { SLIP } else { 0.0 };
+            let value =
+                solution.score[pair] + beat(between, gap, self.period) - if slipped { SLIP } else { 0.0 };
             if value > best.0 {
                 best = (value, pair);
             }
@@ -199,7 +203,33 @@ impl<'a> Graph<'a> {
     }
 }
 
-/// What a gap says after the one before it, nats.
-fn beat(before: f64, after: f64) -> f64 {
-    (EVEN - libm::log(after / before).abs() / TIGHT).max(JUMP)
+/// How many samples lie between neighbours that are no farther apart than those of one stretch.
+pub(super) fn covered(offsets: &[usize], period: usize) -> usize {
+    let most = REACH[1] * period as f64;
+    offsets.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap as f64 <= most).sum()
+}
+
+/// What a gap says after the one before it, nats. An even beat counts by the time it covers, up to a period, so that frames cut
+/// in two are not worth twice as much as whole ones.
+fn beat(before: f64, after: f64, period: f64) -> f64 {
+    (EVEN * (after / period).min(1.0) - libm::log(after / before).abs() / TIGHT).max(JUMP)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_beat_of_halves_is_worth_no_more_than_one_of_wholes() {
+        assert_eq!(beat(100.0, 100.0, 100.0), EVEN);
+        assert_eq!(2.0 * beat(50.0, 50.0, 100.0), EVEN);
+        assert_eq!(beat(200.0, 200.0, 100.0), EVEN);
+        assert_eq!(beat(100.0, 150.0, 100.0), JUMP);
+    }
+
+    #[test]
+    fn pauses_are_not_covered() {
+        assert_eq!(covered(&[0, 100, 200, 900, 1000], 100), 300);
+        assert_eq!((covered(&[], 100), covered(&[5], 100)), (0, 0));
+    }
 }

@@ -6,6 +6,8 @@ use super::Candidate;
 pub(super) const FEATURES: usize = 2;
 /// A single candidate says no more than this for itself, and no more than that against, in nats: content and clock may have changed.
 const BOUNDS: [f64; 2] = [-4.0, 10.0];
+/// Where power levels have changed, no more than this against: an even beat of frames that are alike weighs as much.
+const CHANGED: f64 = -3.0;
 /// What a mark weighs.
 const MARKED: f64 = 1e3;
 /// Variance added to each feature, as a share of its variance over all candidates. The more for the summed squares, which follow
@@ -25,11 +27,14 @@ pub(super) enum Label {
 pub(super) struct Evidence {
     direction: [f64; FEATURES],
     middle: f64,
+    /// No candidate weighs less.
+    least: f64,
 }
 
 impl Evidence {
-    /// From examples. A feature by which starts are farther than the rest is left out: nearer is never less likely.
-    pub fn learn(candidates: &[Candidate], labels: &[Label], shape_only: bool) -> Self {
+    /// From examples. A feature by which starts are farther than the rest is left out: nearer is never less likely. Where power
+    /// levels have changed, shape alone speaks, and less.
+    pub fn learn(candidates: &[Candidate], labels: &[Label], levels_changed: bool) -> Self {
         let of = |label: Label| -> Vec<[f64; FEATURES]> {
             let labelled = candidates.iter().zip(labels).filter(|(_, l)| **l == label);
             labelled.map(|(candidate, _)| candidate.features).collect()
@@ -47,10 +52,14 @@ impl Evidence {
             pooled[i][i] += 1e-4 + SHRINKAGE[i] * total[i][i];
         }
         let apart = [m1[0] - m0[0], m1[1] - m0[1]];
-        let direction =
-            if shape_only { [(apart[0] / pooled[0][0]).min(0.0), 0.0] } else { discriminant(pooled, apart) };
+        let direction = if levels_changed {
+            [(apart[0] / pooled[0][0]).min(0.0), 0.0]
+        } else {
+            discriminant(pooled, apart)
+        };
+        let least = if levels_changed { CHANGED } else { BOUNDS[0] };
         let middle = (0..FEATURES).map(|i| direction[i] * 0.5 * (m1[i] + m0[i])).sum();
-        Self { direction, middle }
+        Self { direction, middle, least }
     }
 
     /// The evidence for one candidate, nats.
@@ -59,7 +68,7 @@ impl Evidence {
             return MARKED;
         }
         let along: f64 = self.direction.iter().zip(&candidate.features).map(|(a, b)| a * b).sum();
-        (along - self.middle).clamp(BOUNDS[0], BOUNDS[1])
+        (along - self.middle).clamp(self.least, BOUNDS[1])
     }
 }
 
@@ -126,6 +135,17 @@ mod tests {
             (0..40).map(|i| if i % 2 == 0 { Label::Start } else { Label::Rest }).collect();
         let evidence = Evidence::learn(&candidates(&features), &labels, false);
         assert!(evidence.direction[0] < 0.0 && evidence.direction[1] == 0.0, "{evidence:?}");
+    }
+
+    #[test]
+    fn where_levels_have_changed_squares_say_nothing_and_shape_less_against() {
+        let features: Vec<[f64; 2]> = (0..40).map(|i| [f64::from(i % 2), f64::from(i % 2)]).collect();
+        let labels: Vec<Label> =
+            (0..40).map(|i| if i % 2 == 0 { Label::Start } else { Label::Rest }).collect();
+        let evidence = Evidence::learn(&candidates(&features), &labels, true);
+        let weight = |features| evidence.weight(&candidates(&[features])[0], &[]);
+        assert_eq!(weight([0.2, -5.0]), weight([0.2, 5.0]));
+        assert_eq!(weight([900.0, 0.0]), CHANGED);
     }
 
     #[test]

@@ -27,7 +27,7 @@ const FIRST_PERIODS: usize = 12;
 const LAST_ROUNDS: usize = 3;
 /// Candidates kept of every stretch of one period.
 const KEPT: usize = 10;
-/// Where the sequence covers less than this share of the stretch considered, power levels have changed.
+/// Where the sequence covers less than this share of what candidates do, pauses left out, power levels have changed.
 const COVERED: f64 = 0.75;
 
 /// What was found.
@@ -83,8 +83,8 @@ struct Tracker {
     candidates: Vec<Candidate>,
     evidence: Evidence,
     chain: Chain,
-    /// Once power levels have changed, the sum of squares says nothing more.
-    shape_only: bool,
+    /// Once power levels have changed, the sum of squares says nothing more, and shape less.
+    levels_changed: bool,
 }
 
 impl Tracker {
@@ -102,7 +102,7 @@ impl Tracker {
             candidates: Vec::new(),
             evidence: Evidence::default(),
             chain: Chain::default(),
-            shape_only: false,
+            levels_changed: false,
         };
         tracker.relearn(&starts);
         tracker
@@ -118,10 +118,9 @@ impl Tracker {
         self.chain = Graph::new(&self.bank, &self.candidates, self.period).best();
         let starts = self.starts();
         self.period = guess::median_gap(&starts).unwrap_or(self.period);
-        let span =
-            |offsets: &[usize]| offsets.last().zip(offsets.first()).map_or(0, |(last, first)| last - first);
         let all: Vec<usize> = self.candidates.iter().map(|candidate| candidate.offset).collect();
-        self.shape_only |= (span(&starts) as f64) < COVERED * span(&all) as f64;
+        let covered = |offsets: &[usize]| chain::covered(offsets, self.period) as f64;
+        self.levels_changed |= covered(&starts) < COVERED * covered(&all);
     }
 
     /// New templates, and what distances mean, from the sequence found.
@@ -134,7 +133,7 @@ impl Tracker {
     fn relearn(&mut self, starts: &[usize]) {
         let candidates = self.collect();
         let labels = self.labels(&candidates, starts);
-        self.evidence = Evidence::learn(&candidates, &labels, self.shape_only);
+        self.evidence = Evidence::learn(&candidates, &labels, self.levels_changed);
     }
 
     fn starts(&self) -> Vec<usize> {

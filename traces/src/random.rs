@@ -1,4 +1,4 @@
-//! White Gaussian noise as a pure function of (seed, rail, sample): any order, any thread, the same numbers.
+//! Random numbers as a pure function of (seed, stream, counter): any order, any thread, the same numbers.
 
 use core::f64::consts::TAU;
 
@@ -13,27 +13,33 @@ fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A generator of pairs of independent standard normal numbers.
+/// One stream of numbers, asked for by their counters.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Noise {
+pub(crate) struct Random {
     key: u64,
 }
 
-impl Noise {
-    /// The noise of one rail.
-    pub(super) fn new(seed: u64, rail: u64) -> Self {
-        Self { key: mix(seed.wrapping_add(GOLDEN.wrapping_mul(rail.wrapping_add(1)))) }
+impl Random {
+    /// A stream of a seed: of one rail, or of one thing that varies.
+    pub fn new(seed: u64, stream: u64) -> Self {
+        Self { key: mix(seed.wrapping_add(GOLDEN.wrapping_mul(stream.wrapping_add(1)))) }
     }
 
-    fn uniform(self, counter: u64) -> f64 {
+    /// Even over `(0, 1)`.
+    pub fn uniform(self, counter: u64) -> f64 {
         let bits = mix(self.key.wrapping_add(GOLDEN.wrapping_mul(counter.wrapping_add(1))));
         // 53 bits, shifted by half a step: never 0, so the logarithm is finite.
         ((bits >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
     }
 
-    /// Two independent numbers of mean 0 and variance 1 for a sample (Box and Muller 1958).
-    pub(super) fn pair(self, sample: u64) -> (f64, f64) {
-        let counter = sample.wrapping_mul(2);
+    /// Even between two numbers.
+    pub fn between(self, counter: u64, [low, high]: [f64; 2]) -> f64 {
+        low + (high - low) * self.uniform(counter)
+    }
+
+    /// Two independent normal numbers of mean 0 and variance 1 (Box and Muller 1958), from the even ones `2 n` and `2 n + 1`.
+    pub fn normals(self, n: u64) -> (f64, f64) {
+        let counter = n.wrapping_mul(2);
         let radius = libm::sqrt(-2.0 * libm::log(self.uniform(counter)));
         let angle = TAU * self.uniform(counter.wrapping_add(1));
         (radius * libm::cos(angle), radius * libm::sin(angle))
@@ -46,16 +52,16 @@ mod tests {
 
     #[test]
     fn mean_variance_kurtosis_and_correlation_are_those_of_a_standard_normal() {
-        let noise = Noise::new(7, 0);
+        let random = Random::new(7, 0);
         let n = 200_000_u64;
         let (mut sum, mut square, mut fourth, mut cross, mut lag) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for sample in 0..n {
-            let (a, b) = noise.pair(sample);
+            let (a, b) = random.normals(sample);
             sum += a;
             square += a * a;
             fourth += a * a * a * a;
             cross += a * b;
-            lag += a * noise.pair(sample + 1).0;
+            lag += a * random.normals(sample + 1).0;
         }
         let n = n as f64;
         // Five standard errors each: 1, sqrt 2, sqrt 96, 1, 1 over sqrt n.
@@ -68,9 +74,9 @@ mod tests {
     }
 
     #[test]
-    fn seeds_and_rails_differ_and_repeat() {
-        assert_eq!(Noise::new(1, 0).pair(5), Noise::new(1, 0).pair(5));
-        assert_ne!(Noise::new(1, 0).pair(5), Noise::new(2, 0).pair(5));
-        assert_ne!(Noise::new(1, 0).pair(5), Noise::new(1, 1).pair(5));
+    fn seeds_and_streams_differ_and_repeat() {
+        assert_eq!(Random::new(1, 0).normals(5), Random::new(1, 0).normals(5));
+        assert_ne!(Random::new(1, 0).normals(5), Random::new(2, 0).normals(5));
+        assert_ne!(Random::new(1, 0).normals(5), Random::new(1, 1).normals(5));
     }
 }

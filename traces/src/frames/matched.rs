@@ -1,0 +1,158 @@
+//! Starts by distance to the marked windows alone: threshold and local minima.
+
+use super::correlate::squares;
+use super::find::{Found, FrameStart, marked_starts, spacing};
+use super::marks::{MarkError, Marks, Placement};
+use super::method::Method;
+use super::minima::spaced_minima;
+use super::normalized::normalized;
+use super::regularity::regularity;
+use super::threshold::{Threshold, choose};
+use super::{assess, refine};
+use crate::median::median;
+use crate::trace::Trace;
+
+/// How far, in samples, refinement may move a start from the lowest offset of the profile.
+pub(super) const REACH: usize = 2;
+/// How many values a median over the whole trace is taken from.
+const MEDIAN_OF: usize = 65_536;
+
+/// A local minimum of the profile.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    offset: usize,
+    distance_w2: f64,
+}
+
+/// Everything about a trace that single starts are found with.
+pub(super) struct View<'a> {
+    pub trace: &'a Trace,
+    pub power: &'a [f64],
+    pub placement: &'a Placement,
+    pub threshold: &'a Threshold,
+}
+
+impl View<'_> {
+    /// The start at a candidate, finer than a sample.
+    fn start_near(&self, candidate: &Candidate, mark: usize) -> FrameStart {
+        let mark = &self.placement.marks[mark];
+        let template = &self.power[mark.first..mark.first + self.placement.samples];
+        let aligned = refine::align(self.power, template, candidate.offset, REACH);
+        FrameStart {
+            time_s: mark.mark_s + (aligned - mark.first as f64) * self.trace.period_s(),
+            distance_w2: candidate.distance_w2,
+            confidence: assess::confidence(candidate.distance_w2, self.threshold),
+            marked: false,
+        }
+    }
+}
+
+/// [`View::start_after_idle`] for samples that are not all of a trace.
+pub(crate) fn start_after_idle(
+    trace: &Trace,
+    power: &[f64],
+    placement: &Placement,
+    threshold: &Threshold,
+    starts: &[FrameStart],
+    spacing: usize,
+) -> Option<FrameStart> {
+    View { trace, power, placement, threshold }.start_after_idle(starts, spacing)
+}
+
+/// `method` says by which distance: that of squares, or the normalized one.
+pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Result<Found, MarkError> {
+    let measure = if method == Method::Normalized { normalized } else { squares };
+    let placement = marks.place(trace)?;
+    let power: Vec<f64> = trace.powers_w().collect();
+    let (profile, nearest) = nearest_profile(&power, &placement, measure);
+    let spacing = spacing(placement.samples);
+    let candidates = candidates(&profile, &placement, spacing);
+    let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
+    let noise_w2 = 2.0 * placement.samples as f64 * noise_variance(&power);
+    let background_w2 = median_of(profile.iter().copied(), profile.len());
+    let threshold =
+        choose(&distances, background_w2, noise_w2, misalignment_w2(&power, &placement), |value_w2| {
+            evenness(&candidates, &placement, value_w2)
+        });
+
+    let mut starts = marked_starts(&placement, &profile);
+    let view = View { trace, power: &power, placement: &placement, threshold: &threshold };
+    for candidate in candidates.iter().filter(|candidate| candidate.distance_w2 < threshold.value_w2) {
+        starts.push(view.start_near(candidate, nearest.get(candidate.offset).copied().unwrap_or(0)));
+    }
+    starts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s);
+    if let Some(first) = view.start_after_idle(&starts, spacing) {
+        starts.insert(0, first);
+    }
+    let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
+    starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
+    Ok(Found { method, ..assess::conclude(trace, marks, &placement, starts, threshold) })
+}
+
+/// The minima that could be starts, the marks and their surroundings left out.
+fn candidates(profile: &[f64], placement: &Placement, spacing: usize) -> Vec<Candidate> {
+    let beside_marks =
+        |offset: &usize| placement.marks.iter().all(|mark| mark.first.abs_diff(*offset) >= spacing);
+    spaced_minima(profile, spacing)
+        .into_iter()
+        .filter(beside_marks)
+        .map(|offset| Candidate { offset, distance_w2: profile[offset] })
+        .collect()
+}
+
+/// How evenly the starts are spaced if the threshold is `value_w2`.
+fn evenness(candidates: &[Candidate], placement: &Placement, value_w2: f64) -> f64 {
+    let below = candidates
+        .iter()
+        .filter(|candidate| candidate.distance_w2 < value_w2)
+        .map(|candidate| candidate.offset);
+    let mut offsets: Vec<usize> = below.chain(placement.marks.iter().map(|mark| mark.first)).collect();
+    offsets.sort_unstable();
+    let span =
+        candidates.last().map_or(0, |last| last.offset) - candidates.first().map_or(0, |first| first.offset);
+    regularity(&offsets, span)
+}
+
+/// The smallest distance to any mark's window at each offset, and with several marks which one it was.
+fn nearest_profile(
+    power: &[f64],
+    placement: &Placement,
+    measure: fn(&[f64], &[f64]) -> Vec<f64>,
+) -> (Vec<f64>, Vec<usize>) {
+    let template = |first: usize| &power[first..first + placement.samples];
+    let mut profile = placement.marks.first().map_or(Vec::new(), |mark| measure(power, template(mark.first)));
+    let mut nearest = Vec::new();
+    for (index, mark) in placement.marks.iter().enumerate().skip(1) {
+        nearest.resize(profile.len(), 0);
+        let other = measure(power, template(mark.first));
+        for ((lowest, which), value) in profile.iter_mut().zip(&mut nearest).zip(other) {
+            if value < *lowest {
+                (*lowest, *which) = (value, index);
+            }
+        }
+    }
+    (profile, nearest)
+}
+
+/// The largest distance of a marked window to itself half a sample on, W^2, in between taken to be linear.
+pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
+    let windows = placement.marks.iter().map(|mark| &power[mark.first..mark.first + placement.samples]);
+    let half_steps =
+        windows.map(|window| window.windows(2).map(|pair| 0.25 * (pair[1] - pair[0]).powi(2)).sum());
+    half_steps.fold(0.0, f64::max)
+}
+
+/// Variance of the sensor noise, W^2, from the median step between neighbours: `median |p[i+1] - p[i]|` is
+/// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a median.
+fn noise_variance(power: &[f64]) -> f64 {
+    let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let sigma = median_of(steps, power.len().saturating_sub(1)) / (0.674_489_75 * core::f64::consts::SQRT_2);
+    sigma * sigma
+}
+
+/// The (upper) median of at most [`MEDIAN_OF`] of `count` values, evenly picked; 0 for none.
+fn median_of(values: impl Iterator<Item = f64>, count: usize) -> f64 {
+    let mut picked: Vec<f64> = values.step_by(count.div_ceil(MEDIAN_OF).max(1)).collect();
+    median(&mut picked)
+}

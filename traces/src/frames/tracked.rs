@@ -1,0 +1,37 @@
+//! Starts by the sequence that fits best.
+
+use super::assess;
+use super::find::{Found, FrameStart, spacing};
+use super::marks::{MarkError, Marks, Placed};
+use super::method::Method;
+use super::register::register;
+use super::threshold::choose;
+use super::track::{Start, track};
+use crate::trace::Trace;
+
+/// By the sequence of starts that fits best.
+pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
+    let placement = marks.place(trace)?;
+    let power: Vec<f64> = trace.powers_w().collect();
+    let tracked = track(&power, &placement);
+    let offsets: Vec<usize> = tracked.starts.iter().map(|start| start.offset).collect();
+    let marked: Vec<Option<&Placed>> =
+        offsets.iter().map(|offset| placement.marks.iter().find(|mark| mark.first == *offset)).collect();
+    let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
+    let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
+    let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
+    let start = |((start, position), marked): ((&Start, f64), &Option<&Placed>)| FrameStart {
+        time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
+        distance_w2: start.distance_w2,
+        confidence: start.confidence,
+        marked: marked.is_some(),
+    };
+    let mut starts: Vec<FrameStart> = tracked.starts.iter().zip(positions).zip(&marked).map(start).collect();
+    starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
+    let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
+    starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
+    let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
+    let mut found = assess::conclude(trace, marks, &placement, starts, nothing);
+    found.method = Method::Tracking;
+    Ok(found)
+}
