@@ -9,7 +9,7 @@ use serde_json::json;
 use tests::{Glb, Inputs, Results, quintile, root};
 
 /// Codes that no test here brings about, and why.
-const NOT_PROVOKED: [(&str, &str); 2] = [
+const NOT_PROVOKED: [(&str, &str); 4] = [
     (
         "clipped-samples",
         "the recorder of a run is chosen so that its range holds the peak; only a recorder set by hand could clip",
@@ -18,10 +18,15 @@ const NOT_PROVOKED: [(&str, &str); 2] = [
         "prediction-unsure",
         "it takes an animation whose previews mislead by more than a few percent; a unit test in `sim` makes it up",
     ),
+    (
+        "short-packets",
+        "it takes a larger GPU than those that come with the program; a unit test in `sim` has a stream of such packets",
+    ),
+    ("unsure-frames", "it takes a trace in which frames go astray; tests in `traces` have some"),
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 30] = [
+const PROVOKED: [&str; 31] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -38,6 +43,7 @@ const PROVOKED: [&str; 30] = [
     "irregular-spacing",
     "lens-leaves-view",
     "light-ignored",
+    "memory-rows",
     "missing-image",
     "missing-texcoord",
     "missed-vsync",
@@ -281,6 +287,29 @@ fn regimes_in_which_tile_tests_pay_little() {
         assert_warns(&run(&hopeless, args), code);
         let codes = run(&harmless, quiet).warning_codes();
         assert!(!codes.contains(&code.to_owned()), "{code} without need: {codes:?}");
+    }
+}
+
+/// The reference GPU with memory that opens a row for every line, slowly.
+#[test]
+fn rows_of_memory_that_decide() {
+    let inputs = Inputs::new();
+    let path = root().join("sim/gpus/reference.ron");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let slow = text
+        .replace("activate_cycles: 7, precharge_cycles: 7", "activate_cycles: 100, precharge_cycles: 100")
+        .replace("row_bytes: 4096, interleave_bytes: 256", "row_bytes: 64, interleave_bytes: 64")
+        .replace("l2: (entries: 4096, ways: 8)", "l2: (entries: 64, ways: 8)");
+    assert_ne!(text, slow, "the GPU has another memory now");
+    let gpu = inputs.put("slow.ron", slow);
+    let run = |gpu: &str, level: &str| {
+        let args = ["--size", "160x90", "--frames", "0..1", "--gpu", gpu, "--timing", level];
+        quintile!().run("default", &args)
+    };
+    assert_warns(&run(&gpu, "packet"), "memory-rows");
+    assert_warns(&run(&gpu, "bound"), "memory-rows");
+    for (gpu, level) in [(gpu.as_str(), "stepped"), ("reference", "packet")] {
+        assert!(!run(gpu, level).warning_codes().contains(&"memory-rows".to_owned()), "{gpu} {level}");
     }
 }
 

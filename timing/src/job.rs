@@ -213,7 +213,7 @@ fn whole(cycles: f64) -> u32 {
     let cycles = (cycles - 1e-6).max(0.0);
     // `ceil` is a call where the processor is taken for an old one.
     let below = cycles as u32;
-    below + u32::from(f64::from(below) < cycles)
+    below.saturating_add(u32::from(f64::from(below) < cycles))
 }
 
 #[cfg(test)]
@@ -238,5 +238,6 @@ mod tests {
             [0.0, 0.2, 1.0, 3.0 * (1.0 / 3.0), 49.0 * (1.0 / 49.0), 2.1].map(whole),
             [0, 1, 1, 1, 1, 3]
         );
+        assert_eq!([4.2e9, 1e10, 1e300].map(whole), [4_200_000_000, u32::MAX, u32::MAX]);
     }
 }

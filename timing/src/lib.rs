@@ -50,7 +50,13 @@ pub struct Timed {
     pub unit_cycles: u64,
     /// Packets of the stream.
     pub packets: u64,
-    /// The share of the frame for which the bank of memory that is busiest with it opens and closes rows, where the level
-    /// knows. Levels differ most where it is large, as they reorder lines differently.
+    /// For how long the bank of memory that is busiest with it opens and closes rows, over the busy time of the unit that is
+    /// busiest; where the level knows. Levels differ most where it is large, as they reorder lines differently.
     pub rows: Option<f64>,
+}
+
+/// A length of time over the busy time of the busiest unit.
+fn over_busiest(length_ps: u64, timeline: &activity::Timeline) -> f64 {
+    let busiest = timeline.busy_ps().into_iter().max().unwrap_or(0);
+    length_ps as f64 / busiest.max(1) as f64
 }

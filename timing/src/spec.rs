@@ -50,6 +50,11 @@ pub struct ClientSpec {
     pub rates: Rates,
 }
 
+/// The most of anything: more is a slip of the pen, and would take for ever.
+const MOST: u32 = 1 << 20;
+/// The fewest events of a cycle.
+const SLOWEST: f64 = 1e-6;
+
 fn one() -> u32 {
     1
 }
@@ -219,6 +224,19 @@ impl MachineSpec {
                     "`units.{name}.latency_cycles` is 0; nothing is seen before the next cycle, so it is at least 1"
                 ));
             }
+            if common.latency_cycles > MOST {
+                return Err(format!(
+                    "`units.{name}.latency_cycles` is {}; it has to be 1 to {MOST}",
+                    common.latency_cycles
+                ));
+            }
+            let slow = common.rates.and_then(|rates| rates.iter().find(|(_, rate)| *rate < SLOWEST));
+            if let Some((event, rate)) = slow {
+                let event = event.name();
+                return Err(format!(
+                    "`units.{name}.rates` has {rate:e} `{event}` a cycle; it has to be at least {SLOWEST:e}"
+                ));
+            }
             let foreign = common.rates.and_then(|rates| rates.iter().find(|(event, _)| event.unit() != unit));
             if let Some((event, _)) = foreign {
                 let (event, owner) = (event.name(), event.unit().name());
@@ -250,12 +268,15 @@ impl MachineSpec {
             ("dram.channels", dram.channels, 1),
             ("dram.banks", dram.banks, 1),
             ("dram.burst_cycles", dram.burst_cycles, 1),
+            ("dram.cas_cycles", dram.cas_cycles, 0),
+            ("dram.activate_cycles", dram.activate_cycles, 0),
+            ("dram.precharge_cycles", dram.precharge_cycles, 0),
             ("dram.row_bytes", dram.row_bytes, crate::LINE_BYTES),
             ("dram.interleave_bytes", dram.interleave_bytes, crate::LINE_BYTES),
         ];
-        match sizes.iter().find(|(_, value, least)| !(*least..=1 << 20).contains(value)) {
+        match sizes.iter().find(|(_, value, least)| !(*least..=MOST).contains(value)) {
             Some((field, value, least)) => {
-                Err(format!("`units.{field}` is {value}; it has to be {least} to 1048576"))
+                Err(format!("`units.{field}` is {value}; it has to be {least} to {MOST}"))
             }
             None => Ok(()),
         }

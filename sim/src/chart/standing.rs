@@ -84,7 +84,12 @@ impl Standings for SamplingChart {
 
 impl Standings for TileTests {
     fn standings(&self) -> Vec<Standing> {
-        let front = self.rows.iter().filter(|row| row.on_efficiency_front);
+        // Of combinations that cost and gain the same, the first.
+        let same = |a: &&super::tile_tests::Row, b: &&super::tile_tests::Row| {
+            (&a.scene, a.madds_per_triangle, a.efficiency) == (&b.scene, b.madds_per_triangle, b.efficiency)
+        };
+        let mut front: Vec<_> = self.rows.iter().filter(|row| row.on_efficiency_front).collect();
+        front.dedup_by(|a, b| same(a, b));
         let row = |row: &super::tile_tests::Row| {
             standing(
                 &format!("samples of a triangle ({})", row.scene),
@@ -93,7 +98,7 @@ impl Standings for TileTests {
                 format!("{:.0} multiply-adds a triangle", row.madds_per_triangle),
             )
         };
-        front.map(row).collect()
+        front.into_iter().map(row).collect()
     }
 }
 

@@ -34,6 +34,11 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
             "--scene goes with `chart all`, `sampled`, `tile-tests` and `timing`; leave it out".to_owned();
         return Err(Failure { message, code: 2 });
     }
+    // What can be known to be wrong is told before minutes of work.
+    OutDir::create(&args.out).map_err(RunError::from)?;
+    for scene in &args.scene {
+        workloads::load(scene).map_err(RunError::from)?;
+    }
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
     if args.chart == ChartArg::All {

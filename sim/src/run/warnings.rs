@@ -43,7 +43,7 @@ fn doubted(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
         }
     }
     let level = plan.options.timing;
-    worst.iter().map(|(frame, doubt)| Warning::new(doubt.code(), doubt.message(*frame, level))).collect()
+    worst.iter().map(|(frame, doubt)| doubt.warning(*frame, level)).collect()
 }
 
 fn degenerate(simulated: &Simulated) -> Option<Warning> {

@@ -1,5 +1,6 @@
 //! What a level is known to be bad at, seen in its own result.
 
+use activity::Warning;
 use timing::Timed;
 
 use super::Level;
@@ -7,15 +8,18 @@ use super::Level;
 /// A reason not to trust the time of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
-    /// A bank of memory opens and closes rows for this share of the frame: `packet` and `bound` reorder its lines otherwise than
-    /// `stepped` does.
+    /// A bank of memory opens and closes rows for this long, over the busy time of the busiest unit: `packet` and `bound` reorder
+    /// its lines otherwise than `stepped` does.
     MemoryRows(f64),
     /// A packet comes every so many cycles: at `bound`, short ones wait for a unit each, where no unit is busy for long.
     ShortPackets(f64),
 }
 
-/// The share of the frame from which rows decide.
-const ROWS: f64 = 0.5;
+const MEMORY_ROWS: &str = "memory-rows";
+const SHORT_PACKETS: &str = "short-packets";
+
+/// The time of rows, over that of the busiest unit, from which they decide.
+const ROWS: f64 = 0.2;
 /// Cycles of a packet below which packets are short.
 const SHORT: f64 = 2.0;
 
@@ -31,8 +35,8 @@ impl Doubt {
     /// Its code among the warnings.
     pub const fn code(self) -> &'static str {
         match self {
-            Self::MemoryRows(_) => "memory-rows",
-            Self::ShortPackets(_) => "short-packets",
+            Self::MemoryRows(_) => MEMORY_ROWS,
+            Self::ShortPackets(_) => SHORT_PACKETS,
         }
     }
 
@@ -45,18 +49,23 @@ impl Doubt {
     }
 
     /// What to tell of a frame.
-    pub fn message(self, frame: u32, level: Level) -> String {
+    pub fn warning(self, frame: u32, level: Level) -> Warning {
         let name = level.name();
         match self {
-            Self::MemoryRows(share) => format!(
-                "a bank of memory opens and closes rows for {:.0} % of frame {frame}: in streams made for that `{name}` \
-                 takes up to {} longer than the reference; use --timing stepped, or let --accuracy choose",
-                100.0 * share,
-                if level == Level::Bound { "two thirds" } else { "half" },
+            Self::MemoryRows(share) => Warning::new(
+                MEMORY_ROWS,
+                format!(
+                    "a bank of memory opens and closes rows for {share:.1} times as long as any unit works in frame {frame}: \
+                     times at `{name}` may be far off, as what counts is which lines wait side by side; use --timing \
+                     stepped, or let --accuracy choose"
+                ),
             ),
-            Self::ShortPackets(cycles) => format!(
-                "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a quarter \
-                 too short; use --timing packet, or let --accuracy choose"
+            Self::ShortPackets(cycles) => Warning::new(
+                SHORT_PACKETS,
+                format!(
+                    "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a \
+                     quarter too short; use --timing packet, or let --accuracy choose"
+                ),
             ),
         }
     }

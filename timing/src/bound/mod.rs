@@ -85,9 +85,10 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     }
     recorder.lasts(clocks.ps(now));
     let packets = totals.stretches().map(|stretch| u64::from(stretch.packets)).sum();
-    let share = rows.iter().sum::<Time>() as f64 / now.max(1) as f64;
+    let timeline = recorder.finish();
+    let share = crate::over_busiest(clocks.ps(rows.iter().sum()), &timeline);
     let cycles = clocks.cycles(Clock::Core, now);
-    Timed { timeline: recorder.finish(), cycles, stalls: None, unit_cycles: 0, packets, rows: Some(share) }
+    Timed { timeline, cycles, stalls: None, unit_cycles: 0, packets, rows: Some(share) }
 }
 
 fn write(

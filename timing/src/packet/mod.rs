@@ -236,13 +236,15 @@ impl PacketClock {
         for bus in memory.buses() {
             write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }
+        let timeline = recorder.finish();
+        let rows = crate::over_busiest(clocks.ps(memory.rows()), &timeline);
         Timed {
-            timeline: recorder.finish(),
+            timeline,
             cycles: clocks.cycles(Clock::Core, end),
             stalls: None,
             unit_cycles: 0,
             packets,
-            rows: Some(memory.rows() as f64 / end.max(1) as f64),
+            rows: Some(rows),
         }
     }
 }

@@ -63,7 +63,9 @@ fn entry(name: String, done: Done, took_s: f64, dir: &OutDir) -> Result<Entry, F
         "each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, cost",
         |(_, about)| about,
     );
-    let stems: &[&str] = if name == STRESS { &["stress", "auto", "plots/stress"] } else { &[&name] };
+    let file = name.replace('-', "_");
+    let plots = format!("plots/{file}");
+    let stems: &[&str] = if name == STRESS { &["stress", "auto", &plots] } else { &[&file, &plots] };
     let entry = Entry {
         about: about.to_owned(),
         text: done.text,
