@@ -9,7 +9,7 @@ pub enum Cause {
     Launch,
     /// The processor waits in a blocking finish.
     Finish,
-    /// The disturbance at this place in [`crate::System::disturbances`].
+    /// The disturbance at this place in the `disturbances` of a [`crate::System`].
     Disturbance(usize),
 }
 
