@@ -52,6 +52,20 @@ pub fn pairs(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<(usize, 
     pairs
 }
 
+/// For each found start the place of the true one beside it.
+pub fn true_beside_found(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<Option<usize>> {
+    let mut beside = vec![None; found_s.len()];
+    pairs(found_s, truth_s, tolerance_s).into_iter().for_each(|(found, truth)| beside[found] = Some(truth));
+    beside
+}
+
+/// For each true start the place of the found one beside it.
+pub fn found_beside_true(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<Option<usize>> {
+    let mut beside = vec![None; truth_s.len()];
+    pairs(found_s, truth_s, tolerance_s).into_iter().for_each(|(found, truth)| beside[truth] = Some(found));
+    beside
+}
+
 /// Scores found frames, both sorted by start.
 pub fn score(found: &[FrameEnergy], truth: &[TrueFrame], tolerance_s: f64) -> Score {
     let found_s: Vec<f64> = found.iter().map(|frame| frame.start_s).collect();
@@ -75,11 +89,8 @@ pub fn score(found: &[FrameEnergy], truth: &[TrueFrame], tolerance_s: f64) -> Sc
 pub fn truth_beside(found: &[FrameEnergy], truth: &[TrueFrame], tolerance_s: f64) -> Vec<Option<TrueFrame>> {
     let found_s: Vec<f64> = found.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = truth.iter().map(|frame| frame.start_s).collect();
-    let mut beside = vec![None; found.len()];
-    for (f, t) in pairs(&found_s, &truth_s, tolerance_s) {
-        beside[f] = Some(truth[t]);
-    }
-    beside
+    let beside = true_beside_found(&found_s, &truth_s, tolerance_s);
+    beside.into_iter().map(|place| place.map(|place| truth[place])).collect()
 }
 
 impl Score {

@@ -4,7 +4,7 @@ use power_model::{Circumstances, FramePower};
 use traces::energy::PowerIntegral;
 
 use super::figure::{POWER, TIME, line};
-use super::recording::{MARKED, Recording, looped};
+use super::recording::{Frames, MARKED, Recording, looped};
 use super::row::{Kind, Row, Verdict, numbers};
 use super::stage::Stage;
 use super::{Done, Effort, Figure};
@@ -21,9 +21,10 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
     let frames = pc.pc_animation(effort.pc_frames, progress)?;
     let shown = looped(&frames, effort.recorded_frames);
     let circumstances = Circumstances { launch: false, blocking_finish: false, seed: 1 };
-    let recording = Recording::new(&pc, &shown, pc.capped()?, circumstances, MARKED)?;
+    let recording = Recording::new(&pc, &shown, pc.capped()?, circumstances)?;
+    let found = recording.find(MARKED)?;
     let idle_w = pc.platform.idle_w.value();
-    Ok(vec![passes(&recording, &frames, idle_w), inverses(&recording)])
+    Ok(vec![passes(&recording, &frames, idle_w), inverses(&recording, &found)])
 }
 
 /// Energies of the stretches of a frame over all frames, with the mean idle power taken off as in the paper, J per pixel.
@@ -110,13 +111,13 @@ fn figure(recording: &Recording, idle_w: f64) -> Figure {
 }
 
 /// II-2: the mean of inverses is not the inverse of the mean.
-fn inverses(recording: &Recording) -> Done {
-    let per_pixel: Vec<f64> = recording.found.iter().map(|frame| frame.energy_j / PIXELS).collect();
+fn inverses(recording: &Recording, frames: &Frames) -> Done {
+    let per_pixel: Vec<f64> = frames.found.iter().map(|frame| frame.energy_j / PIXELS).collect();
     let count = per_pixel.len() as f64;
     let wrong = per_pixel.iter().map(|joules| 1.0 / joules).sum::<f64>() / count;
     let right = count / per_pixel.iter().sum::<f64>();
     // The right one is that of the whole animation: all pixels over all joules.
-    let whole_j = PowerIntegral::new(&recording.trace).energy_j(recording.found[0].start_s, recording.end_s);
+    let whole_j = PowerIntegral::new(&recording.trace).energy_j(frames.found[0].start_s, frames.end_s);
     let whole = PIXELS * count / whole_j;
     let row = Row {
         id: "II-2",

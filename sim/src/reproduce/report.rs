@@ -99,10 +99,7 @@ impl Report {
         }
         let stem = stem(self.paper);
         dir.write_atomic(&format!("{stem}.md"), |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
-        dir.write_atomic(&format!("{stem}.json"), |out| {
-            serde_json::to_writer_pretty(&mut *out, self)?;
-            Ok(writeln!(out)?)
-        })?;
+        dir.write_json(&format!("{stem}.json"), self)?;
         Ok(())
     }
 }

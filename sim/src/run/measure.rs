@@ -39,11 +39,8 @@ impl Measurement {
     pub fn by_true_frame(&self) -> Vec<Option<&FrameEnergy>> {
         let starts: Vec<f64> = self.truth.iter().map(|frame| frame.start_s).collect();
         let found: Vec<f64> = self.frames.iter().map(|frame| frame.start_s).collect();
-        let mut matched = vec![None; starts.len()];
-        for (found, truth) in score::pairs(&found, &starts, TOLERANCE_S) {
-            matched[truth] = Some(&self.frames[found]);
-        }
-        matched
+        let beside = score::found_beside_true(&found, &starts, TOLERANCE_S);
+        beside.into_iter().map(|place| place.map(|place| &self.frames[place])).collect()
     }
 }
 

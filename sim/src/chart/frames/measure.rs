@@ -6,7 +6,7 @@ use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Flag, Marks, Method, Options, default_window, find_with};
-use traces::score::{TOLERANCE_S, pairs, score};
+use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Recording, Scenario, Scene};
 
 use super::{Effort, Way};
@@ -96,10 +96,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, ChartError
 fn flagged(frames: &[FrameEnergy], scene: &Scene) -> Outcome {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
-    let mut partner = vec![None; frames.len()];
-    for (found, truth) in pairs(&found_s, &truth_s, TOLERANCE_S) {
-        partner[found] = Some(truth);
-    }
+    let partner = true_beside_found(&found_s, &truth_s, TOLERANCE_S);
     let mut outcome = Outcome::default();
     for (two, frame) in partner.windows(2).zip(frames) {
         let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);

@@ -110,11 +110,12 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
     let pacing = bench.pc.capped()?;
     let [with, without] = [(blocked as fn(u64) -> Circumstances, 1), (settled, 2000)].map(
         |(how, first)| -> Result<_, RunError> {
-            let recordings =
-                (first..first + bench.effort.repeats).map(|seed| bench.on_pc(pacing, how(seed), MARKED));
-            let runs: Vec<Vec<Option<f64>>> = recordings
-                .map(|recording| Ok(recording?.by_true_frame_j()))
-                .collect::<Result<_, RunError>>()?;
+            let run = |seed| {
+                let recording = bench.on_pc(pacing, how(seed))?;
+                Ok(recording.by_true_frame_j(&recording.find(MARKED)?))
+            };
+            let runs = (first..first + bench.effort.repeats).map(run);
+            let runs: Vec<Vec<Option<f64>>> = runs.collect::<Result<_, RunError>>()?;
             Ok(by_frame(&runs, bench.pc_frames.len()))
         },
     );

@@ -7,7 +7,7 @@ use super::super::figure::{ENERGY, POWER, TIME, by_place, dots, line};
 use super::super::recording::Recording;
 use super::super::row::{Kind, Row, Verdict, numbers};
 use super::super::{Done, Figure};
-use super::{Bench, settled};
+use super::{Bench, settled, unflagged};
 use crate::run::RunError;
 
 /// Frames of a short repeated measurement for the upper half of Figure 8.
@@ -65,11 +65,11 @@ pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
     let shown = vec![bench.frame(); bench.effort.still_frames];
     let recording = bench.on_phone(&shown, settled(5))?;
     // A frame that was not found counts as one of no energy, which nobody could overlook.
-    let energies: Vec<f64> = recording.by_true_frame_j().iter().map(|energy| energy.unwrap_or(0.0)).collect();
+    let found = recording.by_true_frame_j(&recording.find(1)?);
+    let energies: Vec<f64> = found.iter().map(|energy| energy.unwrap_or(0.0)).collect();
     let flags = outliers(&energies);
     let tally = tally(&recording, &flags);
-    let kept: Vec<f64> =
-        energies.iter().zip(&flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect();
+    let kept = unflagged(&energies, &flags);
     let deviation_mj = |values: &[f64]| 1e3 * Spread::of(values).map_or(f64::NAN, |spread| spread.deviation);
     let (all_mj, without_mj) = (deviation_mj(&energies), deviation_mj(&kept));
     let [fewest, most] = tally.frames;

@@ -6,7 +6,7 @@ use traces::frames::Method;
 use traces::score::Score;
 
 use super::super::figure::{POWER, TIME, dots, line};
-use super::super::recording::{MARKED, Recording};
+use super::super::recording::{Frames, MARKED, Recording};
 use super::super::row::{Kind, Row, Verdict, numbers};
 use super::super::{Done, Figure};
 use super::{Bench, settled};
@@ -123,29 +123,33 @@ fn missed(found: &[Found; 4]) -> String {
     names.iter().zip(found).filter_map(line).collect()
 }
 
+/// A recording and what was found in it.
+type Searched = (Recording, Frames);
+
 /// Recordings of the PC's animation with one mark each: the first, and how well all of them are found by either method.
-fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Recording, [Found; 2]), RunError> {
+fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Searched, [Found; 2]), RunError> {
     let mut first = None;
     let (mut squares, mut tracking) = (Vec::new(), Vec::new());
     for seed in first_seed..first_seed + bench.effort.repeats {
-        let recording = bench.on_pc(pacing, settled(seed), 1)?;
-        squares.push(recording.score(Method::SumOfSquares)?);
-        tracking.push(recording.score(Method::Tracking)?);
-        first.get_or_insert(recording);
+        let recording = bench.on_pc(pacing, settled(seed))?;
+        let tracked = recording.find(1)?;
+        squares.push(recording.score(&recording.find_by(Method::SumOfSquares, 1)?));
+        tracking.push(recording.score(&tracked));
+        first.get_or_insert((recording, tracked));
     }
     let none = || RunError::Setting("no recording was asked for".to_owned());
     Ok((first.ok_or_else(none)?, [Found::of(&squares), Found::of(&tracking)]))
 }
 
 /// Some frames from the middle, with the starts that were found.
-fn shown_frames(name: &'static str, title: &str, recording: &Recording, count: usize) -> Figure {
+fn shown_frames(name: &'static str, title: &str, (recording, frames): &Searched, count: usize) -> Figure {
     let middle = recording.truth.frames.len() / 2;
     let (first, last) = (&recording.truth.frames[middle], &recording.truth.frames[middle + count - 1]);
     let margin_s = 0.05 * (last.end_s - first.start_s);
     let (from_s, to_s) = (first.start_s - margin_s, last.end_s + margin_s);
     let points = recording.points(from_s, to_s);
     let near = |time_s: f64| points.iter().find(|point| point.0 >= time_s).map_or(0.0, |point| point.1);
-    let starts = recording.found.iter().map(|frame| frame.start_s);
+    let starts = frames.found.iter().map(|frame| frame.start_s);
     let starts = starts
         .filter(|start| (from_s..to_s).contains(start))
         .map(|start| (start - from_s, near(start - from_s)));
@@ -156,10 +160,11 @@ fn shown_frames(name: &'static str, title: &str, recording: &Recording, count: u
 
 /// III-2: start-to-start energies sum to the whole, begin-to-finish ones do not.
 pub(super) fn sums(bench: &Bench<'_>) -> Result<Done, RunError> {
-    let capped = bench.on_pc(bench.pc.capped()?, settled(1), MARKED)?;
+    let capped = bench.on_pc(bench.pc.capped()?, settled(1))?;
+    let frames = capped.find(MARKED)?;
     let integral = PowerIntegral::new(&capped.trace);
-    let whole_j = integral.energy_j(capped.found[0].start_s, capped.end_s);
-    let new_j: f64 = capped.energies_j().iter().sum();
+    let whole_j = integral.energy_j(frames.found[0].start_s, frames.end_s);
+    let new_j: f64 = frames.energies_j().iter().sum();
     let drawn_j = integral.energy_j(capped.truth.start_s, capped.truth.end_s);
     let old_j: f64 = capped.begin_to_finish_j().iter().sum();
     let [new, old] = [(new_j / whole_j - 1.0).abs(), 1.0 - old_j / drawn_j];

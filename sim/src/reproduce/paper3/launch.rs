@@ -7,7 +7,7 @@ use super::super::figure::{ENERGY, POWER, TIME, by_place, level, line};
 use super::super::recording::{MARKED, Recording, looped};
 use super::super::row::{Kind, Row, Verdict, numbers};
 use super::super::{Done, Figure};
-use super::{Bench, settled};
+use super::{Bench, settled, unflagged};
 use crate::run::RunError;
 
 /// What the paper found on the phone.
@@ -42,7 +42,11 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
     let shown = vec![bench.frame(); FRAMES];
     let recordings = (1..=bench.effort.repeats).map(|seed| bench.on_phone(&shown, launched(seed)));
     let recordings: Vec<Recording> = recordings.collect::<Result<_, _>>()?;
-    let knees: Vec<WarmUp> = recordings.iter().map(|recording| settles(&recording.energies_j())).collect();
+    let energies: Vec<Vec<f64>> = recordings
+        .iter()
+        .map(|recording| Ok(recording.find(1)?.energies_j()))
+        .collect::<Result<_, RunError>>()?;
+    let knees: Vec<WarmUp> = energies.iter().map(|energies| settles(energies)).collect();
     let frames: Vec<f64> = knees.iter().map(|knee| knee.frames as f64).collect();
     let (low, high) =
         (frames.iter().copied().fold(f64::INFINITY, f64::min), frames.iter().copied().fold(0.0, f64::max));
@@ -50,8 +54,9 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
     let excess_w = knees.iter().map(|knee| knee.excess_j).sum::<f64>() / (knees.len() as f64 * period_s);
     let pc_shown = looped(&bench.pc_frames[..1], FRAMES);
     bench.bar.inc();
-    let pc = Recording::new(&bench.pc, &pc_shown, bench.pc.capped()?, launched(1), MARKED)?;
-    let pc_frames = settles(&pc.energies_j()).frames;
+    let pc = Recording::new(&bench.pc, &pc_shown, bench.pc.capped()?, launched(1))?;
+    let pc_energies = pc.find(MARKED)?.energies_j();
+    let pc_frames = settles(&pc_energies).frames;
     let row = Row {
         id: "III-3",
         kind: Kind::Number,
@@ -78,8 +83,8 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
         figure: None,
         figures: Vec::new(),
     };
-    let first = &recordings[0];
-    Ok(Done { row, figures: vec![drop(first), on_pc(&pc), discarded(first, knees[0].frames)] })
+    let figures = vec![drop(&recordings[0]), on_pc(&pc_energies), discarded(&energies[0], knees[0].frames)];
+    Ok(Done { row, figures })
 }
 
 /// Figure 5a: nine frames about the drop.
@@ -97,8 +102,7 @@ fn drop(recording: &Recording) -> Figure {
 }
 
 /// Figure 5b: identical frames on the PC, from launch on.
-fn on_pc(recording: &Recording) -> Figure {
-    let energies = recording.energies_j();
+fn on_pc(energies: &[f64]) -> Figure {
     let shown = energies.len().min(60);
     Figure::lines(
         "III_fig5b",
@@ -110,11 +114,9 @@ fn on_pc(recording: &Recording) -> Figure {
 }
 
 /// Figure 5c: mean energy over discarded frames, outliers left out.
-fn discarded(recording: &Recording, knee: usize) -> Figure {
-    let energies = recording.energies_j();
-    let flags = outliers(&energies);
-    let kept: Vec<f64> =
-        energies.iter().zip(&flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect();
+fn discarded(energies: &[f64], knee: usize) -> Figure {
+    let flags = outliers(energies);
+    let kept = unflagged(energies, &flags);
     // Frames are numbered as kept from here on.
     let knee = (0..knee).filter(|&place| !flags[place]).count();
     let means = mean_over_discarded(&kept);

@@ -32,28 +32,28 @@ fn settled(seed: u64) -> Circumstances {
     Circumstances { launch: false, blocking_finish: false, seed }
 }
 
+/// The energies that are not flagged.
+fn unflagged(energies_j: &[f64], flags: &[bool]) -> Vec<f64> {
+    energies_j.iter().zip(flags).filter(|(_, flag)| !**flag).map(|(energy, _)| *energy).collect()
+}
+
 impl Bench<'_> {
     /// The frame of Figure 7, or the last simulated one before it.
     fn frame(&self) -> &FramePower {
         &self.phone_frames[FRAME / self.effort.phone_step as usize]
     }
 
-    /// The phone draws `frames` at its cap; one start is marked.
+    /// The phone draws `frames` at its cap.
     fn on_phone(&self, frames: &[&FramePower], circumstances: Circumstances) -> Result<Recording, RunError> {
         self.bar.inc();
-        Recording::new(&self.phone, frames, self.phone.capped()?, circumstances, 1)
+        Recording::new(&self.phone, frames, self.phone.capped()?, circumstances)
     }
 
-    /// The PC draws its animation; so many starts are marked.
-    fn on_pc(
-        &self,
-        pacing: Pacing,
-        circumstances: Circumstances,
-        marked: usize,
-    ) -> Result<Recording, RunError> {
+    /// The PC draws its animation.
+    fn on_pc(&self, pacing: Pacing, circumstances: Circumstances) -> Result<Recording, RunError> {
         self.bar.inc();
         let shown = looped(&self.pc_frames, self.effort.recorded_frames);
-        Recording::new(&self.pc, &shown, pacing, circumstances, marked)
+        Recording::new(&self.pc, &shown, pacing, circumstances)
     }
 }
 
