@@ -50,7 +50,7 @@ pub mod metadata;
 mod overlap;
 pub mod pareto;
 pub mod pyramid;
-mod random;
+pub mod random;
 pub mod score;
 pub mod stream;
 mod sum;

@@ -4,10 +4,10 @@ use core::f64::consts::TAU;
 
 /// The odd constant nearest to 2^64 over the golden ratio: SplitMix64's increment (Steele, Lea and Flood 2014,
 /// "Fast splittable pseudorandom number generators", fig. 17).
-const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+pub const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// SplitMix64's output function (same source; constants by Stafford, variant 13).
-fn mix(mut z: u64) -> u64 {
+pub fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
@@ -15,7 +15,7 @@ fn mix(mut z: u64) -> u64 {
 
 /// One stream of numbers, asked for by their counters.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Random {
+pub struct Random {
     key: u64,
 }
 

@@ -43,16 +43,10 @@ pub struct Finish {
 /// Something that happens again and again and draws power on top (Paper III, section 5.3).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Written")]
-pub struct Disturbance {
-    name: String,
-    period_s: Sourced<Interval>,
-    irregularity: Sourced<Share>,
-    duration_s: Sourced<Seconds>,
-    extra_w: Sourced<Watts>,
-    variation: Sourced<Share>,
-}
+pub struct Disturbance(Written);
 
-#[derive(Deserialize)]
+/// As it stands in the file, before anything is known of whether it can be.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
     name: String,
@@ -66,57 +60,57 @@ struct Written {
 impl TryFrom<Written> for Disturbance {
     type Error = String;
     fn try_from(written: Written) -> Result<Self, String> {
-        let Written { name, period_s, irregularity, duration_s, extra_w, variation } = written;
-        let (lasts, every) = (duration_s.value(), period_s.value());
+        let (lasts, every) = (written.duration_s.value(), written.period_s.value());
         if lasts > every {
             return Err(format!(
-                "disturbance `{name}` lasts {lasts} s but comes every {every} s: shorten it, or add its power to idle_w \
-                 and constant_w"
+                "disturbance `{}` lasts {lasts} s but comes every {every} s: shorten it, or add its power to idle_w \
+                 and constant_w",
+                written.name
             ));
         }
-        Ok(Self { name, period_s, irregularity, duration_s, extra_w, variation })
+        Ok(Self(written))
     }
 }
 
 impl Disturbance {
     /// Its name.
     pub fn name(&self) -> &str {
-        &self.name
+        &self.0.name
     }
 
     /// The time from one to the next, on average, s.
     pub fn period_s(&self) -> f64 {
-        self.period_s.value()
+        self.0.period_s.value()
     }
 
     /// Which part of its period each one may come late: 0 for a clock, 1 for no pattern but its mean.
     pub fn irregularity(&self) -> f64 {
-        self.irregularity.value()
+        self.0.irregularity.value()
     }
 
     /// How long each lasts, at most a period, s.
     pub fn duration_s(&self) -> f64 {
-        self.duration_s.value()
+        self.0.duration_s.value()
     }
 
     /// The power on top, on average, W.
     pub fn extra_w(&self) -> f64 {
-        self.extra_w.value()
+        self.0.extra_w.value()
     }
 
     /// By which part of it each one may draw more or less: 0 where all are alike.
     pub fn variation(&self) -> f64 {
-        self.variation.value()
+        self.0.variation.value()
     }
 
     fn provenance(&self) -> [Provenance<'_>; 5] {
-        let field = |name: &str| format!("system.disturbances.{}.{name}", self.name);
+        let field = |name: &str| format!("system.disturbances.{}.{name}", self.0.name);
         [
-            provenance(&field("period_s"), &self.period_s),
-            provenance(&field("irregularity"), &self.irregularity),
-            provenance(&field("duration_s"), &self.duration_s),
-            provenance(&field("extra_w"), &self.extra_w),
-            provenance(&field("variation"), &self.variation),
+            provenance(&field("period_s"), &self.0.period_s),
+            provenance(&field("irregularity"), &self.0.irregularity),
+            provenance(&field("duration_s"), &self.0.duration_s),
+            provenance(&field("extra_w"), &self.0.extra_w),
+            provenance(&field("variation"), &self.0.variation),
         ]
     }
 }

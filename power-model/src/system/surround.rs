@@ -1,6 +1,6 @@
 //! A run as a recorder would see it in its surroundings.
 
-use traces::Curve;
+use traces::{Curve, random};
 
 use super::pulse::{Cause, Pulse, overlay};
 use super::spec::{Disturbance, System};
@@ -128,10 +128,7 @@ fn uniform(stream: u64, counter: u64) -> f64 {
     (mix(stream.wrapping_add(mix(counter))) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// The output function of `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014).
+/// `SplitMix64` with `number` as its state (Steele, Lea and Flood, OOPSLA 2014).
 fn mix(number: u64) -> u64 {
-    let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    random::mix(number.wrapping_add(random::GOLDEN))
 }
