@@ -14,6 +14,7 @@ pub mod fit;
 pub mod frames;
 pub mod growth;
 pub mod index;
+mod quantiles;
 pub mod sampled;
 pub mod sampling;
 pub mod standing;

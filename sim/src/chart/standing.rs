@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::frames::{Axis, FramesChart, Outcome, Way};
 use super::growth::GrowthChart;
 use super::sampled::SampledChart;
 use super::sampling::SamplingChart;
@@ -99,6 +100,22 @@ impl Standings for TileTests {
             )
         };
         front.into_iter().map(row).collect()
+    }
+}
+
+/// Every method at the least noise of the chart, over all scenes.
+impl Standings for FramesChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |way: Way| {
+            let snr_db = self.values(Axis::Noise).into_iter().reduce(f64::max)?;
+            let mean = |of: fn(&Outcome) -> Option<f64>| self.mean(Axis::Noise, snr_db, way, of);
+            let (f1, host_s) = (mean(|o| Some(o.f1))?, mean(|o| Some(o.host_s_per_1e6))?);
+            let energy =
+                mean(|o| o.energy_error).map_or(String::new(), |e| format!(", energy {:.3} %", e * 100.0));
+            let cost = format!("{host_s:.2} s for a million samples");
+            Some(standing("frames of a trace", way.name(), format!("F1 {f1:.3}{energy}"), cost))
+        };
+        Way::ALL.into_iter().filter_map(row).collect()
     }
 }
 

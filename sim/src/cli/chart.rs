@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Failure;
 use super::args::{ChartArg, ChartArgs};
-use super::terminal::print;
+use super::terminal::{json_text, print};
 use crate::chart::ChartError;
 use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
@@ -35,16 +35,16 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
         return Err(Failure { message, code: 2 });
     }
     // What can be known to be wrong is told before minutes of work.
-    OutDir::create(&args.out).map_err(RunError::from)?;
+    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     for scene in &args.scene {
         workloads::load(scene).map_err(RunError::from)?;
     }
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
     if args.chart == ChartArg::All {
-        return pool.install(|| all::run(args, &progress));
+        return pool.install(|| all::run(args, &dir, &progress));
     }
-    let done = pool.install(|| make(args.chart, args, &progress))?;
+    let done = pool.install(|| make(args.chart, args, &dir, &progress))?;
     match args.json {
         true => print(&done.json)?,
         false => print(&format!("{}results: {}", done.text, args.out.display()))?,
@@ -64,21 +64,19 @@ struct Done {
 
 impl Done {
     fn new(chart: &(impl Serialize + Standings), text: String) -> Result<Self, Failure> {
-        let json = serde_json::to_string_pretty(chart);
-        let json = json.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })?;
-        Ok(Self { text, json, standings: chart.standings(), fault: None })
+        Ok(Self { text, json: json_text(chart, true)?, standings: chart.standings(), fault: None })
     }
 }
 
-fn make(chart: ChartArg, args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
         ChartArg::Frames => chart_frames(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
-        ChartArg::Sampled => chart_sampled(args, progress),
+        ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
-        ChartArg::Timing => chart_timing(args, progress),
+        ChartArg::Timing => chart_timing(args, dir, progress),
     }
 }
 
@@ -107,11 +105,10 @@ fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure
     Done::new(&chart, format!("{}took {took_s:.1} s\n", text(&chart)))
 }
 
-fn chart_sampled(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_sampled(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { sampled::Effort::QUICK } else { sampled::Effort::FULL };
     let chart = sampled::sampled(&args.scene, effort, progress)?;
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
-    chart.write(&dir).map_err(RunError::from)?;
+    chart.write(dir).map_err(RunError::from)?;
     Done::new(&chart, format!("{}\n{}", chart.text(), chart.cost_text()))
 }
 
@@ -124,11 +121,10 @@ fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<Done, Failu
     Ok(Done { fault: (lost > 0).then_some(fault), ..Done::new(&chart, chart.text())? })
 }
 
-fn chart_timing(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_timing(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let started = Instant::now();
     let chart = timing(&args.scene, args.quick, progress)?;
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
-    chart.write(&dir).map_err(RunError::from)?;
+    chart.write(dir).map_err(RunError::from)?;
     let speed = &chart.reference;
     let text = format!(
         "{}the reference: {:.1} million unit-cycles, {:.2} million cycles a second\ntook {:.1} s\n",

@@ -18,15 +18,10 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     } else {
         print(&report.text())?;
     }
-    let clean = report.is_clean();
+    let fault = report.fault();
     report.write(dir).map_err(RunError::from)?;
     if !args.json {
         print(&format!("results: {}", args.out.display()))?;
     }
-    let lost = || Failure {
-        message: "a test is not conservative: samples were lost or boxes are too small; please report it"
-            .to_owned(),
-        code: 1,
-    };
-    if clean { Ok(()) } else { Err(lost()) }
+    fault.map_or(Ok(()), |fault| Err(Failure { message: fault.to_owned(), code: 1 }))
 }

@@ -17,8 +17,13 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
 
 /// Prints a value as JSON, over several lines where `pretty`.
 pub(super) fn print_json(value: &impl serde::Serialize, pretty: bool) -> Result<(), Failure> {
+    print(&json_text(value, pretty)?)
+}
+
+/// A value as JSON, over several lines where `pretty`.
+pub(super) fn json_text(value: &impl serde::Serialize, pretty: bool) -> Result<String, Failure> {
     let text = if pretty { serde_json::to_string_pretty(value) } else { serde_json::to_string(value) };
-    print(&text.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })?)
+    text.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })
 }
 
 /// Tells `message` on standard error; there is nowhere to say that this failed.

@@ -55,6 +55,12 @@ impl Report {
         summary.samples_lost == 0 && summary.pairs_wrong == 0
     }
 
+    /// What to say where it is not.
+    pub fn fault(&self) -> Option<&'static str> {
+        let fault = "a test is not conservative: samples were lost or boxes are too small; please report it";
+        (!self.is_clean()).then_some(fault)
+    }
+
     /// The rows of one family.
     pub fn of(&self, family: &Family) -> impl Iterator<Item = &Row> + use<'_> {
         let name = family.name;

@@ -14,7 +14,6 @@ use serde::Serialize;
 use traces::synth::{Recording, SCENARIOS};
 
 use super::ChartError;
-use super::standing::{Standing, Standings};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 
@@ -166,7 +165,7 @@ pub struct FramesChart {
 
 impl FramesChart {
     /// The values along an axis, in order.
-    fn values(&self, axis: Axis) -> Vec<f64> {
+    pub(super) fn values(&self, axis: Axis) -> Vec<f64> {
         let mut values: Vec<f64> =
             self.rows.iter().filter(|row| row.axis == axis).map(|row| row.value).collect();
         values.dedup();
@@ -179,29 +178,15 @@ impl FramesChart {
     }
 
     /// The mean over scenes of what each has; `None` where none has it.
-    fn mean(&self, axis: Axis, value: f64, way: Way, of: fn(&Outcome) -> Option<f64>) -> Option<f64> {
+    pub(super) fn mean(
+        &self,
+        axis: Axis,
+        value: f64,
+        way: Way,
+        of: fn(&Outcome) -> Option<f64>,
+    ) -> Option<f64> {
         let values: Vec<f64> = self.at(axis, value, way).filter_map(|row| of(&row.outcome)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-    }
-}
-
-impl Standings for FramesChart {
-    /// Every method at the least noise of the chart, over all scenes.
-    fn standings(&self) -> Vec<Standing> {
-        let row = |way: Way| {
-            let snr_db = self.values(Axis::Noise).into_iter().reduce(f64::max)?;
-            let mean = |of: fn(&Outcome) -> Option<f64>| self.mean(Axis::Noise, snr_db, way, of);
-            let (f1, host_s) = (mean(|o| Some(o.f1))?, mean(|o| Some(o.host_s_per_1e6))?);
-            let energy =
-                mean(|o| o.energy_error).map_or(String::new(), |e| format!(", energy {:.3} %", e * 100.0));
-            Some(Standing {
-                subject: "frames of a trace".to_owned(),
-                level: way.name().to_owned(),
-                error: format!("F1 {f1:.3}{energy}"),
-                cost: format!("{host_s:.2} s for a million samples"),
-            })
-        };
-        Way::ALL.into_iter().filter_map(row).collect()
     }
 }
 

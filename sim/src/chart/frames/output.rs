@@ -39,10 +39,7 @@ pub(super) fn write(chart: &FramesChart, dir: &OutDir) -> Result<(), OutputError
         .write(dir, "frames_time")?;
     dir.write_atomic("frames.csv", |out| csv(chart, out))?;
     dir.write_atomic("frames.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
-    dir.write_atomic("frames.json", |out| {
-        serde_json::to_writer_pretty(&mut *out, chart)?;
-        Ok(writeln!(out)?)
-    })?;
+    dir.write_json("frames.json", chart)?;
     Ok(())
 }
 

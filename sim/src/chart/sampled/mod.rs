@@ -5,6 +5,7 @@ mod output;
 
 use serde::Serialize;
 
+use super::quantiles::quantiles;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
 use crate::run::RunError;
@@ -128,14 +129,7 @@ pub fn sampled(scenes: &[String], effort: Effort, progress: &Progress) -> Result
 
 fn figures(quantity: &'static str, trials: &[Trial]) -> Figures {
     let of: Vec<&Trial> = trials.iter().filter(|t| quantity == "all" || t.quantity == quantity).collect();
-    let sorted = |pick: fn(&Trial) -> f64| {
-        let mut values: Vec<f64> = of.iter().map(|trial| pick(trial)).collect();
-        values.sort_by(f64::total_cmp);
-        move |quantile: f64| {
-            let last = values.len().saturating_sub(1);
-            values.get((quantile * last as f64).ceil() as usize).copied().unwrap_or(0.0)
-        }
-    };
+    let sorted = |pick: fn(&Trial) -> f64| quantiles(of.iter().map(move |trial| pick(trial)));
     let errors = sorted(|trial| trial.error_percent.abs());
     Figures {
         quantity,

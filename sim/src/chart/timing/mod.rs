@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::quantiles::quantiles;
 use crate::gpu::GpuSpec;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -141,16 +142,6 @@ fn figures(level: Level, rows: &[Row], added: &[AddedRow]) -> Figures {
         speedup_over_stepped_least: speedup(0.0),
         added_percent: added(0.5),
         added_worst_percent: added(1.0),
-    }
-}
-
-/// The quantiles of some values.
-fn quantiles(values: impl Iterator<Item = f64>) -> impl Fn(f64) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    move |quantile| {
-        let last = values.len().saturating_sub(1);
-        values.get((quantile * last as f64).ceil() as usize).copied().unwrap_or(0.0)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::chart::CHARTS;
 use crate::chart::index::{Entry, Index};
 use crate::cli::Failure;
 use crate::cli::args::{ChartArg, ChartArgs};
-use crate::cli::terminal::{print, print_json};
+use crate::cli::terminal::{json_text, print, print_json};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::run::RunError;
@@ -19,8 +19,7 @@ use crate::run::RunError;
 const STRESS: &str = "stress";
 
 /// Makes every chart and the page; a broken promise of one does not keep the others.
-pub(super) fn run(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> {
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+pub(super) fn run(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<(), Failure> {
     let (mut json, mut faults) = (Map::new(), Vec::new());
     let charts: Vec<_> = charts();
     let mut index = Index { command: command(args), ..Index::default() };
@@ -31,7 +30,7 @@ pub(super) fn run(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> 
         }
         let started = Instant::now();
         let done = match chart {
-            Some(chart) => make(*chart, args, progress)?,
+            Some(chart) => make(*chart, args, dir, progress)?,
             None => stress(args, progress)?,
         };
         if !args.json {
@@ -39,9 +38,9 @@ pub(super) fn run(args: &ChartArgs, progress: &Progress) -> Result<(), Failure> 
         }
         json.insert(name.clone(), serde_json::from_str(&done.json).unwrap_or(Value::Null));
         faults.extend(done.fault.iter().map(|fault| format!("{name}: {fault}")));
-        index.entries.push(entry(name.clone(), done, started.elapsed().as_secs_f64(), &dir)?);
+        index.entries.push(entry(name.clone(), done, started.elapsed().as_secs_f64(), dir)?);
         // After each, so that what there is can be looked at while the next one runs.
-        index.write(&dir).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+        index.write(dir).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
     }
     match args.json {
         true => print_json(&Value::Object(json), true)?,
@@ -81,11 +80,8 @@ fn entry(name: String, done: Done, took_s: f64, dir: &OutDir) -> Result<Entry, F
 /// The failure catalogue as a chart among the others.
 fn stress(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let report = crate::stress::stress(None, args.quick, progress)?;
-    let text = report.text();
-    let json = serde_json::to_string(&report.summary());
-    let json = json.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })?;
-    let fault = "a test is not conservative: samples were lost or boxes are too small; please report it";
-    let fault = (!report.is_clean()).then(|| fault.to_owned());
+    let (text, fault) = (report.text(), report.fault().map(str::to_owned));
+    let json = json_text(&report.summary(), false)?;
     let dir = OutDir::create(&args.out).map_err(RunError::from)?;
     report.write(dir).map_err(RunError::from)?;
     Ok(Done { text, json, standings: Vec::new(), fault })
