@@ -4,6 +4,7 @@
 //! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]), and
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
+//! - [`job`] is for work that is more than one rendering of a scene.
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
@@ -26,6 +27,7 @@ pub mod builtin;
 pub mod collision;
 mod error;
 mod import;
+pub mod job;
 mod load;
 pub mod material;
 mod samples;
@@ -36,6 +38,7 @@ pub mod visibility;
 
 pub use builtin::builtin_names;
 pub use error::LoadError;
+pub use job::Job;
 pub use load::load;
 pub use material::Material;
 pub use samples::SampleChoice;

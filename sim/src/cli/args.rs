@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use pipeline::Features;
 use pipeline::frame::HeatMap;
 
-use super::parse::{duration, frames, percent, size, tests};
+use super::parse::{duration, frames, percent, setting, size, tests};
 use super::trace::args::TraceArgs;
 use crate::timing::Method;
 
@@ -48,14 +48,21 @@ pub enum Command {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
-    quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n\n\
+    quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
+    quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
     timeline.perfetto-trace (open it at ui.perfetto.dev). summary.json is written last: where it is, all is there."
 )]
 pub struct RunArgs {
-    /// A built-in scene (see `quintile list`) or a .ron, .gltf, .glb, .ply or .obj file
-    #[arg(default_value = "default")]
+    /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .ply or .obj file
+    #[arg(default_value = "default", value_name = "SCENE|WORKLOAD|FILE")]
     pub scene: String,
+    /// Options of a workload in a .ron file
+    #[arg(long, value_name = "FILE.ron")]
+    pub options: Option<PathBuf>,
+    /// An option of a workload; may be given several times, and comes after --options
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    pub set: Vec<(String, String)>,
     /// Folder for the results; made where it is missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,

@@ -76,7 +76,7 @@ fn listing() -> Listing {
         energy_tables: power_model::EnergyTable::names().map(table).collect(),
         sample_tables: pipeline::SampleSpec::names().map(|(name, what)| Entry::new(name, what)).collect(),
         charts: crate::chart::CHARTS.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
-        workloads: vec![Entry::new("run", "draw a scene with motion and defocus, one opaque pass")],
+        workloads: workloads::job::names().map(|(name, what)| Entry::new(name, what)).collect(),
         figures: crate::run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
     }
 }

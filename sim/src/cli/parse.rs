@@ -33,6 +33,13 @@ pub(super) fn tests(text: &str) -> Result<Features, String> {
     Ok(features)
 }
 
+/// A name and a value with `=` between.
+pub(super) fn setting(text: &str) -> Result<(String, String), String> {
+    let (name, value) =
+        text.split_once('=').ok_or_else(|| format!("`{text}` has no value; write it as name=value"))?;
+    Ok((name.trim().to_owned(), value.trim().to_owned()))
+}
+
 /// A share in percent, more than none and at most all, as a fraction.
 pub(super) fn percent(text: &str) -> Result<f64, String> {
     let number =

@@ -5,13 +5,14 @@ use std::time::Instant;
 use power_model::Bound;
 use serde::Serialize;
 use workloads::Overrides;
+use workloads::job::OptionSource;
 
 use super::Failure;
 use super::args::{BoundArg, PacingArg, RunArgs};
 use super::terminal::{print, print_json};
 use crate::output::MeanSd;
 use crate::output::progress::Progress;
-use crate::output::table::{Table, si, si_mean_sd};
+use crate::output::table::{Table, digits, si, si_mean_sd};
 use crate::run::{Detection, Outcome, PacingChoice, RunOptions, Summary, Wish};
 
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
@@ -29,6 +30,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
 fn options(args: &RunArgs) -> RunOptions {
     RunOptions {
         scene: args.scene.clone(),
+        options: OptionSource { file: args.options.clone(), set: args.set.clone() },
         overrides: Overrides {
             size: args.size,
             samples: args.samples,
@@ -93,6 +95,7 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
     if let Some(efficiency) = summary.sample_test_efficiency {
         lines.push(format!("sample test efficiency {:.1} %", efficiency * 100.0));
     }
+    lines.extend(summary.facts.iter().map(|(name, value)| format!("{name}: {}", digits(*value))));
     lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
     lines.push(format!("results: {}", args.out.display()));
     lines.push(format!("report:  {}\n", args.out.join("report.html").display()));

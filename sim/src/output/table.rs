@@ -103,6 +103,16 @@ fn decimals(value: f64, digits: usize) -> usize {
     digits.saturating_sub(whole as usize)
 }
 
+/// A number without a unit to four digits, without an exponent where it can be read without.
+pub fn digits(value: f64) -> String {
+    let magnitude = value.abs();
+    if magnitude == 0.0 || (1e-3..1e9).contains(&magnitude) {
+        let decimals = if magnitude == 0.0 { 0 } else { (3 - magnitude.log10().floor() as i32).max(0) };
+        return format!("{value:.*}", decimals as usize);
+    }
+    format!("{value:.3e}")
+}
+
 /// An integer in groups of three: `1 234 567`.
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();

@@ -15,6 +15,8 @@ pub enum RunError {
     #[error(transparent)]
     Frame(#[from] workloads::FrameError),
     #[error(transparent)]
+    Job(#[from] workloads::job::JobError),
+    #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Platform(#[from] power_model::PlatformError),
@@ -66,6 +68,7 @@ impl RunError {
             | Self::Samples(_)
             | Self::Device(_)
             | Self::Model(_)
+            | Self::Job(workloads::job::JobError::Setting(_) | workloads::job::JobError::Cache(_))
             | Self::Setting(_) => true,
             _ => false,
         }

@@ -4,13 +4,13 @@ use power_model::Bound;
 
 use super::{Outcome, Plan};
 use crate::output::report::{FactRow, FileLink};
-use crate::output::table::{grouped, si};
+use crate::output::table::{digits, grouped, si};
 
 /// What was run.
 pub(super) fn facts(outcome: &Outcome) -> Vec<FactRow> {
     let (plan, summary) = (&outcome.plan, &outcome.summary);
     let mut facts = vec![
-        FactRow::new("scene", plan.scene.name()),
+        FactRow::new("scene", plan.work.name()),
         FactRow::new("triangles", grouped(summary.settings.triangles as u64)),
         FactRow::new("GPU", format!("{}: {}", plan.gpu.name, plan.gpu.doc)),
         FactRow::new("platform", format!("{}: {}", plan.platform.name, plan.platform.doc)),
@@ -20,6 +20,8 @@ pub(super) fn facts(outcome: &Outcome) -> Vec<FactRow> {
         FactRow::new("counts hash", summary.counts_hash.clone()),
         FactRow::new("Quintile", summary.version),
     ];
+    let found = |(&name, value): (&&'static str, &f64)| FactRow::new(name, digits(*value));
+    facts.extend(summary.facts.iter().map(found));
     facts.extend(summary.judgement().into_iter().map(|(name, value)| FactRow::new(name, value)));
     facts
 }
@@ -41,7 +43,7 @@ pub(super) fn settings(outcome: &Outcome) -> Vec<FactRow> {
     vec![
         FactRow::new("size", format!("{}x{} pixels", settings.width, settings.height)),
         FactRow::new("samples per pixel", settings.samples.to_string()),
-        FactRow::new("sample table", outcome.plan.scene.settings().table.clone()),
+        FactRow::new("sample table", outcome.plan.work.settings().table.clone()),
         FactRow::new("frames", frames(&outcome.plan)),
         FactRow::new("frame rate", si(settings.frame_rate_hz, "Hz")),
         FactRow::new("shutter", format!("{} of the frame period", settings.shutter)),
@@ -64,7 +66,7 @@ pub(super) fn settings(outcome: &Outcome) -> Vec<FactRow> {
 }
 
 fn frames(plan: &Plan) -> String {
-    let frames = &plan.scene.settings().frames;
+    let frames = &plan.work.settings().frames;
     format!("{} ({}..{})", frames.end - frames.start, frames.start, frames.end)
 }
 

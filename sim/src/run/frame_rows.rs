@@ -60,7 +60,7 @@ fn around(value: f64, half: Option<f64>) -> Option<[f64; 2]> {
 
 /// Every frame of the run.
 pub(super) fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
-    let first = plan.scene.settings().frames.start;
+    let first = plan.work.settings().frames.start;
     measurement
         .run
         .frames

@@ -48,7 +48,7 @@ fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> 
         title: &format!("{} per pixel, frame {frame}{spread}", map.event.name()),
         subject: &format!(
             "{} on {}: {} in all{elsewhere}",
-            plan.scene.name(),
+            plan.work.name(),
             plan.gpu.name,
             grouped(map.total())
         ),

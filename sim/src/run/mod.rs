@@ -24,6 +24,7 @@ mod stalls;
 mod summary;
 mod timeline;
 mod warnings;
+mod work;
 mod write;
 
 use std::path::Path;
@@ -46,6 +47,7 @@ pub(crate) use simulate::BIN_PS;
 pub use simulate::{Simulated, SimulatedFrame, frames_of};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};
+pub use work::Work;
 
 /// Everything a run found out.
 pub struct Outcome {

@@ -41,7 +41,7 @@ impl Modelled {
             "one voltage and clock state; no governor, no temperature change",
             "caches are walked in the order of the stream, whenever it is timed",
         ];
-        if !plan.scene.is_animated() && simulated.frames.len() > 1 {
+        if !plan.work.is_animated() && simulated.frames.len() > 1 {
             limits.push("the scene is still: one frame was simulated and repeated");
         }
         if predicted > 0 {

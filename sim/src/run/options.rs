@@ -6,10 +6,11 @@ use activity::Event;
 use pipeline::Viewport;
 use pipeline::sampling::SampleSource;
 use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
-use workloads::{Overrides, SampleChoice, Scene};
+use workloads::job::OptionSource;
+use workloads::{Overrides, SampleChoice};
 
 use super::limits::Size;
-use super::{RunError, Wish};
+use super::{RunError, Wish, Work};
 use crate::gpu::GpuSpec;
 use crate::timing::{Level, Sampling};
 
@@ -26,8 +27,10 @@ pub enum PacingChoice {
 /// A run as asked for.
 #[derive(Clone, Debug)]
 pub struct RunOptions {
-    /// A built-in scene or a file.
+    /// A built-in scene, a file or a workload.
     pub scene: String,
+    /// Options of a workload.
+    pub options: OptionSource,
     /// Changes to the scene's settings.
     pub overrides: Overrides,
     /// A built-in GPU or a RON file.
@@ -62,6 +65,7 @@ impl Default for RunOptions {
     fn default() -> Self {
         Self {
             scene: "default".to_owned(),
+            options: OptionSource::default(),
             overrides: Overrides::default(),
             gpu: "reference".to_owned(),
             platform: "reference".to_owned(),
@@ -84,8 +88,8 @@ impl Default for RunOptions {
 pub struct Plan {
     /// What was asked for.
     pub options: RunOptions,
-    /// The scene with its settings changed as asked.
-    pub scene: Scene,
+    /// The scene or the job with its settings changed as asked.
+    pub work: Work,
     /// Size of the image.
     pub viewport: Viewport,
     /// Where and when each pixel looks.
@@ -114,8 +118,11 @@ impl Plan {
                 "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
             )));
         }
-        let (scene, table) = scene(&options)?;
-        let settings = scene.settings();
+        let (work, table) = work(&options)?;
+        if !options.heat.is_empty() {
+            work.scene("--heat")?;
+        }
+        let settings = work.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;
         let pacing = match options.pacing {
@@ -136,7 +143,7 @@ impl Plan {
         let gpu = GpuSpec::load(&options.gpu)?;
         let table = file_or_name(&options.energy, EnergyTable::load, EnergyTable::builtin)?;
         let model = PowerModel::at(&table, &platform, options.bound)?;
-        Ok(Self { scene, viewport, samples, gpu, platform, table, model, pacing, options })
+        Ok(Self { work, viewport, samples, gpu, platform, table, model, pacing, options })
     }
 
     /// Pixels of the image.
@@ -145,14 +152,18 @@ impl Plan {
     }
 }
 
-/// The scene with its settings changed as asked, and its sample table. A table in a file decides how many samples there
+/// What is drawn with its settings changed as asked, and its sample table. A table in a file decides how many samples there
 /// are, unless the caller asked for another number.
-fn scene(options: &RunOptions) -> Result<(Scene, SampleChoice), RunError> {
-    let scene = workloads::load(&options.scene)?.with_overrides(&options.overrides)?;
-    let table = SampleChoice::load(&scene.settings().table)?;
-    match table.per_pixel().filter(|_| options.overrides.samples.is_none()) {
-        None => Ok((scene, table)),
-        samples => Ok((scene.with_overrides(&Overrides { samples, ..Overrides::default() })?, table)),
+fn work(options: &RunOptions) -> Result<(Work, SampleChoice), RunError> {
+    let work = Work::find(&options.scene, &options.overrides, &options.options, options.seed)?;
+    let table = SampleChoice::load(&work.settings().table)?;
+    let samples = table.per_pixel().filter(|_| options.overrides.samples.is_none());
+    match (work, samples) {
+        (Work::Scene(scene), Some(_)) => {
+            let scene = scene.with_overrides(&Overrides { samples, ..Overrides::default() })?;
+            Ok((Work::Scene(Box::new(scene)), table))
+        }
+        (work, _) => Ok((work, table)),
     }
 }
 

@@ -18,7 +18,7 @@ pub(super) struct Plot {
 
 /// Every plot of a run.
 pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
-    let subject = format!("{} on {}", outcome.plan.scene.name(), outcome.plan.gpu.name);
+    let subject = format!("{} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
     let shown = shown_frame(outcome);
     let mut plots = vec![
         Plot {

@@ -17,7 +17,7 @@ use crate::output::report::{
 pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
     let plan = &outcome.plan;
     Ok(Report {
-        title: format!("{} on {}", plan.scene.name(), plan.gpu.name).into(),
+        title: format!("{} on {}", plan.work.name(), plan.gpu.name).into(),
         facts: facts::facts(outcome),
         warnings: warnings(outcome),
         headline: outcome.summary.headline(),

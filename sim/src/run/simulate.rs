@@ -1,17 +1,17 @@
 //! The frames of a run through pipeline, clock and watts.
 
-use activity::{Counts, Timeline, Unit};
+use activity::{Counts, Timeline, Unit, Warning};
 use glam::Vec3;
-use pipeline::frame::{HeatMap, render_with_heat};
+use pipeline::frame::HeatMap;
 use power_model::FramePower;
 use rayon::prelude::*;
 use timing::{Recorder, Stalls};
-use workloads::Frame;
+use workloads::job::Fact;
 
 use super::heat::{self, HeatPicture};
 use super::regime::Regime;
 use super::sampled::{self, SampledSummary, Taken};
-use super::{Plan, RunError};
+use super::{Plan, RunError, work};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
 use crate::output::progress::Progress;
@@ -36,6 +36,10 @@ pub struct SimulatedFrame {
     pub lens: bool,
     /// How often each event happened.
     pub counts: Counts,
+    /// What a job found out in it.
+    pub facts: Vec<Fact>,
+    /// What a job warned of in it.
+    pub warnings: Vec<Warning>,
     /// Triangles that tile tests are known to be bad at.
     pub regime: Regime,
     /// Watts over time and joules by part.
@@ -92,8 +96,8 @@ impl Simulated {
 /// Simulates the frames that the plan asks for, writing the image of each as soon as it is done.
 pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result<Simulated, RunError> {
     remove_stale(dir)?;
-    let range = plan.scene.settings().frames.clone();
-    let animated = plan.scene.is_animated();
+    let range = plan.work.settings().frames.clone();
+    let animated = plan.work.is_animated();
     let numbers: Vec<u32> = if animated { range.collect() } else { vec![range.start] };
     let stage = Stage { plan, dir: Some(dir), most_bins: (MOST_BINS / numbers.len()).max(FEWEST_BINS) };
     if animated && plan.options.sampling != Sampling::Every {
@@ -121,7 +125,7 @@ pub(super) fn every(stage: &Stage<'_>, numbers: &[u32], progress: &Progress) -> 
         pictures.extend(done.picture.map(|picture| (done.frame.index, picture)));
         distinct.push(done.frame);
     }
-    let frames = stage.plan.scene.settings().frames.clone();
+    let frames = stage.plan.work.settings().frames.clone();
     let frames =
         frames.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
     Ok(Simulated { distinct, frames, pictures, heat, sampled: None })
@@ -169,8 +173,8 @@ impl Stage<'_> {
         if let Some(dir) = self.dir {
             heat = maps.iter().map(|map| heat::write(plan, dir, number, map)).collect::<Result<_, _>>()?;
             // A still scene is simulated once; every frame of the run has its image all the same.
-            let range = plan.scene.settings().frames.clone();
-            let mut shown_as = if plan.scene.is_animated() { number..number + 1 } else { range };
+            let range = plan.work.settings().frames.clone();
+            let mut shown_as = if plan.work.is_animated() { number..number + 1 } else { range };
             shown_as.try_for_each(|frame| write_image(plan, dir, frame, &image))?;
         }
         Ok(Whole { frame, picture: picture.then_some(image), heat })
@@ -197,31 +201,21 @@ fn simulate_frame(
     number: u32,
     most_bins: usize,
 ) -> Result<(SimulatedFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
-    let frame = plan.scene.frame(number)?;
-    let settings = pipeline::Settings {
-        spec: &plan.gpu.pipeline,
-        viewport: plan.viewport,
-        samples: &*plan.samples,
-        background: plan.scene.background(),
-    };
-    let draws = frame.draws(&plan.scene)?;
     let mut clock = FrameClock::new(plan.options.timing, &plan.gpu, Recorder::new(BIN_PS, most_bins))?;
-    let events = &plan.options.heat;
-    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-    let (rendered, heat) = render_with_heat(&frame.camera, &draws, &settings, events, emit)
-        .map_err(|error| RunError::Setting(error.to_string()))?;
+    let drawing = work::draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
     let timed = clock.finish()?;
     let doubts = Doubt::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
-    let moving = is_moving(&frame);
     let simulated = SimulatedFrame {
         index: number,
-        triangles: frame.triangle_count(),
-        moving,
-        lens: frame.camera.lens().is_some(),
-        counts: rendered.counts,
-        regime: Regime::of(&frame.camera, &draws, plan.viewport, plan.samples.per_pixel()),
+        triangles: drawing.triangles,
+        moving: drawing.moving,
+        lens: drawing.lens,
+        counts: drawing.counts,
+        regime: drawing.regime,
+        facts: drawing.facts,
+        warnings: drawing.warnings,
         power,
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
@@ -230,11 +224,7 @@ fn simulate_frame(
         stalls: timed.stalls,
         predicted: None,
     };
-    Ok((simulated, rendered.image, heat))
-}
-
-pub(super) fn is_moving(frame: &Frame) -> bool {
-    frame.camera.open() != frame.camera.close() || frame.meshes.iter().any(|mesh| !mesh.is_still())
+    Ok((simulated, drawing.image, drawing.heat))
 }
 
 fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {

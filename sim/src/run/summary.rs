@@ -54,6 +54,8 @@ pub struct Summary {
     pub stalls: BTreeMap<&'static str, StallShares>,
     /// Samples hit over samples tested.
     pub sample_test_efficiency: Option<f64>,
+    /// What a workload found out, its mean over frames.
+    pub facts: BTreeMap<&'static str, f64>,
     /// How often each event happened in the frames that were simulated.
     pub counts: Counts,
     /// A hash of the counts of every frame that was simulated: equal runs have equal hashes.
@@ -178,7 +180,7 @@ impl Summary {
         let pixels = plan.pixels();
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            scene: plan.scene.name().to_owned(),
+            scene: plan.work.name().to_owned(),
             gpu: plan.gpu.name.clone(),
             platform: plan.platform.name.clone(),
             energy_table: [plan.table.name().to_owned(), format!("{:?}", plan.options.bound).to_lowercase()],
@@ -196,6 +198,7 @@ impl Summary {
                 .collect(),
             unit_busy: unit_busy(simulated),
             stalls: stalls::shares(simulated),
+            facts: facts(simulated),
             sample_test_efficiency: counts.sample_test_efficiency(),
             counts,
             counts_hash: format!(
@@ -208,6 +211,17 @@ impl Summary {
             frames: rows(plan, simulated, measurement),
         }
     }
+}
+
+/// The mean over frames of each fact that frames know.
+fn facts(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
+    let mut sums: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
+    for fact in simulated.known().flat_map(|frame| &frame.facts) {
+        let [sum, count] = sums.entry(fact.name).or_default();
+        *sum += fact.value;
+        *count += 1.0;
+    }
+    sums.into_iter().map(|(name, [sum, count])| (name, sum / count)).collect()
 }
 
 /// The true frames in the form of measured ones, for the same statistics.
@@ -223,7 +237,7 @@ fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
 }
 
 fn settings(plan: &Plan, simulated: &Simulated) -> SettingsSummary {
-    let scene = plan.scene.settings();
+    let scene = plan.work.settings();
     SettingsSummary {
         width: scene.width,
         height: scene.height,

@@ -11,7 +11,8 @@ const FEWEST_SAMPLES: f64 = 50.0;
 
 /// Every warning of a run, sorted and each once.
 pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
-    let mut all = plan.scene.warnings().to_vec();
+    let mut all = plan.work.warnings().to_vec();
+    all.extend(simulated.distinct.iter().flat_map(|frame| frame.warnings.iter().cloned()));
     all.extend(measurement.run.warnings.iter().cloned());
     // A run of one frame has no other that could resemble it.
     let alone = simulated.frames.len() == 1;

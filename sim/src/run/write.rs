@@ -19,7 +19,7 @@ pub(super) fn write(outcome: &Outcome, dir: OutDir, progress: &Progress) -> Resu
     dir.write_atomic("trace.json", |out| Ok(traces::io::csv::write_sidecar(trace, out)?))?;
     bar.inc();
     write_frames(outcome, &dir)?;
-    let process = format!("quintile {} on {}", outcome.plan.scene.name(), outcome.plan.gpu.name);
+    let process = format!("quintile {} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
     let timeline = timeline::timeline(outcome, &process);
     dir.write_atomic("timeline.perfetto-trace", |out| Ok(perfetto::write(&timeline, out)?))?;
     bar.inc();

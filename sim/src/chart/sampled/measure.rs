@@ -19,7 +19,7 @@ pub(super) fn animation(
     progress: &Progress,
 ) -> Result<(Cost, Vec<Trial>), RunError> {
     let plan = plan(scene, effort)?;
-    let numbers: Vec<u32> = plan.scene.settings().frames.clone().collect();
+    let numbers: Vec<u32> = plan.work.settings().frames.clone().collect();
     let started = ProcessTime::now();
     let scout = Scout::look(&plan, &numbers, progress)?;
     let previews_s = started.elapsed().as_secs_f64();
@@ -69,7 +69,7 @@ fn plan(scene: &str, effort: Effort) -> Result<Plan, RunError> {
         ..Overrides::default()
     };
     let plan = Plan::resolve(RunOptions { scene: scene.to_owned(), overrides, ..RunOptions::default() })?;
-    if plan.scene.is_animated() {
+    if plan.work.is_animated() {
         return Ok(plan);
     }
     Err(RunError::Setting(format!(

@@ -41,8 +41,8 @@ struct Seen {
 impl Probe {
     /// Looks at the scene of `plan`.
     pub fn new(plan: &Plan, progress: &Progress) -> Result<Self, RunError> {
-        let range = plan.scene.settings().frames.clone();
-        let run_frames = if plan.scene.is_animated() { range.end - range.start } else { 1 };
+        let range = plan.work.settings().frames.clone();
+        let run_frames = if plan.work.is_animated() { range.end - range.start } else { 1 };
         let some = FRAMES.min(run_frames);
         let numbers: Vec<u32> =
             (0..some).map(|part| range.start + (2 * part + 1) * run_frames / (2 * some)).collect();
@@ -112,9 +112,10 @@ fn see(
     level: Level,
 ) -> Result<Seen, RunError> {
     let started = Instant::now();
-    let frame = plan.scene.frame(number)?;
-    let draws = frame.draws(&plan.scene)?;
-    let settings = Settings { spec, viewport, samples: &*plan.samples, background: plan.scene.background() };
+    let scene = plan.work.scene("--accuracy or --budget")?;
+    let frame = scene.frame(number)?;
+    let draws = frame.draws(scene)?;
+    let settings = Settings { spec, viewport, samples: &*plan.samples, background: scene.background() };
     let mut clock =
         FrameClock::new(level, &plan.gpu, Recorder::new(simulate::BIN_PS, simulate::FEWEST_BINS))?;
     let mut packets = Vec::new();

@@ -72,6 +72,8 @@ fn predict(
         moving: glimpse.moving,
         lens: glimpse.lens,
         counts: Counts::default(),
+        facts: Vec::new(),
+        warnings: Vec::new(),
         regime: Regime::default(),
         power: like.power.reshaped((like.power.duration_ps() as f64 * time).round() as u64, energy_j),
         busy_ps: Unit::ALL.map(|unit| (like.busy_ps[unit as usize] as f64 * time).round() as u64),

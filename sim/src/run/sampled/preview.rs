@@ -7,7 +7,7 @@ use pipeline::{Settings, Viewport};
 use timing::Recorder;
 use workloads::SampleChoice;
 
-use super::super::{Plan, RunError, simulate};
+use super::super::{Plan, RunError, simulate, work};
 use crate::timing::{FrameClock, Level};
 
 /// The preview is as many times smaller along each axis as leaves it so wide, and at most [`SMALLEST`] times.
@@ -48,7 +48,7 @@ impl Preview {
         let [width, height] = [plan.viewport.width(), plan.viewport.height()].map(|side| side.div_ceil(by));
         let viewport = Viewport::new(width, height)
             .ok_or_else(|| RunError::Setting(format!("size of the preview: {width}x{height}")))?;
-        let settings = plan.scene.settings();
+        let settings = plan.work.settings();
         let table = SampleChoice::load(&settings.table)?;
         let own = |count| table.source(count, plan.options.seed);
         let samples = own(1).or_else(|_| own(plan.samples.per_pixel()))?;
@@ -63,14 +63,15 @@ impl Preview {
 
     /// Frame `number` at a glance.
     pub fn frame(&self, plan: &Plan, number: u32) -> Result<Glimpse, RunError> {
-        let frame = plan.scene.frame(number)?;
+        let scene = plan.work.scene("predicting frames")?;
+        let frame = scene.frame(number)?;
         let settings = Settings {
             spec: &plan.gpu.pipeline,
             viewport: self.viewport,
             samples: &*self.samples,
-            background: plan.scene.background(),
+            background: scene.background(),
         };
-        let draws = frame.draws(&plan.scene)?;
+        let draws = frame.draws(scene)?;
         let recorder = Recorder::new(simulate::BIN_PS, BINS);
         let mut clock = FrameClock::new(self.level, &plan.gpu, recorder)?;
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
@@ -79,7 +80,7 @@ impl Preview {
         let timed = clock.finish()?;
         Ok(Glimpse {
             triangles: frame.triangle_count(),
-            moving: simulate::is_moving(&frame),
+            moving: work::is_moving(&frame),
             lens: frame.camera.lens().is_some(),
             counts: rendered.0.counts,
             busy_ps: timed.timeline.busy_ps(),

@@ -1,0 +1,162 @@
+//! What a run draws: the frames of a scene, or those of a job.
+
+use activity::{Counts, Event, LineAccess, Packet, Warning};
+use glam::Vec3;
+use pipeline::frame::{HeatMap, render_with_heat};
+use pipeline::{Settings, Viewport};
+use workloads::job::{self, Fact, Job, OptionSource, Request};
+use workloads::{Frame, LoadError, Overrides, Scene};
+
+use super::regime::Regime;
+use super::{Plan, RunError};
+
+/// The frames of a run.
+pub enum Work {
+    /// One rendering of a scene each.
+    Scene(Box<Scene>),
+    /// Passes of a job.
+    Job {
+        /// Its name.
+        name: String,
+        /// What draws.
+        job: Box<dyn Job>,
+    },
+}
+
+/// A frame as it was drawn.
+pub(super) struct Drawing {
+    pub image: Vec<Vec3>,
+    pub counts: Counts,
+    pub triangles: usize,
+    pub moving: bool,
+    pub lens: bool,
+    pub regime: Regime,
+    pub facts: Vec<Fact>,
+    pub warnings: Vec<Warning>,
+    pub heat: Vec<HeatMap>,
+}
+
+impl Work {
+    /// The job called `name`, or the scene of that name or path.
+    ///
+    /// # Errors
+    /// [`LoadError`] when it cannot be loaded, or its settings make no sense.
+    pub fn find(
+        name: &str,
+        overrides: &Overrides,
+        options: &OptionSource,
+        seed: u64,
+    ) -> Result<Self, LoadError> {
+        if let Some(job) = job::find(name, options, &Request { overrides, seed }) {
+            return Ok(Self::Job { name: name.to_owned(), job: job? });
+        }
+        if *options != OptionSource::default() {
+            let jobs: Vec<&str> = job::names().map(|(name, _)| name).collect();
+            let message = format!("`{name}` is a scene; only workloads have options: {}", jobs.join(", "));
+            return Err(LoadError::Setting { setting: "set", message });
+        }
+        Ok(Self::Scene(Box::new(workloads::load(name)?.with_overrides(overrides)?)))
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Scene(scene) => scene.name(),
+            Self::Job { name, .. } => name,
+        }
+    }
+
+    /// Size of the image, sampling, time and lens.
+    pub fn settings(&self) -> &workloads::Settings {
+        match self {
+            Self::Scene(scene) => scene.settings(),
+            Self::Job { job, .. } => job.settings(),
+        }
+    }
+
+    /// Whether frames differ.
+    pub fn is_animated(&self) -> bool {
+        match self {
+            Self::Scene(scene) => scene.is_animated(),
+            Self::Job { job, .. } => job.is_animated(),
+        }
+    }
+
+    /// What was found strange when it was loaded.
+    pub fn warnings(&self) -> &[Warning] {
+        match self {
+            Self::Scene(scene) => scene.warnings(),
+            Self::Job { .. } => &[],
+        }
+    }
+
+    /// The scene, for what cannot be done with jobs.
+    ///
+    /// # Errors
+    /// Says that `what` needs a scene.
+    pub fn scene(&self, what: &str) -> Result<&Scene, RunError> {
+        match self {
+            Self::Scene(scene) => Ok(scene),
+            Self::Job { name, .. } => Err(RunError::Setting(format!(
+                "{what} needs a scene, and `{name}` is a workload: leave it out"
+            ))),
+        }
+    }
+}
+
+/// Draws frame `number`, with heat maps of `events`.
+pub(super) fn draw(
+    plan: &Plan,
+    number: u32,
+    events: &[Event],
+    mut emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<Drawing, RunError> {
+    match &plan.work {
+        Work::Scene(scene) => draw_scene(plan, scene, number, events, emit),
+        Work::Job { job, .. } => {
+            let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
+            Ok(Drawing {
+                image: drawn.image,
+                counts: drawn.counts,
+                triangles: drawn.triangles,
+                moving: drawn.moving,
+                lens: drawn.lens,
+                regime: Regime::default(),
+                facts: drawn.facts,
+                warnings: drawn.warnings,
+                heat: Vec::new(),
+            })
+        }
+    }
+}
+
+fn draw_scene(
+    plan: &Plan,
+    scene: &Scene,
+    number: u32,
+    events: &[Event],
+    emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<Drawing, RunError> {
+    let frame = scene.frame(number)?;
+    let draws = frame.draws(scene)?;
+    let viewport: Viewport = plan.viewport;
+    let background = scene.background();
+    let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
+    let (rendered, heat) = render_with_heat(&frame.camera, &draws, &settings, events, emit)
+        .map_err(|error| RunError::Setting(error.to_string()))?;
+    Ok(Drawing {
+        image: rendered.image,
+        counts: rendered.counts,
+        triangles: frame.triangle_count(),
+        moving: is_moving(&frame),
+        lens: frame.camera.lens().is_some(),
+        regime: Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel()),
+        facts: Vec::new(),
+        warnings: Vec::new(),
+        heat,
+    })
+}
+
+pub(super) fn is_moving(frame: &Frame) -> bool {
+    frame.camera.open() != frame.camera.close() || frame.meshes.iter().any(|mesh| !mesh.is_still())
+}

@@ -1,0 +1,110 @@
+//! Jobs: work for the rasterizer that is more than one rendering of a scene.
+//!
+//! A [`Job`] draws frames as a scene does, in passes of its own, and hands every packet of work to whoever asked, so that it
+//! can be timed and turned into watts. [`find`] makes one by name from its [`Options`](OptionSource).
+
+mod options;
+mod passes;
+
+use activity::{Counts, LineAccess, Packet, Warning};
+use glam::Vec3;
+use pipeline::PipelineSpec;
+use pipeline::memory::CacheError;
+
+use crate::error::LoadError;
+use crate::scene::{FrameError, Overrides, Settings};
+
+pub use options::OptionSource;
+pub use passes::{FrontEnd, Passes, TileWork, Touch};
+
+/// Where the packets of a frame go, with the lines each asks the L2 for, in the order of the modelled hardware.
+pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
+
+/// A number that a job found out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fact {
+    /// Its name, with its unit.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+}
+
+/// What a job drew in one frame.
+#[derive(Clone, Debug, Default)]
+pub struct Drawn {
+    /// Linear RGB radiance of each pixel, row by row from the top left.
+    pub image: Vec<Vec3>,
+    /// How often each event happened, in all passes.
+    pub counts: Counts,
+    /// Triangles drawn, in all passes.
+    pub triangles: usize,
+    /// Whether time is a dimension of what was drawn.
+    pub moving: bool,
+    /// Whether the lens is.
+    pub lens: bool,
+    /// What was found out.
+    pub facts: Vec<Fact>,
+    /// Regimes in which its methods are known to be bad.
+    pub warnings: Vec<Warning>,
+}
+
+/// Work for the rasterizer that is more than one rendering of a scene.
+pub trait Job: Sync + Send {
+    /// Size of the image, frames and frame rate.
+    fn settings(&self) -> &Settings;
+
+    /// Whether frames differ; frames of a job that is still are drawn once.
+    fn is_animated(&self) -> bool {
+        true
+    }
+
+    /// Draws frame `number` on the hardware `spec`.
+    ///
+    /// # Errors
+    /// When the hardware cannot be built or the frame cannot be made.
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+}
+
+/// Why a frame of a job could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum JobError {
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// Two settings that cannot be together, or one that cannot be.
+    #[error("{0}")]
+    Setting(String),
+}
+
+/// What a job is made from besides its own options.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Changes to its settings.
+    pub overrides: &'a Overrides,
+    /// Seed of everything random in it.
+    pub seed: u64,
+}
+
+type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
+
+/// Every job: its name, what it is, and how it is made.
+const JOBS: &[(&str, &str, Maker)] = &[];
+
+/// Names of the jobs, each with a line that says what it is.
+pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+    JOBS.iter().map(|(name, what, _)| (*name, *what))
+}
+
+/// The job called `name`, if there is one.
+///
+/// # Errors
+/// [`LoadError`] when its options or settings make no sense.
+pub fn find(
+    name: &str,
+    options: &OptionSource,
+    request: &Request<'_>,
+) -> Option<Result<Box<dyn Job>, LoadError>> {
+    JOBS.iter().find(|(known, ..)| *known == name).map(|(.., make)| make(options, request))
+}

@@ -1,0 +1,107 @@
+//! Options of a job: a RON file, and single values over it.
+
+use std::path::PathBuf;
+
+use activity::spec;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::error::LoadError;
+
+/// Where the options of a job come from; what is not named has its default.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OptionSource {
+    /// A file in RON.
+    pub file: Option<PathBuf>,
+    /// Names and values that come after it. A value is a number, `true`, a list such as `[1, 2]`, or else text.
+    pub set: Vec<(String, String)>,
+}
+
+impl OptionSource {
+    /// The options.
+    ///
+    /// # Errors
+    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Setting`] for a value that was set.
+    pub fn read<T: Default + Serialize + DeserializeOwned>(&self) -> Result<T, LoadError> {
+        let mut options = self.file.as_deref().map(spec::load).transpose()?.unwrap_or_default();
+        for (name, value) in &self.set {
+            options = with(&options, name, value)?;
+        }
+        Ok(options)
+    }
+}
+
+/// `options` with one of them changed.
+fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -> Result<T, LoadError> {
+    let refused = |message: String| LoadError::Setting { setting: "set", message };
+    let Ok(Value::Object(mut fields)) = serde_json::to_value(options) else {
+        return Err(refused(format!("`{name}`: there are no options to set")));
+    };
+    if !fields.contains_key(name) {
+        let known: Vec<&str> = fields.keys().map(String::as_str).collect();
+        return Err(refused(format!("unknown option `{name}`, {}", spec::suggestion(name, &known))));
+    }
+    let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.to_owned()));
+    fields.insert(name.to_owned(), parsed);
+    serde_json::from_value(Value::Object(fields)).map_err(|error| refused(format!("{name}={error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Method {
+        Prism,
+        ConvexHull,
+    }
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    struct Options {
+        method: Method,
+        boxes: u32,
+        depth: Option<f64>,
+    }
+
+    impl Default for Options {
+        fn default() -> Self {
+            Self { method: Method::Prism, boxes: 4, depth: None }
+        }
+    }
+
+    fn set(pairs: &[(&str, &str)]) -> Result<Options, String> {
+        let set = pairs.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        OptionSource { file: None, set }.read().map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn values_that_are_set_replace_defaults() {
+        assert_eq!(set(&[]).unwrap(), Options::default());
+        let changed = set(&[("boxes", "8"), ("method", "convex_hull"), ("depth", "1.5")]).unwrap();
+        assert_eq!(changed, Options { method: Method::ConvexHull, boxes: 8, depth: Some(1.5) });
+    }
+
+    #[test]
+    fn what_cannot_be_set_is_told() {
+        assert_eq!(set(&[("boxs", "8")]).unwrap_err(), "set: unknown option `boxs`, did you mean `boxes`?");
+        assert!(set(&[("boxes", "-1")]).unwrap_err().starts_with("set: boxes=invalid value"));
+        assert!(set(&[("method", "hull")]).unwrap_err().contains("unknown variant `hull`"));
+    }
+
+    #[test]
+    fn a_file_comes_first() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "(boxes: 16, method: convex_hull)").unwrap();
+        let set = vec![("boxes".to_owned(), "2".to_owned())];
+        let read: Options =
+            OptionSource { file: Some(file.path().to_owned()), set: set.clone() }.read().unwrap();
+        assert_eq!(read, Options { method: Method::ConvexHull, boxes: 2, depth: None });
+        std::fs::write(file.path(), "(boxs: 16)").unwrap();
+        let error = OptionSource { file: Some(file.path().to_owned()), set }.read::<Options>().unwrap_err();
+        assert!(error.to_string().contains(":1:"), "{error}");
+    }
+}

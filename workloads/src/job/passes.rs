@@ -1,0 +1,197 @@
+//! Passes that a job walks by itself: each piece of work as a packet, with what it asks of the caches.
+
+use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
+use pipeline::MemorySpec;
+use pipeline::memory::{CacheError, LINE_BYTES, MemorySystem};
+
+use super::Emit;
+
+/// Triangles whose vertices travel in one packet.
+const BATCH: usize = 16;
+/// Bytes of a pixel of the image.
+const PIXEL_BYTES: u64 = 4;
+
+/// What the front end does for the triangles of a draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrontEnd {
+    /// Bytes of a vertex, at both ends of the shutter where it moves.
+    pub vertex_bytes: u32,
+    /// Operations of the vertex shader, for all ends.
+    pub vertex_ops: u32,
+    /// Multiply-adds that set a triangle up.
+    pub setup_madds: u32,
+}
+
+/// Work of one triangle, or of a whole buffer, in one tile.
+#[derive(Clone, Copy, Debug)]
+pub struct TileWork {
+    /// The tile, row by row from the top left.
+    pub tile: u32,
+    /// The triangle, counted through the pass.
+    pub triangle: u32,
+    /// What is counted besides the lines of memory.
+    pub counts: PacketCounts,
+}
+
+/// Bytes of a buffer that are touched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Touch {
+    /// The first byte.
+    pub address: u64,
+    /// How many.
+    pub bytes: u64,
+    /// Whether they change.
+    pub write: bool,
+    /// Whether they were cleared and not written since, so that nothing has to be fetched.
+    pub fresh: bool,
+}
+
+impl Touch {
+    fn lines(&self) -> impl Iterator<Item = u64> + use<> {
+        let last = self.address + self.bytes.max(1) - 1;
+        (self.address / LINE_BYTES..=last / LINE_BYTES).map(|line| line * LINE_BYTES)
+    }
+}
+
+/// The passes of a frame: packets go out as they come, and their counts are added up.
+pub struct Passes<'a> {
+    memory: MemorySystem,
+    emit: Emit<'a>,
+    counts: Counts,
+    pass: u16,
+    /// Triangles of the pass so far.
+    triangles: u32,
+    triangles_in_all: usize,
+}
+
+impl<'a> Passes<'a> {
+    /// Before the first pass, with empty caches.
+    ///
+    /// # Errors
+    /// When a cache of `spec` cannot be built.
+    pub fn new(spec: &MemorySpec, emit: Emit<'a>) -> Result<Self, CacheError> {
+        let memory = MemorySystem::new(spec)?;
+        Ok(Self { memory, emit, counts: Counts::default(), pass: 0, triangles: 0, triangles_in_all: 0 })
+    }
+
+    /// Ends a pass: packets from here on belong to the next.
+    pub fn next(&mut self) {
+        (self.pass, self.triangles) = (self.pass.saturating_add(1), 0);
+    }
+
+    /// A draw of `triangles` triangles, three vertices each, that lie in memory from `address` on.
+    pub fn draw(&mut self, triangles: usize, address: u64, front_end: &FrontEnd) {
+        let mut start = Packet::new(PacketKind::Draw, self.pass, 0, self.triangles);
+        start.counts[Event::Draws] = 1;
+        self.tell(&start);
+        let bytes = u64::from(front_end.vertex_bytes);
+        for first in (0..triangles).step_by(BATCH) {
+            let vertices = 3 * BATCH.min(triangles - first) as u32;
+            let mut packet = Packet::new(PacketKind::Vertices, self.pass, 0, self.triangles);
+            let counts = &mut packet.counts;
+            counts[Event::Indices] = vertices;
+            counts[Event::VerticesFetched] = vertices;
+            counts[Event::VertexBytes] = vertices * front_end.vertex_bytes;
+            counts[Event::VertexInvocations] = vertices;
+            counts[Event::ShaderOps] = vertices * front_end.vertex_ops;
+            counts[Event::TrianglesIn] = vertices / 3;
+            counts[Event::TrianglesSetUp] = vertices / 3;
+            counts[Event::SetupMadds] = vertices / 3 * front_end.setup_madds;
+            let from = address + 3 * first as u64 * bytes;
+            self.memory.vertices(from, u64::from(vertices) * bytes, counts);
+            self.tell(&packet);
+            self.triangles += vertices / 3;
+        }
+        self.triangles_in_all += triangles;
+    }
+
+    /// Work in a tile that touches what is given of depth buffers, then of colour buffers.
+    pub fn tile(&mut self, work: &TileWork, depth: &[Touch], colour: &[Touch]) {
+        let mut packet = Packet::new(PacketKind::Tile, self.pass, work.tile, work.triangle);
+        packet.counts = work.counts;
+        for touch in depth {
+            let counts = &mut packet.counts;
+            touch.lines().for_each(|line| self.memory.depth(line, touch.write, touch.fresh, counts));
+        }
+        for touch in colour {
+            let counts = &mut packet.counts;
+            touch.lines().for_each(|line| self.memory.colour(line, touch.write, touch.fresh, counts));
+        }
+        self.tell(&packet);
+    }
+
+    /// Writes `pixels` pixels of an image that lies at `address`, a packet for each tile of `tile_pixels`, and empties the caches
+    /// of it.
+    pub fn resolve(&mut self, address: u64, pixels: u64, tile_pixels: u32) {
+        let tile_pixels = u64::from(tile_pixels.max(1));
+        for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
+            let count = tile_pixels.min(pixels - first);
+            let mut packet = Packet::new(PacketKind::Resolve, self.pass, tile, u32::MAX);
+            packet.counts[Event::PixelsResolved] = count as u32;
+            let (address, bytes) = (address + first * PIXEL_BYTES, count * PIXEL_BYTES);
+            let counts = &mut packet.counts;
+            let written = Touch { address, bytes, write: true, fresh: true };
+            written.lines().for_each(|line| self.memory.colour(line, true, true, counts));
+            self.tell(&packet);
+        }
+        let mut last = Packet::new(PacketKind::Resolve, self.pass, 0, u32::MAX);
+        self.memory.finish(address..address + pixels * PIXEL_BYTES, &mut last.counts);
+        self.tell(&last);
+    }
+
+    /// What all passes counted, and the triangles they drew.
+    pub fn finish(self) -> (Counts, usize) {
+        (self.counts, self.triangles_in_all)
+    }
+
+    fn tell(&mut self, packet: &Packet) {
+        self.counts += &packet.counts;
+        (self.emit)(packet, self.memory.log());
+        self.memory.forget();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use activity::LineAccess;
+    use pipeline::CacheSpec;
+    use pipeline::memory::Compression;
+
+    const LINES: CacheSpec = CacheSpec::lru(256, 4);
+    const MEMORY: MemorySpec = MemorySpec {
+        depth: LINES,
+        colour: LINES,
+        texture: LINES,
+        l2: LINES,
+        compression: Compression { depth: false, colour: false },
+    };
+
+    #[test]
+    fn counts_are_the_sum_of_packets_and_lines_are_told_once() {
+        let (mut sum, mut lines, mut kinds) = (Counts::default(), 0, Vec::new());
+        let mut emit = |packet: &Packet, asked: &[LineAccess]| {
+            sum += &packet.counts;
+            lines += asked.len();
+            kinds.push((packet.kind, packet.pass));
+        };
+        let mut passes = Passes::new(&MEMORY, &mut emit).unwrap();
+        passes.draw(20, 0, &FrontEnd { vertex_bytes: 24, vertex_ops: 8, setup_madds: 60 });
+        passes.next();
+        let mut counts = PacketCounts::default();
+        counts[Event::TilesVisited] = 1;
+        let touch = Touch { address: 1 << 20, bytes: 130, write: true, fresh: true };
+        passes.tile(&TileWork { tile: 3, triangle: 0, counts }, &[touch], &[]);
+        passes.resolve(1 << 21, 100, 64);
+        let (total, triangles) = passes.finish();
+        assert_eq!((total, triangles), (sum, 20));
+        assert_eq!(total[Event::VertexBytes], 20 * 3 * 24);
+        assert_eq!((total[Event::DepthLines], total[Event::PixelsResolved]), (3, 100));
+        assert_eq!(total[Event::DramWriteBytes], 7 * 64, "100 pixels are 6.25 lines");
+        assert!(lines > 0);
+        use PacketKind::{Draw, Resolve, Tile, Vertices};
+        let expected =
+            [(Draw, 0), (Vertices, 0), (Vertices, 0), (Tile, 1), (Resolve, 1), (Resolve, 1), (Resolve, 1)];
+        assert_eq!(kinds, expected);
+    }
+}
