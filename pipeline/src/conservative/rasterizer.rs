@@ -65,6 +65,17 @@ impl Rasterizer {
         self.descend(&prepared, grid, 0..grid.columns, 0..grid.rows, &self.clip, &mut each);
     }
 
+    /// The same for a prepared triangle and the tiles in some columns and rows alone.
+    pub fn rasterize_part(
+        &self,
+        prepared: &Prepared,
+        grid: &Grid,
+        [columns, rows]: [Range<u32>; 2],
+        mut each: impl FnMut([u32; 2], &Touch),
+    ) {
+        self.descend(prepared, grid, columns, rows, &self.clip, &mut each);
+    }
+
     /// What every tile asks of a triangle.
     pub fn prepare(&self, triangle: &MovingTriangle) -> Prepared {
         Prepared::new(triangle, &self.view)

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::search::Scratch;
+use super::compare::Scratch;
 use super::{Object, Search, Verdict, candidates};
 
 /// What is known of objects `a` and `b`, `a < b`.

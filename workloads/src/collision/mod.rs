@@ -18,9 +18,11 @@
 mod bounds;
 mod buffer;
 mod candidates;
+mod compare;
 mod crossing;
 mod depth_only;
 mod detect;
+mod glance;
 mod object;
 mod pass;
 mod search;

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::Bounds;
+use super::window::times_inside;
 use crate::visibility::MovingMesh;
 
 /// A triangle at time 0 and at time 1.
@@ -53,6 +54,12 @@ impl Object {
     /// Whether it has none.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
+    }
+
+    /// The times at which a triangle may be inside a box of space and time.
+    pub(super) fn times_inside(&self, triangle: u32, within: &Bounds) -> Option<[f64; 2]> {
+        let triangle = triangle as usize;
+        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.uncertainty)
     }
 
     /// The box that it sweeps.

@@ -1,11 +1,12 @@
-//! Two objects drawn orthographically along one axis.
+//! One object drawn orthographically along one axis.
+
+use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
 
-use super::bounds::{Bounds, meet};
-use super::buffer::{TzBox, TzBuffer};
+use super::bounds::{Bounds, NOTHING, hull, meet};
+use super::buffer::TzBox;
 use super::object::{Ends, Object};
-use super::window::times_inside;
 
 /// Part of an object: the triangles that come near.
 #[derive(Clone, Copy)]
@@ -14,26 +15,62 @@ pub(super) struct Part<'a> {
     pub list: &'a [u32],
 }
 
+/// How closely a triangle is fitted with tiles and intervals. Both are conservative; a pass draws all with the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// By the box it sweeps within a bin of time: cheap, and near the truth where triangles are smaller than tiles.
+    Boxes,
+    /// By edges and plane, as the conservative rasterizer has them.
+    Edges,
+}
+
+/// Fragments that may still be drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort(u64);
+
+impl Effort {
+    /// As many as it takes.
+    pub fn endless() -> Self {
+        Self(u64::MAX)
+    }
+
+    /// So many fragments.
+    pub fn of(fragments: u64) -> Self {
+        Self(fragments)
+    }
+
+    /// Takes what is spent; `false` where that is more than there is.
+    fn spend(&mut self, fragments: u64) -> bool {
+        let enough = fragments <= self.0;
+        self.0 = self.0.saturating_sub(fragments);
+        enough
+    }
+}
+
 /// How a pass looks at what may touch.
 #[derive(Clone, Copy)]
 pub(super) struct Pass {
     /// The axis it looks along.
-    axis: usize,
+    pub axis: usize,
     grid: Grid,
     /// What of space and time it covers.
     hull: Bounds,
+    fit: Fit,
 }
 
 /// What an object is in one tile in one bin of time.
+#[derive(Clone, Copy)]
 pub(super) struct Fragment {
     pub tile: [u32; 2],
     pub bin: usize,
+    /// Place of its triangle in the list of the part.
+    pub item: u32,
     pub inside: TzBox,
 }
 
 impl Pass {
     /// A pass along `axis` over `hull` with `resolution` tiles across, one where there is no extent.
-    pub fn new(axis: usize, hull: &Bounds, resolution: u32) -> Self {
+    pub fn new(axis: usize, hull: &Bounds, resolution: u32, fit: Fit) -> Self {
         let side = |across: usize| {
             let [low, high] = hull.space[(axis + across) % 3];
             // Borders are rounded; the margin keeps the last of them outside.
@@ -43,7 +80,7 @@ impl Pass {
         };
         let [x, y] = [side(1), side(2)];
         let grid = Grid { origin: [x.0, y.0], tile: [x.1, y.1], columns: x.2, rows: y.2 };
-        Self { axis, grid, hull: *hull }
+        Self { axis, grid, hull: *hull, fit }
     }
 
     /// Tiles of the pass.
@@ -68,25 +105,67 @@ impl Pass {
         let mut space = [z; 3];
         space[(self.axis + 1) % 3] = rect.x;
         space[(self.axis + 2) % 3] = rect.y;
-        Bounds { space, time: t }
+        // Boxes are put into tiles by division, whose borders may differ from these by rounding.
+        let bounds = Bounds { space, time: t };
+        if self.fit == Fit::Boxes { bounds.inflated(self.slack()) } else { bounds }
     }
 
-    /// Hands `each` fragment of a part in the bins that are left, until it says stop.
-    pub fn draw(&self, part: Part<'_>, bins: &[Option<Bounds>], mut each: impl FnMut(Fragment)) {
+    /// By how much borders of tiles by division and by multiplication may differ.
+    fn slack(&self) -> f64 {
+        let size = self.hull.space.as_flattened().iter().fold(0.0, |size: f64, at| size.max(at.abs()));
+        8.0 * f64::EPSILON * size
+    }
+
+    /// Hands `each` fragment of a part in the bins that are left. Says whether that was all of them: where they are more than
+    /// `effort`, the rest is left out.
+    pub fn draw(
+        &self,
+        part: Part<'_>,
+        bins: &[Option<Bounds>],
+        effort: &mut Effort,
+        mut each: impl FnMut(&Fragment),
+    ) -> bool {
         let Part { object, list } = part;
-        for &triangle in list {
+        let left: Vec<(usize, Bounds)> =
+            bins.iter().enumerate().filter_map(|(bin, left)| left.map(|left| (bin, left))).collect();
+        for (&triangle, item) in list.iter().zip(0..) {
             let ends = &object.triangles[triangle as usize];
-            let Some(times) = times_inside(ends, &self.hull, object.uncertainty) else { continue };
-            let Some(turned) = self.turned(ends, object.uncertainty) else { continue };
-            for (bin, left) in bins.iter().enumerate() {
-                let Some(t) = left.and_then(|left| meet(left.time, times)) else { continue };
-                let clip = Region { t, ..Region::WHOLE };
-                let rasterizer = Rasterizer::new(View::orthographic()).clipped(clip).halving(HALVINGS);
-                rasterizer.rasterize(&turned, &self.grid, |tile, touch| {
-                    each(Fragment { tile, bin, inside: TzBox { t: touch.t, z: touch.z, triangle } });
-                });
+            let Some(times) = self.times(object, triangle) else { continue };
+            let first = left.partition_point(|(_, left)| left.time[1] < times[0]);
+            let open = left[first..].iter().take_while(|(_, left)| left.time[0] <= times[1]);
+            let mut drawing = Drawing { pass: self, object, ends, triangle, item, turned: None };
+            for (bin, left) in open {
+                if !drawing.bin(*bin, left, times, effort, &mut each) {
+                    return false;
+                }
             }
         }
+        true
+    }
+
+    /// When a triangle may be in what the pass covers; at an instant its box says that better.
+    fn times(&self, object: &Object, triangle: u32) -> Option<[f64; 2]> {
+        let [first, last] = self.hull.time;
+        if first == last { Some(self.hull.time) } else { object.times_inside(triangle, &self.hull) }
+    }
+
+    /// The tile that holds a coordinate; a function that never falls, so that what lies between two lies in the tiles between.
+    fn tile_of(&self, across: usize, at: f64) -> u32 {
+        let last = if across == 0 { self.grid.columns } else { self.grid.rows } - 1;
+        let tile = (at - self.grid.origin[across]) / self.grid.tile[across];
+        // Numbers beyond either end, and none at all, saturate.
+        (tile as u32).min(last)
+    }
+
+    /// Columns and rows that hold a box, with one more all around where its border may be a hair off.
+    fn tiles_of(&self, near: &[[f64; 2]; 3]) -> [Range<u32>; 2] {
+        let more = u32::from(self.fit == Fit::Edges);
+        let counts = [self.grid.columns, self.grid.rows];
+        [0, 1].map(|across| {
+            let [low, high] = near[(self.axis + across + 1) % 3];
+            let (first, last) = (self.tile_of(across, low), self.tile_of(across, high));
+            first.saturating_sub(more)..(last + 1 + more).min(counts[across])
+        })
     }
 
     /// The triangle as it is seen along the axis.
@@ -97,92 +176,80 @@ impl Pass {
     }
 }
 
+/// A triangle being drawn.
+struct Drawing<'a> {
+    pass: &'a Pass,
+    object: &'a Object,
+    ends: &'a Ends,
+    triangle: u32,
+    item: u32,
+    turned: Option<MovingTriangle>,
+}
+
+impl Drawing<'_> {
+    fn bin(
+        &mut self,
+        bin: usize,
+        left: &Bounds,
+        times: [f64; 2],
+        effort: &mut Effort,
+        each: &mut impl FnMut(&Fragment),
+    ) -> bool {
+        let (pass, item, triangle) = (self.pass, self.item, self.triangle);
+        let Some(t) = meet(left.time, times) else { return true };
+        let Some(near) = near(self.object, triangle, t, left) else { return true };
+        let [columns, rows] = pass.tiles_of(&near);
+        if !effort.spend(columns.len() as u64 * rows.len() as u64) {
+            return false;
+        }
+        if pass.fit == Fit::Boxes {
+            let inside = TzBox { t, z: near[pass.axis], triangle };
+            for row in rows {
+                columns.clone().for_each(|column| each(&Fragment { tile: [column, row], bin, item, inside }));
+            }
+            return true;
+        }
+        let turned = self.turned.or_else(|| pass.turned(self.ends, self.object.uncertainty));
+        self.turned = turned;
+        let Some(turned) = turned else { return true };
+        let clip = Region { t, ..Region::WHOLE };
+        let rasterizer = Rasterizer::new(View::orthographic()).clipped(clip).halving(HALVINGS);
+        let prepared = rasterizer.prepare(&turned);
+        rasterizer.rasterize_part(&prepared, &pass.grid, [columns, rows], |tile, touch| {
+            each(&Fragment { tile, bin, item, inside: TzBox { t: touch.t, z: touch.z, triangle } });
+        });
+        true
+    }
+}
+
+/// The part of `left` that a triangle sweeps during `t`, or `None` where it stays outside.
+fn near(object: &Object, triangle: u32, t: [f64; 2], left: &Bounds) -> Option<[[f64; 2]; 3]> {
+    let triangle = triangle as usize;
+    let (ends, mut near) = (&object.triangles[triangle], object.boxes[triangle].space);
+    for (axis, near) in near.iter_mut().enumerate() {
+        if t != [0.0, 1.0] {
+            *near = swept(ends, axis, t, object.uncertainty);
+        }
+        *near = meet(*near, left.space[axis])?;
+    }
+    Some(near)
+}
+
+/// Least and greatest coordinate of a triangle during `t`.
+fn swept(ends: &Ends, axis: usize, t: [f64; 2], uncertainty: f64) -> [f64; 2] {
+    let (mut swept, mut size) = (NOTHING, 0.0_f64);
+    for corner in 0..3 {
+        let [from, to] = [ends[0][corner][axis], ends[1][corner][axis]];
+        let at = |t: f64| from + t * (to - from);
+        let first = at(t[0]);
+        let last = if t[0] == t[1] { first } else { at(t[1]) };
+        swept = hull(swept, [first.min(last), first.max(last)]);
+        size = size.max(from.abs()).max(to.abs());
+    }
+    // Each end is off by three roundings at most.
+    let margin = 8.0 * f64::EPSILON * size + uncertainty;
+    [swept[0] - margin, swept[1] + margin]
+}
+
 /// How often the rasterizer may halve the time of a tile; bins of time do that here.
 const HALVINGS: u32 = 1;
-
-/// What of each bin is left after a pass, and what was done for it.
-#[derive(Default)]
-pub(super) struct Survivors {
-    /// By bin, where and when both may touch.
-    pub bins: Vec<Option<Bounds>>,
-    /// Tiles, in any bin, in which they may.
-    pub tiles: u64,
-    /// Fragments drawn.
-    pub fragments: u64,
-    /// Triangles of the first and the second that may touch, and when: some of them.
-    pub suspects: Vec<([u32; 2], f64)>,
-}
-
-/// So many suspects are named in a pass.
-const MOST_SUSPECTS: usize = 48;
-
-impl Survivors {
-    /// Nothing is left yet of `bins`.
-    pub fn none(bins: usize) -> Self {
-        Self { bins: vec![None; bins], ..Self::default() }
-    }
-
-    /// Notes that both may touch within `found`.
-    pub fn add(&mut self, bin: usize, found: &Bounds, triangles: [u32; 2]) {
-        let known = self.bins[bin].get_or_insert(Bounds::NOTHING);
-        *known = known.hull(found);
-        self.tiles += 1;
-        if self.suspects.len() < MOST_SUSPECTS {
-            self.suspects.push((triangles, 0.5 * (found.time[0] + found.time[1])));
-        }
-    }
-}
-
-/// The first part's box in each tile against each fragment of the second (Fig. 5, right), both in a bin of time.
-pub(super) fn fragments_against_boxes(
-    pass: &Pass,
-    [first, second]: [Part<'_>; 2],
-    bins: &[Option<Bounds>],
-    [boxes, _]: &mut [TzBuffer; 2],
-) -> Survivors {
-    let mut left = Survivors::none(bins.len());
-    let mut fragments = 0;
-    boxes.clear(pass.tiles() * bins.len());
-    pass.draw(first, bins, |fragment| {
-        fragments += 1;
-        boxes.add(pass.place(fragment.tile, fragment.bin), &fragment.inside);
-    });
-    pass.draw(second, bins, |Fragment { tile, bin, inside }| {
-        fragments += 1;
-        let known = boxes.at(pass.place(tile, bin));
-        let Some([t, z]) = known.meet(inside.t, inside.z) else { return };
-        let found = bins[bin].and_then(|allowed| allowed.meet(&pass.bounds(tile, t, z)));
-        if let Some(found) = found {
-            left.add(bin, &found, [known.triangle, inside.triangle]);
-        }
-    });
-    left.fragments = fragments;
-    left
-}
-
-/// The boxes of both in each tile (Fig. 5, left), in a bin of time.
-pub(super) fn boxes_against_boxes(
-    pass: &Pass,
-    parts: [Part<'_>; 2],
-    bins: &[Option<Bounds>],
-    buffers: &mut [TzBuffer; 2],
-) -> Survivors {
-    let mut left = Survivors::none(bins.len());
-    for (part, boxes) in parts.into_iter().zip(&mut *buffers) {
-        boxes.clear(pass.tiles() * bins.len());
-        pass.draw(part, bins, |fragment| {
-            left.fragments += 1;
-            boxes.add(pass.place(fragment.tile, fragment.bin), &fragment.inside);
-        });
-    }
-    let [first, second] = &*buffers;
-    for (place, one) in first.used() {
-        let other = second.at(place);
-        let (tile, bin) = pass.at(place);
-        let Some([t, z]) = one.meet(other.t, other.z) else { continue };
-        if let Some(found) = bins[bin].and_then(|allowed| allowed.meet(&pass.bounds(tile, t, z))) {
-            left.add(bin, &found, [one.triangle, other.triangle]);
-        }
-    }
-    left
-}

@@ -1,12 +1,12 @@
 //! One pair of objects, looked at closer and closer.
 
 use super::bounds::Bounds;
-use super::buffer::TzBuffer;
+use super::compare::{Comparison, Scratch, Survivors, Watch};
 use super::crossing::cross;
 use super::depth_only;
+use super::glance;
 use super::object::Object;
-use super::pass::{Part, Pass, Survivors, boxes_against_boxes, fragments_against_boxes};
-use super::window::times_inside;
+use super::pass::{Effort, Fit, Part, Pass};
 
 /// What is compared in a tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,17 +62,16 @@ impl Verdict {
     }
 }
 
-/// Buffers used over and over.
-#[derive(Default)]
-pub(super) struct Scratch {
-    buffers: [TzBuffer; 2],
-}
-
-/// Looking closer ends when so much of space and time is left of a round.
+/// Looking closer ends when so much of space and time, and of the triangles, is left of a round.
 const STUCK: f64 = 0.5;
+/// Tiles across that looking closer begins with, at least; more where there are more than so many triangles for a tile.
+const FIRST_TILES: u32 = 8;
+const TRIANGLES_A_TILE: f64 = 16.0;
+/// So many triangles are looked at by their boxes first.
+const MANY: usize = 64;
 /// Fragments that may be drawn for a pair before it is let stand, and more for each of its triangles.
 const MOST_FRAGMENTS: u64 = 1 << 16;
-const FRAGMENTS_EACH: u64 = 16;
+const FRAGMENTS_EACH: u64 = 4;
 /// Rounds that may be needed to halve space and time down to the spacing of numbers.
 const MOST_ROUNDS: u32 = 64;
 
@@ -80,21 +79,52 @@ const MOST_ROUNDS: u32 = 64;
 struct Round {
     window: Bounds,
     tiles: u64,
-    fragments: u64,
     seen: bool,
+}
+
+/// How a round ends.
+enum Outcome {
+    /// Nothing touches.
+    Apart,
+    /// It would take too long.
+    GaveUp,
+    /// Something may.
+    Left(Round),
+}
+
+/// So many triangles of a part say how fast it is.
+const SOME: usize = 64;
+
+/// How closely a round looks.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Look {
+    resolution: u32,
+    bins: u32,
+    fit: Fit,
 }
 
 impl Search {
     /// Whether `a` and `b` may collide.
     pub(super) fn pair(&self, a: &Object, b: &Object, scratch: &mut Scratch) -> Verdict {
+        self.watched(a, b, scratch, &mut ())
+    }
+
+    /// The same, with `watch` told what is done.
+    pub(super) fn watched(
+        &self,
+        a: &Object,
+        b: &Object,
+        scratch: &mut Scratch,
+        watch: &mut impl Watch,
+    ) -> Verdict {
         let Some(window) = a.bounds.meet(&b.bounds) else { return Verdict::Apart };
         let everything = |object: &Object| (0..object.len() as u32).collect::<Vec<_>>();
         let mut search =
             Pair { objects: [a, b], lists: [everything(a), everything(b)], window, search: self };
         match (self.method, self.zoom) {
-            (Method::DepthOnly, _) => search.by_depth(scratch),
-            (_, false) => search.once(scratch),
-            (_, true) => search.closer(scratch),
+            (Method::DepthOnly, _) => search.by_depth(scratch, watch),
+            (_, false) => search.once(scratch, watch),
+            (_, true) => search.closer(scratch, watch),
         }
     }
 }
@@ -110,52 +140,96 @@ struct Pair<'a> {
 
 impl Pair<'_> {
     /// Without time, as the method knows none.
-    fn by_depth(&mut self, scratch: &mut Scratch) -> Verdict {
-        let tiles =
-            depth_only::tiles(self.parts(), &self.window, self.search.resolution, &mut scratch.buffers);
+    fn by_depth(&mut self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
+        let tiles = depth_only::tiles(self.parts(), &self.window, self.search.resolution, scratch, watch);
         tiles.map_or(Verdict::Apart, |tiles| Verdict::Maybe { bounds: self.window, tiles, seen: false })
     }
 
     /// At the resolution asked for.
-    fn once(&mut self, scratch: &mut Scratch) -> Verdict {
+    fn once(&mut self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
         if !self.tighten() {
             return Verdict::Apart;
         }
-        let round = self.round(self.search.resolution, self.search.bins, scratch);
-        round.map_or(Verdict::Apart, |Round { window, tiles, seen, .. }| Verdict::Maybe {
-            bounds: window,
-            tiles,
-            seen,
-        })
+        let Search { resolution, bins, .. } = *self.search;
+        let look = Look { resolution, bins, fit: Fit::Edges };
+        match self.round(look, &mut Effort::endless(), scratch, watch) {
+            Outcome::Apart => Verdict::Apart,
+            Outcome::GaveUp => self.maybe(0, false),
+            Outcome::Left(Round { window, tiles, seen }) => Verdict::Maybe { bounds: window, tiles, seen },
+        }
     }
 
-    /// From few tiles to many and, wherever that leaves less of space and time, closer.
-    fn closer(&mut self, scratch: &mut Scratch) -> Verdict {
-        let triangles = self.lists.iter().map(|list| list.len() as u64).sum::<u64>();
-        let budget = MOST_FRAGMENTS + FRAGMENTS_EACH * triangles;
-        let (mut resolution, mut bins, mut spent) =
-            (8.min(self.search.resolution), 2.min(self.search.bins), 0);
-        let mut last = Verdict::Maybe { bounds: self.window, tiles: 0, seen: false };
+    fn maybe(&self, tiles: u64, seen: bool) -> Verdict {
+        Verdict::Maybe { bounds: self.window, tiles, seen }
+    }
+
+    /// From few tiles to many and, wherever that leaves less of space and time, closer. Many triangles are looked at by their boxes
+    /// until that no longer helps, those that are left by their edges.
+    fn closer(&mut self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
+        if !self.tighten() {
+            return Verdict::Apart;
+        }
+        if glance::crossing(self.parts(), &self.window).is_some() {
+            return self.maybe(0, true);
+        }
+        let most = self.search.resolution;
+        let mut effort = Effort::of(MOST_FRAGMENTS + FRAGMENTS_EACH * self.triangles() as u64);
+        let mut fit = if self.triangles() > MANY { Fit::Boxes } else { Fit::Edges };
+        let first = (self.triangles() as f64 / TRIANGLES_A_TILE).sqrt() as u32;
+        let (mut resolution, mut last) = (first.max(FIRST_TILES).min(most), self.maybe(0, false));
         for _ in 0..MOST_ROUNDS {
+            let (before, triangles) = (self.window, self.triangles());
+            let look = Look { resolution, bins: self.bins(resolution), fit };
+            let round = match self.round(look, &mut effort, scratch, watch) {
+                Outcome::Apart => return Verdict::Apart,
+                Outcome::GaveUp => break,
+                Outcome::Left(round) => round,
+            };
+            self.window = round.window;
+            last = self.maybe(round.tiles, round.seen);
+            if round.seen {
+                break;
+            }
             if !self.tighten() {
                 return Verdict::Apart;
             }
-            let before = self.window;
-            let Some(round) = self.round(resolution, bins, scratch) else { return Verdict::Apart };
-            spent += round.fragments;
-            self.window = round.window;
-            last = Verdict::Maybe { bounds: round.window, tiles: round.tiles, seen: round.seen };
-            let at_most = resolution == self.search.resolution && bins == self.search.bins;
-            let stuck = round.window.share_of(&before) > STUCK;
-            if round.seen || spent > budget || (stuck && at_most) {
-                break;
+            if self.triangles() <= MANY {
+                fit = Fit::Edges;
             }
-            if stuck {
-                resolution = (2 * resolution).min(self.search.resolution);
-                bins = (2 * bins).min(self.search.bins);
+            let stuck = round.window.share_of(&before) > STUCK;
+            let crowded = self.triangles() as f64 > STUCK * triangles as f64;
+            match (stuck && resolution < most, crowded, fit) {
+                (true, ..) => resolution = (2 * resolution).min(most),
+                (false, true, Fit::Boxes) => fit = Fit::Edges,
+                (false, true, Fit::Edges) if stuck => break,
+                _ => {}
             }
         }
         last
+    }
+
+    /// Bins of time in which a triangle moves by a tile or so, and no more than asked for.
+    fn bins(&self, resolution: u32) -> u32 {
+        let [first, last] = self.window.time;
+        let step = |part: &Part<'_>| {
+            let some = part.list.iter().step_by(part.list.len().div_ceil(SOME).max(1));
+            let moved = |triangle: &u32| {
+                let [open, close] = &part.object.triangles[*triangle as usize];
+                let moved = |axis: usize| {
+                    let extent = self.window.space[axis][1] - self.window.space[axis][0];
+                    let way = (close[0][axis] - open[0][axis]).abs() * (last - first);
+                    if extent > 0.0 { way / extent } else { 0.0 }
+                };
+                moved(0).max(moved(1)).max(moved(2))
+            };
+            some.clone().map(moved).sum::<f64>() / some.len().max(1) as f64
+        };
+        let step = self.parts().iter().map(step).fold(0.0, f64::max);
+        ((step * f64::from(resolution)).ceil() as u32).clamp(1, self.search.bins)
+    }
+
+    fn triangles(&self) -> usize {
+        self.lists.iter().map(Vec::len).sum()
     }
 
     fn parts(&self) -> [Part<'_>; 2] {
@@ -169,8 +243,7 @@ impl Pair<'_> {
             let mut within = Bounds::NOTHING;
             self.lists[which].retain(|&triangle| {
                 let Some(part) = object.boxes[triangle as usize].meet(&window) else { return false };
-                let ends = &object.triangles[triangle as usize];
-                let Some(times) = times_inside(ends, &window, object.uncertainty) else { return false };
+                let Some(times) = object.times_inside(triangle, &window) else { return false };
                 within = within.hull(&Bounds { time: times, ..part });
                 true
             });
@@ -182,25 +255,44 @@ impl Pair<'_> {
         true
     }
 
-    /// Three passes; `None` where they show that nothing touches.
-    fn round(&self, resolution: u32, bins: u32, scratch: &mut Scratch) -> Option<Round> {
-        let mut left = slices(&self.window, bins);
-        let (mut tiles, mut fragments, mut seen) = (0, 0, false);
+    /// Three passes. Where it is looked closer, triangles that touch nothing are dropped on the way.
+    fn round(
+        &mut self,
+        look: Look,
+        effort: &mut Effort,
+        scratch: &mut Scratch,
+        watch: &mut impl Watch,
+    ) -> Outcome {
+        let mut left = slices(&self.window, look.bins);
+        let (mut tiles, mut seen) = (0, false);
         for axis in 0..3 {
-            let pass = Pass::new(axis, &joined(&left)?, resolution);
-            let compare = match self.search.method {
-                Method::BoxBox => boxes_against_boxes,
-                _ => fragments_against_boxes,
+            let Some(hull) = joined(&left) else { return Outcome::Apart };
+            let pass = Pass::new(axis, &hull, look.resolution, look.fit);
+            let comparison = Comparison { pass: &pass, parts: self.parts(), bins: &left };
+            let found = match self.search.method {
+                Method::BoxBox => comparison.boxes_against_boxes(scratch, effort, watch),
+                _ => comparison.fragments_against_boxes(scratch, effort, watch),
             };
-            let found = compare(&pass, self.parts(), &left, &mut scratch.buffers);
-            (tiles, fragments) = (found.tiles, fragments + found.fragments);
+            let Some(found) = found else { return Outcome::GaveUp };
+            tiles = found.tiles;
             seen |= self.search.zoom && self.is_seen(&found);
+            if self.search.zoom {
+                self.keep(&found);
+            }
             left = found.bins;
             if seen {
                 break;
             }
         }
-        joined(&left).map(|window| Round { window, tiles, fragments, seen })
+        joined(&left).map_or(Outcome::Apart, |window| Outcome::Left(Round { window, tiles, seen }))
+    }
+
+    /// Keeps the triangles that are alive.
+    fn keep(&mut self, found: &Survivors) {
+        for (list, alive) in self.lists.iter_mut().zip(&found.alive) {
+            let mut alive = alive.iter();
+            list.retain(|_| alive.next().copied().unwrap_or(true));
+        }
     }
 
     /// Whether any of the suspects cross.

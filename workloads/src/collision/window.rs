@@ -8,11 +8,20 @@ use super::object::Ends;
 const ROUNDING: f64 = 1e-14;
 
 /// The times in `within` at which a triangle may touch it, or `None` where it never does. Each of the six sides alone: the triangle is
-/// on the outside as long as all its corners are.
-pub(super) fn times_inside(ends: &Ends, within: &Bounds, uncertainty: f64) -> Option<[f64; 2]> {
+/// on the outside as long as all its corners are. `swept` is the box that it sweeps.
+pub(super) fn times_inside(
+    ends: &Ends,
+    swept: &Bounds,
+    within: &Bounds,
+    uncertainty: f64,
+) -> Option<[f64; 2]> {
     let mut times = within.time;
     for axis in 0..3 {
         let [low, high] = within.space[axis];
+        let [least, most] = swept.space[axis];
+        if low <= least && most <= high {
+            continue;
+        }
         let corners = [0, 1, 2].map(|corner| [ends[0][corner][axis], ends[1][corner][axis]]);
         times = meet(times, inside(corners.map(|ends| ends.map(|at| at - (low - uncertainty)))))?;
         times = meet(times, inside(corners.map(|ends| ends.map(|at| (high + uncertainty) - at))))?;
@@ -27,11 +36,11 @@ fn inside(corners: [[f64; 2]; 3]) -> [f64; 2] {
 
 /// The times at which a number that runs from `from` to `to` is not below zero.
 fn since([from, to]: [f64; 2]) -> [f64; 2] {
-    let root = from / (from - to);
+    let root = || from / (from - to);
     match (from >= 0.0, to >= 0.0) {
         (true, true) => [0.0, 1.0],
-        (true, false) => [0.0, root + ROUNDING],
-        (false, true) => [root - ROUNDING, 1.0],
+        (true, false) => [0.0, root() + ROUNDING],
+        (false, true) => [root() - ROUNDING, 1.0],
         (false, false) => NOTHING,
     }
 }
@@ -41,18 +50,19 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn times(ends: &Ends, within: &Bounds) -> Option<[f64; 2]> {
+        times_inside(ends, &Bounds::of(ends.as_flattened().iter().copied()), within, 0.0)
+    }
+
     #[test]
     fn a_point_that_passes_a_box_is_inside_between_its_sides() {
         let ends = [[[-1.0, 0.5, 0.5]; 3], [[3.0, 0.5, 0.5]; 3]];
         let within = Bounds { space: [[0.0, 1.0]; 3], time: [0.0, 1.0] };
-        let [first, last] = times_inside(&ends, &within, 0.0).unwrap();
+        let [first, last] = times(&ends, &within).unwrap();
         assert!((first - 0.25).abs() < 1e-12 && (last - 0.5).abs() < 1e-12, "{first} {last}");
         assert!(first <= 0.25 && last >= 0.5);
-        assert!(times_inside(&ends, &Bounds { time: [0.6, 1.0], ..within }, 0.0).is_none());
-        assert!(
-            times_inside(&ends, &Bounds { space: [[0.0, 1.0], [0.0, 0.25], [0.0, 1.0]], ..within }, 0.0)
-                .is_none()
-        );
+        assert!(times(&ends, &Bounds { time: [0.6, 1.0], ..within }).is_none());
+        assert!(times(&ends, &Bounds { space: [[0.0, 1.0], [0.0, 0.25], [0.0, 1.0]], ..within }).is_none());
     }
 
     proptest! {
@@ -71,7 +81,7 @@ mod tests {
                 (0..3).map(|k| share[k] * (ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]))).sum()
             };
             if (0..3).all(|axis| (bounds.space[axis][0]..=bounds.space[axis][1]).contains(&at(axis))) {
-                let times = times_inside(&ends, &bounds, 0.0);
+                let times = times(&ends, &bounds);
                 prop_assert!(times.is_some_and(|[first, last]| first <= t && t <= last), "{times:?} {t}");
             }
         }
