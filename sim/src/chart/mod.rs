@@ -1,5 +1,6 @@
 //! Charts of the book: each measured, drawn and written in one go, one module for each.
 //!
+//! - [`collision`]: pairs kept in vain by collision detection.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
 //! - [`sampled`]: frames predicted from few against all of them.
@@ -9,6 +10,7 @@
 //! - [`index`]: one page of all of them, with [what each level costs and how wrong it is](standing).
 //! - [`fit`]: exponents of curves.
 
+pub mod collision;
 mod error;
 pub mod fit;
 pub mod frames;
@@ -24,8 +26,12 @@ pub mod timing;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 7] = [
+pub const CHARTS: [(&str, &str); 8] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
+    (
+        "collision",
+        "pairs kept in vain by collision detection over resolution, bins of time and cost, and where it fails",
+    ),
     ("frames", "frame starts found and energy error, by method, over rate, noise, bits and host time"),
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
     ("sampled", "frames predicted from few: errors, how often intervals hold the truth, host time"),

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::collision::CollisionChart;
 use super::frames::{Axis, FramesChart, Outcome, Way};
 use super::growth::GrowthChart;
 use super::sampled::SampledChart;
@@ -123,5 +124,22 @@ impl Standings for FramesChart {
 impl Standings for GrowthChart {
     fn standings(&self) -> Vec<Standing> {
         Vec::new()
+    }
+}
+
+impl Standings for CollisionChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::collision::Row| {
+            let level = match row.resolution {
+                0 => row.way.clone(),
+                px => format!("{}, {px} px", row.way),
+            };
+            let error = format!(
+                "kept in vain {:.3} of two objects, {:.4} of many; missed {}",
+                row.two, row.many, row.missed
+            );
+            standing("pairs that may collide", &level, error, format!("{:.3} ms a pair", 1e3 * row.pair_s))
+        };
+        self.rows.iter().map(row).collect()
     }
 }

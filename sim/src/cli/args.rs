@@ -258,6 +258,8 @@ pub struct ChartArgs {
 pub enum ChartArg {
     /// Every chart, the failure catalogue of `quintile stress`, and `index.html`: speed against accuracy on one page
     All,
+    /// Pairs kept in vain by collision detection, over resolution, bins of time and cost, and where it fails
+    Collision,
     /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
     Frames,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents

@@ -16,20 +16,30 @@ pub(super) fn cross(a: &Ends, b: &Ends, t: f64) -> bool {
     edges(a).iter().any(|edge| pierces(edge, &b)) || edges(b).iter().any(|edge| pierces(edge, &a))
 }
 
-/// Whether a segment passes through a triangle: its ends on both sides of the plane, and the triangle around it (signed volumes).
+/// Whether a segment passes through a triangle, beyond what rounding could make of one that does not: its ends on both sides of the
+/// plane, and the triangle around it (signed volumes).
 fn pierces(&[p, q]: &[DVec3; 2], [a, b, c]: &[DVec3; 3]) -> bool {
-    let volume = |d: DVec3, e: DVec3, f: DVec3| d.cross(e).dot(f);
-    let side = |point: DVec3| volume(*b - *a, *c - *a, point - *a);
+    let size = [p, q, *a, *b, *c].iter().fold(0.0, |size: f64, p| size.max(p.abs().max_element()));
+    // What a corner at an instant is off by, and so a difference of two.
+    let off = 8.0 * f64::EPSILON * size;
+    let sign = |d: DVec3, e: DVec3, f: DVec3| {
+        let volume = d.cross(e).dot(f);
+        let [d, e, f] = [d, e, f].map(|side| side.abs().element_sum());
+        let margin = off * (d * e + e * f + f * d) + 8.0 * f64::EPSILON * d * e * f;
+        if volume.abs() > 2.0 * margin { volume.signum() } else { 0.0 }
+    };
+    let side = |point: DVec3| sign(*b - *a, *c - *a, point - *a);
     if side(p) * side(q) >= 0.0 {
         return false;
     }
-    let around = [(*a, *b), (*b, *c), (*c, *a)].map(|(d, e)| volume(q - p, d - p, e - p));
+    let around = [(*a, *b), (*b, *c), (*c, *a)].map(|(d, e)| sign(q - p, d - p, e - p));
     around.iter().all(|&turn| turn > 0.0) || around.iter().all(|&turn| turn < 0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DQuat;
 
     #[test]
     fn what_passes_through_crosses_while_it_does() {
@@ -40,5 +50,17 @@ mod tests {
             !cross(&still, &falling, 0.25) && cross(&still, &falling, 0.6) && !cross(&still, &falling, 0.9)
         );
         assert!(cross(&falling, &still, 0.6));
+    }
+
+    #[test]
+    fn what_only_touches_or_lies_in_one_plane_does_not_cross() {
+        let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+        let wall = |x: f64| [[0.5, x, 0.0], [0.5, x + 1.0, 0.2], [0.5, x, 1.0]];
+        let posed = |ends: [[f64; 3]; 3]| ends.map(|p| (turn * DVec3::from(p)).to_array());
+        for n in 0..100 {
+            let x = f64::from(n) * 0.01;
+            let (one, other) = ([posed(wall(0.0)); 2], [posed(wall(x - 0.5)), posed(wall(x + 0.5))]);
+            assert!(!cross(&one, &other, 0.5), "{x}");
+        }
     }
 }

@@ -14,6 +14,7 @@
 //! - [`candidates`]: the pairs whose swept boxes touch.
 //! - [`Method`], [`Search`]: how closely a pair is looked at; [`Verdict`]: what is found.
 //! - [`detect`]: all pairs of a case.
+//! - [`families`]: cases whose truth is known.
 
 mod bounds;
 mod buffer;
@@ -22,6 +23,8 @@ mod compare;
 mod crossing;
 mod depth_only;
 mod detect;
+pub mod families;
+mod frame;
 mod glance;
 mod object;
 mod pass;

@@ -40,10 +40,43 @@ impl Object {
         if !triangles.as_flattened().as_flattened().as_flattened().iter().all(fits) {
             return None;
         }
+        Some(Self::fitted(triangles, uncertainty))
+    }
+
+    /// How far its corners go on average from time 0 to time 1.
+    pub(super) fn mean_way(&self) -> [f64; 3] {
+        let count = (3 * self.triangles.len()).max(1) as f64;
+        [0, 1, 2].map(|axis| {
+            let way = |[open, close]: &Ends| (0..3).map(|k| close[k][axis] - open[k][axis]).sum::<f64>();
+            self.triangles.iter().map(way).sum::<f64>() / count
+        })
+    }
+
+    /// The same seen from a frame of reference that goes `way` from time 0 to time 1.
+    pub(super) fn less(&self, way: [f64; 3]) -> Self {
+        let seen = |[open, close]: &Ends| [*open, close.map(|p| [0, 1, 2].map(|axis| p[axis] - way[axis]))];
+        let triangles: Vec<Ends> = self.triangles.iter().map(seen).collect();
+        let coordinates = triangles.as_flattened().as_flattened().as_flattened();
+        let largest = coordinates.iter().chain(&way).fold(0.0, |largest: f64, at| largest.max(at.abs()));
+        // A difference is off by half a unit of its last place.
+        Self::fitted(triangles, self.uncertainty + f64::EPSILON * largest)
+    }
+
+    /// With its boxes.
+    fn fitted(triangles: Vec<Ends>, uncertainty: f64) -> Self {
         let swept = |ends: &Ends| Bounds::of(ends.as_flattened().iter().copied()).inflated(uncertainty);
         let boxes: Vec<Bounds> = triangles.iter().map(swept).collect();
-        let bounds = Bounds::of(triangles.as_flattened().as_flattened().iter().copied());
-        Some(Self { triangles, boxes, bounds: bounds.inflated(uncertainty), uncertainty })
+        let bounds =
+            boxes.iter().fold(Bounds { time: [0.0, 1.0], ..Bounds::NOTHING }, |all, one| all.hull(one));
+        Self { triangles, boxes, bounds, uncertainty }
+    }
+
+    /// The same, its coordinates unsure by `relative` of the largest.
+    #[must_use]
+    pub fn loosened(&self, relative: f64) -> Self {
+        let coordinates = self.triangles.as_flattened().as_flattened().as_flattened();
+        let largest = coordinates.iter().fold(0.0, |largest: f64, at| largest.max(at.abs()));
+        Self::fitted(self.triangles.clone(), self.uncertainty + relative * largest)
     }
 
     /// Its triangles.

@@ -4,6 +4,7 @@ use super::bounds::Bounds;
 use super::compare::{Comparison, Scratch, Survivors, Watch};
 use super::crossing::cross;
 use super::depth_only;
+use super::frame::Seen;
 use super::glance;
 use super::object::Object;
 use super::pass::{Effort, Fit, Part, Pass};
@@ -117,6 +118,15 @@ impl Search {
         scratch: &mut Scratch,
         watch: &mut impl Watch,
     ) -> Verdict {
+        if self.zoom && self.method != Method::DepthOnly {
+            let seen = Seen::new(a, b);
+            let [one, other] = seen.objects.each_ref();
+            return seen.told(self.as_seen(one, other, scratch, watch));
+        }
+        self.as_seen(a, b, scratch, watch)
+    }
+
+    fn as_seen(&self, a: &Object, b: &Object, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
         let Some(window) = a.bounds.meet(&b.bounds) else { return Verdict::Apart };
         let everything = |object: &Object| (0..object.len() as u32).collect::<Vec<_>>();
         let mut search =

@@ -1,0 +1,113 @@
+//! The files of the chart.
+
+use super::{CollisionChart, Row};
+use crate::output::dir::BoxError;
+use crate::output::plot::{Curve, CurvePanel, Curves};
+use crate::output::table::Table;
+use crate::output::{OutDir, OutputError};
+
+/// What an earlier chart left.
+pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
+    dir.remove_stale("", "collision", &["svg", "png", "csv", "json"])
+}
+
+/// Writes pictures and numbers; `collision.json` comes last.
+pub(super) fn write(chart: &CollisionChart, dir: &OutDir) -> Result<(), OutputError> {
+    let subject = chart.subject();
+    let title = "Pairs kept in vain by collision detection";
+    Curves { title, subject: &subject, panels: chart.panels() }.picture().write(dir, "collision")?;
+    let (title, subject) = (
+        "Where collision detection fails: plates that slide along each other without touching",
+        "share of ways to lie in which they are kept in vain, looked at closer",
+    );
+    Curves { title, subject, panels: vec![chart.failures()] }.picture().write(dir, "collision_failures")?;
+    dir.write_atomic("collision.csv", |out| chart.csv(out))?;
+    dir.write_json("collision.json", chart)?;
+    Ok(())
+}
+
+impl CollisionChart {
+    /// What is printed: a row for each way.
+    pub fn text(&self) -> String {
+        let mut table = Table::new(["", "px", "two objects", "many", "missed", "ms a pair"]);
+        for row in &self.rows {
+            table.row([
+                row.way.clone(),
+                if row.resolution == 0 { "-".to_owned() } else { row.resolution.to_string() },
+                format!("{:.3}", row.two),
+                format!("{:.4}", row.many),
+                row.missed.to_string(),
+                format!("{:.3}", 1e3 * row.pair_s),
+            ]);
+        }
+        let mut slides = Table::new(["plates that slide: gap", "px", "kept in vain"]);
+        for slide in &self.slides {
+            let (gap, kept) = (format!("{:e}", slide.gap), format!("{:.2}", slide.kept));
+            slides.row([gap, slide.resolution.to_string(), kept]);
+        }
+        format!("{table}{}\n\n{slides}", self.subject())
+    }
+
+    fn subject(&self) -> String {
+        let [[two_hit, two], [many_hit, many]] = self.pairs;
+        format!(
+            "shares of pairs that do not collide: {two} of two objects (beside {two_hit} that do), {many} of many ({many_hit})"
+        )
+    }
+
+    /// Two objects and many over resolution, and over time.
+    fn panels(&self) -> Vec<CurvePanel> {
+        let mut names: Vec<&str> = Vec::new();
+        for row in self.rows.iter().filter(|row| row.resolution > 0) {
+            if !names.contains(&row.way.as_str()) {
+                names.push(&row.way);
+            }
+        }
+        let curves = |point: &dyn Fn(&Row) -> (f64, f64)| -> Vec<Curve> {
+            let of = |name: &&str| {
+                let rows = self.rows.iter().filter(|row| row.way == *name);
+                Curve { name: (*name).to_owned(), note: String::new(), points: rows.map(point).collect() }
+            };
+            names.iter().map(of).collect()
+        };
+        let panel = |title: &str, across: &str, doubling, curves| CurvePanel {
+            title: title.to_owned(),
+            across: across.to_owned(),
+            up: "share kept in vain".to_owned(),
+            doubling,
+            curves,
+        };
+        let across = |row: &Row| f64::from(row.resolution);
+        vec![
+            panel("two objects", "pixels across", true, curves(&|row| (across(row), row.two))),
+            panel("many objects", "pixels across", true, curves(&|row| (across(row), row.many))),
+            panel(
+                "two objects",
+                "CPU time of a pair (ms)",
+                false,
+                curves(&|row| (1e3 * row.pair_s, row.two)),
+            ),
+        ]
+    }
+
+    fn failures(&self) -> CurvePanel {
+        let curve = |&resolution: &u32| {
+            let of = self.slides.iter().filter(|slide| slide.resolution == resolution);
+            let points = of.map(|slide| (slide.gap, slide.kept)).collect();
+            Curve { name: format!("{resolution} px"), note: String::new(), points }
+        };
+        CurvePanel {
+            title: "plates of 72 triangles, any way round".to_owned(),
+            across: "gap (lengths of a plate)".to_owned(),
+            up: "share kept in vain".to_owned(),
+            doubling: false,
+            curves: self.effort.resolutions.iter().map(curve).collect(),
+        }
+    }
+
+    fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {
+        let mut table = csv::Writer::from_writer(out);
+        self.rows.iter().try_for_each(|row| table.serialize(row))?;
+        Ok(table.flush()?)
+    }
+}

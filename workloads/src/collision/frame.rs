@@ -1,0 +1,83 @@
+//! A frame of reference that moves with one of two objects.
+//!
+//! Whether and when two objects touch does not change when both are moved alike. Seen from the larger one, which then hardly moves,
+//! tiles hold what they should for all of the time instead of what sweeps through them.
+
+use std::borrow::Cow;
+
+use super::object::Object;
+use super::search::Verdict;
+
+/// Moving by less than this share of what both objects share is not worth a copy.
+const LEAST: f64 = 1.0 / 64.0;
+
+/// Two objects seen from a frame of reference.
+pub(super) struct Seen<'a> {
+    pub objects: [Cow<'a, Object>; 2],
+    /// How far the frame goes from time 0 to time 1.
+    way: [f64; 3],
+}
+
+/// Coordinates beyond this stay where they are, so that none leaves the range that the rasterizer takes.
+const FARTHEST: f64 = 1e59;
+
+impl<'a> Seen<'a> {
+    /// From the larger one of `a` and `b`, unless it hardly moves.
+    pub fn new(a: &'a Object, b: &'a Object) -> Self {
+        let larger = if size(a) >= size(b) { a } else { b };
+        let way = larger.mean_way();
+        let far = |object: &Object| object.bounds.space.as_flattened().iter().any(|at| at.abs() > FARTHEST);
+        let worth = !far(a)
+            && !far(b)
+            && a.bounds.meet(&b.bounds).is_some_and(|shared| {
+                (0..3).any(|axis| way[axis].abs() > LEAST * (shared.space[axis][1] - shared.space[axis][0]))
+            });
+        if worth {
+            return Self { objects: [a, b].map(|object| Cow::Owned(object.less(way))), way };
+        }
+        Self { objects: [a, b].map(Cow::Borrowed), way: [0.0; 3] }
+    }
+
+    /// A verdict on the objects as seen, for where they are.
+    pub fn told(&self, verdict: Verdict) -> Verdict {
+        let Verdict::Maybe { mut bounds, tiles, seen } = verdict else { return verdict };
+        for (range, way) in bounds.space.iter_mut().zip(self.way) {
+            let [from, to] = bounds.time.map(|t| t * way);
+            let size = range[0].abs().max(range[1].abs()) + way.abs();
+            let margin = if way == 0.0 { 0.0 } else { 4.0 * f64::EPSILON * size };
+            *range = [range[0] + from.min(to) - margin, range[1] + from.max(to) + margin];
+        }
+        Verdict::Maybe { bounds, tiles, seen }
+    }
+}
+
+/// The longest side of the box an object is in at first.
+fn size(object: &Object) -> f64 {
+    let corners = object.triangles.iter().flat_map(|[open, _]| *open);
+    let bounds = super::Bounds::of(corners);
+    bounds.space.iter().map(|[low, high]| high - low).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_larger_one_stands_still_and_places_are_told_as_they_are() {
+        let square = |x: f64, size: f64| [[x, 0.0, 0.0], [x + size, 0.0, 0.0], [x, size, 0.0]];
+        let large = Object::from_ends(vec![[square(0.0, 4.0), square(8.0, 4.0)]], 0.0).unwrap();
+        let small = Object::from_ends(vec![[square(1.0, 1.0), square(1.5, 1.0)]], 0.0).unwrap();
+        let seen = Seen::new(&small, &large);
+        assert_eq!(seen.objects[1].triangles[0][0], seen.objects[1].triangles[0][1]);
+        assert_eq!(seen.objects[0].triangles[0][1], square(-6.5, 1.0));
+        let bounds = super::super::Bounds { space: [[1.0, 2.0], [0.0, 1.0], [0.0, 0.0]], time: [0.25, 0.5] };
+        let Verdict::Maybe { bounds: told, .. } = seen.told(Verdict::Maybe { bounds, tiles: 1, seen: false })
+        else {
+            panic!("a pair that may collide")
+        };
+        assert!((told.space[0][0] - 3.0).abs() < 1e-12 && (told.space[0][1] - 6.0).abs() < 1e-12);
+        assert_eq!(told.space[1..], bounds.space[1..]);
+        let still = Object::from_ends(vec![[square(0.0, 4.0); 2]], 0.0).unwrap();
+        assert!(matches!(Seen::new(&small, &still).objects, [Cow::Borrowed(_), Cow::Borrowed(_)]));
+    }
+}
