@@ -24,8 +24,8 @@ const FARTHEST: f64 = 1e59;
 impl<'a> Seen<'a> {
     /// From the larger one of `a` and `b`, unless it hardly moves.
     pub fn new(a: &'a Object, b: &'a Object) -> Self {
-        let larger = if size(a) >= size(b) { a } else { b };
-        let way = larger.mean_way();
+        let ways = [a, b].map(Object::way);
+        let way = if size(a, &ways[0]) >= size(b, &ways[1]) { ways[0] } else { ways[1] };
         let far = |object: &Object| object.bounds.space.as_flattened().iter().any(|at| at.abs() > FARTHEST);
         let worth = !far(a)
             && !far(b)
@@ -51,11 +51,10 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// The longest side of the box an object is in at first.
-fn size(object: &Object) -> f64 {
-    let corners = object.triangles.iter().flat_map(|[open, _]| *open);
-    let bounds = super::Bounds::of(corners);
-    bounds.space.iter().map(|[low, high]| high - low).fold(0.0, f64::max)
+/// The longest side of an object, its way taken off the box that it sweeps.
+fn size(object: &Object, way: &[f64; 3]) -> f64 {
+    let sides = object.bounds.space.iter().zip(way).map(|([low, high], way)| high - low - way.abs());
+    sides.fold(0.0, f64::max)
 }
 
 #[cfg(test)]
