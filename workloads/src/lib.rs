@@ -5,6 +5,7 @@
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`job`] is for work that is more than one rendering of a scene.
+//! - [`caustics`] draws refracted and reflected light, beams as moving triangles.
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
@@ -24,6 +25,7 @@
 //! deterministic: the same file gives the same bits on every machine.
 
 pub mod builtin;
+pub mod caustics;
 pub mod collision;
 mod error;
 mod import;
