@@ -7,6 +7,7 @@
 //! - [`job`] is for work that is more than one rendering of a scene.
 //! - [`caustics`] draws refracted and reflected light, beams as moving triangles.
 //! - [`collision`] finds the pairs of moving objects that may collide.
+//! - [`occlusion`] finds objects that are hidden at all times and from everywhere on the lens.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
 //! ```
@@ -32,6 +33,7 @@ mod import;
 pub mod job;
 mod load;
 pub mod material;
+pub mod occlusion;
 mod samples;
 pub mod scene;
 pub mod shapes;

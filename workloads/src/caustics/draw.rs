@@ -25,7 +25,7 @@ pub struct Picture {
 
 /// One tile of one beam, told in the order in which hardware would meet it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TileWork {
+pub(super) struct Covered {
     /// The beam.
     pub beam: u32,
     /// The tile of 8x8 pixels, row by row from the top left.
@@ -56,7 +56,7 @@ pub(super) fn draw_with_work(
     method: Method,
     light: Option<Light>,
     log: bool,
-) -> (Picture, Vec<TileWork>) {
+) -> (Picture, Vec<Covered>) {
     let seen: Vec<Option<Seen>> = beams.par_iter().map(|beam| eye.see(beam)).collect();
     let rows = eye.viewport().height().div_ceil(TILE_PX);
     let bands: Vec<Band> = (0..rows.div_ceil(BAND_TILES))
@@ -90,7 +90,7 @@ struct Band {
     useful: u64,
     tiles: u64,
     tests: u64,
-    work: Vec<TileWork>,
+    work: Vec<Covered>,
 }
 
 impl Band {
@@ -110,7 +110,7 @@ impl Band {
                 self.shade(eye, seen, light, first, pixels);
                 if log {
                     let tile = first[1] / TILE_PX * columns + first[0] / TILE_PX;
-                    self.work.push(TileWork { beam: number, tile, pixels });
+                    self.work.push(Covered { beam: number, tile, pixels });
                 }
             });
         }

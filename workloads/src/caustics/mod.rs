@@ -22,6 +22,7 @@ mod cubic;
 mod draw;
 mod eye;
 pub mod generator;
+mod job;
 mod light;
 pub mod optics;
 
@@ -30,4 +31,5 @@ pub use bound::Method;
 pub use check::{Found, receivers};
 pub use draw::{Picture, draw};
 pub use eye::Eye;
+pub use job::{Look, Options, job};
 pub use light::{Floor, Light};

@@ -44,6 +44,14 @@ impl Method {
         }
     }
 
+    /// Triangles that are set up for a beam: itself, or so many faces of a body, where it does not fold.
+    pub const fn triangles(self) -> usize {
+        match self {
+            Self::Moving => 1,
+            _ => 8,
+        }
+    }
+
     /// The bodies of a beam; none where the triangle itself is rasterized.
     pub(super) fn bodies(self, beam: &Beam, into: &mut Body) {
         into.clear();

@@ -1,0 +1,160 @@
+//! Occlusion queries against all samples.
+
+use glam::Vec3;
+use pipeline::depth::{BoxGrid, DepthSpec};
+use pipeline::frame::visibility;
+use pipeline::geometry::Projection;
+use pipeline::memory::Compression;
+use pipeline::{
+    CacheSpec, Cull, Draw, Features, Geometry, LensShape, MemorySpec, PipelineSpec, SampleTable, Settings,
+    Shader, ShaderCost, Shading, ShadingPoint, Viewport,
+};
+use proptest::prelude::*;
+use workloads::occlusion::{MovingBox, Pyramid, Queries, Samples, Yard, YardSpec};
+
+const LINES: CacheSpec = CacheSpec::lru(256, 4);
+
+fn spec() -> PipelineSpec {
+    PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 32,
+        batch_triangles: 1024,
+        vertex_reuse: 32,
+        shading: Shading::Cached,
+        shading_cache: LINES,
+        memory: MemorySpec {
+            depth: LINES,
+            colour: LINES,
+            texture: LINES,
+            l2: LINES,
+            compression: Compression { depth: false, colour: false },
+        },
+        features: Features::ALL,
+        depth: DepthSpec::default(),
+    }
+}
+
+struct Dark;
+
+impl Shader for Dark {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost::default()
+    }
+
+    fn shade(&self, _: &ShadingPoint, _: glam::Vec4) -> Vec3 {
+        Vec3::ZERO
+    }
+}
+
+/// What of the boxes of a yard is hidden: by intervals for each grid of boxes and each side of a tile, and by samples.
+struct Told {
+    by_intervals: Vec<Vec<bool>>,
+    by_samples: Vec<bool>,
+    half_covered: f64,
+}
+
+fn ask(yard: &Yard, size: [u32; 2], per_pixel: u32, grids: &[([u32; 3], u32)]) -> Told {
+    let viewport = Viewport::new(size[0], size[1]).unwrap();
+    let samples = SampleTable::low_discrepancy(per_pixel, 7, LensShape::Disk).unwrap();
+    let spec = spec();
+    let settings = Settings { spec: &spec, viewport, samples: &samples, background: Vec3::ZERO };
+    let geometry = Geometry::new(&yard.open, &yard.close, &yard.triangles).unwrap();
+    let draws = [Draw { geometry, shader: &Dark, cull: Cull::None }];
+    let depths: Vec<f32> = visibility(&yard.camera, &draws, &settings)
+        .unwrap()
+        .iter()
+        .map(|(_, bits)| f32::from_bits(*bits))
+        .collect();
+    let sampled = Samples { camera: &yard.camera, settings: &settings, depths: &depths };
+    let by_samples = yard.boxes.iter().map(|object| sampled.ask(object).unwrap().passed == 0).collect();
+    let projection = Projection::new(&yard.camera, viewport);
+    let mut half_covered = 0.0;
+    let by_intervals = grids.iter().map(|&(boxes, tile_px)| {
+        let grid = BoxGrid::new(boxes, yard.camera.lens().is_some()).unwrap();
+        let pyramid = Pyramid::new(viewport, &samples, &depths, tile_px, grid);
+        half_covered = pyramid.half_covered();
+        let queries = Queries::new(&pyramid, &projection);
+        yard.boxes.iter().map(|object| queries.ask(object).hidden).collect()
+    });
+    Told { by_intervals: by_intervals.collect(), by_samples, half_covered }
+}
+
+fn count(hidden: &[bool]) -> usize {
+    hidden.iter().filter(|hidden| **hidden).count()
+}
+
+const WHOLE: YardSpec =
+    YardSpec { walls: 12, slats: 1, gaps: 0.0, boxes: 60, motion: 1.5, lens: 0.0, seed: 3 };
+
+#[test]
+fn more_boxes_in_time_find_more_hidden_behind_what_moves() {
+    let grids: Vec<_> = [1, 2, 4, 8, 16].map(|t| ([1, 1, t], 8)).into();
+    let told = ask(&WHOLE.yard().unwrap(), [160, 90], 16, &grids);
+    let found: Vec<usize> = told.by_intervals.iter().map(|hidden| count(hidden)).collect();
+    assert!(found.is_sorted() && found[4] > found[0] + 3, "{found:?} of {}", count(&told.by_samples));
+    assert!(found[4] <= count(&told.by_samples));
+}
+
+#[test]
+fn more_boxes_on_the_lens_find_more_hidden_behind_what_is_blurred() {
+    let spec = YardSpec { motion: 0.0, lens: 0.15, ..WHOLE };
+    let grids: Vec<_> = [1, 2, 4].map(|n| ([n, n, 1], 8)).into();
+    let told = ask(&spec.yard().unwrap(), [160, 90], 16, &grids);
+    let found: Vec<usize> = told.by_intervals.iter().map(|hidden| count(hidden)).collect();
+    assert!(found.is_sorted() && found[2] > found[0], "{found:?} of {}", count(&told.by_samples));
+}
+
+#[test]
+fn many_small_occluders_hide_little_from_intervals() {
+    let slats = |slats| {
+        ask(
+            &YardSpec { slats, gaps: 0.02, motion: 0.0, ..WHOLE }.yard().unwrap(),
+            [160, 90],
+            16,
+            &[([1; 3], 8)],
+        )
+    };
+    let (few, many) = (slats(1), slats(24));
+    assert!(count(&many.by_intervals[0]) * 2 <= count(&few.by_intervals[0]), "not found behind slats");
+    assert!(
+        many.half_covered > 0.25 && few.half_covered < 0.25,
+        "{} {}",
+        many.half_covered,
+        few.half_covered
+    );
+}
+
+#[test]
+fn a_box_about_the_eye_is_never_hidden_and_one_out_of_view_is() {
+    let mut yard = WHOLE.yard().unwrap();
+    let at = |low: Vec3, high: Vec3| MovingBox { open: [low, high], close: [low, high] };
+    yard.boxes = vec![
+        at(Vec3::splat(-1.0), Vec3::splat(1.0)),
+        at(Vec3::new(90.0, 90.0, 5.0), Vec3::new(91.0, 91.0, 6.0)),
+    ];
+    let told = ask(&yard, [80, 45], 4, &[([1, 1, 2], 8)]);
+    assert_eq!(told.by_intervals[0], [false, true]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// The promise: what a sample sees is not called hidden, whatever moves, is blurred, or is cut by the near plane.
+    #[test]
+    fn nothing_that_is_seen_is_called_hidden(
+        (seed, walls, slats) in (0_u64..1_000_000, 1_u32..14, 1_u32..5),
+        (gaps, motion) in (0.0_f32..0.3, prop_oneof![Just(0.0_f32), 0.0_f32..6.0]),
+        lens in prop_oneof![Just(0.0_f32), 0.01_f32..0.6],
+        boxes in ([1_u32..5, 1_u32..5, 1_u32..17], 0_u32..4),
+        per_pixel in prop_oneof![Just(1_u32), Just(4), Just(16)],
+    ) {
+        let spec = YardSpec { walls, slats, gaps, boxes: 24, motion, lens, seed };
+        let (boxes, size) = boxes;
+        let told = ask(&spec.yard().unwrap(), [61, 37], per_pixel, &[(boxes, 2 << size), ([1; 3], 8)]);
+        for by_intervals in &told.by_intervals {
+            for (number, (hidden, truly)) in by_intervals.iter().zip(&told.by_samples).enumerate() {
+                prop_assert!(!hidden || *truly, "box {number} is seen");
+            }
+        }
+    }
+}
