@@ -2,15 +2,14 @@
 
 use glam::Vec3;
 use pipeline::depth::{BoxGrid, DepthSpec};
-use pipeline::frame::visibility;
 use pipeline::geometry::Projection;
 use pipeline::memory::Compression;
 use pipeline::{
-    CacheSpec, Cull, Draw, Features, Geometry, LensShape, MemorySpec, PipelineSpec, SampleTable, Settings,
-    Shader, ShaderCost, Shading, ShadingPoint, Viewport,
+    CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, SampleTable, Settings, Shading, Viewport,
 };
 use proptest::prelude::*;
-use workloads::occlusion::{MovingBox, Pyramid, Queries, Samples, Yard, YardSpec};
+use workloads::occlusion::{MovingBox, Pyramid, Queries, Samples, Yard, YardSpec, depths};
+use workloads::visibility::Unshaded;
 
 const LINES: CacheSpec = CacheSpec::lru(256, 4);
 
@@ -34,18 +33,6 @@ fn spec() -> PipelineSpec {
     }
 }
 
-struct Dark;
-
-impl Shader for Dark {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _: &ShadingPoint, _: glam::Vec4) -> Vec3 {
-        Vec3::ZERO
-    }
-}
-
 /// What of the boxes of a yard is hidden: by intervals for each grid of boxes and each side of a tile, and by samples.
 struct Told {
     by_intervals: Vec<Vec<bool>>,
@@ -58,13 +45,7 @@ fn ask(yard: &Yard, size: [u32; 2], per_pixel: u32, grids: &[([u32; 3], u32)]) -
     let samples = SampleTable::low_discrepancy(per_pixel, 7, LensShape::Disk).unwrap();
     let spec = spec();
     let settings = Settings { spec: &spec, viewport, samples: &samples, background: Vec3::ZERO };
-    let geometry = Geometry::new(&yard.open, &yard.close, &yard.triangles).unwrap();
-    let draws = [Draw { geometry, shader: &Dark, cull: Cull::None }];
-    let depths: Vec<f32> = visibility(&yard.camera, &draws, &settings)
-        .unwrap()
-        .iter()
-        .map(|(_, bits)| f32::from_bits(*bits))
-        .collect();
+    let depths = depths(&yard.camera, &[yard.walls(&Unshaded).unwrap()], &settings).unwrap();
     let sampled = Samples { camera: &yard.camera, settings: &settings, depths: &depths };
     let by_samples = yard.boxes.iter().map(|object| sampled.ask(object).unwrap().passed == 0).collect();
     let projection = Projection::new(&yard.camera, viewport);

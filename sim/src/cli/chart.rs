@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{frames, growth, sampled};
+use crate::chart::{caustics, frames, growth, occlusion, sampled};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -71,13 +71,29 @@ impl Done {
 fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
+        ChartArg::Caustics => chart_caustics(args, progress),
         ChartArg::Frames => chart_frames(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
+        ChartArg::Occlusion => chart_occlusion(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
         ChartArg::Timing => chart_timing(args, dir, progress),
     }
+}
+
+fn chart_caustics(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { caustics::Effort::QUICK } else { caustics::Effort::FULL };
+    let chart = caustics::chart(effort, &args.out, progress)?;
+    let (text, fault) = (chart.text(), chart.fault());
+    Ok(Done { text, json: json_text(&chart, true)?, standings: Vec::new(), fault })
+}
+
+fn chart_occlusion(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { occlusion::Effort::QUICK } else { occlusion::Effort::FULL };
+    let chart = occlusion::chart(effort, &args.out, progress)?;
+    let (text, fault) = (chart.text(), chart.fault());
+    Ok(Done { text, json: json_text(&chart, true)?, standings: Vec::new(), fault })
 }
 
 fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {

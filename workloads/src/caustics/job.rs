@@ -116,7 +116,7 @@ const LIGHT_BYTES: u64 = 4;
 const TILE_PIXELS: u64 = 64;
 /// Sides of beams cross for so much of their length, on average, where corners begin not to stand for the light between them any more
 /// (the chart measures the error).
-const CROSSED: f64 = 0.02;
+pub const CROSSED: f64 = 0.02;
 
 impl Job for Caustics {
     fn settings(&self) -> &Settings {

@@ -31,5 +31,5 @@ pub use bound::Method;
 pub use check::{Found, receivers};
 pub use draw::{Picture, draw};
 pub use eye::Eye;
-pub use job::{Look, Options, job};
+pub use job::{CROSSED, Look, Options, job};
 pub use light::{Floor, Light};

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Warning};
 use glam::{Vec3, Vec4};
 use pipeline::depth::BoxGrid;
-use pipeline::frame::{render_with_heat, visibility};
+use pipeline::frame::render_with_heat;
 use pipeline::geometry::Projection;
 use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
 use serde::{Deserialize, Serialize};
 
-use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec};
+use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
 use crate::error::LoadError;
 use crate::job::{Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork};
 use crate::samples::SampleChoice;
@@ -121,16 +121,11 @@ impl Job for Occlusion {
             .ok_or_else(|| refused("the image has no area"))?;
         let background = Vec3::new(0.02, 0.03, 0.05);
         let settings = pipeline::Settings { spec, viewport, samples: &*self.samples, background };
-        let walls = Geometry::new(&self.yard.open, &self.yard.close, &self.yard.triangles);
-        let walls = walls.map_err(|error| JobError::Setting(error.to_string()))?;
-        let wall = Draw { geometry: walls, shader: &WALL, cull: Cull::None };
+        let wall = self.yard.walls(&WALL).map_err(|error| JobError::Setting(error.to_string()))?;
         let mut counts = Counts::default();
         let camera = &self.yard.camera;
         counts += &render_with_heat(camera, &[wall], &settings, &[], &mut *emit)?.0.counts;
-        let depths: Vec<f32> = visibility(camera, &[wall], &settings)?
-            .into_iter()
-            .map(|(_, bits)| f32::from_bits(bits))
-            .collect();
+        let depths = depths(camera, &[wall], &settings)?;
         let grid = BoxGrid::new(self.options.boxes, camera.lens().is_some())
             .ok_or_else(|| refused("boxes: 1 to 16 along each axis"))?;
         let pyramid = Pyramid::new(viewport, &*self.samples, &depths, self.options.tile_px, grid);

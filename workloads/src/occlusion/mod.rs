@@ -20,5 +20,5 @@ mod yard;
 pub use job::{Options, job};
 pub use pyramid::Pyramid;
 pub use query::{Answer, MovingBox, Queries};
-pub use sampled::{Samples, Seen};
+pub use sampled::{Samples, Seen, depths};
 pub use yard::{Yard, YardSpec};

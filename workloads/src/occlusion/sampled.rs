@@ -1,14 +1,12 @@
 //! The query by samples: the box is drawn, and samples that pass the depth test are counted.
 
 use activity::Event;
-use glam::{Vec3, Vec4};
 use pipeline::frame::visibility;
 use pipeline::memory::CacheError;
-use pipeline::{
-    Camera, Cull, Draw, Features, Geometry, PipelineSpec, Settings, Shader, ShaderCost, ShadingPoint, render,
-};
+use pipeline::{Camera, Cull, Draw, Features, Geometry, PipelineSpec, Settings, render};
 
 use super::MovingBox;
+use crate::visibility::Unshaded;
 
 /// The depths that a query is held against.
 #[derive(Clone, Copy, Debug)]
@@ -48,17 +46,12 @@ impl Seen {
     }
 }
 
-/// Draws depth alone.
-struct Unlit;
-
-impl Shader for Unlit {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _: &ShadingPoint, _: Vec4) -> Vec3 {
-        Vec3::ZERO
-    }
+/// The depth of every sample that sees `draws`, as [`Samples`] wants it.
+///
+/// # Errors
+/// When a cache of the hardware cannot be built.
+pub fn depths(camera: &Camera, draws: &[Draw<'_>], settings: &Settings<'_>) -> Result<Vec<f32>, CacheError> {
+    Ok(visibility(camera, draws, settings)?.into_iter().map(|(_, bits)| f32::from_bits(bits)).collect())
 }
 
 impl Samples<'_> {
@@ -72,15 +65,14 @@ impl Samples<'_> {
         let Ok(geometry) = Geometry::new(&open, &close, &MovingBox::TRIANGLES) else {
             return Ok(Seen::default());
         };
-        let draws = [Draw { geometry, shader: &Unlit, cull: Cull::None }];
+        let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
         // A query knows the stored depths of nothing but samples.
         let features = Features { z_max: false, ..self.settings.spec.features };
         let spec = PipelineSpec { features, ..*self.settings.spec };
         let settings = Settings { spec: &spec, ..*self.settings };
-        let found = visibility(self.camera, &draws, &settings)?;
-        let own = found.iter().map(|(_, bits)| f32::from_bits(*bits));
-        let passed =
-            own.zip(self.depths).filter(|(own, stored)| own.is_finite() && own <= stored).count() as u64;
+        let own = depths(self.camera, &draws, &settings)?;
+        let passes = |(own, stored): &(f32, &f32)| own.is_finite() && own <= stored;
+        let passed = own.into_iter().zip(self.depths).filter(passes).count() as u64;
         let counts = render(self.camera, &draws, &settings, |_| ())?.counts;
         let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum();
         Ok(Seen {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 use pipeline::sampling::mix;
-use pipeline::{Camera, Lens};
+use pipeline::{Camera, Cull, Draw, DrawError, Geometry, Lens, Shader};
 
 use super::MovingBox;
 
@@ -46,6 +46,20 @@ pub struct Yard {
 const FAR: f32 = 8.0;
 const HALF: f32 = 1.5;
 const FOCUS: f32 = 2.0;
+
+impl Yard {
+    /// The walls, to be drawn with `shader`.
+    ///
+    /// # Errors
+    /// When a wall is infinitely large or far.
+    pub fn walls<'a>(&'a self, shader: &'a dyn Shader) -> Result<Draw<'a>, DrawError> {
+        Ok(Draw {
+            geometry: Geometry::new(&self.open, &self.close, &self.triangles)?,
+            shader,
+            cull: Cull::None,
+        })
+    }
+}
 
 impl YardSpec {
     /// The yard, or `None` where the lens or the gaps make no sense.
