@@ -1,10 +1,11 @@
 //! `quintile run caustics`.
 
-use activity::{Event, PacketCounts, Warning};
+use activity::{Event, PacketCounts};
 use glam::{DVec3, Vec3};
 use pipeline::PipelineSpec;
 use serde::{Deserialize, Serialize};
 
+use super::doubt::{crossing, doubts};
 use super::draw::{Covered, draw_with_work};
 use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
@@ -114,9 +115,6 @@ const TIME_MADDS: u32 = 60;
 const LIGHT_BYTES: u64 = 4;
 /// Pixels of a tile.
 const TILE_PIXELS: u64 = 64;
-/// Sides of beams cross for so much of their length, on average, where corners begin not to stand for the light between them any more
-/// (the chart measures the error).
-pub const CROSSED: f64 = 0.02;
 
 impl Job for Caustics {
     fn settings(&self) -> &Settings {
@@ -131,15 +129,14 @@ impl Job for Caustics {
         let mut passes = Passes::new(&spec.memory, emit)?;
         self.tell(&beams, &eye, &work, &mut passes);
         let (counts, triangles) = passes.finish();
-        let crossing = beams.iter().map(Beam::crossing).sum::<f64>() / beams.len().max(1) as f64;
         Ok(Drawn {
             image: toned(&picture.light),
             counts,
             triangles,
             moving: method == Method::Moving,
             lens: false,
-            facts: facts(&picture, &beams, crossing),
-            warnings: warnings(crossing),
+            facts: facts(&picture, &beams),
+            warnings: doubts(&self.ocean, &beams),
         })
     }
 }
@@ -197,7 +194,7 @@ impl Caustics {
     }
 }
 
-fn facts(picture: &Picture, beams: &[Beam], crossing: f64) -> Vec<Fact> {
+fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
     let runs = picture.total_runs() as f64;
     let facts = [
         ("beams", beams.len() as f64),
@@ -205,22 +202,10 @@ fn facts(picture: &Picture, beams: &[Beam], crossing: f64) -> Vec<Fact> {
         ("shader_executions", runs),
         ("shader_executions_per_pixel", runs / picture.runs.len().max(1) as f64),
         ("executions_that_find_light", picture.useful as f64 / runs.max(1.0)),
-        ("crossed_share_of_length", crossing),
+        ("crossed_share_of_length", crossing(beams)),
         ("beams_left_out", picture.left_out as f64),
     ];
     facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
-}
-
-fn warnings(crossing: f64) -> Vec<Warning> {
-    let message = || {
-        format!(
-            "the sides of beams cross for {:.1} % of their length on average (a warning from {:.0} % on): the corners of generator \
-             triangles no longer stand for the light between them; more cells, flatter waves or shallower water help",
-            100.0 * crossing,
-            100.0 * CROSSED
-        )
-    };
-    (crossing > CROSSED).then(|| Warning::new("caustics-crossed", message())).into_iter().collect()
 }
 
 /// Light as colour: bright enough that one pixel in a hundred is white.
@@ -275,21 +260,22 @@ mod tests {
     #[test]
     fn every_look_and_method_is_told_whole() {
         for look in ["volume", "floor"] {
-            let ours = drawn(&[("cells", "12"), ("look", look)]);
+            let ours = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look)]);
             assert!(ours.warnings.is_empty() && ours.moving, "{:?}", ours.warnings);
             assert!(ours.image.iter().filter(|pixel| pixel.y > 0.0).count() > 500, "{look}");
             let executions = ours.facts.iter().find(|fact| fact.name == "shader_executions").unwrap().value;
             assert_eq!(ours.counts[Event::PixelInvocations] as f64, executions);
-            let prism = drawn(&[("cells", "12"), ("look", look), ("method", "prism")]);
+            let prism = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look), ("method", "prism")]);
             assert_eq!(prism.image, ours.image);
             assert!(prism.counts[Event::PixelInvocations] > ours.counts[Event::PixelInvocations]);
         }
     }
 
     #[test]
-    fn crossed_sides_are_warned_of() {
-        let found = drawn(&[("cells", "6"), ("slope", "0.7")]);
-        assert_eq!(found.warnings.first().map(|warning| warning.code), Some("caustics-crossed"));
+    fn warped_beams_and_coarse_surfaces_are_warned_of() {
+        let codes = |set| drawn(set).warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
+        assert_eq!(codes(&[("cells", "26"), ("wave_m", "8"), ("slope", "1")]), ["caustics-crossed"]);
+        assert_eq!(codes(&[("cells", "6")]), ["caustics-coarse"]);
     }
 
     #[test]

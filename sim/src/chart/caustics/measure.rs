@@ -5,7 +5,7 @@ use glam::DVec3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
-use workloads::caustics::{Beam, CROSSED, Eye, Floor, Light, Method, Picture, draw};
+use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, crossing, doubts, draw};
 
 use super::{CausticsChart, Coarse, Effort, Row};
 use crate::chart::ChartError;
@@ -92,10 +92,6 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsCha
     Ok(CausticsChart { effort, ocean, rows, coarse })
 }
 
-fn crossing(beams: &[Beam]) -> f64 {
-    beams.iter().map(Beam::crossing).sum::<f64>() / beams.len().max(1) as f64
-}
-
 /// Every method on one surface: the light in the volume.
 fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Result<Vec<Row>, ChartError> {
     let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
@@ -133,20 +129,21 @@ fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, Chart
     let eye = Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.3 * SIDE_M, [side; 2]);
     let eye = eye.ok_or_else(refused)?;
     let floor = Light::Floor(Floor { height_m: -DEPTH_M });
-    let beams = |cells: u32| Water { overshoot: 0.02, ..water(cells, slope) }.beams(0.0);
+    let surface = |cells: u32| Water { overshoot: 0.02, ..water(cells, slope) };
     let image = |beams: &[Beam]| {
         let light = draw(beams, &eye, Method::Moving, Some(floor)).light;
         bar.inc();
         squares(&light, side as usize)
     };
-    let known = image(&beams(effort.reference_cells));
+    let known = image(&surface(effort.reference_cells).beams(0.0));
     let sum: f64 = known.iter().sum();
     let row = |&cells: &u32| {
-        let beams = beams(cells);
+        let surface = surface(cells);
+        let beams = surface.beams(0.0);
         let found = image(&beams);
-        let crossing = crossing(&beams);
         let error = found.iter().zip(&known).map(|(a, b)| (a - b).abs()).sum::<f64>() / sum;
-        Coarse { cells, slope, crossing, error, warned: crossing > CROSSED }
+        let warned = !doubts(&surface, &beams).is_empty();
+        Coarse { cells, slope, crossing: crossing(&beams), error, warned }
     };
     Ok(effort.coarse_cells.iter().map(row).collect())
 }

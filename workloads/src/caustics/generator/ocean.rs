@@ -69,6 +69,11 @@ impl Ocean {
         2 * self.cells as usize * self.cells as usize
     }
 
+    /// The length of the shortest wave in metres, infinite without waves.
+    pub fn shortest_m(&self) -> f64 {
+        TAU / self.waves.iter().map(|wave| wave.number.length()).fold(0.0, f64::max)
+    }
+
     /// A beam for each generator triangle, at a time in seconds.
     pub fn beams(&self, time_s: f64) -> Vec<Beam> {
         let side = self.cells as usize + 1;
