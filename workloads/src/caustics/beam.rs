@@ -113,7 +113,7 @@ impl Beam {
     pub fn crossing(&self) -> f64 {
         let cuts = self.cuts();
         let crossed = |ends: &&[f64]| self.sign(0.5 * (ends[0] + ends[1])).is_none();
-        cuts.windows(2).filter(crossed).map(|ends| ends[1] - ends[0]).sum()
+        cuts.windows(2).filter(crossed).map(|ends| ends[1] - ends[0]).fold(0.0, |sum, part| sum + part)
     }
 
     /// 0, the [folds](Self::folds), and 1.

@@ -103,10 +103,8 @@ fn row(like: Row, told: &[(Told, bool)]) -> Row {
     let count = |of: &dyn Fn(bool, bool) -> bool| {
         told.iter().filter(|((says, _), truly)| of(*says, *truly)).count() as u64
     };
-    // Where both say hidden; a query that fails ends early.
-    let whole = || told.iter().filter(|((says, _), truly)| *says && *truly).map(|((_, cost), _)| cost);
-    let number = whole().count().max(1) as f64;
-    let mean = |of: usize| whole().map(|cost| cost[of]).sum::<u64>() as f64 / number;
+    let mean =
+        |of: usize| told.iter().map(|((_, cost), _)| cost[of]).sum::<u64>() as f64 / told.len().max(1) as f64;
     Row {
         objects: told.len() as u64,
         hidden: count(&|_, truly| truly),

@@ -75,7 +75,7 @@ impl Kind {
     }
 }
 
-/// A way to ask, on one kind of yard. Costs are means over the objects that are hidden, where neither way ends early.
+/// A way to ask, on one kind of yard. Costs are means over all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// What blurs.

@@ -54,7 +54,9 @@ impl OcclusionChart {
         self.rows().for_each(|row| {
             table.row(row.cells());
         });
-        format!("{table}\ncosts are means over the objects that are found hidden\n")
+        format!(
+            "{table}\ncosts are means over all objects; a query by intervals ends where an object is seen to be visible\n"
+        )
     }
 
     /// Whether anything that a sample sees was called hidden.
@@ -67,7 +69,7 @@ impl OcclusionChart {
         let mut panels: Vec<CurvePanel> = Kind::ALL.map(|kind| self.rates(kind)).into();
         panels.push(self.failures());
         let subject = format!(
-            "share of hidden boxes that are found, over bytes of stored depth read for each of them; {} samples a pixel, sampled queries 16 to 64; \
+            "share of hidden boxes that are found, over bytes of stored depth read for each box that is asked for; {} samples a pixel, sampled queries 16 to 64; \
              dots of a tile from few boxes of lens and time to many",
             self.effort.samples[0]
         );
@@ -87,7 +89,7 @@ impl OcclusionChart {
         curves.push(Curve { name: "sampled queries".to_owned(), note: String::new(), points });
         CurvePanel {
             title: kind.name().to_owned(),
-            across: "bytes for a hidden box".to_owned(),
+            across: "bytes of depth read for a box".to_owned(),
             up: "share found".to_owned(),
             doubling: false,
             curves,

@@ -82,7 +82,7 @@ fn cost(chart: &OcclusionChart) -> Done {
             "at least {tests:.1} times fewer tests, {bytes:.1} times fewer bytes, {madds:.1} times fewer multiply-adds{shown}"
         ),
         verdict: Verdict::of(tests > 2.0 && bytes > 2.0),
-        note: "holds where tests and bytes are less than half in every case; means over hidden objects, where neither query ends early".to_owned(),
+        note: "holds where tests and bytes are less than half in every case; means over all objects of a scene; the query by intervals ends as soon as it sees that an object is visible, the sampled one counts samples to the end".to_owned(),
         numbers: numbers([("least_tests_ratio", tests), ("least_bytes_ratio", bytes), ("least_madds_ratio", madds)]),
         figure: None,
         figures: Vec::new(),
