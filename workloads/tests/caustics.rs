@@ -1,4 +1,5 @@
 //! Caustics against closed forms, photons, energy and brute force.
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 use std::f64::consts::TAU;
 

@@ -179,7 +179,11 @@ impl Caustics {
             let runs = covered.pixels.count_ones();
             let mut counts = PacketCounts::default();
             counts[Event::TilesVisited] = 1;
-            counts[Event::TileMadds] = TILE_MADDS + TIME_MADDS * runs;
+            counts[Event::TileMadds] = TILE_MADDS;
+            // The middle of a pixel is its only sample, tested at all times at once.
+            counts[Event::SamplesTested] = runs;
+            counts[Event::SamplesHit] = runs;
+            counts[Event::SampleMadds] = TIME_MADDS * runs;
             counts[Event::PixelInvocations] = runs;
             counts[Event::ShaderOps] = runs * self.light().ops();
             counts[Event::ColourWrites] = runs;
