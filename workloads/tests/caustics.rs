@@ -207,7 +207,7 @@ fn one_wave_is_as_bright_as_the_closed_form() {
     let focus = 1.0 / (bend * amplitude_m * number * number);
     for (depth_m, allowed) in [(0.5 * focus, 0.01), (2.0 * focus, 0.03)] {
         let wave = Wave { amplitude_m, number: DVec2::new(number, 0.0), rate: 0.0, phase: 0.0 };
-        let mut water = Ocean { overshoot: 0.01, ..Ocean::new(240, 3.0, depth_m, [1.0, 0.1], 1) };
+        let mut water = Ocean { overshoot: 0.01, ..Ocean::new(300, 3.0, depth_m, [1.0, 0.1], 1) };
         (water.waves, water.sun) = (vec![wave], DVec3::NEG_Y);
         let eye = above(1.0, 200);
         let floor = Light::Floor(Floor { height_m: -depth_m });
