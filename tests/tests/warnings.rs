@@ -26,13 +26,15 @@ const NOT_PROVOKED: [(&str, &str); 4] = [
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 31] = [
+const PROVOKED: [&str; 34] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
     "blur-beyond-image",
     "budget-missed",
     "camera-ignored",
+    "caustics-coarse",
+    "caustics-crossed",
     "coordinates-out-of-range",
     "degenerate-triangle",
     "empty-frame",
@@ -48,6 +50,7 @@ const PROVOKED: [&str; 31] = [
     "missing-texcoord",
     "missed-vsync",
     "obj-materials-ignored",
+    "occlusion-small-occluders",
     "only-mark",
     "orthographic-view",
     "primitive-dropped",
@@ -372,4 +375,18 @@ fn code_of(argument: &str, file: &str) -> Option<String> {
     let constant = format!("const {name}: &str =");
     let (_, rest) = file.split_once(&constant)?;
     quoted(rest)
+}
+
+#[test]
+fn beams_whose_sides_cross() {
+    let args = ["--size", "64x36", "--set", "cells=24", "--set", "slope=1"];
+    let results = quintile!().run("caustics", &args);
+    assert_warns(&results, "caustics-crossed");
+    assert_warns(&results, "caustics-coarse");
+}
+
+#[test]
+fn occluders_smaller_than_tiles() {
+    let args = ["--size", "96x54", "--set", "slats=24", "--set", "gaps=0.02", "--set", "walls=40"];
+    assert_warns(&quintile!().run("occlusion", &args), "occlusion-small-occluders");
 }

@@ -5,7 +5,9 @@
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`job`] is for work that is more than one rendering of a scene.
+//! - [`caustics`] draws refracted and reflected light, beams as moving triangles.
 //! - [`collision`] finds the pairs of moving objects that may collide.
+//! - [`occlusion`] finds objects that are hidden at all times and from everywhere on the lens.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
 //! ```
@@ -24,12 +26,14 @@
 //! deterministic: the same file gives the same bits on every machine.
 
 pub mod builtin;
+pub mod caustics;
 pub mod collision;
 mod error;
 mod import;
 pub mod job;
 mod load;
 pub mod material;
+pub mod occlusion;
 mod samples;
 pub mod scene;
 pub mod shapes;

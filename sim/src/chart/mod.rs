@@ -1,8 +1,10 @@
 //! Charts of the book: each measured, drawn and written in one go, one module for each.
 //!
 //! - [`collision`]: pairs kept in vain by collision detection.
+//! - [`caustics`]: shader executions of caustics, by how beams are bounded.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
+//! - [`occlusion`]: what occlusion queries find, and what they cost.
 //! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
@@ -10,12 +12,14 @@
 //! - [`index`]: one page of all of them, with [what each level costs and how wrong it is](standing).
 //! - [`fit`]: exponents of curves.
 
+pub mod caustics;
 pub mod collision;
 mod error;
 pub mod fit;
 pub mod frames;
 pub mod growth;
 pub mod index;
+pub mod occlusion;
 mod quantiles;
 pub mod sampled;
 pub mod sampling;
@@ -26,14 +30,19 @@ pub mod timing;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 8] = [
+pub const CHARTS: [(&str, &str); 10] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
     (
         "collision",
         "pairs kept in vain by collision detection over resolution, bins of time and cost, and where it fails",
     ),
+    ("caustics", "shader executions and images of caustics by how beams are bounded, and where beams fail"),
     ("frames", "frame starts found and energy error, by method, over rate, noise, bits and host time"),
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
+    (
+        "occlusion",
+        "occlusion queries: hidden objects found over tests and bytes, by intervals and by samples",
+    ),
     ("sampled", "frames predicted from few: errors, how often intervals hold the truth, host time"),
     ("sampling", "image error over samples per pixel and over host time, for every sample table"),
     ("tile-tests", "every combination of tile tests: efficiency and tightness over multiply-adds"),

@@ -260,10 +260,14 @@ pub enum ChartArg {
     All,
     /// Pairs kept in vain by collision detection, over resolution, bins of time and cost, and where it fails
     Collision,
+    /// Shader executions and images of caustics, by how beams are bounded, and where beams fail
+    Caustics,
     /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
     Frames,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
+    /// Hidden objects found over tests and bytes, by intervals and by samples
+    Occlusion,
     /// Frames predicted from few: errors, how often intervals hold the truth, host time
     Sampled,
     /// Image error over samples per pixel and over host time, for every sample table

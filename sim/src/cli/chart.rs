@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{collision, frames, growth, sampled};
+use crate::chart::{caustics, collision, frames, growth, occlusion, sampled};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -72,8 +72,10 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
         ChartArg::Collision => chart_collision(args, progress),
+        ChartArg::Caustics => chart_caustics(args, progress),
         ChartArg::Frames => chart_frames(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
+        ChartArg::Occlusion => chart_occlusion(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
@@ -87,6 +89,20 @@ fn chart_collision(args: &ChartArgs, progress: &Progress) -> Result<Done, Failur
     let missed = chart.missed();
     let fault = format!("{missed} pairs that collide were not kept: a bound does not hold; please report it");
     Ok(Done { fault: (missed > 0).then_some(fault), ..Done::new(&chart, chart.text())? })
+}
+
+fn chart_caustics(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { caustics::Effort::QUICK } else { caustics::Effort::FULL };
+    let chart = caustics::chart(effort, &args.out, progress)?;
+    let (text, fault) = (chart.text(), chart.fault());
+    Ok(Done { text, json: json_text(&chart, true)?, standings: Vec::new(), fault })
+}
+
+fn chart_occlusion(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { occlusion::Effort::QUICK } else { occlusion::Effort::FULL };
+    let chart = occlusion::chart(effort, &args.out, progress)?;
+    let (text, fault) = (chart.text(), chart.fault());
+    Ok(Done { text, json: json_text(&chart, true)?, standings: Vec::new(), fault })
 }
 
 fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {

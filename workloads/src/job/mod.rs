@@ -90,7 +90,18 @@ pub struct Request<'a> {
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
 /// Every job: its name, what it is, and how it is made.
-const JOBS: &[(&str, &str, Maker)] = &[];
+const JOBS: &[(&str, &str, Maker)] = &[
+    (
+        "caustics",
+        "light refracted by waves: beams drawn as moving triangles, or in the bodies that others put around them",
+        crate::caustics::job,
+    ),
+    (
+        "occlusion",
+        "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
+        crate::occlusion::job,
+    ),
+];
 
 /// Names of the jobs, each with a line that says what it is.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {

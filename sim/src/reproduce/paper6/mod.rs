@@ -1,13 +1,15 @@
 //! Paper VI, "Design and Novel Uses of Higher-Dimensional Rasterization": a module for each use.
 
+mod caustics;
 mod collision;
+mod occlusion;
 
 use super::{Done, Effort};
 use crate::output::progress::Progress;
 use crate::run::RunError;
 
 pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, RunError> {
-    let uses = [collision::rows];
+    let uses = [occlusion::rows, collision::rows, caustics::rows];
     let mut rows = Vec::new();
     for rows_of in uses {
         rows.extend(rows_of(effort, progress)?);

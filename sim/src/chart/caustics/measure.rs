@@ -1,0 +1,159 @@
+//! Oceans, and what methods do for them.
+
+use cpu_time::ThreadTime;
+use glam::DVec3;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+use workloads::caustics::generator::Ocean as Water;
+use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, crossing, doubts, draw};
+
+use super::{CausticsChart, Coarse, Effort, Row};
+use crate::chart::ChartError;
+use crate::output::progress::{Bar, Progress};
+
+/// Side and depth of the water and its longest waves, in metres.
+const SIDE_M: f64 = 16.0;
+const DEPTH_M: f64 = 5.0;
+const WAVE_M: f64 = 4.0;
+/// The slope of the paper's ocean is not given; this is a fresh breeze (Cox and Munk 1954 have 0.15 at some 4 m/s).
+const SLOPE: f64 = 0.15;
+/// Decides what the waves are like.
+const SEED: u64 = 1;
+/// Slopes of the oceans that get coarser.
+const COARSE_SLOPES: [f64; 3] = [0.05, 0.15, 0.4];
+/// Pixels along a side of the squares that are compared: next to a focus single pixels have no bound.
+const SQUARE_PX: usize = 8;
+
+/// What every method does for one ocean seen from the side.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ocean {
+    /// Generator triangles.
+    pub volumes: usize,
+    /// Pixels of the image.
+    pub size: [u32; 2],
+    /// Shader executions by method, in the order of [`Method::ALL`].
+    pub executions: [u64; 4],
+    /// The most executions of a pixel, likewise.
+    pub most: [u32; 4],
+    /// Executions of every pixel.
+    #[serde(skip)]
+    pub runs: Vec<Vec<u32>>,
+}
+
+fn water(cells: u32, slope: f64) -> Water {
+    Water::new(cells, SIDE_M, DEPTH_M, [WAVE_M, slope], SEED)
+}
+
+fn refused() -> ChartError {
+    ChartError::Pipeline("a view without extent".to_owned())
+}
+
+/// All of the water from the side, a little above and askew.
+fn aside(size: [u32; 2]) -> Result<Eye, ChartError> {
+    let middle = DVec3::new(0.6, -2.5, 0.3);
+    let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
+    Eye::new([from, middle, DVec3::Y], 6.5, size).ok_or_else(refused)
+}
+
+/// Counts the executions of every method on an ocean of `2 cells^2` volumes.
+///
+/// # Errors
+/// When `size` is no size of an image.
+pub fn ocean(cells: u32, size: [u32; 2], progress: &Progress) -> Result<Ocean, ChartError> {
+    let (beams, eye) = (water(cells, SLOPE).beams(0.0), aside(size)?);
+    let bar = progress.bar("ocean", 4);
+    let pictures = Method::ALL.map(|method| {
+        let picture = draw(&beams, &eye, method, None);
+        bar.inc();
+        picture
+    });
+    Ok(Ocean {
+        volumes: beams.len(),
+        size,
+        executions: pictures.each_ref().map(Picture::total_runs),
+        most: pictures.each_ref().map(|picture| picture.runs.iter().copied().max().unwrap_or(0)),
+        runs: pictures.map(|picture| picture.runs).into(),
+    })
+}
+
+pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, ChartError> {
+    let ocean = ocean(effort.ocean_cells, effort.ocean_px, progress)?;
+    let steps = effort.slopes.len() * 4 + COARSE_SLOPES.len() * (1 + effort.coarse_cells.len());
+    let bar = progress.bar("caustics", steps as u64);
+    let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
+    let mut rows = Vec::new();
+    for &slope in effort.slopes {
+        rows.extend(by_method(&effort, slope, &thread, &bar)?);
+    }
+    let mut coarse = Vec::new();
+    for slope in COARSE_SLOPES {
+        coarse.extend(by_cells(&effort, slope, &bar)?);
+    }
+    Ok(CausticsChart { effort, ocean, rows, coarse })
+}
+
+/// Every method on one surface: the light in the volume.
+fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Result<Vec<Row>, ChartError> {
+    let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
+    let ours = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
+    let crossing = crossing(&beams);
+    let row = |method| {
+        let once = || {
+            let start = ThreadTime::now();
+            let picture = draw(&beams, &eye, method, Some(Light::Volume));
+            (start.elapsed().as_secs_f64(), picture)
+        };
+        let mut runs = thread
+            .install(|| -> Vec<_> { std::iter::repeat_with(once).take(effort.repeats.max(1)).collect() });
+        runs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (cpu_s, picture) = &runs[runs.len() / 2];
+        bar.inc();
+        let apart = ours.light.iter().zip(&picture.light).map(|(a, b)| (a - b).abs());
+        let (executions, useful) = (picture.total_runs(), picture.useful as f64);
+        Row {
+            slope,
+            crossing,
+            method,
+            executions,
+            useful: useful / executions.max(1) as f64,
+            difference: apart.fold(0.0, f64::max),
+            cpu_s: *cpu_s,
+        }
+    };
+    Ok(Method::ALL.map(row).into())
+}
+
+/// One surface of fewer and fewer triangles against that of many: the light on the floor, from above.
+fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, ChartError> {
+    let side = effort.floor_px;
+    let eye = Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.3 * SIDE_M, [side; 2]);
+    let eye = eye.ok_or_else(refused)?;
+    let floor = Light::Floor(Floor { height_m: -DEPTH_M });
+    let surface = |cells: u32| Water { overshoot: 0.02, ..water(cells, slope) };
+    let image = |beams: &[Beam]| {
+        let light = draw(beams, &eye, Method::Moving, Some(floor)).light;
+        bar.inc();
+        squares(&light, side as usize)
+    };
+    let known = image(&surface(effort.reference_cells).beams(0.0));
+    let sum: f64 = known.iter().sum();
+    let row = |&cells: &u32| {
+        let surface = surface(cells);
+        let beams = surface.beams(0.0);
+        let found = image(&beams);
+        let error = found.iter().zip(&known).map(|(a, b)| (a - b).abs()).sum::<f64>() / sum;
+        let warned = !doubts(&surface, &beams).is_empty();
+        Coarse { cells, slope, crossing: crossing(&beams), error, warned }
+    };
+    Ok(effort.coarse_cells.iter().map(row).collect())
+}
+
+/// Sums over squares of the image.
+fn squares(light: &[f64], side: usize) -> Vec<f64> {
+    let across = side.div_ceil(SQUARE_PX);
+    let mut sums = vec![0.0; across * across];
+    for (place, light) in light.iter().enumerate() {
+        sums[place / side / SQUARE_PX * across + place % side / SQUARE_PX] += light;
+    }
+    sums
+}

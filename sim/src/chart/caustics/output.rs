@@ -1,0 +1,204 @@
+//! The files of the chart.
+
+use workloads::caustics::Method;
+
+use super::{CausticsChart, Ocean};
+use crate::output::dir::BoxError;
+use crate::output::plot::{Curve, CurvePanel, Curves, HeatMapPlot, HeatTile, Picture};
+use crate::output::table::Table;
+use crate::output::{OutDir, OutputError};
+
+/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
+pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
+    dir.remove_stale("", "caustics", &["svg", "png", "csv", "json"])
+}
+
+/// Writes pictures and numbers; `caustics.json` comes last.
+pub(super) fn write(chart: &CausticsChart, dir: &OutDir) -> Result<(), OutputError> {
+    chart.picture().write(dir, "caustics")?;
+    for (method, name) in Method::ALL.into_iter().zip(["moving", "refined", "hull", "prism"]) {
+        chart.ocean.map(method).write(dir, &format!("caustics_map_{name}"))?;
+    }
+    dir.write_atomic("caustics.csv", |out| chart.csv(out))?;
+    dir.write_json("caustics.json", chart)?;
+    Ok(())
+}
+
+/// Pixels along a side of a rectangle of a map.
+const MAP_PX: u32 = 4;
+
+impl Ocean {
+    /// Executions of a method at every pixel (Fig. 8).
+    pub fn map(&self, method: Method) -> Picture {
+        let place = Method::ALL.iter().position(|known| *known == method).unwrap_or(0);
+        let ([width, height], runs) = (self.size, &self.runs[place]);
+        let mean = |x: u32, y: u32| {
+            let size = [MAP_PX.min(width - x), MAP_PX.min(height - y)];
+            let rows = (y..y + size[1]).map(|row| (row * width + x) as usize);
+            let sum: u64 = rows
+                .flat_map(|first| &runs[first..first + size[0] as usize])
+                .map(|runs| u64::from(*runs))
+                .sum();
+            HeatTile { origin: [x, y], size, value: sum as f64 / f64::from(size[0] * size[1]) }
+        };
+        let rows = (0..height).step_by(MAP_PX as usize);
+        let tiles: Vec<_> = rows
+            .flat_map(|y| (0..width).step_by(MAP_PX as usize).map(move |x| (x, y)))
+            .map(|(x, y)| mean(x, y))
+            .collect();
+        HeatMapPlot {
+            title: &format!("Shader executions of a pixel: {}", method.name()),
+            subject: &format!(
+                "{} volumes under waves, {width}x{height} pixels; {} executions in all, {:.2} of the prism's",
+                self.volumes,
+                self.executions[place],
+                self.executions[place] as f64 / self.executions[3] as f64
+            ),
+            label: "executions",
+            size: self.size,
+            tiles: &tiles,
+        }
+        .picture()
+    }
+}
+
+impl CausticsChart {
+    /// What is printed.
+    pub fn text(&self) -> String {
+        let mut table = Table::new(["ocean", "executions", "a pixel", "most", "of the prism's"]);
+        let ocean = &self.ocean;
+        let pixels = f64::from(ocean.size[0] * ocean.size[1]);
+        for (place, method) in Method::ALL.into_iter().enumerate() {
+            let total = ocean.executions[place];
+            table.row([
+                method.name().to_owned(),
+                total.to_string(),
+                format!("{:.1}", total as f64 / pixels),
+                ocean.most[place].to_string(),
+                format!("{:.3}", total as f64 / ocean.executions[3] as f64),
+            ]);
+        }
+        let mut sweep = Table::new(["slope", "crossed", "method", "executions", "find light", "CPU ms"]);
+        for row in &self.rows {
+            sweep.row([
+                row.slope.to_string(),
+                format!("{:.4}", row.crossing),
+                row.method.name().to_owned(),
+                row.executions.to_string(),
+                format!("{:.3}", row.useful),
+                format!("{:.1}", 1e3 * row.cpu_s),
+            ]);
+        }
+        let mut coarse = Table::new(["slope", "cells", "crossed", "error", "warns"]);
+        for row in &self.coarse {
+            coarse.row([
+                row.slope.to_string(),
+                row.cells.to_string(),
+                format!("{:.4}", row.crossing),
+                format!("{:.3}", row.error),
+                if row.warned { "yes" } else { "no" }.to_owned(),
+            ]);
+        }
+        format!("{} volumes\n{table}\n{sweep}\n{coarse}\n", ocean.volumes)
+    }
+
+    /// The first promise that was found broken.
+    pub fn fault(&self) -> Option<String> {
+        let other = self.rows.iter().find(|row| row.difference > 0.0)?;
+        Some(format!(
+            "{} draws another image than the moving triangles; please report it",
+            other.method.name()
+        ))
+    }
+
+    fn picture(&self) -> Picture {
+        let by_method = |of: fn(&super::Row) -> f64| {
+            let curve = |method: Method| {
+                let rows = self.rows.iter().filter(move |row| row.method == method);
+                let points = rows.map(|row| (row.slope, of(row))).collect();
+                Curve { name: method.name().to_owned(), note: String::new(), points }
+            };
+            Method::ALL.map(curve).into()
+        };
+        let panel = |title: &str, across: &str, up: &str, curves| CurvePanel {
+            title: title.to_owned(),
+            across: across.to_owned(),
+            up: up.to_owned(),
+            doubling: false,
+            curves,
+        };
+        let slope = "slope of the waves (root mean square)";
+        let runs = panel("cost", slope, "shader executions", by_method(|row| row.executions as f64));
+        let time = panel("cost", slope, "CPU time (ms)", by_method(|row| 1e3 * row.cpu_s));
+        let mut slopes: Vec<f64> = self.coarse.iter().map(|row| row.slope).collect();
+        slopes.dedup();
+        let failing = slopes.into_iter().map(|slope| {
+            let rows = self.coarse.iter().filter(|row| row.slope == slope);
+            let points = rows.map(|row| (f64::from(row.cells), row.error)).collect();
+            Curve { name: format!("{slope} slope"), note: String::new(), points }
+        });
+        let failing = panel(
+            "where beams fail: error of the light on the floor",
+            "cells along a side",
+            "error over mean",
+            failing.collect(),
+        );
+        let subject = format!(
+            "light in the water: {} volumes; the image is the same by every method. Right: moving triangles, other colours are slopes",
+            2 * self.effort.sweep_cells * self.effort.sweep_cells
+        );
+        Curves {
+            title: "Caustics: beams and bodies about them",
+            subject: &subject,
+            panels: vec![runs, time, failing],
+        }
+        .picture()
+    }
+
+    fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {
+        let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
+        table.write_record([
+            "sweep",
+            "slope",
+            "cells",
+            "crossing",
+            "method",
+            "executions",
+            "useful",
+            "difference",
+            "cpu_s",
+            "error",
+        ])?;
+        for row in &self.rows {
+            let cells = self.effort.sweep_cells;
+            table.serialize((
+                "slope",
+                row.slope,
+                cells,
+                row.crossing,
+                row.method,
+                row.executions,
+                row.useful,
+                row.difference,
+                row.cpu_s,
+                "",
+            ))?;
+        }
+        for row in &self.coarse {
+            let method = Method::Moving;
+            table.serialize((
+                "cells",
+                row.slope,
+                row.cells,
+                row.crossing,
+                method,
+                "",
+                "",
+                "",
+                "",
+                row.error,
+            ))?;
+        }
+        Ok(table.flush()?)
+    }
+}

@@ -1,0 +1,152 @@
+//! The files of the chart.
+
+use super::{Kind, OcclusionChart, Row};
+use crate::output::dir::BoxError;
+use crate::output::plot::{Curve, CurvePanel, Curves, Picture};
+use crate::output::table::Table;
+use crate::output::{OutDir, OutputError};
+
+/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
+pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
+    dir.remove_stale("", "occlusion", &["svg", "png", "csv", "json"])
+}
+
+/// Writes picture and numbers; `occlusion.json` comes last.
+pub(super) fn write(chart: &OcclusionChart, dir: &OutDir) -> Result<(), OutputError> {
+    chart.picture().write(dir, "occlusion")?;
+    dir.write_atomic("occlusion.csv", |out| chart.csv(out))?;
+    dir.write_json("occlusion.json", chart)?;
+    Ok(())
+}
+
+const HEADER: [&str; 10] =
+    ["blur", "slats", "samples", "tile", "boxes", "hidden", "found", "tests", "bytes", "multiply-adds"];
+
+impl Row {
+    fn way(&self) -> String {
+        self.boxes.map_or("samples".to_owned(), |[u, v, t]| format!("{u}x{v}x{t}"))
+    }
+
+    fn cells(&self) -> [String; 10] {
+        [
+            self.kind.name().to_owned(),
+            self.slats.to_string(),
+            self.samples.to_string(),
+            self.tile_px.map_or("-".to_owned(), |px| px.to_string()),
+            self.way(),
+            format!("{} of {}", self.hidden, self.objects),
+            format!("{} ({:.3})", self.found, self.rate()),
+            format!("{:.0}", self.tests),
+            format!("{:.0}", self.bytes),
+            format!("{:.0}", self.madds),
+        ]
+    }
+}
+
+impl OcclusionChart {
+    fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.intervals.iter().chain(&self.samples).chain(&self.failing)
+    }
+
+    /// What is printed.
+    pub fn text(&self) -> String {
+        let mut table = Table::new(HEADER);
+        self.rows().for_each(|row| {
+            table.row(row.cells());
+        });
+        format!(
+            "{table}\ncosts are means over all objects; a query by intervals ends where an object is seen to be visible\n"
+        )
+    }
+
+    /// Whether anything that a sample sees was called hidden.
+    pub fn fault(&self) -> Option<String> {
+        let wrong: u64 = self.rows().map(|row| row.wrong).sum();
+        (wrong > 0).then(|| format!("{wrong} objects that are seen were called hidden; please report it"))
+    }
+
+    fn picture(&self) -> Picture {
+        let mut panels: Vec<CurvePanel> = Kind::ALL.map(|kind| self.rates(kind)).into();
+        panels.push(self.failures());
+        let subject = format!(
+            "share of hidden boxes that are found, over bytes of stored depth read for each box that is asked for; {} samples a pixel, sampled queries 16 to 64; \
+             dots of a tile from few boxes of lens and time to many",
+            self.effort.samples[0]
+        );
+        Curves { title: "Occlusion queries: by intervals and by samples", subject: &subject, panels }
+            .picture()
+    }
+
+    fn rates(&self, kind: Kind) -> CurvePanel {
+        let of_tile = |&tile: &u32| {
+            let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
+            let points = rows.map(|row| (row.bytes, row.rate())).collect();
+            Curve { name: format!("{tile}-pixel tiles"), note: String::new(), points }
+        };
+        let mut curves: Vec<Curve> = self.effort.tiles.iter().map(of_tile).collect();
+        let sampled = self.samples.iter().filter(|row| row.kind == kind && row.boxes.is_none());
+        let points = sampled.map(|row| (row.bytes, row.rate())).collect();
+        curves.push(Curve { name: "sampled queries".to_owned(), note: String::new(), points });
+        CurvePanel {
+            title: kind.name().to_owned(),
+            across: "bytes of depth read for a box".to_owned(),
+            up: "share found".to_owned(),
+            doubling: false,
+            curves,
+        }
+    }
+
+    fn failures(&self) -> CurvePanel {
+        let curve = |name: &str, tile_px: Option<u32>| {
+            let rows = self.failing.iter().filter(|row| row.tile_px == tile_px);
+            let points = rows.map(|row| (f64::from(row.slats), row.rate())).collect();
+            Curve { name: name.to_owned(), note: String::new(), points }
+        };
+        // In the order, and so the colours, of the panels beside it.
+        let curves = self.effort.tiles.iter().map(|&tile| curve(&format!("{tile}-pixel tiles"), Some(tile)));
+        CurvePanel {
+            title: "where it fails: walls of slats with gaps".to_owned(),
+            across: "slats of a wall".to_owned(),
+            up: "share found".to_owned(),
+            doubling: true,
+            curves: curves.chain([curve("sampled queries", None)]).collect(),
+        }
+    }
+
+    fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {
+        let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
+        table.write_record([
+            "kind",
+            "slats",
+            "samples",
+            "tile_px",
+            "boxes",
+            "objects",
+            "hidden",
+            "found",
+            "wrong",
+            "half_covered",
+            "tests",
+            "bytes",
+            "madds",
+        ])?;
+        for row in self.rows() {
+            table.serialize((
+                row.kind,
+                row.slats,
+                row.samples,
+                row.tile_px,
+                row.way(),
+                row.objects,
+                row.hidden,
+                row.found,
+                row.wrong,
+                row.half_covered,
+                row.tests,
+                row.bytes,
+                row.madds,
+            ))?;
+        }
+        Ok(table.flush()?)
+    }
+}

@@ -1,0 +1,50 @@
+//! Coverage against brute force.
+
+use rayon::prelude::*;
+
+use super::draw::draw_with_work;
+use super::eye::Seen;
+use super::{Beam, Eye, Floor, Method};
+
+/// What a method covers of what it has to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Pairs of a pixel and a beam that lights the point of the floor seen in its middle.
+    pub lit: u64,
+    /// Of these, those that the method leaves out: there must be none.
+    pub missed: u64,
+    /// Hits, of which a pair may have three.
+    pub hits: u64,
+}
+
+/// Tests every beam at the point of the floor that every pixel sees, and looks which of them a method leaves out.
+pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Found {
+    let (_, mut work) = draw_with_work(beams, eye, method, None, true);
+    work.sort_by_key(|work| (work.beam, work.tile));
+    let (width, height) = (eye.viewport().width(), eye.viewport().height());
+    let columns = width.div_ceil(8);
+    let covered = |beam: u32, [x, y]: [u32; 2]| {
+        let tile = y / 8 * columns + x / 8;
+        let at = work.binary_search_by_key(&(beam, tile), |work| (work.beam, work.tile));
+        at.is_ok_and(|at| work[at].pixels >> (y % 8 * 8 + x % 8) & 1 != 0)
+    };
+    let seen: Vec<Option<Seen>> = beams.iter().map(|beam| eye.see(beam)).collect();
+    let row = |y: u32| {
+        let mut found = Found::default();
+        for x in 0..width {
+            let Some(point) = floor.point(eye, eye.middle([x, y])) else { continue };
+            for (number, seen) in (0..).zip(&seen) {
+                let hits = seen.as_ref().map_or(0, |seen| seen.image.inside(point).count() as u64);
+                if hits > 0 {
+                    found.lit += 1;
+                    found.hits += hits;
+                    found.missed += u64::from(!covered(number, [x, y]));
+                }
+            }
+        }
+        found
+    };
+    let add =
+        |a: Found, b: Found| Found { lit: a.lit + b.lit, missed: a.missed + b.missed, hits: a.hits + b.hits };
+    (0..height).into_par_iter().map(row).reduce(Found::default, add)
+}

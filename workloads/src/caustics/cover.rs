@@ -1,0 +1,184 @@
+//! The pixels whose middle a method covers.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
+use pipeline::traversal::{TimeIntervals, time_interval};
+
+use super::bound::Body;
+use super::eye::Seen;
+use super::{Eye, Method};
+
+/// Side of a tile in pixels.
+pub(super) const TILE_PX: u32 = 8;
+
+/// Rows of tiles, in which beams are rasterized one after the other.
+pub(super) struct Cover<'a> {
+    eye: &'a Eye,
+    method: Method,
+    grid: Grid,
+    /// The first row of pixels.
+    first_row: u32,
+    /// Of each tile the pixels that the beam at hand covers.
+    masks: Vec<u64>,
+    used: Vec<u32>,
+    body: Body,
+    /// Tiles tested that may be touched.
+    pub tiles: u64,
+    /// Pixels tested.
+    pub tests: u64,
+}
+
+/// The times at which the middle of a pixel is in a beam, by the face that is seen.
+pub(super) fn times(eye: &Eye, seen: &Seen, at: [f64; 2]) -> [TimeIntervals; 2] {
+    time_interval(&seen.triangle, eye.shear(), at[0], at[1])
+}
+
+impl<'a> Cover<'a> {
+    /// The tiles in these rows of tiles of the image.
+    pub fn new(eye: &'a Eye, method: Method, rows: Range<u32>) -> Self {
+        let [half_width, half_height] = eye.viewport().half_px().map(f64::from);
+        let (side, first_row) = (f64::from(TILE_PX), rows.start * TILE_PX);
+        let columns = eye.viewport().width().div_ceil(TILE_PX);
+        let count = rows.end - rows.start;
+        let origin = [-half_width, f64::from(first_row) - half_height];
+        let grid = Grid { origin, tile: [side; 2], columns, rows: count };
+        let masks = vec![0; (columns * count) as usize];
+        Self { eye, method, grid, first_row, masks, used: Vec::new(), body: Body::new(), tiles: 0, tests: 0 }
+    }
+
+    /// Hands `each` tile, as its first pixel and a mask of 8 by 8, the pixels of it that the method covers.
+    pub fn each(&mut self, seen: &Seen, mut each: impl FnMut([u32; 2], u64)) {
+        match self.method {
+            Method::Moving => self.moving(seen),
+            method => {
+                let mut body = std::mem::take(&mut self.body);
+                method.bodies(&seen.image, &mut body);
+                body.iter().for_each(|face| self.face(face));
+                self.body = body;
+            }
+        }
+        let mut used = std::mem::take(&mut self.used);
+        used.sort_unstable();
+        for tile in used.drain(..) {
+            each(self.first_pixel(tile), std::mem::take(&mut self.masks[tile as usize]));
+        }
+        self.used = used;
+    }
+
+    fn first_pixel(&self, tile: u32) -> [u32; 2] {
+        let [column, row] = [tile % self.grid.columns, tile / self.grid.columns];
+        [column * TILE_PX, self.first_row + row * TILE_PX]
+    }
+
+    /// The triangle as it moves.
+    fn moving(&mut self, seen: &Seen) {
+        let [open, close] = [seen.image.open, seen.image.close].map(|end| end.map(|p| p.to_array()));
+        let Some(triangle) = MovingTriangle::new(open, close) else { return };
+        let rasterizer = Rasterizer::new(View::orthographic()).halving(HALVINGS);
+        let (eye, grid) = (self.eye, self.grid);
+        rasterizer.rasterize(&triangle, &grid, |tile, touch| {
+            let reach = reach(seen, touch);
+            self.test(tile, reach, |at| times(eye, seen, at).iter().any(|face| !face.as_slice().is_empty()));
+        });
+    }
+
+    /// A face of a body, where it is a back face: what is convex has one at each pixel that it covers, and a body that winds about a point
+    /// has one behind it.
+    fn face(&mut self, face: &[DVec3; 3]) {
+        let edge = |i: usize, j: usize, [x, y]: [f64; 2]| {
+            let (a, b) = (face[i], face[j]);
+            (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
+        };
+        let corners = face.map(|p| p.to_array());
+        // Depth grows away from the eye.
+        if (face[1] - face[0]).cross(face[2] - face[0]).z <= 0.0 {
+            return;
+        }
+        let Some(triangle) = MovingTriangle::new(corners, corners) else { return };
+        let largest = face.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let (side, grid) =
+            (f64::from(self.eye.viewport().width().max(self.eye.viewport().height())), self.grid);
+        let slack = 16.0 * f64::EPSILON * (largest + side) * (largest + side);
+        Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, _| {
+            self.test(tile, EVERYWHERE, |at| {
+                [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| edge(i, j, at) >= -slack)
+            });
+        });
+    }
+
+    /// Tests the pixels of a tile that may be within reach and are not known to be covered.
+    fn test(&mut self, [column, row]: [u32; 2], reach: [[f64; 2]; 2], covered: impl Fn([f64; 2]) -> bool) {
+        self.tiles += 1;
+        let tile = row * self.grid.columns + column;
+        let [x0, y0] = self.first_pixel(tile);
+        let [width, height] = [self.eye.viewport().width(), self.eye.viewport().height()];
+        let (before, mut mask) = (self.masks[tile as usize], self.masks[tile as usize]);
+        for bit in (0..64_u32).filter(|bit| before >> bit & 1 == 0) {
+            let pixel = [x0 + bit % TILE_PX, y0 + bit / TILE_PX];
+            let at = self.eye.middle(pixel);
+            let near = (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&at[axis]));
+            if near && pixel[0] < width && pixel[1] < height {
+                self.tests += 1;
+                mask |= u64::from(covered(at)) << bit;
+            }
+        }
+        if before == 0 && mask != 0 {
+            self.used.push(tile);
+        }
+        self.masks[tile as usize] = mask;
+    }
+}
+
+/// How often the time of a tile is halved.
+const HALVINGS: u32 = 2;
+const EVERYWHERE: [[f64; 2]; 2] = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+
+/// Where the corners are while a tile may be touched, with room for rounding.
+fn reach(seen: &Seen, touch: &Touch) -> [[f64; 2]; 2] {
+    let ends = touch.t.map(|t| seen.image.corners(t));
+    [0, 1].map(|axis| {
+        let all = || ends.iter().flatten().map(|p| p[axis]);
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        let slack = 1e-9 * (1.0 + low.abs().max(high.abs()));
+        [low - slack, high + slack]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::caustics::generator::tests::{Uniform, warped};
+
+    /// Any point of any beam is within the times found for its place on the image, and in the tile it lies in.
+    #[test]
+    fn every_point_of_a_beam_is_covered() {
+        let view = [DVec3::new(0.0, 0.0, -9.0), DVec3::ZERO, DVec3::new(0.3, 1.0, 0.0)];
+        let eye = Eye::new([view[0] + 4.0 * DVec3::X, view[1], view[2]], 4.0, [96, 96]).unwrap();
+        let mut random = Uniform::new(21);
+        for round in 0..400 {
+            let Some(seen) = eye.see(&warped(&mut random, [0.0, 0.3, 0.8, 1.5][round % 4])) else { continue };
+            let mut cover = Cover::new(&eye, Method::Moving, 0..12);
+            let mut tiles = Vec::new();
+            let [open, close] = [seen.image.open, seen.image.close].map(|end| end.map(|p| p.to_array()));
+            let triangle = MovingTriangle::new(open, close).unwrap();
+            Rasterizer::new(View::orthographic())
+                .rasterize(&triangle, &cover.grid, |tile, _| tiles.push(tile));
+            cover.each(&seen, |_, _| ());
+            for _ in 0..50 {
+                let hit = random.hit();
+                let point = seen.image.point(&hit);
+                let found = times(&eye, &seen, [point.x, point.y]);
+                let near = |t: f64| found.iter().any(|set| set.contains(t));
+                assert!(
+                    near(hit.t) || near(hit.t - 1e-9) || near(hit.t + 1e-9),
+                    "{round}: {hit:?} {found:?}"
+                );
+                let tile = [point.x, point.y].map(|c| ((c + 48.0) / 8.0).floor());
+                let inside = tile.iter().all(|c| (0.0..12.0).contains(c));
+                assert!(!inside || tiles.contains(&tile.map(|c| c as u32)), "{round}");
+            }
+        }
+    }
+}

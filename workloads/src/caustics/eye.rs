@@ -1,0 +1,106 @@
+//! Where the light is looked at from.
+
+use glam::{Affine3A, DAffine3, DMat3, DVec3};
+use pipeline::geometry::Projection;
+use pipeline::{Camera, Cull, MovingVertex, Shear, Viewport};
+
+use pipeline::setup::{Outcome, Triangle, set_up};
+
+use super::Beam;
+
+/// An orthographic view.
+#[derive(Clone, Copy, Debug)]
+pub struct Eye {
+    projection: Projection,
+    viewport: Viewport,
+    /// Pixels in a metre.
+    scale_px: f64,
+    /// From view space to the world.
+    pose: DAffine3,
+}
+
+/// A beam as the rasterizer gets it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// The beam in the world.
+    pub world: Beam,
+    /// The same in pixels and depth, from the numbers that the rasterizer has.
+    pub image: Beam,
+    /// The triangle that moves from one of its ends to the other.
+    pub triangle: Triangle,
+}
+
+/// Nothing is cut off in front of an orthographic camera that stands this far behind what it looks at.
+const NEAR: f32 = 1e-6;
+
+impl Eye {
+    /// A view from `from` at `target`, its image upright where `up` is, `half_height` metres high on either side of the middle. `None`
+    /// where `from` is `target`, `up` is along the view, or something is not finite or not above zero.
+    pub fn new([from, target, up]: [DVec3; 3], half_height: f64, [width, height]: [u32; 2]) -> Option<Self> {
+        let viewport = Viewport::new(width, height)?;
+        let forward = (target - from).try_normalize()?;
+        let right = forward.cross(up).try_normalize()?;
+        let axes = DMat3::from_cols(right, right.cross(forward), forward).transpose();
+        let pose = DAffine3 { matrix3: axes, translation: -(axes * from) };
+        let rounded = Affine3A::from_cols_array(&pose.to_cols_array().map(|c| c as f32));
+        let camera = Camera::orthographic(rounded, half_height as f32, NEAR).ok()?;
+        let rounded = DAffine3::from_cols_array(&rounded.to_cols_array().map(f64::from));
+        let scale_px = 0.5 * f64::from(height) / f64::from(half_height as f32);
+        Some(Self {
+            projection: Projection::new(&camera, viewport),
+            viewport,
+            scale_px,
+            pose: rounded.inverse(),
+        })
+    }
+
+    /// The size of the image.
+    pub fn viewport(&self) -> Viewport {
+        self.viewport
+    }
+
+    /// Pixels in a metre.
+    pub fn scale_px(&self) -> f64 {
+        self.scale_px
+    }
+
+    /// How the rasterizer sees points.
+    pub(super) fn shear(&self) -> &Shear {
+        &self.projection.shear
+    }
+
+    /// The middle of a pixel, in pixels from the middle of the image.
+    pub(super) fn middle(&self, [column, row]: [u32; 2]) -> [f64; 2] {
+        let middle = |at: u32, side: u32| f64::from(at) + 0.5 - 0.5 * f64::from(side);
+        [middle(column, self.viewport.width()), middle(row, self.viewport.height())]
+    }
+
+    /// The place in the world of a point of the image at this depth.
+    pub fn world(&self, [x, y]: [f64; 2], depth: f64) -> DVec3 {
+        self.pose.transform_point3(DVec3::new(x / self.scale_px, -y / self.scale_px, depth))
+    }
+
+    /// Where a point of the world is: pixels from the middle of the image, and depth.
+    pub fn image(&self, point: DVec3) -> DVec3 {
+        let p = self.pose.inverse().transform_point3(point);
+        DVec3::new(p.x * self.scale_px, -p.y * self.scale_px, p.z)
+    }
+
+    /// A beam as it is seen, or `None` where it has no volume at all or reaches behind the camera.
+    pub(super) fn see(&self, beam: &Beam) -> Option<Seen> {
+        let vertices =
+            [0, 1, 2].map(|k| self.projection.vertex(beam.open[k].as_vec3(), beam.close[k].as_vec3()));
+        let [a, b, c]: [&MovingVertex; 3] = vertices.each_ref();
+        let half_px = self.viewport.half_px();
+        let Outcome::Ready(triangle) = set_up(0, [a, b, c], Cull::None, self.shear(), NEAR, half_px) else {
+            return None;
+        };
+        let ends = triangle.corners.map(|corner| {
+            let [open, delta] = [corner.open, corner.delta].map(|p| DVec3::from_array(p.map(f64::from)));
+            [open, open + delta]
+        });
+        let [open, close] = [0, 1].map(|end| ends.map(|corner| corner[end]));
+        let in_front = open.iter().chain(&close).all(|p| p.z > f64::from(NEAR));
+        in_front.then_some(Seen { world: *beam, image: Beam { open, close, flux_w: beam.flux_w }, triangle })
+    }
+}

@@ -1,0 +1,130 @@
+//! Light through a ball of glass.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::super::Beam;
+use super::super::optics::{refract, transmission};
+
+/// A ball of glass at the origin in parallel light along +x, of a watt in a square metre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BallLens {
+    /// Radius in metres.
+    pub radius_m: f64,
+    /// Refractive index over that around.
+    pub index: f64,
+    /// How much of the radius is lit, 0 to 1, from the axis on.
+    pub aperture: f64,
+    /// Rings of triangles, and parts of a ring.
+    pub rings: u32,
+    /// Parts of a ring.
+    pub segments: u32,
+    /// How far along x, from the middle of the ball, light is followed, in metres.
+    pub reach_m: f64,
+}
+
+/// A ray behind the ball.
+struct Ray {
+    from: DVec3,
+    along: DVec3,
+    enters: f64,
+}
+
+impl BallLens {
+    /// The ray that comes in at height `h` in the half-plane at `angle` about the axis. There is no total reflection inside: it leaves at the
+    /// angle it came in.
+    fn ray(&self, h: f64, angle: f64) -> Option<Ray> {
+        let across = DVec3::new(0.0, libm::cos(angle), libm::sin(angle));
+        let normal =
+            (h * across - libm::sqrt(self.radius_m * self.radius_m - h * h) * DVec3::X) / self.radius_m;
+        let inside = refract(DVec3::X, normal, 1.0 / self.index)?;
+        let entry = self.radius_m * normal;
+        let from = entry - 2.0 * entry.dot(inside) * inside;
+        let along = refract(inside, -from / self.radius_m, self.index)?;
+        let enters = transmission(-normal.x, -inside.dot(normal), 1.0 / self.index);
+        Some(Ray { from, along, enters: enters * enters })
+    }
+
+    /// Two beams for each part of a ring, from the back of the ball up to the plane at `reach_m`.
+    pub fn beams(&self) -> Vec<Beam> {
+        let height = |ring: u32| self.aperture * self.radius_m * f64::from(ring) / f64::from(self.rings);
+        let angle = |part: u32| TAU * f64::from(part) / f64::from(self.segments);
+        let mut beams = Vec::new();
+        for ring in 0..self.rings {
+            for part in 0..self.segments {
+                let corner = |r: u32, s: u32| (height(r), angle(s % self.segments));
+                let [a, b] = [corner(ring, part), corner(ring, part + 1)];
+                let [c, d] = [corner(ring + 1, part), corner(ring + 1, part + 1)];
+                let three = if ring == 0 { vec![[a, c, d]] } else { vec![[a, c, d], [a, d, b]] };
+                beams.extend(three.into_iter().filter_map(|three| self.beam(three)));
+            }
+        }
+        beams
+    }
+
+    fn beam(&self, three: [(f64, f64); 3]) -> Option<Beam> {
+        let [Some(a), Some(b), Some(c)] = three.map(|(h, angle)| self.ray(h, angle)) else { return None };
+        let end = |ray: &Ray| ray.from + (self.reach_m - ray.from.x) / ray.along.x * ray.along;
+        let before = three.map(|(h, angle)| DVec3::new(0.0, h * libm::cos(angle), h * libm::sin(angle)));
+        let area = 0.5 * (before[1] - before[0]).cross(before[2] - before[0]).length();
+        let flux_w = area * (a.enters + b.enters + c.enters) / 3.0;
+        Some(Beam { open: [a.from, b.from, c.from], close: [end(&a), end(&b), end(&c)], flux_w })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BALL: BallLens =
+        BallLens { radius_m: 1.0, index: 1.5, aperture: 0.7, rings: 400, segments: 720, reach_m: 6.0 };
+
+    /// With `sin i = h / R = n sin r` the ray turns by `D = 2 (i - r)` and cuts the axis at `R sin i / sin D` from the middle.
+    #[test]
+    fn rays_cut_the_axis_where_they_should() {
+        for h in [0.01_f64, 0.2, 0.5, 0.69] {
+            let (i, r) = (h.asin(), (h / 1.5).asin());
+            let turned = 2.0 * (i - r);
+            let ray = BALL.ray(h, 0.0).unwrap();
+            let cut = ray.from.x - ray.from.y / ray.along.y * ray.along.x;
+            assert!((cut - i.sin() / turned.sin()).abs() < 1e-9, "{h}: {cut}");
+            assert!((ray.along.x - turned.cos()).abs() < 1e-12 && (ray.along.y + turned.sin()).abs() < 1e-12);
+        }
+        // Close to the axis: n R / (2 (n - 1)).
+        let ray = BALL.ray(1e-4, 0.3).unwrap();
+        let away = ray.from - ray.from.x * DVec3::X;
+        let cut = ray.from.x + away.length() / (ray.along - ray.along.x * DVec3::X).length() * ray.along.x;
+        assert!((cut - 1.5).abs() < 1e-6, "{cut}");
+    }
+
+    /// Neighbouring rays of a half-plane cross at `h (sin D, cos D) + h' (cos D, -sin D)`, `h' = R cos i / (2 (1 - cos i / (n cos r)))`.
+    #[test]
+    fn the_caustic_of_a_ball_is_that_of_the_closed_form() {
+        for ring in [60, 150, 250, 390] {
+            let h = 0.7 * (f64::from(ring) + 0.5) / 400.0;
+            let (i, r) = (h.asin(), (h / 1.5).asin());
+            let (turned, rate) = (2.0 * (i - r), i.cos() / (2.0 * (1.0 - i.cos() / (1.5 * r.cos()))));
+            let known = [h * turned.sin() + rate * turned.cos(), h * turned.cos() - rate * turned.sin()];
+            let beams = BALL.beams();
+            // The first part of a ring has two corners on one half-plane; both of its beams do.
+            let beam = &beams[720 + (ring as usize - 1) * 1440];
+            let found = beam.folds().into_iter().map(|t| {
+                let at = beam.corners(t);
+                let middle = 0.5 * (at[0] + at[1]);
+                [middle.x, (middle.y * middle.y + middle.z * middle.z).sqrt()]
+            });
+            let near = |point: &[f64; 2]| (point[0] - known[0]).abs() + (point[1] - known[1].abs()).abs();
+            let nearest = found.map(|point| near(&point)).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 0.02, "ring {ring}: {nearest}");
+        }
+    }
+
+    #[test]
+    fn light_through_the_ball_is_what_falls_on_it_less_what_is_mirrored() {
+        let sum: f64 = BALL.beams().iter().map(|beam| beam.flux_w).sum();
+        let falls = std::f64::consts::PI * 0.49;
+        // Fresnel takes 4 % on each side near the axis, more far off.
+        assert!(sum < 0.9217 * falls && sum > 0.90 * falls, "{}", sum / falls);
+    }
+}

@@ -1,0 +1,65 @@
+//! Where beams come from.
+//!
+//! - [`Ocean`]: light refracted into water by a surface of waves; one wave alone is the sinusoidal surface with a known answer.
+//! - [`MirrorRing`]: light reflected inside a ring, whose caustic is a nephroid or a cardioid.
+//! - [`BallLens`]: light through a ball of glass.
+
+mod lens;
+mod ocean;
+mod ring;
+
+pub use lens::BallLens;
+pub use ocean::{Ocean, Wave};
+pub use ring::{MirrorRing, Source};
+
+#[cfg(test)]
+pub(in crate::caustics) mod tests {
+    use glam::DVec3;
+    use pipeline::sampling::mix;
+
+    use crate::caustics::{Beam, Hit};
+
+    /// Counter-based uniform numbers.
+    pub struct Uniform(u64);
+
+    impl Uniform {
+        pub fn new(seed: u64) -> Self {
+            Self(mix(seed ^ 0xCA05_71C5))
+        }
+
+        pub fn within(&mut self, low: f64, high: f64) -> f64 {
+            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            low + (high - low) * ((mix(self.0) >> 11) as f64 / (1_u64 << 53) as f64)
+        }
+
+        /// A place in a beam.
+        pub fn hit(&mut self) -> Hit {
+            let (mut b, mut c) = (self.within(0.0, 1.0), self.within(0.0, 1.0));
+            if b + c > 1.0 {
+                (b, c) = (1.0 - b, 1.0 - c);
+            }
+            Hit { weights: [1.0 - b - c, b, c], t: self.within(0.0, 1.0) }
+        }
+    }
+
+    /// A beam along z whose directions are off by up to `warp` across.
+    pub fn warped(random: &mut Uniform, warp: f64) -> Beam {
+        let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
+        let (lean, length) = ([random.within(-0.3, 0.3), random.within(-0.3, 0.3)], random.within(1.5, 3.0));
+        let close = open.map(|p| {
+            let across = lean.map(|lean| lean + random.within(-warp, warp));
+            let short = 1.0 - 0.2 * warp.min(1.0) * random.within(0.0, 1.0);
+            p + length * short * DVec3::new(across[0], across[1], 1.0)
+        });
+        Beam { open, close, flux_w: 1.0 }
+    }
+
+    /// A beam that turns by about half a circle on its short way, so that its sides cross.
+    pub fn turned(random: &mut Uniform) -> Beam {
+        let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
+        let (sin, cos) = random.within(2.5, 3.8).sin_cos();
+        let close =
+            open.map(|p| DVec3::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y, random.within(-0.3, 0.3)));
+        Beam { open, close, flux_w: 1.0 }
+    }
+}

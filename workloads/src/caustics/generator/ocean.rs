@@ -1,0 +1,192 @@
+//! Light that a surface of waves refracts into the water.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+use pipeline::sampling::mix;
+
+use super::super::Beam;
+use super::super::optics::{refract, transmission};
+
+/// A wave of the surface: `amplitude cos(number . (x, z) - rate t + phase)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wave {
+    /// In metres.
+    pub amplitude_m: f64,
+    /// Radians in a metre, along x and z.
+    pub number: DVec2,
+    /// Radians in a second.
+    pub rate: f64,
+    /// In radians.
+    pub phase: f64,
+}
+
+/// A square of water, its middle at the origin and its surface at rest at height 0, over a level floor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ocean {
+    /// Squares of two generator triangles along each side.
+    pub cells: u32,
+    /// Length of a side in metres.
+    pub side_m: f64,
+    /// From the surface at rest to the floor, in metres.
+    pub depth_m: f64,
+    /// How far beams go on below the floor, as a part of their length: a receiver is to lie within them.
+    pub overshoot: f64,
+    /// The waves.
+    pub waves: Vec<Wave>,
+    /// Where sunlight goes, downwards, of unit length.
+    pub sun: DVec3,
+    /// Watts in a square metre across the light.
+    pub irradiance: f64,
+    /// Refractive index of the water.
+    pub index: f64,
+}
+
+/// Gravity in metres per second squared, for the pace of waves.
+const GRAVITY: f64 = 9.81;
+
+impl Ocean {
+    /// Water under a low sun in waves of many lengths and directions, from the third part of `longest_m` on; `slope` is the
+    /// root mean square of their slopes.
+    pub fn new(cells: u32, side_m: f64, depth_m: f64, [longest_m, slope]: [f64; 2], seed: u64) -> Self {
+        let uniform = |n: u64| (mix(mix(seed ^ 0x0CEA) ^ n) >> 11) as f64 / (1_u64 << 53) as f64;
+        let waves = (0..WAVES).map(|n| {
+            let length_m = longest_m * libm::pow(SHORTEST, n as f64 / (WAVES - 1) as f64);
+            let angle = SPREAD * (2.0 * uniform(2 * n) - 1.0);
+            let number = TAU / length_m * DVec2::new(libm::cos(angle), libm::sin(angle));
+            // Each has the same share of the slope, whose mean square is half the peak's.
+            let amplitude_m = slope * libm::sqrt(2.0 / WAVES as f64) / number.length();
+            let rate = libm::sqrt(GRAVITY * number.length());
+            Wave { amplitude_m, number, rate, phase: TAU * uniform(2 * n + 1) }
+        });
+        let sun = DVec3::new(0.35, -1.0, 0.2).normalize();
+        let (irradiance, index) = (1000.0, 1.33);
+        Self { cells, side_m, depth_m, overshoot: 0.0, waves: waves.collect(), sun, irradiance, index }
+    }
+
+    /// The number of generator triangles.
+    pub fn triangles(&self) -> usize {
+        2 * self.cells as usize * self.cells as usize
+    }
+
+    /// The length of the shortest wave in metres, infinite without waves.
+    pub fn shortest_m(&self) -> f64 {
+        TAU / self.waves.iter().map(|wave| wave.number.length()).fold(0.0, f64::max)
+    }
+
+    /// A beam for each generator triangle, at a time in seconds.
+    pub fn beams(&self, time_s: f64) -> Vec<Beam> {
+        let side = self.cells as usize + 1;
+        let at = |n: usize| self.side_m * (n as f64 / f64::from(self.cells) - 0.5);
+        let corner = |n: usize| self.corner(DVec2::new(at(n % side), at(n / side)), time_s);
+        let corners: Vec<Corner> = (0..side * side).map(corner).collect();
+        let cell = |n: usize| {
+            let first = n / self.cells as usize * side + n % self.cells as usize;
+            let [a, b, c, d] = [first, first + 1, first + side, first + side + 1];
+            [[a, c, b], [b, c, d]]
+        };
+        let all = (0..(self.cells * self.cells) as usize).flat_map(cell);
+        all.map(|three| self.beam(three.map(|n| &corners[n]))).collect()
+    }
+
+    /// The light that comes in through the square: that on the triangles, before any is reflected.
+    pub fn incoming_w(&self, time_s: f64) -> f64 {
+        self.beams(time_s).iter().map(|beam| self.on(&beam.open)).sum()
+    }
+
+    /// Height of the surface and its slopes along x and z.
+    fn surface(&self, at: DVec2, time_s: f64) -> (f64, DVec2) {
+        self.waves.iter().fold((0.0, DVec2::ZERO), |(height, slope), wave| {
+            let angle = wave.number.dot(at) - wave.rate * time_s + wave.phase;
+            let (up, down) = (wave.amplitude_m * libm::cos(angle), -wave.amplitude_m * libm::sin(angle));
+            (height + up, slope + down * wave.number)
+        })
+    }
+
+    fn corner(&self, at: DVec2, time_s: f64) -> Corner {
+        let (height, slope) = self.surface(at, time_s);
+        let normal = DVec3::new(-slope.x, 1.0, -slope.y).normalize();
+        let position = DVec3::new(at.x, height, at.y);
+        // Into the denser medium there is always a way.
+        let direction = refract(self.sun, normal, 1.0 / self.index).unwrap_or(self.sun);
+        let enters = transmission(-self.sun.dot(normal), -direction.dot(normal), 1.0 / self.index);
+        let length = (height + self.depth_m) / -direction.y * (1.0 + self.overshoot);
+        Corner { position, end: position + length * direction, enters }
+    }
+
+    fn beam(&self, corners: [&Corner; 3]) -> Beam {
+        let open = corners.map(|corner| corner.position);
+        let enters = corners.iter().map(|corner| corner.enters).sum::<f64>() / 3.0;
+        Beam { open, close: corners.map(|corner| corner.end), flux_w: self.on(&open) * enters }
+    }
+
+    /// The light that falls on a triangle.
+    fn on(&self, [a, b, c]: &[DVec3; 3]) -> f64 {
+        let area = 0.5 * (*b - *a).cross(*c - *a);
+        self.irradiance * -area.dot(self.sun)
+    }
+}
+
+/// How many waves an ocean has, how long the shortest is over the longest, and how far from the x axis they go, in radians.
+const WAVES: u64 = 12;
+const SHORTEST: f64 = 1.0 / 3.0;
+const SPREAD: f64 = 1.2;
+
+struct Corner {
+    position: DVec3,
+    end: DVec3,
+    /// The share of light that is not reflected.
+    enters: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_in_is_what_falls_on_the_square() {
+        let mut ocean = Ocean::new(96, 12.0, 5.0, [3.0, 0.2], 1);
+        ocean.sun = DVec3::NEG_Y;
+        let flat = ocean.irradiance * ocean.side_m * ocean.side_m;
+        assert!(
+            (ocean.incoming_w(0.7) - flat).abs() < 1e-9 * flat,
+            "straight from above, whatever the waves"
+        );
+        let entered: f64 = ocean.beams(0.7).iter().map(|beam| beam.flux_w).sum();
+        assert!(entered < 0.98 * flat && entered > 0.95 * flat, "{entered} of {flat}");
+    }
+
+    #[test]
+    fn slopes_are_as_steep_as_asked_for() {
+        let ocean = Ocean::new(4, 12.0, 5.0, [3.0, 0.2], 9);
+        let uniform = |n: u64| (mix(n) >> 11) as f64 / (1_u64 << 53) as f64;
+        let count = 20_000;
+        let squares = (0..count).map(|n| {
+            let at = DVec2::new(1000.0 * uniform(2 * n), 1000.0 * uniform(2 * n + 1));
+            ocean.surface(at, 0.0).1.length_squared()
+        });
+        let rms = (squares.sum::<f64>() / count as f64).sqrt();
+        assert!((rms - 0.2).abs() < 0.004, "{rms}");
+    }
+
+    /// Sinusoidal water under light from straight above: the first cusp is under the crests, at `1 / ((1 - 1/n) A k^2)` for small
+    /// slopes.
+    #[test]
+    fn one_wave_focuses_where_it_should() {
+        let (amplitude_m, number) = (0.002, TAU / 1.0);
+        let depth = 1.0 / ((1.0 - 1.0 / 1.33) * amplitude_m * number * number);
+        let wave = Wave { amplitude_m, number: DVec2::new(number, 0.0), rate: 0.0, phase: 0.0 };
+        let mut ocean = Ocean::new(400, 1.0, 2.0 * depth, [1.0, 0.1], 1);
+        (ocean.waves, ocean.sun) = (vec![wave], DVec3::NEG_Y);
+        let beams = ocean.beams(0.0);
+        let focuses = |beam: &Beam| {
+            let t = beam.folds().first().copied()?;
+            Some(t * (2.0 * depth + amplitude_m))
+        };
+        let first = beams.iter().filter_map(focuses).fold(f64::INFINITY, f64::min);
+        assert!((first / depth - 1.0).abs() < 0.002, "{first} {depth}");
+        // Under the troughs light spreads.
+        let trough = beams.iter().filter(|beam| beam.open.iter().all(|p| (p.x.abs() - 0.5).abs() < 0.1));
+        assert!(trough.clone().count() > 100 && trough.into_iter().all(|beam| beam.folds().is_empty()));
+    }
+}

@@ -1,0 +1,295 @@
+//! `quintile run caustics`.
+
+use activity::{Event, PacketCounts};
+use glam::{DVec3, Vec3};
+use pipeline::PipelineSpec;
+use serde::{Deserialize, Serialize};
+
+use super::doubt::{crossing, doubts};
+use super::draw::{Covered, draw_with_work};
+use super::generator::Ocean;
+use super::{Beam, Eye, Floor, Light, Method, Picture};
+use crate::error::LoadError;
+use crate::job::{
+    Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, Touch,
+};
+use crate::scene::Settings;
+
+/// What is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Look {
+    /// The light in the water, from the side.
+    #[default]
+    Volume,
+    /// The light on the floor, from above.
+    Floor,
+}
+
+/// Water in waves under the sun.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// Squares of two generator triangles along each side, 1 to 1024. 255 make the 130,050 volumes of the paper's ocean.
+    pub cells: u32,
+    /// Length of a side in metres.
+    pub side_m: f64,
+    /// Depth in metres.
+    pub depth_m: f64,
+    /// Length of the longest waves in metres; the shortest are a third of that.
+    pub wave_m: f64,
+    /// Root mean square of the slope of the surface, 0 to 1.
+    pub slope: f64,
+    /// How beams are rasterized.
+    pub method: Method,
+    /// What is looked at.
+    pub look: Look,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cells: 64,
+            side_m: 16.0,
+            depth_m: 5.0,
+            wave_m: 4.0,
+            slope: 0.15,
+            method: Method::Moving,
+            look: Look::Volume,
+        }
+    }
+}
+
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        let refuse = |setting, message: String| Err(LoadError::Setting { setting, message });
+        if !(1..=1024).contains(&self.cells) {
+            return refuse("cells", format!("{}: a side takes 1 to 1024 squares", self.cells));
+        }
+        for (setting, value) in [("side_m", self.side_m), ("depth_m", self.depth_m), ("wave_m", self.wave_m)]
+        {
+            if !(1e-3..=1e4).contains(&value) {
+                return refuse(setting, format!("{value}: it has to be 0.001 to 10000 metres"));
+            }
+        }
+        if !(0.0..=1.0).contains(&self.slope) {
+            return refuse("slope", format!("{}: it has to be 0 to 1", self.slope));
+        }
+        Ok(())
+    }
+}
+
+/// The job.
+struct Caustics {
+    options: Options,
+    ocean: Ocean,
+    settings: Settings,
+}
+
+/// Makes the job `caustics`.
+///
+/// # Errors
+/// [`LoadError`] when an option or a setting makes no sense.
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    let options: Options = options.read()?;
+    options.check()?;
+    let settings =
+        Settings { width: 512, height: 288, samples: 1, frame_rate_hz: 30.0, ..Settings::default() };
+    let settings = settings.with(request.overrides)?;
+    let Options { cells, side_m, depth_m, wave_m, slope, .. } = options;
+    let mut ocean = Ocean::new(cells, side_m, depth_m, [wave_m, slope], request.seed);
+    if options.look == Look::Floor {
+        ocean.overshoot = 0.02;
+    }
+    Ok(Box::new(Caustics { options, ocean, settings }))
+}
+
+/// Bytes of a vertex at both ends of a beam, operations of the vertex shader that refracts the light and follows it to the floor, and
+/// multiply-adds that set a moving triangle up.
+const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 70, setup_madds: 60 };
+/// Multiply-adds of a conservative test of a tile: four sides at both ends of time, three edges at eight corners, planes of depth.
+const TILE_MADDS: u32 = 180;
+/// Multiply-adds of the exact times at a pixel.
+const TIME_MADDS: u32 = 60;
+/// Bytes of a pixel of the buffer that light is summed up in.
+const LIGHT_BYTES: u64 = 4;
+/// Pixels of a tile.
+const TILE_PIXELS: u64 = 64;
+
+impl Job for Caustics {
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let beams = self.ocean.beams(f64::from(number) / self.settings.frame_rate_hz);
+        let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
+        let method = self.options.method;
+        let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);
+        let mut passes = Passes::new(&spec.memory, emit)?;
+        self.tell(&beams, &eye, &work, &mut passes);
+        let (counts, triangles) = passes.finish();
+        Ok(Drawn {
+            image: toned(&picture.light),
+            counts,
+            triangles,
+            moving: method == Method::Moving,
+            lens: false,
+            facts: facts(&picture, &beams),
+            warnings: doubts(&self.ocean, &beams),
+        })
+    }
+}
+
+impl Caustics {
+    fn light(&self) -> Light {
+        match self.options.look {
+            Look::Volume => Light::Volume,
+            Look::Floor => Light::Floor(Floor { height_m: -self.options.depth_m }),
+        }
+    }
+
+    /// From the side, a little above and askew, or straight from above: all of the water is in the image.
+    fn eye(&self) -> Option<Eye> {
+        let Options { side_m, depth_m, .. } = self.options;
+        let size @ [width, height] = [self.settings.width, self.settings.height];
+        let aspect = f64::from(width) / f64::from(height);
+        let middle = DVec3::new(0.12 * depth_m, -0.5 * depth_m, 0.07 * depth_m);
+        let far = 4.0 * (side_m + depth_m);
+        let (toward, up, needed) = match self.options.look {
+            Look::Volume => {
+                let high = 0.5 * (depth_m + 0.5 * side_m);
+                (DVec3::new(0.3, 0.35, 1.0).normalize(), DVec3::Y, [0.72 * side_m, high])
+            }
+            Look::Floor => (DVec3::Y, DVec3::NEG_Z, [0.55 * side_m; 2]),
+        };
+        Eye::new([middle + far * toward, middle, up], needed[1].max(needed[0] / aspect), size)
+    }
+
+    /// The work as packets: one draw of all beams, and each tile of each.
+    fn tell(&self, beams: &[Beam], eye: &Eye, work: &[Covered], passes: &mut Passes<'_>) {
+        let triangles = beams.len() * self.options.method.triangles();
+        let pixels = eye.viewport().pixels() as u64;
+        let tiles =
+            u64::from(eye.viewport().width().div_ceil(8)) * u64::from(eye.viewport().height().div_ceil(8));
+        let image = tiles * TILE_PIXELS * LIGHT_BYTES;
+        passes.draw(triangles, 2 * image, &FRONT_END);
+        let mut used = vec![false; tiles as usize];
+        for covered in work {
+            let runs = covered.pixels.count_ones();
+            let mut counts = PacketCounts::default();
+            counts[Event::TilesVisited] = 1;
+            counts[Event::TileMadds] = TILE_MADDS;
+            // The middle of a pixel is its only sample, tested at all times at once.
+            counts[Event::SamplesTested] = runs;
+            counts[Event::SamplesHit] = runs;
+            counts[Event::SampleMadds] = TIME_MADDS * runs;
+            counts[Event::PixelInvocations] = runs;
+            counts[Event::ShaderOps] = runs * self.light().ops();
+            counts[Event::ColourWrites] = runs;
+            let fresh = !std::mem::replace(&mut used[covered.tile as usize], true);
+            let bytes = TILE_PIXELS * LIGHT_BYTES;
+            let touch = Touch { address: u64::from(covered.tile) * bytes, bytes, write: true, fresh };
+            let tile = TileWork { tile: covered.tile, triangle: covered.beam, counts };
+            passes.tile(&tile, &[], &[touch]);
+        }
+        passes.next();
+        passes.resolve(image, pixels, TILE_PIXELS as u32);
+    }
+}
+
+fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
+    let runs = picture.total_runs() as f64;
+    let facts = [
+        ("beams", beams.len() as f64),
+        ("flux_W", beams.iter().map(|beam| beam.flux_w).sum()),
+        ("shader_executions", runs),
+        ("shader_executions_per_pixel", runs / picture.runs.len().max(1) as f64),
+        ("executions_that_find_light", picture.useful as f64 / runs.max(1.0)),
+        ("crossed_share_of_length", crossing(beams)),
+        ("beams_left_out", picture.left_out as f64),
+    ];
+    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
+}
+
+/// Light as colour: bright enough that one pixel in a hundred is white.
+fn toned(light: &[f64]) -> Vec<Vec3> {
+    let mut sorted: Vec<f64> = light.iter().copied().filter(|light| *light > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    let white = sorted.get(sorted.len().saturating_sub(1 + sorted.len() / 100)).copied().unwrap_or(1.0);
+    light.iter().map(|light| (light / white) as f32 * TINT).collect()
+}
+
+/// The colour of light in water.
+const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Overrides;
+    use pipeline::memory::Compression;
+    use pipeline::{CacheSpec, MemorySpec, Shading};
+
+    const LINES: CacheSpec = CacheSpec::lru(256, 4);
+    const SPEC: PipelineSpec = PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 64,
+        batch_triangles: 1024,
+        vertex_reuse: 32,
+        shading: Shading::Cached,
+        shading_cache: LINES,
+        memory: MemorySpec {
+            depth: LINES,
+            colour: LINES,
+            texture: LINES,
+            l2: LINES,
+            compression: Compression { depth: false, colour: false },
+        },
+        features: pipeline::Features::ALL,
+        depth: pipeline::depth::DepthSpec {
+            bound: pipeline::depth::DepthBound::VerticesInTime,
+            boxes: [1; 3],
+            z_min: false,
+        },
+    };
+
+    fn drawn(set: &[(&str, &str)]) -> Drawn {
+        let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        let overrides = Overrides { size: Some((96, 54)), ..Overrides::default() };
+        let request = Request { overrides: &overrides, seed: 1 };
+        let job = job(&OptionSource { file: None, set }, &request).unwrap();
+        job.frame(0, &SPEC, &mut |_, _| ()).unwrap()
+    }
+
+    #[test]
+    fn every_look_and_method_is_told_whole() {
+        for look in ["volume", "floor"] {
+            let ours = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look)]);
+            assert!(ours.warnings.is_empty() && ours.moving, "{:?}", ours.warnings);
+            assert!(ours.image.iter().filter(|pixel| pixel.y > 0.0).count() > 500, "{look}");
+            let executions = ours.facts.iter().find(|fact| fact.name == "shader_executions").unwrap().value;
+            assert_eq!(ours.counts[Event::PixelInvocations] as f64, executions);
+            let prism = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look), ("method", "prism")]);
+            assert_eq!(prism.image, ours.image);
+            assert!(prism.counts[Event::PixelInvocations] > ours.counts[Event::PixelInvocations]);
+        }
+    }
+
+    #[test]
+    fn warped_beams_and_coarse_surfaces_are_warned_of() {
+        let codes = |set| drawn(set).warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
+        assert_eq!(codes(&[("cells", "26"), ("wave_m", "8"), ("slope", "1")]), ["caustics-crossed"]);
+        assert_eq!(codes(&[("cells", "6")]), ["caustics-coarse"]);
+    }
+
+    #[test]
+    fn options_that_make_no_sense_are_named() {
+        let overrides = Overrides::default();
+        for (name, value) in [("cells", "0"), ("depth_m", "-1"), ("slope", "2"), ("method", "\"prsm\"")] {
+            let set = vec![(name.to_owned(), value.to_owned())];
+            let made = job(&OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 });
+            let error = made.err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(error.contains(name), "{name}: {error}");
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! `quintile run occlusion`.
+
+use std::sync::Arc;
+
+use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Warning};
+use glam::{Vec3, Vec4};
+use pipeline::depth::BoxGrid;
+use pipeline::frame::render_with_heat;
+use pipeline::geometry::Projection;
+use pipeline::sampling::SampleSource;
+use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
+use serde::{Deserialize, Serialize};
+
+use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
+use crate::error::LoadError;
+use crate::job::{Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork};
+use crate::samples::SampleChoice;
+use crate::scene::Settings;
+
+/// Walls, boxes behind them, and how these are asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// Walls, 0 to 1000.
+    pub walls: u32,
+    /// Slats of a wall, 1 to 1000.
+    pub slats: u32,
+    /// The part of a wall that is gaps between slats, 0 to 1.
+    pub gaps: f32,
+    /// Boxes, 0 to 100000.
+    pub objects: u32,
+    /// Motion of walls while the shutter is open, in metres; a wall is 3 wide.
+    pub motion: f32,
+    /// Radius of the lens in metres, 0 to 1; it is focused in front of all.
+    pub lens: f32,
+    /// Side of a tile of the first level in pixels: 1 to 256.
+    pub tile_px: u32,
+    /// Boxes of lens and time in a tile, along u, v and t, 1 to 16 each.
+    pub boxes: [u32; 3],
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            walls: 12,
+            slats: 1,
+            gaps: 0.0,
+            objects: 96,
+            motion: 1.0,
+            lens: 0.0,
+            tile_px: 8,
+            boxes: [1, 1, 8],
+        }
+    }
+}
+
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        let checks = [
+            ("walls", self.walls <= 1000, "0 to 1000"),
+            ("slats", (1..=1000).contains(&self.slats), "1 to 1000"),
+            ("gaps", (0.0..=1.0).contains(&self.gaps), "0 to 1"),
+            ("objects", self.objects <= 100_000, "0 to 100000"),
+            ("motion", (0.0..=100.0).contains(&self.motion), "0 to 100 metres"),
+            ("lens", (0.0..=1.0).contains(&self.lens), "0 to 1 metre"),
+            ("tile_px", (1..=256).contains(&self.tile_px), "1 to 256 pixels"),
+            ("boxes", BoxGrid::new(self.boxes, true).is_some(), "1 to 16 along each of u, v and t"),
+        ];
+        match checks.into_iter().find(|(_, holds, _)| !holds) {
+            Some((setting, _, allowed)) => {
+                Err(LoadError::Setting { setting, message: format!("it has to be {allowed}") })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// The job.
+struct Occlusion {
+    options: Options,
+    settings: Settings,
+    samples: Arc<dyn SampleSource>,
+    yard: Yard,
+}
+
+/// Makes the job `occlusion`.
+///
+/// # Errors
+/// [`LoadError`] when an option or a setting makes no sense.
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    let options: Options = options.read()?;
+    options.check()?;
+    let settings = Settings { width: 512, height: 288, samples: 16, ..Settings::default() };
+    let settings = settings.with(request.overrides)?;
+    let samples = SampleChoice::load(&settings.table)?.source(settings.samples, request.seed)?.into();
+    let Options { walls, slats, gaps, objects, motion, lens, .. } = options;
+    let spec = YardSpec { walls, slats, gaps, boxes: objects, motion, lens, seed: request.seed };
+    let refused =
+        || LoadError::Setting { setting: "lens", message: format!("{lens}: there is no such lens") };
+    let yard = spec.yard().ok_or_else(refused)?;
+    Ok(Box::new(Occlusion { options, settings, samples, yard }))
+}
+
+/// Bytes of a corner of a box at both ends, its transformation, and the set-up of its triangles.
+const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_madds: 77 };
+/// A quarter of the tiles half covered: occluders are small, and what they hide together is not found hidden.
+const HALF_COVERED: f64 = 0.25;
+
+impl Job for Occlusion {
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn is_animated(&self) -> bool {
+        false
+    }
+
+    fn frame(&self, _: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let refused = |what: &str| JobError::Setting(what.to_owned());
+        let viewport = Viewport::new(self.settings.width, self.settings.height)
+            .ok_or_else(|| refused("the image has no area"))?;
+        let background = Vec3::new(0.02, 0.03, 0.05);
+        let settings = pipeline::Settings { spec, viewport, samples: &*self.samples, background };
+        let wall = self.yard.walls(&WALL).map_err(|error| JobError::Setting(error.to_string()))?;
+        let mut counts = Counts::default();
+        let camera = &self.yard.camera;
+        counts += &render_with_heat(camera, &[wall], &settings, &[], &mut *emit)?.0.counts;
+        let depths = depths(camera, &[wall], &settings)?;
+        let grid = BoxGrid::new(self.options.boxes, camera.lens().is_some())
+            .ok_or_else(|| refused("boxes: 1 to 16 along each axis"))?;
+        let pyramid = Pyramid::new(viewport, &*self.samples, &depths, self.options.tile_px, grid);
+        let projection = Projection::new(camera, viewport);
+        let queries = Queries::new(&pyramid, &projection);
+        let answers: Vec<Answer> = self.yard.boxes.iter().map(|object| queries.ask(object)).collect();
+        counts += &tell(&answers, spec, &mut *emit)?;
+        let seen: Vec<&MovingBox> = self
+            .yard
+            .boxes
+            .iter()
+            .zip(&answers)
+            .filter(|(_, answer)| !answer.hidden)
+            .map(|(b, _)| b)
+            .collect();
+        let Mesh { open, close, triangles } = mesh(&seen);
+        let boxes = Geometry::new(&open, &close, &triangles);
+        let boxes = boxes.map_err(|error| JobError::Setting(error.to_string()))?;
+        let draws = [wall, Draw { geometry: boxes, shader: &BOX, cull: Cull::None }];
+        let last = |packet: &Packet, lines: &[LineAccess]| emit(&Packet { pass: 2, ..*packet }, lines);
+        let (rendered, _) = render_with_heat(camera, &draws, &settings, &[], last)?;
+        counts += &rendered.counts;
+        Ok(Drawn {
+            image: rendered.image,
+            counts,
+            triangles: 2 * self.yard.triangles.len() + triangles.len() + 12 * answers.len(),
+            moving: self.options.motion > 0.0,
+            lens: camera.lens().is_some(),
+            facts: facts(&answers),
+            warnings: warnings(pyramid.half_covered()),
+        })
+    }
+}
+
+/// The queries as packets of a pass of their own: the farthest depths lie in a fast memory beside the tile tests, so that no cache is asked.
+fn tell(answers: &[Answer], spec: &PipelineSpec, emit: Emit<'_>) -> Result<Counts, JobError> {
+    let mut passes = Passes::new(&spec.memory, emit)?;
+    passes.next();
+    passes.draw(12 * answers.len(), 0, &FRONT_END);
+    for (number, answer) in (0..).zip(answers) {
+        let mut counts = PacketCounts::default();
+        counts[Event::TilesVisited] = answer.tiles as u32;
+        counts[Event::TileMadds] = answer.madds as u32;
+        counts[Event::ZCullTests] = answer.compared as u32;
+        passes.tile(&TileWork { tile: 0, triangle: 12 * number, counts }, &[], &[]);
+    }
+    Ok(passes.finish().0)
+}
+
+struct Mesh {
+    open: Vec<Vec3>,
+    close: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+fn mesh(boxes: &[&MovingBox]) -> Mesh {
+    let mut mesh = Mesh { open: Vec::new(), close: Vec::new(), triangles: Vec::new() };
+    for object in boxes {
+        let (first, [open, close]) = (mesh.open.len() as u32, object.corners());
+        mesh.open.extend(open);
+        mesh.close.extend(close);
+        mesh.triangles.extend(MovingBox::TRIANGLES.map(|three| three.map(|corner| first + corner)));
+    }
+    mesh
+}
+
+fn facts(answers: &[Answer]) -> Vec<Fact> {
+    let sum = |of: fn(&Answer) -> u64| answers.iter().map(of).sum::<u64>() as f64;
+    let facts = [
+        ("objects", answers.len() as f64),
+        ("objects_hidden", sum(|answer| u64::from(answer.hidden))),
+        ("tests", sum(Answer::tests)),
+        ("depth_bytes", sum(Answer::bytes)),
+    ];
+    facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
+}
+
+fn warnings(half_covered: f64) -> Vec<Warning> {
+    let message = || {
+        format!(
+            "{:.0} % of the tiles are covered for most of their samples, but not for all (a warning from {:.0} % on): many small occluders hide \
+             objects together, and a farthest depth for each tile does not know it; smaller tiles and more boxes of lens and time help",
+            100.0 * half_covered,
+            100.0 * HALF_COVERED
+        )
+    };
+    (half_covered > HALF_COVERED)
+        .then(|| Warning::new("occlusion-small-occluders", message()))
+        .into_iter()
+        .collect()
+}
+
+/// A colour under a light that comes from the eye.
+struct Plain(Vec3);
+
+const WALL: Plain = Plain(Vec3::new(0.55, 0.5, 0.42));
+const BOX: Plain = Plain(Vec3::new(0.75, 0.25, 0.12));
+
+impl Shader for Plain {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 12, vertex_ops: 24 }
+    }
+
+    fn shade(&self, at: &ShadingPoint, _: Vec4) -> Vec3 {
+        self.0 * (0.25 + 0.75 * at.normal.dot(at.to_camera).abs())
+    }
+}

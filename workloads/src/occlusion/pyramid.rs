@@ -1,0 +1,152 @@
+//! The farthest stored depths, level by level.
+
+use pipeline::Viewport;
+use pipeline::depth::BoxGrid;
+use pipeline::sampling::{Sample, SampleSource};
+
+/// The farthest depth of each tile for each box of lens and time, and of tiles of twice the side, and so on.
+#[derive(Clone, Debug)]
+pub struct Pyramid {
+    viewport: Viewport,
+    grid: BoxGrid,
+    tile_px: u32,
+    levels: Vec<Level>,
+    half_covered: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Level {
+    columns: u32,
+    rows: u32,
+    farthest: Vec<f32>,
+}
+
+impl Pyramid {
+    /// Of an image whose samples, from `source`, have `depths` in the order `(y width + x) per_pixel + index`, infinite where nothing is.
+    /// Tiles of the first level have a side of `tile_px` pixels, 1 or more.
+    pub fn new(
+        viewport: Viewport,
+        source: &dyn SampleSource,
+        depths: &[f32],
+        tile_px: u32,
+        grid: BoxGrid,
+    ) -> Self {
+        let mut this = Self { viewport, grid, tile_px, levels: Vec::new(), half_covered: 0 };
+        let mut level = Level::empty(viewport, tile_px, grid.len());
+        let per_pixel = source.per_pixel() as usize;
+        let mut samples = vec![Sample::default(); per_pixel];
+        let mut covered = vec![[0_u32; 2]; (level.columns * level.rows) as usize];
+        for (pixel, depths) in (0..).zip(depths.chunks_exact(per_pixel)) {
+            let [x, y] = [pixel % viewport.width(), pixel / viewport.width()];
+            source.pixel_into(x, y, &mut samples);
+            let tile = (y / tile_px * level.columns + x / tile_px) as usize;
+            for (sample, &depth) in samples.iter().zip(depths) {
+                let place = tile * grid.len() + grid.of_sample(sample.u, sample.v, sample.t);
+                level.farthest[place] = level.farthest[place].max(depth);
+                covered[tile][usize::from(depth.is_finite())] += 1;
+            }
+        }
+        this.half_covered = covered.iter().filter(|[open, hit]| *open > 0 && hit > open).count() as u64;
+        while level.columns * level.rows > 1 {
+            let above = level.above(viewport, tile_px << (this.levels.len() + 1), grid.len());
+            this.levels.push(std::mem::replace(&mut level, above));
+        }
+        this.levels.push(level);
+        this
+    }
+
+    /// How lens and time are divided.
+    pub fn grid(&self) -> &BoxGrid {
+        &self.grid
+    }
+
+    /// The size of the image.
+    pub fn viewport(&self) -> Viewport {
+        self.viewport
+    }
+
+    /// How many levels there are; the last one has one tile.
+    pub fn levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Side of a tile of a level in pixels.
+    pub fn side_px(&self, level: usize) -> u32 {
+        self.tile_px << level
+    }
+
+    /// Columns and rows of tiles of a level.
+    pub fn size(&self, level: usize) -> [u32; 2] {
+        [self.levels[level].columns, self.levels[level].rows]
+    }
+
+    /// No sample of a box of a tile is farther than this.
+    pub fn farthest(&self, level: usize, [column, row]: [u32; 2], index: usize) -> f32 {
+        let level = &self.levels[level];
+        level.farthest[(row * level.columns + column) as usize * self.grid.len() + index]
+    }
+
+    /// The share of tiles that most samples, but not all, find covered: there the farthest depth is that of the gaps, and small occluders hide
+    /// nothing.
+    pub fn half_covered(&self) -> f64 {
+        let [columns, rows] = self.size(0);
+        self.half_covered as f64 / f64::from(columns * rows)
+    }
+}
+
+impl Level {
+    /// A level without samples: a box that has none hides everything, as no sample of it sees anything.
+    fn empty(viewport: Viewport, side_px: u32, boxes: usize) -> Self {
+        let (columns, rows) = (viewport.width().div_ceil(side_px), viewport.height().div_ceil(side_px));
+        Self { columns, rows, farthest: vec![f32::NEG_INFINITY; (columns * rows) as usize * boxes] }
+    }
+
+    /// Tiles of twice the side.
+    fn above(&self, viewport: Viewport, side_px: u32, boxes: usize) -> Self {
+        let mut above = Self::empty(viewport, side_px, boxes);
+        for (tile, of_tile) in (0..).zip(self.farthest.chunks_exact(boxes)) {
+            let [column, row] = [tile % self.columns / 2, tile / self.columns / 2];
+            let first = (row * above.columns + column) as usize * boxes;
+            for (known, &farthest) in above.farthest[first..].iter_mut().zip(of_tile) {
+                *known = known.max(farthest);
+            }
+        }
+        above
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pipeline::{LensShape, SampleTable};
+
+    #[test]
+    fn every_level_knows_the_farthest_of_its_samples() {
+        let viewport = Viewport::new(37, 21).unwrap();
+        let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+        let depth = |n: usize| (pipeline::sampling::mix(n as u64) % 1000) as f32;
+        let depths: Vec<f32> = (0..viewport.pixels() * 4).map(depth).collect();
+        let grid = BoxGrid::new([2, 1, 3], true).unwrap();
+        let pyramid = Pyramid::new(viewport, &table, &depths, 8, grid);
+        assert_eq!((pyramid.levels(), pyramid.size(0), pyramid.size(3)), (4, [5, 3], [1, 1]));
+        for level in 0..4 {
+            let [columns, rows] = pyramid.size(level);
+            let side = pyramid.side_px(level);
+            let mut known = vec![f32::NEG_INFINITY; (columns * rows) as usize * 6];
+            for pixel in 0..viewport.pixels() as u32 {
+                let [x, y] = [pixel % 37, pixel / 37];
+                for (index, sample) in table.pixel(x, y).iter().enumerate() {
+                    let tile = (y / side * columns + x / side) as usize;
+                    let place = &mut known[tile * 6 + grid.of_sample(sample.u, sample.v, sample.t)];
+                    *place = place.max(depth(pixel as usize * 4 + index));
+                }
+            }
+            for tile in 0..columns * rows {
+                for index in 0..6 {
+                    let at = [tile % columns, tile / columns];
+                    assert_eq!(pyramid.farthest(level, at, index), known[tile as usize * 6 + index]);
+                }
+            }
+        }
+    }
+}
