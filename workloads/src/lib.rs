@@ -5,6 +5,7 @@
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`job`] is for work that is more than one rendering of a scene.
+//! - [`soft_shadows`] makes motion-blurred shadows of area lights; [`accumulation`] is what it is held against.
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
 //!
@@ -23,6 +24,7 @@
 //! World space is that of glTF: right-handed, y up. Camera space is x right, y up, z forward. Scenes are
 //! deterministic: the same file gives the same bits on every machine.
 
+pub mod accumulation;
 pub mod builtin;
 pub mod collision;
 mod error;
@@ -33,6 +35,7 @@ pub mod material;
 mod samples;
 pub mod scene;
 pub mod shapes;
+pub mod soft_shadows;
 pub mod stress;
 pub mod visibility;
 

@@ -4,6 +4,7 @@
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
 //! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
+//! - [`shadows`]: soft shadows in one pass against accumulation buffering.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`timing`]: every level of timing against the reference.
 //! - [`index`]: one page of all of them, with [what each level costs and how wrong it is](standing).
@@ -13,10 +14,12 @@ mod error;
 pub mod fit;
 pub mod frames;
 pub mod growth;
+mod image;
 pub mod index;
 mod quantiles;
 pub mod sampled;
 pub mod sampling;
+pub mod shadows;
 pub mod standing;
 pub mod tile_tests;
 pub mod timing;
@@ -24,12 +27,13 @@ pub mod timing;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 7] = [
+pub const CHARTS: [(&str, &str); 8] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
     ("frames", "frame starts found and energy error, by method, over rate, noise, bits and host time"),
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
     ("sampled", "frames predicted from few: errors, how often intervals hold the truth, host time"),
     ("sampling", "image error over samples per pixel and over host time, for every sample table"),
+    ("shadows", "soft shadows: error over places on the light, one pass against accumulation, and the bias"),
     ("tile-tests", "every combination of tile tests: efficiency and tightness over multiply-adds"),
     ("timing", "every level of timing: error against the reference over host time, and where it fails"),
 ];

@@ -6,6 +6,7 @@ use super::frames::{Axis, FramesChart, Outcome, Way};
 use super::growth::GrowthChart;
 use super::sampled::SampledChart;
 use super::sampling::SamplingChart;
+use super::shadows::ShadowsChart;
 use super::tile_tests::TileTests;
 use super::timing::TimingChart;
 
@@ -123,5 +124,18 @@ impl Standings for FramesChart {
 impl Standings for GrowthChart {
     fn standings(&self) -> Vec<Standing> {
         Vec::new()
+    }
+}
+
+impl Standings for ShadowsChart {
+    fn standings(&self) -> Vec<Standing> {
+        let Some(row) = self.rows.last() else { return Vec::new() };
+        let error = format!("RMSE {:.4}", row.rmse);
+        let both = [("one pass", &row.one_pass), ("accumulation", &row.accumulation)];
+        let both = both.map(|(name, cost)| {
+            let level = format!("{name}, {} places on the light", row.points);
+            standing("soft shadows", &level, error.clone(), format!("{:.2} s", cost.host_s))
+        });
+        both.to_vec()
     }
 }

@@ -266,6 +266,8 @@ pub enum ChartArg {
     Sampled,
     /// Image error over samples per pixel and over host time, for every sample table
     Sampling,
+    /// Soft shadows: error over places on the light, one pass against accumulation, and the bias
+    Shadows,
     /// Every combination of tile tests: efficiency and tightness over multiply-adds
     TileTests,
     /// Every level of timing: error against the reference over host time

@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{frames, growth, sampled};
+use crate::chart::{frames, growth, sampled, shadows};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -75,6 +75,7 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
         ChartArg::Growth => chart_growth(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
+        ChartArg::Shadows => chart_shadows(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
         ChartArg::Timing => chart_timing(args, dir, progress),
     }
@@ -110,6 +111,13 @@ fn chart_sampled(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<
     let chart = sampled::sampled(&args.scene, effort, progress)?;
     chart.write(dir).map_err(RunError::from)?;
     Done::new(&chart, format!("{}\n{}", chart.text(), chart.cost_text()))
+}
+
+fn chart_shadows(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { shadows::Effort::QUICK } else { shadows::Effort::FULL };
+    let chart = shadows::chart(effort, &args.out, progress)?;
+    let fault = (!chart.is_equal()).then(|| "one pass and accumulation differ; please report it".to_owned());
+    Ok(Done { fault, ..Done::new(&chart, chart.text())? })
 }
 
 fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
