@@ -5,6 +5,7 @@
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`job`] is for work that is more than one rendering of a scene.
+//! - [`multiview`] draws stereo and multi-view images in one pass.
 //! - [`soft_shadows`] makes motion-blurred shadows of area lights; [`accumulation`] is what it is held against.
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
@@ -32,6 +33,7 @@ mod import;
 pub mod job;
 mod load;
 pub mod material;
+pub mod multiview;
 mod samples;
 pub mod scene;
 pub mod shapes;

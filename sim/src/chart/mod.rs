@@ -7,6 +7,7 @@
 //! - [`shadows`]: soft shadows in one pass against accumulation buffering.
 //! - [`tile_tests`]: what each combination of tile tests gains over what it costs.
 //! - [`timing`]: every level of timing against the reference.
+//! - [`views`]: stereo and multi-view in one pass against view by view and accumulation.
 //! - [`index`]: one page of all of them, with [what each level costs and how wrong it is](standing).
 //! - [`fit`]: exponents of curves.
 
@@ -23,11 +24,12 @@ pub mod shadows;
 pub mod standing;
 pub mod tile_tests;
 pub mod timing;
+pub mod views;
 
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 8] = [
+pub const CHARTS: [(&str, &str); 9] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
     ("frames", "frame starts found and energy error, by method, over rate, noise, bits and host time"),
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
@@ -36,4 +38,5 @@ pub const CHARTS: [(&str, &str); 8] = [
     ("shadows", "soft shadows: error over places on the light, one pass against accumulation, and the bias"),
     ("tile-tests", "every combination of tile tests: efficiency and tightness over multiply-adds"),
     ("timing", "every level of timing: error against the reference over host time, and where it fails"),
+    ("views", "stereo and multi-view: shader runs over views and caches, one pass against its rivals"),
 ];

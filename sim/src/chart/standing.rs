@@ -9,6 +9,7 @@ use super::sampling::SamplingChart;
 use super::shadows::ShadowsChart;
 use super::tile_tests::TileTests;
 use super::timing::TimingChart;
+use super::views::ViewsChart;
 
 /// A level of a method: what it costs and how wrong it is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -137,5 +138,19 @@ impl Standings for ShadowsChart {
             standing("soft shadows", &level, error.clone(), format!("{:.2} s", cost.host_s))
         });
         both.to_vec()
+    }
+}
+
+/// One pass has no error of its own besides that of shading for the middle of the line.
+impl Standings for ViewsChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::views::Row| {
+            let cost = format!(
+                "{:.2} times the shader runs of one view ({:.2} view by view)",
+                row.one_pass.over_one_view, row.view_by_view.over_one_view
+            );
+            standing("many views", &format!("{} views in one pass", row.views), "none".to_owned(), cost)
+        };
+        self.rows.iter().map(row).collect()
     }
 }

@@ -272,6 +272,8 @@ pub enum ChartArg {
     TileTests,
     /// Every level of timing: error against the reference over host time
     Timing,
+    /// Stereo and multi-view: shader runs over views and caches, one pass against its rivals
+    Views,
 }
 
 /// Arguments of `list`.

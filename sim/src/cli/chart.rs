@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{frames, growth, sampled, shadows};
+use crate::chart::{frames, growth, sampled, shadows, views};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -78,6 +78,7 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
         ChartArg::Shadows => chart_shadows(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
         ChartArg::Timing => chart_timing(args, dir, progress),
+        ChartArg::Views => chart_views(args, progress),
     }
 }
 
@@ -142,6 +143,12 @@ fn chart_timing(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<D
         started.elapsed().as_secs_f64()
     );
     Done::new(&chart, text)
+}
+
+fn chart_views(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { views::Effort::QUICK } else { views::Effort::FULL };
+    let chart = views::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
 }
 
 /// Exponents and errors, a row for each scene and table.

@@ -90,11 +90,18 @@ pub struct Request<'a> {
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
 /// Every job: its name, what it is, and how it is made.
-const JOBS: &[(&str, &str, Maker)] = &[(
-    "soft-shadows",
-    "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
-    crate::soft_shadows::job,
-)];
+const JOBS: &[(&str, &str, Maker)] = &[
+    (
+        "multiview",
+        "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
+        crate::multiview::job,
+    ),
+    (
+        "soft-shadows",
+        "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
+        crate::soft_shadows::job,
+    ),
+];
 
 /// Names of the jobs, each with a line that says what it is.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
