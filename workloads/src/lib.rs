@@ -5,6 +5,7 @@
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`job`] is for work that is more than one rendering of a scene.
+//! - [`glossy`] makes glossy reflections and refractions on planar receivers.
 //! - [`multiview`] draws stereo and multi-view images in one pass.
 //! - [`soft_shadows`] makes motion-blurred shadows of area lights; [`accumulation`] is what it is held against.
 //! - [`collision`] finds the pairs of moving objects that may collide.
@@ -29,6 +30,7 @@ pub mod accumulation;
 pub mod builtin;
 pub mod collision;
 mod error;
+pub mod glossy;
 mod import;
 pub mod job;
 mod load;

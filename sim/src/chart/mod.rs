@@ -1,6 +1,7 @@
 //! Charts of the book: each measured, drawn and written in one go, one module for each.
 //!
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
+//! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
 //! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
@@ -14,6 +15,7 @@
 mod error;
 pub mod fit;
 pub mod frames;
+pub mod glossy;
 pub mod growth;
 mod image;
 pub mod index;
@@ -29,9 +31,10 @@ pub mod views;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 9] = [
+pub const CHARTS: [(&str, &str); 10] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
     ("frames", "frame starts found and energy error, by method, over rate, noise, bits and host time"),
+    ("glossy", "glossy reflection and refraction: error over samples, contact hardening, lenses too wide"),
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),
     ("sampled", "frames predicted from few: errors, how often intervals hold the truth, host time"),
     ("sampling", "image error over samples per pixel and over host time, for every sample table"),

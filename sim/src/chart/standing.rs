@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::frames::{Axis, FramesChart, Outcome, Way};
+use super::glossy::GlossyChart;
 use super::growth::GrowthChart;
 use super::sampled::SampledChart;
 use super::sampling::SamplingChart;
@@ -150,6 +151,17 @@ impl Standings for ViewsChart {
                 row.one_pass.over_one_view, row.view_by_view.over_one_view
             );
             standing("many views", &format!("{} views in one pass", row.views), "none".to_owned(), cost)
+        };
+        self.rows.iter().map(row).collect()
+    }
+}
+
+impl Standings for GlossyChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::glossy::Row| {
+            let level = format!("one pass, {} samples a texel", row.samples);
+            let subject = format!("glossy {}", row.effect);
+            standing(&subject, &level, format!("RMSE {:.4}", row.rmse), format!("{:.3} s", row.host_s))
         };
         self.rows.iter().map(row).collect()
     }

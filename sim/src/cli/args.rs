@@ -260,6 +260,8 @@ pub enum ChartArg {
     All,
     /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
     Frames,
+    /// Glossy reflection and refraction: error over samples, contact hardening, lenses too wide
+    Glossy,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
     /// Frames predicted from few: errors, how often intervals hold the truth, host time

@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{frames, growth, sampled, shadows, views};
+use crate::chart::{frames, glossy, growth, sampled, shadows, views};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -72,6 +72,7 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
         ChartArg::Frames => chart_frames(args, progress),
+        ChartArg::Glossy => chart_glossy(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
@@ -91,6 +92,12 @@ fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> 
         "{table}*: mean F1 below {below}; in brackets how many scenes are below\ntook {took_s:.1} s\n"
     );
     Done::new(&chart, text)
+}
+
+fn chart_glossy(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { glossy::Effort::QUICK } else { glossy::Effort::FULL };
+    let chart = glossy::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
 }
 
 fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {

@@ -92,6 +92,11 @@ type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 /// Every job: its name, what it is, and how it is made.
 const JOBS: &[(&str, &str, Maker)] = &[
     (
+        "glossy",
+        "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
+        crate::glossy::job,
+    ),
+    (
         "multiview",
         "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
         crate::multiview::job,

@@ -18,7 +18,7 @@ pub(super) fn write(chart: &ShadowsChart, dir: &OutDir) -> Result<(), OutputErro
     Curves { title, subject: &subject, panels: costs(chart) }.picture().write(dir, "shadows_cost")?;
     failures(chart, &subject).write(dir, "shadows_failures")?;
     dir.write_atomic("shadows.csv", |out| {
-        let mut table = csv::Writer::from_writer(out);
+        let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record([
             "points",
             "rmse",

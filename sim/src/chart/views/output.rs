@@ -17,7 +17,7 @@ pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError>
     let title = "Where one pass fails: shading that depends on who looks";
     Curves { title, subject: &subject, panels: angles(chart) }.picture().write(dir, "views_failures")?;
     dir.write_atomic("views.csv", |out| {
-        let mut table = csv::Writer::from_writer(out);
+        let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record([
             "views",
             "samples_per_view",

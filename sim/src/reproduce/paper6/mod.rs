@@ -1,5 +1,6 @@
 //! Paper VI, "Design and Novel Uses of Higher-Dimensional Rasterization".
 
+mod glossy;
 mod shadows;
 mod views;
 
@@ -8,5 +9,7 @@ use crate::output::progress::Progress;
 use crate::run::RunError;
 
 pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, RunError> {
-    Ok([shadows::rows(effort, progress)?, views::rows(effort, progress)?].into_iter().flatten().collect())
+    let rows =
+        [glossy::rows(effort, progress)?, shadows::rows(effort, progress)?, views::rows(effort, progress)?];
+    Ok(rows.into_iter().flatten().collect())
 }
