@@ -1,9 +1,9 @@
 //! Glossy reflection or refraction as a job: the map, and the scene with the map on its receiver.
 
-use activity::{Event, Packet, Warning};
+use activity::{Event, Warning};
 use glam::{DVec3, Vec3};
 use pipeline::frame::render_with_heat;
-use pipeline::{Cull, Draw, Geometry, PipelineSpec, SampleSpec, Viewport};
+use pipeline::{Camera, Cull, Draw, Geometry, PipelineSpec, Rendered, SampleSpec, SampleTable, Viewport};
 use serde::{Deserialize, Serialize};
 
 use super::map::Map;
@@ -11,7 +11,7 @@ use super::receiver::{Effect, Receiver};
 use super::stage::{receiver, stage};
 use super::surface::ReceiverShader;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Options of the job.
@@ -52,12 +52,35 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
+        if !self.half.iter().all(|half| *half > 0.0 && half.is_finite()) {
+            return refused("half", format!("{:?}: both have to be finite lengths above zero", self.half));
+        }
+        if !(self.roughness >= 0.0 && self.roughness.is_finite()) {
+            return refused("roughness", format!("{}: it is a finite radius, 0 or above", self.roughness));
+        }
+        if !(0.0..=1.0).contains(&self.fresnel) {
+            return refused("fresnel", format!("{}: it is a share, 0 to 1", self.fresnel));
+        }
+        match self.map_samples {
+            1..=SampleTable::MAX_PER_PIXEL => Ok(()),
+            samples => refused("map_samples", format!("{samples}: a texel takes 1 to 256")),
+        }
+    }
+}
+
 /// The job.
 pub struct Glossy {
     scene: Scene,
     receiver: Receiver,
     options: Options,
     seed: u64,
+}
+
+fn refused(error: impl std::fmt::Display) -> JobError {
+    JobError::Setting(error.to_string())
 }
 
 /// Linear RGB radiance of the receiver's own surface.
@@ -74,20 +97,7 @@ impl Glossy {
             None => stage(options.index.is_some())?,
         };
         let scene = scene.with_overrides(overrides)?;
-        let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
-        if !options.half.iter().all(|half| *half > 0.0 && half.is_finite()) {
-            return refused("half", format!("{:?}: both have to be finite lengths above zero", options.half));
-        }
-        if !(options.roughness >= 0.0 && options.roughness.is_finite()) {
-            return refused("roughness", format!("{}: it is a finite radius, 0 or above", options.roughness));
-        }
-        if !(0.0..=1.0).contains(&options.fresnel) {
-            return refused("fresnel", format!("{}: it is a share, 0 to 1", options.fresnel));
-        }
-        let table = SampleSpec::default().table(options.map_samples, seed);
-        if let Err(error) = table {
-            return refused("map_samples", error.to_string());
-        }
+        options.check()?;
         let receiver = Receiver::lying(DVec3::from_array(options.centre), options.half);
         let job = Self { scene, receiver, options, seed };
         let first = job.scene.settings().frames.start;
@@ -107,6 +117,34 @@ impl Glossy {
         let (eye, along) = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
         let Options { roughness, texels, .. } = self.options;
         Map::new(&self.receiver, (eye, along), self.effect(), roughness, texels)
+    }
+
+    fn table(&self, samples: u32) -> Result<SampleTable, JobError> {
+        SampleSpec::default().table(samples, self.seed).map_err(refused)
+    }
+
+    /// The scene with the map on its receiver.
+    fn show(
+        &self,
+        (map, texels): (&Map, &[Vec3]),
+        (camera, mut draws): (&Camera, Vec<Draw<'_>>),
+        spec: &PipelineSpec,
+        emit: Emit<'_>,
+    ) -> Result<Rendered, JobError> {
+        let shader =
+            ReceiverShader::new(texels, map.viewport, BASE, self.options.fresnel).map_err(refused)?;
+        let (corners, uvs) = (self.receiver.corners(), map.uvs());
+        let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]);
+        let geometry = geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(refused)?;
+        let settings = self.scene.settings();
+        let viewport = Viewport::new(settings.width, settings.height)
+            .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
+        let samples = self.table(settings.samples)?;
+        let background = self.scene.background();
+        let settings = pipeline::Settings { spec, viewport, samples: &samples, background };
+        let receiver = Draw { geometry, shader: &shader, cull: Cull::None };
+        let draws: Vec<Draw<'_>> = draws.drain(..).chain([receiver]).collect();
+        Ok(render_with_heat(camera, &draws, &settings, &[], emit)?.0)
     }
 
     fn warnings(&self) -> Vec<Warning> {
@@ -130,41 +168,22 @@ impl Job for Glossy {
 
     fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
         let frame = self.scene.frame(number)?;
-        let refused = |error: &dyn std::fmt::Display| JobError::Setting(error.to_string());
-        let map = self.map(&frame).map_err(|error| refused(&error))?;
+        let map = self.map(&frame).map_err(refused)?;
         let draws: Vec<_> =
             frame.draws(&self.scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
-        let table = |samples| SampleSpec::default().table(samples, self.seed);
-        let samples = table(self.options.map_samples).map_err(|error| refused(&error))?;
-        let look = (spec, self.scene.background());
-        let (texels, mut counts) = map.one_pass(&draws, &samples, look, emit)?;
-        let gathered = counts[Event::SamplesTested];
-        let shader = ReceiverShader::new(&texels, map.viewport, BASE, self.options.fresnel);
-        let shader = shader.map_err(|error| refused(&error))?;
-        let (corners, uvs) = (self.receiver.corners(), map.uvs());
-        let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]);
-        let geometry =
-            geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(|error| refused(&error))?;
-        let mut scene = draws.clone();
-        scene.push(Draw { geometry, shader: &shader, cull: Cull::None });
-        let settings = self.scene.settings();
-        let viewport = Viewport::new(settings.width, settings.height)
-            .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
-        let samples = table(settings.samples).map_err(|error| refused(&error))?;
-        let settings = pipeline::Settings { spec, viewport, samples: &samples, background: look.1 };
-        let mut second = |packet: &Packet, lines: &[_]| emit(&Packet { pass: 1, ..packet.clone() }, lines);
-        let (drawn, _) = render_with_heat(&frame.camera, &scene, &settings, &[], &mut second)?;
-        counts += &drawn.counts;
+        let samples = self.table(self.options.map_samples)?;
+        let (texels, mut counts) = map.one_pass(&draws, &samples, (spec, self.scene.background()), emit)?;
         let facts = vec![
             Fact { name: "map_texels", value: map.viewport.pixels() as f64 },
-            Fact { name: "map_samples_tested", value: gathered as f64 },
+            Fact { name: "map_samples_tested", value: counts[Event::SamplesTested] as f64 },
             Fact { name: "blur_at_height_1", value: map.blur(1.0) },
         ];
+        let image = self.show((&map, &texels), (&frame.camera, draws), spec, &mut shifted(1, emit))?;
+        counts += &image.counts;
         let first = number == self.scene.settings().frames.start;
         let warnings = if first { self.warnings() } else { Vec::new() };
-        let triangles = 2 * frame.triangle_count() + 2;
-        let moving = self.is_animated();
-        Ok(Drawn { image: drawn.image, counts, triangles, moving, lens: true, facts, warnings })
+        let (triangles, moving) = (2 * frame.triangle_count() + 2, self.is_animated());
+        Ok(Drawn { image: image.image, counts, triangles, moving, lens: true, facts, warnings })
     }
 }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::receiver::{Effect, Receiver};
 use crate::accumulation::{Rays, SharedSamples, pinhole};
 use crate::error::LoadError;
-use crate::job::{Emit, JobError};
+use crate::job::{Emit, JobError, shifted};
 use crate::scene::camera::Stand;
 
 /// The camera of a map and the texels of the receiver.
@@ -138,10 +138,8 @@ impl Map {
             let camera = camera.map_err(|error| JobError::Setting(error.to_string()))?;
             let samples = set.still(index);
             let settings = Settings { spec, viewport: self.viewport, samples: &samples, background };
-            let mut pass = |packet: &activity::Packet, lines: &[activity::LineAccess]| {
-                emit(&activity::Packet { pass: index as u16, ..packet.clone() }, lines);
-            };
-            let (one, _) = render_with_heat(&camera, draws, &settings, &[], &mut pass)?;
+            let (one, _) =
+                render_with_heat(&camera, draws, &settings, &[], &mut shifted(index as u16, emit))?;
             counts += &one.counts;
             sum.iter_mut().zip(one.image).for_each(|(sum, pixel)| *sum += pixel);
         }

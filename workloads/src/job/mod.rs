@@ -20,6 +20,14 @@ pub use passes::{FrontEnd, Passes, TileWork, Touch};
 /// Where the packets of a frame go, with the lines each asks the L2 for, in the order of the modelled hardware.
 pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
 
+/// Packets go out as those of passes from `first` on.
+pub(crate) fn shifted<'e>(
+    first: u16,
+    emit: &'e mut (dyn FnMut(&Packet, &[LineAccess]) + 'e),
+) -> impl FnMut(&Packet, &[LineAccess]) + 'e {
+    move |packet, lines| emit(&Packet { pass: packet.pass.saturating_add(first), ..packet.clone() }, lines)
+}
+
 /// A number that a job found out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fact {

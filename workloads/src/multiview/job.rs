@@ -1,7 +1,7 @@
 //! Multi-view as a job.
 
-use activity::{Counts, Event, Packet, Warning};
-use pipeline::{CacheSpec, PipelineSpec, Viewport};
+use activity::{Event, Warning};
+use pipeline::{CacheSpec, Draw, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
 
 use super::layout::Layout;
@@ -185,32 +185,33 @@ impl Job for MultiView {
         } else {
             rig.one_pass(&draws, &to, emit)?
         };
-        let mut warnings: Vec<_> = self.angle_warning(&rig).into_iter().collect();
         let mut facts = vec![
             Fact { name: "pixel_invocations", value: views.counts[Event::PixelInvocations] as f64 },
             Fact { name: "invocations_per_pixel_and_view", value: per_pixel(&views, self.view) },
         ];
+        let mut warnings: Vec<_> = self.angle_warning(&rig).into_iter().collect();
         if self.options.check_cache {
-            let everything = PipelineSpec { shading_cache: ALL, ..*spec };
-            let to = Target { spec: &everything, ..to };
-            let counts = rig.one_pass(&draws, &to, &mut |_: &Packet, _| ())?.counts;
-            let ratio = ratio(&views.counts, &counts);
-            facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value: ratio });
-            warnings.extend(cache_warning(ratio, spec));
+            let value = over_everything(&rig, &draws, &to, &views)?;
+            facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value });
+            warnings.extend(cache_warning(value, spec));
         }
-        let warnings = if number == self.settings.frames.start { warnings } else { Vec::new() };
+        warnings.retain(|_| number == self.settings.frames.start);
         let triangles = frame.triangle_count() * views.passes as usize;
         let image = self.shown(&views);
         Ok(Drawn { image, counts: views.counts, triangles, moving: true, lens: true, facts, warnings })
     }
 }
 
-fn per_pixel(views: &Views, viewport: Viewport) -> f64 {
-    views.counts[Event::PixelInvocations] as f64 / (viewport.pixels() * views.images.len()) as f64
+/// The shader runs of `views` over those of one pass with a cache that holds everything.
+fn over_everything(rig: &Rig, draws: &[Draw<'_>], to: &Target<'_>, views: &Views) -> Result<f64, JobError> {
+    let everything = PipelineSpec { shading_cache: ALL, ..*to.spec };
+    let to = Target { spec: &everything, ..*to };
+    let least = rig.one_pass(draws, &to, &mut |_, _| ())?.counts[Event::PixelInvocations];
+    Ok(views.counts[Event::PixelInvocations] as f64 / least.max(1) as f64)
 }
 
-fn ratio(counts: &Counts, least: &Counts) -> f64 {
-    counts[Event::PixelInvocations] as f64 / least[Event::PixelInvocations].max(1) as f64
+fn per_pixel(views: &Views, viewport: Viewport) -> f64 {
+    views.counts[Event::PixelInvocations] as f64 / (viewport.pixels() * views.images.len()) as f64
 }
 
 fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use activity::{Counts, LineAccess, Packet};
+use activity::Counts;
 use glam::Vec3;
 use pipeline::frame::{render_views, render_with_heat};
 use pipeline::sampling::{SampleSource, SampleSpec};
@@ -11,7 +11,7 @@ use pipeline::{Camera, Draw, Lens, LensShape, PipelineSpec, SampleTable, Setting
 use super::layout::Layout;
 use super::samples::Run;
 use crate::error::LoadError;
-use crate::job::{Emit, JobError};
+use crate::job::{Emit, JobError, shifted};
 
 /// What is drawn into.
 #[derive(Clone, Copy)]
@@ -128,10 +128,7 @@ impl Rig {
     ) -> Result<Views, JobError> {
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
         for view in 0..self.runs.len() {
-            let mut pass = |packet: &Packet, lines: &[LineAccess]| {
-                emit(&Packet { pass: view as u16, ..packet.clone() }, lines);
-            };
-            let (image, counts) = self.view(view, draws, to, &mut pass)?;
+            let (image, counts) = self.view(view, draws, to, &mut shifted(view as u16, emit))?;
             views.add(image, &counts, 1);
         }
         Ok(views)

@@ -1,6 +1,6 @@
 //! What one pass is held against besides view by view.
 
-use activity::{Counts, LineAccess, Packet};
+use activity::Counts;
 use glam::{Affine3A, Vec3};
 use pipeline::sampling::Sample;
 use pipeline::{Camera, Draw, Geometry, Lens, PipelineSpec, Shading};
@@ -8,7 +8,7 @@ use pipeline::{Camera, Draw, Geometry, Lens, PipelineSpec, Shading};
 use super::rig::{Rig, Target, Views, settings};
 use super::samples::{OwnLens, Run};
 use crate::accumulation::{SharedSamples, pinhole};
-use crate::job::{Emit, JobError};
+use crate::job::{Emit, JobError, shifted};
 
 impl Rig {
     /// Accumulation buffering (Haeberli and Akeley 1990): for each sample of each view a pass of still geometry through a pinhole, all
@@ -35,11 +35,13 @@ impl Rig {
             let draws = draws.iter().zip(&stills).map(|(draw, at)| with_positions(draw, at));
             let draws = draws.collect::<Result<Vec<_>, _>>().map_err(|e| refused(&e))?;
             let one = set.still(number);
-            let mut pass = |packet: &Packet, lines: &[LineAccess]| {
-                emit(&Packet { pass: number as u16, ..packet.clone() }, lines);
-            };
-            let (drawn, _) =
-                pipeline::frame::render_with_heat(&camera, &draws, &settings(to, &one), &[], &mut pass)?;
+            let (drawn, _) = pipeline::frame::render_with_heat(
+                &camera,
+                &draws,
+                &settings(to, &one),
+                &[],
+                &mut shifted(number as u16, emit),
+            )?;
             views.counts += &drawn.counts;
             views.passes += 1;
             images.push(drawn.image);

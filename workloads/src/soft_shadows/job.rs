@@ -1,8 +1,8 @@
 //! Soft shadows as a job: the map, the samples that are seen, and their shading.
 
-use activity::{Event, Packet, Warning};
+use activity::{Counts, Event, Warning};
 use glam::{DVec3, Vec3};
-use pipeline::sampling::{Pattern, SampleSpec};
+use pipeline::sampling::{Pattern, SampleSource, SampleSpec};
 use pipeline::{Cull, Draw, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use super::shade::{Shadows, World};
 use super::stage::stage;
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Overrides, Scene, Settings};
 
 /// Options of the job.
@@ -42,6 +42,20 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
+        if !(2..=4096).contains(&self.map_px) || !self.map_px.is_multiple_of(2) {
+            let message = format!("{}: a shadow map is 2 to 4096 texels wide, an even number", self.map_px);
+            return refused("map_px", message);
+        }
+        if !(self.bias >= 0.0 && self.bias.is_finite()) {
+            return refused("bias", format!("{}: the bias is a finite depth, 0 or above", self.bias));
+        }
+        Ok(())
+    }
+}
+
 /// The job.
 pub struct SoftShadows {
     scene: Scene,
@@ -57,16 +71,7 @@ impl SoftShadows {
     /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
     pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene = options.scene.as_deref().map_or_else(stage, crate::load)?.with_overrides(overrides)?;
-        let refused = |setting, message: String| LoadError::Setting { setting, message };
-        if !(2..=4096).contains(&options.map_px) || !options.map_px.is_multiple_of(2) {
-            let message =
-                format!("{}: a shadow map is 2 to 4096 texels wide, an even number", options.map_px);
-            return Err(refused("map_px", message));
-        }
-        if !(options.bias >= 0.0 && options.bias.is_finite()) {
-            let message = format!("{}: the bias is a finite depth, 0 or above", options.bias);
-            return Err(refused("bias", message));
-        }
+        options.check()?;
         let light = AreaLight::new(&options.light)?;
         let samples = scene.settings().samples;
         let spec = SampleSpec::default();
@@ -76,12 +81,27 @@ impl SoftShadows {
             let pattern = Pattern::Given { points: options.points.clone() };
             SharedSamples::from_spec(&SampleSpec { pattern, ..spec }, samples, seed)
         };
-        let set = set.map_err(|error| refused("points", error.to_string()))?;
+        let set =
+            set.map_err(|error| LoadError::Setting { setting: "points", message: error.to_string() })?;
         Ok(Self { scene, light, set, options })
     }
 
     fn method(&self) -> Method {
         if self.options.accumulate { Method::Accumulation } else { Method::OnePass }
+    }
+
+    /// Passes that make the map.
+    fn passes(&self) -> u16 {
+        if self.options.accumulate { self.set.samples().len() as u16 } else { 1 }
+    }
+
+    fn facts(&self, map: &ShadowMap, shaded: &Counts) -> Vec<Fact> {
+        vec![
+            Fact { name: "shadow_map_bytes", value: map.bytes() as f64 },
+            Fact { name: "shadow_map_passes", value: f64::from(self.passes()) },
+            Fact { name: "shadow_map_samples_tested", value: map.counts[Event::SamplesTested] as f64 },
+            Fact { name: "look_ups", value: shaded[Event::TextureFetches] as f64 },
+        ]
     }
 
     /// Where the set or the bias is known to be bad.
@@ -127,42 +147,19 @@ impl Job for SoftShadows {
         let (draws, albedos) = parts(&self.scene, &frame)?;
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
-        let camera = frame.camera.with_lens(None);
-        let mut first = 0;
-        let mut passes = |packet: &Packet, lines: &[_]| {
-            emit(&Packet { pass: packet.pass.saturating_add(first), ..packet.clone() }, lines);
-        };
-        let map = ShadowMap::new(
-            (&self.light, &draws),
-            self.options.map_px,
-            &self.set,
-            (self.method(), spec),
-            &mut passes,
-        )?;
-        let each = if self.options.accumulate { self.set.samples().len() as u16 } else { 1 };
-        first = each;
-        let mut passes = |packet: &Packet, lines: &[_]| {
-            emit(&Packet { pass: packet.pass.saturating_add(first), ..packet.clone() }, lines);
-        };
-        let seen = see((&camera, &draws), viewport, &self.set, (self.method(), spec), &mut passes)?;
-        first = 2 * each;
-        let mut passes = |packet: &Packet, lines: &[_]| {
-            emit(&Packet { pass: first, ..packet.clone() }, lines);
-        };
+        let (camera, how, each) = (frame.camera.with_lens(None), (self.method(), spec), self.passes());
+        let map = ShadowMap::new((&self.light, &draws), self.options.map_px, &self.set, how, emit)?;
+        let seen = see((&camera, &draws), viewport, &self.set, how, &mut shifted(each, emit))?;
         let world = World::new((&camera, &draws), viewport, &self.light, &albedos, self.scene.background());
-        let shaded = look_up_packets(&world, (&self.set, &seen.samples), &map, spec, &mut passes)?;
+        let looks = (&self.set as &dyn SampleSource, &seen.samples[..]);
+        let shaded = look_up_packets(&world, looks, &map, spec, &mut shifted(2 * each, emit))?;
         let shadows = Shadows::Map { map: &map, bias: self.options.bias };
         let image = world.image(&self.set, &seen.samples, shadows);
         let mut counts = map.counts;
         counts += &seen.counts;
         counts += &shaded;
-        let facts = vec![
-            Fact { name: "shadow_map_bytes", value: map.bytes() as f64 },
-            Fact { name: "shadow_map_passes", value: f64::from(each) },
-            Fact { name: "shadow_map_samples_tested", value: map.counts[Event::SamplesTested] as f64 },
-            Fact { name: "look_ups", value: shaded[Event::TextureFetches] as f64 },
-        ];
         let triangles = map.triangles + seen.triangles;
+        let facts = self.facts(&map, &shaded);
         let warnings = if number == settings.frames.start { self.warnings() } else { Vec::new() };
         Ok(Drawn { image, counts, triangles, moving: true, lens: true, facts, warnings })
     }

@@ -5,8 +5,8 @@ use glam::Vec3;
 use pipeline::frame::render_depth;
 use pipeline::{Camera, Draw, PipelineSpec, Settings, Viewport};
 
-use crate::accumulation::{SharedSamples, Snapshot};
-use crate::job::{Emit, JobError};
+use crate::accumulation::{SharedSamples, Snapshot, SnapshotError};
+use crate::job::{Emit, JobError, shifted};
 
 /// How the samples of a set are rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,15 +49,12 @@ pub fn see(
     let mut seen =
         Seen { samples: vec![(0, 0); viewport.pixels() * each], counts: Counts::default(), triangles: 0 };
     for (index, at) in set.samples().iter().enumerate() {
-        let unmade = |error: crate::accumulation::SnapshotError| JobError::Setting(error.to_string());
+        let unmade = |error: SnapshotError| JobError::Setting(error.to_string());
         let snapshot = Snapshot::new(camera, draws, viewport, at).map_err(unmade)?;
         let still = snapshot.draws().map_err(unmade)?;
         let samples = set.still(index);
         let settings = Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
-        let mut pass = |packet: &activity::Packet, lines: &[activity::LineAccess]| {
-            emit(&activity::Packet { pass: index as u16, ..packet.clone() }, lines);
-        };
-        let (one, counts) = render_depth(&snapshot.camera, &still, &settings, &mut pass)?;
+        let (one, counts) = render_depth(&snapshot.camera, &still, &settings, shifted(index as u16, emit))?;
         seen.counts += &counts;
         seen.triangles += of_a_pass;
         seen.samples.iter_mut().skip(index).step_by(each).zip(one).for_each(|(into, from)| *into = from);

@@ -189,7 +189,8 @@ impl Bench {
     }
 }
 
-/// The width in texels of a straight ramp across an image, from the variance of its slope; the box of a texel adds its own.
+/// The width in texels of a straight ramp across an image, from the variance of its slope; the boxes of a texel and of a
+/// difference add their own.
 fn ramp(image: &[Vec3], width: usize) -> f64 {
     let column = |x: usize| image.iter().skip(x).step_by(width).map(|pixel| f64::from(pixel.x)).sum::<f64>();
     let columns: Vec<f64> = (0..width).map(column).collect();
@@ -197,7 +198,7 @@ fn ramp(image: &[Vec3], width: usize) -> f64 {
     let total: f64 = slopes.iter().sum();
     let moment =
         |power: i32| slopes.iter().enumerate().map(|(x, s)| s * (x as f64).powi(power)).sum::<f64>() / total;
-    (12.0 * (moment(2) - moment(1) * moment(1)) - 1.0).max(0.0).sqrt()
+    (12.0 * (moment(2) - moment(1) * moment(1)) - 2.0).max(0.0).sqrt()
 }
 
 /// White all over.
