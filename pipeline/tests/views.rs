@@ -68,9 +68,9 @@ fn a_single_view_is_what_render_gives_packet_by_packet() {
         let spec = spec(Features::ALL);
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         let settings = settings(&spec, viewport, table);
-        let (images, _) =
-            render_views(camera, draws, &settings, &[0..PER_PIXEL], |p, _| ours.push(p.clone())).unwrap();
-        let image = render(camera, draws, &settings, |p| theirs.push(p.clone())).unwrap().image;
+        let all: Vec<_> = std::iter::once(0..PER_PIXEL).collect();
+        let (images, _) = render_views(camera, draws, &settings, &all, |p, _| ours.push(*p)).unwrap();
+        let image = render(camera, draws, &settings, |p| theirs.push(*p)).unwrap().image;
         assert_eq!(bits(&images[0]), bits(&image));
         assert_eq!(ours, theirs);
     });

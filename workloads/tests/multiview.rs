@@ -120,7 +120,7 @@ fn shading_is_reused_between_views_as_far_as_the_cache_goes() {
 }
 
 fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>, u32) {
-    let overrides = Overrides { size: Some((32, 24)), ..Overrides::default() };
+    let overrides = Overrides { size: Some((64, 48)), ..Overrides::default() };
     let options = Options { scene: "tiny".to_owned(), ..options };
     let job = MultiView::new(options, &overrides, 1).unwrap();
     let mut sum = activity::Counts::default();
@@ -134,13 +134,13 @@ fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>
 fn the_job_shows_views_side_by_side_interlaced_or_alone() {
     let spec = spec();
     let (pair, _, width) = drawn(Options::default(), &spec);
-    assert_eq!((pair.len(), width), (64 * 24, 64));
+    assert_eq!((pair.len(), width), (128 * 48, 128));
     let (left, ..) = drawn(Options { show: Show::One, ..Options::default() }, &spec);
-    assert_eq!(bits(&left[32..64]), bits(&pair[64..96]), "the left half of the second row");
+    assert_eq!(bits(&left[64..128]), bits(&pair[128..192]), "the left half of the second row");
     let options =
         Options { views: 7, spacing: 0.05, overlap: 2, show: Show::Interlaced, ..Options::default() };
     let (panel, _, width) = drawn(options, &spec);
-    assert_eq!((panel.len(), width), (32 * 24, 32));
+    assert_eq!((panel.len(), width), (64 * 48, 64));
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn each_bad_regime_is_told() {
     let big = PipelineSpec { shading_cache: CacheSpec::lru(16_384, 4), ..spec() };
     let near = Options { spacing: 0.15, aperture: 0.05, ..Options::default() };
     assert_eq!(drawn(near.clone(), &big).1, Vec::<&str>::new());
-    let small = PipelineSpec { shading_cache: CacheSpec::lru(4, 4), ..spec() };
+    let small = PipelineSpec { shading_cache: CacheSpec::lru(2, 2), ..spec() };
     assert_eq!(drawn(near, &small).1, ["shading-cache-small"]);
     let wide = Options { spacing: 1.5, ..Options::default() };
     assert!(drawn(wide, &big).1.contains(&"view-dependent-shading"));

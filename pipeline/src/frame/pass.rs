@@ -48,7 +48,7 @@ pub(super) struct Pass<'a> {
 impl<'a> Pass<'a> {
     /// A pass with an image of all samples.
     pub fn new(camera: &Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
-        Self::with_views(camera, draws, settings, vec![0..settings.samples.per_pixel()])
+        Self::with_views(camera, draws, settings, std::iter::once(0..settings.samples.per_pixel()).collect())
     }
 
     /// A pass with an image for each run of samples, or with depths only.

@@ -25,7 +25,7 @@ pub(crate) fn shifted<'e>(
     first: u16,
     emit: &'e mut (dyn FnMut(&Packet, &[LineAccess]) + 'e),
 ) -> impl FnMut(&Packet, &[LineAccess]) + 'e {
-    move |packet, lines| emit(&Packet { pass: packet.pass.saturating_add(first), ..packet.clone() }, lines)
+    move |packet, lines| emit(&Packet { pass: packet.pass.saturating_add(first), ..*packet }, lines)
 }
 
 /// A number that a job found out.

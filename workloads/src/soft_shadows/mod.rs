@@ -1,8 +1,8 @@
 //! Motion-blurred soft shadows from a five-dimensional shadow map (thesis, Paper VI, section 7).
 //!
 //! The lens of the light's camera is the area of the light, focused at infinity, and all texels share a small fixed set of places on
-//! it and in time. So the map is an array of ordinary shadow maps, one for each `(u, v, t)`, made in one pass ([`ShadowMap::one_pass`])
-//! rather than in as many ([`ShadowMap::accumulated`], accumulation buffering). The pass that is shaded has the same set, and each of its
+//! it and in time. So the map is an array of ordinary shadow maps, one for each `(u, v, t)`, made in one pass ([`Method::OnePass`])
+//! rather than in as many ([`Method::Accumulation`]). The pass that is shaded has the same set, and each of its
 //! samples looks into the map of its own `(u, v, t)` ([`World::image`]).
 //!
 //! - [`AreaLight`]: the light and where it sees a point.
