@@ -6,6 +6,9 @@
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
 //! - [`job`] is for work that is more than one rendering of a scene.
 //! - [`caustics`] draws refracted and reflected light, beams as moving triangles.
+//! - [`glossy`] makes glossy reflections and refractions on planar receivers.
+//! - [`multiview`] draws stereo and multi-view images in one pass.
+//! - [`soft_shadows`] makes motion-blurred shadows of area lights; [`accumulation`] is what it is held against.
 //! - [`collision`] finds the pairs of moving objects that may collide.
 //! - [`occlusion`] finds objects that are hidden at all times and from everywhere on the lens.
 //! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
@@ -25,18 +28,22 @@
 //! World space is that of glTF: right-handed, y up. Camera space is x right, y up, z forward. Scenes are
 //! deterministic: the same file gives the same bits on every machine.
 
+pub mod accumulation;
 pub mod builtin;
 pub mod caustics;
 pub mod collision;
 mod error;
+pub mod glossy;
 mod import;
 pub mod job;
 mod load;
 pub mod material;
+pub mod multiview;
 pub mod occlusion;
 mod samples;
 pub mod scene;
 pub mod shapes;
+pub mod soft_shadows;
 pub mod stress;
 pub mod visibility;
 

@@ -14,6 +14,8 @@ mod tile_tests;
 mod vertices;
 mod worker;
 
+use std::ops::Range;
+
 use activity::{Counts, Event, LineAccess, Packet, PacketKind};
 use glam::Vec3;
 use judge::Judge;
@@ -67,20 +69,79 @@ pub fn render_with_heat(
 ) -> Result<(Rendered, Vec<HeatMap>), CacheError> {
     let mut pass = Pass::new(camera, draws, settings);
     pass.heat = !events.is_empty();
-    let mut heat: Vec<_> = events.iter().map(|&event| HeatMap::new(event, &pass)).collect();
+    let (images, counts, heat) = draw(&pass, events, &mut emit)?;
+    Ok((Rendered { image: images.into_iter().flatten().collect(), counts }, heat))
+}
+
+/// Renders several images in one pass: image `k` is the mean of those samples of each pixel whose indices are in `views[k]`.
+/// Runs may overlap; indices beyond the samples of a pixel add nothing, and an image of no samples is black.
+///
+/// # Errors
+/// When a cache of the settings cannot be built.
+pub fn render_views(
+    camera: &Camera,
+    draws: &[Draw<'_>],
+    settings: &Settings<'_>,
+    views: &[Range<u32>],
+    mut emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<(Vec<Vec<Vec3>>, Counts), CacheError> {
+    let within = views.iter().map(|run| run.start..run.end.min(settings.samples.per_pixel()).max(run.start));
+    let pass = Pass::with_views(camera, draws, settings, within.collect());
+    if pass.is_depth_only() {
+        return Ok((Vec::new(), Counts::default()));
+    }
+    draw(&pass, &[], &mut emit).map(|(images, counts, _)| (images, counts))
+}
+
+/// A pass that leaves depths and no image, such as a shadow map: nothing is shaded, and the depths are written to memory. What
+/// each sample sees is told as by [`visibility`].
+///
+/// # Errors
+/// When a cache of the settings cannot be built.
+pub fn render_depth(
+    camera: &Camera,
+    draws: &[Draw<'_>],
+    settings: &Settings<'_>,
+    mut emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<(Vec<(u32, u32)>, Counts), CacheError> {
+    let pass = Pass::with_views(camera, draws, settings, Vec::new());
+    let (mut counts, mut replay) = (Counts::default(), Replay::new(&pass)?);
+    let mut emit = |packet: &Packet, lines: &[LineAccess]| {
+        counts += &packet.counts;
+        emit(packet, lines);
+    };
+    let bins = rasterize(&pass, &mut replay, &mut |done: Done<'_>| {
+        if let Done::Packet(packet, lines) = done {
+            emit(packet, lines);
+        }
+    });
+    replay.finish(&mut emit);
+    Ok((resolve::visible(&pass, &bins), counts))
+}
+
+/// Images, counts and heat.
+type Drawn = (Vec<Vec<Vec3>>, Counts, Vec<HeatMap>);
+
+/// A pass from its draws to its images.
+fn draw(
+    pass: &Pass<'_>,
+    events: &[Event],
+    emit: &mut impl FnMut(&Packet, &[LineAccess]),
+) -> Result<Drawn, CacheError> {
+    let mut heat: Vec<_> = events.iter().map(|&event| HeatMap::new(event, pass)).collect();
     let mut counts = Counts::default();
-    let mut replay = Replay::new(&pass)?;
+    let mut replay = Replay::new(pass)?;
     let mut emit = |work: Done<'_>| match work {
         Done::Packet(packet, lines) => {
             counts += &packet.counts;
             heat.iter_mut().for_each(|map| map.packet(packet));
             emit(packet, lines);
         }
-        Done::Tests(number, bin, log) => heat.iter_mut().for_each(|map| map.tests(&pass, number, bin, log)),
+        Done::Tests(number, bin, log) => heat.iter_mut().for_each(|map| map.tests(pass, number, bin, log)),
     };
-    let bins = rasterize(&pass, &mut replay, &mut emit);
+    let bins = rasterize(pass, &mut replay, &mut emit);
     replay.finish(&mut |packet: &Packet, lines: &[LineAccess]| emit(Done::Packet(packet, lines)));
-    Ok((Rendered { image: resolve::resolve(&pass, &bins), counts }, heat))
+    Ok((resolve::resolve(pass, &bins), counts, heat))
 }
 
 /// Something that was done, told in order.
@@ -101,7 +162,7 @@ pub fn visibility(
     draws: &[Draw<'_>],
     settings: &Settings<'_>,
 ) -> Result<Vec<(u32, u32)>, CacheError> {
-    let pass = Pass::new(camera, draws, settings);
+    let pass = Pass::with_views(camera, draws, settings, Vec::new());
     let bins = rasterize(&pass, &mut Replay::new(&pass)?, &mut |_: Done<'_>| ());
     Ok(resolve::visible(&pass, &bins))
 }

@@ -41,10 +41,23 @@ pub(super) struct Pass<'a> {
     pub eye: Vec4,
     /// Whether workers note where tile tests are done.
     pub heat: bool,
+    /// The samples of a pixel that each image is the mean of; without any the pass leaves depths only and shades nothing.
+    pub views: Vec<Range<u32>>,
 }
 
 impl<'a> Pass<'a> {
+    /// A pass with an image of all samples.
     pub fn new(camera: &Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
+        Self::with_views(camera, draws, settings, std::iter::once(0..settings.samples.per_pixel()).collect())
+    }
+
+    /// A pass with an image for each run of samples, or with depths only.
+    pub fn with_views(
+        camera: &Camera,
+        draws: &'a [Draw<'a>],
+        settings: &'a Settings<'a>,
+        views: Vec<Range<u32>>,
+    ) -> Self {
         let projection = Projection::new(camera, settings.viewport);
         let vertices = draws.iter().map(|draw| projection.images(&draw.geometry)).collect();
         let first_triangle = std::iter::once(0)
@@ -59,13 +72,14 @@ impl<'a> Pass<'a> {
             settings,
             vertices,
             first_triangle,
-            addresses: addresses(draws, settings),
+            addresses: addresses(draws, settings, views.len()),
             origin: [Viewport::edge(0, viewport.width()), Viewport::edge(0, viewport.height())],
             lens: !projection.shear.is_none(),
             clip: camera.clip(),
             still_camera: camera.open() == camera.close(),
             eye: projection.eye(),
             heat: false,
+            views,
             projection,
         }
     }
@@ -118,13 +132,24 @@ impl<'a> Pass<'a> {
         BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
     }
 
+    /// Whether depths are all that is asked for.
+    pub fn is_depth_only(&self) -> bool {
+        self.views.is_empty()
+    }
+
+    /// Fine tiles of the image.
+    pub fn tiles(&self) -> u64 {
+        let rows = self.settings.viewport.height().div_ceil(self.settings.spec.tile_px);
+        u64::from(self.tiles_across()) * u64::from(rows)
+    }
+
     /// Fine tiles in a row of the image.
     pub fn tiles_across(&self) -> u32 {
         self.settings.viewport.width().div_ceil(self.settings.spec.tile_px)
     }
 }
 
-fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>) -> AddressMap {
+fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>, images: usize) -> AddressMap {
     let mut memory = Allocator::default();
     let (viewport, tile_px) = (settings.viewport, settings.spec.tile_px);
     let tiles =
@@ -133,7 +158,7 @@ fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>) -> AddressMap {
     let samples = pixels * u64::from(settings.samples.per_pixel());
     let mut known: Vec<(*const Texture, u64)> = Vec::new();
     let (depth, colour, image) =
-        (memory.take(samples * 4), memory.take(samples * 4), memory.take(pixels * 4));
+        (memory.take(samples * 4), memory.take(samples * 4), memory.take(pixels * 4 * images as u64));
     let vertices = draws
         .iter()
         .map(|draw| memory.take(draw.geometry.open().len() as u64 * u64::from(draw.geometry.vertex_bytes())))

@@ -115,7 +115,7 @@ impl<'a> Replay<'a> {
         counts[Event::DepthReads] = work.hit - work.unread;
         counts[Event::DepthReadsSkipped] = work.unread;
         counts[Event::DepthWrites] = work.written;
-        counts[Event::ColourWrites] = work.written;
+        counts[Event::ColourWrites] = if self.pass.is_depth_only() { 0 } else { work.written };
         self.compress(work);
         let base = self.pass.addresses.depth;
         self.lines(work.tile, work.read_pixels, |this, line, pixels| {
@@ -128,6 +128,9 @@ impl<'a> Replay<'a> {
                 Shading::Cached => self.shade(work.triangle, quads, counts),
                 Shading::PerSample => self.shade_samples(work.triangle, quads, counts),
             }
+        }
+        if self.pass.is_depth_only() {
+            return packet;
         }
         let base = self.pass.addresses.colour;
         self.lines(work.tile, work.written_pixels, |this, line, _| {
@@ -227,29 +230,34 @@ impl<'a> Replay<'a> {
         open.into_iter().for_each(|(line, held)| each(self, line, held));
     }
 
-    /// The packets that resolve the tiles of a bin.
+    /// The packets that resolve the tiles of a bin; depths stay what they are.
     pub fn resolve(&mut self, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
+        if self.pass.is_depth_only() {
+            return;
+        }
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
             let packet = self.resolve_tile(tile, pixels, touched);
             self.tell(&packet, emit);
         }
     }
 
-    /// The end of the frame: the image leaves the caches.
+    /// The end of the frame: the images, or the depths where there are none, leave the caches.
     pub fn finish(&mut self, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
-        let image = self.pass.addresses.image;
-        let end = self.pass.addresses.vertices.first().copied().unwrap_or(u64::MAX);
-        self.memory.finish(image..end, &mut last.counts);
+        let at = &self.pass.addresses;
+        let end = at.vertices.first().copied().unwrap_or(u64::MAX);
+        let kept = if self.pass.is_depth_only() { at.depth..at.colour } else { at.image..end };
+        self.memory.finish(kept, &mut last.counts);
         self.tell(&last, emit);
     }
 
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
         let mut packet = super::packet(PacketKind::Resolve, tile, u32::MAX);
         let counts = &mut packet.counts;
-        counts[Event::PixelsResolved] = pixels.count_ones();
+        counts[Event::PixelsResolved] = pixels.count_ones() * self.pass.views.len() as u32;
         if touched {
-            counts[Event::SamplesResolved] = pixels.count_ones() * self.pass.settings.samples.per_pixel();
+            let samples: u32 = self.pass.views.iter().map(ExactSizeIterator::len).sum::<usize>() as u32;
+            counts[Event::SamplesResolved] = pixels.count_ones() * samples;
             let (colour, depth) = (self.pass.addresses.colour, self.pass.addresses.depth);
             self.lines(tile, pixels, |this, line, _| {
                 let fresh = !this.colour_used[line as usize];
@@ -260,9 +268,11 @@ impl<'a> Replay<'a> {
         }
         let side = u64::from(self.pass.settings.spec.tile_px);
         let bytes = side * side * SAMPLE_BYTES;
-        let first = self.pass.addresses.image + u64::from(tile) * bytes;
-        for line in first / LINE_BYTES..=(first + bytes - 1) / LINE_BYTES {
-            self.memory.colour(line * LINE_BYTES, true, true, counts);
+        for view in 0..self.pass.views.len() as u64 {
+            let first = self.pass.addresses.image + (view * self.pass.tiles() + u64::from(tile)) * bytes;
+            for line in first / LINE_BYTES..=(first + bytes - 1) / LINE_BYTES {
+                self.memory.colour(line * LINE_BYTES, true, true, counts);
+            }
         }
         packet
     }

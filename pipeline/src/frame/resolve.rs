@@ -14,21 +14,23 @@ use super::surface::{Grid, Surface};
 use crate::depth::DepthTile;
 use crate::sampling::{TileSamples, mix};
 
-/// The image: each pixel the mean of its samples.
-pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec3> {
+/// The images: each pixel the mean of its samples.
+pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
     let viewport = pass.settings.viewport;
     let tiles: Vec<_> = bins.par_iter().map(|bin| resolve_bin(pass, bin)).collect();
-    let mut image = vec![pass.settings.background; viewport.pixels()];
+    let mut images = vec![vec![pass.settings.background; viewport.pixels()]; pass.views.len()];
+    let side = pass.settings.spec.tile_px;
     for (origin, pixels) in tiles.into_iter().flatten() {
-        let side = pass.settings.spec.tile_px;
-        for (pixel, colour) in (0..).zip(pixels) {
-            let [x, y] = [origin[0] + pixel % side, origin[1] + pixel / side];
-            if x < viewport.width() && y < viewport.height() {
-                image[y as usize * viewport.width() as usize + x as usize] = colour;
+        for (image, of_view) in images.iter_mut().zip(pixels.chunks_exact((side * side) as usize)) {
+            for (pixel, colour) in (0..).zip(of_view) {
+                let [x, y] = [origin[0] + pixel % side, origin[1] + pixel / side];
+                if x < viewport.width() && y < viewport.height() {
+                    image[y as usize * viewport.width() as usize + x as usize] = *colour;
+                }
             }
         }
     }
-    image
+    images
 }
 
 /// The triangle each sample sees and the bits of its depth, pixel by pixel in rows.
@@ -51,7 +53,7 @@ pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
     seen
 }
 
-/// The touched tiles of a bin: the first pixel of each and its pixels, row by row.
+/// The touched tiles of a bin: the first pixel of each and its pixels, view by view and row by row.
 fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
     let mut samples = TileSamples::default();
     let mut scratch = Scratch::default();
@@ -89,8 +91,14 @@ fn resolve_tile(
     origin: [u32; 2],
     scratch: &mut Scratch,
 ) -> Vec<Vec3> {
-    let side = pass.settings.spec.tile_px;
-    let mut sums = vec![Vec3::ZERO; (side * side) as usize];
+    let (side, per_pixel) = (pass.settings.spec.tile_px, pass.settings.samples.per_pixel());
+    let pixels = (side * side) as usize;
+    let mut sums = vec![Vec3::ZERO; pixels * pass.views.len()];
+    let mut add = |slot: usize, colour: Vec3| {
+        let (pixel, index) = (samples.pixel[slot] as usize, samples.in_pixel(slot, per_pixel));
+        let views = pass.views.iter().enumerate().filter(|(_, samples)| samples.contains(&index));
+        views.for_each(|(view, _)| sums[view * pixels + pixel] += colour);
+    };
     scratch.slots.clear();
     scratch.slots.extend(0..samples.len as u16);
     // Stable, so that sums are made in one order.
@@ -98,9 +106,7 @@ fn resolve_tile(
     for group in scratch.slots.chunk_by(|&a, &b| tile.triangle[a as usize] == tile.triangle[b as usize]) {
         let triangle = tile.triangle[group[0] as usize];
         if triangle == DepthTile::NOTHING {
-            for &slot in group {
-                sums[samples.pixel[slot as usize] as usize] += pass.settings.background;
-            }
+            group.iter().for_each(|&slot| add(slot as usize, pass.settings.background));
             continue;
         }
         let (corners, moving) = pass.moving_corners(triangle);
@@ -115,11 +121,11 @@ fn resolve_tile(
                     *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(cell))
                 }
             };
-            sums[samples.pixel[slot] as usize] += colour;
+            add(slot, colour);
         }
     }
-    let per_pixel = pass.settings.samples.per_pixel() as f32;
-    sums.into_iter().map(|sum| sum / per_pixel).collect()
+    let counts = pass.views.iter().map(|samples| samples.len().max(1) as f32);
+    sums.chunks_exact(pixels).zip(counts).flat_map(|(sums, n)| sums.iter().map(move |sum| *sum / n)).collect()
 }
 
 /// Spreads the two coordinates of a cell; the map is never iterated, so nothing depends on its order.

@@ -140,7 +140,9 @@ impl<'a, 'p> Worker<'a, 'p> {
             }
             let tested = self.samples(subject, &tile, &mut left, place);
             if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
-                self.ask_for_quads(subject.triangle, place, origin);
+                if !self.pass.is_depth_only() {
+                    self.ask_for_quads(subject.triangle, place, origin);
+                }
                 let small = self.small_pixels(subject.triangle, place, origin);
                 self.record(subject.triangle.id, (tested, small), in_front, origin);
             }

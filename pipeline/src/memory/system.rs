@@ -121,17 +121,21 @@ impl MemorySystem {
         (first..=last).for_each(|line| shared(&mut self.l2, Unit::Command, line, false, counts));
     }
 
-    /// The end of the frame: what the display will read leaves the L2; depths and sample colours are not needed again.
-    pub fn finish(&mut self, image: std::ops::Range<u64>, counts: &mut PacketCounts) {
-        for line in self.colour.cache.flush() {
-            if image.contains(&(line * LINE_BYTES)) {
-                shared(&mut self.l2, Unit::Colour, line, true, counts);
+    /// The end of the frame: what is `kept`, images or depths, leaves the L2; all else is not needed again.
+    pub fn finish(&mut self, kept: std::ops::Range<u64>, counts: &mut PacketCounts) {
+        let mut unit = Unit::Colour;
+        for client in [&mut self.colour, &mut self.depth] {
+            for line in client.cache.flush() {
+                if kept.contains(&(line * LINE_BYTES)) {
+                    unit = client.unit;
+                    shared(&mut self.l2, unit, self.halves.place(line), true, counts);
+                }
             }
         }
-        let written = self.l2.cache.flush().into_iter().filter(|line| image.contains(&(line * LINE_BYTES)));
+        let written = self.l2.cache.flush().into_iter().filter(|line| kept.contains(&(line * LINE_BYTES)));
         for line in written {
             counts[Event::DramWriteBytes] += LINE_BYTES as u32;
-            self.l2.log.push(access_to(Unit::Colour, line, LineKind::Drain, None));
+            self.l2.log.push(access_to(unit, line, LineKind::Drain, None));
         }
     }
 }
@@ -237,6 +241,15 @@ mod tests {
         memory.colour(2048, true, true, &mut counts);
         memory.finish(2048..4096, &mut counts);
         assert_eq!(counts[Event::DramWriteBytes], 64);
+    }
+
+    #[test]
+    fn depths_that_are_kept_are_written_and_colours_then_are_not() {
+        let (mut memory, mut counts) = (system(), PacketCounts::default());
+        (0..3).for_each(|line| memory.depth(64 * line, true, true, &mut counts));
+        memory.colour(1024, true, true, &mut counts);
+        memory.finish(0..1024, &mut counts);
+        assert_eq!(counts[Event::DramWriteBytes], 3 * 64);
     }
 
     #[test]

@@ -127,6 +127,11 @@ impl TileSamples {
         (y * viewport.width() as usize + x) * per_pixel as usize + sample as usize
     }
 
+    /// The index in its pixel of the sample in `slot`, of `per_pixel`.
+    pub fn in_pixel(&self, slot: usize, per_pixel: u32) -> u32 {
+        u32::from(self.order[slot]) % per_pixel
+    }
+
     fn resize(&mut self, padded: usize) {
         let [lens_x, lens_y] = &mut self.lens;
         let [slope_x, slope_y] = &mut self.slope;

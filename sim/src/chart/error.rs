@@ -28,5 +28,7 @@ pub enum ChartError {
     #[error("the pipeline does not take the scene: {0}")]
     Pipeline(String),
     #[error(transparent)]
+    Job(#[from] workloads::job::JobError),
+    #[error(transparent)]
     Output(#[from] OutputError),
 }

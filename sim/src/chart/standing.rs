@@ -4,11 +4,14 @@ use serde::Serialize;
 
 use super::collision::CollisionChart;
 use super::frames::{Axis, FramesChart, Outcome, Way};
+use super::glossy::GlossyChart;
 use super::growth::GrowthChart;
 use super::sampled::SampledChart;
 use super::sampling::SamplingChart;
+use super::shadows::ShadowsChart;
 use super::tile_tests::TileTests;
 use super::timing::TimingChart;
+use super::views::ViewsChart;
 
 /// A level of a method: what it costs and how wrong it is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -139,6 +142,44 @@ impl Standings for CollisionChart {
                 row.two, row.many, row.missed
             );
             standing("pairs that may collide", &level, error, format!("{:.3} ms a pair", 1e3 * row.pair_s))
+        };
+        self.rows.iter().map(row).collect()
+    }
+}
+
+impl Standings for ShadowsChart {
+    fn standings(&self) -> Vec<Standing> {
+        let Some(row) = self.rows.last() else { return Vec::new() };
+        let error = format!("RMSE {:.4}", row.rmse);
+        let both = [("one pass", &row.one_pass), ("accumulation", &row.accumulation)];
+        let both = both.map(|(name, cost)| {
+            let level = format!("{name}, {} places on the light", row.points);
+            standing("soft shadows", &level, error.clone(), format!("{:.2} s", cost.host_s))
+        });
+        both.to_vec()
+    }
+}
+
+/// One pass has no error of its own besides that of shading for the middle of the line.
+impl Standings for ViewsChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::views::Row| {
+            let cost = format!(
+                "{:.2} times the shader runs of one view ({:.2} view by view)",
+                row.one_pass.over_one_view, row.view_by_view.over_one_view
+            );
+            standing("many views", &format!("{} views in one pass", row.views), "none".to_owned(), cost)
+        };
+        self.rows.iter().map(row).collect()
+    }
+}
+
+impl Standings for GlossyChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::glossy::Row| {
+            let level = format!("one pass, {} samples a texel", row.samples);
+            let subject = format!("glossy {}", row.effect);
+            standing(&subject, &level, format!("RMSE {:.4}", row.rmse), format!("{:.3} s", row.host_s))
         };
         self.rows.iter().map(row).collect()
     }

@@ -264,6 +264,8 @@ pub enum ChartArg {
     Caustics,
     /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
     Frames,
+    /// Glossy reflection and refraction: error over samples, contact hardening, lenses too wide
+    Glossy,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
     /// Hidden objects found over tests and bytes, by intervals and by samples
@@ -272,10 +274,14 @@ pub enum ChartArg {
     Sampled,
     /// Image error over samples per pixel and over host time, for every sample table
     Sampling,
+    /// Soft shadows: error over places on the light, one pass against accumulation, and the bias
+    Shadows,
     /// Every combination of tile tests: efficiency and tightness over multiply-adds
     TileTests,
     /// Every level of timing: error against the reference over host time
     Timing,
+    /// Stereo and multi-view: shader runs over views and caches, one pass against its rivals
+    Views,
 }
 
 /// Arguments of `list`.

@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{caustics, collision, frames, growth, occlusion, sampled};
+use crate::chart::{caustics, collision, frames, glossy, growth, occlusion, sampled, shadows, views};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -74,12 +74,15 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
         ChartArg::Collision => chart_collision(args, progress),
         ChartArg::Caustics => chart_caustics(args, progress),
         ChartArg::Frames => chart_frames(args, progress),
+        ChartArg::Glossy => chart_glossy(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
         ChartArg::Occlusion => chart_occlusion(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
+        ChartArg::Shadows => chart_shadows(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
         ChartArg::Timing => chart_timing(args, dir, progress),
+        ChartArg::Views => chart_views(args, progress),
     }
 }
 
@@ -116,6 +119,12 @@ fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> 
     Done::new(&chart, text)
 }
 
+fn chart_glossy(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { glossy::Effort::QUICK } else { glossy::Effort::FULL };
+    let chart = glossy::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
+}
+
 fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
     let chart = growth::chart(effort, &args.out, progress)?;
@@ -135,6 +144,13 @@ fn chart_sampled(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<
     let chart = sampled::sampled(&args.scene, effort, progress)?;
     chart.write(dir).map_err(RunError::from)?;
     Done::new(&chart, format!("{}\n{}", chart.text(), chart.cost_text()))
+}
+
+fn chart_shadows(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { shadows::Effort::QUICK } else { shadows::Effort::FULL };
+    let chart = shadows::chart(effort, &args.out, progress)?;
+    let fault = (!chart.is_equal()).then(|| "one pass and accumulation differ; please report it".to_owned());
+    Ok(Done { fault, ..Done::new(&chart, chart.text())? })
 }
 
 fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
@@ -159,6 +175,12 @@ fn chart_timing(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<D
         started.elapsed().as_secs_f64()
     );
     Done::new(&chart, text)
+}
+
+fn chart_views(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { views::Effort::QUICK } else { views::Effort::FULL };
+    let chart = views::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
 }
 
 /// Exponents and errors, a row for each scene and table.

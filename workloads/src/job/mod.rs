@@ -20,6 +20,14 @@ pub use passes::{FrontEnd, Passes, TileWork, Touch};
 /// Where the packets of a frame go, with the lines each asks the L2 for, in the order of the modelled hardware.
 pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
 
+/// Packets go out as those of passes from `first` on.
+pub(crate) fn shifted<'e>(
+    first: u16,
+    emit: &'e mut (dyn FnMut(&Packet, &[LineAccess]) + 'e),
+) -> impl FnMut(&Packet, &[LineAccess]) + 'e {
+    move |packet, lines| emit(&Packet { pass: packet.pass.saturating_add(first), ..*packet }, lines)
+}
+
 /// A number that a job found out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fact {
@@ -100,6 +108,21 @@ const JOBS: &[(&str, &str, Maker)] = &[
         "occlusion",
         "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
         crate::occlusion::job,
+    ),
+    (
+        "glossy",
+        "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
+        crate::glossy::job,
+    ),
+    (
+        "multiview",
+        "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
+        crate::multiview::job,
+    ),
+    (
+        "soft-shadows",
+        "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
+        crate::soft_shadows::job,
     ),
 ];
 

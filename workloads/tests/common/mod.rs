@@ -148,3 +148,30 @@ pub fn expect(text: &str, parts: &[&str]) {
         assert!(text.contains(part), "`{part}` is not in: {text}");
     }
 }
+
+/// Hardware for tests: everything switched on, caches as those of the reference GPU.
+pub fn spec() -> pipeline::PipelineSpec {
+    let lines = pipeline::CacheSpec::lru(256, 4);
+    pipeline::PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 64,
+        batch_triangles: 65_536,
+        vertex_reuse: 32,
+        shading: pipeline::Shading::Cached,
+        shading_cache: pipeline::CacheSpec::lru(1024, 8),
+        memory: pipeline::MemorySpec {
+            depth: lines,
+            colour: lines,
+            texture: lines,
+            l2: pipeline::CacheSpec::lru(4096, 16),
+            compression: Default::default(),
+        },
+        features: pipeline::Features::ALL,
+        depth: Default::default(),
+    }
+}
+
+/// An image to the bit.
+pub fn bits(image: &[glam::Vec3]) -> Vec<[u32; 3]> {
+    image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
+}

@@ -5,9 +5,10 @@ use pipeline::SampleSpec;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::measure::{Point, errors, image, mean_square, point, reference, sweep, table};
+use super::measure::{Point, image, point, reference, sweep, table};
 use super::stages::{Fence, Stage};
 use super::{ChartError, Effort, Row, fitted};
+use crate::chart::image::{errors, mean_square, neighbours};
 use crate::output::progress::Bar;
 
 /// Regimes in which the default table is no better than others.
@@ -92,13 +93,4 @@ fn shared(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Shar
         })
     };
     names().map(row).collect()
-}
-
-/// The correlation of the errors of pixels side by side, in rows of `width` pixels of three channels.
-pub(super) fn neighbours(errors: &[f64], width: usize) -> f64 {
-    let products =
-        errors.chunks_exact(3 * width).flat_map(|row| row.iter().zip(&row[3..]).map(|(a, b)| a * b));
-    let (sum, count) = products.fold((0.0, 0_u32), |(sum, count), product| (sum + product, count + 1));
-    let squares = mean_square(errors);
-    if count == 0 || squares == 0.0 { 0.0 } else { sum / f64::from(count) / squares }
 }

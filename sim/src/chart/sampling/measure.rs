@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::stages::Stage;
 use super::{ChartError, Effort};
+use crate::chart::image::{errors, mean_square};
 use crate::gpu::GpuSpec;
 
 /// One measurement.
@@ -54,17 +55,6 @@ pub(super) fn reference(stage: &Stage, effort: &Effort) -> Result<Vec<Vec3>, Cha
         (sum / frames.len() as f64).as_vec3()
     };
     Ok((0..frames[0].len()).map(mean).collect())
-}
-
-/// The differences of two images, channel by channel.
-pub(super) fn errors(image: &[Vec3], reference: &[Vec3]) -> Vec<f64> {
-    let pixels = image.iter().zip(reference);
-    pixels.flat_map(|(a, b)| (*a - *b).to_array()).map(f64::from).collect()
-}
-
-/// The mean of the squares.
-pub(super) fn mean_square(errors: &[f64]) -> f64 {
-    errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64
 }
 
 /// Error and time of one table at one number of samples.

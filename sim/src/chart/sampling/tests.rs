@@ -1,5 +1,5 @@
-use super::failures::neighbours;
 use super::*;
+use crate::chart::image::neighbours;
 
 /// Small enough for a test.
 const SMALL: Effort = Effort {

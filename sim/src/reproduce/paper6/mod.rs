@@ -2,14 +2,17 @@
 
 mod caustics;
 mod collision;
+mod glossy;
 mod occlusion;
+mod shadows;
+mod views;
 
 use super::{Done, Effort};
 use crate::output::progress::Progress;
 use crate::run::RunError;
 
 pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, RunError> {
-    let uses = [occlusion::rows, collision::rows, caustics::rows];
+    let uses = [occlusion::rows, collision::rows, caustics::rows, glossy::rows, shadows::rows, views::rows];
     let mut rows = Vec::new();
     for rows_of in uses {
         rows.extend(rows_of(effort, progress)?);

@@ -1,0 +1,172 @@
+//! `quintile chart views`: stereo and multi-view in one pass against view by view and accumulation.
+//!
+//! What is shaded once serves all views, the lens and the shutter. The measure is pixel shader lanes run, over those that one of the
+//! views takes alone on the same hardware.
+
+mod gloss;
+mod measure;
+mod output;
+
+use std::path::Path;
+
+use pipeline::Replacement;
+use serde::Serialize;
+use workloads::multiview::Layout;
+
+use super::ChartError;
+use crate::output::OutDir;
+use crate::output::progress::Progress;
+
+pub use measure::{Angle, Bench, Cached, Row, Run};
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Effort {
+    /// The built-in scene, and its frame.
+    pub scene: (&'static str, u32),
+    /// Pixels of each view, across and down.
+    pub size: [u32; 2],
+    /// Numbers of views.
+    pub views: &'static [u32],
+    /// Entries of the shading cache.
+    pub entries: &'static [u32],
+    /// Lengths of the camera line over the distance of what is in focus, for view-dependent shading.
+    pub baselines: &'static [f64],
+}
+
+impl Effort {
+    /// The chart of the book.
+    pub const FULL: Self = Self {
+        scene: ("default", 18),
+        size: [320, 180],
+        views: &[1, 2, 7, 9, 64],
+        entries: &[64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
+        baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
+    };
+    /// A look in seconds.
+    pub const QUICK: Self = Self {
+        size: [128, 72],
+        views: &[1, 2, 7, 64],
+        entries: &[64, 256, 1024, 16_384],
+        baselines: &[0.05, 0.4],
+        ..Self::FULL
+    };
+}
+
+/// Samples for each view of a pixel (thesis, Paper VI, section 8).
+pub const SAMPLES: u32 = 8;
+/// Distance of the eyes over that of what is in focus, the photographer's rule of thumb.
+const EYES: f64 = 1.0 / 30.0;
+/// Radius of a view's aperture, scene units: that of the scene's own lens.
+const APERTURE: f64 = 0.11;
+
+/// Two eyes that look at what is `focus` away.
+pub fn stereo(focus: f64) -> Layout {
+    Layout::stereo(EYES * focus, APERTURE)
+}
+
+/// So many views on a line as long as both eyes and their lenses take, each with a box filter that overlaps half of the next.
+pub fn line(views: u32, focus: f64) -> Layout {
+    Layout::line(views, EYES * focus + 2.0 * APERTURE, APERTURE)
+}
+
+/// The policies, each with its name.
+pub const POLICIES: [(&str, Replacement); 3] =
+    [("lru", Replacement::Lru), ("fifo", Replacement::Fifo), ("random", Replacement::Random { seed: 1 })];
+
+/// Everything the chart found.
+#[derive(Clone, Debug, Serialize)]
+pub struct ViewsChart {
+    /// How much was measured.
+    pub effort: Effort,
+    /// By number of views.
+    pub rows: Vec<Row>,
+    /// Two and seven views, by policy and entries of the cache.
+    pub caches: Vec<Cached>,
+    /// What shading for the middle of the line leaves out, by its length.
+    pub angles: Vec<Angle>,
+}
+
+/// Measures the chart and writes it into `out`.
+///
+/// # Errors
+/// [`ChartError`], above all when `out` cannot be written to.
+pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<ViewsChart, ChartError> {
+    let dir = OutDir::create(out)?;
+    dir.remove_stale("", "views", &["svg", "png", "csv", "json"])?;
+    let chart = measure(effort, progress)?;
+    output::write(&chart, &dir)?;
+    Ok(chart)
+}
+
+/// Measures without writing.
+///
+/// # Errors
+/// [`ChartError`] when the scene cannot be drawn.
+pub fn measure(effort: Effort, progress: &Progress) -> Result<ViewsChart, ChartError> {
+    let steps = effort.views.len() + 2 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
+    let bar = progress.bar("views", steps as u64);
+    let bench = Bench::new(effort.scene, effort.size)?;
+    let ticked = |done| {
+        bar.inc();
+        done
+    };
+    let rows = effort.views.iter().map(|&views| ticked(bench.row(views)));
+    let rows = rows.collect::<Result<_, _>>()?;
+    let mut caches = Vec::new();
+    for layout in [stereo(bench.focus()), line(7, bench.focus())] {
+        for policy in POLICIES {
+            for &entries in effort.entries {
+                caches.push(bench.cached(layout, policy, entries)?);
+                bar.inc();
+            }
+        }
+    }
+    let mut angles = Vec::new();
+    for &baseline in effort.baselines {
+        angles.push(bench.angle(baseline)?);
+        bar.inc();
+    }
+    Ok(ViewsChart { effort, rows, caches, angles })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEAST: Effort = Effort {
+        scene: ("tiny", 1),
+        size: [40, 30],
+        views: &[1, 2, 7],
+        entries: &[16, 1024],
+        baselines: &[0.05, 0.8],
+    };
+
+    #[test]
+    fn one_pass_shades_less_than_its_rivals_and_fails_where_it_must() {
+        let chart = measure(LEAST, &Progress::new(true)).unwrap();
+        for row in &chart.rows[1..] {
+            assert!(row.one_pass.over_one_view < row.view_by_view.over_one_view, "{row:?}");
+            assert!(row.one_pass.over_one_view < row.accumulation.over_one_view, "{row:?}");
+            assert!(
+                (row.view_by_view.over_one_view - f64::from(row.views)).abs() < 0.3 * f64::from(row.views)
+            );
+        }
+        for pair in chart.caches.chunks_exact(2) {
+            assert!(pair[0].invocations_per_pixel > pair[1].invocations_per_pixel, "{pair:?}");
+        }
+        let (near, far) = (&chart.angles[0], &chart.angles[1]);
+        assert!(far.rmse_shiny > 1.5 * near.rmse_shiny, "{near:?} {far:?}");
+        assert!(far.rmse_shiny > far.rmse_matt, "{far:?}");
+    }
+
+    #[test]
+    fn the_files_are_all_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let effort = Effort { views: &[1, 2], entries: &[64], baselines: &[0.1], ..LEAST };
+        chart(effort, folder.path(), &Progress::new(true)).unwrap();
+        for file in ["views.csv", "views.json", "views_cost.svg", "views_cache.png", "views_failures.svg"] {
+            assert!(folder.path().join(file).exists(), "{file}");
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Rays through moving triangles, one against all: slow and sure.
+
+use glam::{DVec3, Vec3};
+use pipeline::Draw;
+
+/// A triangle at both ends of the shutter, in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Face {
+    /// Corners when the shutter opens and when it closes.
+    pub ends: [[Vec3; 3]; 2],
+    /// The draw it belongs to.
+    pub draw: usize,
+}
+
+impl Face {
+    /// The corners at time `t`.
+    pub fn at(&self, t: f32) -> [DVec3; 3] {
+        let [open, close] = self.ends.map(|end| end.map(|corner| corner.as_dvec3()));
+        std::array::from_fn(|k| open[k] + f64::from(t) * (close[k] - open[k]))
+    }
+}
+
+/// Triangles that rays may hit, numbered as a pass numbers them.
+#[derive(Clone, Debug, Default)]
+pub struct Rays {
+    faces: Vec<Face>,
+}
+
+impl Rays {
+    /// The triangles of `draws`.
+    pub fn new(draws: &[Draw<'_>]) -> Self {
+        let faces = draws.iter().enumerate().flat_map(|(draw, of)| {
+            let geometry = of.geometry;
+            let ends = move |corners: &[u32; 3]| {
+                [geometry.open(), geometry.close()].map(|end| corners.map(|vertex| end[vertex as usize]))
+            };
+            geometry.triangles().iter().map(move |corners| Face { ends: ends(corners), draw })
+        });
+        Self { faces: faces.collect() }
+    }
+
+    /// The triangles.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// Whether anything but the triangle `but` stands between two points at time `t`.
+    pub fn blocked(&self, from: DVec3, to: DVec3, t: f32, but: u32) -> bool {
+        let inside = (1e-6, 1.0 - 1e-6);
+        let others = self.faces.iter().enumerate().filter(|(id, _)| *id != but as usize);
+        others
+            .map(|(_, face)| hit(from, to - from, &face.at(t)))
+            .any(|at| at.is_some_and(|(distance, _)| inside.0 < distance && distance < inside.1))
+    }
+
+    /// The first triangle along a ray at time `t` beyond `nearest` times `along`, with its distance in lengths of `along`.
+    pub fn first(&self, from: DVec3, along: DVec3, t: f32, nearest: f64) -> Option<(usize, f64)> {
+        let hits = self.faces.iter().enumerate().filter_map(|(id, face)| {
+            let (distance, _) = hit(from, along, &face.at(t))?;
+            (distance > nearest).then_some((id, distance))
+        });
+        hits.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// Where the line `from + s along` meets a triangle: `s` and two barycentric coordinates (Möller and Trumbore 1997).
+fn hit(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<(f64, [f64; 2])> {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let across = along.cross(ac);
+    let det = ab.dot(across);
+    if det == 0.0 {
+        return None;
+    }
+    let to = from - *a;
+    let u = to.dot(across) / det;
+    let turned = to.cross(ab);
+    let v = along.dot(turned) / det;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| (ac.dot(turned) / det, [u, v]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_meets_a_moving_triangle_where_it_then_is() {
+        let at = |x: f32| [Vec3::new(x, -1.0, 2.0), Vec3::new(x + 2.0, -1.0, 2.0), Vec3::new(x, 3.0, 2.0)];
+        let rays = Rays { faces: vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }] };
+        let first = |t| rays.first(DVec3::ZERO, DVec3::Z, t, 0.0);
+        assert_eq!(first(0.5), Some((0, 2.0)));
+        assert_eq!((first(0.0), first(1.0)), (None, None));
+        assert!(rays.blocked(DVec3::ZERO, DVec3::Z * 4.0, 0.5, 7));
+        assert!(!rays.blocked(DVec3::ZERO, DVec3::Z * 4.0, 0.5, 0), "its own triangle does not count");
+        assert!(!rays.blocked(DVec3::ZERO, DVec3::Z * 1.9, 0.5, 7));
+    }
+}

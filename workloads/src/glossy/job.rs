@@ -1,0 +1,196 @@
+//! Glossy reflection or refraction as a job: the map, and the scene with the map on its receiver.
+
+use activity::{Event, Warning};
+use glam::{DVec3, Vec3};
+use pipeline::frame::render_with_heat;
+use pipeline::{Camera, Cull, Draw, Geometry, PipelineSpec, Rendered, SampleSpec, SampleTable, Viewport};
+use serde::{Deserialize, Serialize};
+
+use super::map::Map;
+use super::receiver::{Effect, Receiver};
+use super::stage::{receiver, stage};
+use super::surface::ReceiverShader;
+use crate::error::LoadError;
+use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
+use crate::scene::{Frame, Overrides, Scene, Settings};
+
+/// Options of the job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// A built-in scene or a file; the stage of this workload without it.
+    pub scene: Option<String>,
+    /// Middle of the receiver, which lies in a plane of constant height and is seen from above; scene units.
+    pub centre: [f64; 3],
+    /// Half of its sides along x and z, scene units.
+    pub half: [f64; 2],
+    /// Refraction instead of reflection, with this index.
+    pub index: Option<f64>,
+    /// Radius of the lens, scene units: the roughness. 0 is a mirror.
+    pub roughness: f64,
+    /// Texels of the map from the near to the far side of the receiver.
+    pub texels: u32,
+    /// Samples of a texel.
+    pub map_samples: u32,
+    /// Share of light from straight above that goes into the map; the rest shows the surface's own colour.
+    pub fresnel: f32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let Receiver { centre, half, .. } = receiver();
+        Self {
+            scene: None,
+            centre: centre.to_array(),
+            half,
+            index: None,
+            roughness: 0.25,
+            texels: 128,
+            map_samples: 16,
+            fresnel: 0.6,
+        }
+    }
+}
+
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
+        if !self.half.iter().all(|half| *half > 0.0 && half.is_finite()) {
+            return refused("half", format!("{:?}: both have to be finite lengths above zero", self.half));
+        }
+        if !(self.roughness >= 0.0 && self.roughness.is_finite()) {
+            return refused("roughness", format!("{}: it is a finite radius, 0 or above", self.roughness));
+        }
+        if !(0.0..=1.0).contains(&self.fresnel) {
+            return refused("fresnel", format!("{}: it is a share, 0 to 1", self.fresnel));
+        }
+        match self.map_samples {
+            1..=SampleTable::MAX_PER_PIXEL => Ok(()),
+            samples => refused("map_samples", format!("{samples}: a texel takes 1 to 256")),
+        }
+    }
+}
+
+/// The job.
+pub struct Glossy {
+    scene: Scene,
+    receiver: Receiver,
+    options: Options,
+    seed: u64,
+}
+
+fn refused(error: impl std::fmt::Display) -> JobError {
+    JobError::Setting(error.to_string())
+}
+
+/// Linear RGB radiance of the receiver's own surface.
+const BASE: Vec3 = Vec3::new(0.10, 0.11, 0.12);
+
+impl Glossy {
+    /// A glossy receiver in the scene of `options`, settings changed by `overrides`.
+    ///
+    /// # Errors
+    /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
+    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+        let scene = match &options.scene {
+            Some(name) => crate::load(name)?,
+            None => stage(options.index.is_some())?,
+        };
+        let scene = scene.with_overrides(overrides)?;
+        options.check()?;
+        let receiver = Receiver::lying(DVec3::from_array(options.centre), options.half);
+        let job = Self { scene, receiver, options, seed };
+        let first = job.scene.settings().frames.start;
+        let frame = job.scene.frame(first);
+        let frame =
+            frame.map_err(|error| LoadError::Setting { setting: "frames", message: error.to_string() })?;
+        job.map(&frame)?;
+        Ok(job)
+    }
+
+    fn effect(&self) -> Effect {
+        self.options.index.map_or(Effect::Reflection, Effect::Refraction)
+    }
+
+    fn map(&self, frame: &Frame) -> Result<Map, LoadError> {
+        let world = frame.camera.open().inverse();
+        let (eye, along) = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
+        let Options { roughness, texels, .. } = self.options;
+        Map::new(&self.receiver, (eye, along), self.effect(), roughness, texels)
+    }
+
+    fn table(&self, samples: u32) -> Result<SampleTable, JobError> {
+        SampleSpec::default().table(samples, self.seed).map_err(refused)
+    }
+
+    /// The scene with the map on its receiver.
+    fn show(
+        &self,
+        (map, texels): (&Map, &[Vec3]),
+        (camera, mut draws): (&Camera, Vec<Draw<'_>>),
+        spec: &PipelineSpec,
+        emit: Emit<'_>,
+    ) -> Result<Rendered, JobError> {
+        let shader =
+            ReceiverShader::new(texels, map.viewport, BASE, self.options.fresnel).map_err(refused)?;
+        let (corners, uvs) = (self.receiver.corners(), map.uvs());
+        let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]);
+        let geometry = geometry.and_then(|geometry| geometry.with_uvs(&uvs)).map_err(refused)?;
+        let settings = self.scene.settings();
+        let viewport = Viewport::new(settings.width, settings.height)
+            .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
+        let samples = self.table(settings.samples)?;
+        let background = self.scene.background();
+        let settings = pipeline::Settings { spec, viewport, samples: &samples, background };
+        let receiver = Draw { geometry, shader: &shader, cull: Cull::None };
+        let draws: Vec<Draw<'_>> = draws.drain(..).chain([receiver]).collect();
+        Ok(render_with_heat(camera, &draws, &settings, &[], emit)?.0)
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        let (radius, least) = (self.options.roughness, self.receiver.half[0].min(self.receiver.half[1]));
+        let message = format!(
+            "the lens is {radius} in radius and the receiver {least} in half its shorter side: texels at its rim gather from quite other \
+             directions than a surface of one roughness would, and samples are too few for the blur"
+        );
+        (radius > least).then(|| Warning::new("lens-wider-than-receiver", message)).into_iter().collect()
+    }
+}
+
+impl Job for Glossy {
+    fn settings(&self) -> &Settings {
+        self.scene.settings()
+    }
+
+    fn is_animated(&self) -> bool {
+        self.scene.is_animated()
+    }
+
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let frame = self.scene.frame(number)?;
+        let map = self.map(&frame).map_err(refused)?;
+        let draws: Vec<_> =
+            frame.draws(&self.scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+        let samples = self.table(self.options.map_samples)?;
+        let (texels, mut counts) = map.one_pass(&draws, &samples, (spec, self.scene.background()), emit)?;
+        let facts = vec![
+            Fact { name: "map_texels", value: map.viewport.pixels() as f64 },
+            Fact { name: "map_samples_tested", value: counts[Event::SamplesTested] as f64 },
+            Fact { name: "blur_at_height_1", value: map.blur(1.0) },
+        ];
+        let image = self.show((&map, &texels), (&frame.camera, draws), spec, &mut shifted(1, emit))?;
+        counts += &image.counts;
+        let first = number == self.scene.settings().frames.start;
+        let warnings = if first { self.warnings() } else { Vec::new() };
+        let (triangles, moving) = (2 * frame.triangle_count() + 2, self.is_animated());
+        Ok(Drawn { image: image.image, counts, triangles, moving, lens: true, facts, warnings })
+    }
+}
+
+/// The job by its options.
+///
+/// # Errors
+/// As [`Glossy::new`].
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    Ok(Box::new(Glossy::new(options.read()?, request.overrides, request.seed)?))
+}

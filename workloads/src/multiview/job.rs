@@ -1,0 +1,234 @@
+//! Multi-view as a job.
+
+use activity::{Event, Warning};
+use pipeline::{CacheSpec, Draw, PipelineSpec, Viewport};
+use serde::{Deserialize, Serialize};
+
+use super::layout::Layout;
+use super::lenticular::Panel;
+use super::rig::{Rig, Target, Views};
+use crate::error::LoadError;
+use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request};
+use crate::scene::{Overrides, Scene, Settings};
+
+/// How views become the one image that is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Show {
+    /// Side by side, the left eye's first: for parallel eyes. Each view has its share of the width.
+    #[default]
+    SideBySide,
+    /// Interlaced for a lenticular panel.
+    Interlaced,
+    /// One view alone.
+    One,
+}
+
+/// Options of the job. Samples of a pixel are those of each view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// A built-in scene or a file.
+    pub scene: String,
+    /// Views.
+    pub views: u32,
+    /// From one view to the next, scene units.
+    pub spacing: f64,
+    /// Radius of a view's aperture, scene units.
+    pub aperture: f64,
+    /// Steps of the camera line that a view's box filter takes; 0 for small lenses apart.
+    pub overlap: u32,
+    /// Depth at which all views agree, scene units; that of the scene's lens without it.
+    pub focus: Option<f32>,
+    /// How the views are shown.
+    pub show: Show,
+    /// The panel, where they are interlaced.
+    pub panel: Panel,
+    /// View by view instead of one pass: the same images at another cost.
+    pub view_by_view: bool,
+    /// Whether the frame is drawn once more with a cache that holds everything, to tell what the cache misses.
+    pub check_cache: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let Layout { views, spacing, aperture, overlap } = Layout::default();
+        Self {
+            scene: "default".to_owned(),
+            views,
+            spacing,
+            aperture,
+            overlap,
+            focus: None,
+            show: Show::default(),
+            panel: Panel::default(),
+            view_by_view: false,
+            check_cache: true,
+        }
+    }
+}
+
+impl Options {
+    /// Where the views are.
+    pub fn layout(&self) -> Layout {
+        let Self { views, spacing, aperture, overlap, .. } = *self;
+        Layout { views, spacing, aperture, overlap }
+    }
+}
+
+/// The job.
+pub struct MultiView {
+    scene: Scene,
+    options: Options,
+    settings: Settings,
+    view: Viewport,
+    seed: u64,
+}
+
+impl MultiView {
+    /// Views of the scene of `options`, settings changed by `overrides`: without a size 320x180 pixels for each view.
+    ///
+    /// # Errors
+    /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
+    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+        let size = overrides.size.or(Some((320, 180)));
+        let scene = crate::load(&options.scene)?.with_overrides(&Overrides { size, ..overrides.clone() })?;
+        options.panel.check()?;
+        let settings = scene.settings().clone();
+        let across = if options.show == Show::SideBySide { options.views.max(1) } else { 1 };
+        let settings = Settings { width: settings.width.saturating_mul(across), ..settings };
+        settings.check()?;
+        let view = Viewport::new(settings.width / across, settings.height);
+        let refused = |message: &str| LoadError::Setting { setting: "size", message: message.to_owned() };
+        let view = view.ok_or_else(|| refused("views of no size"))?;
+        let job = Self { scene, options, settings, view, seed };
+        job.rig(job.settings.frames.start).map_err(|error| match error {
+            RigError::Load(error) => error,
+            RigError::Frame(error) => refused(&error.to_string()),
+        })?;
+        Ok(job)
+    }
+
+    fn rig(&self, number: u32) -> Result<Rig, RigError> {
+        let frame = self.scene.frame(number).map_err(RigError::Frame)?;
+        let lens = frame.camera.lens().map(|lens| lens.focus());
+        let focus = self.options.focus.or(lens).ok_or_else(|| {
+            let message = "the scene has no lens and so no depth at which views agree: give one".to_owned();
+            RigError::Load(LoadError::Setting { setting: "focus", message })
+        })?;
+        let samples = self.settings.samples;
+        Rig::new(&frame.camera, focus, &self.options.layout(), samples, self.seed).map_err(RigError::Load)
+    }
+
+    fn shown(&self, views: &Views) -> Vec<glam::Vec3> {
+        let width = self.view.width();
+        match self.options.show {
+            Show::One => views.images[0].clone(),
+            Show::Interlaced => self.options.panel.interlace(&views.images, width),
+            Show::SideBySide => {
+                let rows = (0..self.view.height() as usize).map(|row| row * width as usize);
+                rows.flat_map(|from| {
+                    views.images.iter().flat_map(move |image| &image[from..from + width as usize]).copied()
+                })
+                .collect()
+            }
+        }
+    }
+
+    /// A view that depends on the direction to the viewer is shaded for the middle of the line only.
+    fn angle_warning(&self, rig: &Rig) -> Option<Warning> {
+        let lens = rig.camera().lens()?;
+        let angle = 2.0 * libm::atan2(f64::from(lens.radius()), f64::from(lens.focus())).to_degrees();
+        let shiny = self.scene.materials().iter().any(|material| !material.unlit);
+        (shiny && angle > MOST_DEG).then(|| {
+            let message = format!(
+                "views see the same point from up to {angle:.0} degrees apart, and shading is that of their middle: highlights do \
+                 not move with the viewer"
+            );
+            Warning::new("view-dependent-shading", message)
+        })
+    }
+}
+
+/// Views farther apart than this, seen from what is in focus, show highlights at visibly wrong places.
+const MOST_DEG: f64 = 6.0;
+/// A cache that holds everything.
+const ALL: CacheSpec = CacheSpec::lru(1 << 22, 16);
+/// The shader runs over those with a cache that holds everything, beyond which the cache is too small.
+const MOST_RUNS: f64 = 1.5;
+
+/// Why there is no rig.
+enum RigError {
+    Load(LoadError),
+    Frame(crate::FrameError),
+}
+
+impl Job for MultiView {
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn is_animated(&self) -> bool {
+        self.scene.is_animated()
+    }
+
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let frame = self.scene.frame(number)?;
+        let draws = frame.draws(&self.scene)?;
+        let rig = self.rig(number).map_err(|error| match error {
+            RigError::Load(error) => JobError::Setting(error.to_string()),
+            RigError::Frame(error) => JobError::Frame(error),
+        })?;
+        let to = Target { viewport: self.view, spec, background: self.scene.background() };
+        let views = if self.options.view_by_view {
+            rig.view_by_view(&draws, &to, emit)?
+        } else {
+            rig.one_pass(&draws, &to, emit)?
+        };
+        let mut facts = vec![
+            Fact { name: "pixel_invocations", value: views.counts[Event::PixelInvocations] as f64 },
+            Fact { name: "invocations_per_pixel_and_view", value: per_pixel(&views, self.view) },
+        ];
+        let mut warnings: Vec<_> = self.angle_warning(&rig).into_iter().collect();
+        if self.options.check_cache {
+            let value = over_everything(&rig, &draws, &to, &views)?;
+            facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value });
+            warnings.extend(cache_warning(value, spec));
+        }
+        warnings.retain(|_| number == self.settings.frames.start);
+        let triangles = frame.triangle_count() * views.passes as usize;
+        let image = self.shown(&views);
+        Ok(Drawn { image, counts: views.counts, triangles, moving: true, lens: true, facts, warnings })
+    }
+}
+
+/// The shader runs of `views` over those of one pass with a cache that holds everything.
+fn over_everything(rig: &Rig, draws: &[Draw<'_>], to: &Target<'_>, views: &Views) -> Result<f64, JobError> {
+    let everything = PipelineSpec { shading_cache: ALL, ..*to.spec };
+    let to = Target { spec: &everything, ..*to };
+    let least = rig.one_pass(draws, &to, &mut |_, _| ())?.counts[Event::PixelInvocations];
+    Ok(views.counts[Event::PixelInvocations] as f64 / least.max(1) as f64)
+}
+
+fn per_pixel(views: &Views, viewport: Viewport) -> f64 {
+    views.counts[Event::PixelInvocations] as f64 / (viewport.pixels() * views.images.len()) as f64
+}
+
+fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
+    (ratio > MOST_RUNS).then(|| {
+        let message = format!(
+            "the shader runs {ratio:.2} times as often as with a cache that holds everything: {} entries are fewer than are in use at \
+             a time; a larger cache, or fewer views and samples",
+            spec.shading_cache.entries
+        );
+        Warning::new("shading-cache-small", message)
+    })
+}
+
+/// The job by its options.
+///
+/// # Errors
+/// As [`MultiView::new`].
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    Ok(Box::new(MultiView::new(options.read()?, request.overrides, request.seed)?))
+}

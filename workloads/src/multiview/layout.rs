@@ -1,0 +1,155 @@
+//! Where views are on the camera line.
+
+use std::ops::Range;
+
+use pipeline::sampling::{LensRegion, LensRegions};
+use serde::{Deserialize, Serialize};
+
+use crate::error::LoadError;
+
+/// Views on a camera line, from left to right, all the same distance apart.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Layout {
+    /// How many.
+    pub views: u32,
+    /// From one to the next, scene units.
+    pub spacing: f64,
+    /// Radius of each view's aperture across the line, and along it where views are apart; scene units.
+    pub aperture: f64,
+    /// How many steps of the line the box filter of a view takes: 1 for views side by side, 2 for views that overlap by half, and so
+    /// on. 0 for views apart, each with a small lens of its own.
+    pub overlap: u32,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self::stereo(0.28, 0.11)
+    }
+}
+
+/// The most views: their samples have to fit in a pixel.
+const MOST_VIEWS: u32 = 128;
+
+impl Layout {
+    /// Two small lenses of radius `aperture`, their middles `spacing` apart.
+    pub const fn stereo(spacing: f64, aperture: f64) -> Self {
+        Self { views: 2, spacing, aperture, overlap: 0 }
+    }
+
+    /// `views` on a line of the given length, each with a box filter that overlaps half of the next.
+    pub fn line(views: u32, length: f64, aperture: f64) -> Self {
+        Self { views, spacing: length / f64::from(views + 1), aperture, overlap: 2 }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// Names the first that cannot be, and what would do.
+    pub fn check(&self) -> Result<(), LoadError> {
+        let refused = |setting, message| Err(LoadError::Setting { setting, message });
+        if !(1..=MOST_VIEWS).contains(&self.views) {
+            return refused("views", format!("{}: there can be 1 to {MOST_VIEWS}", self.views));
+        }
+        for (setting, value) in [("spacing", self.spacing), ("aperture", self.aperture)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return refused(setting, format!("{value}: it has to be a finite length above zero"));
+            }
+        }
+        if self.overlap == 0 && self.views > 1 && self.spacing < 2.0 * self.aperture {
+            let message = format!(
+                "{}: apart, lenses of radius {} need twice that; or give an `overlap` of 1 or more",
+                self.spacing, self.aperture
+            );
+            return refused("spacing", message);
+        }
+        if self.overlap > 16 {
+            return refused("overlap", format!("{}: a filter takes 0 to 16 steps", self.overlap));
+        }
+        Ok(())
+    }
+
+    /// Parts of the lens that have samples of their own.
+    pub fn strips(&self) -> u32 {
+        self.views + self.overlap.max(1) - 1
+    }
+
+    /// Half the length of the camera line, or of the lens across it where that is more; scene units.
+    pub fn radius(&self) -> f64 {
+        let along = match self.overlap {
+            0 => 0.5 * f64::from(self.views - 1) * self.spacing + self.aperture,
+            _ => 0.5 * f64::from(self.strips()) * self.spacing,
+        };
+        along.max(self.aperture)
+    }
+
+    /// The middle of a view's part of the line, in lens coordinates.
+    pub fn middle(&self, view: u32) -> f64 {
+        (f64::from(view) - 0.5 * f64::from(self.views - 1)) * self.spacing / self.radius()
+    }
+
+    /// The regions of the lens, strip by strip.
+    pub fn regions(&self) -> LensRegions {
+        let (radius, steps) = (self.radius(), f64::from(self.strips()));
+        let high = ((self.aperture / radius) as f32).min(1.0);
+        let edge = |at: f64| ((at * self.spacing / radius) as f32).clamp(-1.0, 1.0);
+        let region = |strip: u32| {
+            let u = match self.overlap {
+                0 => [-1.0, 1.0].map(|side| {
+                    ((self.middle(strip) + side * self.aperture / radius) as f32).clamp(-1.0, 1.0)
+                }),
+                _ => [0.0, 1.0].map(|next| edge(f64::from(strip) + next - 0.5 * steps)),
+            };
+            LensRegion { u: (u[0], u[1]), v: (-high, high) }
+        };
+        LensRegions::Rectangles((0..self.strips()).map(region).collect())
+    }
+
+    /// The samples of each view, where each strip has `per_strip`.
+    pub fn runs(&self, per_strip: u32) -> Vec<Range<u32>> {
+        let strips = self.overlap.max(1);
+        (0..self.views).map(|view| view * per_strip..(view + strips) * per_strip).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_small_lenses_lie_at_the_ends_of_a_wide_one() {
+        let stereo = Layout::stereo(0.3, 0.1);
+        assert!((stereo.radius() - 0.25).abs() < 1e-12 && stereo.strips() == 2);
+        let regions = stereo.regions().rectangles().unwrap();
+        assert!((regions[0].u.0 + 1.0).abs() < 1e-6 && (regions[0].u.1 + 0.2).abs() < 1e-6, "{regions:?}");
+        assert_eq!(regions[0].v.1, 0.4);
+        assert_eq!(stereo.runs(8), [0..8, 8..16]);
+        assert!((stereo.middle(0) + 0.6).abs() < 1e-12 && stereo.middle(0) == -stereo.middle(1));
+    }
+
+    #[test]
+    fn overlapping_filters_share_strips_and_cover_the_line() {
+        let seven = Layout::line(7, 0.8, 0.1);
+        assert_eq!((seven.strips(), seven.runs(4)[1].clone()), (8, 4..12));
+        let regions = seven.regions().rectangles().unwrap();
+        assert_eq!((regions[0].u.0, regions[7].u.1), (-1.0, 1.0));
+        for view in 0..7 {
+            let middle = 0.5 * (regions[view].u.0 + regions[view + 1].u.1);
+            assert!((f64::from(middle) - seven.middle(view as u32)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let base = Layout::default();
+        for bad in [
+            Layout { views: 0, ..base },
+            Layout { spacing: 0.1, ..base },
+            Layout { aperture: f64::NAN, ..base },
+            Layout { overlap: 99, ..base },
+        ] {
+            assert!(bad.check().unwrap_err().is_usage());
+        }
+        assert!(base.check().is_ok() && Layout { views: 1, spacing: 0.1, ..base }.check().is_ok());
+    }
+}

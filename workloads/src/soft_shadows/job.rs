@@ -1,0 +1,184 @@
+//! Soft shadows as a job: the map, the samples that are seen, and their shading.
+
+use activity::{Counts, Event, Warning};
+use glam::{DVec3, Vec3};
+use pipeline::sampling::{Pattern, SampleSource, SampleSpec};
+use pipeline::{Cull, Draw, PipelineSpec, Viewport};
+use serde::{Deserialize, Serialize};
+
+use super::light::{AreaLight, LightSpec};
+use super::look_up::look_up_packets;
+use super::map::ShadowMap;
+use super::sees::{Method, see};
+use super::shade::{Shadows, World};
+use super::stage::stage;
+use crate::accumulation::SharedSamples;
+use crate::error::LoadError;
+use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
+use crate::scene::{Overrides, Scene, Settings};
+
+/// Options of the job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// A built-in scene or a file; the stage of this workload without it.
+    pub scene: Option<String>,
+    /// The light.
+    pub light: LightSpec,
+    /// Texels of the map across and down, even.
+    pub map_px: u32,
+    /// Depth by which a point may lie behind what the map holds and still be lit, scene units.
+    pub bias: f64,
+    /// Places `(u, v, t)` of one's own instead of the first points of a scrambled Sobol sequence, at least as many as samples.
+    pub points: Vec<(f32, f32, f32)>,
+    /// Accumulation buffering instead of one pass: the same image at another cost.
+    pub accumulate: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let light = LightSpec::default();
+        Self { scene: None, light, map_px: 256, bias: 0.06, points: Vec::new(), accumulate: false }
+    }
+}
+
+impl Options {
+    fn check(&self) -> Result<(), LoadError> {
+        let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
+        if !(2..=4096).contains(&self.map_px) || !self.map_px.is_multiple_of(2) {
+            let message = format!("{}: a shadow map is 2 to 4096 texels wide, an even number", self.map_px);
+            return refused("map_px", message);
+        }
+        if !(self.bias >= 0.0 && self.bias.is_finite()) {
+            return refused("bias", format!("{}: the bias is a finite depth, 0 or above", self.bias));
+        }
+        Ok(())
+    }
+}
+
+/// The job.
+pub struct SoftShadows {
+    scene: Scene,
+    light: AreaLight,
+    set: SharedSamples,
+    options: Options,
+}
+
+impl SoftShadows {
+    /// Soft shadows in the scene of `options`, settings changed by `overrides`. The samples of a pixel are the size of the set.
+    ///
+    /// # Errors
+    /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
+    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+        let scene = options.scene.as_deref().map_or_else(stage, crate::load)?.with_overrides(overrides)?;
+        options.check()?;
+        let light = AreaLight::new(&options.light)?;
+        let samples = scene.settings().samples;
+        let spec = SampleSpec::default();
+        let set = if options.points.is_empty() {
+            SharedSamples::interleaved(&spec, samples, seed)
+        } else {
+            let pattern = Pattern::Given { points: options.points.clone() };
+            SharedSamples::from_spec(&SampleSpec { pattern, ..spec }, samples, seed)
+        };
+        let set =
+            set.map_err(|error| LoadError::Setting { setting: "points", message: error.to_string() })?;
+        Ok(Self { scene, light, set, options })
+    }
+
+    fn method(&self) -> Method {
+        if self.options.accumulate { Method::Accumulation } else { Method::OnePass }
+    }
+
+    /// Passes that make the map.
+    fn passes(&self) -> u16 {
+        if self.options.accumulate { self.set.samples().len() as u16 } else { 1 }
+    }
+
+    fn facts(&self, map: &ShadowMap, shaded: &Counts) -> Vec<Fact> {
+        vec![
+            Fact { name: "shadow_map_bytes", value: map.bytes() as f64 },
+            Fact { name: "shadow_map_passes", value: f64::from(self.passes()) },
+            Fact { name: "shadow_map_samples_tested", value: map.counts[Event::SamplesTested] as f64 },
+            Fact { name: "look_ups", value: shaded[Event::TextureFetches] as f64 },
+        ]
+    }
+
+    /// Where the set or the bias is known to be bad.
+    fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let count = self.set.samples().len();
+        if count < Self::FEWEST {
+            let message = format!(
+                "{count} places on the light: penumbras show as {count} steps (bands); --samples {} or more",
+                Self::FEWEST
+            );
+            warnings.push(Warning::new("shadow-banding", message));
+        }
+        let texel = self.light.texel_width(DVec3::from_array(self.options.light.target), self.options.map_px);
+        let bias = self.options.bias;
+        if bias < Self::BIAS_TEXELS[0] * texel || bias > Self::BIAS_TEXELS[1] * texel {
+            let message = format!(
+                "the bias is {bias} and a texel of the map {texel:.3} scene units wide at the target: with less than half a texel \
+                 surfaces shade themselves (acne), with more than eight shadows come off what throws them"
+            );
+            warnings.push(Warning::new("shadow-bias", message));
+        }
+        warnings
+    }
+
+    /// With fewer places than this a penumbra shows as bands.
+    const FEWEST: usize = 16;
+    /// Widths of a texel between which the bias works.
+    const BIAS_TEXELS: [f64; 2] = [0.5, 8.0];
+}
+
+impl Job for SoftShadows {
+    fn settings(&self) -> &Settings {
+        self.scene.settings()
+    }
+
+    fn is_animated(&self) -> bool {
+        self.scene.is_animated()
+    }
+
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let (frame, settings) = (self.scene.frame(number)?, self.scene.settings());
+        let (draws, albedos) = parts(&self.scene, &frame)?;
+        let viewport = Viewport::new(settings.width, settings.height)
+            .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
+        let (camera, how, each) = (frame.camera.with_lens(None), (self.method(), spec), self.passes());
+        let map = ShadowMap::new((&self.light, &draws), self.options.map_px, &self.set, how, emit)?;
+        let seen = see((&camera, &draws), viewport, &self.set, how, &mut shifted(each, emit))?;
+        let world = World::new((&camera, &draws), viewport, &self.light, &albedos, self.scene.background());
+        let looks = (&self.set as &dyn SampleSource, &seen.samples[..]);
+        let shaded = look_up_packets(&world, looks, &map, spec, &mut shifted(2 * each, emit))?;
+        let shadows = Shadows::Map { map: &map, bias: self.options.bias };
+        let image = world.image(&self.set, &seen.samples, shadows);
+        let mut counts = map.counts;
+        counts += &seen.counts;
+        counts += &shaded;
+        let triangles = map.triangles + seen.triangles;
+        let facts = self.facts(&map, &shaded);
+        let warnings = if number == settings.frames.start { self.warnings() } else { Vec::new() };
+        Ok(Drawn { image, counts, triangles, moving: true, lens: true, facts, warnings })
+    }
+}
+
+/// The draws of a frame, both faces seen, and the reflectance of each.
+pub(crate) fn parts<'a>(
+    scene: &'a Scene,
+    frame: &'a crate::scene::Frame,
+) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
+    let draws = frame.draws(scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+    let drawn = frame.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
+    Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
+}
+
+/// The job by its options.
+///
+/// # Errors
+/// As [`SoftShadows::new`].
+pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    Ok(Box::new(SoftShadows::new(options.read()?, request.overrides, request.seed)?))
+}
