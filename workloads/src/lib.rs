@@ -31,6 +31,7 @@ pub mod job;
 mod load;
 pub mod material;
 mod samples;
+pub mod points;
 pub mod scene;
 pub mod shapes;
 pub mod stress;
