@@ -127,3 +127,6 @@ pub fn ball(dimensions: usize) -> f64 {
 pub fn radius_for(count: f64, dimensions: usize) -> f64 {
     (saturation(dimensions) / (ball(dimensions) * count)).powf(1.0 / dimensions as f64)
 }
+
+#[cfg(test)]
+mod tests;
