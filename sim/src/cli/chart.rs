@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{frames, growth, sampled};
+use crate::chart::{frames, growth, points, sampled};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -73,6 +73,7 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
         ChartArg::Frames => chart_frames(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
+        ChartArg::Points => chart_points(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
         ChartArg::TileTests => chart_tile_tests(args, progress),
@@ -94,6 +95,12 @@ fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> 
 fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
     let chart = growth::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
+}
+
+fn chart_points(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { points::Effort::QUICK } else { points::Effort::FULL };
+    let chart = points::chart(effort, &args.out, progress)?;
     Done::new(&chart, chart.text())
 }
 

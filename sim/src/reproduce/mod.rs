@@ -10,6 +10,7 @@
 mod figure;
 mod paper2;
 mod paper3;
+mod paper6;
 mod recording;
 mod report;
 mod row;
@@ -39,6 +40,10 @@ pub enum Paper {
     #[value(name = "III")]
     #[serde(rename = "III")]
     Three,
+    /// Design and Novel Uses of Higher-Dimensional Rasterization
+    #[value(name = "VI")]
+    #[serde(rename = "VI")]
+    Six,
 }
 
 impl Paper {
@@ -47,6 +52,7 @@ impl Paper {
         match self {
             Self::Two => "II",
             Self::Three => "III",
+            Self::Six => "VI",
         }
     }
 
@@ -54,6 +60,7 @@ impl Paper {
     pub const fn title(self) -> &'static str {
         match self {
             Self::Two => "Performance per What? Energy-Efficiency Units for Graphics",
+            Self::Six => "Design and Novel Uses of Higher-Dimensional Rasterization",
             Self::Three => "Per-frame Energy Measurement Methodology for Computer Graphics",
         }
     }
@@ -97,6 +104,7 @@ pub fn compute(paper: Paper, effort: Effort, progress: &Progress) -> Result<Repo
     let done = match paper {
         Paper::Two => paper2::rows(effort, progress),
         Paper::Three => paper3::rows(effort, progress),
+        Paper::Six => paper6::rows(effort, progress),
     }?;
     Ok(Report::new(paper, effort, done))
 }

@@ -90,7 +90,8 @@ pub struct Request<'a> {
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
 /// Every job: its name, what it is, and how it is made.
-const JOBS: &[(&str, &str, Maker)] = &[];
+const JOBS: &[(&str, &str, Maker)] =
+    &[("sampling", "dart throwing over voids that are drawn, until no point fits", crate::points::job::job)];
 
 /// Names of the jobs, each with a line that says what it is.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {

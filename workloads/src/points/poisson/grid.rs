@@ -271,6 +271,13 @@ impl<const D: usize> Grid<D> {
         Dart { slot: slot as u32, place, point }
     }
 
+    /// The dart at a point of the unit cube, moved to the lattice.
+    pub fn dart_at(&self, point: &[f64; D]) -> Dart<D> {
+        let cell = point.map(|x| self.cell_of(x));
+        let at = std::array::from_fn(|k| point[k] * self.across as f64 - cell[k] as f64);
+        self.dart(cell, self.slot(cell), at)
+    }
+
     fn cell_of(&self, x: f64) -> u64 {
         ((x * self.across as f64) as u64).min(self.across - 1)
     }

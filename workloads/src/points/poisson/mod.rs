@@ -20,7 +20,8 @@ mod throw;
 mod voids;
 
 pub use exact::closer;
-pub use throw::poisson_disk;
+pub use throw::{poisson_disk, poisson_disk_drawn};
+pub use voids::Cube;
 
 /// What lies beyond the unit square or cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -14,6 +14,21 @@ pub(super) struct Drop<const D: usize> {
     pub dart: Dart<D>,
 }
 
+/// What has fallen on many cells.
+#[derive(Debug)]
+pub(super) struct Fallen<const D: usize> {
+    /// The darts that are free of what was there before, in no order.
+    pub drops: Vec<Drop<D>>,
+    /// All of them.
+    pub darts: u64,
+}
+
+impl<const D: usize> Default for Fallen<D> {
+    fn default() -> Self {
+        Self { drops: Vec::new(), darts: 0 }
+    }
+}
+
 /// So many darts fall on a cell at most; that more would is less likely than 2^-64.
 const MOST: usize = 24;
 

@@ -1,8 +1,8 @@
 //! Level after level: throw, halve.
 
 use super::grid::{Dart, Grid};
-use super::rain::Rain;
-use super::voids::{Place, Voids};
+use super::rain::{Fallen, Rain};
+use super::voids::{Cube, Place, Voids};
 use super::{PoissonDisk, PoissonError, PoissonSpec};
 use crate::points::random::Stream;
 
@@ -15,24 +15,41 @@ const LATER: f64 = 0.6;
 /// # Errors
 /// [`PoissonError`] when the radius cannot be or memory would not do.
 pub fn poisson_disk<const D: usize>(spec: &PoissonSpec) -> Result<PoissonDisk<D>, PoissonError> {
-    const { assert!(D >= 1 && D <= 4) };
-    let least = 64.0 / spec.spacing.per_unit();
-    if !(spec.radius >= least && spec.radius <= 0.5) {
-        return Err(PoissonError::Radius { radius: spec.radius, least });
-    }
-    let mut throwing = Throwing { grid: Grid::new(spec)?, seed: spec.seed, darts: 0, voids: 0 };
-    let mut voids = Voids::everything(&throwing.grid);
+    let mut throwing = Throwing::new(spec)?;
+    let voids = Voids::everything(&throwing.grid);
     throwing.first(&voids);
-    while !voids.cells.is_empty() && !voids.is_full(&throwing.grid) && !throwing.is_last(&voids) {
-        voids = throwing.level(&voids);
+    Ok(throwing.finish(voids))
+}
+
+/// The same where the darts of the first `rounds` levels come from elsewhere: `draw` is given the voids and returns points of the unit
+/// cube, each uniform over all of the voids, in random order. Also how many points these made.
+///
+/// # Errors
+/// Those of `draw`; inside, as [`poisson_disk`].
+#[allow(clippy::type_complexity, reason = "the failures of two parties")]
+pub fn poisson_disk_drawn<const D: usize, E>(
+    spec: &PoissonSpec,
+    rounds: u32,
+    mut draw: impl FnMut(&[Cube<D>]) -> Result<Vec<[f64; D]>, E>,
+) -> Result<Result<(PoissonDisk<D>, usize), PoissonError>, E> {
+    let mut throwing = match Throwing::new(spec) {
+        Ok(throwing) => throwing,
+        Err(error) => return Ok(Err(error)),
+    };
+    let mut voids = Voids::everything(&throwing.grid);
+    for _ in 0..rounds {
+        if voids.cells.is_empty() || voids.is_full(&throwing.grid) || throwing.is_last(&voids) {
+            break;
+        }
+        for point in draw(&voids.cubes(&throwing.grid))? {
+            throwing.darts += 1;
+            throwing.keep(&throwing.grid.dart_at(&point));
+        }
+        throwing.voids += voids.cells.len() as u64;
+        voids = voids.halved(&throwing.grid, &Rain::new(Stream::new(0, 0), 0.0)).0;
     }
-    let mut voids = voids.widen();
-    while !voids.cells.is_empty() && !throwing.is_last(&voids) {
-        voids = throwing.level(&voids);
-    }
-    let thin_voids = throwing.number_by_number(&voids);
-    let Throwing { grid, darts, voids: all, .. } = throwing;
-    Ok(PoissonDisk { points: grid.points, darts, voids: all, levels: voids.level, thin_voids })
+    let drawn = throwing.grid.points.len();
+    Ok(Ok((throwing.finish(voids), drawn)))
 }
 
 /// What has been thrown so far.
@@ -44,6 +61,29 @@ struct Throwing<const D: usize> {
 }
 
 impl<const D: usize> Throwing<D> {
+    fn new(spec: &PoissonSpec) -> Result<Self, PoissonError> {
+        const { assert!(D >= 1 && D <= 4) };
+        let least = 64.0 / spec.spacing.per_unit();
+        if !(spec.radius >= least && spec.radius <= 0.5) {
+            return Err(PoissonError::Radius { radius: spec.radius, least });
+        }
+        Ok(Self { grid: Grid::new(spec)?, seed: spec.seed, darts: 0, voids: 0 })
+    }
+
+    /// Level after level until no void is left.
+    fn finish(mut self, mut voids: Voids<u32, D>) -> PoissonDisk<D> {
+        while !voids.cells.is_empty() && !voids.is_full(&self.grid) && !self.is_last(&voids) {
+            voids = self.level(&voids);
+        }
+        let mut voids = voids.widen();
+        while !voids.cells.is_empty() && !self.is_last(&voids) {
+            voids = self.level(&voids);
+        }
+        let thin_voids = self.number_by_number(&voids);
+        let Self { grid, darts, voids: all, .. } = self;
+        PoissonDisk { points: grid.points, darts, voids: all, levels: voids.level, thin_voids }
+    }
+
     fn is_last<P>(&self, voids: &Voids<P, D>) -> bool {
         self.grid.is_finest(voids.level)
     }
@@ -63,8 +103,9 @@ impl<const D: usize> Throwing<D> {
     /// Halves voids and throws at what is left of them.
     fn level<P: Place>(&mut self, voids: &Voids<P, D>) -> Voids<P, D> {
         let stream = Stream::new(self.seed, u64::from(voids.level) + 1);
-        let (left, mut drops) = voids.halved(&self.grid, &Rain::new(stream, LATER));
+        let (left, Fallen { mut drops, darts }) = voids.halved(&self.grid, &Rain::new(stream, LATER));
         self.voids += voids.cells.len() as u64;
+        self.darts += darts;
         drops.sort_unstable_by_key(|drop| drop.time);
         for drop in &drops {
             self.keep(&drop.dart);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::grid::{Dart, Grid, Near};
-use super::rain::{Drop, Rain};
+use super::rain::{Drop, Fallen, Rain};
 use crate::points::random::Stream;
 
 /// A number that says where a cell of a level is along an axis.
@@ -28,6 +28,15 @@ impl Place for u64 {
     fn get(self) -> u64 {
         self
     }
+}
+
+/// A cube of which some part may still be free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cube<const D: usize> {
+    /// Its low corner in the unit cube.
+    pub low: [f64; D],
+    /// Its side.
+    pub side: f64,
 }
 
 /// The cells of a level that are left.
@@ -83,20 +92,22 @@ impl<P: Place, const D: usize> Voids<P, D> {
         Some(grid.dart(cell, slot, place))
     }
 
-    /// The cells of the next level that no point is in and no single disk surely covers, and the darts of their rain that are free.
-    pub fn halved(&self, grid: &Grid<D>, rain: &Rain) -> (Self, Vec<Drop<D>>) {
+    /// The cells of the next level that no point is in and no single disk surely covers, and what falls on them.
+    pub fn halved(&self, grid: &Grid<D>, rain: &Rain) -> (Self, Fallen<D>) {
         let parts: Vec<_> = self.cells.par_chunks(CHUNK).map(|cells| self.part(grid, rain, cells)).collect();
         let mut left = Vec::with_capacity(parts.iter().map(|(cells, _)| cells.len()).sum());
-        let mut drops = Vec::with_capacity(parts.iter().map(|(_, drops)| drops.len()).sum());
+        let mut fallen = Fallen::default();
         for (cells, some) in parts {
             left.extend(cells);
-            drops.extend(some);
+            fallen.drops.extend(some.drops);
+            fallen.darts += some.darts;
         }
-        (Self { level: self.level + 1, cells: left }, drops)
+        (Self { level: self.level + 1, cells: left }, fallen)
     }
 
-    fn part(&self, grid: &Grid<D>, rain: &Rain, cells: &[[P; D]]) -> (Vec<[P; D]>, Vec<Drop<D>>) {
-        let (mut left, mut drops, mut near) = (Vec::with_capacity(cells.len()), Vec::new(), Near::new());
+    fn part(&self, grid: &Grid<D>, rain: &Rain, cells: &[[P; D]]) -> (Vec<[P; D]>, Fallen<D>) {
+        let (mut left, mut fallen, mut near) =
+            (Vec::with_capacity(cells.len()), Fallen::default(), Near::new());
         let side = 1.0 / (2_u64 << self.level) as f64;
         for parent in cells {
             let (cell, low) = split(parent, self.level);
@@ -116,14 +127,22 @@ impl<P: Place, const D: usize> Voids<P, D> {
                 let child = std::array::from_fn(|k| 2 * parent[k].get() + upper(k));
                 left.push(child.map(P::new));
                 rain.on(child, side, |time, within| {
+                    fallen.darts += 1;
                     let dart = grid.dart(cell, slot, std::array::from_fn(|k| low[k] + within[k]));
                     if grid.is_free_among(&near, &dart) {
-                        drops.push(Drop { time, dart });
+                        fallen.drops.push(Drop { time, dart });
                     }
                 });
             }
         }
-        (left, drops)
+        (left, fallen)
+    }
+
+    /// The cells in the unit cube.
+    pub fn cubes(&self, grid: &Grid<D>) -> Vec<Cube<D>> {
+        let side = 1.0 / (grid.across << self.level) as f64;
+        let cube = |cell: &[P; D]| Cube { low: cell.map(|at| at.get() as f64 * side), side };
+        self.cells.iter().map(cube).collect()
     }
 
     /// Every lattice point of a cell.

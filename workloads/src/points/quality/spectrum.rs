@@ -35,6 +35,17 @@ impl Spectrum {
         Self { power, count: points.len(), dimensions: D }
     }
 
+    /// The mean of spectra up to the same frequency; that of nothing is nothing.
+    pub fn mean(spectra: &[Self]) -> Self {
+        let Some(first) = spectra.first() else { return Self::default() };
+        let mean = |k: usize| spectra.iter().map(|s| s.power[k]).sum::<f64>() / spectra.len() as f64;
+        Self {
+            power: (0..first.power.len()).map(mean).collect(),
+            count: first.count,
+            dimensions: first.dimensions,
+        }
+    }
+
     /// Frequencies, in units of the mean rate of points along an axis, with their power.
     pub fn curve(&self) -> Vec<(f64, f64)> {
         let rate = (self.count as f64).powf(1.0 / self.dimensions as f64);

@@ -15,6 +15,8 @@ pub use solid::{Solid, SolidError};
 pub use standard::{Covered, standard_mode};
 pub use torus::Torus;
 
+pub(super) use standard::{camera, place};
+
 use super::random::Stream;
 
 /// What can be sampled.
@@ -25,3 +27,5 @@ pub trait Inside: Sync {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(super) use tests::hardware;

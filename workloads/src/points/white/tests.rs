@@ -55,7 +55,7 @@ fn another_density_is_told_apart() {
 
 #[test]
 fn low_discrepancy_fits_too_well() {
-    let even = WhiteSpec { numbers: Numbers::LowDiscrepancy, ..spec(20_000, 1) };
+    let even = WhiteSpec { numbers: Numbers::LowDiscrepancy, across: 1, ..spec(20_000, 1) };
     assert!(fit::<1>(&Named::Constant, &even, 50).p > 0.999);
     assert!(fit::<2>(&Named::Constant, &even, 20).p > 0.999);
 }
