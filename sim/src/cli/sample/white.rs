@@ -37,7 +37,7 @@ pub struct WhiteArgs {
 
 fn density(name: &str) -> Result<Named, String> {
     let known = Named::ALL.map(|(name, _)| name);
-    Named::named(name).ok_or_else(|| format!("no density is called `{name}`; {}", suggestion(name, &known)))
+    Named::by_name(name).ok_or_else(|| format!("no density is called `{name}`; {}", suggestion(name, &known)))
 }
 
 /// What is to be said of the points.

@@ -1,26 +1,14 @@
 //! Points in cells so small that each holds one at most, and the two questions that are asked of them.
 
 use super::exact::{FINEST_BITS, closer};
+use super::near::{FAR, LANES, Near, Row, rows, smallest};
 use super::{Domain, PoissonError, PoissonSpec};
 
-/// Cells of a row looked at together.
-const LANES: usize = 8;
-/// A place so far away that an empty cell is in nobody's way.
-const FAR: f32 = 1e9;
 /// What single precision may lose of a squared distance near the radius, in squared cells: places are within 5 of a cell, so a
 /// difference is off by less than 5e-7, its square near the radius (at most 3 cells) by 3e-6, and that of four axes by 6e-6.
 const MARGIN: f32 = 1e-5;
 /// Cells that memory is taken for at most.
 const MOST_CELLS: f64 = (1_u64 << 28) as f64;
-
-/// Neighbours in a row along the first axis.
-#[derive(Clone, Copy, Debug)]
-struct Row<const D: usize> {
-    /// From a cell to the first of the row.
-    offset: isize,
-    /// Cells from a cell to the row along each axis; the first is not used.
-    away: [f32; D],
-}
 
 /// A place that may become a point.
 #[derive(Clone, Copy, Debug)]
@@ -30,58 +18,6 @@ pub(super) struct Dart<const D: usize> {
     /// Where in the cell, in cells.
     pub place: [f32; D],
     pub point: [f64; D],
-}
-
-/// The points whose disks may touch a cell.
-pub(super) struct Near<const D: usize> {
-    slot: usize,
-    /// Where they are, seen from the low corner of the cell, by axis; far away from the last one on.
-    places: [Vec<f32>; D],
-    /// How many of these are to be looked at, a multiple of the lanes.
-    padded: usize,
-}
-
-impl<const D: usize> Near<D> {
-    /// Of no cell yet.
-    pub fn new() -> Self {
-        Self { slot: usize::MAX, places: std::array::from_fn(|_| Vec::new()), padded: 0 }
-    }
-
-    /// Whether they are those of this cell.
-    pub fn is_of(&self, slot: usize) -> bool {
-        self.slot == slot
-    }
-
-    /// The smallest squared distance to a point from the corner of a cube that is farthest from it; middle and half a side.
-    #[inline]
-    fn nearest(&self, at: &[f32; D], half: f32) -> f32 {
-        let mut least = [f32::INFINITY; LANES];
-        for first in (0..self.padded).step_by(LANES) {
-            let mut sums = [0.0_f32; LANES];
-            for axis in 0..D {
-                let places = &self.places[axis][first..first + LANES];
-                for lane in 0..LANES {
-                    let apart = (places[lane] - at[axis]).abs() + half;
-                    sums[lane] += apart * apart;
-                }
-            }
-            for lane in 0..LANES {
-                least[lane] = if sums[lane] < least[lane] { sums[lane] } else { least[lane] };
-            }
-        }
-        smallest(least)
-    }
-}
-
-#[inline]
-fn smallest(mut least: [f32; LANES]) -> f32 {
-    for width in [4, 2, 1] {
-        for lane in 0..width {
-            let (a, b) = (least[lane], least[lane + width]);
-            least[lane] = if a < b { a } else { b };
-        }
-    }
-    least[0]
 }
 
 /// The points so far. Cells are padded by copies of those across the border (torus) or by empty ones (box).
@@ -342,23 +278,3 @@ impl<const D: usize> Grid<D> {
 
 /// Half a side of a cube from which on double precision is worth its time, in cells.
 const FINE: f64 = 1.0 / 1024.0;
-
-/// The rows that may reach into a cell, nearest first.
-fn rows<const D: usize>(pad: i64, strides: &[u64; D], ratio: f64) -> Vec<Row<D>> {
-    let along = 2 * pad + 1;
-    let row = |number: i64| {
-        let away: [i64; D] = std::array::from_fn(|axis| match axis {
-            0 => -pad,
-            _ => number / along.pow(axis as u32 - 1) % along - pad,
-        });
-        let gap = |at: i64| (at.abs() - 1).max(0) as f64;
-        let apart: f64 = away[1..].iter().map(|&at| gap(at) * gap(at)).sum();
-        let size: i64 = away[1..].iter().map(|at| at * at).sum();
-        let offset = (0..D).map(|axis| away[axis] * strides[axis] as i64).sum::<i64>() as isize;
-        (apart, size, Row { offset, away: away.map(|at| at as f32) })
-    };
-    let mut all: Vec<_> = (0..along.pow(D as u32 - 1)).map(row).collect();
-    all.retain(|(apart, _, _)| *apart < ratio * ratio);
-    all.sort_by_key(|(_, size, _)| *size);
-    all.into_iter().map(|(_, _, row)| row).collect()
-}

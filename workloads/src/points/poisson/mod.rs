@@ -15,6 +15,7 @@
 
 mod exact;
 mod grid;
+mod near;
 mod rain;
 mod throw;
 mod voids;

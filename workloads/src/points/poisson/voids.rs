@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::grid::{Dart, Grid, Near};
+use super::grid::{Dart, Grid};
+use super::near::Near;
 use super::rain::{Drop, Fallen, Rain};
 use crate::points::random::Stream;
 

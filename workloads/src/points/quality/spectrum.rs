@@ -92,12 +92,11 @@ fn row(waves: &[Vec<Waves>], others: &[i64], count: usize, most: usize) -> Vec<(
     }
     let mut sums = vec![(0.0, 0.0); most + 1];
     let square: i64 = others.iter().map(|k| k * k).sum();
-    for first in 0..=most {
+    for (first, (cosines, sines)) in waves[0].iter().enumerate() {
         let length = ((square + (first * first) as i64) as f64).sqrt().round() as usize;
         if length > most {
             break;
         }
-        let (cosines, sines) = &waves[0][first];
         let (mut re, mut im) = (0.0, 0.0);
         for n in 0..count {
             re += product.0[n] * cosines[n] - product.1[n] * sines[n];

@@ -118,7 +118,7 @@ fn open_edges(positions: &[DVec3], triangles: &[[u32; 3]]) -> usize {
         let [a, b, c] = corners.map(place);
         for (from, to) in [(a, b), (b, c), (c, a)] {
             *edges.entry((from.min(to), from.max(to))).or_default() +=
-                if from < to { 1 } else { i64::from(from != to) * -1 };
+                if from < to { 1 } else { -i64::from(from != to) };
         }
     }
     edges.values().map(|count| count.unsigned_abs() as usize).sum()

@@ -45,7 +45,7 @@ impl Named {
         [("constant", Self::Constant), ("ramp", Self::Ramp), ("gauss", Self::Gauss), ("waves", Self::Waves)];
 
     /// The density called `name`.
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|(known, _)| *known == name).map(|(_, density)| density)
     }
 }
