@@ -40,6 +40,7 @@ mod load;
 pub mod material;
 pub mod multiview;
 pub mod occlusion;
+pub mod points;
 mod samples;
 pub mod scene;
 pub mod shapes;

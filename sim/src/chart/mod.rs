@@ -6,6 +6,7 @@
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
 //! - [`occlusion`]: what occlusion queries find, and what they cost.
+//! - [`points`]: quality of points over points a second.
 //! - [`sampled`]: frames predicted from few against all of them.
 //! - [`sampling`]: image error over samples per pixel and over host time.
 //! - [`shadows`]: soft shadows in one pass against accumulation buffering.
@@ -25,6 +26,7 @@ pub mod growth;
 mod image;
 pub mod index;
 pub mod occlusion;
+pub mod points;
 mod quantiles;
 pub mod sampled;
 pub mod sampling;
@@ -37,7 +39,7 @@ pub mod views;
 pub use error::ChartError;
 
 /// The charts there are, each with a line that says what it shows.
-pub const CHARTS: [(&str, &str); 13] = [
+pub const CHARTS: [(&str, &str); 14] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
     (
         "collision",
@@ -51,6 +53,7 @@ pub const CHARTS: [(&str, &str); 13] = [
         "occlusion",
         "occlusion queries: hidden objects found over tests and bytes, by intervals and by samples",
     ),
+    ("points", "points of all kinds: quality over points a second, spectra, and where it fails"),
     ("sampled", "frames predicted from few: errors, how often intervals hold the truth, host time"),
     ("sampling", "image error over samples per pixel and over host time, for every sample table"),
     ("shadows", "soft shadows: error over places on the light, one pass against accumulation, and the bias"),

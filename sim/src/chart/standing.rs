@@ -6,6 +6,7 @@ use super::collision::CollisionChart;
 use super::frames::{Axis, FramesChart, Outcome, Way};
 use super::glossy::GlossyChart;
 use super::growth::GrowthChart;
+use super::points::PointsChart;
 use super::sampled::SampledChart;
 use super::sampling::SamplingChart;
 use super::shadows::ShadowsChart;
@@ -120,6 +121,25 @@ impl Standings for FramesChart {
             Some(standing("frames of a trace", way.name(), format!("F1 {f1:.3}{energy}"), cost))
         };
         Way::ALL.into_iter().filter_map(row).collect()
+    }
+}
+
+impl Standings for PointsChart {
+    fn standings(&self) -> Vec<Standing> {
+        let row = |row: &super::points::Row| {
+            let level = if row.effort == 0 {
+                row.method.to_owned()
+            } else {
+                format!("{} {}", row.method, row.effort)
+            };
+            standing(
+                &format!("points that keep their distance ({}D)", row.dimensions),
+                &level,
+                format!("largest hole {:.4} r, {:.1e} free", row.hole_over_r, row.free_share),
+                format!("{:.0} points a second", row.points_per_s),
+            )
+        };
+        self.rows.iter().map(row).collect()
     }
 }
 

@@ -30,6 +30,8 @@ pub enum Command {
     Visibility(VisibilityArgs),
     /// Find the pairs of moving objects that may collide
     Ccd(super::ccd::CcdArgs),
+    /// Make points: apart from each other, after a density, or evenly in a volume
+    Sample(super::sample::SampleArgs),
     /// Write a sample table into a file
     Samples(SamplesArgs),
     /// Try each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, width of intervals, cost
@@ -270,6 +272,8 @@ pub enum ChartArg {
     Growth,
     /// Hidden objects found over tests and bytes, by intervals and by samples
     Occlusion,
+    /// Points of all kinds: quality over points a second, spectra, and where it fails
+    Points,
     /// Frames predicted from few: errors, how often intervals hold the truth, host time
     Sampled,
     /// Image error over samples per pixel and over host time, for every sample table

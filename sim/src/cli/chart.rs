@@ -12,7 +12,7 @@ use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
 use crate::chart::tile_tests::tile_tests;
 use crate::chart::timing::timing;
-use crate::chart::{caustics, collision, frames, glossy, growth, occlusion, sampled, shadows, views};
+use crate::chart::{caustics, collision, frames, glossy, growth, occlusion, points, sampled, shadows, views};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 use crate::output::table::Table;
@@ -77,6 +77,7 @@ fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) ->
         ChartArg::Glossy => chart_glossy(args, progress),
         ChartArg::Growth => chart_growth(args, progress),
         ChartArg::Occlusion => chart_occlusion(args, progress),
+        ChartArg::Points => chart_points(args, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
         ChartArg::Sampling => chart_sampling(args, progress),
         ChartArg::Shadows => chart_shadows(args, progress),
@@ -128,6 +129,12 @@ fn chart_glossy(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> 
 fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
     let chart = growth::chart(effort, &args.out, progress)?;
+    Done::new(&chart, chart.text())
+}
+
+fn chart_points(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+    let effort = if args.quick { points::Effort::QUICK } else { points::Effort::FULL };
+    let chart = points::chart(effort, &args.out, progress)?;
     Done::new(&chart, chart.text())
 }
 

@@ -7,6 +7,7 @@ mod list;
 mod parse;
 mod reproduce;
 mod run;
+mod sample;
 mod samples;
 mod stress;
 mod terminal;
@@ -87,6 +88,7 @@ fn dispatch(cli: &Cli) -> Result<(), Failure> {
         Command::List(args) => list::list(args),
         Command::Visibility(args) => visibility::run(args),
         Command::Ccd(args) => ccd::run(args),
+        Command::Sample(args) => sample::run(args),
         Command::Samples(args) => samples::run(args),
         Command::Stress(args) => stress::run(args),
         Command::Chart(args) => chart::run(args),

@@ -60,8 +60,8 @@ impl Paper {
     pub const fn title(self) -> &'static str {
         match self {
             Self::Two => "Performance per What? Energy-Efficiency Units for Graphics",
-            Self::Three => "Per-frame Energy Measurement Methodology for Computer Graphics",
             Self::Six => "Design and Novel Uses of Higher-Dimensional Rasterization",
+            Self::Three => "Per-frame Energy Measurement Methodology for Computer Graphics",
         }
     }
 }

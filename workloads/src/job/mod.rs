@@ -119,6 +119,7 @@ const JOBS: &[(&str, &str, Maker)] = &[
         "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
         crate::multiview::job,
     ),
+    ("sampling", "dart throwing over voids that are drawn, until no point fits", crate::points::job::job),
     (
         "soft-shadows",
         "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",

@@ -106,6 +106,17 @@ pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, Load
     Ok(cases)
 }
 
+/// Loads a mesh that stays still from a PLY or OBJ file.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
+    match Kind::of(path)? {
+        Kind::Surface(format) => pair::still((path, format)),
+        _ => Err(LoadError::Kind { file: path.display().to_string(), known: ".ply and .obj (also gzipped)" }),
+    }
+}
+
 /// Objects that may collide, and where they came from.
 #[derive(Clone, Debug)]
 pub struct CollisionCase {

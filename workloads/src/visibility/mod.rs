@@ -18,7 +18,7 @@ mod unshaded;
 
 pub use camera::CameraSpec;
 pub use hits::write_hits;
-pub use load::{CollisionCase, load, load_cases};
+pub use load::{CollisionCase, load, load_cases, load_surface};
 pub use m5d::parse as parse_m5d;
 pub use mesh::MovingMesh;
 pub use mts::{load_mts, parse_mts};

@@ -4,6 +4,7 @@ mod caustics;
 mod collision;
 mod glossy;
 mod occlusion;
+mod sampling;
 mod shadows;
 mod views;
 
@@ -12,7 +13,15 @@ use crate::output::progress::Progress;
 use crate::run::RunError;
 
 pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, RunError> {
-    let uses = [occlusion::rows, collision::rows, caustics::rows, glossy::rows, shadows::rows, views::rows];
+    let uses = [
+        occlusion::rows,
+        collision::rows,
+        caustics::rows,
+        glossy::rows,
+        sampling::rows,
+        shadows::rows,
+        views::rows,
+    ];
     let mut rows = Vec::new();
     for rows_of in uses {
         rows.extend(rows_of(effort, progress)?);

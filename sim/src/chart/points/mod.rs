@@ -1,0 +1,97 @@
+//! `quintile chart points`: quality of points that keep their distance over points a second, spectra, and where it fails.
+//!
+//! Times are of the CPU, of one thread.
+
+mod failures;
+mod measure;
+mod output;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::ChartError;
+use crate::output::OutDir;
+use crate::output::progress::Progress;
+
+pub use failures::{Columns, Single};
+pub use measure::Row;
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Effort {
+    /// Least distance in the plane and in space.
+    pub radius: [f64; 2],
+    /// Places tried to find what is still free.
+    pub darts: u64,
+    /// Points of other seeds that a spectrum is the mean of.
+    pub seeds: u64,
+    /// Least distances of the sweep in single precision, each half of the one before, from 1/8 on.
+    pub halvings: u32,
+    /// Points that follow a density.
+    pub white: usize,
+}
+
+impl Effort {
+    /// The chart of the book.
+    pub const FULL: Self =
+        Self { radius: [0.01, 0.06], darts: 1_000_000, seeds: 4, halvings: 8, white: 200_000 };
+    /// A look in seconds.
+    pub const QUICK: Self =
+        Self { radius: [0.025, 0.1], darts: 100_000, seeds: 2, halvings: 6, white: 20_000 };
+}
+
+/// Everything the chart found.
+#[derive(Clone, Debug, Serialize)]
+pub struct PointsChart {
+    /// How much was measured.
+    pub effort: Effort,
+    /// Dimension by dimension, method by method.
+    pub rows: Vec<Row>,
+    /// Voids thinner than the spacing of numbers.
+    pub single: Vec<Single>,
+    /// Candidates for a point that follows a density.
+    pub columns: Vec<Columns>,
+}
+
+/// Measures the chart and writes it into `out`.
+///
+/// # Errors
+/// [`ChartError`], above all when `out` cannot be written to.
+pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<PointsChart, ChartError> {
+    let dir = OutDir::create(out)?;
+    output::remove_stale(&dir)?;
+    let bar = progress.bar("points", 14);
+    let failed = |message: String| ChartError::Pipeline(message);
+    let mut rows = measure::rows::<2>(&effort, effort.radius[0], &bar).map_err(|e| failed(e.to_string()))?;
+    rows.extend(measure::rows::<3>(&effort, effort.radius[1], &bar).map_err(|e| failed(e.to_string()))?);
+    let single = failures::single(&effort).map_err(|e| failed(e.to_string()))?;
+    bar.inc();
+    let columns = failures::columns(&effort).map_err(|e| failed(e.to_string()))?;
+    bar.inc();
+    let chart = PointsChart { effort, rows, single, columns };
+    output::write(&chart, &dir)?;
+    Ok(chart)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quick_chart_is_written_and_the_maximal_method_alone_is_maximal() {
+        let effort = Effort { radius: [0.06, 0.2], darts: 5000, seeds: 1, halvings: 4, white: 2000 };
+        let out = tempfile::tempdir().unwrap();
+        let chart = chart(effort, out.path(), &Progress::new(true)).unwrap();
+        for row in &chart.rows {
+            let maximal = row.hole_over_r <= 1.0 + 1e-9;
+            assert_eq!(maximal, row.method == measure::VOIDS, "{row:?}");
+            assert!(row.closer_pairs == 0 && row.points_per_s > 0.0, "{row:?}");
+        }
+        for file in
+            ["points_quality.svg", "points_spectra.svg", "points_failures.png", "points.csv", "points.json"]
+        {
+            assert!(out.path().join(file).exists(), "{file}");
+        }
+    }
+}

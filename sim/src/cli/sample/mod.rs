@@ -1,0 +1,109 @@
+//! `quintile sample`.
+
+mod file;
+mod poisson;
+mod volume;
+mod white;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use serde::Serialize;
+
+use super::Failure;
+use super::terminal::{print, print_json};
+use file::Points;
+
+/// Arguments of `sample`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  quintile sample poisson --dim 2 --r 0.01 -o points.csv\n  \
+    quintile sample poisson --dim 3 --count 100000 --box -o points.npy --json\n  \
+    quintile sample white --dim 2 --image portrait.png --count 20000 -o stipples.csv\n  \
+    quintile sample volume --mesh bunny.ply --count 50000 -o inside.bin\n\n\
+    Files by their ending: .csv (with a line x,y,... first), .npy, or .bin (coordinates point by point, little-endian, f64 or, with\n\
+    --single, f32). Without -o the points are printed as CSV.")]
+pub struct SampleArgs {
+    /// What kind of points
+    #[command(subcommand)]
+    pub kind: Kind,
+}
+
+/// Kinds of points.
+#[derive(Debug, Subcommand)]
+pub enum Kind {
+    /// Points of the unit square, cube, ... that keep their distance, to which none can be added
+    Poisson(poisson::PoissonArgs),
+    /// Independent points of the unit square, cube, ... that follow a density
+    White(white::WhiteArgs),
+    /// Even points of a torus or of what a closed surface encloses
+    Volume(volume::VolumeArgs),
+}
+
+/// What every kind of points has.
+#[derive(Debug, Args)]
+pub struct Common {
+    /// Other points by another seed
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// File for the points: .csv, .npy or .bin
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Coordinates in single precision
+    #[arg(long)]
+    pub single: bool,
+    /// Worker threads; all cores without it. The points do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print what was made as one line of JSON instead of the points
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What was made, for those who do not want the points themselves.
+#[derive(Serialize)]
+struct Made<T: Serialize> {
+    points: usize,
+    dimensions: usize,
+    out: Option<String>,
+    #[serde(flatten)]
+    facts: T,
+}
+
+impl Common {
+    /// Writes and prints what was asked for.
+    fn deliver(&self, points: &Points, facts: impl Serialize, line: &str) -> Result<(), Failure> {
+        if let Some(path) = &self.out {
+            points.write(path, self.single)?;
+        } else if !self.json {
+            return print(&points.csv(self.single));
+        }
+        let out = self.out.as_deref().map(|path| path.display().to_string());
+        if self.json {
+            let dimensions = points.dimensions;
+            return print_json(&Made { points: points.len(), dimensions, out, facts }, false);
+        }
+        print(&format!(
+            "{}: {} points in {}D; {line}",
+            out.unwrap_or_default(),
+            points.len(),
+            points.dimensions
+        ))
+    }
+
+    /// Refuses a file whose ending says nothing, before any work.
+    fn check(&self) -> Result<(), Failure> {
+        self.out.as_deref().map_or(Ok(()), |path: &Path| file::Format::of(path).map(|_| ()))
+    }
+}
+
+fn usage(message: impl std::fmt::Display) -> Failure {
+    Failure { message: message.to_string(), code: 2 }
+}
+
+pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
+    match &args.kind {
+        Kind::Poisson(args) => poisson::run(args),
+        Kind::White(args) => white::run(args),
+        Kind::Volume(args) => volume::run(args),
+    }
+}

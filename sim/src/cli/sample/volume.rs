@@ -1,0 +1,98 @@
+//! `quintile sample volume`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+use workloads::points::volume::{Bounds, Inside, Sampled, Solid, Torus};
+use workloads::visibility::load_surface;
+
+use super::file::Points;
+use super::{Common, Failure, usage};
+
+/// Arguments of `sample volume`.
+#[derive(Debug, Args)]
+pub struct VolumeArgs {
+    /// Dimensions: 3
+    #[arg(long, value_name = "D", default_value_t = 3, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(3..=3))]
+    pub dim: u8,
+    /// A closed surface, .ply or .obj; without it a torus about the middle of the unit cube
+    #[arg(long, value_name = "FILE")]
+    pub mesh: Option<PathBuf>,
+    /// From the axis of the torus to the middle of its tube
+    #[arg(long, value_name = "R", default_value_t = 0.3, allow_negative_numbers = true)]
+    pub ring: f64,
+    /// Radius of the tube of the torus
+    #[arg(long, value_name = "R", default_value_t = 0.15, allow_negative_numbers = true)]
+    pub tube: f64,
+    /// How many points; 10000 where neither this nor a density is given
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "density", value_parser = clap::value_parser!(u32).range(1..))]
+    pub count: Option<u32>,
+    /// How many points to a unit of volume on average
+    #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
+    pub density: Option<f64>,
+    /// Tiles across, in each of which the volume is bounded
+    #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=2048))]
+    pub tiles: u32,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// What is to be said of the points.
+#[derive(Serialize)]
+struct Facts {
+    seed: u64,
+    /// What is enclosed, by its closed form or the divergence theorem.
+    volume: f64,
+    /// The same by counting: share of the candidates times the volume of the bounds.
+    volume_by_count: f64,
+    bounds_volume: f64,
+    candidates: u64,
+}
+
+pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
+    args.common.check()?;
+    let pool = crate::cli::threads(args.common.threads)?;
+    pool.install(|| match &args.mesh {
+        Some(path) => {
+            crate::cli::not_an_input(args.common.out.as_deref(), [path.as_path()])?;
+            let mesh = load_surface(path)?;
+            let solid = Solid::new(&mesh.open, &mesh.triangles, args.tiles)
+                .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
+            sample(args, &solid, solid.bounds(), solid.volume().abs())
+        }
+        None => {
+            let torus = Torus { ring: args.ring, tube: args.tube };
+            if !(args.tube > 0.0 && args.tube < args.ring && args.ring + args.tube <= 0.5) {
+                return Err(usage(format!(
+                    "--ring {}, --tube {}: the tube has to be above 0 and below the ring, and both together at most 0.5",
+                    args.ring, args.tube
+                )));
+            }
+            sample(args, &torus, &torus.bounds(args.tiles), torus.volume())
+        }
+    })
+}
+
+fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -> Result<(), Failure> {
+    let seed = args.common.seed;
+    let count = args.count.unwrap_or(10_000) as usize;
+    let Sampled { points, candidates } = match args.density {
+        Some(density) if !(density > 0.0 && density * bounds.volume() < 1e10) => {
+            return Err(usage(format!(
+                "--density {density}: it has to be above 0, and times the volume of {:e} below 1e10",
+                bounds.volume()
+            )));
+        }
+        Some(density) => bounds.sample_density(solid, density, seed),
+        None => bounds.sample(solid, count, seed),
+    };
+    if args.density.is_none() && points.len() < count {
+        let message = format!("only {} points found in {candidates}: the volume is too thin", points.len());
+        return Err(Failure { message, code: 1 });
+    }
+    let volume_by_count = points.len() as f64 / candidates.max(1) as f64 * bounds.volume();
+    let facts = Facts { seed, volume, volume_by_count, bounds_volume: bounds.volume(), candidates };
+    let line = format!("volume {volume:.6}, by count {volume_by_count:.6}; {candidates} candidates");
+    args.common.deliver(&Points::new(&points), facts, &line)
+}

@@ -1,0 +1,254 @@
+//! `sampling` as a job: voids are drawn and the samples that hit them are the candidates (thesis, Paper VI, section 5, Fig. 11).
+//!
+//! In each round every void is a square of two triangles; as voids do not overlap, the depth test keeps nothing away. Each sample
+//! is new in every round, so no place is favoured. What the samples leave, finer than the pixels, is finished by
+//! [`super::poisson`] on the host; the facts say how much that is.
+
+use activity::{Counts, LineAccess, Packet};
+use glam::{Vec3, Vec4};
+use pipeline::frame::{render_with_heat, visibility};
+use pipeline::sampling::{HashedSamples, LensShape, SampleSource, mix};
+use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
+use serde::{Deserialize, Serialize};
+
+use super::poisson::{Cube, Domain, PoissonSpec, Spacing, poisson_disk_drawn};
+use super::volume::{camera, place};
+use crate::error::LoadError;
+use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request};
+use crate::scene::Settings;
+
+/// What can be set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// Least distance of points, 0.005 to 0.5.
+    pub radius: f64,
+    /// Rounds of darts that are drawn, 1 to 8.
+    pub rounds: u32,
+    /// A torus rather than a box.
+    pub periodic: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { radius: 0.02, rounds: 5, periodic: true }
+    }
+}
+
+/// The job.
+struct Sampling {
+    options: Options,
+    settings: Settings,
+    seed: u64,
+}
+
+/// The job called `sampling`.
+///
+/// # Errors
+/// [`LoadError::Setting`] for an option out of range.
+pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+    let options: Options = options.read()?;
+    let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
+    if !(0.005..=0.5).contains(&options.radius) {
+        return refused("radius", format!("{}: it has to be 0.005 to 0.5", options.radius));
+    }
+    if !(1..=8).contains(&options.rounds) {
+        return refused("rounds", format!("{}: it has to be 1 to 8", options.rounds));
+    }
+    let usual = Settings { width: 512, height: 512, samples: 4, ..Settings::default() };
+    let settings = usual.with(request.overrides)?;
+    if settings.width != settings.height {
+        return refused("size", "the unit square is drawn: let width and height be equal".to_owned());
+    }
+    Ok(Box::new(Sampling { options, settings, seed: request.seed }))
+}
+
+/// Appends a candidate to a list: an address, a compare and the two coordinates.
+struct Append;
+
+impl Shader for Append {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 8, vertex_ops: 4 }
+    }
+
+    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
+        Vec3::ONE
+    }
+}
+
+/// What the rounds have done so far.
+#[derive(Default)]
+struct Done {
+    counts: Counts,
+    triangles: usize,
+    candidates: u64,
+    round: u16,
+}
+
+impl Sampling {
+    /// Draws the voids of a round and takes the samples that hit, in random order.
+    fn round(
+        &self,
+        cubes: &[Cube<2>],
+        frame: u32,
+        spec: &PipelineSpec,
+        done: &mut Done,
+        emit: Emit<'_>,
+    ) -> Result<Vec<[f64; 2]>, JobError> {
+        let side = self.settings.height;
+        let seed = mix(self.seed ^ u64::from(frame) << 32 ^ u64::from(done.round));
+        let wrong = || JobError::Setting(format!("{side} pixels, {} samples", self.settings.samples));
+        let samples =
+            HashedSamples::new(seed, side, self.settings.samples, LensShape::Square).ok_or_else(wrong)?;
+        let (viewport, camera) = (Viewport::new(side, side).ok_or_else(wrong)?, camera().ok_or_else(wrong)?);
+        let (corners, triangles) = squares(cubes);
+        let geometry =
+            Geometry::new(&corners, &corners, &triangles).map_err(|e| JobError::Setting(e.to_string()))?;
+        let draws = [Draw { geometry, shader: &Append, cull: Cull::None }];
+        let settings = pipeline::Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
+        let pass = done.round;
+        let mut tell = |packet: &Packet, lines: &[LineAccess]| emit(&Packet { pass, ..*packet }, lines);
+        let (rendered, _) = render_with_heat(&camera, &draws, &settings, &[], &mut tell)?;
+        let seen = visibility(&camera, &draws, &settings)?;
+        let candidates = hits(&seen, side, &samples, seed);
+        done.counts += &rendered.counts;
+        done.triangles += triangles.len();
+        done.candidates += candidates.len() as u64;
+        done.round += 1;
+        Ok(candidates)
+    }
+}
+
+/// Two triangles for each square.
+fn squares(cubes: &[Cube<2>]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let corner = |cube: &Cube<2>, n: u32| {
+        let [x, y] = [0, 1].map(|k| (cube.low[k] + f64::from(n >> k & 1) * cube.side) as f32);
+        Vec3::new(x, y, 1.0)
+    };
+    let corners = cubes.iter().flat_map(|cube| (0..4).map(move |n| corner(cube, n))).collect();
+    let two = |first: u32| [[first, first + 1, first + 3], [first, first + 3, first + 2]];
+    (corners, (0..cubes.len() as u32).flat_map(|n| two(4 * n)).collect())
+}
+
+/// The places of samples that see a triangle, in an order of their own.
+fn hits(seen: &[(u32, u32)], side: u32, samples: &HashedSamples, seed: u64) -> Vec<[f64; 2]> {
+    let per_pixel = samples.per_pixel();
+    let mut own = vec![pipeline::sampling::Sample::default(); per_pixel as usize];
+    let mut found = Vec::new();
+    for (pixel, seen) in (0..).zip(seen.chunks(per_pixel as usize)) {
+        let at = [pixel % side, pixel / side];
+        samples.pixel_into(at[0], at[1], &mut own);
+        for (index, (sample, _)) in own.iter().zip(seen).enumerate().filter(|(_, (_, hit))| hit.0 != u32::MAX)
+        {
+            let [x, y, _] = place(sample, at, side);
+            let order = mix(seed ^ (u64::from(pixel) * u64::from(per_pixel) + index as u64));
+            found.push((order, [x, y]));
+        }
+    }
+    found.sort_unstable_by_key(|(order, _)| *order);
+    found.into_iter().map(|(_, at)| at).collect()
+}
+
+/// Points as white squares on black.
+fn picture(points: &[[f64; 2]], side: u32, radius: f64) -> Vec<Vec3> {
+    let mut image = vec![Vec3::ZERO; (side * side) as usize];
+    let (half, last) = ((0.15 * radius * f64::from(side)) as i64, i64::from(side) - 1);
+    for [x, y] in points {
+        let [column, row] = [*x, 1.0 - *y].map(|at| (at * f64::from(side)) as i64);
+        for row in (row - half).max(0)..=(row + half).min(last) {
+            for column in (column - half).max(0)..=(column + half).min(last) {
+                image[(row * i64::from(side) + column) as usize] = Vec3::ONE;
+            }
+        }
+    }
+    image
+}
+
+impl Job for Sampling {
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let domain = if self.options.periodic { Domain::Torus } else { Domain::Box };
+        let seed = mix(self.seed.wrapping_add(u64::from(number)));
+        let asked = PoissonSpec { radius: self.options.radius, domain, seed, spacing: Spacing::Double };
+        let mut done = Done::default();
+        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, spec, &mut done, emit);
+        let (found, drawn) = poisson_disk_drawn(&asked, self.options.rounds, draw)?
+            .map_err(|error| JobError::Setting(error.to_string()))?;
+        let fact = |name, value| Fact { name, value };
+        let facts = vec![
+            fact("points", found.points.len() as f64),
+            fact("points_from_samples", drawn as f64),
+            fact("candidates_from_samples", done.candidates as f64),
+            fact("voids", found.voids as f64),
+            fact("thin_voids", found.thin_voids as f64),
+        ];
+        let image = picture(&found.points, self.settings.height, asked.radius);
+        let Done { counts, triangles, .. } = done;
+        Ok(Drawn { image, counts, triangles, facts, ..Drawn::default() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::poisson::closer;
+    use super::super::volume::hardware;
+    use super::*;
+    use crate::scene::Overrides;
+
+    fn made(set: &[(&str, &str)], size: (u32, u32)) -> Result<Box<dyn Job>, String> {
+        let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        let overrides = Overrides { size: Some(size), ..Overrides::default() };
+        job(&OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 })
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn most_points_come_from_samples_and_packets_add_up() {
+        let job = made(&[("radius", "0.05")], (128, 128)).unwrap();
+        let (mut sum, mut passes) = (Counts::default(), 0);
+        let mut emit = |packet: &Packet, _: &[LineAccess]| {
+            sum += &packet.counts;
+            passes = passes.max(packet.pass + 1);
+        };
+        let drawn = job.frame(0, &hardware(), &mut emit).unwrap();
+        assert_eq!((drawn.counts, passes), (sum, 5));
+        let fact = |name: &str| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
+        assert!(fact("points_from_samples") > 0.9 * fact("points"), "{:?}", drawn.facts);
+        assert!(drawn.image.contains(&Vec3::ONE) && drawn.triangles > 1600);
+    }
+
+    #[test]
+    fn points_of_drawn_voids_keep_their_distance_and_no_other_fits() {
+        let asked = PoissonSpec { radius: 0.07, domain: Domain::Torus, seed: 1, spacing: Spacing::Double };
+        let stream = super::super::random::Stream::new(1, 1);
+        let draw = |cubes: &[Cube<2>]| {
+            let near = |n: u64| {
+                let cube = &cubes[stream.below(3 * n, cubes.len() as u64) as usize];
+                [0, 1].map(|k| cube.low[k] + cube.side * stream.unit(3 * n + 1 + k as u64))
+            };
+            Ok::<_, ()>((0..500).map(near).collect())
+        };
+        let (found, drawn) = poisson_disk_drawn::<2, _>(&asked, 4, draw).unwrap().unwrap();
+        assert!(drawn > 50 && drawn <= found.points.len());
+        for (number, a) in found.points.iter().enumerate() {
+            assert!(!found.points[..number].iter().any(|b| closer(a, b, 0.07, Domain::Torus)));
+        }
+        let hole = super::super::quality::largest_hole(&found.points, Domain::Torus);
+        assert!(hole.radius <= 0.07 * (1.0 + 1e-12), "{hole:?}");
+    }
+
+    #[test]
+    fn options_out_of_range_are_refused() {
+        for (set, size, part) in [
+            (("radius", "0.6"), (64, 64), "radius: 0.6"),
+            (("rounds", "0"), (64, 64), "rounds: 0"),
+            (("rounds", "2"), (64, 32), "width and height"),
+        ] {
+            let message = made(&[set], size).err().unwrap();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

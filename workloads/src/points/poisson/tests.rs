@@ -1,0 +1,142 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::points::quality::{closer_than, free_share, largest_hole, least_distance};
+
+fn spec(radius: f64, domain: Domain, seed: u64) -> PoissonSpec {
+    PoissonSpec { radius, domain, seed, spacing: Spacing::Double }
+}
+
+/// No two closer than the radius, by all pairs and without rounding; no place farther away than the radius.
+fn check<const D: usize>(spec: &PoissonSpec) -> PoissonDisk<D> {
+    let found = poisson_disk::<D>(spec).unwrap();
+    let points = &found.points;
+    assert!(points.iter().flatten().all(|x| (0.0..1.0).contains(x)));
+    let ticks = spec.spacing.per_unit();
+    assert!(points.iter().flatten().all(|x| (x * ticks).fract() == 0.0));
+    for (number, a) in points.iter().enumerate() {
+        let close = points[..number].iter().find(|b| closer(a, b, spec.radius, spec.domain));
+        assert_eq!(close, None, "{spec:?}: {a:?}");
+    }
+    let hole = largest_hole(points, spec.domain);
+    let slack = 4.0 * (D as f64).sqrt() / ticks;
+    assert!(hole.radius <= spec.radius * (1.0 + 1e-12) + slack, "{spec:?}: {hole:?}");
+    found
+}
+
+#[test]
+fn points_are_apart_and_no_other_fits_in_one_to_four_dimensions() {
+    for domain in [Domain::Torus, Domain::Box] {
+        for seed in 0..2 {
+            check::<1>(&spec(0.01, domain, seed));
+            check::<2>(&spec(0.04, domain, seed));
+            check::<3>(&spec(0.2, domain, seed));
+        }
+        check::<4>(&spec(0.4, domain, 1));
+    }
+}
+
+#[test]
+fn few_large_disks_meet_themselves_across_the_border() {
+    for radius in [0.5, 0.45, 0.34, 0.3, 0.25, 0.2501] {
+        for seed in 0..4 {
+            for domain in [Domain::Torus, Domain::Box] {
+                check::<1>(&spec(radius, domain, seed));
+                check::<2>(&spec(radius, domain, seed));
+                check::<3>(&spec(radius.max(0.3), domain, seed));
+            }
+        }
+    }
+}
+
+#[test]
+fn as_many_fit_as_in_random_sequential_addition() {
+    // On the torus: 0.547 of the plane and 0.384 of space; the spread of 20,000 points is below 0.002.
+    let density = |points: usize, radius: f64, d: usize| points as f64 * ball(d) * radius.powi(d as i32);
+    let plane = poisson_disk::<2>(&spec(0.006, Domain::Torus, 3)).unwrap();
+    assert!((density(plane.points.len(), 0.006, 2) - 0.547).abs() < 0.002);
+    let space = poisson_disk::<3>(&spec(0.035, Domain::Torus, 3)).unwrap();
+    assert!((density(space.points.len(), 0.035, 3) - 0.384).abs() < 0.003);
+    let line = poisson_disk::<1>(&spec(0.0001, Domain::Torus, 3)).unwrap();
+    assert!((density(line.points.len(), 0.0001, 1) - 0.7476).abs() < 0.006);
+}
+
+#[test]
+fn few_points_of_a_line_are_as_many_as_the_integral_of_renyi_says() {
+    let mean = |count: u64| {
+        let points = |seed| poisson_disk::<1>(&spec(0.4, Domain::Box, seed)).unwrap().points.len() as f64;
+        (0..count).map(points).sum::<f64>() / count as f64
+    };
+    let expected = expected_points();
+    assert!((mean(4000) - expected).abs() < 0.03, "{} {expected}", mean(4000));
+}
+
+/// The mean number of points of [0, 1) at least 0.4 apart: the first one cuts the line in two (Renyi 1958).
+fn expected_points() -> f64 {
+    // In an interval of length l whose ends are free, above zero: M(l) = 1 + 2/l * integral of M(y - 0.4) over y in [0, l].
+    let step = 1e-4;
+    let mut mean = vec![0.0; 10_001];
+    let mut sums = vec![0.0; 10_001];
+    for n in 1..=10_000_usize {
+        // The integral of M(y - 0.4) up to y = n steps is that of M up to n steps less 0.4.
+        let inner = if n > 4000 { sums[n - 4000] } else { 0.0 };
+        mean[n] = 1.0 + 2.0 * inner / (n as f64 * step);
+        sums[n] = sums[n - 1] + step * mean[n];
+    }
+    mean[10_000]
+}
+
+#[test]
+fn threads_change_nothing() {
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let plane = poisson_disk::<2>(&spec(0.01, Domain::Torus, 5)).unwrap();
+            (plane, poisson_disk::<3>(&spec(0.08, Domain::Box, 5)).unwrap())
+        })
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn single_precision_is_exact_for_the_numbers_written() {
+    for seed in 0..4 {
+        let single = PoissonSpec { spacing: Spacing::Single, ..spec(0.03, Domain::Torus, seed) };
+        let found = check::<2>(&single);
+        assert!(found.points.iter().flatten().all(|&x| f64::from(x as f32) == x));
+        assert!(least_distance(&found.points, Domain::Torus) >= 0.03);
+        assert_eq!(closer_than(&found.points, 0.03, Domain::Torus), 0);
+        assert_eq!(free_share(&found.points, 0.03 * (1.0 + 1e-5), Domain::Torus, 50_000), 0.0);
+    }
+}
+
+#[test]
+fn voids_thinner_than_the_spacing_are_counted() {
+    let thin = |spacing| {
+        let spec = PoissonSpec { spacing, ..spec(0.002, Domain::Torus, 1) };
+        poisson_disk::<2>(&spec).unwrap().thin_voids
+    };
+    assert!(thin(Spacing::Single) > 0, "disks are some thousand numbers wide");
+    assert_eq!(thin(Spacing::Double), 0);
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    for radius in [0.0, -1.0, f64::NAN, 0.51, 1e-15] {
+        let refused = poisson_disk::<2>(&spec(radius, Domain::Torus, 1)).unwrap_err();
+        assert!(matches!(refused, PoissonError::Radius { .. }), "{radius}");
+    }
+    let refused = poisson_disk::<3>(&spec(1e-4, Domain::Torus, 1)).unwrap_err();
+    assert!(refused.to_string().contains("choose a larger r"), "{refused}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+    #[test]
+    fn any_radius_and_seed(radius in 0.05_f64..0.5, seed in any::<u64>(), torus in any::<bool>(), single in any::<bool>()) {
+        let domain = if torus { Domain::Torus } else { Domain::Box };
+        let spacing = if single { Spacing::Single } else { Spacing::Double };
+        check::<2>(&PoissonSpec { radius, domain, seed, spacing });
+        check::<3>(&PoissonSpec { radius: radius.max(0.2), domain, seed, spacing });
+    }
+}

@@ -1,0 +1,136 @@
+//! Level after level: throw, halve.
+
+use super::grid::{Dart, Grid};
+use super::rain::{Fallen, Rain};
+use super::voids::{Cube, Place, Voids};
+use super::{PoissonDisk, PoissonError, PoissonSpec};
+use crate::points::random::Stream;
+
+/// Darts for each void of the first level, and of the others.
+const FIRST: f64 = 0.9;
+const LATER: f64 = 0.6;
+
+/// Points with no two closer than the radius, to which none can be added. The same for any number of threads.
+///
+/// # Errors
+/// [`PoissonError`] when the radius cannot be or memory would not do.
+pub fn poisson_disk<const D: usize>(spec: &PoissonSpec) -> Result<PoissonDisk<D>, PoissonError> {
+    let mut throwing = Throwing::new(spec)?;
+    let voids = Voids::everything(&throwing.grid);
+    throwing.first(&voids);
+    Ok(throwing.finish(voids))
+}
+
+/// The same where the darts of the first `rounds` levels come from elsewhere: `draw` is given the voids and returns points of the unit
+/// cube, each uniform over all of the voids, in random order. Also how many points these made.
+///
+/// # Errors
+/// Those of `draw`; inside, as [`poisson_disk`].
+#[allow(clippy::type_complexity, reason = "the failures of two parties")]
+pub fn poisson_disk_drawn<const D: usize, E>(
+    spec: &PoissonSpec,
+    rounds: u32,
+    mut draw: impl FnMut(&[Cube<D>]) -> Result<Vec<[f64; D]>, E>,
+) -> Result<Result<(PoissonDisk<D>, usize), PoissonError>, E> {
+    let mut throwing = match Throwing::new(spec) {
+        Ok(throwing) => throwing,
+        Err(error) => return Ok(Err(error)),
+    };
+    let mut voids = Voids::everything(&throwing.grid);
+    for _ in 0..rounds {
+        if voids.cells.is_empty() || voids.is_full(&throwing.grid) || throwing.is_last(&voids) {
+            break;
+        }
+        for point in draw(&voids.cubes(&throwing.grid))? {
+            throwing.darts += 1;
+            throwing.keep(&throwing.grid.dart_at(&point));
+        }
+        throwing.voids += voids.cells.len() as u64;
+        voids = voids.halved(&throwing.grid, &Rain::new(Stream::new(0, 0), 0.0)).0;
+    }
+    let drawn = throwing.grid.points.len();
+    Ok(Ok((throwing.finish(voids), drawn)))
+}
+
+/// What has been thrown so far.
+struct Throwing<const D: usize> {
+    grid: Grid<D>,
+    seed: u64,
+    darts: u64,
+    voids: u64,
+}
+
+impl<const D: usize> Throwing<D> {
+    fn new(spec: &PoissonSpec) -> Result<Self, PoissonError> {
+        const { assert!(D >= 1 && D <= 4) };
+        let least = 64.0 / spec.spacing.per_unit();
+        if !(spec.radius >= least && spec.radius <= 0.5) {
+            return Err(PoissonError::Radius { radius: spec.radius, least });
+        }
+        Ok(Self { grid: Grid::new(spec)?, seed: spec.seed, darts: 0, voids: 0 })
+    }
+
+    /// Level after level until no void is left.
+    fn finish(mut self, mut voids: Voids<u32, D>) -> PoissonDisk<D> {
+        while !voids.cells.is_empty() && !voids.is_full(&self.grid) && !self.is_last(&voids) {
+            voids = self.level(&voids);
+        }
+        let mut voids = voids.widen();
+        while !voids.cells.is_empty() && !self.is_last(&voids) {
+            voids = self.level(&voids);
+        }
+        let thin_voids = self.number_by_number(&voids);
+        let Self { grid, darts, voids: all, .. } = self;
+        PoissonDisk { points: grid.points, darts, voids: all, levels: voids.level, thin_voids }
+    }
+
+    fn is_last<P>(&self, voids: &Voids<P, D>) -> bool {
+        self.grid.is_finest(voids.level)
+    }
+
+    /// Throws at the cells of the grid, one dart after the other: nothing is there yet that would leave few of them.
+    fn first(&mut self, voids: &Voids<u32, D>) {
+        let count = (FIRST * voids.cells.len() as f64).ceil() as u64;
+        let stream = Stream::new(self.seed, 0);
+        self.darts += count;
+        for number in 0..count {
+            if let Some(dart) = voids.dart(&self.grid, stream, number) {
+                self.keep(&dart);
+            }
+        }
+    }
+
+    /// Halves voids and throws at what is left of them.
+    fn level<P: Place>(&mut self, voids: &Voids<P, D>) -> Voids<P, D> {
+        let stream = Stream::new(self.seed, u64::from(voids.level) + 1);
+        let (left, Fallen { mut drops, darts }) = voids.halved(&self.grid, &Rain::new(stream, LATER));
+        self.voids += voids.cells.len() as u64;
+        self.darts += darts;
+        drops.sort_unstable_by_key(|drop| drop.time);
+        for drop in &drops {
+            self.keep(&drop.dart);
+        }
+        left
+    }
+
+    /// Adds a dart where it is free.
+    #[inline]
+    fn keep(&mut self, dart: &Dart<D>) -> bool {
+        let free = !self.grid.is_taken(dart.slot as usize) && self.grid.is_free(dart);
+        if free {
+            self.grid.insert(dart);
+        }
+        free
+    }
+
+    /// Tries every number in the voids that are left; the voids that then still may be free somewhere have no number there.
+    fn number_by_number(&mut self, voids: &Voids<u64, D>) -> u64 {
+        let mut thin = 0;
+        for number in 0..voids.cells.len() {
+            let darts = voids.lattice(&self.grid, number);
+            let stayed = darts.iter().filter(|dart| self.keep(dart)).count();
+            thin += u64::from(stayed == 0);
+        }
+        thin
+    }
+}

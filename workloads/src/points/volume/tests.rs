@@ -1,0 +1,121 @@
+use glam::DVec3;
+use pipeline::memory::Compression;
+use pipeline::sampling::{HashedSamples, LensShape, Sample, SampleSource};
+use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Shading};
+
+use super::standard::place;
+use super::*;
+use crate::points::quality::chi_square;
+use crate::points::white::counts;
+
+/// Some hardware; which does not matter here.
+pub(in crate::points) fn hardware() -> PipelineSpec {
+    let lines = CacheSpec::lru(256, 4);
+    let compression = Compression { depth: false, colour: false };
+    PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 32,
+        batch_triangles: 4096,
+        vertex_reuse: 16,
+        shading: Shading::Cached,
+        shading_cache: lines,
+        memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: lines, compression },
+        features: Features::ALL,
+        depth: pipeline::depth::DepthSpec::default(),
+    }
+}
+
+/// A cube from 0 to 1 as triangles.
+fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let corners = (0..8).map(|n| DVec3::new(f64::from(n & 1), f64::from(n >> 1 & 1), f64::from(n >> 2)));
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    (corners.collect(), triangles)
+}
+
+#[test]
+fn the_torus_has_the_volume_and_the_moment_of_its_samples() {
+    let torus = Torus::default();
+    let samples = HashedSamples::new(4, 256, 8, LensShape::Square).unwrap();
+    let found = standard_mode(&torus, 256, &samples, &hardware()).unwrap();
+    let (n, all) = (found.points.len() as f64, found.samples as f64);
+    let share = torus.volume();
+    let deviation = (all * share * (1.0 - share)).sqrt();
+    assert!((n - all * share).abs() < 3.0 * deviation, "{n} of {}", all * share);
+    let moment = |[x, y, _]: &[f64; 3]| (x - 0.5).powi(2) + (y - 0.5).powi(2);
+    let sum: f64 = found.points.iter().map(moment).sum();
+    assert!((sum / all / torus.moment() - 1.0).abs() < 0.01, "{}", sum / all);
+    assert!(found.covered as f64 > n && (found.covered as f64) < 1.2 * n, "{} covered", found.covered);
+}
+
+#[test]
+fn no_sample_of_the_torus_is_missed_by_the_moving_triangles() {
+    for torus in [Torus::default(), Torus { ring: 0.21, tube: 0.2 }, Torus { ring: 0.45, tube: 0.02 }] {
+        let samples = HashedSamples::new(9, 96, 16, LensShape::Square).unwrap();
+        let found = standard_mode(&torus, 96, &samples, &hardware()).unwrap();
+        let mut own = [Sample::default(); 16];
+        let mut brute = 0;
+        for pixel in 0..96 * 96 {
+            let at = [pixel % 96, pixel / 96];
+            samples.pixel_into(at[0], at[1], &mut own);
+            brute += own.iter().filter(|sample| torus.contains(&place(sample, at, 96), 0)).count();
+        }
+        assert_eq!(found.points.len(), brute, "{torus:?}");
+    }
+}
+
+#[test]
+fn bounds_hold_all_of_the_torus() {
+    let torus = Torus::default();
+    for tiles in [1, 7, 32, 128] {
+        let bounds = torus.bounds(tiles);
+        assert!(bounds.volume() >= torus.volume(), "{tiles}");
+        let found = bounds.sample_density(&torus, 200_000.0, 3);
+        let n = found.points.len() as f64;
+        let share = torus.volume() / bounds.volume();
+        let deviation = (found.candidates as f64 * share * (1.0 - share)).sqrt();
+        assert!((n - 200_000.0 * torus.volume()).abs() < 3.0 * deviation, "{tiles}: {n}");
+    }
+    assert!(torus.bounds(128).volume() < 1.25 * torus.volume());
+}
+
+#[test]
+fn points_of_a_cube_are_even_and_inside() {
+    let (positions, triangles) = cube();
+    let solid = Solid::new(&positions, &triangles, 9).unwrap();
+    assert!((solid.volume() - 1.0).abs() < 1e-12);
+    let found = solid.bounds().sample(&solid, 20_000, 1);
+    assert!(found.points.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
+    let fit = chi_square(&counts(&found.points, 8), &[1.0; 512]);
+    assert!(fit.p > 0.001 && fit.p < 0.999, "{fit:?}");
+    assert!(found.candidates < 20_100, "a cube fills its bounds: {}", found.candidates);
+}
+
+#[test]
+fn points_of_a_tetrahedron_are_those_of_its_inequalities() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let solid = Solid::new(&corners, &faces, 16).unwrap();
+    assert!((solid.volume() - 1.0 / 6.0).abs() < 1e-12);
+    let stream = Stream::new(5, 5);
+    for number in 0..20_000 {
+        let point: [f64; 3] = std::array::from_fn(|k| stream.unit(3 * number + k as u64));
+        let tile = ((point[1] * 16.0) as usize) * 16 + (point[0] * 16.0) as usize;
+        let sum: f64 = point.iter().sum();
+        if (sum - 1.0).abs() > 1e-6 {
+            assert_eq!(solid.contains(&point, tile), sum < 1.0, "{point:?}");
+        }
+    }
+}
+
+#[test]
+fn an_open_or_empty_surface_is_refused() {
+    let (positions, mut triangles) = cube();
+    assert_eq!(Solid::new(&positions, &[], 4).unwrap_err(), SolidError::Empty);
+    triangles[0].swap(0, 1);
+    assert_eq!(Solid::new(&positions, &triangles, 4).unwrap_err(), SolidError::Open(6));
+    triangles.remove(0);
+    assert_eq!(Solid::new(&positions, &triangles, 4).unwrap_err(), SolidError::Open(3));
+    let flat = vec![DVec3::ZERO; 8];
+    assert_eq!(Solid::new(&flat, &cube().1, 4).unwrap_err(), SolidError::Empty);
+}
