@@ -1,6 +1,7 @@
 //! Voltage and current over time, recorded or synthetic alike.
 
 use crate::metadata::Metadata;
+use core::ops::Range;
 use thiserror::Error;
 
 /// The largest |time| a trace may reach, s: its nanoseconds must fit an i64.
@@ -55,6 +56,7 @@ pub struct Trace {
     current_a: Vec<f32>,
     rate_hz: f64,
     start_s: f64,
+    lost: Vec<Range<usize>>,
     /// Where the trace comes from.
     pub metadata: Metadata,
 }
@@ -87,7 +89,38 @@ impl Trace {
         }
         check_finite(&voltage_v, "voltage_V")?;
         check_finite(&current_a, "current_A")?;
-        Ok(Self { voltage_v, current_a, rate_hz, start_s, metadata })
+        Ok(Self { voltage_v, current_a, rate_hz, start_s, lost: Vec::new(), metadata })
+    }
+
+    /// The same samples, some of which the recorder lost on the way: they are put on the straight line between their neighbours, as
+    /// nothing is known of them, and left out of files. Of `lost`, in order and apart, what is beyond the samples is cut off, and so is
+    /// the first sample, with which a recording begins.
+    #[must_use]
+    pub fn without(mut self, lost: impl IntoIterator<Item = Range<usize>>) -> Self {
+        let count = self.samples();
+        let inside = |range: Range<usize>| range.start.max(1)..range.end.min(count);
+        self.lost = lost.into_iter().map(inside).filter(|range| range.start < range.end).collect();
+        for range in &self.lost {
+            bridge(&mut self.voltage_v, range.clone());
+            bridge(&mut self.current_a, range.clone());
+        }
+        self
+    }
+
+    /// Stretches that the recorder lost, in order.
+    pub fn lost(&self) -> &[Range<usize>] {
+        &self.lost
+    }
+
+    /// Those of some samples that were not lost.
+    pub(crate) fn kept(&self, rows: Range<usize>) -> impl Iterator<Item = usize> + '_ {
+        let mut next = self.lost.partition_point(|lost| lost.end <= rows.start);
+        rows.filter(move |row| {
+            while self.lost.get(next).is_some_and(|lost| lost.end <= *row) {
+                next += 1;
+            }
+            !self.lost.get(next).is_some_and(|lost| lost.contains(row))
+        })
     }
 
     /// Number of samples; never 0.
@@ -152,6 +185,16 @@ impl Trace {
     /// Power of every sample, W, in order.
     pub fn powers_w(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
         self.voltage_v.iter().zip(&self.current_a).map(|(&v, &i)| f64::from(v) * f64::from(i))
+    }
+}
+
+/// The straight line from the value before to the one after, or that before where there is none after.
+fn bridge(values: &mut [f32], lost: Range<usize>) {
+    let before = values[lost.start - 1];
+    let after = values.get(lost.end).copied().unwrap_or(before);
+    let steps = (lost.len() + 1) as f32;
+    for (at, value) in values[lost].iter_mut().enumerate() {
+        *value = before + (after - before) * ((at + 1) as f32 / steps);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
 
 mod bound;
+mod packets;
 mod quantizer;
 mod rail;
 mod sample;
@@ -41,13 +42,14 @@ impl Device {
         &self.spec
     }
 
-    /// The same device without noise and without low-pass filter: its only error is quantization.
+    /// The same device without noise, low-pass filter and losses: its only error is quantization.
     #[must_use]
     pub fn noise_free(&self) -> Self {
         let mut quiet = self.clone();
         quiet.spec.current_noise_a = 0.0;
         quiet.spec.voltage_noise_v = 0.0;
         quiet.spec.low_pass_s = None;
+        quiet.spec.packet_loss = 0.0;
         quiet
     }
 
@@ -59,6 +61,7 @@ impl Device {
             && spec.current_offset_a == 0.0
             && spec.voltage_offset_v == 0.0
             && spec.specified_voltage_v.is_none()
+            && spec.packet_loss == 0.0
     }
 
     fn is_noise_free(&self) -> bool {

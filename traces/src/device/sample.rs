@@ -96,7 +96,7 @@ impl Device {
             Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..Metadata::default() };
         let trace = Trace::new(channels.voltage_v, channels.current_a, self.spec.rate_hz, start_s, metadata)?;
         Ok(Sampled {
-            trace,
+            trace: trace.without(self.lost(count)),
             clipped_currents: channels.clipped_currents,
             clipped_voltages: channels.clipped_voltages,
         })

@@ -52,7 +52,11 @@ pub struct DeviceSpec {
     pub voltage_noise_v: f64,
     /// Time constant of a one-pole low-pass on the power (the rail's decoupling), s.
     pub low_pass_s: Option<f64>,
-    /// Seed of the noise.
+    /// Samples that travel together and are lost together.
+    pub packet_samples: u32,
+    /// Share of packets that are lost, 0 to below 1; the first one never is.
+    pub packet_loss: f64,
+    /// Seed of noise and losses.
     pub seed: u64,
 }
 
@@ -76,6 +80,8 @@ impl Default for DeviceSpec {
             current_noise_a: 0.005,
             voltage_noise_v: 0.002,
             low_pass_s: None,
+            packet_samples: 512,
+            packet_loss: 0.0,
             seed: 1,
         }
     }
@@ -115,6 +121,8 @@ impl DeviceSpec {
                 low_pass_s.is_finite() && low_pass_s > 0.0,
                 "a finite number above 0, or absent",
             ),
+            ("packet_samples", f64::from(self.packet_samples), self.packet_samples > 0, "at least 1"),
+            ("packet_loss", self.packet_loss, (0.0..1.0).contains(&self.packet_loss), "from 0 to below 1"),
         ];
         match checks.into_iter().find(|(_, _, good, _)| !good) {
             Some((field, value, _, must)) => {
@@ -134,7 +142,7 @@ mod tests {
     #[test]
     fn the_default_is_valid_and_every_bad_field_is_named() {
         assert_eq!(DeviceSpec::default().check(), Ok(()));
-        let spoils: [(&str, Spoil); 11] = [
+        let spoils: [(&str, Spoil); 13] = [
             ("current_gain", |s| s.current_gain = f64::NAN),
             ("specified_voltage_v", |s| s.specified_voltage_v = Some(f64::INFINITY)),
             ("rate_hz", |s| s.rate_hz = -1.0),
@@ -146,6 +154,8 @@ mod tests {
             ("current_noise_a", |s| s.current_noise_a = -1.0),
             ("voltage_noise_v", |s| s.voltage_noise_v = -1.0),
             ("low_pass_s", |s| s.low_pass_s = Some(0.0)),
+            ("packet_samples", |s| s.packet_samples = 0),
+            ("packet_loss", |s| s.packet_loss = 1.0),
         ];
         for (field, spoil) in spoils {
             let mut spec = DeviceSpec::default();

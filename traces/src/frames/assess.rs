@@ -1,10 +1,10 @@
 //! How sure the finder is, and what it has to say about the result as a whole.
 
-use super::find::{Found, FrameSpan, FrameStart};
-use super::flags::{Flag, Flags};
+use super::find::{Found, FrameStart};
+use super::flags::Flag;
 use super::marks::{Marks, Placement, Window};
+use super::spans::{Sampling, median_duration_s, spans};
 use super::threshold::{DISTINCT, Rule, Threshold};
-use crate::median::median;
 use crate::trace::Trace;
 use crate::warning::Warning;
 
@@ -46,7 +46,7 @@ pub(crate) fn conclude_at(
     starts: Vec<FrameStart>,
     threshold: Threshold,
 ) -> Found {
-    let frames = spans(&starts, marks.end_s);
+    let frames = spans(&starts, marks.end_s, Sampling { window: placement.samples, rate_hz });
     let period_s = 1.0 / rate_hz;
     let pre_s = placement.marks.first().map_or(0.0, |mark| libm::round(mark.anchor) * period_s);
     let window = Window { pre_s, post_s: placement.samples as f64 * period_s - pre_s };
@@ -72,84 +72,6 @@ pub(crate) fn conclude_at(
     .flatten()
     .collect();
     found
-}
-
-fn spans(starts: &[FrameStart], end_s: f64) -> Vec<FrameSpan> {
-    let mut frames: Vec<FrameSpan> = Vec::with_capacity(starts.len());
-    for (index, start) in starts.iter().enumerate() {
-        let next = starts.get(index + 1);
-        let mut flags = Flags::default();
-        if start.marked {
-            flags.insert(Flag::Marked);
-        }
-        if next.is_none() {
-            flags.insert(Flag::Last);
-        }
-        let confidence = next.map_or(start.confidence, |next| start.confidence.min(next.confidence));
-        if confidence < 0.5 {
-            flags.insert(Flag::Unsure);
-        }
-        frames.push(FrameSpan {
-            start_s: start.time_s,
-            end_s: next.map_or(end_s, |next| next.time_s),
-            confidence,
-            flags,
-        });
-    }
-    flag_lengths(&mut frames);
-    flag_beside_others(&mut frames);
-    frames
-}
-
-fn flag_lengths(frames: &mut [FrameSpan]) {
-    let Some(median_s) = median_duration_s(frames) else { return };
-    for frame in frames {
-        let duration_s = frame.end_s - frame.start_s;
-        if duration_s > 1.5 * median_s {
-            frame.flags.insert(Flag::Long);
-        } else if duration_s < 0.5 * median_s {
-            frame.flags.insert(Flag::Short);
-        }
-    }
-}
-
-/// How many frames on either side tell what a usual length is here.
-const AROUND: usize = 4;
-/// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
-const TWICE: f64 = 1.6;
-/// A length that differs from the usual one by more than this share of it, and by more than so many times what the lengths around do,
-/// is odd.
-const ODD: [f64; 2] = [0.1, 6.0];
-
-/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one, or break their beat.
-fn flag_beside_others(frames: &mut [FrameSpan]) {
-    let durations_s: Vec<f64> = frames.iter().map(|frame| frame.end_s - frame.start_s).collect();
-    let Some(inner) = durations_s.len().checked_sub(1) else { return };
-    for index in 0..inner {
-        let around = (index.saturating_sub(AROUND)..inner.min(index + AROUND + 1)).filter(|&i| i != index);
-        let mut around: Vec<f64> = around.map(|i| durations_s[i]).collect();
-        if around.len() < 2 {
-            continue;
-        }
-        let usual_s = median(&mut around);
-        let off_s = (durations_s[index] - usual_s).abs();
-        let mut others_s: Vec<f64> = around.iter().map(|other_s| (other_s - usual_s).abs()).collect();
-        if durations_s[index] > TWICE * usual_s {
-            frames[index].flags.insert(Flag::Merged);
-        } else if durations_s[index] * TWICE < usual_s {
-            frames[index].flags.insert(Flag::Split);
-        } else if off_s > (ODD[0] * usual_s).max(ODD[1] * median(&mut others_s)) {
-            frames[index].flags.insert(Flag::Odd);
-        }
-    }
-}
-
-/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if alone.
-fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
-    let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
-    let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();
-    durations.sort_by(f64::total_cmp);
-    durations.get(durations.len() / 2).copied()
 }
 
 fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
@@ -239,34 +161,6 @@ mod tests {
             FrameStart { time_s, distance_w2: 0.0, confidence, marked: false }
         };
         core::iter::once(0.0).chain(gaps_s.iter().copied()).map(&mut start).collect()
-    }
-
-    fn flagged(gaps_s: &[f64], flag: Flag) -> Vec<usize> {
-        let starts = starts(gaps_s, 1.0);
-        let end_s = starts.last().map_or(1.0, |last| last.time_s + 1.0);
-        let frames = spans(&starts, end_s);
-        (0..frames.len()).filter(|&index| frames[index].flags.contains(flag)).collect()
-    }
-
-    #[test]
-    fn a_start_misplaced_in_an_even_beat_makes_both_its_frames_odd() {
-        let gaps_s = [1.0, 1.01, 0.99, 1.0, 1.2, 0.8, 1.0, 1.01, 1.0, 0.99];
-        assert_eq!(flagged(&gaps_s, Flag::Odd), [4, 5]);
-    }
-
-    #[test]
-    fn a_clock_step_and_lengths_that_vary_anyway_are_not_odd() {
-        let step_s = [1.0, 1.01, 0.99, 1.0, 1.01, 1.4, 1.41, 1.39, 1.4, 1.4, 1.41];
-        assert!(flagged(&step_s, Flag::Odd).is_empty());
-        let varied_s = [1.0, 1.2, 0.9, 1.15, 0.85, 1.1, 0.95, 1.2, 0.9, 1.0];
-        assert!(flagged(&varied_s, Flag::Odd).is_empty());
-    }
-
-    #[test]
-    fn merged_and_split_frames_are_called_that_and_not_odd() {
-        let gaps_s = [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0, 1.0];
-        assert_eq!((flagged(&gaps_s, Flag::Merged), flagged(&gaps_s, Flag::Split)), (vec![3], vec![6, 7]));
-        assert!(flagged(&gaps_s, Flag::Odd).is_empty());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What is found, and by which method.
 
 use super::assess;
+use super::auto::find_auto;
 use super::flags::Flags;
 use super::marks::{MarkError, Marks, Placed, Placement, Window};
 use super::matched::find_matched;
@@ -10,13 +11,6 @@ use super::tracked::find_tracked;
 use crate::trace::Trace;
 use crate::warning::Warning;
 
-/// With fewer starts than this there is too little to learn from: [`Method::Auto`] keeps the sum of squares.
-const FEW: usize = 16;
-/// With fewer samples in the window shapes are too coarse to be followed: [`Method::Auto`] keeps the sum of squares
-/// (`quintile chart frames`: F1 0.61 against 0.91 with 10 samples, 0.96 against 0.97 with 25, 0.99 against 0.99 with 50).
-const COARSE: usize = 20;
-/// Traces of more samples are tracked by [`Method::Auto`] only where the sum of squares is in doubt.
-const LONG: usize = 1 << 24;
 /// One frame start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameStart {
@@ -90,13 +84,7 @@ pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Foun
     match options.method {
         Method::SumOfSquares | Method::Normalized => find_matched(trace, marks, options.method),
         Method::Tracking => find_tracked(trace, marks),
-        Method::Auto => {
-            let found = find_matched(trace, marks, Method::SumOfSquares)?;
-            let few = found.starts.len() < FEW;
-            let long_and_clear = trace.samples() > LONG && found.threshold.clarity() >= 1.0;
-            let coarse = marks.place(trace)?.samples < COARSE;
-            if few || coarse || long_and_clear { Ok(found) } else { find_tracked(trace, marks) }
-        }
+        Method::Auto => find_auto(trace, marks),
     }
 }
 

@@ -14,8 +14,8 @@ pub enum Method {
     Normalized,
     /// The sequence of starts that resembles several templates, by shape and by squares, itself, and an even beat best.
     Tracking,
-    /// Tracking; the sum of squares where there are fewer than 16 frames, fewer than 20 samples in the window, or more than 16
-    /// million samples and no doubt.
+    /// Tracking; with fewer than 20 samples in the window, of tracking, the sum of squares and normalized that with the most even beat,
+    /// with fewer than 8 the sum of squares. That also where there are fewer than 16 frames, or more than 16 million samples and no doubt.
     #[default]
     Auto,
 }

@@ -3,6 +3,8 @@
 //! tells starts from the rest, and where it cannot, the result carries a [`Warning`](crate::Warning).
 
 mod assess;
+mod auto;
+mod beat;
 mod correlate;
 mod find;
 mod first;
@@ -17,10 +19,12 @@ mod propose;
 mod refine;
 mod register;
 mod regularity;
+mod spans;
 mod split;
 mod threshold;
 mod track;
 mod tracked;
+mod uncovered;
 
 pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_only};
 pub use flags::{Flag, Flags};

@@ -7,6 +7,7 @@ use super::method::Method;
 use super::register::register;
 use super::threshold::choose;
 use super::track::{Start, track};
+use super::uncovered::uncovered;
 use crate::trace::Trace;
 
 /// By the sequence of starts that fits best.
@@ -32,6 +33,9 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
     let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
     let mut found = assess::conclude(trace, marks, &placement, starts, nothing);
+    let places: Vec<f64> = found.starts.iter().map(|start| trace.position(start.time_s)).collect();
+    let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());
+    found.warnings.extend(uncovered(&power[..end], &places));
     found.method = Method::Tracking;
     Ok(found)
 }

@@ -31,7 +31,8 @@ pub fn write_with<W: Write>(trace: &Trace, out: W, delimiter: u8) -> Result<(), 
 
 fn write_rows(trace: &Trace, out: &mut impl Write, c: char) -> std::io::Result<()> {
     writeln!(out, "{TIME}{c}{}{c}{}", CHANNELS[0], CHANNELS[1])?;
-    for (index, (voltage, current)) in trace.voltage_v().iter().zip(trace.current_a()).enumerate() {
+    for index in trace.kept(0..trace.samples()) {
+        let (voltage, current) = (trace.voltage_v()[index], trace.current_a()[index]);
         let time_ns = trace.time_ns(index);
         let (sign, time_ns) = (if time_ns < 0 { "-" } else { "" }, time_ns.unsigned_abs());
         let (seconds, mut fraction, mut digits) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000, 9);
@@ -39,7 +40,7 @@ fn write_rows(trace: &Trace, out: &mut impl Write, c: char) -> std::io::Result<(
             fraction /= 10;
             digits -= 1;
         }
-        let (voltage, current) = (f64::from(*voltage), f64::from(*current));
+        let (voltage, current) = (f64::from(voltage), f64::from(current));
         writeln!(out, "{sign}{seconds}.{fraction:0digits$}{c}{voltage}{c}{current}")?;
     }
     out.flush()

@@ -42,7 +42,7 @@ pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError>
         version: VERSION,
         rate_hz: Some(trace.rate_hz()),
         start_s: Some(trace.start_s()),
-        samples: Some(trace.samples() as u64),
+        samples: Some(trace.kept(0..trace.samples()).count() as u64),
         units: [("time_ns", "ns"), ("time_s", "s"), ("voltage_V", "V"), ("current_A", "A")].map(unit).into(),
         metadata,
     };

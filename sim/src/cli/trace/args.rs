@@ -292,7 +292,13 @@ pub struct SampleArgs {
     /// Time constant of the low-pass in seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub low_pass: Option<f64>,
-    /// Seed of the noise
+    /// Samples that travel together, and are lost together
+    #[arg(long, value_name = "N")]
+    pub packet_samples: Option<u32>,
+    /// Share of packets that are lost, 0 to below 1: gaps in the file
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub packet_loss: Option<f64>,
+    /// Seed of noise and losses
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
     /// File to write, as for `trace convert`

@@ -21,6 +21,15 @@ pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
             sampled.clipped_currents, sampled.clipped_voltages
         ));
     }
+    let lost = sampled.trace.lost();
+    if let Some(first) = lost.first() {
+        complain(&format!(
+            "warning packets-lost: {} samples in {} stretches are missing, the first after {} s; --repair fills them",
+            lost.iter().map(|range| range.len()).sum::<usize>(),
+            lost.len(),
+            sampled.trace.time_s(first.start - 1)
+        ));
+    }
     save(&sampled.trace, &args.out)?;
     let before_j = PowerIntegral::new(&trace).energy_j(sampled.trace.start_s(), sampled.trace.end_s());
     let after_j = PowerIntegral::new(&sampled.trace).total_j();
@@ -66,6 +75,8 @@ fn spec(args: &SampleArgs) -> Result<DeviceSpec, Failure> {
     spec.voltage_range_v = args.voltage_range.map_or(spec.voltage_range_v, |v| [-v, v]);
     spec.specified_voltage_v = args.specified_voltage.or(spec.specified_voltage_v);
     spec.low_pass_s = args.low_pass.or(spec.low_pass_s);
+    spec.packet_samples = args.packet_samples.unwrap_or(spec.packet_samples);
+    set(&mut spec.packet_loss, args.packet_loss);
     spec.seed = args.seed.unwrap_or(spec.seed);
     Ok(spec)
 }

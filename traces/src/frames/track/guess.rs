@@ -12,12 +12,15 @@ const REACH_WINDOWS: usize = 200;
 const SPARSER: f64 = 1.3;
 /// What is nearer than this share of the median minimum may be told apart after all: at coarse rates half a sample is much.
 const FAR_BELOW: f64 = 0.1;
+/// A gap of the first guess is looked at for up to so many frames.
+const MOST_BETWEEN: usize = 5;
 /// How much a separation, capped at 5, counts beside regularity.
 const SEPARATION_SHARE: f64 = 0.1;
 
 /// The period in samples and the starts of that split of the minima, by either measure, that leaves the most even beat.
 pub(super) fn first(bank: &Bank, spacing: usize, marks: &[usize]) -> (usize, Vec<usize>) {
     let mut best = (f64::NEG_INFINITY, 2 * spacing, marks.to_vec());
+    let mut by = &bank.shape;
     for profile in [&bank.shape, &bank.squares_w2] {
         let reach = 2 * spacing * REACH_WINDOWS;
         let mut minima = spaced_minima(profile, spacing);
@@ -41,11 +44,52 @@ pub(super) fn first(bank: &Bank, spacing: usize, marks: &[usize]) -> (usize, Vec
             let dense = if (gap as f64) < SPARSER * usual { 10.0 } else { 0.0 };
             let value = regularity(&starts, span) + SEPARATION_SHARE * separation(&split).min(5.0) - dense;
             if value > best.0 {
-                best = (value, gap, starts);
+                (best, by) = ((value, gap, starts), profile);
             }
         }
     }
-    (best.1, best.2)
+    let (_, period, starts) = best;
+    match (2..=MOST_BETWEEN).rev().find_map(|parts| between(by, &starts, [period, spacing], parts, marks)) {
+        Some(starts) => (median_gap(&starts).unwrap_or(period), starts),
+        None => (period, starts),
+    }
+}
+
+/// The starts and those between them, where what divides every gap of a period into so many equal parts resembles the mark as well as
+/// half a sample lets anything: of V-synchronized frames whose period is no whole number of samples, only some fall on the mark's place
+/// between samples, and they keep a beat of their own.
+fn between(
+    profile: &[f64],
+    starts: &[usize],
+    [period, spacing]: [usize; 2],
+    parts: usize,
+    marks: &[usize],
+) -> Option<Vec<usize>> {
+    if period / parts <= spacing {
+        return None;
+    }
+    let even = |pair: &&[usize]| (pair[1] - pair[0]).abs_diff(period) <= 1;
+    let divided = |pair: &[usize]| -> Vec<usize> {
+        let (from, gap) = (pair[0], pair[1] - pair[0]);
+        (1..parts).map(|part| lowest_beside(profile, from + (gap * part + parts / 2) / parts)).collect()
+    };
+    if starts.windows(2).filter(even).count() * 10 < starts.len() * 9 {
+        return None;
+    }
+    let more: Vec<usize> = starts.windows(2).filter(even).flat_map(divided).collect();
+    let mut values: Vec<f64> = more.iter().map(|&offset| profile[offset]).collect();
+    if values.is_empty() || median(&mut values) > half_a_sample(profile, marks) {
+        return None;
+    }
+    let mut all = [starts, &more].concat();
+    all.sort_unstable();
+    Some(all)
+}
+
+/// The lowest of an offset and its two neighbours.
+fn lowest_beside(profile: &[f64], offset: usize) -> usize {
+    let three = offset.saturating_sub(1)..(offset + 2).min(profile.len());
+    three.min_by(|a, b| profile[*a].total_cmp(&profile[*b])).unwrap_or(offset)
 }
 
 /// What a match half a sample off leaves: a quarter of what a whole one does. Nearer ones are not told apart, or else, where a few
@@ -81,5 +125,21 @@ mod tests {
     #[test]
     fn the_median_gap_of_few_is_none() {
         assert_eq!((median_gap(&[]), median_gap(&[5]), median_gap(&[5, 8, 20, 24])), (None, None, Some(4)));
+    }
+
+    #[test]
+    fn frames_between_those_that_fall_on_the_marks_place_between_samples_are_seen() {
+        // A period of 33 1/3 samples: every third start is nearest to the mark, the others a third of a sample off.
+        let near = |offset: f64| {
+            let phase = (offset / (100.0 / 3.0)).fract();
+            let off = phase.min(1.0 - phase) * (100.0 / 3.0);
+            (off * off).min(9.0)
+        };
+        let profile: Vec<f64> = (0..2000).map(|offset| near(f64::from(offset))).collect();
+        let thirds: Vec<usize> = (0..19).map(|k| 100 * k).collect();
+        let all = between(&profile, &thirds, [100, 10], 3, &[500]).unwrap();
+        assert_eq!((all.len(), &all[..4]), (55, &[0, 33, 67, 100][..]));
+        assert_eq!(between(&profile, &thirds, [100, 10], 2, &[500]), None);
+        assert_eq!(between(&profile, &thirds, [100, 40], 3, &[500]), None);
     }
 }

@@ -27,6 +27,8 @@ const FIRST_PERIODS: usize = 12;
 const LAST_ROUNDS: usize = 3;
 /// Candidates kept of every stretch of one period.
 const KEPT: usize = 10;
+/// Candidates nearer than so many samples are one; none is so near to a mark.
+const APART: usize = 3;
 /// Where the sequence covers less than this share of what candidates do, pauses left out, power levels have changed.
 const COVERED: f64 = 0.75;
 
@@ -146,11 +148,11 @@ impl Tracker {
         offsets.extend(spaced_minima(&self.bank.squares_w2, self.spacing));
         offsets.retain(|offset| {
             let nearest = self.marks.iter().map(|mark| mark.abs_diff(*offset)).min().unwrap_or(0);
-            (self.spacing..=self.reach).contains(&nearest)
+            (self.spacing.max(APART)..=self.reach).contains(&nearest)
         });
         offsets.extend(&self.marks);
         offsets.sort_unstable();
-        offsets.dedup_by(|later, earlier| *later - *earlier < 3);
+        offsets.dedup_by(|later, earlier| *later - *earlier < APART);
         let candidate = |offset| Candidate { offset, features: self.bank.features(offset), weight: 0.0 };
         offsets.into_iter().map(candidate).collect()
     }

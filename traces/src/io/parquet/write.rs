@@ -11,7 +11,6 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnPath, Type};
 use std::io::Write;
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -44,12 +43,16 @@ pub fn save(trace: &Trace, path: &Path) -> Result<(), WriteError> {
 fn write_file<W: Write + Send>(trace: &Trace, json: String, out: W) -> Result<(), ParquetError> {
     let mut writer = SerializedFileWriter::new(out, Arc::new(schema()?), Arc::new(properties(json)))?;
     for start in (0..trace.samples()).step_by(GROUP_ROWS) {
-        let rows = start..trace.samples().min(start + GROUP_ROWS);
+        let rows: Vec<usize> = trace.kept(start..trace.samples().min(start + GROUP_ROWS)).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let of = |channel: &[f32]| -> Vec<f32> { rows.iter().map(|&row| channel[row]).collect() };
         let mut group = writer.next_row_group()?;
-        let times_ns: Vec<i64> = rows.clone().map(|index| trace.time_ns(index)).collect();
-        write_column::<Int64Type, W>(&mut group, &times_ns, 0..times_ns.len())?;
-        write_column::<FloatType, W>(&mut group, trace.voltage_v(), rows.clone())?;
-        write_column::<FloatType, W>(&mut group, trace.current_a(), rows)?;
+        let times_ns: Vec<i64> = rows.iter().map(|&row| trace.time_ns(row)).collect();
+        write_column::<Int64Type, W>(&mut group, &times_ns)?;
+        write_column::<FloatType, W>(&mut group, &of(trace.voltage_v()))?;
+        write_column::<FloatType, W>(&mut group, &of(trace.current_a()))?;
         group.close()?;
     }
     writer.close()?;
@@ -59,11 +62,10 @@ fn write_file<W: Write + Send>(trace: &Trace, json: String, out: W) -> Result<()
 fn write_column<T: DataType, W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     values: &[T::T],
-    rows: Range<usize>,
 ) -> Result<(), ParquetError> {
     let mut column =
         group.next_column()?.ok_or_else(|| ParquetError::General("no column left".to_owned()))?;
-    column.typed::<T>().write_batch(&values[rows], None, None)?;
+    column.typed::<T>().write_batch(values, None, None)?;
     column.close()
 }
 

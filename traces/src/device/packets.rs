@@ -1,0 +1,79 @@
+//! Packets that get lost between recorder and host.
+
+use super::Device;
+use crate::random::Random;
+use core::ops::Range;
+
+/// The random numbers of losses are none of those of the noise.
+const STREAM: u64 = 1;
+
+impl Device {
+    /// The stretches of `samples` that do not arrive, neighbouring packets in one. Each packet but the first is lost or not by itself.
+    pub(super) fn lost(&self, samples: usize) -> Vec<Range<usize>> {
+        let random = Random::new(self.spec.seed, STREAM);
+        let length = self.spec.packet_samples as usize;
+        let packets = 1..samples.div_ceil(length);
+        let mut lost: Vec<Range<usize>> = Vec::new();
+        for packet in packets.filter(|&packet| random.uniform(packet as u64) < self.spec.packet_loss) {
+            let range = packet * length..samples.min((packet + 1) * length);
+            match lost.last_mut().filter(|last| last.end == range.start) {
+                Some(last) => last.end = range.end,
+                None => lost.push(range),
+            }
+        }
+        lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::curve::Curve;
+    use crate::device::{Device, DeviceSpec};
+    use crate::io::{self, ReadError, ReadOptions, csv, parquet};
+
+    fn device(packet_loss: f64, seed: u64) -> Device {
+        Device::new(DeviceSpec { packet_samples: 100, packet_loss, seed, ..DeviceSpec::default() }).unwrap()
+    }
+
+    #[test]
+    fn as_many_are_lost_as_asked_whole_and_never_the_first() {
+        for seed in 1..20 {
+            let lost = device(0.1, seed).lost(100_050);
+            let samples: usize = lost.iter().map(ExactSizeIterator::len).sum();
+            // 1000 packets, each lost with 0.1: within five standard deviations of 100.
+            assert!((samples as f64 - 10_000.0).abs() < 5.0 * 949.0, "{samples}");
+            assert!(lost.iter().all(|range| range.start >= 100 && range.start % 100 == 0));
+            assert!(lost.windows(2).all(|two| two[0].end < two[1].start));
+        }
+        assert!(device(0.0, 1).lost(100_000).is_empty());
+        assert_ne!(device(0.1, 1).lost(100_000), device(0.1, 2).lost(100_000));
+    }
+
+    #[test]
+    fn a_file_has_the_gaps_and_whoever_reads_it_is_told_where() {
+        let curve = Curve::new((0..=40).map(|i| f64::from(i) * 0.01).collect(), vec![12.0; 40]).unwrap();
+        let trace = device(0.2, 3).sample(&curve, 0.0, 0.4).unwrap().trace;
+        let first = trace.lost()[0].clone();
+        let dir = std::env::temp_dir().join(format!("quintile-packets-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let (table, text) = (dir.join("t.parquet"), dir.join("t.csv"));
+        parquet::save(&trace, &table).unwrap();
+        csv::save_as(&trace, &text, b',', false).unwrap();
+        for path in [table, text] {
+            let refused = io::read(&path, &ReadOptions::default()).unwrap_err();
+            let at_gap = |row: u64| row == first.start as u64 + 1;
+            assert!(matches!(refused, ReadError::Uneven { row, .. } if at_gap(row)), "{refused}");
+            let mended = io::read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
+            let gaps = mended.repairs.iter().filter(|repair| repair.code == "filled-gap");
+            let gaps: Vec<u64> = gaps.map(|repair| repair.count).collect();
+            let lost: Vec<u64> = trace
+                .lost()
+                .iter()
+                .filter(|lost| lost.end < trace.samples())
+                .map(|lost| lost.len() as u64)
+                .collect();
+            assert_eq!(gaps, lost);
+        }
+        std::fs::remove_dir_all(dir).unwrap();
+    }
+}

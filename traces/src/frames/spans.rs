@@ -1,0 +1,196 @@
+//! The frames between starts, and what is remarkable about each.
+
+use super::beat;
+use super::find::{FrameSpan, FrameStart};
+use super::flags::{Flag, Flags};
+use crate::median::median;
+
+/// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
+const TWICE: f64 = 1.6;
+/// A length that differs from the usual one by more than this share of it, and by more than so many times what the lengths around do,
+/// is odd.
+const ODD: [f64; 2] = [0.1, 6.0];
+/// In a window of fewer samples many things look like a start, and the beat alone tells which is one.
+const COARSE: usize = 20;
+/// With fewer yet, a start may be a sample off, and even gaps have to agree within half a sample.
+const COARSEST: usize = 8;
+/// Where fewer of the gaps than this are even nothing is sure, in windows of fewer than so many samples.
+const MOSTLY: [(usize, f64); 2] = [(COARSE, 0.9), (50, 0.6)];
+/// Where the median gap is less than so many windows there is no room for what tells a start from the middle of a frame.
+const ROOM: f64 = 1.2;
+/// What is left of the confidence where window and beat say nothing.
+const LEFT: f64 = 0.4;
+
+/// How finely a window is sampled.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sampling {
+    /// Samples in the window.
+    pub window: usize,
+    /// Samples per second.
+    pub rate_hz: f64,
+}
+
+/// Frames and their flags from the starts; the last one ends at `end_s`.
+pub(super) fn spans(starts: &[FrameStart], end_s: f64, sampling: Sampling) -> Vec<FrameSpan> {
+    let mut frames: Vec<FrameSpan> = Vec::with_capacity(starts.len());
+    for (index, start) in starts.iter().enumerate() {
+        let next = starts.get(index + 1);
+        let mut flags = Flags::default();
+        if start.marked {
+            flags.insert(Flag::Marked);
+        }
+        if next.is_none() {
+            flags.insert(Flag::Last);
+        }
+        frames.push(FrameSpan {
+            start_s: start.time_s,
+            end_s: next.map_or(end_s, |next| next.time_s),
+            confidence: next.map_or(start.confidence, |next| start.confidence.min(next.confidence)),
+            flags,
+        });
+    }
+    doubt_coarse(&mut frames, sampling);
+    for frame in frames.iter_mut().filter(|frame| frame.confidence < 0.5) {
+        frame.flags.insert(Flag::Unsure);
+    }
+    flag_lengths(&mut frames);
+    flag_beside_others(&mut frames);
+    frames
+}
+
+/// Lengths of all frames but the last, which is cut by the end mark, s.
+fn lengths_s(frames: &[FrameSpan]) -> Vec<f64> {
+    let inner = frames.split_last().map_or(&[][..], |(_, inner)| inner);
+    inner.iter().map(|frame| frame.end_s - frame.start_s).collect()
+}
+
+/// In a coarse window lowers the confidence of what breaks the beat; of everything where there is none.
+fn doubt_coarse(frames: &mut [FrameSpan], sampling: Sampling) {
+    let Some((_, mostly)) = MOSTLY.into_iter().find(|(samples, _)| sampling.window < *samples) else {
+        return;
+    };
+    let lengths_s = lengths_s(frames);
+    let most_s = if sampling.window < COARSEST { 0.5 / sampling.rate_hz } else { f64::INFINITY };
+    let mut even = beat::even(&lengths_s, most_s);
+    let many = even.iter().filter(|even| **even).count() as f64;
+    let crowded = median(&mut lengths_s.clone()) * sampling.rate_hz < ROOM * sampling.window as f64;
+    if many < mostly * even.len() as f64 || crowded && sampling.window < COARSE {
+        even.fill(false);
+    } else if sampling.window >= COARSE {
+        return;
+    }
+    even.push(even.last().copied().unwrap_or(false));
+    frames.iter_mut().zip(even).filter(|(_, even)| !even).for_each(|(frame, _)| frame.confidence *= LEFT);
+}
+
+fn flag_lengths(frames: &mut [FrameSpan]) {
+    let Some(median_s) = median_duration_s(frames) else { return };
+    for frame in frames {
+        let duration_s = frame.end_s - frame.start_s;
+        if duration_s > 1.5 * median_s {
+            frame.flags.insert(Flag::Long);
+        } else if duration_s < 0.5 * median_s {
+            frame.flags.insert(Flag::Short);
+        }
+    }
+}
+
+/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one, or break their beat.
+fn flag_beside_others(frames: &mut [FrameSpan]) {
+    let lengths_s = lengths_s(frames);
+    for ((frame, length_s), usual_s) in frames.iter_mut().zip(&lengths_s).zip(beat::usual(&lengths_s)) {
+        let Some([usual_s, others_s]) = usual_s else { continue };
+        if *length_s > TWICE * usual_s {
+            frame.flags.insert(Flag::Merged);
+        } else if length_s * TWICE < usual_s {
+            frame.flags.insert(Flag::Split);
+        } else if (length_s - usual_s).abs() > (ODD[0] * usual_s).max(ODD[1] * others_s) {
+            frame.flags.insert(Flag::Odd);
+        }
+    }
+}
+
+/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if alone.
+pub(super) fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
+    let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
+    let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();
+    durations.sort_by(f64::total_cmp);
+    durations.get(durations.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FINE: Sampling = Sampling { window: 250, rate_hz: 50e3 };
+
+    /// Starts with gaps of so many seconds, all of one confidence.
+    fn starts(gaps_s: &[f64], confidence: f64) -> Vec<FrameStart> {
+        let mut time_s = 0.0;
+        let mut start = |gap_s: f64| {
+            time_s += gap_s;
+            FrameStart { time_s, distance_w2: 0.0, confidence, marked: false }
+        };
+        core::iter::once(0.0).chain(gaps_s.iter().copied()).map(&mut start).collect()
+    }
+
+    fn flagged(gaps_s: &[f64], flag: Flag) -> Vec<usize> {
+        let starts = starts(gaps_s, 1.0);
+        let end_s = starts.last().map_or(1.0, |last| last.time_s + 1.0);
+        let frames = spans(&starts, end_s, FINE);
+        (0..frames.len()).filter(|&index| frames[index].flags.contains(flag)).collect()
+    }
+
+    #[test]
+    fn a_start_misplaced_in_an_even_beat_makes_both_its_frames_odd() {
+        let gaps_s = [1.0, 1.01, 0.99, 1.0, 1.2, 0.8, 1.0, 1.01, 1.0, 0.99];
+        assert_eq!(flagged(&gaps_s, Flag::Odd), [4, 5]);
+    }
+
+    #[test]
+    fn a_clock_step_and_lengths_that_vary_anyway_are_not_odd() {
+        let step_s = [1.0, 1.01, 0.99, 1.0, 1.01, 1.4, 1.41, 1.39, 1.4, 1.4, 1.41];
+        assert!(flagged(&step_s, Flag::Odd).is_empty());
+        let varied_s = [1.0, 1.2, 0.9, 1.15, 0.85, 1.1, 0.95, 1.2, 0.9, 1.0];
+        assert!(flagged(&varied_s, Flag::Odd).is_empty());
+    }
+
+    #[test]
+    fn merged_and_split_frames_are_called_that_and_not_odd() {
+        let gaps_s = [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0, 1.0];
+        assert_eq!((flagged(&gaps_s, Flag::Merged), flagged(&gaps_s, Flag::Split)), (vec![3], vec![6, 7]));
+        assert!(flagged(&gaps_s, Flag::Odd).is_empty());
+    }
+
+    fn unsure(gaps_s: &[f64], sampling: Sampling) -> Vec<usize> {
+        let starts = starts(gaps_s, 1.0);
+        let frames = spans(&starts, starts.last().map_or(1.0, |last| last.time_s + 1.0), sampling);
+        (0..frames.len()).filter(|&index| frames[index].flags.contains(Flag::Unsure)).collect()
+    }
+
+    #[test]
+    fn in_a_coarse_window_what_breaks_the_beat_is_unsure_and_without_a_beat_all_is() {
+        let coarse = Sampling { window: 10, rate_hz: 20.0 };
+        let mut gaps_s = vec![1.0; 30];
+        (gaps_s[10], gaps_s[11]) = (1.15, 0.85);
+        assert_eq!(unsure(&gaps_s, coarse), [10, 11]);
+        assert!(unsure(&gaps_s, FINE).is_empty());
+        let halves: Vec<f64> = (0..30).map(|i| if i % 2 == 0 { 1.2 } else { 0.8 }).collect();
+        assert_eq!(unsure(&halves, coarse).len(), 31);
+        assert_eq!(unsure(&halves, Sampling { window: 40, ..coarse }).len(), 31);
+        assert!(unsure(&halves, FINE).is_empty());
+    }
+
+    #[test]
+    fn with_a_handful_of_samples_gaps_must_agree_within_half_of_one() {
+        let mut gaps_s = vec![1.0; 30];
+        (gaps_s[10], gaps_s[11]) = (1.06, 0.94);
+        assert_eq!(unsure(&gaps_s, Sampling { window: 5, rate_hz: 10.0 }), [10, 11]);
+        assert!(unsure(&gaps_s, Sampling { window: 8, rate_hz: 10.0 }).is_empty());
+    }
+
+    #[test]
+    fn frames_hardly_longer_than_a_coarse_window_are_unsure_all() {
+        assert_eq!(unsure(&[1.0; 30], Sampling { window: 10, rate_hz: 11.0 }).len(), 31);
+    }
+}
