@@ -148,7 +148,7 @@ fn each_bad_regime_is_told() {
     let big = PipelineSpec { shading_cache: CacheSpec::lru(16_384, 4), ..spec() };
     let near = Options { spacing: 0.15, aperture: 0.05, ..Options::default() };
     assert_eq!(drawn(near.clone(), &big).1, Vec::<&str>::new());
-    let small = PipelineSpec { shading_cache: CacheSpec::lru(2, 2), ..spec() };
+    let small = PipelineSpec { shading_cache: CacheSpec::lru(1, 1), ..spec() };
     assert_eq!(drawn(near, &small).1, ["shading-cache-small"]);
     let wide = Options { spacing: 1.5, ..Options::default() };
     assert!(drawn(wide, &big).1.contains(&"view-dependent-shading"));

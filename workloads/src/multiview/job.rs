@@ -155,7 +155,7 @@ const MOST_DEG: f64 = 6.0;
 /// A cache that holds everything.
 const ALL: CacheSpec = CacheSpec::lru(1 << 22, 16);
 /// The shader runs over those with a cache that holds everything, beyond which the cache is too small.
-const MOST_RUNS: f64 = 1.5;
+const MOST_RUNS: f64 = 1.25;
 
 /// Why there is no rig.
 enum RigError {
