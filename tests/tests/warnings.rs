@@ -30,7 +30,7 @@ const NOT_PROVOKED: [(&str, &str); 5] = [
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 34] = [
+const PROVOKED: [&str; 35] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -39,6 +39,7 @@ const PROVOKED: [&str; 34] = [
     "camera-ignored",
     "caustics-coarse",
     "caustics-crossed",
+    "collision-near-everywhere",
     "coordinates-out-of-range",
     "degenerate-triangle",
     "empty-frame",
@@ -393,4 +394,10 @@ fn beams_whose_sides_cross() {
 fn occluders_smaller_than_tiles() {
     let args = ["--size", "96x54", "--set", "slats=24", "--set", "gaps=0.02", "--set", "walls=40"];
     assert_warns(&quintile!().run("occlusion", &args), "occlusion-small-occluders");
+}
+
+#[test]
+fn objects_that_images_do_not_tell_apart() {
+    let results = quintile!().run("ccd", &["--set", "resolution=1"]);
+    assert_warns(&results, "collision-near-everywhere");
 }

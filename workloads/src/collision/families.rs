@@ -276,6 +276,17 @@ fn swarm(draws: &mut Draws) -> Option<Case> {
     draws.case(moving, collide)
 }
 
+/// `balls` balls that fly about.
+pub fn swarm_of(balls: u32, seed: u64) -> Vec<Object> {
+    let mut draws = Draws { seed: mix(seed ^ 0x05EE_D0FB), drawn: 0 };
+    let lane = |_| [draws.vector() * 2.0, draws.vector() * 2.0];
+    let lanes: Vec<[DVec3; 2]> = (0..balls).map(lane).collect();
+    lanes
+        .iter()
+        .filter_map(|[from, to]| Moving::going(&ball(0.3), *from, *to).posed(&DMat3::IDENTITY))
+        .collect()
+}
+
 /// The least distance of two points that go straight.
 fn nearest(a: [DVec3; 2], b: [DVec3; 2]) -> f64 {
     let (from, way) = (b[0] - a[0], (b[1] - a[1]) - (b[0] - a[0]));

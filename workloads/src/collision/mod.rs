@@ -15,6 +15,7 @@
 //! - [`Method`], [`Search`]: how closely a pair is looked at; [`Verdict`]: what is found.
 //! - [`detect`]: all pairs of a case.
 //! - [`families`]: cases whose truth is known.
+//! - [`job`]: the passes as a workload of the modelled hardware.
 
 mod bounds;
 mod buffer;
@@ -26,6 +27,7 @@ mod detect;
 pub mod families;
 mod frame;
 mod glance;
+mod job;
 mod object;
 mod pass;
 mod search;
@@ -34,5 +36,6 @@ mod window;
 pub use bounds::Bounds;
 pub use candidates::candidates;
 pub use detect::{Answer, detect};
+pub use job::{Options, job};
 pub use object::{Object, components};
 pub use search::{Method, Search, Verdict};

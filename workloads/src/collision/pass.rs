@@ -238,8 +238,7 @@ fn near(object: &Object, triangle: u32, t: [f64; 2], left: &Bounds) -> Option<[[
 /// Least and greatest coordinate of a triangle during `t`.
 fn swept(ends: &Ends, axis: usize, t: [f64; 2], uncertainty: f64) -> [f64; 2] {
     let (mut swept, mut size) = (NOTHING, 0.0_f64);
-    for corner in 0..3 {
-        let [from, to] = [ends[0][corner][axis], ends[1][corner][axis]];
+    for (from, to) in ends[0].iter().zip(&ends[1]).map(|(from, to)| (from[axis], to[axis])) {
         let at = |t: f64| from + t * (to - from);
         let first = at(t[0]);
         let last = if t[0] == t[1] { first } else { at(t[1]) };

@@ -1,5 +1,7 @@
 //! One pair of objects, looked at closer and closer.
 
+use serde::{Deserialize, Serialize};
+
 use super::bounds::Bounds;
 use super::compare::{Comparison, Scratch, Survivors, Watch};
 use super::crossing::cross;
@@ -10,7 +12,8 @@ use super::object::Object;
 use super::pass::{Effort, Fit, Part, Pass};
 
 /// What is compared in a tile.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Each fragment of one object with the box of the other (Fig. 5, right).
     #[default]

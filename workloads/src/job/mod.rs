@@ -105,6 +105,11 @@ const JOBS: &[(&str, &str, Maker)] = &[
         crate::caustics::job,
     ),
     (
+        "ccd",
+        "continuous collision detection: moving objects drawn along three axes into boxes of time and depth",
+        crate::collision::job,
+    ),
+    (
         "occlusion",
         "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
         crate::occlusion::job,
