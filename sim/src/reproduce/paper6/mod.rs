@@ -4,6 +4,7 @@ mod caustics;
 mod collision;
 mod glossy;
 mod occlusion;
+mod pipeline;
 mod sampling;
 mod shadows;
 mod views;
@@ -21,6 +22,7 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
         sampling::rows,
         shadows::rows,
         views::rows,
+        pipeline::rows,
     ];
     let mut rows = Vec::new();
     for rows_of in uses {
