@@ -48,12 +48,23 @@ const MOST_SUSPECTS: usize = 48;
 
 impl Survivors {
     /// Nothing is left yet of `bins`.
-    fn none(bins: usize, parts: [Part<'_>; 2]) -> Self {
+    pub fn none(bins: usize, parts: [Part<'_>; 2]) -> Self {
         Self {
             bins: vec![None; bins],
             tiles: 0,
             suspects: Vec::new(),
             alive: parts.map(|part| vec![false; part.list.len()]),
+        }
+    }
+
+    /// Adds what is left of the bins that come next.
+    pub fn join(&mut self, next: Self) {
+        self.bins.extend(next.bins);
+        self.tiles += next.tiles;
+        let room = MOST_SUSPECTS.saturating_sub(self.suspects.len());
+        self.suspects.extend(next.suspects.into_iter().take(room));
+        for (alive, next) in self.alive.iter_mut().zip(next.alive) {
+            alive.iter_mut().zip(next).for_each(|(alive, next)| *alive |= next);
         }
     }
 

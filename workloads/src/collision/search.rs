@@ -73,8 +73,11 @@ const FIRST_TILES: u32 = 8;
 const TRIANGLES_A_TILE: f64 = 16.0;
 /// So many triangles are looked at by their boxes first.
 const MANY: usize = 64;
-/// Fragments that may be drawn for a pair before it is let stand, and more for each of its triangles.
-const MOST_FRAGMENTS: u64 = 1 << 16;
+/// Fragments that may be drawn for a pair before it is let stand: many for few triangles, which are cheap all the same and often
+/// nearly touch, and a few for each of many.
+const MOST_FRAGMENTS: u64 = 1 << 18;
+const LEAST_FRAGMENTS: u64 = 1 << 16;
+const FRAGMENTS_LESS: u64 = 128;
 const FRAGMENTS_EACH: u64 = 4;
 /// Rounds that may be needed to halve space and time down to the spacing of numbers.
 const MOST_ROUNDS: u32 = 64;
@@ -95,6 +98,9 @@ enum Outcome {
     /// Something may.
     Left(Round),
 }
+
+/// Tiles in any bin that are held at once, about 50 bytes each for each of the two.
+const MOST_PLACES: usize = 1 << 21;
 
 /// So many triangles of a part say how fast it is.
 const SOME: usize = 64;
@@ -186,7 +192,9 @@ impl Pair<'_> {
             return self.maybe(0, true);
         }
         let most = self.search.resolution;
-        let mut effort = Effort::of(MOST_FRAGMENTS + FRAGMENTS_EACH * self.triangles() as u64);
+        let triangles = self.triangles() as u64;
+        let few = MOST_FRAGMENTS.saturating_sub(FRAGMENTS_LESS * triangles).max(LEAST_FRAGMENTS);
+        let mut effort = Effort::of(few + FRAGMENTS_EACH * triangles);
         let mut fit = if self.triangles() > MANY { Fit::Boxes } else { Fit::Edges };
         let first = (self.triangles() as f64 / TRIANGLES_A_TILE).sqrt() as u32;
         let (mut resolution, mut last) = (first.max(FIRST_TILES).min(most), self.maybe(0, false));
@@ -281,12 +289,9 @@ impl Pair<'_> {
         for axis in 0..3 {
             let Some(hull) = joined(&left) else { return Outcome::Apart };
             let pass = Pass::new(axis, &hull, look.resolution, look.fit);
-            let comparison = Comparison { pass: &pass, parts: self.parts(), bins: &left };
-            let found = match self.search.method {
-                Method::BoxBox => comparison.boxes_against_boxes(scratch, effort, watch),
-                _ => comparison.fragments_against_boxes(scratch, effort, watch),
+            let Some(found) = self.compare(&pass, &left, effort, scratch, watch) else {
+                return Outcome::GaveUp;
             };
-            let Some(found) = found else { return Outcome::GaveUp };
             tiles = found.tiles;
             seen |= self.search.zoom && self.is_seen(&found);
             if self.search.zoom {
@@ -298,6 +303,26 @@ impl Pair<'_> {
             }
         }
         joined(&left).map_or(Outcome::Apart, |window| Outcome::Left(Round { window, tiles, seen }))
+    }
+
+    /// Both in one pass, as many bins at once as fit in memory; `None` where that takes more than `effort`.
+    fn compare(
+        &self,
+        pass: &Pass,
+        left: &[Option<Bounds>],
+        effort: &mut Effort,
+        scratch: &mut Scratch,
+        watch: &mut impl Watch,
+    ) -> Option<Survivors> {
+        let mut all = Survivors::none(0, self.parts());
+        for bins in left.chunks((MOST_PLACES / pass.tiles()).max(1)) {
+            let comparison = Comparison { pass, parts: self.parts(), bins };
+            all.join(match self.search.method {
+                Method::BoxBox => comparison.boxes_against_boxes(scratch, effort, watch),
+                _ => comparison.fragments_against_boxes(scratch, effort, watch),
+            }?);
+        }
+        Some(all)
     }
 
     /// Keeps the triangles that are alive.

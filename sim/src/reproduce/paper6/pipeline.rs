@@ -85,7 +85,8 @@ fn tighter(scenes: &[StressScene], most: usize) -> Result<Done, RunError> {
     for scene in scenes {
         for corners in scene.triangles.iter().take(2 * most) {
             let close = if scene.open == scene.close { &scene.open } else { &scene.close };
-            let geometry = Geometry::new(&scene.open, close, std::slice::from_ref(corners)).map_err(setting)?;
+            let geometry =
+                Geometry::new(&scene.open, close, std::slice::from_ref(corners)).map_err(setting)?;
             let draw = Draw { geometry, ..scene.draw(&Unshaded).map_err(setting)? };
             measure(scene, &draw, [&mut all, &mut turning]);
         }
@@ -118,7 +119,9 @@ fn tighter(scenes: &[StressScene], most: usize) -> Result<Done, RunError> {
     };
     let shares = |widths: &Widths| {
         let shares = widths.pairs.iter().enumerate();
-        shares.map(|(place, (vertices, planes))| (place as f64 / widths.tiles as f64, planes / vertices)).collect()
+        shares
+            .map(|(place, (vertices, planes))| (place as f64 / widths.tiles as f64, planes / vertices))
+            .collect()
     };
     let figure = Figure::lines(
         "VI_figA_depth",
@@ -142,9 +145,11 @@ fn measure(scene: &StressScene, draw: &Draw<'_>, [all, turning]: [&mut Widths; 2
     let across = scene.viewport.width();
     let per_pixel = seen.len() / scene.viewport.pixels();
     for (y, x) in (0..across).step_by(8).flat_map(|y| (0..across).step_by(8).map(move |x| (y, x))) {
-        let pixels = (y..y + TILE_PX).flat_map(|row| (x..x + TILE_PX).map(move |column| row * across + column));
+        let pixels =
+            (y..y + TILE_PX).flat_map(|row| (x..x + TILE_PX).map(move |column| row * across + column));
         let samples = pixels.flat_map(|pixel| &seen[pixel as usize * per_pixel..][..per_pixel]);
-        let depths = samples.filter(|(triangle, _)| *triangle != u32::MAX).map(|(_, bits)| f32::from_bits(*bits));
+        let depths =
+            samples.filter(|(triangle, _)| *triangle != u32::MAX).map(|(_, bits)| f32::from_bits(*bits));
         let range = depths.fold([f32::INFINITY, f32::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
         if range[0] > range[1] {
             continue;
