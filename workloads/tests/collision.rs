@@ -175,6 +175,22 @@ fn no_contact_made_on_purpose_is_missed() {
     }
 }
 
+/// Products of such coordinates are not numbers that there are.
+#[test]
+fn contacts_of_the_smallest_numbers_are_not_missed() {
+    for exponent in (-1060..=-60).step_by(20) {
+        let scale = 2_f64.powi(exponent / 2) * 2_f64.powi(exponent - exponent / 2);
+        let at = |p: [i32; 3]| p.map(|c| f64::from(c) * scale);
+        let bar = |a, b| [at(a), at(b), at(b)];
+        let a: Ends = [bar([-8, 0, 0], [8, 0, 0]); 2];
+        // Edge against edge at a quarter of the time.
+        let b: Ends = [bar([0, -8, 2], [0, 8, 2]), bar([0, -8, -6], [0, 8, -6])];
+        for search in &SEARCHES {
+            assert!(may_collide(a, b, search), "2^{exponent} {search:?}");
+        }
+    }
+}
+
 /// Small triangles on a lattice of 5x5x5, every second one of `which`; none of one comes near one of the other.
 fn crowd(seed: u64, which: u64) -> impl Iterator<Item = Ends> {
     let (scale, offset) = space(seed);

@@ -64,6 +64,17 @@ impl Object {
         Self::fitted(triangles, self.uncertainty + f64::EPSILON * largest)
     }
 
+    /// The same `factor` times as large, a power of two.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let scaled = |ends: &Ends| ends.map(|end| end.map(|p| p.map(|at| at * factor)));
+        Self::fitted(self.triangles.iter().map(scaled).collect(), self.uncertainty * factor)
+    }
+
+    /// The largest coordinate that it reaches.
+    pub(super) fn largest(&self) -> f64 {
+        self.bounds.space.as_flattened().iter().fold(0.0, |largest, at| largest.max(at.abs()))
+    }
+
     /// With its boxes.
     fn fitted(triangles: Vec<Ends>, uncertainty: f64) -> Self {
         let swept = |ends: &Ends| Bounds::of(ends.as_flattened().iter().copied()).inflated(uncertainty);

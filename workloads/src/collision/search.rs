@@ -60,10 +60,27 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// The same `factor` times as large.
+    fn scaled(self, factor: f64) -> Self {
+        let Self::Maybe { bounds, tiles, seen } = self else { return self };
+        let space = bounds.space.map(|range| range.map(|at| at * factor));
+        Self::Maybe { bounds: Bounds { space, ..bounds }, tiles, seen }
+    }
+
     /// Whether the pair has to stay.
     pub fn may_collide(&self) -> bool {
         *self != Self::Apart
     }
+}
+
+/// Below this, products of three coordinates would vanish: a pair is then looked at as much larger as brings it near one.
+const TINY: f64 = 1e-60;
+
+/// The power of two that brings a small number near one, at most 2^1000: times it, all numbers are exact.
+fn enlarging(small: f64) -> f64 {
+    const BIAS: u64 = 1023;
+    let exponent = BIAS.saturating_sub(small.to_bits() >> 52).min(1000);
+    f64::from_bits((BIAS + exponent) << 52)
 }
 
 /// Looking closer ends when so much of space and time, and of the triangles, is left of a round.
@@ -127,6 +144,17 @@ impl Search {
         scratch: &mut Scratch,
         watch: &mut impl Watch,
     ) -> Verdict {
+        let largest = a.largest().max(b.largest());
+        if largest > 0.0 && largest < TINY {
+            let factor = enlarging(largest);
+            let [one, other] = [a, b].map(|object| object.scaled(factor));
+            return self.framed(&one, &other, scratch, watch).scaled(1.0 / factor);
+        }
+        self.framed(a, b, scratch, watch)
+    }
+
+    /// In the frame of reference that suits them.
+    fn framed(&self, a: &Object, b: &Object, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
         if self.zoom && self.method != Method::DepthOnly {
             let seen = Seen::new(a, b);
             let [one, other] = seen.objects.each_ref();

@@ -61,6 +61,9 @@ impl Options {
         if !(self.roughness >= 0.0 && self.roughness.is_finite()) {
             return refused("roughness", format!("{}: it is a finite radius, 0 or above", self.roughness));
         }
+        if let Some(index) = self.index.filter(|index| !(1.0..=10.0).contains(index)) {
+            return refused("index", format!("{index}: an index of refraction is 1 to 10 here"));
+        }
         if !(0.0..=1.0).contains(&self.fresnel) {
             return refused("fresnel", format!("{}: it is a share, 0 to 1", self.fresnel));
         }

@@ -32,19 +32,19 @@ pub struct Effort {
 impl Effort {
     /// The chart of the book.
     pub const FULL: Self = Self {
-        cases: [24, 3],
-        resolutions: &[8, 16, 32, 64, 128],
-        bins: &[1, 4, 16, 64],
+        cases: [12, 2],
+        resolutions: &[8, 16, 32, 64],
+        bins: &[1, 4, 16],
         gaps: &[0.3, 0.1, 0.03, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6],
-        slides: 24,
+        slides: 16,
     };
     /// A look in seconds.
     pub const QUICK: Self = Self {
-        cases: [6, 1],
-        resolutions: &[8, 32],
+        cases: [3, 1],
+        resolutions: &[4, 16],
         bins: &[1, 4],
-        gaps: &[0.1, 1e-2, 1e-3, 1e-4],
-        slides: 8,
+        gaps: &[0.3, 0.1, 1e-2, 1e-3],
+        slides: 6,
     };
 }
 
