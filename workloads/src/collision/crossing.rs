@@ -16,23 +16,37 @@ pub(super) fn cross(a: &Ends, b: &Ends, t: f64) -> bool {
     edges(a).iter().any(|edge| pierces(edge, &b)) || edges(b).iter().any(|edge| pierces(edge, &a))
 }
 
-/// Whether a segment passes through a triangle, beyond what rounding could make of one that does not: its ends on both sides of the
-/// plane, and the triangle around it (signed volumes).
-fn pierces(&[p, q]: &[DVec3; 2], [a, b, c]: &[DVec3; 3]) -> bool {
-    let size = [p, q, *a, *b, *c].iter().fold(0.0, |size: f64, p| size.max(p.abs().max_element()));
-    // What a corner at an instant is off by, and so a difference of two.
-    let off = 8.0 * f64::EPSILON * size;
-    let sign = |d: DVec3, e: DVec3, f: DVec3| {
-        let volume = d.cross(e).dot(f);
-        let [d, e, f] = [d, e, f].map(|side| side.abs().element_sum());
-        let margin = off * (d * e + e * f + f * d) + 8.0 * f64::EPSILON * d * e * f;
-        if volume.abs() > 2.0 * margin { volume.signum() } else { 0.0 }
-    };
-    let side = |point: DVec3| sign(*b - *a, *c - *a, point - *a);
-    if side(p) * side(q) >= 0.0 {
+/// Whether a segment passes through a triangle, beyond what rounding could make of one that does not.
+fn pierces(segment: &[DVec3; 2], triangle: &[DVec3; 3]) -> bool {
+    let volume = |d: DVec3, e: DVec3, f: DVec3| d.cross(e).dot(f);
+    // Most do not even as computed; only of the others is it asked by how much.
+    passes(segment, triangle, volume) && {
+        let [p, q] = segment;
+        let corners = [p, q].into_iter().chain(triangle);
+        let size = corners.fold(0.0, |size: f64, p| size.max(p.abs().max_element()));
+        // What a corner at an instant is off by, and so a difference of two.
+        let off = 8.0 * f64::EPSILON * size;
+        passes(segment, triangle, |d, e, f| {
+            let computed = volume(d, e, f);
+            let [d, e, f] = [d, e, f].map(|side| side.abs().element_sum());
+            let margin = off * (d * e + e * f + f * d) + 8.0 * f64::EPSILON * d * e * f;
+            if computed.abs() > 2.0 * margin { computed } else { 0.0 }
+        })
+    }
+}
+
+/// The ends on both sides of the plane, and the triangle around the segment, by signed volumes.
+fn passes(
+    &[p, q]: &[DVec3; 2],
+    &[a, b, c]: &[DVec3; 3],
+    volume: impl Fn(DVec3, DVec3, DVec3) -> f64,
+) -> bool {
+    let side = |point: DVec3| volume(b - a, c - a, point - a);
+    let (one, other) = (side(p), side(q));
+    if !(one > 0.0 && other < 0.0 || one < 0.0 && other > 0.0) {
         return false;
     }
-    let around = [(*a, *b), (*b, *c), (*c, *a)].map(|(d, e)| sign(q - p, d - p, e - p));
+    let around = [(a, b), (b, c), (c, a)].map(|(d, e)| volume(q - p, d - p, e - p));
     around.iter().all(|&turn| turn > 0.0) || around.iter().all(|&turn| turn < 0.0)
 }
 

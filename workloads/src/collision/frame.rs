@@ -8,8 +8,11 @@ use std::borrow::Cow;
 use super::object::Object;
 use super::search::Verdict;
 
-/// Moving by less than this share of what both objects share is not worth a copy.
+/// Moving by less than this share of what both objects share is not worth a copy, and by less than the larger one not that of many
+/// triangles.
 const LEAST: f64 = 1.0 / 64.0;
+const LEAST_OF_MANY: f64 = 0.25;
+const MANY: usize = 4096;
 
 /// Two objects seen from a frame of reference.
 pub(super) struct Seen<'a> {
@@ -27,10 +30,11 @@ impl<'a> Seen<'a> {
         let ways = [a, b].map(Object::way);
         let way = if size(a, &ways[0]) >= size(b, &ways[1]) { ways[0] } else { ways[1] };
         let far = |object: &Object| object.bounds.space.as_flattened().iter().any(|at| at.abs() > FARTHEST);
+        let least = if a.len() + b.len() < MANY { LEAST } else { LEAST_OF_MANY };
         let worth = !far(a)
             && !far(b)
             && a.bounds.meet(&b.bounds).is_some_and(|shared| {
-                (0..3).any(|axis| way[axis].abs() > LEAST * (shared.space[axis][1] - shared.space[axis][0]))
+                (0..3).any(|axis| way[axis].abs() > least * (shared.space[axis][1] - shared.space[axis][0]))
             });
         if worth {
             return Self { objects: [a, b].map(|object| Cow::Owned(object.less(way))), way };

@@ -62,12 +62,17 @@ const APERTURE: f64 = 0.11;
 
 /// Two eyes that look at what is `focus` away.
 pub fn stereo(focus: f64) -> Layout {
-    Layout::stereo(EYES * focus, APERTURE)
+    Layout::stereo(EYES * focus, aperture(focus))
+}
+
+/// The radius of the lens of an eye: that of the chart's scene, and small enough for the eyes not to meet.
+fn aperture(focus: f64) -> f64 {
+    APERTURE.min(0.4 * EYES * focus)
 }
 
 /// So many views on a line as long as both eyes and their lenses take, each with a box filter that overlaps half of the next.
 pub fn line(views: u32, focus: f64) -> Layout {
-    Layout::line(views, EYES * focus + 2.0 * APERTURE, APERTURE)
+    Layout::line(views, EYES * focus + 2.0 * aperture(focus), aperture(focus))
 }
 
 /// The policies, each with its name.
