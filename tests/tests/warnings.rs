@@ -8,8 +8,20 @@ use std::path::Path;
 use serde_json::json;
 use tests::{Glb, Inputs, Results, quintile, root};
 
+/// Why a warning of a workload is not brought about here.
+const TESTED: &str = "tests of the workload bring it about, each in a run of its own";
+
 /// Codes that no test here brings about, and why.
-const NOT_PROVOKED: [(&str, &str); 5] = [
+const NOT_PROVOKED: [(&str, &str); 11] = [
+    (
+        "collision-near-everywhere",
+        "it takes surfaces that slide along each other; a unit test in `workloads` makes it up",
+    ),
+    ("lens-wider-than-receiver", TESTED),
+    ("shading-cache-small", TESTED),
+    ("shadow-banding", TESTED),
+    ("shadow-bias", TESTED),
+    ("view-dependent-shading", TESTED),
     (
         "clipped-samples",
         "the recorder of a run is chosen so that its range holds the peak; only a recorder set by hand could clip",
@@ -30,7 +42,7 @@ const NOT_PROVOKED: [(&str, &str); 5] = [
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 35] = [
+const PROVOKED: [&str; 34] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -39,7 +51,6 @@ const PROVOKED: [&str; 35] = [
     "camera-ignored",
     "caustics-coarse",
     "caustics-crossed",
-    "collision-near-everywhere",
     "coordinates-out-of-range",
     "degenerate-triangle",
     "empty-frame",
@@ -122,8 +133,7 @@ fn an_accuracy_that_no_time_is_left_for() {
 
 #[test]
 fn frames_that_are_not_found() {
-    let results =
-        quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "30000"]);
+    let results = quintile!().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "6000"]);
     assert_warns(&results, "frames-missed");
     assert_warns(&results, "few-samples");
 }
@@ -394,10 +404,4 @@ fn beams_whose_sides_cross() {
 fn occluders_smaller_than_tiles() {
     let args = ["--size", "96x54", "--set", "slats=24", "--set", "gaps=0.02", "--set", "walls=40"];
     assert_warns(&quintile!().run("occlusion", &args), "occlusion-small-occluders");
-}
-
-#[test]
-fn objects_that_images_do_not_tell_apart() {
-    let results = quintile!().run("ccd", &["--set", "resolution=1"]);
-    assert_warns(&results, "collision-near-everywhere");
 }
