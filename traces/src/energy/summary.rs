@@ -24,11 +24,11 @@ impl Spread {
         let mean = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
         let deviation = if values.len() > 1 { libm::sqrt(squares / (count - 1.0)) } else { 0.0 };
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let middle = sorted.len() / 2;
-        let lower = sorted[(sorted.len() - 1) / 2];
-        Some(Self { mean, deviation, median: 0.5 * (lower + sorted[middle]) })
+        let mut others = values.to_vec();
+        let (below, &mut upper, _) = others.select_nth_unstable_by(values.len() / 2, f64::total_cmp);
+        let lower =
+            if values.len() % 2 == 1 { upper } else { below.iter().copied().fold(f64::MIN, f64::max) };
+        Some(Self { mean, deviation, median: 0.5 * (lower + upper) })
     }
 }
 

@@ -13,13 +13,18 @@ const EVEN: f64 = 0.1;
 pub(super) fn usual(gaps: &[f64]) -> impl Iterator<Item = Option<[f64; 2]>> + '_ {
     (0..gaps.len()).map(move |index| {
         let around = index.saturating_sub(AROUND)..gaps.len().min(index + AROUND + 1);
-        let mut around: Vec<f64> = around.filter(|&other| other != index).map(|other| gaps[other]).collect();
-        if around.len() < 2 {
+        let (mut held, mut count) = ([0.0; 2 * AROUND], 0);
+        for other in around.filter(|&other| other != index) {
+            held[count] = gaps[other];
+            count += 1;
+        }
+        let around = &mut held[..count];
+        if count < 2 {
             return None;
         }
-        let usual = median(&mut around);
-        let mut off: Vec<f64> = around.iter().map(|other| (other - usual).abs()).collect();
-        Some([usual, median(&mut off)])
+        let usual = median(around);
+        around.iter_mut().for_each(|gap| *gap = (*gap - usual).abs());
+        Some([usual, median(around)])
     })
 }
 

@@ -13,9 +13,8 @@ pub(crate) fn regularity(offsets: &[usize], span: usize) -> f64 {
     if gaps.len() < LEAST_GAPS || span == 0 {
         return 0.0;
     }
-    let mut sorted = gaps.clone();
-    sorted.sort_unstable();
-    let median = sorted[sorted.len() / 2] as f64;
+    let mut others = gaps.clone();
+    let median = *others.select_nth_unstable(gaps.len() / 2).1 as f64;
     let regular = |gap: &&usize| (REGULAR[0] * median..=REGULAR[1] * median).contains(&(**gap as f64));
     gaps.iter().filter(regular).sum::<usize>() as f64 / span as f64
 }

@@ -114,8 +114,7 @@ fn flag_beside_others(frames: &mut [FrameSpan]) {
 pub(super) fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
     let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
     let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();
-    durations.sort_by(f64::total_cmp);
-    durations.get(durations.len() / 2).copied()
+    (!durations.is_empty()).then(|| median(&mut durations))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Which minima are frame starts: a threshold taken from the minima themselves, with its reason as data.
 
 use super::split::{Moments, Split, moments, otsu_tree};
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Excess distances below this share of the background are not told apart: how well a good match matches says nothing.
@@ -110,9 +111,10 @@ pub(crate) fn choose(
     regularity: impl Fn(f64) -> f64,
 ) -> Threshold {
     let none = Threshold { alignment_w2, ..nothing(distances, background_w2, noise_w2) };
-    let mut logs: Vec<f64> =
-        distances.iter().map(|&distance_w2| libm::log(none.excess_w2(distance_w2))).collect();
-    logs.sort_by(f64::total_cmp);
+    let log = |distance_w2: &f64| libm::log(none.excess_w2(*distance_w2));
+    let mut logs: Vec<f64> = distances.par_iter().map(log).collect();
+    // What is equal by this order is the same to the bit.
+    logs.par_sort_unstable_by(f64::total_cmp);
     let between =
         |split: &Split| none.noise_w2 + libm::exp(0.5 * (logs[split.count - 1] + logs[split.count]));
     let splits = otsu_tree(&logs, DEPTH);

@@ -10,6 +10,7 @@ use super::{StreamError, Streamed};
 use crate::frames::{Marks, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
 use crate::sum::PairSum;
+use core::ops::Range;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -92,31 +93,40 @@ impl Plan {
 
     fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
-        let (mut piece, mut chunk, mut next) = (Piece::default(), Chunk::default(), 0_u64);
-        let mut read = rows.next(ROWS, &mut chunk)?;
+        let (mut piece, mut chunk, mut coming) = (Piece::default(), Chunk::default(), Piece::default());
+        let mut read = self.read(rows, &mut chunk, &mut piece)?;
+        let (mut from, mut fresh) = (0, 0);
         loop {
-            let fresh = piece.len();
-            self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
-            if read > 0 {
-                rows.channels(&mut chunk, &mut piece.voltage_v, &mut piece.current_a);
-                check_finite(rows, &piece, fresh)?;
-            }
             gathered.keep_head(&piece, fresh);
-            piece.add_up();
             self.look_up(&piece, &mut gathered);
+            let to = self.ready(&piece, read == 0).max(from);
             if read == 0 {
-                self.search(&piece, next, true, &mut gathered);
+                self.search(&piece, from..to, &mut gathered);
                 (gathered.total_w, gathered.samples) = (piece.sum_to(piece.end() as f64), piece.end());
                 return Ok(gathered);
             }
+            coming.begin_with(&piece, to.saturating_sub((self.spacing + MARGIN) as u64));
+            fresh = coming.len();
             // The next rows are decoded while these are searched.
-            let (coming, searched) = rayon::join(
-                || rows.next(ROWS, &mut chunk),
-                || self.search(&piece, next, false, &mut gathered),
+            let (next, ()) = rayon::join(
+                || self.read(rows, &mut chunk, &mut coming),
+                || self.search(&piece, from..to, &mut gathered),
             );
-            (read, next) = (coming?, searched);
-            piece.drop_before(next.saturating_sub((self.spacing + MARGIN) as u64));
+            (read, from) = (next?, to);
+            std::mem::swap(&mut piece, &mut coming);
         }
+    }
+
+    /// Appends the next rows of the file to a piece; how many there were.
+    fn read(&self, rows: &mut Rows, chunk: &mut Chunk, piece: &mut Piece) -> Result<usize, ReadError> {
+        let read = rows.next(ROWS, chunk)?;
+        self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
+        if read > 0 {
+            rows.channels(chunk, &mut piece.voltage_v, &mut piece.current_a);
+        }
+        piece.add_up();
+        check_finite(rows, piece)?;
+        Ok(read)
     }
 
     /// Sums at the marks and at the end.
@@ -128,18 +138,24 @@ impl Plan {
         }
     }
 
-    /// Searches the offsets from `from` on for which all samples are at hand; the first one left.
-    fn search(&self, piece: &Piece, from: u64, last: bool, gathered: &mut Gathered) -> u64 {
-        let width = self.placement.samples as u64;
-        let all = (piece.end() + 1).saturating_sub(width);
+    /// The offset up to which all samples are at hand, those of neighbours within the spacing too.
+    fn ready(&self, piece: &Piece, last: bool) -> u64 {
+        let all = self.all(piece);
         let spacing = self.spacing as u64;
-        let ready = all.saturating_sub(spacing + MARGIN as u64) / spacing * spacing;
-        let to = if last { all } else { ready };
-        if to <= from {
-            return from;
-        }
+        if last { all } else { all.saturating_sub(spacing + MARGIN as u64) / spacing * spacing }
+    }
+
+    /// The offset after the last at which a window lies in the piece.
+    fn all(&self, piece: &Piece) -> u64 {
+        (piece.end() + 1).saturating_sub(self.placement.samples as u64)
+    }
+
+    /// Searches a range of offsets.
+    fn search(&self, piece: &Piece, range: Range<u64>, gathered: &mut Gathered) {
+        let Range { start: from, end: to } = range;
+        let (all, spacing) = (self.all(piece), self.spacing as u64);
         let task = (TASK as u64).div_ceil(spacing) * spacing;
-        let tasks = (to - from).div_ceil(task);
+        let tasks = to.saturating_sub(from).div_ceil(task);
         let found: Vec<Found> = (0..tasks)
             .into_par_iter()
             .map_init(Workspace::default, |workspace, index| {
@@ -160,7 +176,6 @@ impl Plan {
                 }
             }
         }
-        to
     }
 
     fn task(&self, piece: &Piece, from: u64, to: u64, all: u64, workspace: &mut Workspace) -> Found {
@@ -253,18 +268,18 @@ impl Gathered {
     }
 }
 
-fn check_finite(rows: &Rows, piece: &Piece, fresh: usize) -> Result<(), ReadError> {
+fn check_finite(rows: &Rows, piece: &Piece) -> Result<(), ReadError> {
+    // A sum is not finite if any part is not; the place is looked for only then.
+    if piece.sum_to(piece.end() as f64).value().is_finite() {
+        return Ok(());
+    }
     for (values, column) in [(&piece.voltage_v, "voltage_V"), (&piece.current_a, "current_A")] {
-        // A sum is not finite if any part is not; the place is looked for only then.
-        let all = values[fresh..].iter().fold(0_u32, |any, value| any | u32::from(!value.is_finite()));
-        if all != 0
-            && let Some(at) = values[fresh..].iter().position(|value| !value.is_finite())
-        {
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
             return Err(ReadError::Value {
                 path: rows.path().to_owned(),
-                row: piece.base + (fresh + at) as u64 + 1,
+                row: piece.base + at as u64 + 1,
                 column: column.to_owned(),
-                value: values[fresh + at].to_string(),
+                value: values[at].to_string(),
             });
         }
     }

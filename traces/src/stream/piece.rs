@@ -54,13 +54,18 @@ impl Piece {
         if whole < self.len() { sum.plus_product(self.power_w(whole), place - whole as f64) } else { sum }
     }
 
-    /// Lets go of the samples before one, as far as whole blocks go.
-    pub fn drop_before(&mut self, sample: u64) {
-        let blocks = (sample.saturating_sub(self.base) as usize / BLOCK).min(self.prefix_w.len() - 1);
-        self.voltage_v.drain(..blocks * BLOCK);
-        self.current_a.drain(..blocks * BLOCK);
-        self.prefix_w.drain(..blocks);
-        self.base += (blocks * BLOCK) as u64;
+    /// Takes over the end of another piece, from a sample on, rounded down to a whole block.
+    pub fn begin_with(&mut self, other: &Self, sample: u64) {
+        let blocks = (sample.saturating_sub(other.base) as usize / BLOCK).min(other.prefix_w.len() - 1);
+        let take_over = |mine: &mut Vec<f32>, theirs: &[f32]| {
+            mine.clear();
+            mine.extend_from_slice(&theirs[blocks * BLOCK..]);
+        };
+        take_over(&mut self.voltage_v, &other.voltage_v);
+        take_over(&mut self.current_a, &other.current_a);
+        self.prefix_w.clear();
+        self.prefix_w.extend_from_slice(&other.prefix_w[blocks..]);
+        self.base = other.base + (blocks * BLOCK) as u64;
     }
 }
 

@@ -14,12 +14,15 @@ use crate::output::table::{Table, si, si_digits};
 const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
-    let mut frames = threads(args.threads)?.install(|| args.find.frames(&args.input))?;
-    let pixels = args.find.pixels.or(frames.metadata.pixels);
-    let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
-    if let Some(out) = &args.out {
-        traces::io::atomic::write_file(out, |file| table.write_csv(file))?;
-    }
+    let (frames, table, pixels) = threads(args.threads)?.install(|| {
+        let mut frames = args.find.frames(&args.input)?;
+        let pixels = args.find.pixels.or(frames.metadata.pixels);
+        let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
+        if let Some(out) = &args.out {
+            traces::io::atomic::write_file(out, |file| table.write_csv(file))?;
+        }
+        Ok::<_, Failure>((frames, table, pixels))
+    })?;
     if args.json {
         return print_json(&report(&frames, &table, pixels, args.inverse), true);
     }
