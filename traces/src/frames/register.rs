@@ -6,6 +6,7 @@
 //! `c_i` the position by template and marks held fixed. It is solved by Gauss-Seidel sweeps. An edge just where the compared stretch
 //! ends enters at some shifts only and pulls the result by up to a quarter of a sample (a test shows it).
 
+use super::stretch::Pair;
 use rayon::prelude::*;
 
 /// How many frames on are those that each is aligned with. The near ones are most alike; the far ones keep errors from adding up
@@ -27,12 +28,26 @@ const TEMPLATE: f64 = 0.05;
 const UNLIKE: f64 = 0.7;
 const SWEEPS: usize = 200;
 
-/// A measured shift of a later frame against an earlier one.
+/// Lags up to which frames of unlike clocks are aligned.
+const NEAR: usize = 8;
+/// Frames that leave more than this share of the variance unexplained may be of unlike clocks,
+const POOR: f64 = 0.15;
+/// and are if drawing one out in time leaves less than this share of that,
+const BETTER: f64 = 0.5;
+/// by a ratio farther from 1 than this.
+const UNLIKE_CLOCKS: f64 = 0.05;
+/// Shares of the window before and after the start that are compared then, and the greatest shift.
+const STRETCHED: [f64; 3] = [0.04, 0.4, 0.24];
+
+/// A measured shift of a later frame against an earlier one: with `m` the moves from their offsets,
+/// `m_later = ratio m_earlier + shift`.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     earlier: usize,
     later: usize,
-    /// `x_later - x_earlier` beyond the difference of their offsets, samples.
+    /// How much longer things take in the later frame: 1 unless the clock differs.
+    ratio: f64,
+    /// In samples.
     shift: f64,
     weight: f64,
 }
@@ -53,18 +68,33 @@ pub(super) fn register(
     let of_frame = |earlier: usize| {
         let later = LAGS.into_iter().map(move |lag| earlier + lag).filter(|later| *later < offsets.len());
         later.filter_map(move |later| {
-            let (shift, weight) =
-                shift(power, [offsets[earlier] + skip, offsets[later] + skip], length, reach)?;
-            Some(Link { earlier, later, shift, weight })
+            let (ratio, shift, weight) = (later - earlier <= NEAR)
+                .then(|| stretched(power, [offsets[earlier], offsets[later]], anchor, width))
+                .flatten()
+                .or_else(|| shift(power, [offsets[earlier] + skip, offsets[later] + skip], length, reach))?;
+            Some(Link { earlier, later, ratio, shift, weight })
         })
     };
     let links: Vec<Link> = (0..offsets.len()).into_par_iter().flat_map_iter(of_frame).collect();
-    let moves = reconcile(&links, fixed, reach as f64);
+    let most = (STRETCHED[2] * width as f64).max(reach as f64);
+    let moves = reconcile(&links, fixed, most);
     offsets.iter().zip(moves).map(|(&offset, by)| offset as f64 + by).collect()
 }
 
-/// How much later than at `b` the stretch at `a` is found again, in samples, and the inverse variance of that.
-fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Option<(f64, f64)> {
+/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly of unlike clocks.
+fn stretched(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
+    let [before, after, reach] = STRETCHED.map(|share| (share * width as f64) as usize);
+    let starts = offsets.map(|offset| offset + anchor);
+    let pair = Pair { power, starts, before, after, reach: reach.max(LEAST_SHIFT) };
+    let plain = pair.plain()?;
+    let fit = (plain.unlike > POOR).then(|| pair.best()).flatten()?;
+    let clear = fit.unlike < BETTER * plain.unlike && (fit.ratio - 1.0).abs() > UNLIKE_CLOCKS;
+    let variance = 2.0 * fit.unlike / (before + after) as f64 / fit.curvature + 1.0;
+    clear.then_some((fit.ratio, fit.shift, 1.0 / variance))
+}
+
+/// How much later than at `b` the stretch at `a` is found again, in samples, and the inverse variance of that; after a ratio of 1.
+fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Option<(f64, f64, f64)> {
     let template = power.get(a..a + length)?;
     let from = b.checked_sub(reach)?;
     let stretch = power.get(from..b + reach + length)?;
@@ -80,7 +110,7 @@ fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Opti
     // Of a parabola `c d^2 / 2` with noise of variance v a sample in each stretch, the vertex has about variance 2 v / c; the floor is the
     // parabola's own error on sharp edges.
     let variance = 2.0 * middle / length as f64 / curvature + 0.01;
-    Some((at as f64 - reach as f64 + vertex, 1.0 / variance))
+    Some((1.0, at as f64 - reach as f64 + vertex, 1.0 / variance))
 }
 
 /// Where between two shifts, both included, the residual is least, looked at in steps and then about the best.
@@ -112,16 +142,17 @@ fn unlike(a: &[f64], b: &[f64]) -> f64 {
 fn reconcile(links: &[Link], fixed: &[bool], reach: f64) -> Vec<f64> {
     let mut of = vec![Vec::new(); fixed.len()];
     for link in links {
-        of[link.later].push((link.earlier, link.shift, link.weight));
-        of[link.earlier].push((link.later, -link.shift, link.weight));
+        let Link { ratio, shift, weight, .. } = *link;
+        of[link.later].push((link.earlier, ratio, shift, weight));
+        of[link.earlier].push((link.later, 1.0 / ratio, -shift / ratio, weight * ratio * ratio));
     }
     let mut moves = vec![0.0_f64; fixed.len()];
     for _ in 0..SWEEPS {
         let mut largest = 0.0_f64;
         for node in (0..fixed.len()).filter(|&node| !fixed[node]) {
             let (mut sum, mut weights) = (0.0, TEMPLATE);
-            for &(other, shift, weight) in &of[node] {
-                sum += weight * (moves[other] + shift);
+            for &(other, ratio, shift, weight) in &of[node] {
+                sum += weight * (ratio * moves[other] + shift);
                 weights += weight;
             }
             largest = largest.max((sum / weights - moves[node]).abs());

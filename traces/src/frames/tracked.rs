@@ -2,6 +2,7 @@
 
 use super::assess;
 use super::find::{Found, FrameStart, spacing};
+use super::lock::{Ticks, ticks};
 use super::marks::{MarkError, Marks, Placed};
 use super::method::Method;
 use super::register::register;
@@ -9,6 +10,9 @@ use super::threshold::choose;
 use super::track::{Start, track};
 use super::uncovered::uncovered;
 use crate::trace::Trace;
+
+/// What is left of the confidence of a start between the ticks of the display that the others wait for.
+const BETWEEN: f64 = 0.4;
 
 /// By the sequence of starts that fits best.
 pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
@@ -21,13 +25,21 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
-    let start = |((start, position), marked): ((&Start, f64), &Option<&Placed>)| FrameStart {
-        time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
-        distance_w2: start.distance_w2,
-        confidence: start.confidence,
-        marked: marked.is_some(),
-    };
-    let mut starts: Vec<FrameStart> = tracked.starts.iter().zip(positions).zip(&marked).map(start).collect();
+    let as_they_are = |positions: Vec<f64>| Ticks { between: vec![false; positions.len()], positions };
+    let first_mark = fixed.iter().position(|fixed| *fixed);
+    let Ticks { positions, between } = first_mark
+        .and_then(|mark| ticks(&positions, mark, placement.samples))
+        .unwrap_or_else(|| as_they_are(positions));
+    let start =
+        |(((start, position), between), marked): (((&Start, f64), bool), &Option<&Placed>)| FrameStart {
+            time_s: marked
+                .map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
+            distance_w2: start.distance_w2,
+            confidence: if between { BETWEEN } else { 1.0 } * start.confidence,
+            marked: marked.is_some(),
+        };
+    let mut starts: Vec<FrameStart> =
+        tracked.starts.iter().zip(positions).zip(between).zip(&marked).map(start).collect();
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
     let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);

@@ -11,6 +11,7 @@
 
 mod bank;
 mod chain;
+mod clocks;
 mod doubt;
 mod evidence;
 mod guess;
@@ -25,6 +26,8 @@ use evidence::{Evidence, FEATURES, Label};
 const FIRST_PERIODS: usize = 12;
 /// Rounds after the whole trace has been reached.
 const LAST_ROUNDS: usize = 3;
+/// How often what lies in another phase of the frame is put right.
+const PASSES: usize = 2;
 /// Candidates kept of every stretch of one period.
 const KEPT: usize = 10;
 /// Candidates nearer than so many samples are one; none is so near to a mark.
@@ -60,19 +63,19 @@ struct Candidate {
 
 /// Finds the sequence of starts that fits the marked ones.
 pub(super) fn track(power: &[f64], placement: &Placement) -> Tracked {
-    let mut tracker = Tracker::new(power, placement);
-    let mut rounds_left = LAST_ROUNDS;
-    loop {
-        tracker.solve();
-        if tracker.reach >= power.len() {
-            if rounds_left == 0 {
-                return tracker.conclude();
-            }
-            rounds_left -= 1;
+    let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
+    let anchor = placement.marks.first().map_or(0, |mark| libm::round(mark.anchor) as usize);
+    let mut known = marks.clone();
+    for _ in 0..PASSES {
+        let tracker = Tracker::new(power, placement.samples, anchor, &known).run();
+        let misplaced = clocks::misplaced(power, &tracker.starts(), &known, anchor, placement.samples);
+        if misplaced.is_empty() {
+            return tracker.conclude(&marks);
         }
-        tracker.learn();
-        tracker.reach *= 2;
+        known.extend(misplaced);
+        known.sort_unstable();
     }
+    Tracker::new(power, placement.samples, anchor, &known).run().conclude(&marks)
 }
 
 /// The state between rounds.
@@ -90,15 +93,13 @@ struct Tracker {
 }
 
 impl Tracker {
-    fn new(power: &[f64], placement: &Placement) -> Self {
-        let marks: Vec<usize> = placement.marks.iter().map(|mark| mark.first).collect();
-        let anchor = placement.marks.first().map_or(0, |mark| libm::round(mark.anchor) as usize);
-        let bank = Bank::new(power, placement.samples, anchor, &marks);
-        let (period, starts) = guess::first(&bank, (placement.samples / 2).max(1), &marks);
+    fn new(power: &[f64], width: usize, anchor: usize, marks: &[usize]) -> Self {
+        let bank = Bank::new(power, width, anchor, marks);
+        let (period, starts) = guess::first(&bank, (width / 2).max(1), marks);
         let mut tracker = Self {
             bank,
-            marks,
-            spacing: (placement.samples / 8).max(2),
+            marks: marks.to_vec(),
+            spacing: (width / 8).max(2),
             period,
             reach: FIRST_PERIODS * period,
             candidates: Vec::new(),
@@ -108,6 +109,22 @@ impl Tracker {
         };
         tracker.relearn(&starts);
         tracker
+    }
+
+    /// Rounds until the whole trace has been reached, and some more.
+    fn run(mut self) -> Self {
+        let mut rounds_left = LAST_ROUNDS;
+        loop {
+            self.solve();
+            if self.reach >= self.bank.shape.len() {
+                if rounds_left == 0 {
+                    return self;
+                }
+                rounds_left -= 1;
+            }
+            self.learn();
+            self.reach *= 2;
+        }
     }
 
     /// The best sequence within reach.
@@ -188,11 +205,12 @@ impl Tracker {
         self.candidates = kept;
     }
 
-    fn conclude(self) -> Tracked {
+    /// The sequence; of `marks` everything is sure.
+    fn conclude(self, marks: &[usize]) -> Tracked {
         let left = doubt::left(&self.starts(), &self.marks);
         let start = |((&node, &support), left): ((&usize, &f64), f64)| {
             let offset = self.candidates[node].offset;
-            let marked = self.marks.contains(&offset);
+            let marked = marks.contains(&offset);
             let confidence = if marked { 1.0 } else { left / (1.0 + libm::exp(-support)) };
             Start { offset, distance_w2: self.bank.squares_w2[offset], confidence }
         };

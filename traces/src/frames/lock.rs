@@ -1,0 +1,135 @@
+//! Frames that wait for the display: all starts lie on the ticks of one clock.
+//!
+//! Where the beginning of a frame changes from frame to frame, templates are aligned by what stands out, which may lie a millisecond after
+//! the start. A sequence then wanders about, though the frames it follows do not. If nearly all gaps are whole numbers of one period the
+//! display gives the beat, and where the starts of such a trace are spread all the same, the mark and the period say where they lie.
+
+use crate::median::median;
+
+/// A gap is a whole number of periods if it is off by less than this share of one,
+const WHOLE: f64 = 2e-3;
+/// and a trace waits for the display if this share of its gaps are,
+const MOSTLY: f64 = 0.5;
+/// and this share of its starts lie within so many periods of a tick.
+const ON_TICKS: [f64; 2] = [0.8, 0.1];
+/// Ticks are used only if this share of the starts lie farther than this share of the window from theirs.
+const SPREAD: [f64; 2] = [0.1, 0.06];
+/// Fewest gaps that tell.
+const LEAST: usize = 16;
+/// Rounds of reweighting.
+const ROUNDS: usize = 60;
+
+/// What the display says of starts.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ticks {
+    /// Positions, samples: on the ticks where the starts were spread about, else as they were.
+    pub positions: Vec<f64>,
+    /// Whether each lies far from every tick: no frame begins there.
+    pub between: Vec<bool>,
+}
+
+/// Holds the starts at `positions` (samples, in order) against the ticks of the display, if they wait for it; `fixed` is the number of
+/// one that is right.
+pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Ticks> {
+    let gaps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
+    if gaps.len() < LEAST {
+        return None;
+    }
+    let period = median(&mut gaps.clone());
+    let periods: Vec<f64> = gaps.iter().map(|gap| libm::round(gap / period)).collect();
+    let whole = |(gap, count): (&f64, &f64)| *count > 0.0 && (gap - count * period).abs() < WHOLE * period;
+    let many = gaps.iter().zip(&periods).filter(|pair| whole(*pair)).count();
+    if (many as f64) < MOSTLY * gaps.len() as f64 {
+        return None;
+    }
+    let period = slope(positions, period);
+    let tick = |position: f64| libm::round((position - positions[fixed]) / period);
+    let off: Vec<f64> = positions.iter().map(|x| x - positions[fixed] - tick(*x) * period).collect();
+    let share =
+        |far: &dyn Fn(f64) -> bool| off.iter().filter(|off| far(**off)).count() as f64 / off.len() as f64;
+    let near = |off: f64| off.abs() < ON_TICKS[1] * period;
+    let spread = share(&|off| off.abs() > SPREAD[1] * width as f64) > SPREAD[0];
+    let put = |(x, off): (&f64, &f64)| if spread && near(*off) { x - off } else { *x };
+    (share(&near) > ON_TICKS[0]).then(|| Ticks {
+        positions: positions.iter().zip(&off).map(put).collect(),
+        between: off.iter().map(|off| !near(*off)).collect(),
+    })
+}
+
+/// The period by which the sum of the distances of all positions to ticks is least (iteratively reweighted least squares; Schlossmacher
+/// 1973), from a first guess.
+fn slope(positions: &[f64], guess: f64) -> f64 {
+    let mut count = 0.0;
+    let mut ticks = vec![0.0];
+    for two in positions.windows(2) {
+        count += libm::round((two[1] - two[0]) / guess);
+        ticks.push(count);
+    }
+    let mut weights = vec![1.0; ticks.len()];
+    let mut period = guess;
+    for _ in 0..ROUNDS {
+        let total: f64 = weights.iter().sum();
+        let mean = |of: &[f64]| of.iter().zip(&weights).map(|(x, w)| x * w).sum::<f64>() / total;
+        let (n, x) = (mean(&ticks), mean(positions));
+        let (mut inner, mut squares) = (0.0, 0.0);
+        for ((tick, position), weight) in ticks.iter().zip(positions).zip(&weights) {
+            inner += weight * (tick - n) * (position - x);
+            squares += weight * (tick - n) * (tick - n);
+        }
+        period = inner / squares;
+        for ((tick, position), weight) in ticks.iter().zip(positions).zip(&mut weights) {
+            *weight = 1.0 / (position - x - (tick - n) * period).abs().max(0.1);
+        }
+    }
+    period
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 200 starts on ticks of 400.25 samples, every seventh tick skipped, moved by `off`.
+    fn starts(off: impl Fn(usize) -> f64) -> Vec<f64> {
+        (0..200).map(|i| 50.0 + 400.25 * (i + i / 7) as f64 + off(i)).collect()
+    }
+
+    #[test]
+    fn analytic_starts_that_wander_are_put_back_on_the_ticks_of_the_display() {
+        let wander = |i: usize| match i / 20 % 4 {
+            _ if i == 60 => 0.0,
+            1 => -31.0,
+            2 => -22.0,
+            3 => 9.0,
+            _ => -25.0,
+        };
+        let found = ticks(&starts(wander), 60, 250).unwrap().positions;
+        let worst = found.iter().zip(starts(|_| 0.0)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 8.0, "{worst}");
+    }
+
+    #[test]
+    fn what_lies_on_ticks_or_does_not_wait_is_left_alone() {
+        let even = starts(|i| (i % 3) as f64);
+        assert_eq!(ticks(&even, 60, 250), Some(Ticks { positions: even, between: vec![false; 200] }));
+        let free = |i: usize| 15.0 * libm::sin(i as f64) + 40.0 * libm::sin(0.1 * i as f64);
+        assert_eq!(ticks(&starts(free), 60, 250), None);
+        assert_eq!(ticks(&starts(|_| 0.0)[..10], 3, 250), None);
+    }
+
+    #[test]
+    fn a_start_far_from_every_tick_stays_and_is_told() {
+        let late = |i: usize| {
+            if i == 90 {
+                150.0
+            } else if i % 40 < 10 {
+                -30.0
+            } else {
+                0.0
+            }
+        };
+        let found = ticks(&starts(late), 60, 250).unwrap();
+        assert_eq!(found.positions[90], starts(late)[90]);
+        assert_eq!(found.between.iter().filter(|between| **between).count(), 1);
+        assert!(found.between[90]);
+    }
+}

@@ -1,0 +1,199 @@
+//! Frames at another clock than the mark's, looked for again.
+//!
+//! Templates follow content that changes slowly; at a clock step everything changes at once, and the sequence may go on evenly in
+//! another phase of the frame. So where neighbours become unlike, frames of both sides are aligned with the earlier ones drawn out in
+//! time ([`stretch`](super::super::stretch)), over the whole of a period. Outwards from the mark, each stretch between two such places
+//! is held against the last one that is known to be right. Where it lies elsewhere, one of its frames, put right, is worth a mark.
+
+use super::super::stretch::{Fit, Pair};
+use crate::median::median;
+
+/// Neighbours are unlike if they leave this many times as much unexplained as neighbours usually do, and at least this share.
+const UNLIKE: [f64; 2] = [2.0, 0.06];
+/// At most so many such places are looked at: the most unlike.
+const MOST: usize = 200;
+/// Frames on either side that are aligned, the nearest ones: of the earlier side and of the later.
+const ALIGNED: [[usize; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
+/// How many of them have to agree,
+const AGREE: usize = 3;
+/// within this share of the window, and ratios of clocks within this one of themselves; so far from 1 clocks are not the same.
+const WITHIN: f64 = 0.03;
+const SAME: f64 = 0.09;
+/// What is off by less than this share is not misplaced: that is for finer alignment, and small errors must not add up on the way.
+const MISPLACED: f64 = 0.1;
+/// Shares of the window before and after the start that are compared.
+const COMPARED: [f64; 2] = [0.1, 0.6];
+/// An alignment leaves at most this share of the variance,
+const ALIKE: f64 = 0.3;
+/// and at most this share of what is left where the stretch was thought to be.
+const BETTER: f64 = 0.5;
+
+/// Offsets of windows of starts, put right, one for each stretch of `starts` that lies elsewhere; `anchor` is the place of the start in a
+/// window of `width` samples.
+pub(super) fn misplaced(
+    power: &[f64],
+    starts: &[usize],
+    marks: &[usize],
+    anchor: usize,
+    width: usize,
+) -> Vec<usize> {
+    let view = View { power, starts, anchor, width };
+    let steps = view.steps();
+    let mut found = Vec::new();
+    for mark in marks.iter().filter_map(|mark| starts.binary_search(mark).ok()) {
+        let (before, after) = steps.split_at(steps.partition_point(|step| *step < mark));
+        view.walk(after.iter().map(|step| [*step, *step + 1]), 1, &mut found);
+        view.walk(before.iter().rev().map(|step| [*step + 1, *step]), -1, &mut found);
+    }
+    found.retain(|offset| marks.iter().all(|mark| mark.abs_diff(*offset) > width / 2));
+    found.sort_unstable();
+    found.dedup_by(|later, earlier| *later - *earlier < width / 2);
+    found
+}
+
+/// A sequence of starts in a trace.
+struct View<'a> {
+    power: &'a [f64],
+    starts: &'a [usize],
+    anchor: usize,
+    width: usize,
+}
+
+impl View<'_> {
+    /// Starts whose next one is unlike them, in order.
+    fn steps(&self) -> Vec<usize> {
+        let reach = self.share(0.12);
+        let unlike = |index: usize| {
+            let fit = self.pair([index, index + 1], 0, reach).plain();
+            fit.map_or(1.0, |fit| fit.unlike)
+        };
+        let unlike: Vec<f64> = (0..self.starts.len().saturating_sub(1)).map(unlike).collect();
+        let usual = median(&mut unlike.clone());
+        let limit = (UNLIKE[0] * usual).max(UNLIKE[1]);
+        let mut steps: Vec<usize> = (0..unlike.len()).filter(|&index| unlike[index] > limit).collect();
+        steps.sort_by(|a, b| unlike[*b].total_cmp(&unlike[*a]));
+        steps.truncate(MOST);
+        steps.sort_unstable();
+        steps
+    }
+
+    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step can be told.
+    fn walk(&self, steps: impl Iterator<Item = [usize; 2]>, way: isize, found: &mut Vec<usize>) {
+        let mut moved = 0;
+        for [here, there] in steps {
+            let Some((at, by)) = self.moved(here, moved, there, way) else { return };
+            let misplaced = by.unsigned_abs() > self.share(MISPLACED);
+            moved = if misplaced { by } else { 0 };
+            if misplaced {
+                found.extend(self.starts[at].checked_add_signed(by));
+            }
+        }
+    }
+
+    /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say that they should: the start
+    /// that fits best, and by how many samples. `None` where the two sides do not agree on one ratio of clocks and one place.
+    fn moved(&self, here: usize, moved: isize, there: usize, way: isize) -> Option<(usize, isize)> {
+        let fits: Vec<(usize, Fit)> = ALIGNED
+            .into_iter()
+            .filter_map(|[back, on]| {
+                let from = here.checked_add_signed(-way * (back as isize - 1))?;
+                let to = there.checked_add_signed(way * (on as isize - 1))?;
+                Some((to, self.fit(from, to, moved)?))
+            })
+            .collect();
+        let shift = median(&mut fits.iter().map(|(_, fit)| fit.shift).collect::<Vec<_>>());
+        let ratio = median(&mut fits.iter().map(|(_, fit)| fit.ratio).collect::<Vec<_>>());
+        let near = |(_, fit): &&(usize, Fit)| {
+            (fit.shift - shift).abs() <= self.share(WITHIN) as f64 && (fit.ratio / ratio - 1.0).abs() < SAME
+        };
+        let agreed: Vec<&(usize, Fit)> = fits.iter().filter(near).collect();
+        let best = agreed.iter().min_by(|a, b| a.1.unlike.total_cmp(&b.1.unlike))?;
+        (agreed.len() >= AGREE).then(|| (best.0, libm::round(best.1.shift) as isize))
+    }
+
+    /// The fit of a start to another over a period, if it is a good one, and either at hand or at another clock and much better than
+    /// what is at hand.
+    fn fit(&self, from: usize, to: usize, moved: isize) -> Option<Fit> {
+        let fit = self.pair([from, to], moved, self.period(to)? / 2).best()?;
+        let at_hand = libm::fabs(fit.shift) <= self.share(MISPLACED) as f64;
+        let near = || self.pair([from, to], moved, self.share(MISPLACED)).best();
+        let better = || near().is_none_or(|near| fit.unlike < BETTER * near.unlike);
+        let good = fit.unlike < ALIKE && (at_hand || (fit.ratio - 1.0).abs() > SAME && better());
+        good.then_some(fit)
+    }
+
+    fn pair(&self, starts: [usize; 2], moved: isize, reach: usize) -> Pair<'_> {
+        let place =
+            |start: usize| self.starts.get(start).map_or(usize::MAX / 2, |offset| offset + self.anchor);
+        let [before, after] = COMPARED.map(|share| self.share(share));
+        let starts = [place(starts[0]).saturating_add_signed(moved), place(starts[1])];
+        Pair { power: self.power, starts, before, after, reach }
+    }
+
+    /// The shorter of the gaps beside a start.
+    fn period(&self, start: usize) -> Option<usize> {
+        let gap = |from: usize| Some(self.starts.get(from + 1)? - self.starts.get(from)?);
+        start.checked_sub(1).and_then(gap).into_iter().chain(gap(start)).min()
+    }
+
+    /// A share of the window, in samples.
+    fn share(&self, share: f64) -> usize {
+        ((share * self.width as f64) as usize).max(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ANCHOR: usize = 50;
+    const WIDTH: usize = 250;
+
+    /// Power of frames of 300 samples at clock 1, of as many of 480 at another: each a rest of 40 samples and draws that differ.
+    fn trace(frames: usize, seed: u32) -> (Vec<f64>, Vec<usize>) {
+        let height = |draw: u32| 0.3 + f64::from((draw * 7919 + seed * 104_729) % 97) / 97.0;
+        let (mut power, mut starts) = (Vec::new(), Vec::new());
+        for frame in 0..2 * frames {
+            let (ratio, gain) = if frame < frames { (1.0, 1.0) } else { (1.7, 0.5) };
+            power.extend([0.1; 40]);
+            starts.push(power.len() - ANCHOR);
+            let length = (260.0 * ratio) as usize;
+            let draw = |i: usize| libm::pow(i as f64 / ratio, 0.7) as u32;
+            power.extend((0..length).map(|i| 0.1 + gain * height(draw(i))));
+        }
+        power.extend([0.1; 600]);
+        (power, starts)
+    }
+
+    #[test]
+    fn frames_at_another_clock_that_were_followed_elsewhere_are_found_again() {
+        let (power, right) = trace(12, 1);
+        let moved = |by: usize| -> Vec<usize> {
+            right.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + by }).collect()
+        };
+        let found = misplaced(&power, &moved(90), &[right[3]], ANCHOR, WIDTH);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let off = right.iter().map(|start| start.abs_diff(found[0])).min();
+        assert!(off <= Some(3), "{found:?}");
+        assert!(misplaced(&power, &moved(0), &[right[3]], ANCHOR, WIDTH).is_empty());
+    }
+
+    #[test]
+    fn what_is_another_frame_altogether_tells_nothing() {
+        let (mut power, starts) = trace(12, 1);
+        let (other, _) = trace(12, 2);
+        let from = starts[12] - 20;
+        power[from..].copy_from_slice(&other[from..]);
+        let moved: Vec<usize> =
+            starts.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + 90 }).collect();
+        assert!(misplaced(&power, &moved, &[starts[3]], ANCHOR, WIDTH).is_empty());
+    }
+
+    #[test]
+    fn few_starts_and_no_mark_among_them_are_taken() {
+        let (power, starts) = trace(3, 1);
+        assert!(misplaced(&power, &starts[..1], &starts[..1], ANCHOR, WIDTH).is_empty());
+        assert!(misplaced(&power, &[], &[], ANCHOR, WIDTH).is_empty());
+        assert!(misplaced(&power, &starts, &[1], ANCHOR, WIDTH).is_empty());
+    }
+}
