@@ -1,0 +1,49 @@
+//! What can be typed after `quintile trace align` and `quintile trace convert`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::parse::anchor;
+use super::{FindArgs, InputArgs};
+
+/// Arguments of `trace align`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile trace align meter.csv stamps.csv --anchor 0.0=2.513 --anchor 33.1=35.613\n  quintile trace align meter.csv stamps.csv --mark 2.513"
+)]
+pub struct AlignArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// Recorded stamps in seconds: a number in each line, or a table with a column start_s or time_s
+    #[arg(value_name = "STAMPS")]
+    pub stamps: PathBuf,
+    /// A stamp and its time in the trace, twice; without them the best fit to the frames found
+    #[arg(long, value_name = "STAMP=TIME", value_parser = anchor)]
+    pub anchor: Vec<(f64, f64)>,
+    /// The frames.
+    #[command(flatten)]
+    pub find: FindArgs,
+    /// File for the stamps with their times
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Print as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `trace convert`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  quintile trace convert meter.csv.gz meter.parquet --repair")]
+pub struct ConvertArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// File to write: .parquet, .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace
+    #[arg(value_name = "OUT")]
+    pub out: PathBuf,
+    /// Print what was read, mended and written as JSON
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,77 @@
+//! What can be typed after `quintile trace energy`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::parse::{discard, pass, stretch};
+use super::{FindArgs, InputArgs};
+
+/// Arguments of `trace energy`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile trace energy meter.csv --from 1.5 --to 2.5\n  quintile trace energy meter.csv --mark 2.513 --idle 0..0.4 --pass shadow=0 --pass light=4.2 --discard auto --drop-outliers"
+)]
+pub struct EnergyArgs {
+    /// The trace.
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// The frames.
+    #[command(flatten)]
+    pub find: FindArgs,
+    /// Begin of the stretch
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub from: Option<f64>,
+    /// End of the stretch
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub to: Option<f64>,
+    /// A stretch without rendering: its mean power is taken off
+    #[arg(long, value_name = "A..B", value_parser = stretch, conflicts_with_all = ["idle_w", "idle_trace"])]
+    pub idle: Option<(f64, f64)>,
+    /// Idle power to take off
+    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_negative_numbers = true)]
+    pub idle_w: Option<f64>,
+    /// A recording without rendering to take off
+    #[arg(long, value_name = "TRACE")]
+    pub idle_trace: Option<PathBuf>,
+    /// How the recording is taken off
+    #[arg(long, value_enum, default_value_t)]
+    pub idle_by: IdleBy,
+    /// A pass within every frame, from so many milliseconds after its start to the next pass
+    #[arg(long, value_name = "NAME=MS", value_parser = pass)]
+    pub pass: Vec<(String, f64)>,
+    /// Leave out the first frames: a number, or `auto` to find the warm-up
+    #[arg(long, value_name = "N", default_value = "0", value_parser = discard)]
+    pub discard: Discard,
+    /// Leave out frames that differ from those around them
+    #[arg(long)]
+    pub drop_outliers: bool,
+    /// Another run of the same thing, with the same marks; may be given several times
+    #[arg(long, value_name = "TRACE")]
+    pub run: Vec<PathBuf>,
+    /// Power above which the old method takes a frame's work to go on; a tenth above idle without it
+    #[arg(long, value_name = "W", allow_negative_numbers = true)]
+    pub busy_above: Option<f64>,
+    /// Print everything as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How a recording of idling is taken off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum IdleBy {
+    /// Its mean power, at all times
+    #[default]
+    Mean,
+    /// Instant by instant
+    Instant,
+}
+
+/// Frames to leave out at the beginning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Discard {
+    /// So many.
+    Count(usize),
+    /// Those before the mean settles.
+    Auto,
+}
