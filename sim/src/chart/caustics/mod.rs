@@ -105,6 +105,8 @@ pub struct CausticsChart {
     pub effort: Effort,
     /// The ocean of the paper's figure.
     pub ocean: Ocean,
+    /// Squares along a side of the coarser oceans from which on a run does not warn that they are too few.
+    pub resolved_cells: f64,
     /// By slope and method.
     pub rows: Vec<Row>,
     /// By slope and number of triangles.

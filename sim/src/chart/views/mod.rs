@@ -40,14 +40,14 @@ impl Effort {
         scene: ("default", 18),
         size: [320, 180],
         views: &[1, 2, 7, 9, 64],
-        entries: &[64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
+        entries: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
         baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
     };
     /// A look in seconds.
     pub const QUICK: Self = Self {
         size: [128, 72],
         views: &[1, 2, 7, 64],
-        entries: &[64, 256, 1024, 16_384],
+        entries: &[4, 16, 64, 256, 1024, 16_384],
         baselines: &[0.05, 0.4],
         ..Self::FULL
     };

@@ -1,7 +1,9 @@
 //! The files of the chart.
 
-use super::{Cached, POLICIES, Row, Run, ViewsChart};
-use crate::output::plot::{Curve, CurvePanel, Curves};
+use workloads::multiview::{MOST_DEG, MOST_RUNS};
+
+use super::{Angle, Cached, POLICIES, Row, Run, ViewsChart};
+use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -13,7 +15,10 @@ pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError>
     let title = "Many views: one pass against its rivals";
     Curves { title, subject: &subject, panels: costs(chart) }.picture().write(dir, "views_cost")?;
     let title = "Pixel shader lanes of one pass over the shading cache";
-    Curves { title, subject: &subject, panels: caches(chart) }.picture().write(dir, "views_cache")?;
+    let marked = format!(
+        "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
+    );
+    Curves { title, subject: &marked, panels: caches(chart) }.picture().write(dir, "views_cache")?;
     let title = "Where one pass fails: shading that depends on who looks";
     Curves { title, subject: &subject, panels: angles(chart) }.picture().write(dir, "views_failures")?;
     dir.write_atomic("views.csv", |out| {
@@ -51,18 +56,12 @@ fn runs(row: &Row) -> [(&'static str, &Run); 3] {
 
 fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
     let panel = |title: &str, up: &str, of: fn(&Run) -> f64| {
-        let curve = |method: usize| Curve {
-            name: runs(&chart.rows[0])[method].0.to_owned(),
-            note: String::new(),
-            points: chart.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1))).collect(),
+        let curve = |method: usize| {
+            let points = chart.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1)));
+            Curve::new(runs(&chart.rows[0])[method].0, points)
         };
-        CurvePanel {
-            title: title.to_owned(),
-            across: "views".to_owned(),
-            up: up.to_owned(),
-            doubling: true,
-            curves: (0..3).map(curve).collect(),
-        }
+        CurvePanel::new(title, ["views", up], (0..3).map(curve).collect())
+            .on(Scale::Doublings, Scale::Decades)
     };
     vec![
         panel("pixel shader lanes", "over those of one view", |run| run.over_one_view),
@@ -72,53 +71,58 @@ fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
     ]
 }
 
+/// Caches in which what is in use at a time has no room are marked.
 fn caches(chart: &ViewsChart) -> Vec<CurvePanel> {
     let of = |views: u32, policy: &'static str| {
         chart.caches.iter().filter(move |cached| cached.views == views && cached.policy == policy)
     };
-    let panel = |views: u32, title: String, up: &str, y: fn(&Cached) -> f64| CurvePanel {
-        title,
-        across: "entries of the shading cache".to_owned(),
-        up: up.to_owned(),
-        doubling: true,
-        curves: POLICIES
-            .iter()
-            .map(|(policy, _)| Curve {
-                name: (*policy).to_owned(),
-                note: String::new(),
-                points: of(views, policy).map(|cached| (f64::from(cached.entries), y(cached))).collect(),
-            })
-            .collect(),
+    let panel = |views: u32, title: String, up: &str, y: fn(&Cached) -> f64| {
+        let curve = |(policy, _): &(&'static str, _)| {
+            Curve::new(*policy, of(views, policy).map(|cached| (f64::from(cached.entries), y(cached))))
+        };
+        CurvePanel::new(&title, ["entries of the shading cache", up], POLICIES.iter().map(curve).collect())
+            .on(Scale::Doublings, Scale::Even)
+            .failing(chart.too_small(views).map(|entries| 0.0..entries), "a run warns")
     };
-    [2, 7]
-        .into_iter()
-        .flat_map(|views| {
-            [
-                panel(views, format!("{views} views"), "lanes a pixel", |cached| {
-                    cached.invocations_per_pixel
-                }),
-                panel(views, format!("{views} views over one"), "increase", |cached| cached.increase),
-            ]
-        })
-        .collect()
+    let both = |views| {
+        [
+            panel(views, format!("{views} views"), "lanes a pixel", |cached| cached.invocations_per_pixel),
+            panel(views, format!("{views} views over one"), "increase (%)", |cached| 100.0 * cached.increase),
+        ]
+    };
+    [2, 7].into_iter().flat_map(both).collect()
 }
 
 fn angles(chart: &ViewsChart) -> Vec<CurvePanel> {
-    let curve = |name: &str, of: fn(&super::Angle) -> f64| Curve {
-        name: name.to_owned(),
-        note: String::new(),
-        points: chart.angles.iter().map(|angle| (angle.baseline, of(angle))).collect(),
-    };
-    vec![CurvePanel {
-        title: "error of the outer views".to_owned(),
-        across: "camera line over distance".to_owned(),
-        up: "RMSE against cameras of their own".to_owned(),
-        doubling: false,
-        curves: vec![curve("matt", |angle| angle.rmse_matt), curve("highlight", |angle| angle.rmse_shiny)],
-    }]
+    let of = |error: fn(&Angle) -> f64| chart.angles.iter().map(move |angle| (angle.baseline, error(angle)));
+    let curves = vec![
+        Curve::new("shading that is the same for all", of(|angle| angle.rmse_matt)),
+        Curve::new("with a highlight", of(|angle| angle.rmse_shiny)),
+    ];
+    let axes = [
+        "length of the camera line over the distance of what is in focus",
+        "RMSE against cameras of their own",
+    ];
+    let warned = chart.angles.iter().find(|angle| angle.degrees > MOST_DEG);
+    let panel = CurvePanel::new("error of the outer views", axes, curves);
+    vec![
+        panel.failing(
+            warned.map(|angle| angle.baseline..f64::INFINITY),
+            "a run warns: view-dependent-shading",
+        ),
+    ]
 }
 
 impl ViewsChart {
+    /// The most entries with which the shader runs so much more often than with the largest cache that a run warns.
+    fn too_small(&self, views: u32) -> Option<f64> {
+        let of = |cached: &&Cached| cached.views == views && cached.policy == POLICIES[0].0;
+        let rows = || self.caches.iter().filter(of);
+        let least = rows().map(|cached| cached.invocations_per_pixel).reduce(f64::min)?;
+        let small = rows().filter(|cached| cached.invocations_per_pixel > MOST_RUNS * least);
+        small.map(|cached| f64::from(cached.entries)).reduce(f64::max)
+    }
+
     /// What is printed.
     pub fn text(&self) -> String {
         let mut table =
