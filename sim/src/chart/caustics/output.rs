@@ -152,14 +152,16 @@ impl CausticsChart {
             Curve::new(format!("slope {slope}"), rows.map(|row| (f64::from(row.cells), row.error)))
         };
         let of_cells = |cells: f64| {
-            let rows = self.coarse.iter().filter(move |row| f64::from(row.cells) == cells);
+            let crossed = self.coarse.iter().filter(|row| row.crossing > 0.0);
+            let rows = crossed.filter(move |row| f64::from(row.cells) == cells);
             let mut points: Vec<_> = rows.map(|row| (100.0 * row.crossing, row.error)).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             Curve::new(format!("{cells} squares along a side"), points)
         };
         let up = "error over mean";
         let slopes = all(|row| row.slope).into_iter().map(of_slope).collect();
-        let cells = all(|row| f64::from(row.cells)).into_iter().map(of_cells).collect();
+        let cells = all(|row| f64::from(row.cells)).into_iter().map(of_cells);
+        let cells = cells.filter(|curve| curve.points.len() > 1).collect();
         let crossed = "length of beams for which their sides cross (%)";
         let panels = vec![
             CurvePanel::new("too few triangles", ["squares along a side", up], slopes)

@@ -82,7 +82,9 @@ impl OcclusionChart {
     fn rates(&self, kind: Kind) -> CurvePanel {
         let of_tile = |&tile: &u32| {
             let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
-            Curve::new(format!("{tile}-pixel tiles"), rows.map(|row| (row.bytes, row.rate())))
+            let mut points: Vec<_> = rows.map(|row| (row.bytes, row.rate())).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Curve::new(format!("{tile}-pixel tiles"), points)
         };
         let mut curves: Vec<Curve> = self.effort.tiles.iter().map(of_tile).collect();
         let sampled = self.samples.iter().filter(|row| row.kind == kind && row.boxes.is_none());

@@ -2,7 +2,7 @@
 
 use workloads::multiview::{MOST_DEG, MOST_RUNS};
 
-use super::{Angle, Cached, POLICIES, Row, Run, ViewsChart};
+use super::{Angle, Cached, Case, POLICIES, Row, Run, ViewsChart};
 use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
@@ -42,8 +42,9 @@ pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError>
         Ok(table.flush()?)
     })?;
     dir.write_atomic("views_cache.csv", |out| {
-        let mut table = csv::Writer::from_writer(out);
-        chart.caches.iter().try_for_each(|cached| table.serialize(cached))?;
+        let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
+        table.write_record(CACHE_HEADER)?;
+        chart.cached().try_for_each(|row| table.serialize(row))?;
         Ok(table.flush()?)
     })?;
     dir.write_json("views.json", chart)?;
@@ -73,24 +74,27 @@ fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
 
 /// Caches in which what is in use at a time has no room are marked.
 fn caches(chart: &ViewsChart) -> Vec<CurvePanel> {
-    let of = |views: u32, policy: &'static str| {
-        chart.caches.iter().filter(move |cached| cached.views == views && cached.policy == policy)
-    };
-    let panel = |views: u32, title: String, up: &str, y: fn(&Cached) -> f64| {
+    let panel = |case: &Case| {
         let curve = |(policy, _): &(&'static str, _)| {
-            Curve::new(*policy, of(views, policy).map(|cached| (f64::from(cached.entries), y(cached))))
+            let rows = case.rows.iter().filter(|cached| cached.policy == *policy);
+            Curve::new(*policy, rows.map(|cached| (f64::from(cached.entries), cached.invocations_per_pixel)))
         };
-        CurvePanel::new(&title, ["entries of the shading cache", up], POLICIES.iter().map(curve).collect())
+        let axes = ["entries of the shading cache", "lanes of all views for a pixel of one"];
+        CurvePanel::new(case.name, axes, POLICIES.iter().map(curve).collect())
             .on(Scale::Doublings, Scale::Even)
-            .failing(chart.too_small(views).map(|entries| 0.0..entries), "a run warns")
+            .failing(case.too_small().map(|entries| 0.0..entries), "a run warns")
     };
-    let both = |views| {
-        [
-            panel(views, format!("{views} views"), "lanes a pixel", |cached| cached.invocations_per_pixel),
-            panel(views, format!("{views} views over one"), "increase (%)", |cached| 100.0 * cached.increase),
-        ]
-    };
-    [2, 7].into_iter().flat_map(both).collect()
+    chart.caches.iter().map(panel).collect()
+}
+
+impl Case {
+    /// The most entries with which the shader runs so much more often than with the largest cache that a run warns.
+    fn too_small(&self) -> Option<f64> {
+        let rows = || self.rows.iter().filter(|cached| cached.policy == POLICIES[0].0);
+        let least = rows().map(|cached| cached.invocations_per_pixel).reduce(f64::min)?;
+        let small = rows().filter(|cached| cached.invocations_per_pixel > MOST_RUNS * least);
+        small.map(|cached| f64::from(cached.entries)).reduce(f64::max)
+    }
 }
 
 fn angles(chart: &ViewsChart) -> Vec<CurvePanel> {
@@ -113,14 +117,12 @@ fn angles(chart: &ViewsChart) -> Vec<CurvePanel> {
     ]
 }
 
+const CACHE_HEADER: [&str; 7] =
+    ["case", "views", "policy", "entries", "invocations_per_pixel", "one_view_per_pixel", "increase"];
+
 impl ViewsChart {
-    /// The most entries with which the shader runs so much more often than with the largest cache that a run warns.
-    fn too_small(&self, views: u32) -> Option<f64> {
-        let of = |cached: &&Cached| cached.views == views && cached.policy == POLICIES[0].0;
-        let rows = || self.caches.iter().filter(of);
-        let least = rows().map(|cached| cached.invocations_per_pixel).reduce(f64::min)?;
-        let small = rows().filter(|cached| cached.invocations_per_pixel > MOST_RUNS * least);
-        small.map(|cached| f64::from(cached.entries)).reduce(f64::max)
+    fn cached(&self) -> impl Iterator<Item = (&'static str, &Cached)> {
+        self.caches.iter().flat_map(|case| case.rows.iter().map(|cached| (case.name, cached)))
     }
 
     /// What is printed.
@@ -140,9 +142,9 @@ impl ViewsChart {
             }
         }
         let mut caches = Table::new(["views", "policy", "entries", "lanes a pixel", "over one view"]);
-        for cached in &self.caches {
+        for (case, cached) in self.cached() {
             caches.row([
-                cached.views.to_string(),
+                case.to_owned(),
                 cached.policy.to_owned(),
                 cached.entries.to_string(),
                 format!("{:.3}", cached.invocations_per_pixel),

@@ -173,13 +173,18 @@ impl CurvePanel {
             let at = (left + 20.0, (top + bottom) / 2.0);
             return picture.text(Text { colour: MUTED, ..text("nothing to show", at) });
         };
-        let panel = Panel { left, top, right, bottom, x, y };
-        self.mark(picture, &panel);
+        let mut panel = Panel { left, top, right, bottom, x, y };
+        if self.failing.is_some() {
+            // Room for its name above the curves.
+            panel.y.high += 0.07 * (panel.y.high - panel.y.low);
+        }
+        let marked = self.mark(picture, &panel);
         panel.grid(picture);
         for (value, _) in &panel.x.ticks {
             let x = panel.x_px(*value);
             picture.line((x, panel.top), (x, panel.bottom), GRID, 1.0);
         }
+        marked.into_iter().for_each(|name| picture.text(name));
         for (index, curve) in self.curves.iter().enumerate() {
             self.curve(picture, &panel, (index, curve));
         }
@@ -207,22 +212,22 @@ impl CurvePanel {
         }
     }
 
-    /// The range in which what is shown does not work.
-    fn mark(&self, picture: &mut Picture, panel: &Panel) {
-        let Some((range, name)) = &self.failing else { return };
+    /// Marks the range in which what is shown does not work; what it is called is to be drawn over the grid.
+    fn mark(&self, picture: &mut Picture, panel: &Panel) -> Option<Text> {
+        let (range, name) = self.failing.as_ref()?;
         let end = |value: f64, beyond: f64| {
             let place = if value.is_finite() { self.scales[0].place(value, &panel.x) } else { None };
             place.map_or(beyond, |place| panel.x_px(place))
         };
         let (from, to) = (end(range.start, panel.left), end(range.end, panel.right));
         if to <= from {
-            return;
+            return None;
         }
         picture.rect((from, panel.top), (to, panel.bottom), MARK.alpha(0.22));
         let y = panel.top + 10.0;
         let fits = from + 6.0 + text_width(name, MARK_PX, false) <= panel.right;
         let (x, across) = if fits { (from + 6.0, Across::Left) } else { (to - 6.0, Across::Right) };
-        picture.text(Text { size: MARK_PX, colour: MUTED, across, ..text(name, (x, y)) });
+        Some(Text { size: MARK_PX, colour: MUTED, across, ..text(name, (x, y)) })
     }
 
     /// The notes of the curves in the upper corner that they leave free: right where they fall, left where they rise.

@@ -10,7 +10,7 @@ use crate::run::RunError;
 /// Both rows.
 pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, RunError> {
     let size = if effort == Effort::QUICK { Size::QUICK } else { Size::FULL };
-    let chart = measure(size, progress).map_err(|error| RunError::Setting(error.to_string()))?;
+    let chart = measure(size, progress).map_err(RunError::setting)?;
     Ok(vec![rate(&chart), cost(&chart)])
 }
 

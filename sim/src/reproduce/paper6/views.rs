@@ -25,8 +25,7 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
         };
         SIZES.iter().map(cached).collect()
     };
-    let failed = |error: ChartError| RunError::Setting(error.to_string());
-    let (two, seven) = (sweep(false).map_err(failed)?, sweep(true).map_err(failed)?);
+    let (two, seven) = (sweep(false).map_err(RunError::setting)?, sweep(true).map_err(RunError::setting)?);
     Ok(vec![
         done(
             "VI-13",
