@@ -116,20 +116,20 @@ impl OcclusionChart {
             ),
         ];
         let subject = format!(
-            "walls of slats that all together hide as much, with gaps of {:.0} % between them; motion, {} samples a pixel, 8 boxes of time. Marked: where a \
+            "walls of more and narrower slats, {:.0} % of a wall being gaps; motion, {} samples a pixel, 8 boxes of time. Marked: where a \
              run with {}-pixel tiles warns (occlusion-small-occluders)",
             100.0 * measure::GAPS,
             self.effort.samples[0],
-            measure::FAILING_TILES[1]
+            measure::FAILING_TILES[0]
         );
         Curves { title: "Where occlusion queries fail: many small occluders", subject: &subject, panels }
             .picture()
     }
 
-    /// The number of slats from which on a run with the larger tiles warns.
+    /// The number of slats from which on a run with the smaller tiles warns.
     fn warned(&self) -> Option<f64> {
-        let large = Some(measure::FAILING_TILES[1]);
-        let warned = |row: &&Row| row.tile_px == large && row.half_covered > HALF_COVERED;
+        let small = Some(measure::FAILING_TILES[0]);
+        let warned = |row: &&Row| row.tile_px == small && row.half_covered > HALF_COVERED;
         self.failing.iter().find(warned).map(|row| f64::from(row.slats))
     }
 
