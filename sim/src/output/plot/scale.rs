@@ -74,8 +74,9 @@ impl Scale {
             ticks.windows(2).all(|pair| gap(pair) >= needs(pair))
         };
         let mut all = self.candidates(low, high);
-        let best = all.iter().position(|ticks| ticks.len() > 1 && fits(ticks));
-        all.swap_remove(best.unwrap_or(all.len() - 1))
+        let first = |least: usize| all.iter().position(|ticks| ticks.len() >= least && fits(ticks));
+        let best = first(2).or_else(|| first(1)).unwrap_or(all.len() - 1);
+        all.swap_remove(best)
     }
 
     /// Sets of ticks within the range, from many to few.
@@ -90,7 +91,9 @@ impl Scale {
         }
         let [first, last] = [libm::exp10(low), libm::exp10(high)];
         let round = ticks(first, last, 1.0).into_iter().map(|(value, _)| value).filter(|value| *value > 0.0);
-        let mut all: Vec<_> = (high - low < 0.7).then(|| within(round.collect())).into_iter().collect();
+        let round: Vec<f64> = if high - low < 0.7 { round.collect() } else { Vec::new() };
+        let sparser = |step| within(round.iter().copied().step_by(step).collect());
+        let mut all: Vec<_> = [1, 2, 3].map(sparser).into();
         let powers = libm::floor(low) as i32..=libm::ceil(high) as i32;
         let with = |digits: &[f64], step| -> Vec<f64> {
             let powers = powers.clone().filter(|power| power % step == 0);
