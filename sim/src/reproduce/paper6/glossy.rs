@@ -65,7 +65,7 @@ fn done(reflected: &[Measured], refracted: &[Measured], blurs: &[Blur]) -> Done 
         "VI_fig14_contact",
         "Blur of an edge over its height above the receiver (Paper VI, section 6)",
         "square lens, 64 samples a texel",
-        [("height", "scene units"), ("width on the plane", "scene units")],
+        [("height in scene units", ""), ("width on the plane in scene units", "")],
         vec![
             line("found in the map", points(|blur| blur.width)),
             line("geometry", points(|blur| blur.expected)),
