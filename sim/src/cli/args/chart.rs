@@ -65,7 +65,7 @@ pub enum ChartArg {
     Glossy,
     /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
     Growth,
-    /// Hidden objects found over tests and bytes, by intervals and by samples
+    /// Hidden objects found over tests and bytes, by intervals and by samples, and where occluders are too small
     Occlusion,
     /// Points of all kinds: quality over points a second, spectra, and where it fails
     Points,
