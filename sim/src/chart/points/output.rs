@@ -106,7 +106,7 @@ fn failures(chart: &PointsChart) -> Vec<CurvePanel> {
     let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
         let curve = Curve::new("voids, 2D", chart.coarse.iter().map(|c| (c.radius_in_numbers, of(c))));
         let warned = |c: &&Coarse| c.thin_voids as f64 > THIN * c.points as f64;
-        let last = chart.coarse.iter().filter(warned).last();
+        let last = chart.coarse.iter().rfind(warned);
         CurvePanel::new(title, ["r in spacings of numbers", up], vec![curve])
             .on(Scale::Doublings, Scale::Decades)
             .failing(last.map(|c| 0.0..c.radius_in_numbers), "a run warns")

@@ -244,7 +244,7 @@ impl CurvePanel {
         let rise = |curve: &Curve| {
             let mut heights =
                 curve.points.iter().filter(|point| point.1 > 0.0).map(|point| libm::log10(point.1));
-            heights.next().zip(heights.last()).map_or(0.0, |(first, last)| last - first)
+            heights.next().zip(heights.next_back()).map_or(0.0, |(first, last)| last - first)
         };
         self.curves.iter().map(rise).sum::<f64>() > 0.0
     }
