@@ -42,7 +42,7 @@ const NOT_PROVOKED: [(&str, &str); 11] = [
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 34] = [
+const PROVOKED: [&str; 35] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -69,6 +69,7 @@ const PROVOKED: [&str; 34] = [
     "occlusion-small-occluders",
     "only-mark",
     "orthographic-view",
+    "points-thin-voids",
     "primitive-dropped",
     "short-frame",
     "sliver-triangles",
@@ -398,6 +399,19 @@ fn beams_whose_sides_cross() {
     let results = quintile!().run("caustics", &args);
     assert_warns(&results, "caustics-crossed");
     assert_warns(&results, "caustics-coarse");
+}
+
+/// No run samples points in single precision: the warning is that of `quintile sample`.
+#[test]
+fn points_on_numbers_that_are_too_coarse() {
+    let warnings = |single: &[&str]| {
+        let args = [&["sample", "poisson", "--dim", "1", "--r", "1e-5", "--json"], single].concat();
+        let ended = quintile!().call(&args);
+        let told: serde_json::Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
+        told["warnings"].clone()
+    };
+    assert_eq!(warnings(&["--single"])[0]["code"], "points-thin-voids");
+    assert_eq!(warnings(&[]), json!([]));
 }
 
 #[test]

@@ -1,6 +1,20 @@
-//! Errors of images.
+//! Errors of images, and what images of nothing but edges are shaded with.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
+use pipeline::{Shader, ShaderCost, ShadingPoint};
+
+/// White all over, at no cost.
+pub(super) struct White;
+
+impl Shader for White {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost::default()
+    }
+
+    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
+        Vec3::ONE
+    }
+}
 
 /// The differences of two images, channel by channel.
 pub(super) fn errors(image: &[Vec3], reference: &[Vec3]) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! Charts of the book: each measured, drawn and written in one go, one module for each.
 //!
-//! - [`collision`]: pairs kept in vain by collision detection.
 //! - [`caustics`]: shader executions of caustics, by how beams are bounded.
+//! - [`collision`]: pairs kept in vain by collision detection.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.
@@ -41,11 +41,11 @@ pub use error::ChartError;
 /// The charts there are, each with a line that says what it shows.
 pub const CHARTS: [(&str, &str); 14] = [
     ("all", "every chart, the failure catalogue, and one page of speed against accuracy"),
+    ("caustics", "shader executions and images of caustics by how beams are bounded, and where beams fail"),
     (
         "collision",
         "pairs kept in vain by collision detection over resolution, bins of time and cost, and where it fails",
     ),
-    ("caustics", "shader executions and images of caustics by how beams are bounded, and where beams fail"),
     ("frames", "frame starts found and energy error, by method, over rate, noise, bits and host time"),
     ("glossy", "glossy reflection and refraction: error over samples, contact hardening, lenses too wide"),
     ("growth", "time of the visibility engine over triangles, samples a pixel and blur, with exponents"),

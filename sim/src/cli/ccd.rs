@@ -132,7 +132,7 @@ fn pair(answer: &Answer) -> Option<Pair> {
 }
 
 pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
-    super::not_an_input(args.csv.as_deref(), args.files.iter().map(PathBuf::as_path))?;
+    super::not_an_input(("--csv", args.csv.as_deref()), args.files.iter().map(PathBuf::as_path))?;
     let (search, cases) = (args.search(), load_cases(&args.files)?);
     let pool = super::threads(args.threads)?;
     let found: Vec<Found> =

@@ -71,8 +71,8 @@ impl Done {
 fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
-        ChartArg::Collision => chart_collision(args, progress),
         ChartArg::Caustics => chart_caustics(args, progress),
+        ChartArg::Collision => chart_collision(args, progress),
         ChartArg::Frames => chart_frames(args, progress),
         ChartArg::Glossy => chart_glossy(args, progress),
         ChartArg::Growth => chart_growth(args, progress),

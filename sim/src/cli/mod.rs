@@ -71,12 +71,15 @@ fn threads(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
 }
 
 /// Refuses a result that would be written over one of its own inputs.
-fn not_an_input<'a>(out: Option<&Path>, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
+fn not_an_input<'a>(
+    (flag, out): (&str, Option<&Path>),
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
     let Some(Ok(place)) = out.map(std::fs::canonicalize) else { return Ok(()) };
     let same =
         inputs.into_iter().find(|input| std::fs::canonicalize(input).is_ok_and(|input| input == place));
     let refused = |input: &Path| {
-        let message = format!("--out: {} is what is read; name another file", input.display());
+        let message = format!("{flag}: {} is what is read; name another file", input.display());
         Failure { message, code: 2 }
     };
     same.map_or(Ok(()), |input| Err(refused(input)))

@@ -1,6 +1,6 @@
 //! Figures of the papers, drawn anew.
 
-use crate::output::plot::{Lines, Mark, Picture, Series};
+use crate::output::plot::{Curve, CurvePanel, Curves, Lines, Mark, Picture, Scale, Series};
 
 /// A picture and its name.
 pub struct Figure {
@@ -26,6 +26,17 @@ impl Figure {
     ) -> Self {
         Self { name, picture: Lines { title, subject, x, y, series }.picture() }
     }
+}
+
+/// Curves over a number that doubles, `axes` saying what goes across and up.
+pub(super) fn over_doublings(
+    name: &'static str,
+    [title, subject]: [&str; 2],
+    axes: [&str; 2],
+    curves: Vec<Curve>,
+) -> Figure {
+    let panel = CurvePanel::new("", axes, curves).on(Scale::Doublings, Scale::Even);
+    Figure { name, picture: Curves { title, subject, panels: vec![panel] }.picture() }
 }
 
 /// Time.

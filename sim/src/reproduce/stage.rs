@@ -103,7 +103,7 @@ impl Stage {
             draws.iter().zip(&shaders).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
         let mut clock = FrameClock::new(Level::default(), &self.gpu, Recorder::new(BIN_PS, MOST_BINS))?;
         render_with_heat(&frame.camera, &draws, &settings, &[], |packet, lines| clock.push(packet, lines))
-            .map_err(|error| RunError::Setting(error.to_string()))?;
+            .map_err(RunError::setting)?;
         let timeline = clock.finish()?.timeline;
         self.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })
     }

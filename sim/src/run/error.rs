@@ -54,6 +54,11 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// That something was refused for the reason it gives.
+    pub fn setting(why: impl std::fmt::Display) -> Self {
+        Self::Setting(why.to_string())
+    }
+
     /// Whether the mistake is the caller's (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {

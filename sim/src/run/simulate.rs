@@ -202,20 +202,21 @@ fn simulate_frame(
     most_bins: usize,
 ) -> Result<(SimulatedFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock = FrameClock::new(plan.options.timing, &plan.gpu, Recorder::new(BIN_PS, most_bins))?;
-    let drawing = work::draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
+    let work::Drawing { drawn, regime, heat } =
+        work::draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
     let timed = clock.finish()?;
     let doubts = Doubt::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
     let simulated = SimulatedFrame {
         index: number,
-        triangles: drawing.triangles,
-        moving: drawing.moving,
-        lens: drawing.lens,
-        counts: drawing.counts,
-        regime: drawing.regime,
-        facts: drawing.facts,
-        warnings: drawing.warnings,
+        triangles: drawn.triangles,
+        moving: drawn.moving,
+        lens: drawn.lens,
+        counts: drawn.counts,
+        regime,
+        facts: drawn.facts,
+        warnings: drawn.warnings,
         power,
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
@@ -224,7 +225,7 @@ fn simulate_frame(
         stalls: timed.stalls,
         predicted: None,
     };
-    Ok((simulated, drawing.image, drawing.heat))
+    Ok((simulated, drawn.image, heat))
 }
 
 fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {

@@ -1,10 +1,9 @@
 //! What a run draws: the frames of a scene, or those of a job.
 
-use activity::{Counts, Event, LineAccess, Packet, Warning};
-use glam::Vec3;
+use activity::{Event, LineAccess, Packet, Warning};
 use pipeline::frame::{HeatMap, render_with_heat};
 use pipeline::{Settings, Viewport};
-use workloads::job::{self, Fact, Job, OptionSource, Request};
+use workloads::job::{self, Drawn, Job, OptionSource, Request};
 use workloads::{Frame, LoadError, Overrides, Scene};
 
 use super::regime::Regime;
@@ -25,14 +24,8 @@ pub enum Work {
 
 /// A frame as it was drawn.
 pub(super) struct Drawing {
-    pub image: Vec<Vec3>,
-    pub counts: Counts,
-    pub triangles: usize,
-    pub moving: bool,
-    pub lens: bool,
+    pub drawn: Drawn,
     pub regime: Regime,
-    pub facts: Vec<Fact>,
-    pub warnings: Vec<Warning>,
     pub heat: Vec<HeatMap>,
 }
 
@@ -115,17 +108,7 @@ pub(super) fn draw(
         Work::Scene(scene) => draw_scene(plan, scene, number, events, emit),
         Work::Job { job, .. } => {
             let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
-            Ok(Drawing {
-                image: drawn.image,
-                counts: drawn.counts,
-                triangles: drawn.triangles,
-                moving: drawn.moving,
-                lens: drawn.lens,
-                regime: Regime::default(),
-                facts: drawn.facts,
-                warnings: drawn.warnings,
-                heat: Vec::new(),
-            })
+            Ok(Drawing { drawn, regime: Regime::default(), heat: Vec::new() })
         }
     }
 }
@@ -142,19 +125,18 @@ fn draw_scene(
     let viewport: Viewport = plan.viewport;
     let background = scene.background();
     let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-    let (rendered, heat) = render_with_heat(&frame.camera, &draws, &settings, events, emit)
-        .map_err(|error| RunError::Setting(error.to_string()))?;
-    Ok(Drawing {
+    let (rendered, heat) =
+        render_with_heat(&frame.camera, &draws, &settings, events, emit).map_err(RunError::setting)?;
+    let drawn = Drawn {
         image: rendered.image,
         counts: rendered.counts,
         triangles: frame.triangle_count(),
         moving: is_moving(&frame),
         lens: frame.camera.lens().is_some(),
-        regime: Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel()),
-        facts: Vec::new(),
-        warnings: Vec::new(),
-        heat,
-    })
+        ..Drawn::default()
+    };
+    let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
+    Ok(Drawing { drawn, regime, heat })
 }
 
 pub(super) fn is_moving(frame: &Frame) -> bool {

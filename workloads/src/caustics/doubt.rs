@@ -6,9 +6,9 @@ use super::Beam;
 use super::generator::Ocean;
 
 /// Sides of beams cross for more than this part of their length on average.
-const CROSSED: f64 = 0.005;
+pub const CROSSED: f64 = 0.005;
 /// Fewer squares than this along the shortest wave.
-const SQUARES: f64 = 4.0;
+pub const SQUARES: f64 = 4.0;
 
 /// For how much of their length the sides of beams cross, on average.
 pub fn crossing(beams: &[Beam]) -> f64 {

@@ -30,7 +30,7 @@ pub mod optics;
 pub use beam::{Beam, Hit};
 pub use bound::Method;
 pub use check::{Found, receivers};
-pub use doubt::{crossing, doubts};
+pub use doubt::{CROSSED, SQUARES, crossing, doubts};
 pub use draw::{Picture, draw};
 pub use eye::Eye;
 pub use job::{Look, Options, job};

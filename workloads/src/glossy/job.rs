@@ -58,8 +58,13 @@ impl Options {
         if !self.half.iter().all(|half| *half > 0.0 && half.is_finite()) {
             return refused("half", format!("{:?}: both have to be finite lengths above zero", self.half));
         }
-        if !(self.roughness >= 0.0 && self.roughness.is_finite()) {
-            return refused("roughness", format!("{}: it is a finite radius, 0 or above", self.roughness));
+        let most = WIDEST * self.half[0].min(self.half[1]);
+        if !(0.0..=most).contains(&self.roughness) {
+            let why = format!(
+                "{}: it is a radius of 0 to {most} scene units, {WIDEST} times the receiver's",
+                self.roughness
+            );
+            return refused("roughness", format!("{why} smaller half side"));
         }
         if let Some(index) = self.index.filter(|index| !(1.0..=10.0).contains(index)) {
             return refused("index", format!("{index}: an index of refraction is 1 to 10 here"));
@@ -86,6 +91,8 @@ fn refused(error: impl std::fmt::Display) -> JobError {
     JobError::Setting(error.to_string())
 }
 
+/// The widest lens over the receiver's smaller half side: far beyond where it stands for a surface.
+const WIDEST: f64 = 100.0;
 /// Linear RGB radiance of the receiver's own surface.
 const BASE: Vec3 = Vec3::new(0.10, 0.11, 0.12);
 

@@ -5,6 +5,7 @@
 
 mod options;
 mod passes;
+mod words;
 
 use activity::{Counts, LineAccess, Packet, Warning};
 use glam::Vec3;
@@ -97,7 +98,7 @@ pub struct Request<'a> {
 
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
-/// Every job: its name, what it is, and how it is made.
+/// Every job by its name: what it is, and how it is made.
 const JOBS: &[(&str, &str, Maker)] = &[
     (
         "caustics",
@@ -110,11 +111,6 @@ const JOBS: &[(&str, &str, Maker)] = &[
         crate::collision::job,
     ),
     (
-        "occlusion",
-        "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
-        crate::occlusion::job,
-    ),
-    (
         "glossy",
         "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
         crate::glossy::job,
@@ -123,6 +119,11 @@ const JOBS: &[(&str, &str, Maker)] = &[
         "multiview",
         "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
         crate::multiview::job,
+    ),
+    (
+        "occlusion",
+        "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
+        crate::occlusion::job,
     ),
     ("sampling", "dart throwing over voids that are drawn, until no point fits", crate::points::job::job),
     (

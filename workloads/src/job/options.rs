@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use super::words::plain;
 use crate::error::LoadError;
 
 /// Where the options of a job come from; what is not named has its default.
@@ -44,7 +45,8 @@ fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -
     }
     let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.to_owned()));
     fields.insert(name.to_owned(), parsed);
-    serde_json::from_value(Value::Object(fields)).map_err(|error| refused(format!("{name}={error}")))
+    let told = |error: serde_json::Error| refused(format!("{name}: {}", plain(value, &error.to_string())));
+    serde_json::from_value(Value::Object(fields)).map_err(told)
 }
 
 #[cfg(test)]
@@ -88,8 +90,9 @@ mod tests {
     #[test]
     fn what_cannot_be_set_is_told() {
         assert_eq!(set(&[("boxs", "8")]).unwrap_err(), "set: unknown option `boxs`, did you mean `boxes`?");
-        assert!(set(&[("boxes", "-1")]).unwrap_err().starts_with("set: boxes=invalid value"));
-        assert!(set(&[("method", "hull")]).unwrap_err().contains("unknown variant `hull`"));
+        assert!(set(&[("boxes", "-1")]).unwrap_err().starts_with("set: boxes: `-1` is not a whole number"));
+        let unknown = set(&[("method", "convex-hull")]).unwrap_err();
+        assert_eq!(unknown, "set: method: there is no `convex-hull`; did you mean `convex_hull`?");
     }
 
     #[test]

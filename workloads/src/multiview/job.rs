@@ -137,8 +137,7 @@ impl MultiView {
 
     /// A view that depends on the direction to the viewer is shaded for the middle of the line only.
     fn angle_warning(&self, rig: &Rig) -> Option<Warning> {
-        let lens = rig.camera().lens()?;
-        let angle = 2.0 * libm::atan2(f64::from(lens.radius()), f64::from(lens.focus())).to_degrees();
+        let angle = rig.degrees();
         let shiny = self.scene.materials().iter().any(|material| !material.unlit);
         (shiny && angle > MOST_DEG).then(|| {
             let message = format!(
@@ -151,11 +150,11 @@ impl MultiView {
 }
 
 /// Views farther apart than this, seen from what is in focus, show highlights at visibly wrong places.
-const MOST_DEG: f64 = 6.0;
+pub const MOST_DEG: f64 = 6.0;
 /// A cache that holds everything.
 const ALL: CacheSpec = CacheSpec::lru(1 << 22, 16);
 /// The shader runs over those with a cache that holds everything, beyond which the cache is too small.
-const MOST_RUNS: f64 = 1.25;
+pub const MOST_RUNS: f64 = 1.25;
 
 /// Why there is no rig.
 enum RigError {

@@ -16,7 +16,7 @@ mod rig;
 mod rivals;
 mod samples;
 
-pub use job::{MultiView, Options, Show, job};
+pub use job::{MOST_DEG, MOST_RUNS, MultiView, Options, Show, job};
 pub use layout::Layout;
 pub use lenticular::Panel;
 pub use rig::{Rig, Target, Views};

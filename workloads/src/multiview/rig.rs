@@ -84,6 +84,12 @@ impl Rig {
         &self.camera
     }
 
+    /// The angle under which a point in focus sees the whole lens, in degrees.
+    pub fn degrees(&self) -> f64 {
+        let half = |lens: Lens| libm::atan2(f64::from(lens.radius()), f64::from(lens.focus()));
+        self.camera.lens().map_or(0.0, |lens| 2.0 * half(lens).to_degrees())
+    }
+
     /// Samples of a pixel in all.
     pub fn samples(&self) -> u32 {
         self.table.per_pixel()

@@ -104,7 +104,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
 /// Bytes of a corner of a box at both ends, its transformation, and the set-up of its triangles.
 const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_madds: 77 };
 /// A quarter of the tiles half covered: occluders are small, and what they hide together is not found hidden.
-const HALF_COVERED: f64 = 0.25;
+pub const HALF_COVERED: f64 = 0.25;
 
 impl Job for Occlusion {
     fn settings(&self) -> &Settings {

@@ -17,7 +17,7 @@ mod query;
 mod sampled;
 mod yard;
 
-pub use job::{Options, job};
+pub use job::{HALF_COVERED, Options, job};
 pub use pyramid::Pyramid;
 pub use query::{Answer, MovingBox, Queries};
 pub use sampled::{Samples, Seen, depths};

@@ -5,7 +5,7 @@ use glam::DVec3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
-use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, crossing, doubts, draw};
+use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, SQUARES, crossing, doubts, draw};
 
 use super::{CausticsChart, Coarse, Effort, Row};
 use crate::chart::ChartError;
@@ -20,7 +20,7 @@ const SLOPE: f64 = 0.15;
 /// Decides what the waves are like.
 const SEED: u64 = 1;
 /// Slopes of the oceans that get coarser.
-const COARSE_SLOPES: [f64; 3] = [0.05, 0.15, 0.4];
+const COARSE_SLOPES: [f64; 5] = [0.05, 0.15, 0.4, 0.7, 1.0];
 /// Pixels along a side of the squares that are compared: next to a focus single pixels have no bound.
 const SQUARE_PX: usize = 8;
 
@@ -89,7 +89,7 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsCha
     for slope in COARSE_SLOPES {
         coarse.extend(by_cells(&effort, slope, &bar)?);
     }
-    Ok(CausticsChart { effort, ocean, rows, coarse })
+    Ok(CausticsChart { effort, ocean, resolved_cells: resolved_cells(), rows, coarse })
 }
 
 /// Every method on one surface: the light in the volume.
@@ -146,6 +146,11 @@ fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, Chart
         Coarse { cells, slope, crossing: crossing(&beams), error, warned }
     };
     Ok(effort.coarse_cells.iter().map(row).collect())
+}
+
+/// So many squares along a side, and a run does not warn of a surface that is too coarse.
+fn resolved_cells() -> f64 {
+    SQUARES * SIDE_M / water(1, SLOPE).shortest_m()
 }
 
 /// Sums over squares of the image.

@@ -44,8 +44,8 @@ impl Effort {
         ocean_px: [512, 288],
         sweep_cells: 24,
         sweep_px: [128, 72],
-        slopes: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4],
-        coarse_cells: &[4, 8, 16, 32, 64, 128],
+        slopes: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0],
+        coarse_cells: &[8, 16, 32, 64, 128],
         reference_cells: 320,
         floor_px: 512,
         repeats: 3,
@@ -56,9 +56,9 @@ impl Effort {
         ocean_px: [192, 108],
         sweep_cells: 10,
         sweep_px: [64, 36],
-        slopes: &[0.02, 0.1, 0.4],
-        coarse_cells: &[4, 8, 16, 32],
-        reference_cells: 96,
+        slopes: &[0.02, 0.1, 0.4, 1.0],
+        coarse_cells: &[8, 16, 32, 64],
+        reference_cells: 192,
         floor_px: 192,
         repeats: 1,
     };
@@ -105,6 +105,8 @@ pub struct CausticsChart {
     pub effort: Effort,
     /// The ocean of the paper's figure.
     pub ocean: Ocean,
+    /// Squares along a side of the coarser oceans from which on a run does not warn that they are too few.
+    pub resolved_cells: f64,
     /// By slope and method.
     pub rows: Vec<Row>,
     /// By slope and number of triangles.

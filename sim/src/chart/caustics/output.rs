@@ -1,10 +1,10 @@
 //! The files of the chart.
 
-use workloads::caustics::Method;
+use workloads::caustics::{CROSSED, Method};
 
-use super::{CausticsChart, Ocean};
+use super::{CausticsChart, Coarse, Ocean, Row};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, HeatMapPlot, HeatTile, Picture};
+use crate::output::plot::{Curve, CurvePanel, Curves, HeatMapPlot, HeatTile, Picture, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -16,6 +16,7 @@ pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
 /// Writes pictures and numbers; `caustics.json` comes last.
 pub(super) fn write(chart: &CausticsChart, dir: &OutDir) -> Result<(), OutputError> {
     chart.picture().write(dir, "caustics")?;
+    chart.failures().write(dir, "caustics_failures")?;
     for (method, name) in Method::ALL.into_iter().zip(["moving", "refined", "hull", "prism"]) {
         chart.ocean.map(method).write(dir, &format!("caustics_map_{name}"))?;
     }
@@ -112,47 +113,69 @@ impl CausticsChart {
     }
 
     fn picture(&self) -> Picture {
-        let by_method = |of: fn(&super::Row) -> f64| {
+        let by_method = |of: fn(&Row) -> f64| {
             let curve = |method: Method| {
                 let rows = self.rows.iter().filter(move |row| row.method == method);
-                let points = rows.map(|row| (row.slope, of(row))).collect();
-                Curve { name: method.name().to_owned(), note: String::new(), points }
+                Curve::new(method.name(), rows.map(|row| (row.slope, of(row))))
             };
             Method::ALL.map(curve).into()
         };
-        let panel = |title: &str, across: &str, up: &str, curves| CurvePanel {
-            title: title.to_owned(),
-            across: across.to_owned(),
-            up: up.to_owned(),
-            doubling: false,
-            curves,
-        };
         let slope = "slope of the waves (root mean square)";
-        let runs = panel("cost", slope, "shader executions", by_method(|row| row.executions as f64));
-        let time = panel("cost", slope, "CPU time (ms)", by_method(|row| 1e3 * row.cpu_s));
-        let mut slopes: Vec<f64> = self.coarse.iter().map(|row| row.slope).collect();
-        slopes.dedup();
-        let failing = slopes.into_iter().map(|slope| {
-            let rows = self.coarse.iter().filter(|row| row.slope == slope);
-            let points = rows.map(|row| (f64::from(row.cells), row.error)).collect();
-            Curve { name: format!("{slope} slope"), note: String::new(), points }
-        });
-        let failing = panel(
-            "where beams fail: error of the light on the floor",
-            "cells along a side",
-            "error over mean",
-            failing.collect(),
-        );
+        let runs = by_method(|row| row.executions as f64);
+        let useful = by_method(|row| row.useful);
+        let time = by_method(|row| 1e3 * row.cpu_s);
         let subject = format!(
-            "light in the water: {} volumes; the image is the same by every method. Right: moving triangles, other colours are slopes",
+            "light in the water under {} generator triangles; the image is the same by every method",
             2 * self.effort.sweep_cells * self.effort.sweep_cells
         );
-        Curves {
-            title: "Caustics: beams and bodies about them",
-            subject: &subject,
-            panels: vec![runs, time, failing],
-        }
-        .picture()
+        let panel = |title: &str, up: &str, curves| {
+            CurvePanel::new(title, [slope, up], curves).on(Scale::Decades, Scale::Even)
+        };
+        let panels = vec![
+            panel("cost", "shader executions", runs),
+            panel("use", "share of executions that find light", useful),
+            panel("cost", "CPU time (ms)", time),
+        ];
+        Curves { title: "Caustics: beams and bodies about them", subject: &subject, panels }.picture()
+    }
+
+    /// Where beams fail: the error over the number of triangles, and over how much their sides cross.
+    fn failures(&self) -> Picture {
+        let all = |of: fn(&Coarse) -> f64| {
+            let mut values: Vec<f64> = self.coarse.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            values
+        };
+        let of_slope = |slope: f64| {
+            let rows = self.coarse.iter().filter(move |row| row.slope == slope);
+            Curve::new(format!("slope {slope}"), rows.map(|row| (f64::from(row.cells), row.error)))
+        };
+        let of_cells = |cells: f64| {
+            let crossed = self.coarse.iter().filter(|row| row.crossing > 0.0);
+            let rows = crossed.filter(move |row| f64::from(row.cells) == cells);
+            let mut points: Vec<_> = rows.map(|row| (100.0 * row.crossing, row.error)).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Curve::new(format!("{cells} squares along a side"), points)
+        };
+        let up = "error over mean";
+        let slopes = all(|row| row.slope).into_iter().map(of_slope).collect();
+        let cells = all(|row| f64::from(row.cells)).into_iter().map(of_cells);
+        let cells = cells.filter(|curve| curve.points.len() > 1).collect();
+        let crossed = "length of beams for which their sides cross (%)";
+        let panels = vec![
+            CurvePanel::new("too few triangles", ["squares along a side", up], slopes)
+                .on(Scale::Doublings, Scale::Decades)
+                .failing(Some(0.0..self.resolved_cells), "a run warns: caustics-coarse"),
+            CurvePanel::new("crossed sides: dots are slopes", [crossed, up], cells)
+                .failing(Some(100.0 * CROSSED..f64::INFINITY), "caustics-crossed"),
+        ];
+        let subject = format!(
+            "light on the floor of ever steeper waves by moving triangles, in squares of 8x8 pixels, against {} squares along a side",
+            self.effort.reference_cells
+        );
+        Curves { title: "Where caustics fail: coarse surfaces and crossed sides", subject: &subject, panels }
+            .picture()
     }
 
     fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {

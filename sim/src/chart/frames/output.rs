@@ -63,18 +63,10 @@ fn energy(chart: &FramesChart, axis: Axis) -> SweepPanel<'static> {
 }
 
 fn host_time(chart: &FramesChart) -> CurvePanel {
-    let curve = |way: Way| Curve {
-        name: way.name().to_owned(),
-        note: String::new(),
-        points: timed(chart, way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s)).collect(),
-    };
-    CurvePanel {
-        title: "time over sampling rate".to_owned(),
-        across: "sampling rate, Hz".to_owned(),
-        up: "host seconds for a million samples".to_owned(),
-        doubling: false,
-        curves: Way::ALL.map(curve).into(),
-    }
+    let of = |way: Way| timed(chart, way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
+    let axes = ["sampling rate, Hz", "host seconds for a million samples"];
+    let curves = Way::ALL.map(|way| Curve::new(way.name(), of(way)));
+    CurvePanel::new("time over sampling rate", axes, curves.into())
 }
 
 fn found_over_time(chart: &FramesChart) -> CurvePanel {
@@ -82,15 +74,10 @@ fn found_over_time(chart: &FramesChart) -> CurvePanel {
         let mut points: Vec<(f64, f64)> =
             timed(chart, way).into_iter().map(|(_, host_s, f1)| (host_s, f1)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Curve { name: way.name().to_owned(), note: String::new(), points }
+        Curve::new(way.name(), points)
     };
-    CurvePanel {
-        title: "F1 over time, a dot for each rate".to_owned(),
-        across: "host seconds for a million samples".to_owned(),
-        up: "F1".to_owned(),
-        doubling: false,
-        curves: Way::ALL.map(curve).into(),
-    }
+    let axes = ["host seconds for a million samples", "F1"];
+    CurvePanel::new("F1 over time, a dot for each rate", axes, Way::ALL.map(curve).into())
 }
 
 /// Rate, host seconds for a million samples, and F1.

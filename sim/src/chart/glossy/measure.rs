@@ -3,16 +3,16 @@
 use std::time::Instant;
 
 use activity::Event;
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec, Shader, ShaderCost, ShadingPoint};
+use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec};
 use serde::Serialize;
 use workloads::accumulation::{Rays, SharedSamples};
 use workloads::glossy::{Effect, Lobe, Map, receiver, stage};
 use workloads::{Frame, Scene};
 
 use super::{ChartError, Effort, ROUGHNESS};
-use crate::chart::image::{errors, mean_square};
+use crate::chart::image::{White, errors, mean_square};
 use crate::gpu::GpuSpec;
 
 /// One number of samples.
@@ -199,17 +199,4 @@ fn ramp(image: &[Vec3], width: usize) -> f64 {
     let moment =
         |power: i32| slopes.iter().enumerate().map(|(x, s)| s * (x as f64).powi(power)).sum::<f64>() / total;
     (12.0 * (moment(2) - moment(1) * moment(1)) - 2.0).max(0.0).sqrt()
-}
-
-/// White all over.
-struct White;
-
-impl Shader for White {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        Vec3::ONE
-    }
 }

@@ -1,7 +1,7 @@
 //! The files of the chart.
 
 use super::{EFFECTS, GlossyChart, Row};
-use crate::output::plot::{Curve, CurvePanel, Curves};
+use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -14,8 +14,10 @@ pub(super) fn write(chart: &GlossyChart, dir: &OutDir) -> Result<(), OutputError
     );
     let picture = |title: &str, panels| Curves { title, subject: &subject, panels }.picture();
     picture("Glossy maps: error and cost", rows(chart)).write(dir, "glossy_error")?;
-    picture("Contact hardens", vec![blurs(chart)]).write(dir, "glossy_blur")?;
-    picture("Where the lens fails: wider than the receiver", vec![wides(chart)])
+    let subject = "the width on the plane of the blur of an edge at some height, in a map of 64 rows; below a texel blurs are not resolved";
+    let title = "Glossy maps: contact hardens";
+    Curves { title, subject, panels: vec![blurs(chart)] }.picture().write(dir, "glossy_blur")?;
+    picture("Where glossy maps fail: a lens wider than the receiver", vec![wides(chart)])
         .write(dir, "glossy_failures")?;
     dir.write_atomic("glossy.csv", |out| {
         let mut table = csv::Writer::from_writer(out);
@@ -26,55 +28,67 @@ pub(super) fn write(chart: &GlossyChart, dir: &OutDir) -> Result<(), OutputError
     Ok(())
 }
 
-fn curve(name: &str, points: impl Iterator<Item = (f64, f64)>) -> Curve {
-    Curve { name: name.to_owned(), note: String::new(), points: points.collect() }
-}
+/// The radius, over half of the receiver's shorter side, from which on a run warns.
+const WARNED: f64 = 1.0;
 
-fn panel(title: &str, [across, up]: [&str; 2], doubling: bool, curves: Vec<Curve>) -> CurvePanel {
-    let [title, across, up] = [title, across, up].map(str::to_owned);
-    CurvePanel { title, across, up, doubling, curves }
-}
-
-/// For each effect the error over samples and over host time, and vertices.
+/// For each effect the error over samples and over cost.
 fn rows(chart: &GlossyChart) -> Vec<CurvePanel> {
     let both = |effect: &'static str, of: fn(&Row) -> [(f64, f64); 2]| {
         let of_effect = move || chart.rows.iter().filter(move |row| row.effect == effect);
         vec![
-            curve("one pass", of_effect().map(|row| of(row)[0])),
-            curve("accumulation", of_effect().map(|row| of(row)[1])),
+            Curve::new("one pass", of_effect().map(|row| of(row)[0])),
+            Curve::new("accumulation", of_effect().map(|row| of(row)[1])),
         ]
     };
     let samples: fn(&Row) -> [(f64, f64); 2] = |row| {
         let n = f64::from(row.samples);
         [(n, row.rmse), (n, row.accumulated_rmse)]
     };
-    let time: fn(&Row) -> [(f64, f64); 2] =
-        |row| [(row.host_s, row.rmse), (row.accumulated_host_s, row.accumulated_rmse)];
+    let tests: fn(&Row) -> [(f64, f64); 2] = |row| {
+        let [one, many] = [row.samples_tested, row.accumulated_samples_tested].map(|tests| tests as f64);
+        [(one, row.rmse), (many, row.accumulated_rmse)]
+    };
     EFFECTS
         .iter()
         .flat_map(|&(effect, _)| {
             [
-                panel(effect, ["samples a texel", "RMSE"], true, both(effect, samples)),
-                panel(&format!("{effect}, host time"), ["seconds", "RMSE"], false, both(effect, time)),
+                CurvePanel::new(effect, ["samples a texel", "RMSE"], both(effect, samples))
+                    .on(Scale::Doublings, Scale::Decades),
+                CurvePanel::new(
+                    &format!("{effect}, over cost"),
+                    ["samples tested", "RMSE"],
+                    both(effect, tests),
+                ),
             ]
         })
         .collect()
 }
 
 fn blurs(chart: &GlossyChart) -> CurvePanel {
-    let found = curve("found in the map", chart.blurs.iter().map(|blur| (blur.height, blur.width)));
-    let expected = curve("2 R h / (d + h)", chart.blurs.iter().map(|blur| (blur.height, blur.expected)));
-    panel("blur of an edge", ["height over the plane", "width on the plane"], false, vec![found, expected])
+    let found = Curve::new("found in the map", chart.blurs.iter().map(|blur| (blur.height, blur.width)));
+    let expected = Curve::new("2 R h / (d + h)", chart.blurs.iter().map(|blur| (blur.height, blur.expected)));
+    let axes = ["height over the plane (scene units)", "width on the plane (scene units)"];
+    CurvePanel::new("blur of an edge", axes, vec![found, expected])
+        .failing(Some(0.0..thinnest(chart)), "thinner than a texel")
+}
+
+/// The lowest height at which the blur of the chart is found within a tenth, less a little.
+fn thinnest(chart: &GlossyChart) -> f64 {
+    let found = |blur: &&super::Blur| (blur.width / blur.expected - 1.0).abs() < 0.1;
+    chart.blurs.iter().find(found).map_or(0.0, |blur| 0.8 * blur.height)
 }
 
 fn wides(chart: &GlossyChart) -> CurvePanel {
-    let noise =
-        curve("noise of 16 samples", chart.wides.iter().map(|wide| (wide.over_half, wide.rmse_of_samples)));
-    let lobe = curve(
-        "lens against a cone that is the same everywhere",
-        chart.wides.iter().map(|wide| (wide.over_half, wide.rmse_of_lobe)),
-    );
-    panel("error", ["lens radius over half of the receiver", "RMSE"], false, vec![noise, lobe])
+    let of =
+        |error: fn(&super::Wide) -> f64| chart.wides.iter().map(move |wide| (wide.over_half, error(wide)));
+    let noise = Curve::new("noise of 16 samples", of(|wide| wide.rmse_of_samples));
+    let lobe = Curve::new("lens against a cone that is the same everywhere", of(|wide| wide.rmse_of_lobe));
+    CurvePanel::new(
+        "error",
+        ["radius of the lens over half of the receiver's shorter side", "RMSE"],
+        vec![noise, lobe],
+    )
+    .failing(Some(WARNED..f64::INFINITY), "a run warns: lens-wider-than-receiver")
 }
 
 impl GlossyChart {

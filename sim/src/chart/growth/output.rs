@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::measure::LAYERS;
 use super::{GrowthChart, Kind, Row, Sweep};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves};
+use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -68,13 +68,9 @@ impl GrowthChart {
             Sweep::Samples => ("samples a pixel", format!("{triangles}, {blur}")),
             Sweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
         };
-        CurvePanel {
-            title,
-            across: across.to_owned(),
-            up: "CPU time (ms)".to_owned(),
-            doubling: sweep != Sweep::Triangles,
-            curves: Kind::ALL.map(|kind| self.curve(sweep, kind)).into(),
-        }
+        let scale = if sweep == Sweep::Triangles { Scale::Decades } else { Scale::Doublings };
+        let curves = Kind::ALL.map(|kind| self.curve(sweep, kind)).into();
+        CurvePanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
     }
 
     /// A curve without points where there is none, so that the others keep their colours.

@@ -21,13 +21,15 @@ const IN_BOTH: [[u32; 3]; 5] = [[1, 1, 1], [1, 1, 4], [2, 2, 1], [2, 2, 4], [4, 
 /// Samples in a pixel where boxes and tiles are swept, and the tile and the samples' seed elsewhere.
 const SAMPLES: u32 = 16;
 const TILE_PX: u32 = 8;
+/// Tiles where occluders get smaller.
+pub(super) const FAILING_TILES: [u32; 2] = [4, TILE_PX];
 const SEED: u64 = 7;
 /// Walls, their motion in metres and the radius of the lens.
 const WALLS: u32 = 12;
 const MOTION: f32 = 1.5;
 const LENS: f32 = 0.15;
 /// The part of a wall of slats that is gaps.
-const GAPS: f32 = 0.02;
+pub(super) const GAPS: f32 = 0.02;
 
 impl Kind {
     fn yard(self, effort: &Effort, seed: u64, slats: u32) -> Result<Yard, ChartError> {
@@ -179,7 +181,7 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionCh
         let yards = drawn(&effort, Kind::Motion, slats, SAMPLES, &bar)?;
         let like = blank(Kind::Motion, slats, SAMPLES);
         chart.failing.push(by_samples(&yards, like));
-        chart.failing.extend([4, TILE_PX].map(|tile_px| by_intervals(&yards, like, [1, 1, 8], tile_px)));
+        chart.failing.extend(FAILING_TILES.map(|tile_px| by_intervals(&yards, like, [1, 1, 8], tile_px)));
     }
     Ok(chart)
 }

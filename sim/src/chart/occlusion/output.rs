@@ -1,8 +1,10 @@
 //! The files of the chart.
 
-use super::{Kind, OcclusionChart, Row};
+use workloads::occlusion::HALF_COVERED;
+
+use super::{Kind, OcclusionChart, Row, measure};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, Picture};
+use crate::output::plot::{Curve, CurvePanel, Curves, Picture, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -14,6 +16,7 @@ pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
 /// Writes picture and numbers; `occlusion.json` comes last.
 pub(super) fn write(chart: &OcclusionChart, dir: &OutDir) -> Result<(), OutputError> {
     chart.picture().write(dir, "occlusion")?;
+    chart.failures().write(dir, "occlusion_failures")?;
     dir.write_atomic("occlusion.csv", |out| chart.csv(out))?;
     dir.write_json("occlusion.json", chart)?;
     Ok(())
@@ -66,8 +69,7 @@ impl OcclusionChart {
     }
 
     fn picture(&self) -> Picture {
-        let mut panels: Vec<CurvePanel> = Kind::ALL.map(|kind| self.rates(kind)).into();
-        panels.push(self.failures());
+        let panels = Kind::ALL.map(|kind| self.rates(kind)).into();
         let subject = format!(
             "share of hidden boxes that are found, over bytes of stored depth read for each box that is asked for; {} samples a pixel, sampled queries 16 to 64; \
              dots of a tile from few boxes of lens and time to many",
@@ -80,37 +82,55 @@ impl OcclusionChart {
     fn rates(&self, kind: Kind) -> CurvePanel {
         let of_tile = |&tile: &u32| {
             let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
-            let points = rows.map(|row| (row.bytes, row.rate())).collect();
-            Curve { name: format!("{tile}-pixel tiles"), note: String::new(), points }
+            let mut points: Vec<_> = rows.map(|row| (row.bytes, row.rate())).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Curve::new(format!("{tile}-pixel tiles"), points)
         };
         let mut curves: Vec<Curve> = self.effort.tiles.iter().map(of_tile).collect();
         let sampled = self.samples.iter().filter(|row| row.kind == kind && row.boxes.is_none());
-        let points = sampled.map(|row| (row.bytes, row.rate())).collect();
-        curves.push(Curve { name: "sampled queries".to_owned(), note: String::new(), points });
-        CurvePanel {
-            title: kind.name().to_owned(),
-            across: "bytes of depth read for a box".to_owned(),
-            up: "share found".to_owned(),
-            doubling: false,
-            curves,
-        }
+        curves.push(Curve::new("sampled queries", sampled.map(|row| (row.bytes, row.rate()))));
+        CurvePanel::new(kind.name(), ["bytes of depth read for a box", "share found"], curves)
+            .on(Scale::Decades, Scale::Even)
     }
 
-    fn failures(&self) -> CurvePanel {
-        let curve = |name: &str, tile_px: Option<u32>| {
-            let rows = self.failing.iter().filter(|row| row.tile_px == tile_px);
-            let points = rows.map(|row| (f64::from(row.slats), row.rate())).collect();
-            Curve { name: name.to_owned(), note: String::new(), points }
+    /// Walls of more and more slats: what is found, and why not more is.
+    fn failures(&self) -> Picture {
+        let panel = |title: &str, up: &str, of: fn(&Row) -> f64, ways: &[Option<u32>]| {
+            let curve = |tile_px: &Option<u32>| {
+                let rows = self.failing.iter().filter(|row| row.tile_px == *tile_px);
+                let name = tile_px.map_or("sampled queries".to_owned(), |px| format!("{px}-pixel tiles"));
+                Curve::new(name, rows.map(|row| (f64::from(row.slats), of(row))))
+            };
+            CurvePanel::new(title, ["slats of a wall", up], ways.iter().map(curve).collect())
+                .on(Scale::Doublings, Scale::Even)
+                .failing(self.warned().map(|slats| slats..f64::INFINITY), "a run warns")
         };
-        // In the order, and so the colours, of the panels beside it.
-        let curves = self.effort.tiles.iter().map(|&tile| curve(&format!("{tile}-pixel tiles"), Some(tile)));
-        CurvePanel {
-            title: "where it fails: walls of slats with gaps".to_owned(),
-            across: "slats of a wall".to_owned(),
-            up: "share found".to_owned(),
-            doubling: true,
-            curves: curves.chain([curve("sampled queries", None)]).collect(),
-        }
+        let [small, large] = measure::FAILING_TILES.map(Some);
+        let panels = vec![
+            panel("what is found", "share of hidden boxes found", Row::rate, &[small, large, None]),
+            panel(
+                "tiles that most samples but not all find covered",
+                "share of tiles",
+                |row| row.half_covered,
+                &[small, large],
+            ),
+        ];
+        let subject = format!(
+            "walls of more and narrower slats, {:.0} % of a wall being gaps; motion, {} samples a pixel, 8 boxes of time. Marked: where a \
+             run with {}-pixel tiles warns (occlusion-small-occluders)",
+            100.0 * measure::GAPS,
+            self.effort.samples[0],
+            measure::FAILING_TILES[0]
+        );
+        Curves { title: "Where occlusion queries fail: many small occluders", subject: &subject, panels }
+            .picture()
+    }
+
+    /// The number of slats from which on a run with the smaller tiles warns.
+    fn warned(&self) -> Option<f64> {
+        let small = Some(measure::FAILING_TILES[0]);
+        let warned = |row: &&Row| row.tile_px == small && row.half_covered > HALF_COVERED;
+        self.failing.iter().find(warned).map(|row| f64::from(row.slats))
     }
 
     fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {

@@ -7,36 +7,42 @@ use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, c
 
 use super::Effort;
 
-/// Poisson-disk points of the plane in single precision.
+/// Poisson-disk points of the plane on coarse numbers.
 #[derive(Clone, Debug, Serialize)]
-pub struct Single {
+pub struct Coarse {
+    /// Coordinates are multiples of 2 to the power of minus this.
+    pub bits: u32,
     /// The least distance in spacings of numbers.
     pub radius_in_numbers: f64,
     /// How many points there are.
     pub points: usize,
     /// Voids left, without a number in them.
     pub thin_voids: u64,
-    /// How far the largest hole is beyond r, in spacings of numbers.
-    pub beyond_in_numbers: f64,
+    /// How far the largest hole is beyond r, as a share of r.
+    pub beyond: f64,
 }
 
-/// Coarser and coarser numbers: r from 2^-3 on down, until disks are a few hundred numbers wide.
-pub(super) fn single(effort: &Effort) -> Result<Vec<Single>, PoissonError> {
-    let ticks = Spacing::Single.per_unit();
-    (0..effort.halvings)
-        .map(|step| {
-            let radius = 0.125 / f64::from(1 << step);
-            let spec = PoissonSpec { radius, domain: Domain::Torus, seed: 1, spacing: Spacing::Single };
-            let found = poisson_disk::<2>(&spec)?;
-            let hole = largest_hole(&found.points, Domain::Torus);
-            Ok(Single {
-                radius_in_numbers: radius * ticks,
-                points: found.points.len(),
-                thin_voids: found.thin_voids,
-                beyond_in_numbers: (hole.radius - radius).max(0.0) * ticks,
-            })
+/// The least distance of the points on coarse numbers: what fails depends on how many numbers wide it is alone.
+pub(super) const COARSE_RADIUS: f64 = 1.0 / 64.0;
+/// The coarsest numbers with which that can be asked for.
+const COARSEST_BITS: u32 = 12;
+
+/// Finer and finer numbers, from disks on that are as few numbers wide as may be.
+pub(super) fn coarse(effort: &Effort) -> Result<Vec<Coarse>, PoissonError> {
+    let each = (COARSEST_BITS..=effort.finest_bits).step_by(2).map(|bits| {
+        let spacing = Spacing::Bits(bits);
+        let spec = PoissonSpec { radius: COARSE_RADIUS, domain: Domain::Torus, seed: 1, spacing };
+        let found = poisson_disk::<2>(&spec)?;
+        let hole = largest_hole(&found.points, Domain::Torus);
+        Ok(Coarse {
+            bits,
+            radius_in_numbers: COARSE_RADIUS * spacing.per_unit(),
+            points: found.points.len(),
+            thin_voids: found.thin_voids,
+            beyond: (hole.radius / COARSE_RADIUS - 1.0).max(0.0),
         })
-        .collect()
+    });
+    each.collect()
 }
 
 /// Points that follow the bell.

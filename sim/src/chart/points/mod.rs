@@ -14,7 +14,7 @@ use super::ChartError;
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 
-pub use failures::{Columns, Single};
+pub use failures::{Coarse, Columns};
 pub use measure::Row;
 
 /// How much is measured.
@@ -26,8 +26,8 @@ pub struct Effort {
     pub darts: u64,
     /// Points of other seeds that a spectrum is the mean of.
     pub seeds: u64,
-    /// Least distances of the sweep in single precision, each half of the one before, from 1/8 on.
-    pub halvings: u32,
+    /// Numbers in a unit of length get finer up to 2 to this power, from the fewest that the least distance of that sweep may have.
+    pub finest_bits: u32,
     /// Points that follow a density.
     pub white: usize,
 }
@@ -35,10 +35,10 @@ pub struct Effort {
 impl Effort {
     /// The chart of the book.
     pub const FULL: Self =
-        Self { radius: [0.01, 0.06], darts: 1_000_000, seeds: 4, halvings: 8, white: 200_000 };
+        Self { radius: [0.01, 0.06], darts: 1_000_000, seeds: 4, finest_bits: 26, white: 200_000 };
     /// A look in seconds.
     pub const QUICK: Self =
-        Self { radius: [0.025, 0.1], darts: 100_000, seeds: 2, halvings: 6, white: 20_000 };
+        Self { radius: [0.025, 0.1], darts: 100_000, seeds: 2, finest_bits: 22, white: 20_000 };
 }
 
 /// Everything the chart found.
@@ -49,7 +49,7 @@ pub struct PointsChart {
     /// Dimension by dimension, method by method.
     pub rows: Vec<Row>,
     /// Voids thinner than the spacing of numbers.
-    pub single: Vec<Single>,
+    pub coarse: Vec<Coarse>,
     /// Candidates for a point that follows a density.
     pub columns: Vec<Columns>,
 }
@@ -65,11 +65,11 @@ pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<PointsCh
     let failed = |message: String| ChartError::Pipeline(message);
     let mut rows = measure::rows::<2>(&effort, effort.radius[0], &bar).map_err(|e| failed(e.to_string()))?;
     rows.extend(measure::rows::<3>(&effort, effort.radius[1], &bar).map_err(|e| failed(e.to_string()))?);
-    let single = failures::single(&effort).map_err(|e| failed(e.to_string()))?;
+    let coarse = failures::coarse(&effort).map_err(|e| failed(e.to_string()))?;
     bar.inc();
     let columns = failures::columns(&effort).map_err(|e| failed(e.to_string()))?;
     bar.inc();
-    let chart = PointsChart { effort, rows, single, columns };
+    let chart = PointsChart { effort, rows, coarse, columns };
     output::write(&chart, &dir)?;
     Ok(chart)
 }
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn a_quick_chart_is_written_and_the_maximal_method_alone_is_maximal() {
-        let effort = Effort { radius: [0.06, 0.2], darts: 5000, seeds: 1, halvings: 4, white: 2000 };
+        let effort = Effort { radius: [0.06, 0.2], darts: 5000, seeds: 1, finest_bits: 16, white: 2000 };
         let out = tempfile::tempdir().unwrap();
         let chart = chart(effort, out.path(), &Progress::new(true)).unwrap();
         for row in &chart.rows {

@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
-use super::{PointsChart, Row};
-use crate::output::plot::{Curve, CurvePanel, Curves};
+use workloads::points::THIN;
+
+use super::{Coarse, PointsChart, Row};
+use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -19,7 +21,11 @@ pub(super) fn write(chart: &PointsChart, dir: &OutDir) -> Result<(), OutputError
     let picture = |title, panels| Curves { title, subject: &subject, panels }.picture();
     picture("Largest hole and free share over speed", quality(chart)).write(dir, "points_quality")?;
     picture("Power over frequency, all directions", spectra(chart)).write(dir, "points_spectra")?;
-    picture("Where points fail", failures(chart)).write(dir, "points_failures")?;
+    let (title, subject) = (
+        "Where points fail",
+        "points of the plane that keep their distance, on coarser and coarser numbers (marked: points-thin-voids), and candidates for points that follow a density",
+    );
+    Curves { title, subject, panels: failures(chart) }.picture().write(dir, "points_failures")?;
     dir.write_atomic("points.csv", |out| {
         let mut table = csv::Writer::from_writer(out);
         table.write_record([
@@ -59,71 +65,69 @@ fn by_method(chart: &PointsChart, dimensions: usize) -> impl Iterator<Item = &[R
 }
 
 fn quality(chart: &PointsChart) -> Vec<CurvePanel> {
-    let panel = |dimensions, up: &str, of: fn(&Row) -> f64| CurvePanel {
-        title: format!("{up} in {dimensions}D"),
-        across: "points a second".to_owned(),
-        up: up.to_owned(),
-        doubling: false,
-        curves: by_method(chart, dimensions)
-            .map(|rows| Curve {
-                name: rows[0].method.to_owned(),
-                note: String::new(),
-                points: rows.iter().map(|row| (row.points_per_s, of(row))).collect(),
-            })
-            .collect(),
+    let panel = |dimensions, up: &str, of: fn(&Row) -> f64| {
+        let curve = |rows: &[Row]| {
+            Curve::new(long_name(rows[0].method), rows.iter().map(|row| (row.points_per_s, of(row))))
+        };
+        let title = format!("{up}, {dimensions}D");
+        CurvePanel::new(&title, ["points a second", up], by_method(chart, dimensions).map(curve).collect())
     };
     vec![
-        panel(2, "largest hole over r", |row| row.hole_over_r),
-        panel(3, "largest hole over r", |row| row.hole_over_r),
-        panel(2, "free share (none: not shown)", |row| row.free_share),
+        panel(2, "largest hole over r", |row| row.hole_over_r).on(Scale::Decades, Scale::Even),
+        panel(3, "largest hole over r", |row| row.hole_over_r).on(Scale::Decades, Scale::Even),
+        panel(2, "share where a point would fit", |row| row.free_share),
+        panel(3, "share where a point would fit", |row| row.free_share),
     ]
 }
 
+fn long_name(method: &str) -> &str {
+    match method {
+        "bridson" => "Bridson, more and more candidates",
+        "plain" => "plain darts, more and more misses",
+        _ => "voids",
+    }
+}
+
 fn spectra(chart: &PointsChart) -> Vec<CurvePanel> {
-    let panel = |dimensions| CurvePanel {
-        title: format!("{dimensions}D"),
-        across: "frequency over rate of points".to_owned(),
-        up: "power".to_owned(),
-        doubling: false,
-        curves: by_method(chart, dimensions)
-            .filter_map(<[Row]>::last)
-            .map(|row| Curve {
-                name: row.method.to_owned(),
-                note: format!("peak {:.2}", row.peak.1),
-                points: row.spectrum.clone(),
-            })
-            .collect(),
+    let panel = |dimensions| {
+        let last = by_method(chart, dimensions).filter_map(<[Row]>::last);
+        let curve = |row: &Row| Curve {
+            note: format!("peak {:.2}", row.peak.1),
+            ..Curve::new(row.method, row.spectrum.iter().copied())
+        };
+        let title = format!("{dimensions}D");
+        CurvePanel::new(&title, ["frequency over rate of points", "power"], last.map(curve).collect())
     };
     vec![panel(2), panel(3)]
 }
 
+/// Numbers too coarse for the disks, and columns too few for the density.
 fn failures(chart: &PointsChart) -> Vec<CurvePanel> {
-    let curve =
-        |name: &str, points: Vec<(f64, f64)>| Curve { name: name.to_owned(), note: String::new(), points };
-    let single =
-        |of: fn(&super::Single) -> f64| chart.single.iter().map(|s| (s.radius_in_numbers, of(s))).collect();
-    let thin = CurvePanel {
-        title: "f32: voids thinner than numbers".to_owned(),
-        across: "r in spacings of numbers".to_owned(),
-        up: "thin voids a point; hole beyond r, spacings".to_owned(),
-        doubling: false,
-        curves: vec![
-            curve("voids", single(|s| s.thin_voids as f64 / s.points as f64)),
-            curve("beyond", single(|s| s.beyond_in_numbers)),
-        ],
+    let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
+        let curve = Curve::new("voids, 2D", chart.coarse.iter().map(|c| (c.radius_in_numbers, of(c))));
+        let warned = |c: &&Coarse| c.thin_voids as f64 > THIN * c.points as f64;
+        let last = chart.coarse.iter().rfind(warned);
+        CurvePanel::new(title, ["r in spacings of numbers", up], vec![curve])
+            .on(Scale::Doublings, Scale::Decades)
+            .failing(last.map(|c| 0.0..c.radius_in_numbers), "a run warns")
     };
     let of = |dimensions: usize| {
         let rows = chart.columns.iter().filter(move |c| c.dimensions == dimensions);
-        curve(&format!("{dimensions}D"), rows.map(|c| (f64::from(c.across), c.candidates_each)).collect())
+        Curve::new(format!("{dimensions}D"), rows.map(|c| (f64::from(c.across), c.candidates_each)))
     };
-    let columns = CurvePanel {
-        title: "candidates by columns (bell): 1D to 4D from below".to_owned(),
-        across: "columns along an axis".to_owned(),
-        up: "candidates for a point".to_owned(),
-        doubling: true,
-        curves: (1..=4).map(of).collect(),
-    };
-    vec![thin, columns]
+    let columns = (1..=4).map(of).collect();
+    vec![
+        coarse("voids thinner than the spacing of numbers", "voids without a number, a point", |c| {
+            c.thin_voids as f64 / c.points as f64
+        }),
+        coarse("what that costs: holes", "largest hole beyond r, share of r", |c| c.beyond),
+        CurvePanel::new(
+            "too few columns under a bell",
+            ["columns along an axis", "candidates for a point"],
+            columns,
+        )
+        .on(Scale::Doublings, Scale::Decades),
+    ]
 }
 
 /// The tables of the book's chapter.
@@ -150,12 +154,12 @@ fn markdown(chart: &PointsChart) -> String {
             row.peak.0
         );
     }
-    text += "\n| f32: r in spacings | points | thin voids | hole beyond r, spacings |\n|---|---|---|---|\n";
-    for s in &chart.single {
+    text += "\n| r in spacings | points | thin voids | hole beyond r, share of r |\n|---|---|---|---|\n";
+    for c in &chart.coarse {
         let _ = writeln!(
             text,
-            "| {:.0} | {} | {} | {:.3} |",
-            s.radius_in_numbers, s.points, s.thin_voids, s.beyond_in_numbers
+            "| {:.0} | {} | {} | {:.1e} |",
+            c.radius_in_numbers, c.points, c.thin_voids, c.beyond
         );
     }
     text += "\n| D | columns | candidates a point | p | p, low discrepancy |\n|---|---|---|---|---|\n";
@@ -190,6 +194,15 @@ impl PointsChart {
                 format!("{:.2}", row.peak.1),
             ]);
         }
-        table.to_string()
+        let mut coarse = Table::new(["r in spacings of numbers", "points", "thin voids", "hole beyond r"]);
+        for c in &self.coarse {
+            coarse.row([
+                format!("{:.0}", c.radius_in_numbers),
+                c.points.to_string(),
+                c.thin_voids.to_string(),
+                format!("{:.1e} r", c.beyond),
+            ]);
+        }
+        format!("{table}\n{coarse}")
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{FIT_FROM, Point, Row, SamplingChart};
-use crate::output::plot::{Curve, CurvePanel, Curves};
+use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::{OutDir, OutputError};
 
 /// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
@@ -61,12 +61,10 @@ fn subject(chart: &SamplingChart) -> String {
 /// A panel for each scene.
 fn panels(rows: &[Row], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<CurvePanel> {
     let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
-    let panel = |rows: &[Row]| CurvePanel {
-        title: rows[0].scene.to_owned(),
-        across: across.to_owned(),
-        up: "RMSE".to_owned(),
-        doubling,
-        curves: rows.iter().map(|row| curve(row, doubling, |p| (x(p), p.rmse))).collect(),
+    let scale = if doubling { Scale::Doublings } else { Scale::Decades };
+    let panel = |rows: &[Row]| {
+        let curves = rows.iter().map(|row| curve(row, doubling, |p| (x(p), p.rmse))).collect();
+        CurvePanel::new(rows[0].scene, [across, "RMSE"], curves).on(scale, Scale::Decades)
     };
     scenes.map(panel).collect()
 }
@@ -84,17 +82,11 @@ fn failures(chart: &SamplingChart) -> Vec<CurvePanel> {
     // In the order of the tables' colours everywhere; those not shown here keep their place.
     let every = |name: &str| chart.failures.every_number.iter().find(|row| row.table == name);
     let named = chart.failures.many_edges.iter().map(|row| row.table);
-    let curves = named.map(|name| {
-        let empty = Curve { name: name.to_owned(), note: String::new(), points: Vec::new() };
-        every(name).map_or(empty, |row| curve(row, false, scaled))
-    });
-    let numbers = CurvePanel {
-        title: "motion, every number of samples".to_owned(),
-        across: "samples per pixel".to_owned(),
-        up: "RMSE x root of samples".to_owned(),
-        doubling: true,
-        curves: curves.collect(),
-    };
+    let curves =
+        named.map(|name| every(name).map_or_else(|| Curve::new(name, []), |row| curve(row, false, scaled)));
+    let axes = ["samples per pixel", "RMSE x root of samples"];
+    let numbers = CurvePanel::new("motion, every number of samples", axes, curves.collect())
+        .on(Scale::Doublings, Scale::Decades);
     let fence =
         panels(&chart.failures.many_edges, "samples per pixel", true, |p| f64::from(p.samples_per_pixel));
     let fence = fence

@@ -1,10 +1,11 @@
 //! What is drawn: the built-in scene moving, out of focus and both, and a fence that no table is a match for.
 
-use glam::{Affine3A, Vec3, Vec4};
-use pipeline::{Camera, Cull, Draw, Geometry, Lens, Shader, ShaderCost, ShadingPoint, Viewport};
+use glam::{Affine3A, Vec3};
+use pipeline::{Camera, Cull, Draw, Geometry, Lens, Viewport};
 use workloads::{Frame, Overrides, Scene};
 
 use super::{ChartError, Effort};
+use crate::chart::image::White;
 
 /// Something to draw.
 pub(super) enum Stage {
@@ -116,18 +117,5 @@ impl Fence {
         let geometry = Geometry::new(&self.open, &self.close, &self.triangles).map_err(|e| refused(&e))?;
         let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
         Ok(render(&camera, &draws, self.viewport, Vec3::ZERO))
-    }
-}
-
-/// All white.
-struct White;
-
-impl Shader for White {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        Vec3::ONE
     }
 }

@@ -1,7 +1,7 @@
 //! The files of the chart.
 
-use super::{Cost, Row, ShadowsChart};
-use crate::output::plot::{Curve, CurvePanel, Curves, Sweep, SweepCurve, SweepPanel};
+use super::{Bias, Cost, Row, ShadowsChart};
+use crate::output::plot::{Curve, CurvePanel, Curves, Picture, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -16,7 +16,7 @@ pub(super) fn write(chart: &ShadowsChart, dir: &OutDir) -> Result<(), OutputErro
     Curves { title, subject: &subject, panels: errors(chart) }.picture().write(dir, "shadows_error")?;
     let title = "Soft shadows: one pass against accumulation";
     Curves { title, subject: &subject, panels: costs(chart) }.picture().write(dir, "shadows_cost")?;
-    failures(chart, &subject).write(dir, "shadows_failures")?;
+    failures(chart).write(dir, "shadows_failures")?;
     dir.write_atomic("shadows.csv", |out| {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record([
@@ -52,39 +52,30 @@ pub(super) fn write(chart: &ShadowsChart, dir: &OutDir) -> Result<(), OutputErro
 }
 
 fn curve(name: &str, chart: &ShadowsChart, y: impl Fn(&Row) -> f64) -> Curve {
-    let points = chart.rows.iter().map(|row| (f64::from(row.points), y(row))).collect();
-    Curve { name: name.to_owned(), note: String::new(), points }
+    Curve::new(name, chart.rows.iter().map(|row| (f64::from(row.points), y(row))))
 }
 
 fn panel(title: &str, up: &str, curves: Vec<Curve>) -> CurvePanel {
-    let across = "places (u, v, t)".to_owned();
-    CurvePanel { title: title.to_owned(), across, up: up.to_owned(), doubling: true, curves }
+    CurvePanel::new(title, ["places (u, v, t)", up], curves).on(Scale::Doublings, Scale::Decades)
 }
 
+/// So many places on the light, and a run does not warn any more.
+const BANDS_BELOW: f64 = 16.0;
+
 fn errors(chart: &ShadowsChart) -> Vec<CurvePanel> {
-    let name = "both methods";
-    let over_time = |method: fn(&Row) -> &Cost, name: &str| Curve {
-        name: name.to_owned(),
-        note: String::new(),
-        points: chart.rows.iter().map(|row| (method(row).host_s, row.rmse)).collect(),
+    let name = "both methods: equal to the bit";
+    let over_cost = |method: fn(&Row) -> &Cost, name: &str| {
+        Curve::new(name, chart.rows.iter().map(|row| (method(row).madds as f64, row.rmse)))
     };
+    let banding = vec![curve(name, chart, |row| row.neighbour_correlation)];
+    let costs =
+        vec![over_cost(|row| &row.one_pass, "one pass"), over_cost(|row| &row.accumulation, "accumulation")];
+    let bands = |panel: CurvePanel| panel.failing(Some(0.0..BANDS_BELOW), "a run warns: shadow-banding");
     vec![
-        panel("error (bands below 16)", "RMSE", vec![curve(name, chart, |row| row.rmse)]),
-        panel(
-            "banding",
-            "correlation of neighbours' errors",
-            vec![curve(name, chart, |row| row.neighbour_correlation)],
-        ),
-        CurvePanel {
-            title: "error over host time of the map".to_owned(),
-            across: "host seconds".to_owned(),
-            up: "RMSE".to_owned(),
-            doubling: false,
-            curves: vec![
-                over_time(|row| &row.one_pass, "one pass"),
-                over_time(|row| &row.accumulation, "accumulation"),
-            ],
-        },
+        bands(panel("error", "RMSE", vec![curve(name, chart, |row| row.rmse)])),
+        bands(panel("banding", "correlation of neighbours' errors", banding))
+            .on(Scale::Doublings, Scale::Even),
+        CurvePanel::new("error over cost of the map", ["multiply-adds of all tests", "RMSE"], costs),
     ]
 }
 
@@ -103,24 +94,27 @@ fn costs(chart: &ShadowsChart) -> Vec<CurvePanel> {
     ]
 }
 
-fn failures(chart: &ShadowsChart, subject: &str) -> crate::output::plot::Picture {
-    let values: Vec<String> = chart.biases.iter().map(|bias| bias.texels.to_string()).collect();
-    let share =
-        |of: fn(&super::Bias) -> f64| chart.biases.iter().map(|bias| Some(100.0 * of(bias))).collect();
+/// Wrong shadows over the bias; a bias of none is at zero.
+fn failures(chart: &ShadowsChart) -> Picture {
+    let of =
+        |share: fn(&Bias) -> f64| chart.biases.iter().map(move |bias| (bias.texels, 100.0 * share(bias)));
+    let across = "bias (widths of a texel)";
+    let panel = |title: &str, up: &str, curve, failing| {
+        CurvePanel::new(title, [across, up], vec![curve])
+            .on(Scale::Doublings, Scale::Even)
+            .failing(Some(failing), "a run warns")
+    };
     let panels = vec![
-        SweepPanel {
-            name: "lit samples in shadow, %",
-            log: false,
-            series: vec![SweepCurve { name: "acne", points: share(|bias| bias.acne) }],
-        },
-        SweepPanel {
-            name: "samples in shadow that are lit, %",
-            log: false,
-            series: vec![SweepCurve { name: "leak", points: share(|bias| bias.leak) }],
-        },
+        panel("too small: acne", "lit samples in shadow (%)", Curve::new("acne", of(|b| b.acne)), 0.0..0.5),
+        panel(
+            "too large: leak",
+            "samples in shadow that are lit (%)",
+            Curve::new("leak", of(|b| b.leak)),
+            8.0..f64::INFINITY,
+        ),
     ];
-    let title = "Where shadow maps fail: the bias";
-    Sweep { title, subject, x: "bias in widths of a texel", values: &values, panels }.picture()
+    let subject = "wrong shadows of a map of 16 places against rays; marked: where a run warns (shadow-bias)";
+    Curves { title: "Where shadow maps fail: the bias", subject, panels }.picture()
 }
 
 impl ShadowsChart {

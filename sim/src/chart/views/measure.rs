@@ -68,6 +68,8 @@ pub struct Cached {
 pub struct Angle {
     /// Its length over the distance of what is in focus.
     pub baseline: f64,
+    /// The angle under which a point in focus sees it, in degrees.
+    pub degrees: f64,
     /// Error of the outer views against cameras of their own, where shading does not depend on who looks.
     pub rmse_matt: f64,
     /// The same with a highlight.
@@ -200,6 +202,7 @@ impl Bench {
             let pixels = |images: &[Vec<Vec3>]| images.concat();
             Ok::<_, ChartError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())
         };
-        Ok(Angle { baseline, rmse_matt: error(None)?, rmse_shiny: error(Some(EXPONENT))? })
+        let degrees = rig.degrees();
+        Ok(Angle { baseline, degrees, rmse_matt: error(None)?, rmse_shiny: error(Some(EXPONENT))? })
     }
 }

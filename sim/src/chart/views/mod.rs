@@ -15,7 +15,7 @@ use workloads::multiview::Layout;
 
 use super::ChartError;
 use crate::output::OutDir;
-use crate::output::progress::Progress;
+use crate::output::progress::{Bar, Progress};
 
 pub use measure::{Angle, Bench, Cached, Row, Run};
 
@@ -40,14 +40,14 @@ impl Effort {
         scene: ("default", 18),
         size: [320, 180],
         views: &[1, 2, 7, 9, 64],
-        entries: &[64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
+        entries: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
         baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
     };
     /// A look in seconds.
     pub const QUICK: Self = Self {
         size: [128, 72],
         views: &[1, 2, 7, 64],
-        entries: &[64, 256, 1024, 16_384],
+        entries: &[4, 16, 64, 256, 1024, 16_384],
         baselines: &[0.05, 0.4],
         ..Self::FULL
     };
@@ -86,10 +86,28 @@ pub struct ViewsChart {
     pub effort: Effort,
     /// By number of views.
     pub rows: Vec<Row>,
-    /// Two and seven views, by policy and entries of the cache.
-    pub caches: Vec<Cached>,
+    /// Views near to each other and far apart, by policy and entries of the cache.
+    pub caches: Vec<Case>,
     /// What shading for the middle of the line leaves out, by its length.
     pub angles: Vec<Angle>,
+}
+
+/// Views for which caches are tried.
+#[derive(Clone, Debug, Serialize)]
+pub struct Case {
+    /// What they are.
+    pub name: &'static str,
+    /// By policy and entries of the cache.
+    pub rows: Vec<Cached>,
+}
+
+/// The length, over the distance of what is in focus, of a line of views so far apart that each needs what the others have forgotten.
+const FAR_APART: f64 = 0.8;
+
+/// Views for which caches are tried, with what they are.
+fn layouts(focus: f64) -> [(&'static str, Layout); 3] {
+    let far = Layout::line(7, FAR_APART * focus, aperture(focus));
+    [("two views", stereo(focus)), ("seven views", line(7, focus)), ("seven views far apart", far)]
 }
 
 /// Measures the chart and writes it into `out`.
@@ -109,30 +127,27 @@ pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<ViewsCha
 /// # Errors
 /// [`ChartError`] when the scene cannot be drawn.
 pub fn measure(effort: Effort, progress: &Progress) -> Result<ViewsChart, ChartError> {
-    let steps = effort.views.len() + 2 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
+    let steps = effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
     let bar = progress.bar("views", steps as u64);
     let bench = Bench::new(effort.scene, effort.size)?;
-    let ticked = |done| {
-        bar.inc();
-        done
-    };
-    let rows = effort.views.iter().map(|&views| ticked(bench.row(views)));
+    let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
     let rows = rows.collect::<Result<_, _>>()?;
     let mut caches = Vec::new();
-    for layout in [stereo(bench.focus()), line(7, bench.focus())] {
-        for policy in POLICIES {
-            for &entries in effort.entries {
-                caches.push(bench.cached(layout, policy, entries)?);
-                bar.inc();
-            }
-        }
+    for (name, layout) in layouts(bench.focus()) {
+        let each = POLICIES
+            .into_iter()
+            .flat_map(|policy| effort.entries.iter().map(move |&entries| (policy, entries)));
+        let rows = each.map(|(policy, entries)| ticked(bench.cached(layout, policy, entries), &bar));
+        caches.push(Case { name, rows: rows.collect::<Result<_, _>>()? });
     }
-    let mut angles = Vec::new();
-    for &baseline in effort.baselines {
-        angles.push(bench.angle(baseline)?);
-        bar.inc();
-    }
+    let angles = effort.baselines.iter().map(|&baseline| ticked(bench.angle(baseline), &bar));
+    let angles = angles.collect::<Result<_, _>>()?;
     Ok(ViewsChart { effort, rows, caches, angles })
+}
+
+fn ticked<T>(done: T, bar: &Bar) -> T {
+    bar.inc();
+    done
 }
 
 #[cfg(test)]
@@ -157,7 +172,7 @@ mod tests {
                 (row.view_by_view.over_one_view - f64::from(row.views)).abs() < 0.3 * f64::from(row.views)
             );
         }
-        for pair in chart.caches.chunks_exact(2) {
+        for pair in chart.caches.iter().flat_map(|case| case.rows.chunks_exact(2)) {
             assert!(pair[0].invocations_per_pixel > pair[1].invocations_per_pixel, "{pair:?}");
         }
         let (near, far) = (&chart.angles[0], &chart.angles[1]);

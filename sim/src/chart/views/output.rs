@@ -1,7 +1,9 @@
 //! The files of the chart.
 
-use super::{Cached, POLICIES, Row, Run, ViewsChart};
-use crate::output::plot::{Curve, CurvePanel, Curves};
+use workloads::multiview::{MOST_DEG, MOST_RUNS};
+
+use super::{Angle, Cached, Case, POLICIES, Row, Run, ViewsChart};
+use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
 use crate::output::{OutDir, OutputError};
 
@@ -13,7 +15,10 @@ pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError>
     let title = "Many views: one pass against its rivals";
     Curves { title, subject: &subject, panels: costs(chart) }.picture().write(dir, "views_cost")?;
     let title = "Pixel shader lanes of one pass over the shading cache";
-    Curves { title, subject: &subject, panels: caches(chart) }.picture().write(dir, "views_cache")?;
+    let marked = format!(
+        "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
+    );
+    Curves { title, subject: &marked, panels: caches(chart) }.picture().write(dir, "views_cache")?;
     let title = "Where one pass fails: shading that depends on who looks";
     Curves { title, subject: &subject, panels: angles(chart) }.picture().write(dir, "views_failures")?;
     dir.write_atomic("views.csv", |out| {
@@ -37,8 +42,9 @@ pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError>
         Ok(table.flush()?)
     })?;
     dir.write_atomic("views_cache.csv", |out| {
-        let mut table = csv::Writer::from_writer(out);
-        chart.caches.iter().try_for_each(|cached| table.serialize(cached))?;
+        let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
+        table.write_record(CACHE_HEADER)?;
+        chart.cached().try_for_each(|row| table.serialize(row))?;
         Ok(table.flush()?)
     })?;
     dir.write_json("views.json", chart)?;
@@ -51,18 +57,12 @@ fn runs(row: &Row) -> [(&'static str, &Run); 3] {
 
 fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
     let panel = |title: &str, up: &str, of: fn(&Run) -> f64| {
-        let curve = |method: usize| Curve {
-            name: runs(&chart.rows[0])[method].0.to_owned(),
-            note: String::new(),
-            points: chart.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1))).collect(),
+        let curve = |method: usize| {
+            let points = chart.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1)));
+            Curve::new(runs(&chart.rows[0])[method].0, points)
         };
-        CurvePanel {
-            title: title.to_owned(),
-            across: "views".to_owned(),
-            up: up.to_owned(),
-            doubling: true,
-            curves: (0..3).map(curve).collect(),
-        }
+        CurvePanel::new(title, ["views", up], (0..3).map(curve).collect())
+            .on(Scale::Doublings, Scale::Decades)
     };
     vec![
         panel("pixel shader lanes", "over those of one view", |run| run.over_one_view),
@@ -72,53 +72,57 @@ fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
     ]
 }
 
+/// Caches in which what is in use at a time has no room are marked.
 fn caches(chart: &ViewsChart) -> Vec<CurvePanel> {
-    let of = |views: u32, policy: &'static str| {
-        chart.caches.iter().filter(move |cached| cached.views == views && cached.policy == policy)
+    let panel = |case: &Case| {
+        let curve = |(policy, _): &(&'static str, _)| {
+            let rows = case.rows.iter().filter(|cached| cached.policy == *policy);
+            Curve::new(*policy, rows.map(|cached| (f64::from(cached.entries), cached.invocations_per_pixel)))
+        };
+        let axes = ["entries of the shading cache", "lanes of all views for a pixel of one"];
+        CurvePanel::new(case.name, axes, POLICIES.iter().map(curve).collect())
+            .on(Scale::Doublings, Scale::Even)
+            .failing(case.too_small().map(|entries| 0.0..entries), "a run warns")
     };
-    let panel = |views: u32, title: String, up: &str, y: fn(&Cached) -> f64| CurvePanel {
-        title,
-        across: "entries of the shading cache".to_owned(),
-        up: up.to_owned(),
-        doubling: true,
-        curves: POLICIES
-            .iter()
-            .map(|(policy, _)| Curve {
-                name: (*policy).to_owned(),
-                note: String::new(),
-                points: of(views, policy).map(|cached| (f64::from(cached.entries), y(cached))).collect(),
-            })
-            .collect(),
-    };
-    [2, 7]
-        .into_iter()
-        .flat_map(|views| {
-            [
-                panel(views, format!("{views} views"), "lanes a pixel", |cached| {
-                    cached.invocations_per_pixel
-                }),
-                panel(views, format!("{views} views over one"), "increase", |cached| cached.increase),
-            ]
-        })
-        .collect()
+    chart.caches.iter().map(panel).collect()
+}
+
+impl Case {
+    /// The most entries with which the shader runs so much more often than with the largest cache that a run warns.
+    fn too_small(&self) -> Option<f64> {
+        let rows = || self.rows.iter().filter(|cached| cached.policy == POLICIES[0].0);
+        let least = rows().map(|cached| cached.invocations_per_pixel).reduce(f64::min)?;
+        let small = rows().filter(|cached| cached.invocations_per_pixel > MOST_RUNS * least);
+        small.map(|cached| f64::from(cached.entries)).reduce(f64::max)
+    }
 }
 
 fn angles(chart: &ViewsChart) -> Vec<CurvePanel> {
-    let curve = |name: &str, of: fn(&super::Angle) -> f64| Curve {
-        name: name.to_owned(),
-        note: String::new(),
-        points: chart.angles.iter().map(|angle| (angle.baseline, of(angle))).collect(),
-    };
-    vec![CurvePanel {
-        title: "error of the outer views".to_owned(),
-        across: "camera line over distance".to_owned(),
-        up: "RMSE against cameras of their own".to_owned(),
-        doubling: false,
-        curves: vec![curve("matt", |angle| angle.rmse_matt), curve("highlight", |angle| angle.rmse_shiny)],
-    }]
+    let of = |error: fn(&Angle) -> f64| chart.angles.iter().map(move |angle| (angle.baseline, error(angle)));
+    let curves = vec![
+        Curve::new("shading that is the same for all", of(|angle| angle.rmse_matt)),
+        Curve::new("with a highlight", of(|angle| angle.rmse_shiny)),
+    ];
+    let axes = [
+        "length of the camera line over the distance of what is in focus",
+        "RMSE against cameras of their own",
+    ];
+    // Close to the angle from which on a run warns, angles grow with the line.
+    let off = |angle: &&Angle| (angle.degrees / MOST_DEG).ln().abs();
+    let nearest = chart.angles.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    let warned = nearest.map(|angle| angle.baseline * MOST_DEG / angle.degrees);
+    let panel = CurvePanel::new("error of the outer views", axes, curves);
+    vec![panel.failing(warned.map(|baseline| baseline..f64::INFINITY), "a run warns: view-dependent-shading")]
 }
 
+const CACHE_HEADER: [&str; 7] =
+    ["case", "views", "policy", "entries", "invocations_per_pixel", "one_view_per_pixel", "increase"];
+
 impl ViewsChart {
+    fn cached(&self) -> impl Iterator<Item = (&'static str, &Cached)> {
+        self.caches.iter().flat_map(|case| case.rows.iter().map(|cached| (case.name, cached)))
+    }
+
     /// What is printed.
     pub fn text(&self) -> String {
         let mut table =
@@ -136,9 +140,9 @@ impl ViewsChart {
             }
         }
         let mut caches = Table::new(["views", "policy", "entries", "lanes a pixel", "over one view"]);
-        for cached in &self.caches {
+        for (case, cached) in self.cached() {
             caches.row([
-                cached.views.to_string(),
+                case.to_owned(),
                 cached.policy.to_owned(),
                 cached.entries.to_string(),
                 format!("{:.3}", cached.invocations_per_pixel),

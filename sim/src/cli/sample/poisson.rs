@@ -1,7 +1,9 @@
 //! `quintile sample poisson`.
 
+use activity::Warning;
 use clap::Args;
 use serde::Serialize;
+use workloads::points::doubt;
 use workloads::points::poisson::{Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, radius_for};
 
 use super::file::Points;
@@ -45,6 +47,8 @@ struct Facts {
     levels: u32,
     /// Voids narrower than the spacing of numbers that are left.
     thin_voids: u64,
+    /// Regimes in which points are known to be bad.
+    warnings: Vec<Warning>,
 }
 
 pub(super) fn run(args: &PoissonArgs) -> Result<(), Failure> {
@@ -76,11 +80,13 @@ fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
         voids: found.voids,
         levels: found.levels,
         thin_voids: found.thin_voids,
+        warnings: doubt(found.points.len(), found.thin_voids).into_iter().collect(),
     };
     let thin = match found.thin_voids {
         0 => "no other fits".to_owned(),
         thin => format!("no other number fits; {thin} voids thinner than the spacing of numbers are left"),
     };
-    let line = format!("r {}, packing density {:.4}, {thin}", spec.radius, facts.packing_density);
+    let warnings: String = facts.warnings.iter().map(|warning| format!("\nwarning: {warning}")).collect();
+    let line = format!("r {}, packing density {:.4}, {thin}{warnings}", spec.radius, facts.packing_density);
     args.common.deliver(&Points::new(&found.points), facts, &line)
 }

@@ -55,7 +55,7 @@ pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
     let pool = crate::cli::threads(args.common.threads)?;
     pool.install(|| match &args.mesh {
         Some(path) => {
-            crate::cli::not_an_input(args.common.out.as_deref(), [path.as_path()])?;
+            crate::cli::not_an_input(("--out", args.common.out.as_deref()), [path.as_path()])?;
             let mesh = load_surface(path)?;
             let solid = Solid::new(&mesh.open, &mesh.triangles, args.tiles)
                 .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;

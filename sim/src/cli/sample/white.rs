@@ -55,7 +55,7 @@ pub(super) fn run(args: &WhiteArgs) -> Result<(), Failure> {
         if args.dim != 2 {
             return Err(usage("--image: a picture is a density of two dimensions; leave --dim out or say 2"));
         }
-        crate::cli::not_an_input(args.common.out.as_deref(), [path.as_path()])?;
+        crate::cli::not_an_input(("--out", args.common.out.as_deref()), [path.as_path()])?;
         let image = ImageDensity::load(path).map_err(|e| Failure { message: e.to_string(), code: 1 })?;
         return sample::<2>(args, &image);
     }

@@ -88,7 +88,7 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
 }
 
 /// Multiples of 1, 2 or 5 times a power of ten within the range, at most about eight.
-fn ticks(low: f64, high: f64, factor: f64) -> Vec<(f64, String)> {
+pub(super) fn ticks(low: f64, high: f64, factor: f64) -> Vec<(f64, String)> {
     let (step, power) = step((high - low) * factor / 8.0);
     let decimals = (-power).clamp(0, 7) as usize;
     let plain = high.abs().max(low.abs()) * factor < 1e6 && power >= -7;

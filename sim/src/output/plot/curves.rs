@@ -1,20 +1,29 @@
-//! Curves on logarithmic axes, several panels side by side.
+//! Curves over one parameter, several panels side by side.
 
-use super::axis::{Axis, is_drawable};
-use super::palette::{GRID, MUTED, part_colour};
-use super::panel::{Key, Panel, legend_column, legend_line};
-use super::picture::{Picture, Text, text};
-use crate::output::table::power_of_ten;
+use std::ops::Range;
+
+use super::palette::{GRID, MARK, MUTED, part_colour};
+use super::panel::{Key, Panel, legend_column, legend_line, legend_lines, wrapped};
+use super::picture::{Across, Picture, Text, text};
+use super::render::text_width;
+use super::scale::{Scale, Way};
 
 /// A named curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Its name; the first word names it in the legend above all panels.
+    /// Its name in the legend.
     pub name: String,
-    /// What the legend of its panel says behind the name, for example its exponent.
+    /// What the panel says behind the name, for example its exponent.
     pub note: String,
-    /// Its points from left to right; those that are not above zero are left out.
+    /// Its points from left to right; those that a scale has no place for are left out.
     pub points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    /// A curve without a note.
+    pub fn new(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { name: name.into(), note: String::new(), points: points.into_iter().collect() }
+    }
 }
 
 /// Curves over one axis.
@@ -22,14 +31,36 @@ pub struct Curve {
 pub struct CurvePanel {
     /// What is shown.
     pub title: String,
-    /// What goes across.
+    /// What goes across, with its unit.
     pub across: String,
-    /// What goes up.
+    /// What goes up, with its unit.
     pub up: String,
-    /// Whether ticks across are powers of two rather than of ten.
-    pub doubling: bool,
+    /// How values lie across and up.
+    pub scales: [Scale; 2],
+    /// Where what is shown does not work, as a range across, and what to call it.
+    pub failing: Option<(Range<f64>, String)>,
     /// The curves, in the order of their colours.
     pub curves: Vec<Curve>,
+}
+
+impl CurvePanel {
+    /// Curves on logarithmic scales, `[across, up]` saying what they are.
+    pub fn new(title: &str, [across, up]: [&str; 2], curves: Vec<Curve>) -> Self {
+        let [title, across, up] = [title, across, up].map(str::to_owned);
+        Self { title, across, up, scales: [Scale::Decades; 2], failing: None, curves }
+    }
+
+    /// The same with these scales across and up.
+    #[must_use]
+    pub fn on(self, across: Scale, up: Scale) -> Self {
+        Self { scales: [across, up], ..self }
+    }
+
+    /// The same with a range marked in which what is shown does not work.
+    #[must_use]
+    pub fn failing(self, range: Option<Range<f64>>, name: &str) -> Self {
+        Self { failing: range.map(|range| (range, name.to_owned())), ..self }
+    }
 }
 
 /// Panels side by side.
@@ -37,33 +68,83 @@ pub struct CurvePanel {
 pub struct Curves<'a> {
     /// What is shown.
     pub title: &'a str,
-    /// Of what, for the line below the title.
+    /// Of what, for the lines below the title.
     pub subject: &'a str,
     /// The panels, from left to right.
     pub panels: Vec<CurvePanel>,
 }
 
+/// Room of a panel among several, and of one alone.
 const PANEL_WIDTH: f64 = 400.0;
+const ALONE_WIDTH: f64 = 760.0;
 /// What a panel leaves for its axis and its neighbour.
 const ASIDE: f64 = 76.0;
-const TOP: f64 = 128.0;
-const BOTTOM: f64 = 500.0;
+const HEIGHT: f64 = 372.0;
+/// Distance of lines of text.
+const LINE: f64 = 18.0;
+const LEGEND_LINE: f64 = 22.0;
+/// Size of the name of a marked range.
+const MARK_PX: f64 = 11.5;
+
+/// What stands above the panels, and where they are.
+struct Layout {
+    width: f64,
+    /// Room of a panel across.
+    pitch: f64,
+    subject: Vec<String>,
+    /// Lines of the legend that all panels share.
+    legend: Vec<Vec<(Key, String)>>,
+    /// Whether each panel has a legend of its own, as their curves are of different kinds.
+    apart: bool,
+    /// Where the lines of the legend begin, and the panels.
+    tops: [f64; 2],
+    bottom: f64,
+}
 
 impl Curves<'_> {
-    /// Lines with a dot for each point.
+    /// Lines with a dot for each point. One legend above all panels where they show the same curves, else one below each.
     pub fn picture(&self) -> Picture {
-        let width = 40.0 + PANEL_WIDTH * self.panels.len().max(2) as f64;
-        let mut picture = Picture::new(width, 570.0, self.title, self.subject);
+        let layout = self.layout();
+        let first = layout.subject.first().map_or("", String::as_str);
+        let mut picture = Picture::new(layout.width, layout.bottom, self.title, first);
+        for (line, row) in layout.subject.iter().enumerate().skip(1) {
+            picture.text(Text { colour: MUTED, ..text(row, (24.0, 50.0 + LINE * line as f64)) });
+        }
         if self.panels.is_empty() {
             return picture.nothing("no curves to show");
         }
-        let names = self.panels[0].curves.iter().enumerate();
-        let legend: Vec<_> = names.map(|(i, curve)| (key(i), curve.name.clone())).collect();
-        legend_line(&mut picture, (24.0, 78.0), &legend);
+        for (line, row) in layout.legend.iter().enumerate() {
+            legend_line(&mut picture, (24.0, layout.tops[0] + LEGEND_LINE * line as f64), row);
+        }
         for (place, panel) in self.panels.iter().enumerate() {
-            panel.draw(&mut picture, 90.0 + PANEL_WIDTH * place as f64);
+            panel.draw(&mut picture, 90.0 + layout.pitch * place as f64, &layout);
         }
         picture
+    }
+
+    fn layout(&self) -> Layout {
+        let pitch = if self.panels.len() == 1 { ALONE_WIDTH } else { PANEL_WIDTH };
+        let width = 40.0 + (pitch * self.panels.len() as f64).max(ALONE_WIDTH);
+        let width = width.max(text_width(self.title, 19.0, true) + 48.0);
+        let subject = wrapped(self.subject, 13.0, false, width - 48.0);
+        let shared = self.shared_curves();
+        let entries = shared.iter().flat_map(|curves| curves.iter().enumerate());
+        let entries: Vec<_> = entries.map(|(index, curve)| (key(index), curve.name.clone())).collect();
+        let legend = legend_lines(&entries, width - 48.0);
+        let most = |of: &dyn Fn(&CurvePanel) -> usize| self.panels.iter().map(of).max().unwrap_or(0) as f64;
+        let above = 78.0 + LINE * (subject.len().max(1) - 1) as f64;
+        let headings = LINE * most(&|panel| panel.heading(pitch).len());
+        let top = above + LEGEND_LINE * legend.len() as f64 + headings + 10.0;
+        let below = if shared.is_none() { LEGEND_LINE * most(&|panel| panel.curves.len()) } else { 0.0 };
+        let bottom = top + HEIGHT + 70.0 + below;
+        Layout { width, pitch, subject, legend, apart: shared.is_none(), tops: [above, top], bottom }
+    }
+
+    /// The curves of the panel with the most, where those of all others are called like the first of them.
+    fn shared_curves(&self) -> Option<&[Curve]> {
+        let longest = &self.panels.iter().max_by_key(|panel| panel.curves.len())?.curves;
+        let alike = |panel: &CurvePanel| panel.curves.iter().zip(longest).all(|(a, b)| a.name == b.name);
+        self.panels.iter().all(alike).then_some(longest)
     }
 }
 
@@ -72,96 +153,99 @@ fn key(index: usize) -> Key {
 }
 
 impl CurvePanel {
-    fn draw(&self, picture: &mut Picture, left: f64) {
-        let right = left + PANEL_WIDTH - ASIDE;
-        picture.text(Text { bold: true, ..text(&self.title, (left, TOP - 18.0)) });
-        let Some([x, y]) = self.axes() else {
-            picture.text(Text {
-                colour: MUTED,
-                ..text("nothing above zero", (left + 20.0, (TOP + BOTTOM) / 2.0))
-            });
-            return;
+    fn heading(&self, pitch: f64) -> Vec<String> {
+        wrapped(&self.title, 13.0, true, pitch - 40.0)
+    }
+
+    fn draw(&self, picture: &mut Picture, left: f64, layout: &Layout) {
+        let (right, top) = (left + layout.pitch - ASIDE, layout.tops[1]);
+        let bottom = top + HEIGHT;
+        let heading = self.heading(layout.pitch);
+        for (line, row) in heading.iter().rev().enumerate() {
+            picture.text(Text { bold: true, ..text(row, (left, top - 16.0 - LINE * line as f64)) });
+        }
+        let values = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+            self.curves.iter().flat_map(|curve| curve.points.iter().map(of)).collect()
         };
-        let panel = Panel { left, top: TOP, right, bottom: BOTTOM, x, y };
+        let x = self.scales[0].axis(&self.across, &values(|point| point.0), (Way::Across, right - left));
+        let y = self.scales[1].axis(&self.up, &values(|point| point.1), (Way::Up, HEIGHT));
+        let Some((x, y)) = x.zip(y) else {
+            let at = (left + 20.0, (top + bottom) / 2.0);
+            return picture.text(Text { colour: MUTED, ..text("nothing to show", at) });
+        };
+        let mut panel = Panel { left, top, right, bottom, x, y };
+        if self.failing.is_some() {
+            // Room for its name above the curves.
+            panel.y.high += 0.07 * (panel.y.high - panel.y.low);
+        }
+        let marked = self.mark(picture, &panel);
         panel.grid(picture);
         for (value, _) in &panel.x.ticks {
             let x = panel.x_px(*value);
             picture.line((x, panel.top), (x, panel.bottom), GRID, 1.0);
         }
+        marked.into_iter().for_each(|name| picture.text(name));
         for (index, curve) in self.curves.iter().enumerate() {
-            let colour = part_colour(index, false);
-            let points: Vec<_> = curve.logarithms().map(|(x, y)| panel.at(x, y)).collect();
-            points.iter().for_each(|&point| picture.dot(point, 2.5, colour));
-            if points.len() > 1 {
-                picture.polyline(points, colour.alpha(0.8), 1.5);
-            }
+            self.curve(picture, &panel, (index, curve));
         }
         panel.axes(picture, 0.0);
-        self.notes(picture, right);
+        self.notes(picture, &panel);
+        if layout.apart {
+            let each = self.curves.iter().enumerate();
+            let entries: Vec<_> =
+                each.map(|(i, curve)| (key(i), curve.name.clone(), String::new())).collect();
+            legend_column(picture, (left, bottom + 70.0), right + 40.0, &entries);
+        }
+    }
+
+    /// The first curves are thicker, so that one below another is seen beside it.
+    fn curve(&self, picture: &mut Picture, panel: &Panel, (index, curve): (usize, &Curve)) {
+        let (colour, above) = (part_colour(index, false), (self.curves.len() - 1 - index).min(3) as f64);
+        let at = |&(x, y): &(f64, f64)| {
+            let [across, up] = self.scales;
+            Some(panel.at(across.place(x, &panel.x)?, up.place(y, &panel.y)?))
+        };
+        let points: Vec<_> = curve.points.iter().filter_map(at).collect();
+        points.iter().for_each(|&point| picture.dot(point, 2.5 + 0.7 * above, colour));
+        if points.len() > 1 {
+            picture.polyline(points, colour.alpha(0.8), 1.5 + 0.9 * above);
+        }
+    }
+
+    /// Marks the range in which what is shown does not work; what it is called is to be drawn over the grid.
+    fn mark(&self, picture: &mut Picture, panel: &Panel) -> Option<Text> {
+        let (range, name) = self.failing.as_ref()?;
+        let end = |value: f64, beyond: f64| {
+            let place = if value.is_finite() { self.scales[0].place(value, &panel.x) } else { None };
+            place.map_or(beyond, |place| panel.x_px(place))
+        };
+        let (from, to) = (end(range.start, panel.left), end(range.end, panel.right));
+        if to <= from {
+            return None;
+        }
+        picture.rect((from, panel.top), (to, panel.bottom), MARK.alpha(0.22));
+        let y = panel.top + 10.0;
+        let fits = from + 6.0 + text_width(name, MARK_PX, false) <= panel.right;
+        let (x, across) = if fits { (from + 6.0, Across::Left) } else { (to - 6.0, Across::Right) };
+        Some(Text { size: MARK_PX, colour: MUTED, across, ..text(name, (x, y)) })
     }
 
     /// The notes of the curves in the upper corner that they leave free: right where they fall, left where they rise.
-    fn notes(&self, picture: &mut Picture, right: f64) {
+    fn notes(&self, picture: &mut Picture, panel: &Panel) {
         let noted = self.curves.iter().enumerate().filter(|(_, curve)| !curve.note.is_empty());
         let entries: Vec<_> =
             noted.map(|(index, curve)| (key(index), curve.name.clone(), curve.note.clone())).collect();
-        let right = if self.rises() { right - (PANEL_WIDTH - ASIDE) + 176.0 } else { right };
-        legend_column(picture, (right - 160.0, TOP + 14.0), right - 6.0, &entries);
+        let right = if self.rises() { panel.left + 176.0 } else { panel.right };
+        legend_column(picture, (right - 160.0, panel.top + 14.0), right - 6.0, &entries);
     }
 
     /// Whether the curves end higher than they begin, all in all.
     fn rises(&self) -> bool {
         let rise = |curve: &Curve| {
-            let mut heights = curve.logarithms().map(|(_, y)| y);
-            heights.next().zip(heights.last()).map_or(0.0, |(first, last)| last - first)
+            let mut heights =
+                curve.points.iter().filter(|point| point.1 > 0.0).map(|point| libm::log10(point.1));
+            heights.next().zip(heights.next_back()).map_or(0.0, |(first, last)| last - first)
         };
         self.curves.iter().map(rise).sum::<f64>() > 0.0
     }
-
-    /// Axes of the logarithms, or `None` where there is nothing to show.
-    fn axes(&self) -> Option<[Axis; 2]> {
-        let all = || self.curves.iter().flat_map(Curve::logarithms);
-        let ends = |of: fn((f64, f64)) -> f64| {
-            let (low, high) = (all().map(of).reduce(f64::min)?, all().map(of).reduce(f64::max)?);
-            (is_drawable(low, high) && high < 90.0 && low > -90.0).then_some((low, high))
-        };
-        let (left, right) = ends(|point| point.0)?;
-        let (low, high) = ends(|point| point.1)?;
-        Some([
-            logarithmic(&self.across, left - 0.05, right + 0.05, self.doubling),
-            logarithmic(&self.up, low - 0.05, high + 0.05, false),
-        ])
-    }
-}
-
-impl Curve {
-    /// The decimal logarithms of the points that have any.
-    fn logarithms(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let positive =
-            self.points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
-        positive.map(|(x, y)| (libm::log10(*x), libm::log10(*y)))
-    }
-}
-
-/// An axis of decimal logarithms, ticks at powers of two or at round multiples of powers of ten.
-fn logarithmic(label: &str, low: f64, high: f64, doubling: bool) -> Axis {
-    let values: Vec<f64> = if doubling {
-        (0..40).map(|power| f64::from(1_u32 << power.min(31))).collect()
-    } else {
-        let steps: &[f64] = match high - low {
-            span if span > 2.5 => &[1.0],
-            span if span > 0.8 => &[1.0, 2.0, 5.0],
-            _ => &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0],
-        };
-        let powers = libm::floor(low) as i32..=libm::ceil(high) as i32;
-        powers.flat_map(|power| steps.iter().map(move |step| step * power_of_ten(power))).collect()
-    };
-    let ticks = values.into_iter().map(|value| (libm::log10(value), plain(value)));
-    let mut ticks: Vec<_> = ticks.filter(|(at, _)| (low..=high).contains(at)).collect();
-    ticks.dedup();
-    Axis { low, high: high.max(low + 0.01), ticks, label: label.to_owned() }
-}
-
-fn plain(value: f64) -> String {
-    if (1e-4..1e6).contains(&value) { format!("{}", value as f32) } else { format!("{value:.0e}") }
 }

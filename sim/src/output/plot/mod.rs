@@ -4,7 +4,7 @@
 //! - [`FramePower`]: one frame's power over time, stacked by part.
 //! - [`FrameEnergy`]: energy of each frame, measured against true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
-//! - [`Curves`]: curves on logarithmic axes.
+//! - [`Curves`]: curves over one parameter, on the [`Scale`] that suits them.
 //! - [`Lines`]: bands, lines, dots and bars over plain axes.
 //! - [`HeatMapPlot`]: where in the image something happens.
 //!
@@ -30,6 +30,7 @@ mod panel;
 mod picture;
 mod power_run;
 mod render;
+mod scale;
 mod stalls;
 mod sweep;
 mod tradeoff;
@@ -45,6 +46,7 @@ pub use palette::{Colour, part_colour};
 pub use picture::Picture;
 pub use power_run::PowerRun;
 pub use render::PlotError;
+pub use scale::Scale;
 pub use stalls::{StallLane, StallLanes};
 pub use sweep::{Sweep, SweepCurve, SweepPanel};
 pub use tradeoff::{Tradeoff, TradeoffPanel, TradeoffPoint};

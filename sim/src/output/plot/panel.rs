@@ -112,6 +112,38 @@ pub(super) fn legend_line(picture: &mut Picture, from: Point, entries: &[(Key, S
     }
 }
 
+/// Entries of a legend, as many to a line as have room in `width` pixels.
+pub(super) fn legend_lines(entries: &[(Key, String)], width: f64) -> Vec<Vec<(Key, String)>> {
+    let (mut lines, mut x) = (Vec::<Vec<_>>::new(), f64::INFINITY);
+    for (key, label) in entries {
+        let wide = 22.0 + text_width(label, 12.5, false) + 26.0;
+        if x + wide > width + 26.0 {
+            lines.push(Vec::new());
+            x = 0.0;
+        }
+        x += wide;
+        if let Some(line) = lines.last_mut() {
+            line.push((*key, label.clone()));
+        }
+    }
+    lines
+}
+
+/// `label` in lines of at most `room` pixels, broken between words.
+pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in label.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), size, bold) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 /// A legend in one column, top entry at `from`; each entry has a label and a value that ends at `right`.
 pub(super) fn legend_column(
     picture: &mut Picture,

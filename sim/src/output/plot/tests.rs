@@ -149,14 +149,28 @@ fn curves_and_their_legends_fit() {
             note: "-0.71".to_owned(),
             points: (0..9).map(|i| (f64::from(1 << i), scale / f64::from((1 << i) + k))).collect(),
         });
-        let [title, across, up] = ["motion", "samples per pixel", "RMSE"].map(str::to_owned);
-        CurvePanel { title, across, up, doubling: true, curves: curves.collect() }
+        let [title, across, up] = ["motion", "samples per pixel", "RMSE"];
+        CurvePanel::new(title, [across, up], curves.collect()).on(Scale::Doublings, Scale::Decades)
     };
     let empty = CurvePanel { curves: Vec::new(), ..panel(1.0) };
-    for panels in
-        [vec![], vec![panel(1.0)], vec![panel(1e-6), panel(3e7), panel(0.1)], vec![panel(0.0), empty]]
-    {
-        check(&Curves { title: "Error", subject: "of a scene", panels }.picture());
+    let long = "a title that goes on and on, so that it takes more than the one line there is over a panel";
+    let other = CurvePanel {
+        title: long.to_owned(),
+        ..CurvePanel::new("", ["x", "y"], vec![Curve::new("other", [(1.0, 0.0), (2.0, 5.0)])])
+    };
+    let failing = |range| other.clone().failing(Some(range), "the simulator warns");
+    for panels in [
+        vec![],
+        vec![panel(1.0)],
+        vec![panel(1e-6), panel(3e7), panel(0.1)],
+        vec![panel(0.0), empty],
+        vec![other.clone(), panel(1.0)],
+        vec![failing(0.0..1.2), failing(1.9..f64::INFINITY)],
+        vec![failing(7.0..3.0)],
+    ] {
+        for subject in ["of a scene".to_owned(), [long; 5].join(" ")] {
+            check(&Curves { title: long, subject: &subject, panels: panels.clone() }.picture());
+        }
     }
 }
 

@@ -19,8 +19,7 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
 /// VI-6: shader executions by method on an ocean of 130,050 volumes.
 fn executions(quick: bool, progress: &Progress) -> Result<Done, RunError> {
     let size = if quick { Size::QUICK } else { Size::FULL };
-    let ocean = ocean(size.ocean_cells, size.ocean_px, progress)
-        .map_err(|error| RunError::Setting(error.to_string()))?;
+    let ocean = ocean(size.ocean_cells, size.ocean_px, progress).map_err(RunError::setting)?;
     let [moving, refined, hull, prism] = ocean.executions;
     let part = |total: u64| total as f64 / prism as f64;
     let row = Row {

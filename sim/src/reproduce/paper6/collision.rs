@@ -3,9 +3,10 @@
 use workloads::collision::families::{Case, cases};
 use workloads::collision::{Method, Object, Search, detect};
 
-use super::super::figure::{by_place, line};
+use super::super::figure::over_doublings;
 use super::super::row::{Kind, Row, Verdict, numbers};
-use super::super::{Done, Effort, Figure};
+use super::super::{Done, Effort};
+use crate::output::plot::Curve;
 use crate::output::progress::Progress;
 use crate::run::RunError;
 
@@ -101,10 +102,13 @@ fn dodged(_: &[Case]) -> Done {
     Done { row, figures: Vec::new() }
 }
 
+/// Pixels across at which both are compared.
+const RESOLUTIONS: [u32; 5] = [2, 4, 8, 16, 32];
+
 /// VI-3: a fragment against a box is at least as tight as a box against a box.
 fn tighter(all: &[Case]) -> Done {
     let (mut left, mut right) = (Vec::new(), Vec::new());
-    for resolution in [2, 4, 8, 16, 32] {
+    for resolution in RESOLUTIONS {
         let vain = |method| {
             let search = Search { method, resolution, ..ONCE };
             let vain =
@@ -134,12 +138,17 @@ fn tighter(all: &[Case]) -> Done {
         figure: None,
         figures: Vec::new(),
     };
-    let figure = Figure::lines(
+    let curve = |name: &str, kept: &[f64]| {
+        Curve::new(name, RESOLUTIONS.into_iter().map(f64::from).zip(kept.iter().copied()))
+    };
+    let figure = over_doublings(
         "VI_fig5",
-        "Pairs kept in vain: fragment against box, box against box",
-        "families of moving objects, at 2, 4, 8, 16 and 32 pixels",
-        [("step of resolution", ""), ("pairs kept in vain", "")],
-        vec![line("fragment-box", by_place(&fragments)), line("box-box", by_place(&boxes))],
+        [
+            "Pairs kept in vain: fragment against box, box against box",
+            "families of moving objects, one bin of time",
+        ],
+        ["pixels across", "pairs kept in vain"],
+        vec![curve("fragment-box", &fragments), curve("box-box", &boxes)],
     );
     Done { row, figures: vec![figure] }
 }

@@ -17,15 +17,15 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
     let size =
         if effort == Effort::QUICK { Size { reference_tables: 16, ..Size::QUICK } } else { Size::FULL };
     let bar = progress.bar("glossy", 3);
-    let failed = |error: ChartError| RunError::Setting(error.to_string());
     let effect = |effect| -> Result<Vec<Measured>, ChartError> {
         let bench = Bench::new(effect, size)?;
         let reference = bench.reference(ROUGHNESS)?;
         bar.inc();
         SAMPLES.iter().map(|&samples| bench.row(samples, &reference)).collect()
     };
-    let [reflected, refracted] = [effect(EFFECTS[0]).map_err(failed)?, effect(EFFECTS[1]).map_err(failed)?];
-    let blurs = Bench::new(EFFECTS[0], size).and_then(|bench| bench.blurs()).map_err(failed)?;
+    let [reflected, refracted] =
+        [effect(EFFECTS[0]).map_err(RunError::setting)?, effect(EFFECTS[1]).map_err(RunError::setting)?];
+    let blurs = Bench::new(EFFECTS[0], size).and_then(|bench| bench.blurs()).map_err(RunError::setting)?;
     Ok(vec![done(&reflected, &refracted, &blurs)])
 }
 
@@ -65,7 +65,7 @@ fn done(reflected: &[Measured], refracted: &[Measured], blurs: &[Blur]) -> Done 
         "VI_fig14_contact",
         "Blur of an edge over its height above the receiver (Paper VI, section 6)",
         "square lens, 64 samples a texel",
-        [("height", "scene units"), ("width on the plane", "scene units")],
+        [("height in scene units", ""), ("width on the plane in scene units", "")],
         vec![
             line("found in the map", points(|blur| blur.width)),
             line("geometry", points(|blur| blur.expected)),

@@ -1,16 +1,17 @@
 //! Rows VI-4 and VI-5: occlusion queries by intervals.
 
-use super::super::figure::line;
+use super::super::figure::over_doublings;
 use super::super::row::{Kind, Row, Verdict, numbers};
-use super::super::{Done, Effort, Figure};
+use super::super::{Done, Effort};
 use crate::chart::occlusion::{Effort as Size, Kind as Blur, OcclusionChart, Row as Asked, measure};
+use crate::output::plot::Curve;
 use crate::output::progress::Progress;
 use crate::run::RunError;
 
 /// Both rows.
 pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, RunError> {
     let size = if effort == Effort::QUICK { Size::QUICK } else { Size::FULL };
-    let chart = measure(size, progress).map_err(|error| RunError::Setting(error.to_string()))?;
+    let chart = measure(size, progress).map_err(RunError::setting)?;
     Ok(vec![rate(&chart), cost(&chart)])
 }
 
@@ -44,12 +45,14 @@ fn rate(chart: &OcclusionChart) -> Done {
         figure: None,
         figures: Vec::new(),
     };
-    let figure = Figure::lines(
+    let figure = over_doublings(
         "VI_occlusion",
-        "Occlusion rate over boxes in time (Paper VI, section 3)",
-        "share of the objects hidden from every sample that a query by intervals finds",
-        [("boxes in t", ""), ("share found", "")],
-        vec![line("8-pixel tiles", rates)],
+        [
+            "Occlusion rate over boxes in time (Paper VI, section 3)",
+            "share of the objects hidden from every sample that a query by intervals finds",
+        ],
+        ["boxes in t", "share found"],
+        vec![Curve::new(format!("{tile}-pixel tiles"), rates)],
     );
     Done { row, figures: vec![figure] }
 }

@@ -40,14 +40,10 @@ fn scenes(effort: Effort) -> Result<Vec<StressScene>, RunError> {
         let first = if effort == Effort::QUICK { values.len() / 2 } else { 0 };
         for value in values.iter().skip(first).step_by((values.len() / 2).max(1)) {
             let scene = family.scene(*value, SIZE, 6);
-            scenes.push(scene.map_err(|error| RunError::Setting(error.to_string()))?);
+            scenes.push(scene.map_err(RunError::setting)?);
         }
     }
     Ok(scenes)
-}
-
-fn setting(error: impl ToString) -> RunError {
-    RunError::Setting(error.to_string())
 }
 
 /// Widths of depth intervals in tiles that a triangle is seen in.
@@ -85,9 +81,9 @@ fn tighter(scenes: &[StressScene], most: usize) -> Result<Done, RunError> {
     for scene in scenes {
         for corners in scene.triangles.iter().take(2 * most) {
             let close = if scene.open == scene.close { &scene.open } else { &scene.close };
-            let geometry =
-                Geometry::new(&scene.open, close, std::slice::from_ref(corners)).map_err(setting)?;
-            let draw = Draw { geometry, ..scene.draw(&Unshaded).map_err(setting)? };
+            let geometry = Geometry::new(&scene.open, close, std::slice::from_ref(corners))
+                .map_err(RunError::setting)?;
+            let draw = Draw { geometry, ..scene.draw(&Unshaded).map_err(RunError::setting)? };
             measure(scene, &draw, [&mut all, &mut turning]);
         }
     }
@@ -106,9 +102,10 @@ fn tighter(scenes: &[StressScene], most: usize) -> Result<Done, RunError> {
             all.violations
         ),
         verdict: Verdict::of(holds),
-        note: "mean of ratios over tiles of 8 pixels that a triangle of the failure catalogue is seen in, all of lens and shutter; \
-               with what the sample test's rounding in f32 adds, which takes back most of the gain where a triangle turns over"
-            .to_owned(),
+        note: format!(
+            "mean of ratios over tiles of {TILE_PX} pixels that a triangle of the failure catalogue is seen in, all of lens and shutter; \
+             with what the sample test's rounding in f32 adds, which takes back most of the gain where a triangle turns over"
+        ),
         numbers: numbers([
             ("width_ratio", all.ratio()),
             ("width_ratio_facing_change", turning.ratio()),
@@ -144,7 +141,8 @@ fn measure(scene: &StressScene, draw: &Draw<'_>, [all, turning]: [&mut Widths; 2
     let within = Box5::whole(scene.camera.lens().is_some());
     let across = scene.viewport.width();
     let per_pixel = seen.len() / scene.viewport.pixels();
-    for (y, x) in (0..across).step_by(8).flat_map(|y| (0..across).step_by(8).map(move |x| (y, x))) {
+    let starts = || (0..across).step_by(TILE_PX as usize);
+    for (y, x) in starts().flat_map(|y| starts().map(move |x| (y, x))) {
         let pixels =
             (y..y + TILE_PX).flat_map(|row| (x..x + TILE_PX).map(move |column| row * across + column));
         let samples = pixels.flat_map(|pixel| &seen[pixel as usize * per_pixel..][..per_pixel]);
@@ -186,14 +184,14 @@ fn unchanged(scenes: &[StressScene]) -> Result<Done, RunError> {
         for features in [Features::ALL, Features { auto: true, ..Features::ALL }] {
             let spec = PipelineSpec { features, ..reference };
             let settings = Settings { spec: &spec, viewport, samples: source, background: glam::Vec3::ZERO };
-            let seen = visibility(camera, draws, &settings).map_err(setting)?;
+            let seen = visibility(camera, draws, &settings).map_err(RunError::setting)?;
             samples += seen.len();
             differ += seen.iter().zip(&truth).filter(|(one, other)| one != other).count();
         }
         Ok::<(), RunError>(())
     };
     for scene in scenes {
-        let draw = scene.draw(&Unshaded).map_err(setting)?;
+        let draw = scene.draw(&Unshaded).map_err(RunError::setting)?;
         compare(&scene.camera, &[draw], scene.viewport, &scene.samples)?;
     }
     let row = Row {

@@ -2,10 +2,11 @@
 
 use crate::chart::ChartError;
 use crate::chart::views::{Bench, Cached, POLICIES, line, stereo};
+use crate::output::plot::Curve;
 use crate::output::progress::Progress;
-use crate::reproduce::figure::line as drawn_line;
+use crate::reproduce::figure::over_doublings;
 use crate::reproduce::row::{Kind, Row, Verdict, numbers};
-use crate::reproduce::{Done, Effort, Figure};
+use crate::reproduce::{Done, Effort};
 use crate::run::RunError;
 
 /// Entries of the cache (thesis, Paper VI, section 8).
@@ -25,8 +26,7 @@ pub(super) fn rows(effort: Effort, progress: &Progress) -> Result<Vec<Done>, Run
         };
         SIZES.iter().map(cached).collect()
     };
-    let failed = |error: ChartError| RunError::Setting(error.to_string());
-    let (two, seven) = (sweep(false).map_err(failed)?, sweep(true).map_err(failed)?);
+    let (two, seven) = (sweep(false).map_err(RunError::setting)?, sweep(true).map_err(RunError::setting)?);
     Ok(vec![
         done(
             "VI-13",
@@ -73,16 +73,15 @@ fn done(
     };
     let name = if id == "VI-13" { "VI_fig17_stereo" } else { "VI_fig17_seven" };
     let over = |of: fn(&Cached) -> f64| {
-        sweep.iter().map(|cached| (f64::from(cached.entries.ilog2()), of(cached))).collect::<Vec<_>>()
+        sweep.iter().map(|cached| (f64::from(cached.entries), of(cached))).collect::<Vec<_>>()
     };
-    let figure = Figure::lines(
+    let figure = over_doublings(
         name,
-        "Pixel shader lanes for each pixel over the shading cache (Paper VI, section 8)",
-        claim,
-        [("entries, power of", "2"), ("lanes a pixel", "")],
+        ["Pixel shader lanes for each pixel over the shading cache (Paper VI, section 8)", claim],
+        ["entries of the shading cache", "lanes a pixel"],
         vec![
-            drawn_line("all views in one pass", over(|cached| cached.invocations_per_pixel)),
-            drawn_line("one view alone", over(|cached| cached.one_view_per_pixel)),
+            Curve::new("all views in one pass", over(|cached| cached.invocations_per_pixel)),
+            Curve::new("one view alone", over(|cached| cached.one_view_per_pixel)),
         ],
     );
     Done { row, figures: vec![figure] }

@@ -125,7 +125,7 @@ fn see(
         packets.push((*packet, lines.len()));
     };
     let rendered = render_with_heat(&frame.camera, &draws, &settings, &[], emit);
-    let (rendered, _) = rendered.map_err(|error| RunError::Setting(error.to_string()))?;
+    let (rendered, _) = rendered.map_err(RunError::setting)?;
     let pipeline_s = started.elapsed().as_secs_f64();
     let started = ThreadTime::now();
     let mut first = 0;

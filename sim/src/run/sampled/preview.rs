@@ -75,8 +75,8 @@ impl Preview {
         let recorder = Recorder::new(simulate::BIN_PS, BINS);
         let mut clock = FrameClock::new(self.level, &plan.gpu, recorder)?;
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let rendered = render_with_heat(&frame.camera, &draws, &settings, &[], emit)
-            .map_err(|error| RunError::Setting(error.to_string()))?;
+        let rendered =
+            render_with_heat(&frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;
         let timed = clock.finish()?;
         Ok(Glimpse {
             triangles: frame.triangle_count(),

@@ -42,6 +42,8 @@ pub enum Spacing {
     Double,
     /// Multiples of 2^-24: the same for `f32`.
     Single,
+    /// Multiples of 2^-n, n at most 52: coarser numbers, to see what they do.
+    Bits(u32),
 }
 
 impl Spacing {
@@ -50,6 +52,7 @@ impl Spacing {
         match self {
             Self::Double => (1_u64 << exact::FINEST_BITS) as f64,
             Self::Single => (1_u64 << 24) as f64,
+            Self::Bits(bits) => (1_u64 << bits.min(exact::FINEST_BITS)) as f64,
         }
     }
 }

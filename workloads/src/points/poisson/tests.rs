@@ -133,9 +133,13 @@ fn what_cannot_be_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
     #[test]
-    fn any_radius_and_seed(radius in 0.05_f64..0.5, seed in any::<u64>(), torus in any::<bool>(), single in any::<bool>()) {
+    fn any_radius_and_seed(radius in 0.05_f64..0.5, seed in any::<u64>(), torus in any::<bool>(), bits in prop_oneof![Just(24_u32), Just(52), 12_u32..24]) {
         let domain = if torus { Domain::Torus } else { Domain::Box };
-        let spacing = if single { Spacing::Single } else { Spacing::Double };
+        let spacing = match bits {
+            24 => Spacing::Single,
+            52 => Spacing::Double,
+            bits => Spacing::Bits(bits),
+        };
         check::<2>(&PoissonSpec { radius, domain, seed, spacing });
         check::<3>(&PoissonSpec { radius: radius.max(0.2), domain, seed, spacing });
     }

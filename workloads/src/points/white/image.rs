@@ -15,7 +15,7 @@ pub struct ImageDensity {
 
 /// Why a picture is no density.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{file}: {message}; give a PNG or JPEG that is not black all over")]
+#[error("{file}: {message}")]
 pub struct ImageError {
     file: String,
     message: String,
@@ -28,14 +28,22 @@ impl ImageDensity {
     /// When it cannot be read or decoded.
     pub fn load(path: &Path) -> Result<Self, ImageError> {
         let refused = |message: String| ImageError { file: path.display().to_string(), message };
-        let picture = image::ImageReader::open(path).map_err(|error| refused(error.to_string()))?;
-        let picture = picture.with_guessed_format().map_err(|error| refused(error.to_string()))?;
-        let picture = picture.decode().map_err(|error| refused(error.to_string()))?.into_rgb8();
+        let unread = |error: std::io::Error| refused(format!("cannot be read: {error}"));
+        let unknown = |error| refused(format!("is no picture that is known ({error}); give a PNG or JPEG"));
+        let picture =
+            image::ImageReader::open(path).map_err(unread)?.with_guessed_format().map_err(unread)?;
+        let picture = picture.decode().map_err(unknown)?.into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let linear = |byte: u8| libm::pow(f64::from(byte) / 255.0, 2.2);
         let luminance = |[r, g, b]: [u8; 3]| 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
-        Self::new(width, height, picture.pixels().map(|pixel| luminance(pixel.0)).collect())
-            .ok_or_else(|| refused("there is nothing bright in it".to_owned()))
+        Self::new(width, height, picture.pixels().map(|pixel| luminance(pixel.0)).collect()).ok_or_else(
+            || {
+                refused(
+                    "is black all over, and bright is dense; give a picture with something bright in it"
+                        .to_owned(),
+                )
+            },
+        )
     }
 
     /// A picture of `width` times `height` numbers, none below zero and some above, row by row from the top left.

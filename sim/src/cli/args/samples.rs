@@ -1,0 +1,35 @@
+//! Arguments of `samples`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::parse::size;
+
+/// Arguments of `samples`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  quintile samples jittered --samples 16 --size 640x360 --out mine.smp\n\n\
+    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is that of\n\
+    shared/peers/embree5d/README.md."
+)]
+pub struct SamplesArgs {
+    /// A built-in sample table (see `quintile list`) or a description of one in a .ron file
+    #[arg(value_name = "TABLE", default_value = "owen")]
+    pub table: String,
+    /// Samples in a pixel, 1 to 256
+    #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true)]
+    pub samples: u32,
+    /// Pixels to write; an image that is larger repeats them
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "64x64")]
+    pub size: (u32, u32),
+    /// Seed of the samples
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// The file
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Print what was written as one line of JSON
+    #[arg(long)]
+    pub json: bool,
+}

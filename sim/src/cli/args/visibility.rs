@@ -1,0 +1,46 @@
+//! Arguments of `visibility`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use pipeline::Features;
+
+use crate::cli::parse::tests;
+
+/// Arguments of `visibility`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n  \
+    quintile visibility start.ply end.ply --camera camera.ron --json\n  \
+    quintile visibility cloth-ball.mts.gz --print-camera > camera.ron\n\n\
+    The layouts of .m5d, of sample tables, of the hashed samples and of the result are those of\n\
+    shared/peers/embree5d/README.md, that of .mts is in shared/ccd/README.md.")]
+pub struct VisibilityArgs {
+    /// A moving mesh: an .m5d or .mts file, or two .ply or .obj files of equal topology as the ends of the shutter
+    #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
+    pub files: Vec<PathBuf>,
+    /// A camera in RON; without it an .m5d is seen by its own, other files by one that is fitted to them
+    #[arg(long, value_name = "CAM.ron")]
+    pub camera: Option<PathBuf>,
+    /// Print the camera that was fitted as RON, and do no more
+    #[arg(long, conflicts_with_all = ["camera", "json", "out"])]
+    pub print_camera: bool,
+    /// `hash` (of the seed of the camera), `table` (the built-in one) or a sample table in a file
+    #[arg(long, value_name = "SAMPLES", default_value = "hash")]
+    pub samples: String,
+    /// Rasterize as the modelled hardware does, with these tile tests: `all`, `none`, `auto`, or names with commas between.
+    /// Without it the fastest way is taken; what is seen is the same
+    #[arg(long, value_name = "LIST", value_parser = tests)]
+    pub tests: Option<Features>,
+    /// Rasterize N times and report the median
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repeat: u16,
+    /// File for the triangle and depth of every sample
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Worker threads; all cores without it. The results do not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print what was found as one line of JSON
+    #[arg(long)]
+    pub json: bool,
+}
