@@ -219,3 +219,85 @@ impl<const D: usize> Grid<D> {
 
 /// Half a side of a cube from which on double precision is worth its time, in cells.
 const FINE: f64 = 1.0 / 1024.0;
+
+#[cfg(test)]
+mod tests {
+    use super::super::Spacing;
+    use super::*;
+    use crate::points::random::Stream;
+
+    fn grid(radius: f64, domain: Domain, spacing: Spacing) -> Grid<2> {
+        Grid::new(&PoissonSpec { radius, domain, seed: 1, spacing }).unwrap()
+    }
+
+    #[test]
+    fn a_dart_at_the_radius_is_free_and_one_a_tick_nearer_is_not() {
+        let tick = 1.0 / Spacing::Double.per_unit();
+        for domain in [Domain::Torus, Domain::Box] {
+            let mut grid = grid(0.25, domain, Spacing::Double);
+            grid.insert(&grid.dart_at(&[0.5, 0.5]));
+            for sign in [-1.0, 1.0] {
+                let free = |from: f64| grid.is_free(&grid.dart_at(&[0.5 + sign * from, 0.5]));
+                assert!(free(0.25) && free(0.25 + tick) && !free(0.25 - tick), "{domain:?} {sign}");
+            }
+        }
+    }
+
+    /// Against the distance of the farthest corner in double precision, for cubes of any size whose corner is about at the radius.
+    #[test]
+    fn what_is_said_to_be_covered_is_and_what_is_not_nearly_is_not() {
+        let mut grid = grid(0.03, Domain::Box, Spacing::Double);
+        let point = grid.dart_at(&[0.5031, 0.4987]);
+        grid.insert(&point);
+        let (across, stream) = (grid.across as f64, Stream::new(7, 0));
+        let (mut covered, mut all, mut near) = (0, grid.near(), grid.near());
+        for number in 0..20_000_u64 {
+            let turn = stream.of(number);
+            let (angle, level) = (turn.unit(0) * std::f64::consts::TAU, 1 + turn.below(1, 30) as u32);
+            let off = (turn.unit(2) - 0.5) * 10.0_f64.powf(-9.0 * turn.unit(3));
+            let place = [angle.cos(), angle.sin()].map(|c| c * grid.reach2.sqrt() * (1.0 + off));
+            let at: [f64; 2] = std::array::from_fn(|k| point.point[k] * across + place[k]);
+            let (cell, side) = (at.map(|x| x as u64), 1.0 / (1_u64 << level) as f64);
+            let low: [f64; 2] =
+                std::array::from_fn(|k| ((at[k] - cell[k] as f64) / (2.0 * side)).floor() * 2.0 * side);
+            grid.gather(grid.slot(cell), &mut all);
+            grid.narrow(&all, &low, 2.0 * side, &mut near);
+            let said = grid.covers(&near, &low, side);
+            for half in 0..4_u32 {
+                let far2: f64 = (0..2)
+                    .map(|k| {
+                        let low = cell[k] as f64 + low[k] + f64::from(half >> k & 1) * side;
+                        let from = point.point[k] * across;
+                        (low - from).abs().max((low + side - from).abs()).powi(2)
+                    })
+                    .sum();
+                let (is_said, over) = (said >> half & 1 != 0, far2 - grid.reach2);
+                assert!(!is_said || over < 1e-12, "level {level}: {over:e}");
+                let margin = if 0.5 * side < FINE { 1e-9 } else { 4.0 * f64::from(MARGIN) };
+                assert!(is_said || over > -margin, "level {level}: {over:e}");
+                covered += u32::from(is_said);
+            }
+        }
+        assert!((5_000..70_000).contains(&covered), "{covered}");
+    }
+
+    #[test]
+    fn no_number_of_a_cube_is_left_out() {
+        let grid = grid(0.001, Domain::Box, Spacing::Single);
+        let (across, ticks, side) = (grid.across as f64, grid.ticks, 3.3 * grid.across as f64 / grid.ticks);
+        let stream = Stream::new(1, 1);
+        for number in 0..200 {
+            let cell = [stream.below(4 * number, grid.across), stream.below(4 * number + 1, grid.across)];
+            let low = [2, 3].map(|at| stream.unit(4 * number + at) * (1.0 - side));
+            let found: Vec<_> = grid.lattice(cell, low, side).iter().map(|dart| dart.point).collect();
+            let numbers = |k: usize| {
+                let [from, to] = [low[k], low[k] + side].map(|at| (cell[k] as f64 + at) / across * ticks);
+                (from.ceil() as u64..=to.floor() as u64).map(|tick| tick as f64 / ticks)
+            };
+            for x in numbers(0) {
+                assert!(numbers(1).all(|y| found.contains(&[x, y])), "{cell:?} {low:?}");
+            }
+            assert!(numbers(0).count() >= 3);
+        }
+    }
+}

@@ -143,6 +143,8 @@ fn what_is_too_much_is_refused_at_once_and_what_is_said_would_do() {
         let across = ((D as f64).sqrt() / radius).ceil();
         check_room(radius, D, (across + 6.0).powi(D as i32))
     }
+    // Cells count as well: four dimensions take 2^28 of them for fewer points than there may be.
+    assert!(check_room(0.03, 4, 1.1 * MOST_CELLS).is_err() && check_room(0.03, 4, 0.9 * MOST_CELLS).is_ok());
     assert!((1e-8..1e-7).contains(&least::<1>(1e-8)));
     assert!((1e-4..1e-3).contains(&least::<2>(1e-5)));
     assert!((1e-3..1e-2).contains(&least::<3>(1e-4)) && (1e-3..0.1).contains(&least::<4>(1e-3)));
