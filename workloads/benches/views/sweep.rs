@@ -109,6 +109,10 @@ pub fn run(hardware: &PipelineSpec) {
     for size in [(160, 90), (640, 360), (1280, 720)] {
         line("pixels", format!("{}x{}", size.0, size.1), &Point { size, ..base.clone() }, hardware);
     }
+    for size in [(160, 90), (1280, 720)] {
+        let point = Point { size, eyes: 0.28, ..base.clone() };
+        line("eyes and pixels", format!("0.28, {}x{}", size.0, size.1), &point, hardware);
+    }
     for aperture in [0.02, 0.1, 0.2, 0.49] {
         line("lens over distance of eyes", aperture, &Point { aperture, ..base.clone() }, hardware);
     }
