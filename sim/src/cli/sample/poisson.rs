@@ -106,3 +106,51 @@ fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
     let line = format!("r {}, packing density {:.4}, {thin}{short}", spec.radius, facts.packing_density);
     args.common.deliver(&Points::new(&found.points), facts, &line)
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::args::{Cli, Command};
+    use crate::cli::sample::Kind;
+
+    fn parsed(rest: &[&str]) -> Result<PoissonArgs, String> {
+        let typed = ["quintile", "sample", "poisson"].iter().chain(rest);
+        match Cli::try_parse_from(typed).map_err(|error| error.to_string())?.command {
+            Command::Sample(args) => match args.kind {
+                Kind::Poisson(args) => Ok(args),
+                _ => Err("another kind".to_owned()),
+            },
+            _ => Err("another command".to_owned()),
+        }
+    }
+
+    #[test]
+    fn one_of_both_is_asked_for_and_not_both() {
+        let message = parsed(&[]).unwrap_err();
+        assert!(message.contains("--r <R>") && message.contains("--count <N>"), "{message}");
+        assert!(parsed(&["--r", "0.1", "--count", "4"]).is_err());
+        assert!(parsed(&["--r", "0.1"]).is_ok() && parsed(&["--count", "4"]).is_ok());
+    }
+
+    #[test]
+    fn one_point_is_one_and_what_cannot_be_few_is_said() {
+        let said = |count: &str| {
+            let args = parsed(&["--count", count]).unwrap();
+            let spec = PoissonSpec {
+                radius: radius(args.count.unwrap(), 2, Domain::Torus),
+                domain: Domain::Torus,
+                seed: 1,
+                spacing: Spacing::Double,
+            };
+            let made = make::<2>(&spec, &args).map_err(|failure| failure.message).unwrap().points.len();
+            (made, shortfall(&args, made))
+        };
+        assert_eq!(said("1"), (1, String::new()));
+        let (made, line) = said("2");
+        assert!(made > 1 && line.contains(&format!("2 asked for; r is at most 0.5, which gave {made}")));
+        let (made, line) = said("1000");
+        assert!((900..1100).contains(&made) && line.is_empty());
+    }
+}
