@@ -67,10 +67,10 @@ impl<const D: usize> Near<D> {
     #[inline]
     fn within(&self, first: usize, low: &[f32; D], side: f32, reach2: f32) -> u8 {
         let mut sums = [0.0_f32; LANES];
-        for axis in 0..D {
-            let places = &self.places[axis][first..first + LANES];
+        for (places, low) in self.places.iter().zip(low) {
+            let places = &places[first..first + LANES];
             for lane in 0..LANES {
-                let within = places[lane] - low[axis];
+                let within = places[lane] - low;
                 let gap = larger(larger(-within, within - side), 0.0);
                 sums[lane] += gap * gap;
             }
