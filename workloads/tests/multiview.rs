@@ -27,7 +27,7 @@ fn with<R>(
     scene: &Scene,
     (layout, samples): (Layout, u32),
     spec: &PipelineSpec,
-    run: impl FnOnce(&Rig, &[pipeline::Draw<'_>], &Target<'_>) -> R,
+    run: impl FnOnce(&Rig, &[Draw<'_>], &Target<'_>) -> R,
 ) -> R {
     let frame = scene.frame(1).unwrap();
     let draws = frame.draws(scene).unwrap();
