@@ -1,28 +1,16 @@
 //! Glossy reflection and refraction on planar receivers.
 #![allow(clippy::unwrap_used)]
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec, Shader, ShaderCost, ShadingPoint};
+use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec};
 use workloads::Overrides;
 use workloads::accumulation::{Rays, SharedSamples};
 use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, receiver, stage};
 use workloads::job::Job;
 
 mod common;
-use common::spec;
-
-struct White;
-
-impl Shader for White {
-    fn cost(&self) -> ShaderCost {
-        ShaderCost::default()
-    }
-
-    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
-        Vec3::ONE
-    }
-}
+use common::{White, spec};
 
 const EYE: (DVec3, DVec3) = (DVec3::new(0.3, 2.0, 0.4), DVec3::new(-0.1, -1.0, -0.2));
 

@@ -2,14 +2,14 @@
 #![allow(clippy::unwrap_used)]
 
 use activity::Event;
-use glam::Vec3;
-use pipeline::{CacheSpec, PipelineSpec, Shading, Viewport};
+use glam::{Affine3A, Vec3};
+use pipeline::{CacheSpec, Camera, Cull, Draw, Geometry, PipelineSpec, Shading, Viewport};
 use workloads::job::Job;
 use workloads::multiview::{Layout, MultiView, Options, Rig, Show, Target, Views};
 use workloads::{Overrides, Scene};
 
 mod common;
-use common::{bits, spec};
+use common::{White, bits, spec};
 
 const LAYOUTS: [(Layout, u32); 4] = [
     (Layout::stereo(0.28, 0.11), 8),
@@ -27,7 +27,7 @@ fn with<R>(
     scene: &Scene,
     (layout, samples): (Layout, u32),
     spec: &PipelineSpec,
-    run: impl FnOnce(&Rig, &[pipeline::Draw<'_>], &Target<'_>) -> R,
+    run: impl FnOnce(&Rig, &[Draw<'_>], &Target<'_>) -> R,
 ) -> R {
     let frame = scene.frame(1).unwrap();
     let draws = frame.draws(scene).unwrap();
@@ -101,6 +101,34 @@ fn accumulation_converges_to_the_same_views() {
     });
 }
 
+/// A white strip that crosses the image, before a still camera and still before one that turns.
+#[test]
+fn accumulation_blurs_what_moves_and_what_a_moving_camera_sees() {
+    let strip =
+        |x: f32| [[x, -9.0], [x + 0.8, -9.0], [x + 0.8, 9.0], [x, 9.0]].map(|[x, y]| Vec3::new(x, y, 4.0));
+    let still = Camera::new(Affine3A::IDENTITY, 0.5, 0.1).unwrap();
+    let turns = still.moving(Affine3A::IDENTITY, Affine3A::from_translation(Vec3::X)).unwrap();
+    let viewport = Viewport::new(64, 48).unwrap();
+    for (camera, by) in [(still, 1.0), (turns, 0.0)] {
+        let views = |by: f32, camera: &Camera, many: bool| {
+            let (open, close, spec) = (strip(-0.9), strip(-0.9 + by), spec());
+            let geometry = Geometry::new(&open, &close, &[[0, 1, 2], [0, 2, 3]]).unwrap();
+            let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+            let rig = Rig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
+            let to = Target { viewport, spec: &spec, background: Vec3::ZERO };
+            let views = if many { Rig::accumulated } else { Rig::one_pass };
+            views(&rig, &draws, &to, &mut |_, _| ()).unwrap().images
+        };
+        let (one, many, frozen) =
+            (views(by, &camera, false), views(by, &camera, true), views(0.0, &still, false));
+        for eye in 0..2 {
+            let found = rmse(&one[eye], &many[eye]);
+            assert!(found < 0.04, "{by} {found}");
+            assert!(rmse(&one[eye], &frozen[eye]) > 0.15, "it is blurred");
+        }
+    }
+}
+
 /// What is shaded for a view serves the next: two views cost less than two, and with a cache that holds everything no more than what
 /// only one of them sees; with a cache of nothing they cost as much as they are.
 #[test]
@@ -152,6 +180,11 @@ fn each_bad_regime_is_told() {
     assert_eq!(drawn(near, &small).1, ["shading-cache-small"]);
     let wide = Options { spacing: 1.5, ..Options::default() };
     assert!(drawn(wide, &big).1.contains(&"view-dependent-shading"));
+    // The outermost rays meet at 5.7 and at 6.3 degrees: 0.2 and 0.22 to either side of the middle, 4 away.
+    for (spacing, codes) in [(0.3, &[][..]), (0.34, &["view-dependent-shading"])] {
+        let at = Options { focus: Some(4.0), aperture: 0.05, spacing, ..Options::default() };
+        assert_eq!(drawn(at, &big).1, codes);
+    }
 }
 
 #[test]

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used)]
 
 use activity::{Event, Unit};
-use glam::Vec3;
-use pipeline::sampling::{Pattern, SampleSpec};
+use glam::{DVec3, Vec3};
+use pipeline::sampling::{Pattern, Sample, SampleSpec};
 use pipeline::{Cull, Draw, Geometry, Viewport};
 use proptest::prelude::*;
 use workloads::Overrides;
@@ -126,6 +126,36 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
     let lit = (0..256).filter(|&index| map.is_lit(&light, Vec3::ZERO, index, 0.05)).count();
     // The strip is 1 wide and moves by 4: over the point for a quarter of the time.
     assert!((lit as f64 / 256.0 - 0.75).abs() < 0.01, "{lit}");
+}
+
+/// Lambert's law: a floor seen from where the light is has the cosine of the angle it is seen under at the time of the sample, and what
+/// comes from everywhere; whichever way its triangles are wound.
+#[test]
+fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
+    let light = above(1e-4);
+    let (camera, viewport) = (light.camera().with_lens(None), Viewport::new(8, 8).unwrap());
+    let from = light.point([0.0; 2]);
+    let [right, up] = [[1.0, 0.0], [0.0, 1.0]].map(|at| (light.point(at) - from).normalize());
+    let open = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
+    let close = open.map(|corner| Vec3::new(corner.x, corner.x, corner.z));
+    let albedo = Vec3::new(0.5, 0.25, 1.0);
+    for (t, triangles) in [(0.0, TRIANGLES), (0.5, TRIANGLES), (0.5, TRIANGLES.map(|[a, b, c]| [a, c, b]))] {
+        let sample = Sample { x: 0.5, y: 0.5, t, ..Sample::default() };
+        let set = SharedSamples::new(vec![sample; 3]).unwrap();
+        let draws = [draw(&open, &close, &triangles)];
+        let seen =
+            see((&camera, &draws), viewport, &set, (Method::OnePass, &spec()), &mut |_, _| ()).unwrap();
+        let world =
+            World::new((&camera, &draws), viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
+        let image = world.image(&set, &seen.samples, Shadows::None);
+        let normal = DVec3::new(-f64::from(t), 1.0, 0.0).normalize();
+        for (place, pixel) in image.iter().enumerate() {
+            let at = [place % 8, place / 8].map(|k| (k as f64 - 3.5) / 4.0 * 40.0_f64.to_radians().tan());
+            let along = (at[0] * right - at[1] * up - DVec3::Y).normalize();
+            let expected = albedo * (0.18 - normal.dot(along) as f32);
+            assert!((*pixel - expected).length() < 1e-3, "{t} {place}: {pixel} {expected}");
+        }
+    }
 }
 
 #[test]

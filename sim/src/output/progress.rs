@@ -54,6 +54,11 @@ impl Bar {
         self.bar.inc(1);
     }
 
+    /// So many steps done.
+    pub fn set(&self, position: u64) {
+        self.bar.set_position(position);
+    }
+
     /// Steps done so far.
     pub fn position(&self) -> u64 {
         self.bar.position()

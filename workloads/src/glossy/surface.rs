@@ -49,3 +49,26 @@ impl Shader for ReceiverShader {
         self.base + (texel.truncate() - self.base) * share
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+
+    /// Schlick 1994: at 60 degrees (1 - 1/2)^5 = 1/32 of what is missing is added to the share of light from straight above.
+    #[test]
+    fn the_share_of_the_map_follows_schlick() {
+        let one = Viewport::new(1, 1).unwrap();
+        let surface = ReceiverShader::new(&[Vec3::ONE], one, Vec3::splat(0.2), 0.04).unwrap();
+        let seen = |cosine: f32| {
+            let to_camera = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
+            let at = ShadingPoint { position: Vec3::ZERO, normal: Vec3::Y, to_camera, uv: Vec2::ZERO };
+            surface.shade(&at, Vec4::ONE).x
+        };
+        for (cosine, share) in [(1.0, 0.04), (0.5, 0.04 + 0.96 / 32.0), (0.0, 1.0)] {
+            let expected = 0.2 + 0.8 * share;
+            assert!((seen(cosine) - expected).abs() < 1e-6, "{cosine}: {} {expected}", seen(cosine));
+        }
+    }
+}

@@ -145,11 +145,13 @@ mod tests {
         for bad in [
             Layout { views: 0, ..base },
             Layout { spacing: 0.1, ..base },
+            Layout { spacing: 1.99 * base.aperture, ..base },
             Layout { aperture: f64::NAN, ..base },
             Layout { overlap: 99, ..base },
         ] {
             assert!(bad.check().unwrap_err().is_usage());
         }
         assert!(base.check().is_ok() && Layout { views: 1, spacing: 0.1, ..base }.check().is_ok());
+        assert!(Layout { spacing: 2.0 * base.aperture, ..base }.check().is_ok(), "they may touch");
     }
 }

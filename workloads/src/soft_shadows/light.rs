@@ -112,6 +112,7 @@ mod tests {
         let shifted = |lens| light.texel(Vec3::new(0.01, 0.0, 0.01), lens, 64).unwrap().0;
         let [here, u, v] = [[0.0; 2], [1.0, 0.0], [0.0, 1.0]].map(shifted);
         assert_eq!([here[0] - u[0], v[1] - here[1]], [4, 4]);
+        assert!((light.texel_width(DVec3::ZERO, 64) - 0.125).abs() < 1e-12);
         assert_eq!(light.texel(Vec3::new(9.0, 0.0, 0.0), [0.0; 2], 64), None);
         assert_eq!(light.texel(Vec3::new(0.0, 5.0, 0.0), [0.0; 2], 64), None, "behind the light");
     }

@@ -175,3 +175,16 @@ pub fn spec() -> pipeline::PipelineSpec {
 pub fn bits(image: &[glam::Vec3]) -> Vec<[u32; 3]> {
     image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
 }
+
+/// White, whoever looks.
+pub struct White;
+
+impl pipeline::Shader for White {
+    fn cost(&self) -> pipeline::ShaderCost {
+        pipeline::ShaderCost::default()
+    }
+
+    fn shade(&self, _at: &pipeline::ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
+        glam::Vec3::ONE
+    }
+}

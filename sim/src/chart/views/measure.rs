@@ -120,7 +120,7 @@ impl Bench {
 
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.
     pub(super) fn row(&self, views: u32) -> Result<Row, ChartError> {
-        let layout = if views == 2 { stereo(self.focus()) } else { line(views, self.focus()) };
+        let layout = if views == 2 { stereo() } else { line(views) };
         let (rig, to) = (self.rig(&layout)?, self.target(&self.gpu.pipeline));
         let draws = self.frame.draws(&self.scene)?;
         let one = self.one_view(&rig, &layout, &draws, &to)?;

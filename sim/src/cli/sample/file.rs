@@ -1,9 +1,12 @@
 //! Points in files.
 
+use std::convert::Infallible;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+
+use rayon::prelude::*;
 
 use super::{Failure, usage};
 
@@ -47,7 +50,7 @@ impl Points {
         let format = Format::of(path)?;
         traces::io::atomic::write_file(path, |out: &mut BufWriter<File>| {
             match format {
-                Format::Csv => out.write_all(self.csv(single).as_bytes())?,
+                Format::Csv => self.csv_into(single, |text| out.write_all(text.as_bytes()))?,
                 Format::Npy => {
                     out.write_all(&self.npy_header(single))?;
                     self.numbers(out, single)?;
@@ -59,28 +62,41 @@ impl Points {
         .map_err(|error| Failure { message: error.to_string(), code: 1 })
     }
 
-    /// With as many digits as it takes to read the same numbers back.
+    /// All of the CSV.
     pub fn csv(&self, single: bool) -> String {
-        let mut text = ["x", "y", "z", "w"][..self.dimensions].join(",");
-        text.push('\n');
-        for point in self.coordinates.chunks(self.dimensions) {
-            for (place, &x) in point.iter().enumerate() {
-                let comma = if place == 0 { "" } else { "," };
-                // Writing into a string cannot fail.
-                let _ = if single { write!(text, "{comma}{}", x as f32) } else { write!(text, "{comma}{x}") };
-            }
-            text.push('\n');
+        let mut all = String::new();
+        let pushed: Result<(), Infallible> = self.csv_into(single, |text| {
+            all.push_str(text);
+            Ok(())
+        });
+        let Ok(()) = pushed;
+        all
+    }
+
+    /// CSV with as many digits as it takes to read the same numbers back, in parts that workers write side by side.
+    fn csv_into<E>(&self, single: bool, mut each: impl FnMut(&str) -> Result<(), E>) -> Result<(), E> {
+        each(&["x", "y", "z", "w"][..self.dimensions].join(","))?;
+        each("\n")?;
+        for part in self.coordinates.chunks(PART * PARTS * self.dimensions) {
+            let pieces = part.par_chunks(PART * self.dimensions);
+            let texts: Vec<String> = pieces.map(|piece| lines(piece, self.dimensions, single)).collect();
+            texts.iter().try_for_each(|text| each(text))?;
         }
-        text
+        Ok(())
     }
 
     fn numbers(&self, out: &mut impl Write, single: bool) -> io::Result<()> {
-        let mut each = self.coordinates.iter();
-        if single {
-            each.try_for_each(|&x| out.write_all(&(x as f32).to_le_bytes()))
-        } else {
-            each.try_for_each(|x| out.write_all(&x.to_le_bytes()))
+        let mut bytes = Vec::with_capacity(8 * PART);
+        for part in self.coordinates.chunks(PART) {
+            bytes.clear();
+            if single {
+                part.iter().for_each(|&x| bytes.extend_from_slice(&(x as f32).to_le_bytes()));
+            } else {
+                part.iter().for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()));
+            }
+            out.write_all(&bytes)?;
         }
+        Ok(())
     }
 
     /// The header of version 1.0 of the format of NumPy.
@@ -96,9 +112,41 @@ impl Points {
     }
 }
 
+/// Points that a worker writes at a time, and so many of these together.
+const PART: usize = 4096;
+const PARTS: usize = 64;
+
+/// A line for each point.
+fn lines(coordinates: &[f64], dimensions: usize, single: bool) -> String {
+    let mut text = String::with_capacity(20 * coordinates.len());
+    for point in coordinates.chunks(dimensions) {
+        for (place, &x) in point.iter().enumerate() {
+            let comma = if place == 0 { "" } else { "," };
+            // Writing into a string cannot fail.
+            let _ = if single { write!(text, "{comma}{}", x as f32) } else { write!(text, "{comma}{x}") };
+        }
+        text.push('\n');
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_follow_each_other() {
+        let all: Vec<[f64; 2]> = (0..PART * PARTS + 5).map(|n| [n as f64, 0.25 * n as f64]).collect();
+        let points = Points::new(&all);
+        let text = points.csv(false);
+        assert_eq!(text.lines().count(), all.len() + 1);
+        let read = |line: &str| line.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>();
+        assert!(text.lines().skip(1).zip(&all).all(|(line, point)| read(line) == point));
+        let mut bytes = Vec::new();
+        points.numbers(&mut bytes, false).unwrap();
+        let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap());
+        assert!(bytes.chunks(8).map(number).eq(points.coordinates.iter().copied()));
+    }
 
     #[test]
     fn every_format_holds_the_same_numbers() {

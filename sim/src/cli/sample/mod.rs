@@ -72,10 +72,11 @@ struct Made<T: Serialize> {
 impl Common {
     /// Writes and prints what was asked for.
     fn deliver(&self, points: &Points, facts: impl Serialize, line: &str) -> Result<(), Failure> {
+        let pool = super::threads(self.threads)?;
         if let Some(path) = &self.out {
-            points.write(path, self.single)?;
+            pool.install(|| points.write(path, self.single))?;
         } else if !self.json {
-            return print(&points.csv(self.single));
+            return print(&pool.install(|| points.csv(self.single)));
         }
         let out = self.out.as_deref().map(|path| path.display().to_string());
         if self.json {

@@ -1,30 +1,28 @@
 //! `quintile sample poisson`.
 
 use activity::Warning;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde::Serialize;
 use workloads::points::doubt;
-use workloads::points::poisson::{Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, radius_for};
+use workloads::points::poisson::{
+    Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_telling, radius_for, saturation, span,
+};
 
 use super::file::Points;
 use super::{Common, Failure, usage};
+use crate::output::progress::Progress;
 
 /// Arguments of `sample poisson`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("how many").args(["r", "count"]).required(true))]
 pub struct PoissonArgs {
     /// Dimensions, 1 to 4
     #[arg(long, value_name = "D", default_value_t = 2, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=4))]
     pub dim: u8,
     /// Least distance, up to 0.5
-    #[arg(
-        long,
-        value_name = "R",
-        allow_negative_numbers = true,
-        required_unless_present = "count",
-        conflicts_with = "count"
-    )]
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub r: Option<f64>,
-    /// About how many points: chooses r by how many fit on average
+    /// About how many points: chooses r by how many fit on average; 1 is exact, and no other number is below what r = 0.5 gives
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub count: Option<u32>,
     /// A box with borders instead of a torus, whose opposite sides meet
@@ -61,16 +59,39 @@ pub(super) fn run(args: &PoissonArgs) -> Result<(), Failure> {
     }
 }
 
+/// The radius at which there are about so many points, as far as it can be had.
+fn radius(count: u32, dimensions: usize, domain: Domain) -> f64 {
+    if count == 1 { span(dimensions, domain) } else { radius_for(f64::from(count), dimensions).min(0.5) }
+}
+
+/// Makes the points, with a bar on a terminal.
+fn make<const D: usize>(spec: &PoissonSpec, args: &PoissonArgs) -> Result<PoissonDisk<D>, Failure> {
+    let pool = crate::cli::threads(args.common.threads)?;
+    let volume = ball(D) * spec.radius.powi(D as i32);
+    let progress = Progress::new(false);
+    let bar = progress.bar("points, about", (saturation(D) / volume) as u64);
+    pool.install(|| poisson_disk_telling(spec, &mut |points| bar.set(points as u64))).map_err(usage)
+}
+
+/// What to say where a number of points was asked for that r does not reach.
+fn shortfall(args: &PoissonArgs, made: usize) -> String {
+    match args.count {
+        Some(count @ 2..) if radius_for(f64::from(count), args.dim.into()) > 0.5 => {
+            format!(" ({count} asked for; r is at most 0.5, which gave {made})")
+        }
+        _ => String::new(),
+    }
+}
+
 fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
-    let for_count = || radius_for(f64::from(args.count.unwrap_or(1)), D).min(0.5);
+    let domain = if args.boxed { Domain::Box } else { Domain::Torus };
     let spec = PoissonSpec {
-        radius: args.r.unwrap_or_else(for_count),
-        domain: if args.boxed { Domain::Box } else { Domain::Torus },
+        radius: args.r.unwrap_or_else(|| radius(args.count.unwrap_or(1), D, domain)),
+        domain,
         seed: args.common.seed,
         spacing: if args.common.single { Spacing::Single } else { Spacing::Double },
     };
-    let pool = crate::cli::threads(args.common.threads)?;
-    let found: PoissonDisk<D> = pool.install(|| poisson_disk(&spec)).map_err(usage)?;
+    let found: PoissonDisk<D> = make(&spec, args)?;
     let facts = Facts {
         r: spec.radius,
         periodic: !args.boxed,
@@ -86,7 +107,57 @@ fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
         0 => "no other fits".to_owned(),
         thin => format!("no other number fits; {thin} voids thinner than the spacing of numbers are left"),
     };
+    let short = shortfall(args, found.points.len());
     let warnings: String = facts.warnings.iter().map(|warning| format!("\nwarning: {warning}")).collect();
-    let line = format!("r {}, packing density {:.4}, {thin}{warnings}", spec.radius, facts.packing_density);
+    let line =
+        format!("r {}, packing density {:.4}, {thin}{short}{warnings}", spec.radius, facts.packing_density);
     args.common.deliver(&Points::new(&found.points), facts, &line)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::args::{Cli, Command};
+    use crate::cli::sample::Kind;
+
+    fn parsed(rest: &[&str]) -> Result<PoissonArgs, String> {
+        let typed = ["quintile", "sample", "poisson"].iter().chain(rest);
+        match Cli::try_parse_from(typed).map_err(|error| error.to_string())?.command {
+            Command::Sample(args) => match args.kind {
+                Kind::Poisson(args) => Ok(args),
+                _ => Err("another kind".to_owned()),
+            },
+            _ => Err("another command".to_owned()),
+        }
+    }
+
+    #[test]
+    fn one_of_both_is_asked_for_and_not_both() {
+        let message = parsed(&[]).unwrap_err();
+        assert!(message.contains("--r <R>") && message.contains("--count <N>"), "{message}");
+        assert!(parsed(&["--r", "0.1", "--count", "4"]).is_err());
+        assert!(parsed(&["--r", "0.1"]).is_ok() && parsed(&["--count", "4"]).is_ok());
+    }
+
+    #[test]
+    fn one_point_is_one_and_what_cannot_be_few_is_said() {
+        let said = |count: &str| {
+            let args = parsed(&["--count", count]).unwrap();
+            let spec = PoissonSpec {
+                radius: radius(args.count.unwrap(), 2, Domain::Torus),
+                domain: Domain::Torus,
+                seed: 1,
+                spacing: Spacing::Double,
+            };
+            let made = make::<2>(&spec, &args).map_err(|failure| failure.message).unwrap().points.len();
+            (made, shortfall(&args, made))
+        };
+        assert_eq!(said("1"), (1, String::new()));
+        let (made, line) = said("2");
+        assert!(made > 1 && line.contains(&format!("2 asked for; r is at most 0.5, which gave {made}")));
+        let (made, line) = said("1000");
+        assert!((900..1100).contains(&made) && line.is_empty());
+    }
 }

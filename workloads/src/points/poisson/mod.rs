@@ -13,6 +13,7 @@
 //!
 //! The paper rasterizes the voids to make candidates; that is [`super::job`]. Here a candidate is made by choosing a cell.
 
+mod cells;
 mod exact;
 mod grid;
 mod near;
@@ -21,7 +22,7 @@ mod throw;
 mod voids;
 
 pub use exact::closer;
-pub use throw::{poisson_disk, poisson_disk_drawn};
+pub use throw::{poisson_disk, poisson_disk_drawn, poisson_disk_telling};
 pub use voids::Cube;
 
 /// What lies beyond the unit square or cube.
@@ -60,7 +61,7 @@ impl Spacing {
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoissonSpec {
-    /// No two points are closer than this, and no place is farther from all of them.
+    /// No two points are closer than this, and no place is farther from all of them. At most 0.5, or at least [`span`].
     pub radius: f64,
     /// What lies beyond the border.
     pub domain: Domain,
@@ -74,19 +75,27 @@ pub struct PoissonSpec {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PoissonError {
     /// The radius cannot be.
-    #[error("r is {radius}; it has to be at least {least:e} and at most 0.5")]
+    #[error(
+        "r is {radius}; it has to be at least {least:e} and at most 0.5, or so large that one point fills all ({one:.3})"
+    )]
     Radius {
         /// What it is.
         radius: f64,
         /// The least that coordinates can tell.
         least: f64,
+        /// From here on there is one point.
+        one: f64,
     },
-    /// Too many points for memory.
-    #[error("that would take {cells:.2e} cells, at most {most:.2e} are; choose a larger r or fewer points")]
+    /// Too many points for memory and patience.
+    #[error(
+        "that would be about {points:.1e} points; choose a larger r, at least {least:.1e}, or fewer points, at most {most:.1e}"
+    )]
     TooMany {
-        /// Cells it would take.
-        cells: f64,
-        /// Cells there may be.
+        /// How many there would be.
+        points: f64,
+        /// An r that would do.
+        least: f64,
+        /// How many points there may be about.
         most: f64,
     },
 }
@@ -131,6 +140,32 @@ pub fn ball(dimensions: usize) -> f64 {
 /// The radius at which about `count` points fill the unit cube.
 pub fn radius_for(count: f64, dimensions: usize) -> f64 {
     (saturation(dimensions) / (ball(dimensions) * count)).powf(1.0 / dimensions as f64)
+}
+
+/// The distance from which on one point fills the unit cube: none is farther from it.
+pub fn span(dimensions: usize, domain: Domain) -> f64 {
+    let root = (dimensions as f64).sqrt();
+    if domain == Domain::Torus { 0.5 * root } else { root }
+}
+
+/// Cells that memory is taken for at most, and points that are made at most: some minutes.
+const MOST_CELLS: f64 = (1_u64 << 28) as f64;
+const MOST_POINTS: f64 = (1_u64 << 25) as f64;
+
+/// Refuses what would be too much.
+///
+/// # Errors
+/// [`PoissonError::TooMany`].
+pub(super) fn check_room(radius: f64, dimensions: usize, cells: f64) -> Result<(), PoissonError> {
+    let volume = radius.powi(dimensions as i32);
+    let points = saturation(dimensions) / (ball(dimensions) * volume);
+    let over = (cells / MOST_CELLS).max(points / MOST_POINTS);
+    if over <= 1.0 {
+        return Ok(());
+    }
+    // Padding takes more cells the fewer there are, and what is printed has to do.
+    let most = 0.8 * points / over;
+    Err(PoissonError::TooMany { points, least: 1.05 * radius_for(most, dimensions), most })
 }
 
 #[cfg(test)]

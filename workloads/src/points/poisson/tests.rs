@@ -122,12 +122,57 @@ fn voids_thinner_than_the_spacing_are_counted() {
 
 #[test]
 fn what_cannot_be_is_refused() {
-    for radius in [0.0, -1.0, f64::NAN, 0.51, 1e-15] {
+    for radius in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.51, 1e-15] {
         let refused = poisson_disk::<2>(&spec(radius, Domain::Torus, 1)).unwrap_err();
         assert!(matches!(refused, PoissonError::Radius { .. }), "{radius}");
     }
     let refused = poisson_disk::<3>(&spec(1e-4, Domain::Torus, 1)).unwrap_err();
     assert!(refused.to_string().contains("choose a larger r"), "{refused}");
+}
+
+#[test]
+fn what_is_too_much_is_refused_at_once_and_what_is_said_would_do() {
+    fn least<const D: usize>(radius: f64) -> f64 {
+        let PoissonError::TooMany { least, most, .. } = check::<D>(radius).unwrap_err() else {
+            panic!("{radius}")
+        };
+        assert!(check::<D>(least).is_ok() && check::<D>(radius_for(most, D)).is_ok(), "{D} {least} {most}");
+        least
+    }
+    fn check<const D: usize>(radius: f64) -> Result<(), PoissonError> {
+        let across = ((D as f64).sqrt() / radius).ceil();
+        check_room(radius, D, (across + 6.0).powi(D as i32))
+    }
+    // Cells count as well: four dimensions take 2^28 of them for fewer points than there may be.
+    assert!(check_room(0.03, 4, 1.1 * MOST_CELLS).is_err() && check_room(0.03, 4, 0.9 * MOST_CELLS).is_ok());
+    assert!((1e-8..1e-7).contains(&least::<1>(1e-8)));
+    assert!((1e-4..1e-3).contains(&least::<2>(1e-5)));
+    assert!((1e-3..1e-2).contains(&least::<3>(1e-4)) && (1e-3..0.1).contains(&least::<4>(1e-3)));
+}
+
+#[test]
+fn one_point_fills_all_from_half_a_diagonal_on() {
+    for (domain, radius) in [(Domain::Torus, 0.75_f64.sqrt()), (Domain::Box, 3.0_f64.sqrt())] {
+        for spacing in [Spacing::Single, Spacing::Double] {
+            let spec = PoissonSpec { spacing, ..spec(radius, domain, 1) };
+            assert_eq!(check::<3>(&spec).points.len(), 1);
+            let less = PoissonSpec { radius: radius - 1e-9, ..spec };
+            assert!(poisson_disk::<3>(&less).unwrap_err().to_string().contains("so large that one point"));
+        }
+    }
+    assert_ne!(
+        check::<2>(&spec(1.0, Domain::Torus, 1)).points,
+        check::<2>(&spec(1.0, Domain::Torus, 2)).points
+    );
+}
+
+#[test]
+fn it_tells_of_more_and_more_points() {
+    let mut told = Vec::new();
+    let spec = spec(0.003, Domain::Torus, 1);
+    let found = poisson_disk_telling::<2>(&spec, &mut |points| told.push(points)).unwrap();
+    assert!(told.len() > 5 && told.is_sorted() && told[told.len() / 2] > 0, "{told:?}");
+    assert_eq!(found, poisson_disk::<2>(&spec).unwrap());
 }
 
 proptest! {

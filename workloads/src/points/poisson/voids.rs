@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::grid::{Dart, Grid};
-use super::near::Near;
 use super::rain::{Drop, Fallen, Rain};
 use crate::points::random::Stream;
 
@@ -107,8 +106,8 @@ impl<P: Place, const D: usize> Voids<P, D> {
     }
 
     fn part(&self, grid: &Grid<D>, rain: &Rain, cells: &[[P; D]]) -> (Vec<[P; D]>, Fallen<D>) {
-        let (mut left, mut fallen, mut near) =
-            (Vec::with_capacity(cells.len()), Fallen::default(), Near::new());
+        let (mut left, mut fallen) = (Vec::with_capacity(cells.len()), Fallen::default());
+        let (mut of_cell, mut near) = (grid.near(), grid.near());
         let side = 1.0 / (2_u64 << self.level) as f64;
         for parent in cells {
             let (cell, low) = split(parent, self.level);
@@ -116,15 +115,14 @@ impl<P: Place, const D: usize> Voids<P, D> {
             if grid.is_taken(slot) {
                 continue;
             }
-            if !near.is_of(slot) {
-                grid.gather(slot, &mut near);
+            if !of_cell.is_of(slot) {
+                grid.gather(slot, &mut of_cell);
             }
-            for corner in 0..1_u64 << D {
-                let upper = |k: usize| corner >> k & 1;
+            grid.narrow(&of_cell, &low, 2.0 * side, &mut near);
+            let covered = grid.covers(&near, &low, side);
+            for half in (0..1_u64 << D).filter(|half| covered >> half & 1 == 0) {
+                let upper = |k: usize| half >> k & 1;
                 let low: [f64; D] = std::array::from_fn(|k| low[k] + upper(k) as f64 * side);
-                if grid.covers(&near, &low.map(|low| low + 0.5 * side), 0.5 * side) {
-                    continue;
-                }
                 let child = std::array::from_fn(|k| 2 * parent[k].get() + upper(k));
                 left.push(child.map(P::new));
                 rain.on(child, side, |time, within| {

@@ -1,6 +1,6 @@
 //! Points in cells, one at most in each: the grid that every rival has.
 
-use crate::points::poisson::{Domain, PoissonError, PoissonSpec, closer};
+use crate::points::poisson::{Domain, PoissonError, PoissonSpec, check_room, closer};
 
 pub(super) struct Cells<const D: usize> {
     spec: PoissonSpec,
@@ -9,20 +9,15 @@ pub(super) struct Cells<const D: usize> {
     pub points: Vec<[f64; D]>,
 }
 
-/// Cells that memory is taken for at most.
-const MOST: f64 = (1_u64 << 28) as f64;
-
 impl<const D: usize> Cells<D> {
     pub fn new(spec: &PoissonSpec) -> Result<Self, PoissonError> {
         let least = 1e-9;
         if !(spec.radius >= least && spec.radius <= 0.5) {
-            return Err(PoissonError::Radius { radius: spec.radius, least });
+            return Err(PoissonError::Radius { radius: spec.radius, least, one: f64::INFINITY });
         }
         let across = ((D as f64).sqrt() / spec.radius).ceil();
         let cells = across.powi(D as i32);
-        if cells > MOST {
-            return Err(PoissonError::TooMany { cells, most: MOST });
-        }
+        check_room(spec.radius, D, cells)?;
         Ok(Self {
             spec: *spec,
             across: across as i64,

@@ -1,0 +1,112 @@
+//! One pass of the five-dimensional rasterizer beside the same done as many passes, by CPU time of one thread.
+//!
+//! `cargo bench -p workloads --bench views`; with `sweep` after `--` what the shading of more than one view takes on top of one view
+//! (rows VI-13 and VI-14), over one setting at a time.
+
+#![allow(clippy::unwrap_used, reason = "a benchmark that cannot run may as well panic")]
+
+mod sweep;
+
+use cpu_time::ProcessTime;
+use glam::{DVec3, Vec3};
+use pipeline::sampling::SampleSpec;
+use pipeline::{Cull, Draw, LensShape, PipelineSpec, Viewport};
+use workloads::accumulation::SharedSamples;
+use workloads::multiview::{Layout, Rig, Target};
+use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
+use workloads::{Overrides, glossy, soft_shadows};
+
+const RUNS: usize = 3;
+
+/// The median CPU time of some runs, in seconds.
+fn time(mut run: impl FnMut()) -> f64 {
+    let one = |_| {
+        let started = ProcessTime::now();
+        run();
+        started.elapsed().as_secs_f64()
+    };
+    let mut seconds: Vec<f64> = (0..RUNS).map(one).collect();
+    seconds.sort_by(f64::total_cmp);
+    seconds[RUNS / 2]
+}
+
+/// A row: one pass against others, each with its number of passes.
+fn tell(what: &str, one: f64, others: &[(&str, usize, f64)]) {
+    for (name, passes, seconds) in others {
+        println!(
+            "| {what} | {:.1} ms | {name}, {passes} passes | {:.1} ms | {:.2} |",
+            1e3 * one,
+            1e3 * seconds,
+            seconds / one
+        );
+    }
+}
+
+fn views(spec: &PipelineSpec) {
+    let size = Overrides { size: Some((160, 90)), ..Overrides::default() };
+    let scene = workloads::load("default").unwrap().with_overrides(&size).unwrap();
+    let frame = scene.frame(18).unwrap();
+    let draws = frame.draws(&scene).unwrap();
+    let to = Target { viewport: Viewport::new(160, 90).unwrap(), spec, background: scene.background() };
+    let focus = frame.camera.lens().unwrap().focus();
+    for layout in [Layout::stereo(0.28, 0.11), Layout::line(7, 0.5, 0.11)] {
+        let rig = Rig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
+        let passes = [layout.views as usize, rig.samples() as usize];
+        let one = time(|| _ = rig.one_pass(&draws, &to, &mut |_, _| ()).unwrap());
+        let each = time(|| _ = rig.view_by_view(&draws, &to, &mut |_, _| ()).unwrap());
+        let many = time(|| _ = rig.accumulated(&draws, &to, &mut |_, _| ()).unwrap());
+        let what = format!("{} views, 160x90, 8 samples", layout.views);
+        tell(&what, one, &[("view by view", passes[0], each), ("accumulation", passes[1], many)]);
+    }
+}
+
+fn gloss(spec: &PipelineSpec) {
+    let scene = glossy::stage(false).unwrap();
+    let frame = scene.frame(0).unwrap();
+    let draws: Vec<_> =
+        frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+    let eye = (DVec3::new(0.3, 2.0, 3.0), DVec3::new(-0.1, -1.0, -0.8));
+    let map = glossy::Map::new(&glossy::receiver(), eye, glossy::Effect::Reflection, 0.25, 128).unwrap();
+    let to = (spec, Vec3::ZERO);
+    for count in [16, 64] {
+        let table = SampleSpec::default().table(count, 1).unwrap();
+        let set = SharedSamples::interleaved(&SampleSpec::default(), count, 1).unwrap();
+        let one = time(|| _ = map.one_pass(&draws, &table, to, &mut |_, _| ()).unwrap());
+        let many = time(|| _ = map.accumulated(&draws, &set, to, &mut |_, _| ()).unwrap());
+        let what = format!("glossy map, {}x128, {count} samples", map.viewport.width());
+        tell(&what, one, &[("accumulation", count as usize, many)]);
+    }
+}
+
+fn shadows(spec: &PipelineSpec) {
+    let scene = soft_shadows::stage().unwrap();
+    let frame = scene.frame(1).unwrap();
+    let draws: Vec<_> =
+        frame.draws(&scene).unwrap().into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
+    let light = AreaLight::new(&LightSpec::default()).unwrap();
+    let disk = SampleSpec { lens: LensShape::Disk, ..SampleSpec::default() };
+    for count in [16, 64] {
+        let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
+        let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
+            time(|| {
+                _ = ShadowMap::new((&light, &draws), 256, &set, (method, spec), &mut |_, _| ()).unwrap();
+            })
+        });
+        let what = format!("shadow map, 256x256, {count} places");
+        tell(&what, one, &[("accumulation", count as usize, many)]);
+    }
+}
+
+fn main() {
+    let spec = sweep::hardware();
+    if std::env::args().any(|arg| arg == "sweep") {
+        return sweep::run(&spec);
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    println!("| what | one pass | the same otherwise | its time | over one pass |\n|---|---|---|---|---|");
+    pool.install(|| {
+        views(&spec);
+        gloss(&spec);
+        shadows(&spec);
+    });
+}
