@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 use proptest::prelude::*;
 use workloads::collision::{Method, Object, Search, components, detect};
 use workloads::visibility::load_mts;
@@ -119,7 +119,7 @@ fn public_scenes_keep_every_pair_that_collides() {
 
 /// A corner in a hash's unit cube.
 fn random(seed: u64, n: u64) -> f64 {
-    (mix(seed.wrapping_mul(1000) + n) >> 11) as f64 / (1_u64 << 53) as f64
+    unit(mix(seed.wrapping_mul(1000) + n))
 }
 
 /// Two triangles made to share a point at one time: weights, time and everything else at random, then scaled and moved. The third

@@ -5,7 +5,7 @@
 use core::f64::consts::TAU;
 
 use glam::{DMat3, DQuat, DVec3};
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 
 use super::{Bounds, Object};
 use crate::scene::Mesh;
@@ -66,8 +66,7 @@ struct Draws {
 impl Draws {
     fn within(&mut self, low: f64, high: f64) -> f64 {
         self.drawn += 1;
-        let unit = (mix(self.seed.wrapping_add(self.drawn)) >> 11) as f64 / (1_u64 << 53) as f64;
-        low + (high - low) * unit
+        low + (high - low) * unit(mix(self.seed.wrapping_add(self.drawn)))
     }
 
     fn coin(&mut self) -> bool {
