@@ -13,7 +13,7 @@ use super::pass::{Fragment, Part, Pass};
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, Touch,
+    Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, Touch, must_hold,
 };
 use crate::scene::Settings;
 use crate::visibility::load_cases;
@@ -42,17 +42,11 @@ impl Default for Options {
 
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
-        let checks = [
+        must_hold([
             ("balls", (2..=100).contains(&self.balls), "2 to 100"),
             ("resolution", (1..=1024).contains(&self.resolution), "1 to 1024 tiles"),
             ("bins", (1..=256).contains(&self.bins), "1 to 256"),
-        ];
-        match checks.into_iter().find(|(_, holds, _)| !holds) {
-            Some((setting, _, allowed)) => {
-                Err(LoadError::Setting { setting, message: format!("it has to be {allowed}") })
-            }
-            None => Ok(()),
-        }
+        ])
     }
 
     fn objects(&self, seed: u64) -> Result<Vec<Object>, LoadError> {

@@ -15,6 +15,7 @@ use crate::error::LoadError;
 use crate::scene::{FrameError, Overrides, Settings};
 
 pub use options::OptionSource;
+pub(crate) use options::must_hold;
 pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
 /// Where the packets of a frame go, with the lines each asks the L2 for, in the order of the modelled hardware.
