@@ -79,6 +79,13 @@ impl Survivors {
     }
 }
 
+/// Marks the triangles alive of which a fragment meets the boxes of the other part.
+fn mark(alive: &mut [bool], fragments: &[Kept], others: &TzBuffer) {
+    for kept in fragments {
+        alive[kept.item as usize] |= others.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
+    }
+}
+
 /// What is compared and how: a pass, the two parts, and what of each bin is left.
 pub(super) struct Comparison<'a> {
     pub pass: &'a Pass,
@@ -92,7 +99,7 @@ impl Comparison<'_> {
         &self,
         which: usize,
         scratch: &mut Scratch,
-        effort: &mut Effort,
+        effort: &Effort,
         watch: &mut impl Watch,
     ) -> Option<()> {
         let (boxes, kept) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
@@ -118,7 +125,7 @@ impl Comparison<'_> {
     pub fn fragments_against_boxes(
         &self,
         scratch: &mut Scratch,
-        effort: &mut Effort,
+        effort: &Effort,
         watch: &mut impl Watch,
     ) -> Option<Survivors> {
         let mut left = Survivors::none(self.bins.len(), self.parts);
@@ -138,10 +145,7 @@ impl Comparison<'_> {
             met.add(place, &TzBox { t: both[0], z: both[1], triangle: inside.triangle });
             watch.left(self.pass, tile);
         });
-        for kept in &scratch.fragments[0] {
-            left.alive[0][kept.item as usize] |=
-                met.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
-        }
+        mark(&mut left.alive[0], &scratch.fragments[0], met);
         all.then_some(left)
     }
 
@@ -149,7 +153,7 @@ impl Comparison<'_> {
     pub fn boxes_against_boxes(
         &self,
         scratch: &mut Scratch,
-        effort: &mut Effort,
+        effort: &Effort,
         watch: &mut impl Watch,
     ) -> Option<Survivors> {
         let mut left = Survivors::none(self.bins.len(), self.parts);
@@ -166,19 +170,15 @@ impl Comparison<'_> {
             }
         }
         for (which, alive) in left.alive.iter_mut().enumerate() {
-            let other = &scratch.boxes[1 - which];
-            for kept in &scratch.fragments[which] {
-                alive[kept.item as usize] |=
-                    other.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
-            }
+            mark(alive, &scratch.fragments[which], &scratch.boxes[1 - which]);
         }
         Some(left)
     }
 
     /// Depths alone: tiles in which the second is in front of the farthest of the first, and behind its nearest.
     pub fn depths(&self, scratch: &mut Scratch, watch: &mut impl Watch) -> [u64; 2] {
-        self.fill(0, scratch, &mut Effort::endless(), watch);
-        self.fill(1, scratch, &mut Effort::endless(), watch);
+        self.fill(0, scratch, &Effort::endless(), watch);
+        self.fill(1, scratch, &Effort::endless(), watch);
         let [first, second] = &scratch.boxes;
         let both = || {
             let shared = first.used().map(|(place, one)| (one.z, second.at(place).z));

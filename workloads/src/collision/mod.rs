@@ -20,6 +20,7 @@
 mod bounds;
 mod buffer;
 mod candidates;
+mod closer;
 mod compare;
 mod crossing;
 mod depth_only;
@@ -29,6 +30,7 @@ mod frame;
 mod glance;
 mod job;
 mod object;
+mod pair;
 mod pass;
 mod search;
 mod window;
