@@ -47,13 +47,6 @@ impl Bounds {
         Self { space, time: [0.0, 1.0] }
     }
 
-    /// Whether they share anything.
-    #[inline]
-    pub(super) fn touches(&self, other: &Self) -> bool {
-        let both = |a: &[f64; 2], b: &[f64; 2]| a[0] <= b[1] && b[0] <= a[1];
-        (0..3).all(|axis| both(&self.space[axis], &other.space[axis])) && both(&self.time, &other.time)
-    }
-
     /// What both hold, if anything.
     #[inline]
     pub fn meet(&self, other: &Self) -> Option<Self> {

@@ -34,14 +34,14 @@ impl Pair<'_> {
         let most = self.search.resolution;
         let triangles = self.triangles() as u64;
         let few = MOST_FRAGMENTS.saturating_sub(FRAGMENTS_LESS * triangles).max(LEAST_FRAGMENTS);
-        let effort = Effort::of(few + FRAGMENTS_EACH * triangles);
+        let mut effort = Effort::of(few + FRAGMENTS_EACH * triangles);
         let mut fit = if self.triangles() > MANY { Fit::Boxes } else { Fit::Edges };
         let first = (self.triangles() as f64 / TRIANGLES_A_TILE).sqrt() as u32;
         let (mut resolution, mut last) = (first.max(FIRST_TILES).min(most), self.maybe(0, false));
         for _ in 0..MOST_ROUNDS {
             let (before, triangles) = (self.window, self.triangles());
             let look = Look { resolution, bins: self.bins(resolution), fit };
-            let round = match self.round(look, &effort, scratch, watch) {
+            let round = match self.round(look, &mut effort, scratch, watch) {
                 Outcome::Apart => return Verdict::Apart,
                 Outcome::GaveUp => break,
                 Outcome::Left(round) => round,

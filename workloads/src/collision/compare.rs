@@ -99,7 +99,7 @@ impl Comparison<'_> {
         &self,
         which: usize,
         scratch: &mut Scratch,
-        effort: &Effort,
+        effort: &mut Effort,
         watch: &mut impl Watch,
     ) -> Option<()> {
         let (boxes, kept) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
@@ -125,7 +125,7 @@ impl Comparison<'_> {
     pub fn fragments_against_boxes(
         &self,
         scratch: &mut Scratch,
-        effort: &Effort,
+        effort: &mut Effort,
         watch: &mut impl Watch,
     ) -> Option<Survivors> {
         let mut left = Survivors::none(self.bins.len(), self.parts);
@@ -153,7 +153,7 @@ impl Comparison<'_> {
     pub fn boxes_against_boxes(
         &self,
         scratch: &mut Scratch,
-        effort: &Effort,
+        effort: &mut Effort,
         watch: &mut impl Watch,
     ) -> Option<Survivors> {
         let mut left = Survivors::none(self.bins.len(), self.parts);
@@ -177,8 +177,8 @@ impl Comparison<'_> {
 
     /// Depths alone: tiles in which the second is in front of the farthest of the first, and behind its nearest.
     pub fn depths(&self, scratch: &mut Scratch, watch: &mut impl Watch) -> [u64; 2] {
-        self.fill(0, scratch, &Effort::endless(), watch);
-        self.fill(1, scratch, &Effort::endless(), watch);
+        self.fill(0, scratch, &mut Effort::endless(), watch);
+        self.fill(1, scratch, &mut Effort::endless(), watch);
         let [first, second] = &scratch.boxes;
         let both = || {
             let shared = first.used().map(|(place, one)| (one.z, second.at(place).z));

@@ -61,7 +61,7 @@ fn size(object: &Object, way: &[f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    fn seen(objects: [&Object; 2]) -> Option<Seen> {
+    fn seen_from(objects: [&Object; 2]) -> Option<Seen> {
         let window = objects[0].bounds.meet(&objects[1].bounds)?;
         Seen::new(objects.map(|object| Part { object, list: &[0] }), &window)
     }
@@ -71,7 +71,7 @@ mod tests {
         let square = |x: f64, size: f64| [[x, 0.0, 0.0], [x + size, 0.0, 0.0], [x, size, 0.0]];
         let large = Object::from_ends(vec![[square(0.0, 4.0), square(8.0, 4.0)]], 0.0).unwrap();
         let small = Object::from_ends(vec![[square(1.0, 1.0), square(1.5, 1.0)]], 0.0).unwrap();
-        let seen = seen([&small, &large]).unwrap();
+        let seen = seen_from([&small, &large]).unwrap();
         assert_eq!(seen.objects[1].triangles[0][0], seen.objects[1].triangles[0][1]);
         assert_eq!(seen.objects[0].triangles[0][1], square(-6.5, 1.0));
         let bounds = Bounds { space: [[1.0, 2.0], [0.0, 1.0], [0.0, 0.0]], time: [0.25, 0.5] };
@@ -82,6 +82,6 @@ mod tests {
         assert!((told.space[0][0] - 3.0).abs() < 1e-12 && (told.space[0][1] - 6.0).abs() < 1e-12);
         assert_eq!(told.space[1..], bounds.space[1..]);
         let still = Object::from_ends(vec![[square(0.0, 4.0); 2]], 0.0).unwrap();
-        assert!(seen([&small, &still]).is_none());
+        assert!(seen_from([&small, &still]).is_none());
     }
 }

@@ -25,6 +25,7 @@ mod compare;
 mod crossing;
 mod depth_only;
 mod detect;
+mod easel;
 pub mod families;
 mod frame;
 mod glance;
@@ -37,7 +38,7 @@ mod window;
 
 pub use bounds::Bounds;
 pub use candidates::candidates;
-pub use detect::{Answer, detect};
+pub use detect::{Answer, detect, detect_each};
 pub use job::{Options, job};
 pub use object::{Object, components};
 pub use search::{Method, Search, Verdict};

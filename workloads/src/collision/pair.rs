@@ -65,7 +65,7 @@ impl<'a> Pair<'a> {
     pub fn once(&mut self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
         let Search { resolution, bins, .. } = *self.search;
         let look = Look { resolution, bins, fit: Fit::Edges };
-        match self.round(look, &Effort::endless(), scratch, watch) {
+        match self.round(look, &mut Effort::endless(), scratch, watch) {
             Outcome::Apart => Verdict::Apart,
             Outcome::GaveUp => self.maybe(0, false),
             Outcome::Left(Round { window, tiles, seen }) => Verdict::Maybe { bounds: window, tiles, seen },
@@ -109,7 +109,7 @@ impl<'a> Pair<'a> {
     pub fn round(
         &mut self,
         look: Look,
-        effort: &Effort,
+        effort: &mut Effort,
         scratch: &mut Scratch,
         watch: &mut impl Watch,
     ) -> Outcome {
@@ -139,7 +139,7 @@ impl<'a> Pair<'a> {
         &self,
         pass: &Pass,
         left: &[Option<Bounds>],
-        effort: &Effort,
+        effort: &mut Effort,
         scratch: &mut Scratch,
         watch: &mut impl Watch,
     ) -> Option<Survivors> {

@@ -1,6 +1,5 @@
 //! One object drawn orthographically along one axis.
 
-use std::cell::Cell;
 use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, View};
@@ -26,30 +25,25 @@ pub(super) enum Fit {
 }
 
 /// Fragments that may still be drawn.
-#[derive(Clone, Debug)]
-pub(super) struct Effort(Cell<u64>);
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort(u64);
 
 impl Effort {
     /// As many as it takes.
     pub fn endless() -> Self {
-        Self(Cell::new(u64::MAX))
+        Self(u64::MAX)
     }
 
     /// So many fragments.
     pub fn of(fragments: u64) -> Self {
-        Self(Cell::new(fragments))
+        Self(fragments)
     }
 
     /// Takes what is spent; `false` where that is more than there is.
-    fn spend(&self, fragments: u64) -> bool {
-        let left = self.0.get();
-        self.0.set(left.saturating_sub(fragments));
-        fragments <= left
-    }
-
-    /// Nothing more is to be drawn.
-    pub fn end(&self) {
-        self.0.set(0);
+    fn spend(&mut self, fragments: u64) -> bool {
+        let enough = fragments <= self.0;
+        self.0 = self.0.saturating_sub(fragments);
+        enough
     }
 }
 
@@ -125,7 +119,7 @@ impl Pass {
         &self,
         part: Part<'_>,
         bins: &[Option<Bounds>],
-        effort: &Effort,
+        effort: &mut Effort,
         mut each: impl FnMut(&Fragment),
     ) -> bool {
         let Part { object, list } = part;
@@ -196,7 +190,7 @@ impl Drawing<'_> {
         bin: usize,
         left: &Bounds,
         times: [f64; 2],
-        effort: &Effort,
+        effort: &mut Effort,
         each: &mut impl FnMut(&Fragment),
     ) -> bool {
         let (pass, item, triangle) = (self.pass, self.item, self.triangle);

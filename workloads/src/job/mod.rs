@@ -5,6 +5,8 @@
 
 mod options;
 mod passes;
+#[cfg(test)]
+pub(crate) mod testing;
 
 use activity::{Counts, LineAccess, Packet, Warning};
 use glam::Vec3;
