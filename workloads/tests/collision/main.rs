@@ -6,6 +6,7 @@ mod common;
 mod contacts;
 mod oracle;
 mod public;
+mod yardsticks;
 
 use pipeline::sampling::{mix, unit};
 use workloads::collision::{Method, Object, Search, detect};
