@@ -3,8 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
+mod common;
+
 use glam::Vec3;
-use pipeline::frame::{Shading, visibility};
+use pipeline::frame::visibility;
 use pipeline::geometry::Projection;
 use pipeline::setup::Triangle;
 use pipeline::traversal::{Box5, TileRect, narrow};
