@@ -5,7 +5,7 @@
 use std::collections::{HashMap, HashSet};
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 
 struct Numbers(u64);
 
@@ -16,7 +16,7 @@ impl Numbers {
     }
 
     fn within(&mut self, lo: f64, hi: f64) -> f64 {
-        lo + (hi - lo) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+        lo + (hi - lo) * unit(self.bits())
     }
 
     /// Uniform, on a coarse binary grid, or an end.

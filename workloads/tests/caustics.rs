@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 use workloads::caustics::generator::{BallLens, Ocean, Wave};
 use workloads::caustics::{Beam, Eye, Floor, Light, Method, draw, receivers};
 
@@ -95,7 +95,7 @@ struct Photons(u64);
 impl Photons {
     fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        (mix(self.0) >> 11) as f64 / (1_u64 << 53) as f64
+        unit(mix(self.0))
     }
 
     /// Where a photon of a random beam, in proportion to flux, starts and ends.

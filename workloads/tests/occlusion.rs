@@ -1,38 +1,15 @@
 //! Occlusion queries against all samples.
 #![allow(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
+mod common;
+
 use glam::Vec3;
-use pipeline::depth::{BoxGrid, DepthSpec};
+use pipeline::depth::BoxGrid;
 use pipeline::geometry::Projection;
-use pipeline::memory::Compression;
-use pipeline::{
-    CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, SampleTable, Settings, Shading, Viewport,
-};
+use pipeline::{LensShape, SampleTable, Settings, Viewport};
 use proptest::prelude::*;
 use workloads::occlusion::{MovingBox, Pyramid, Queries, Samples, Yard, YardSpec, depths};
 use workloads::visibility::Unshaded;
-
-const LINES: CacheSpec = CacheSpec::lru(256, 4);
-
-fn spec() -> PipelineSpec {
-    PipelineSpec {
-        tile_px: 8,
-        coarse_tile_px: 32,
-        batch_triangles: 1024,
-        vertex_reuse: 32,
-        shading: Shading::Cached,
-        shading_cache: LINES,
-        memory: MemorySpec {
-            depth: LINES,
-            colour: LINES,
-            texture: LINES,
-            l2: LINES,
-            compression: Compression { depth: false, colour: false },
-        },
-        features: Features::ALL,
-        depth: DepthSpec::default(),
-    }
-}
 
 /// What of the boxes of a yard is hidden: by intervals for each grid of boxes and each side of a tile, and by samples.
 struct Told {
@@ -44,7 +21,7 @@ struct Told {
 fn ask(yard: &Yard, size: [u32; 2], per_pixel: u32, grids: &[([u32; 3], u32)]) -> Told {
     let viewport = Viewport::new(size[0], size[1]).unwrap();
     let samples = SampleTable::low_discrepancy(per_pixel, 7, LensShape::Disk).unwrap();
-    let spec = spec();
+    let spec = common::spec();
     let settings = Settings { spec: &spec, viewport, samples: &samples, background: Vec3::ZERO };
     let depths = depths(&yard.camera, &[yard.walls(&Unshaded).unwrap()], &settings).unwrap();
     let sampled = Samples { camera: &yard.camera, settings: &settings, depths: &depths };

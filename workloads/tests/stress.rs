@@ -3,13 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
+mod common;
+
 use glam::Vec3;
-use pipeline::depth::DepthSpec;
-use pipeline::frame::{Shading, visibility};
+use pipeline::frame::visibility;
 use pipeline::geometry::Projection;
 use pipeline::setup::Triangle;
 use pipeline::traversal::{Box5, TileRect, narrow};
-use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Settings};
+use pipeline::{Features, PipelineSpec, Settings};
 use workloads::stress::{Family, Size, StressScene, brute_force, families, family, within_bounds};
 use workloads::visibility::Unshaded;
 
@@ -39,29 +40,8 @@ fn combinations() -> impl Iterator<Item = Features> {
     alone.into_iter().chain(without).chain(whole)
 }
 
-fn spec(features: Features) -> PipelineSpec {
-    let lines = CacheSpec::lru(256, 4);
-    PipelineSpec {
-        tile_px: 8,
-        coarse_tile_px: 16,
-        batch_triangles: 1000,
-        vertex_reuse: 16,
-        shading: Shading::default(),
-        shading_cache: CacheSpec::lru(1024, 4),
-        memory: MemorySpec {
-            depth: lines,
-            colour: lines,
-            texture: lines,
-            l2: lines,
-            compression: Default::default(),
-        },
-        features,
-        depth: DepthSpec::default(),
-    }
-}
-
 fn seen(scene: &StressScene, features: Features) -> Vec<(u32, u32)> {
-    let spec = spec(features);
+    let spec = PipelineSpec { features, ..common::spec() };
     let (viewport, samples) = (scene.viewport, &scene.samples);
     let settings = Settings { spec: &spec, viewport, samples, background: Vec3::ZERO };
     visibility(&scene.camera, &[scene.draw(&Unshaded).unwrap()], &settings).unwrap()

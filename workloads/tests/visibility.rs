@@ -10,7 +10,7 @@ use common::{Files, expect, failure};
 use glam::Vec3;
 use proptest::prelude::*;
 use workloads::LoadError;
-use workloads::visibility::{CameraSpec, VisibilityScene, load, parse_m5d, parse_mts};
+use workloads::visibility::{CameraSpec, VisibilityScene, load, load_cases, parse_m5d, parse_mts};
 
 const SQUARE: [[f32; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
 const HALVES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
@@ -153,6 +153,34 @@ fn ends_that_differ_say_which_and_where() {
         let text = failure(pair(("a.ply", start), ("b.obj", &end)).unwrap_err());
         expect(&text, &["b.obj: triangle 1: one vertex of"]);
     }
+}
+
+#[test]
+fn obj_files_whose_faces_differ_do_not_go_together_though_every_vertex_has_one_place() {
+    let points = [SQUARE.as_slice(), &SQUARE.map(|[x, y, z]| [x + 4.0, y, z])].concat();
+    let [one, other] = [[[0, 1, 2], [4, 5, 6]], [[4, 5, 6], [0, 1, 2]]].map(|faces| obj(&points, &faces));
+    assert!(pair(("a.obj", &one), ("b.obj", &one)).is_ok());
+    let text = failure(pair(("a.obj", &one), ("b.obj", &other)).unwrap_err());
+    expect(
+        &text,
+        &[
+            "b.obj: line 9: it joins vertices [5, 6, 7], but line 9 of",
+            "a.obj joins [1, 2, 3]",
+            "equal topology",
+        ],
+    );
+}
+
+#[test]
+fn collision_cases_name_folders_and_numbers_beyond_f32() {
+    let files = Files::new();
+    let folder = std::env::temp_dir();
+    let refused = load_cases(&[&folder]).unwrap_err();
+    assert!(refused.is_usage());
+    expect(&refused.to_string(), &["is a folder: give the .mts, .ply or .obj files in it"]);
+    let huge = files.put("a.obj", "v 1e308 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let text = failure(load_cases(&[&huge, &huge]).unwrap_err());
+    expect(&text, &["vertex 0 has a coordinate that is infinite or beyond f32 (3.4e38)"]);
 }
 
 #[test]

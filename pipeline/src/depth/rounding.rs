@@ -93,14 +93,14 @@ fn seen_area<R: Real>(ends: &[Points<R>], slopes: &[[R; 2]; 2]) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::mix;
+    use crate::sampling::{mix, unit};
 
     struct Numbers(u64);
 
     impl Numbers {
         fn within(&mut self, lo: f64, hi: f64) -> f64 {
             self.0 += 1;
-            lo + (hi - lo) * (mix(self.0) >> 11) as f64 / (1_u64 << 53) as f64
+            lo + (hi - lo) * unit(mix(self.0))
         }
 
         fn points(&mut self, reach: f64) -> Points<f64> {

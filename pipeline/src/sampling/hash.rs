@@ -9,6 +9,12 @@ pub const fn mix(word: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// A number in [0, 1), a multiple of 2^-53, from the upper bits of a word.
+#[inline]
+pub const fn unit(word: u64) -> f64 {
+    (word >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// One 64-bit word from a seed and two counters.
 pub(super) const fn word(seed: u64, first: u64, second: u64) -> u64 {
     const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -26,5 +32,11 @@ mod tests {
         let golden = 0x9E37_79B9_7F4A_7C15_u64;
         assert_eq!(mix(golden), 0xE220_A839_7B1D_CDAF);
         assert_eq!(mix(golden.wrapping_mul(2)), 0x6E78_9E6A_A1B9_65F4);
+    }
+
+    #[test]
+    fn units_run_from_zero_to_below_one() {
+        assert_eq!([0, 1 << 63, 1 << 11].map(unit), [0.0, 0.5, f64::EPSILON / 2.0]);
+        assert_eq!(unit(u64::MAX), 1.0 - f64::EPSILON / 2.0);
     }
 }

@@ -12,7 +12,7 @@ mod spec;
 mod table;
 mod tile;
 
-pub use hash::mix;
+pub use hash::{mix, unit};
 pub use hashed::HashedSamples;
 pub use lens::LensShape;
 pub use pattern::Pattern;

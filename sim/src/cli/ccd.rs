@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use workloads::collision::{Answer, Method, Object, Search, Verdict, detect};
+use workloads::collision::{Answer, Method, Object, Search, Verdict, candidates, detect_each};
 use workloads::visibility::{CollisionCase, load_cases};
 
 use super::Failure;
 use super::terminal::{print, print_json};
+use crate::output::progress::{Bar, Progress};
 use crate::output::table::{Table, grouped};
 
 /// Arguments of `ccd`.
@@ -67,6 +68,9 @@ impl CcdArgs {
     }
 }
 
+/// Pixels across times bins from which on a pair that is looked at once takes minutes.
+const SLOW: u32 = 128 * 64;
+
 /// A pair that may collide.
 #[derive(Serialize)]
 struct Pair {
@@ -93,26 +97,30 @@ struct Found {
     may_collide: Vec<Pair>,
 }
 
+/// The objects of a case.
+fn objects(case: &CollisionCase) -> Result<Vec<Object>, Failure> {
+    let object = |(number, mesh)| {
+        Object::new(mesh, case.uncertainty).ok_or_else(|| Failure {
+            message: format!(
+                "{}: object {number}: a coordinate is beyond 1e60 or not a number; scale it",
+                case.id
+            ),
+            code: 1,
+        })
+    };
+    case.objects.iter().enumerate().map(object).collect()
+}
+
 impl Found {
-    fn new(case: &CollisionCase, search: &Search) -> Result<Self, Failure> {
-        let object = |(number, mesh)| {
-            Object::new(mesh, case.uncertainty).ok_or_else(|| Failure {
-                message: format!(
-                    "{}: object {number}: a coordinate is beyond 1e60 or not a number; scale it",
-                    case.id
-                ),
-                code: 1,
-            })
-        };
-        let objects = case.objects.iter().enumerate().map(object).collect::<Result<Vec<_>, _>>()?;
-        let answers = detect(&objects, search);
-        Ok(Self {
+    fn new(case: &CollisionCase, objects: &[Object], search: &Search, bar: &Bar) -> Self {
+        let answers = detect_each(objects, search, || bar.inc());
+        Self {
             case_id: case.id.clone(),
             objects: objects.len(),
             triangles: objects.iter().map(Object::len).sum(),
             candidates: answers.len(),
             may_collide: answers.iter().filter_map(pair).collect(),
-        })
+        }
     }
 
     /// A line for each pair of objects.
@@ -135,8 +143,16 @@ pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
     super::not_an_input(("--csv", args.csv.as_deref()), args.files.iter().map(PathBuf::as_path))?;
     let (search, cases) = (args.search(), load_cases(&args.files)?);
     let pool = super::threads(args.threads)?;
-    let found: Vec<Found> =
-        pool.install(|| cases.iter().map(|case| Found::new(case, &search)).collect::<Result<_, _>>())?;
+    let progress = Progress::new(args.json);
+    if !search.zoom && search.resolution * search.bins > SLOW {
+        progress.note(
+            "looking once at so many pixels and bins takes minutes for a pair; without --no-zoom it is seconds",
+        );
+    }
+    let all = cases.iter().map(objects).collect::<Result<Vec<_>, _>>()?;
+    let bar = progress.bar("pairs", all.iter().map(|objects| candidates(objects).len() as u64).sum());
+    let found = |(case, objects): (_, &Vec<Object>)| Found::new(case, objects, &search, &bar);
+    let found: Vec<Found> = pool.install(|| cases.iter().zip(&all).map(found).collect());
     if let Some(path) = &args.csv {
         write_csv(path, &found)?;
     }

@@ -226,39 +226,15 @@ const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::job::testing::hardware;
     use crate::scene::Overrides;
-    use pipeline::memory::Compression;
-    use pipeline::{CacheSpec, MemorySpec, Shading};
-
-    const LINES: CacheSpec = CacheSpec::lru(256, 4);
-    const SPEC: PipelineSpec = PipelineSpec {
-        tile_px: 8,
-        coarse_tile_px: 64,
-        batch_triangles: 1024,
-        vertex_reuse: 32,
-        shading: Shading::Cached,
-        shading_cache: LINES,
-        memory: MemorySpec {
-            depth: LINES,
-            colour: LINES,
-            texture: LINES,
-            l2: LINES,
-            compression: Compression { depth: false, colour: false },
-        },
-        features: pipeline::Features::ALL,
-        depth: pipeline::depth::DepthSpec {
-            bound: pipeline::depth::DepthBound::VerticesInTime,
-            boxes: [1; 3],
-            z_min: false,
-        },
-    };
 
     fn drawn(set: &[(&str, &str)]) -> Drawn {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
         let overrides = Overrides { size: Some((96, 54)), ..Overrides::default() };
         let request = Request { overrides: &overrides, seed: 1 };
         let job = job(&OptionSource { file: None, set }, &request).unwrap();
-        job.frame(0, &SPEC, &mut |_, _| ()).unwrap()
+        job.frame(0, &hardware(), &mut |_, _| ()).unwrap()
     }
 
     #[test]

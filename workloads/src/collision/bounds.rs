@@ -10,12 +10,14 @@ pub struct Bounds {
 }
 
 /// What two ranges share; touching counts.
+#[inline]
 pub(super) fn meet(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
     let both = [a[0].max(b[0]), a[1].min(b[1])];
     (both[0] <= both[1]).then_some(both)
 }
 
 /// The range that holds both.
+#[inline]
 pub(super) fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
@@ -46,9 +48,10 @@ impl Bounds {
     }
 
     /// What both hold, if anything.
+    #[inline]
     pub fn meet(&self, other: &Self) -> Option<Self> {
-        let [x, y, z] = [0, 1, 2].map(|axis| meet(self.space[axis], other.space[axis]));
-        Some(Self { space: [x?, y?, z?], time: meet(self.time, other.time)? })
+        let shared = |axis: usize| meet(self.space[axis], other.space[axis]);
+        Some(Self { space: [shared(0)?, shared(1)?, shared(2)?], time: meet(self.time, other.time)? })
     }
 
     /// The same with every side `margin` farther out in space.

@@ -79,6 +79,13 @@ impl Survivors {
     }
 }
 
+/// Marks the triangles alive of which a fragment meets the boxes of the other part.
+fn mark(alive: &mut [bool], fragments: &[Kept], others: &TzBuffer) {
+    for kept in fragments {
+        alive[kept.item as usize] |= others.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
+    }
+}
+
 /// What is compared and how: a pass, the two parts, and what of each bin is left.
 pub(super) struct Comparison<'a> {
     pub pass: &'a Pass,
@@ -138,10 +145,7 @@ impl Comparison<'_> {
             met.add(place, &TzBox { t: both[0], z: both[1], triangle: inside.triangle });
             watch.left(self.pass, tile);
         });
-        for kept in &scratch.fragments[0] {
-            left.alive[0][kept.item as usize] |=
-                met.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
-        }
+        mark(&mut left.alive[0], &scratch.fragments[0], met);
         all.then_some(left)
     }
 
@@ -166,11 +170,7 @@ impl Comparison<'_> {
             }
         }
         for (which, alive) in left.alive.iter_mut().enumerate() {
-            let other = &scratch.boxes[1 - which];
-            for kept in &scratch.fragments[which] {
-                alive[kept.item as usize] |=
-                    other.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
-            }
+            mark(alive, &scratch.fragments[which], &scratch.boxes[1 - which]);
         }
         Some(left)
     }

@@ -12,8 +12,19 @@ fn at(ends: &Ends, t: f64) -> [DVec3; 3] {
 /// Whether an edge of one of the triangles passes through the other at time `t`, as far as rounding can tell.
 pub(super) fn cross(a: &Ends, b: &Ends, t: f64) -> bool {
     let (a, b) = (at(a, t), at(b, t));
+    // Most lie on one side of the other's plane.
+    if !on_both_sides(&a, &b) || !on_both_sides(&b, &a) {
+        return false;
+    }
     let edges = |p: [DVec3; 3]| [[p[0], p[1]], [p[1], p[2]], [p[2], p[0]]];
     edges(a).iter().any(|edge| pierces(edge, &b)) || edges(b).iter().any(|edge| pierces(edge, &a))
+}
+
+/// Whether `points` lie on both sides of the plane of a triangle, as computed.
+fn on_both_sides([a, b, c]: &[DVec3; 3], points: &[DVec3; 3]) -> bool {
+    let normal = (b - a).cross(c - a);
+    let sides = points.map(|point| normal.dot(point - a));
+    sides.iter().any(|&side| side > 0.0) && sides.iter().any(|&side| side < 0.0)
 }
 
 /// Whether a segment passes through a triangle, beyond what rounding could make of one that does not.

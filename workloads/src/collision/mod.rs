@@ -20,22 +20,25 @@
 mod bounds;
 mod buffer;
 mod candidates;
+mod closer;
 mod compare;
 mod crossing;
 mod depth_only;
 mod detect;
+mod easel;
 pub mod families;
 mod frame;
 mod glance;
 mod job;
 mod object;
+mod pair;
 mod pass;
 mod search;
 mod window;
 
 pub use bounds::Bounds;
 pub use candidates::candidates;
-pub use detect::{Answer, detect};
+pub use detect::{Answer, detect, detect_each};
 pub use job::{Options, job};
 pub use object::{Object, components};
 pub use search::{Method, Search, Verdict};

@@ -54,10 +54,10 @@ impl Object {
         })
     }
 
-    /// The same seen from a frame of reference that goes `way` from time 0 to time 1.
-    pub(super) fn less(&self, way: [f64; 3]) -> Self {
+    /// Some of its triangles seen from a frame of reference that goes `way` from time 0 to time 1.
+    pub(super) fn less(&self, list: &[u32], way: [f64; 3]) -> Self {
         let seen = |[open, close]: &Ends| [*open, close.map(|p| [0, 1, 2].map(|axis| p[axis] - way[axis]))];
-        let triangles: Vec<Ends> = self.triangles.iter().map(seen).collect();
+        let triangles: Vec<Ends> = list.iter().map(|&n| seen(&self.triangles[n as usize])).collect();
         let coordinates = triangles.as_flattened().as_flattened().as_flattened();
         let largest = coordinates.iter().chain(&way).fold(0.0, |largest: f64, at| largest.max(at.abs()));
         // A difference is off by half a unit of its last place.

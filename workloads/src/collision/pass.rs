@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
+use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, View};
 
 use super::bounds::{Bounds, NOTHING, hull, meet};
 use super::buffer::TzBox;
@@ -56,6 +56,8 @@ pub(super) struct Pass {
     /// What of space and time it covers.
     hull: Bounds,
     fit: Fit,
+    /// By how much borders of tiles by division and by multiplication may differ.
+    slack: f64,
 }
 
 /// What an object is in one tile in one bin of time.
@@ -80,7 +82,8 @@ impl Pass {
         };
         let [x, y] = [side(1), side(2)];
         let grid = Grid { origin: [x.0, y.0], tile: [x.1, y.1], columns: x.2, rows: y.2 };
-        Self { axis, grid, hull: *hull, fit }
+        let size = hull.space.as_flattened().iter().fold(0.0, |size: f64, at| size.max(at.abs()));
+        Self { axis, grid, hull: *hull, fit, slack: 8.0 * f64::EPSILON * size }
     }
 
     /// Tiles of the pass.
@@ -107,13 +110,7 @@ impl Pass {
         space[(self.axis + 2) % 3] = rect.y;
         // Boxes are put into tiles by division, whose borders may differ from these by rounding.
         let bounds = Bounds { space, time: t };
-        if self.fit == Fit::Boxes { bounds.inflated(self.slack()) } else { bounds }
-    }
-
-    /// By how much borders of tiles by division and by multiplication may differ.
-    fn slack(&self) -> f64 {
-        let size = self.hull.space.as_flattened().iter().fold(0.0, |size: f64, at| size.max(at.abs()));
-        8.0 * f64::EPSILON * size
+        if self.fit == Fit::Boxes { bounds.inflated(self.slack) } else { bounds }
     }
 
     /// Hands `each` fragment of a part in the bins that are left. Says whether that was all of them: where they are more than
@@ -129,11 +126,10 @@ impl Pass {
         let left: Vec<(usize, Bounds)> =
             bins.iter().enumerate().filter_map(|(bin, left)| left.map(|left| (bin, left))).collect();
         for (&triangle, item) in list.iter().zip(0..) {
-            let ends = &object.triangles[triangle as usize];
             let Some(times) = self.times(object, triangle) else { continue };
             let first = left.partition_point(|(_, left)| left.time[1] < times[0]);
             let open = left[first..].iter().take_while(|(_, left)| left.time[0] <= times[1]);
-            let mut drawing = Drawing { pass: self, object, ends, triangle, item, turned: None };
+            let mut drawing = Drawing { pass: self, object, triangle, item, prepared: None };
             for (bin, left) in open {
                 if !drawing.bin(*bin, left, times, effort, &mut each) {
                     return false;
@@ -168,11 +164,12 @@ impl Pass {
         })
     }
 
-    /// The triangle as it is seen along the axis.
-    fn turned(&self, ends: &Ends, uncertainty: f64) -> Option<MovingTriangle> {
+    /// The triangle as it is seen along the axis; `None` where it is too large to be seen by its edges.
+    fn prepared(&self, ends: &Ends, uncertainty: f64) -> Option<Prepared> {
         let turn = |p: [f64; 3]| [p[(self.axis + 1) % 3], p[(self.axis + 2) % 3], p[self.axis]];
         let [open, close] = ends.map(|end| end.map(turn));
-        MovingTriangle::uncertain(open, close, [uncertainty; 3])
+        let turned = MovingTriangle::uncertain(open, close, [uncertainty; 3])?;
+        Some(Rasterizer::new(View::orthographic()).prepare(&turned))
     }
 }
 
@@ -180,13 +177,14 @@ impl Pass {
 struct Drawing<'a> {
     pass: &'a Pass,
     object: &'a Object,
-    ends: &'a Ends,
     triangle: u32,
     item: u32,
-    turned: Option<MovingTriangle>,
+    /// Made for the first bin it is in.
+    prepared: Option<Prepared>,
 }
 
 impl Drawing<'_> {
+    /// Hands `each` of its fragments in a bin; `false` where they are more than `effort`.
     fn bin(
         &mut self,
         bin: usize,
@@ -202,37 +200,40 @@ impl Drawing<'_> {
         if !effort.spend(columns.len() as u64 * rows.len() as u64) {
             return false;
         }
-        if pass.fit == Fit::Boxes {
-            let inside = TzBox { t, z: near[pass.axis], triangle };
+        let mut tell = |tile, t, z| each(&Fragment { tile, bin, item, inside: TzBox { t, z, triangle } });
+        let Some(prepared) = self.edges() else {
             for row in rows {
-                columns.clone().for_each(|column| each(&Fragment { tile: [column, row], bin, item, inside }));
+                columns.clone().for_each(|column| tell([column, row], t, near[pass.axis]));
             }
             return true;
-        }
-        let turned = self.turned.or_else(|| pass.turned(self.ends, self.object.uncertainty));
-        self.turned = turned;
-        let Some(turned) = turned else { return true };
+        };
         let clip = Region { t, ..Region::WHOLE };
         let rasterizer = Rasterizer::new(View::orthographic()).clipped(clip).halving(HALVINGS);
-        let prepared = rasterizer.prepare(&turned);
-        rasterizer.rasterize_part(&prepared, &pass.grid, [columns, rows], |tile, touch| {
-            each(&Fragment { tile, bin, item, inside: TzBox { t: touch.t, z: touch.z, triangle } });
+        rasterizer.rasterize_part(prepared, &pass.grid, [columns, rows], |tile, touch| {
+            tell(tile, touch.t, touch.z)
         });
         true
+    }
+
+    /// The triangle with its edges, where these are looked at.
+    fn edges(&mut self) -> Option<&Prepared> {
+        if self.pass.fit == Fit::Edges && self.prepared.is_none() {
+            let ends = &self.object.triangles[self.triangle as usize];
+            self.prepared = self.pass.prepared(ends, self.object.uncertainty);
+        }
+        self.prepared.as_ref()
     }
 }
 
 /// The part of `left` that a triangle sweeps during `t`, or `None` where it stays outside.
 fn near(object: &Object, triangle: u32, t: [f64; 2], left: &Bounds) -> Option<[[f64; 2]; 3]> {
     let triangle = triangle as usize;
-    let (ends, mut near) = (&object.triangles[triangle], object.boxes[triangle].space);
-    for (axis, near) in near.iter_mut().enumerate() {
-        if t != [0.0, 1.0] {
-            *near = swept(ends, axis, t, object.uncertainty);
-        }
-        *near = meet(*near, left.space[axis])?;
-    }
-    Some(near)
+    let (ends, whole) = (&object.triangles[triangle], &object.boxes[triangle].space);
+    let side = |axis: usize| {
+        let swept = if t == [0.0, 1.0] { whole[axis] } else { swept(ends, axis, t, object.uncertainty) };
+        meet(swept, left.space[axis])
+    };
+    Some([side(0)?, side(1)?, side(2)?])
 }
 
 /// Least and greatest coordinate of a triangle during `t`.

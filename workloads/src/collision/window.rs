@@ -19,12 +19,14 @@ pub(super) fn times_inside(
     for axis in 0..3 {
         let [low, high] = within.space[axis];
         let [least, most] = swept.space[axis];
-        if low <= least && most <= high {
-            continue;
+        let corners = || [0, 1, 2].map(|corner| [ends[0][corner][axis], ends[1][corner][axis]]);
+        // What does not reach beyond a side need not be asked for it.
+        if least < low {
+            times = meet(times, inside(corners().map(|ends| ends.map(|at| at - (low - uncertainty)))))?;
         }
-        let corners = [0, 1, 2].map(|corner| [ends[0][corner][axis], ends[1][corner][axis]]);
-        times = meet(times, inside(corners.map(|ends| ends.map(|at| at - (low - uncertainty)))))?;
-        times = meet(times, inside(corners.map(|ends| ends.map(|at| (high + uncertainty) - at))))?;
+        if most > high {
+            times = meet(times, inside(corners().map(|ends| ends.map(|at| (high + uncertainty) - at))))?;
+        }
     }
     Some(times)
 }

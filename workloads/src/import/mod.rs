@@ -1,5 +1,6 @@
 //! Importers: one folder or file for each format, all of them giving [`Parts`].
 
+mod faces;
 mod gltf;
 mod image;
 mod obj;
@@ -13,6 +14,7 @@ use std::path::Path;
 
 use crate::error::LoadError;
 use crate::scene::{Local, Mesh, Node, Parts, Trs};
+pub(crate) use faces::faces;
 use soup::Soup;
 
 /// File formats, told by the end of the name.

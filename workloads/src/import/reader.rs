@@ -49,7 +49,7 @@ pub(crate) fn head<const N: usize>(path: &Path) -> Result<Vec<u8>, LoadError> {
     Ok(data)
 }
 
-fn damaged(path: &Path, error: &std::io::Error) -> LoadError {
+pub(super) fn damaged(path: &Path, error: &std::io::Error) -> LoadError {
     Source { path }
         .broken("contents", format!("reading stops here: {error}; the file may be damaged: get it again"))
 }

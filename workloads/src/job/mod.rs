@@ -5,6 +5,8 @@
 
 mod options;
 mod passes;
+#[cfg(test)]
+pub(crate) mod testing;
 mod words;
 
 use activity::{Counts, LineAccess, Packet, Warning};
@@ -16,6 +18,7 @@ use crate::error::LoadError;
 use crate::scene::{FrameError, Overrides, Settings};
 
 pub use options::OptionSource;
+pub(crate) use options::must_hold;
 pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
 /// Where the packets of a frame go, with the lines each asks the L2 for, in the order of the modelled hardware.

@@ -33,6 +33,18 @@ impl OptionSource {
     }
 }
 
+/// Refuses the first option that does not hold; each with its name and what it may be.
+pub(crate) fn must_hold<const N: usize>(
+    checks: [(&'static str, bool, &'static str); N],
+) -> Result<(), LoadError> {
+    match checks.into_iter().find(|(_, holds, _)| !holds) {
+        Some((setting, _, allowed)) => {
+            Err(LoadError::Setting { setting, message: format!("it has to be {allowed}") })
+        }
+        None => Ok(()),
+    }
+}
+
 /// `options` with one of them changed.
 fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -> Result<T, LoadError> {
     let refused = |message: String| LoadError::Setting { setting: "set", message };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use activity::{Counts, Event, LineAccess, Packet, PacketCounts, Warning};
+use activity::{Counts, Event, PacketCounts, Warning};
 use glam::{Vec3, Vec4};
 use pipeline::depth::BoxGrid;
 use pipeline::frame::render_with_heat;
@@ -13,7 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork};
+use crate::job::{
+    Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, must_hold, shifted,
+};
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
 
@@ -56,7 +58,7 @@ impl Default for Options {
 
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
-        let checks = [
+        must_hold([
             ("walls", self.walls <= 1000, "0 to 1000"),
             ("slats", (1..=1000).contains(&self.slats), "1 to 1000"),
             ("gaps", (0.0..=1.0).contains(&self.gaps), "0 to 1"),
@@ -65,13 +67,7 @@ impl Options {
             ("lens", (0.0..=1.0).contains(&self.lens), "0 to 1 metre"),
             ("tile_px", (1..=256).contains(&self.tile_px), "1 to 256 pixels"),
             ("boxes", BoxGrid::new(self.boxes, true).is_some(), "1 to 16 along each of u, v and t"),
-        ];
-        match checks.into_iter().find(|(_, holds, _)| !holds) {
-            Some((setting, _, allowed)) => {
-                Err(LoadError::Setting { setting, message: format!("it has to be {allowed}") })
-            }
-            None => Ok(()),
-        }
+        ])
     }
 }
 
@@ -145,8 +141,7 @@ impl Job for Occlusion {
         let boxes = Geometry::new(&open, &close, &triangles);
         let boxes = boxes.map_err(|error| JobError::Setting(error.to_string()))?;
         let draws = [wall, Draw { geometry: boxes, shader: &BOX, cull: Cull::None }];
-        let last = |packet: &Packet, lines: &[LineAccess]| emit(&Packet { pass: 2, ..*packet }, lines);
-        let (rendered, _) = render_with_heat(camera, &draws, &settings, &[], last)?;
+        let (rendered, _) = render_with_heat(camera, &draws, &settings, &[], shifted(2, emit))?;
         counts += &rendered.counts;
         Ok(Drawn {
             image: rendered.image,

@@ -1,9 +1,9 @@
 //! The query by samples: the box is drawn, and samples that pass the depth test are counted.
 
 use activity::Event;
-use pipeline::frame::visibility;
+use pipeline::frame::{render_depth, visibility};
 use pipeline::memory::CacheError;
-use pipeline::{Camera, Cull, Draw, Features, Geometry, PipelineSpec, Settings, render};
+use pipeline::{Camera, Cull, Draw, Features, Geometry, PipelineSpec, Settings};
 
 use super::MovingBox;
 use crate::visibility::Unshaded;
@@ -51,7 +51,12 @@ impl Seen {
 /// # Errors
 /// When a cache of the hardware cannot be built.
 pub fn depths(camera: &Camera, draws: &[Draw<'_>], settings: &Settings<'_>) -> Result<Vec<f32>, CacheError> {
-    Ok(visibility(camera, draws, settings)?.into_iter().map(|(_, bits)| f32::from_bits(bits)).collect())
+    Ok(visibility(camera, draws, settings)?.into_iter().map(depth).collect())
+}
+
+/// The depth of what a sample sees.
+fn depth((_, bits): (u32, u32)) -> f32 {
+    f32::from_bits(bits)
 }
 
 impl Samples<'_> {
@@ -70,10 +75,9 @@ impl Samples<'_> {
         let features = Features { z_max: false, ..self.settings.spec.features };
         let spec = PipelineSpec { features, ..*self.settings.spec };
         let settings = Settings { spec: &spec, ..*self.settings };
-        let own = depths(self.camera, &draws, &settings)?;
+        let (own, counts) = render_depth(self.camera, &draws, &settings, |_, _| ())?;
         let passes = |(own, stored): &(f32, &f32)| own.is_finite() && own <= stored;
-        let passed = own.into_iter().zip(self.depths).filter(passes).count() as u64;
-        let counts = render(self.camera, &draws, &settings, |_| ())?.counts;
+        let passed = own.into_iter().map(depth).zip(self.depths).filter(passes).count() as u64;
         let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum();
         Ok(Seen {
             passed,

@@ -194,8 +194,8 @@ impl Job for Sampling {
 #[cfg(test)]
 mod tests {
     use super::super::poisson::closer;
-    use super::super::volume::hardware;
     use super::*;
+    use crate::job::testing::hardware;
     use crate::scene::Overrides;
 
     fn made(set: &[(&str, &str)], size: (u32, u32)) -> Result<Box<dyn Job>, String> {

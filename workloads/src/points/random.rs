@@ -1,6 +1,6 @@
 //! Counter-based random numbers: what is drawn depends on the seed and the counter alone.
 
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
@@ -29,7 +29,7 @@ impl Stream {
     /// A number in [0, 1), a multiple of 2^-53.
     #[inline]
     pub fn unit(self, at: u64) -> f64 {
-        (self.word(at) >> 11) as f64 / (1_u64 << 53) as f64
+        unit(self.word(at))
     }
 
     /// An integer below `count`.

@@ -90,8 +90,9 @@ impl Mesh {
         triangles: Vec<[u32; 3]>,
         material: usize,
     ) -> Result<Self, String> {
-        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(format!("vertex {vertex} has a coordinate that is NaN or infinite"));
+        if let Some((vertex, place)) = positions.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+            let what = if place.is_nan() { "NaN or infinite" } else { "infinite or beyond f32 (3.4e38)" };
+            return Err(format!("vertex {vertex} has a coordinate that is {what}"));
         }
         let count = positions.len();
         for (triangle, corners) in triangles.iter().enumerate() {

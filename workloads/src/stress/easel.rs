@@ -1,7 +1,7 @@
 //! Where scenes are put together: places on the image in pixels, depths in scene units, numbers from a hash.
 
 use glam::{Affine3A, DVec2, DVec3};
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 use pipeline::{Camera, CameraError, Lens, SampleTable, Viewport};
 
 use super::{Size, StressScene};
@@ -135,6 +135,6 @@ impl Dice {
     fn throw(&mut self) -> f64 {
         self.thrown += 1;
         let word = mix(self.seed.wrapping_add(self.thrown.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
-        (word >> 11) as f64 / (1_u64 << 53) as f64
+        unit(word)
     }
 }

@@ -85,6 +85,10 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&Path>) -> Result<Visibil
 /// As [`load`], and where a PLY or OBJ file has no partner.
 pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, LoadError> {
     let mut files = files.iter().map(AsRef::as_ref);
+    if let Some(folder) = files.clone().find(|path| path.is_dir()) {
+        let message = format!("{} is a folder: give the .mts, .ply or .obj files in it", folder.display());
+        return Err(LoadError::Setting { setting: "files", message });
+    }
     let mut cases = Vec::new();
     while let Some(file) = files.next() {
         let case = match Kind::of(file)? {

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::mesh::MovingMesh;
 use crate::error::{LoadError, Source};
-use crate::import::{Format, surface};
+use crate::import::{Format, faces, surface};
 use crate::scene::Mesh;
 
 /// What to do about files that do not go together.
@@ -28,7 +28,13 @@ pub(super) fn moving(start: File<'_>, end: File<'_>) -> Result<MovingMesh, LoadE
     let pair = Pair { paths: [start.0, end.0], open: &open, close: &close };
     let close = match (start.1, end.1) {
         (Format::Ply, Format::Ply) => pair.by_index()?,
-        _ => pair.by_corner()?,
+        both => {
+            let close = pair.by_corner()?;
+            if both == (Format::Obj, Format::Obj) {
+                pair.same_faces()?;
+            }
+            close
+        }
     };
     let widen = |points: &[Vec3]| points.iter().map(|point| point.as_dvec3()).collect();
     Ok(MovingMesh { open: widen(&open.positions), close: widen(&close), triangles: open.triangles.to_vec() })
@@ -53,6 +59,24 @@ impl Pair<'_> {
                 let start = self.paths[0].display();
                 let message = format!("its corners are {to:?}, those in {start} are {from:?}; {MEND}");
                 Err(self.wrong(format!("triangle {triangle}"), message))
+            }
+        }
+    }
+
+    /// Whether the faces of two OBJ files name the same positions: triangles may match by chance where they do not.
+    fn same_faces(&self) -> Result<(), LoadError> {
+        let [open, close] = [faces(self.paths[0])?, faces(self.paths[1])?];
+        match open.iter().zip(&close).find(|(from, to)| from.corners != to.corners) {
+            None => Ok(()),
+            Some((from, to)) => {
+                let message = format!(
+                    "it joins vertices {:?}, but line {} of {} joins {:?}; {MEND}",
+                    to.corners,
+                    from.line,
+                    self.paths[0].display(),
+                    from.corners
+                );
+                Err(self.wrong(format!("line {}", to.line), message))
             }
         }
     }

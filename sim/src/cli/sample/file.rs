@@ -28,7 +28,8 @@ pub(super) enum Format {
 impl Format {
     /// By the ending of a name.
     pub fn of(path: &Path) -> Result<Self, Failure> {
-        match path.extension().and_then(|ending| ending.to_str()) {
+        let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
+        match ending.as_deref() {
             Some("csv") => Ok(Self::Csv),
             Some("npy") => Ok(Self::Npy),
             Some("bin") => Ok(Self::Bin),

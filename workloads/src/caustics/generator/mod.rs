@@ -15,7 +15,7 @@ pub use ring::{MirrorRing, Source};
 #[cfg(test)]
 pub(in crate::caustics) mod tests {
     use glam::DVec3;
-    use pipeline::sampling::mix;
+    use pipeline::sampling::{mix, unit};
 
     use crate::caustics::{Beam, Hit};
 
@@ -29,7 +29,7 @@ pub(in crate::caustics) mod tests {
 
         pub fn within(&mut self, low: f64, high: f64) -> f64 {
             self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            low + (high - low) * ((mix(self.0) >> 11) as f64 / (1_u64 << 53) as f64)
+            low + (high - low) * unit(mix(self.0))
         }
 
         /// A place in a beam.

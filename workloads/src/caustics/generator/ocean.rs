@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use pipeline::sampling::mix;
+use pipeline::sampling::{mix, unit};
 
 use super::super::Beam;
 use super::super::optics::{refract, transmission};
@@ -49,7 +49,7 @@ impl Ocean {
     /// Water under a low sun in waves of many lengths and directions, from the third part of `longest_m` on; `slope` is the
     /// root mean square of their slopes.
     pub fn new(cells: u32, side_m: f64, depth_m: f64, [longest_m, slope]: [f64; 2], seed: u64) -> Self {
-        let uniform = |n: u64| (mix(mix(seed ^ 0x0CEA) ^ n) >> 11) as f64 / (1_u64 << 53) as f64;
+        let uniform = |n: u64| unit(mix(mix(seed ^ 0x0CEA) ^ n));
         let waves = (0..WAVES).map(|n| {
             let length_m = longest_m * libm::pow(SHORTEST, n as f64 / (WAVES - 1) as f64);
             let angle = SPREAD * (2.0 * uniform(2 * n) - 1.0);
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn slopes_are_as_steep_as_asked_for() {
         let ocean = Ocean::new(4, 12.0, 5.0, [3.0, 0.2], 9);
-        let uniform = |n: u64| (mix(n) >> 11) as f64 / (1_u64 << 53) as f64;
+        let uniform = |n: u64| unit(mix(n));
         let count = 20_000;
         let squares = (0..count).map(|n| {
             let at = DVec2::new(1000.0 * uniform(2 * n), 1000.0 * uniform(2 * n + 1));

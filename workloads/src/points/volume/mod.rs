@@ -27,5 +27,3 @@ pub trait Inside: Sync {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(super) use tests::hardware;

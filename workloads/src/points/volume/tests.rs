@@ -1,29 +1,11 @@
 use glam::DVec3;
-use pipeline::memory::Compression;
 use pipeline::sampling::{HashedSamples, LensShape, Sample, SampleSource};
-use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Shading};
 
 use super::standard::place;
 use super::*;
+use crate::job::testing::hardware;
 use crate::points::quality::chi_square;
 use crate::points::white::counts;
-
-/// Some hardware; which does not matter here.
-pub(in crate::points) fn hardware() -> PipelineSpec {
-    let lines = CacheSpec::lru(256, 4);
-    let compression = Compression { depth: false, colour: false };
-    PipelineSpec {
-        tile_px: 8,
-        coarse_tile_px: 32,
-        batch_triangles: 4096,
-        vertex_reuse: 16,
-        shading: Shading::Cached,
-        shading_cache: lines,
-        memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: lines, compression },
-        features: Features::ALL,
-        depth: pipeline::depth::DepthSpec::default(),
-    }
-}
 
 /// A cube from 0 to 1 as triangles.
 fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {

@@ -1,0 +1,91 @@
+//! Looking closer and closer at a pair.
+
+use super::compare::{Scratch, Watch};
+use super::pair::{Look, Outcome, Pair};
+use super::pass::{Effort, Fit, Part};
+use super::search::Verdict;
+
+/// Looking closer ends when so much of space and time, and of the triangles, is left of a round.
+const STUCK: f64 = 0.5;
+/// Tiles across that looking closer begins with, at least; more where there are more than so many triangles for a tile.
+const FIRST_TILES: u32 = 8;
+const TRIANGLES_A_TILE: f64 = 16.0;
+/// So many triangles are looked at by their boxes first.
+const MANY: usize = 64;
+/// Fragments that may be drawn for a pair before it is let stand: many for few triangles, which are cheap all the same and often
+/// nearly touch, and a few for each of many.
+const MOST_FRAGMENTS: u64 = 1 << 18;
+const LEAST_FRAGMENTS: u64 = 1 << 16;
+const FRAGMENTS_LESS: u64 = 128;
+const FRAGMENTS_EACH: u64 = 4;
+/// Rounds that may be needed to halve space and time down to the spacing of numbers.
+const MOST_ROUNDS: u32 = 64;
+
+/// So many triangles of a part say how fast it is.
+const SOME: usize = 64;
+
+impl Pair<'_> {
+    /// From few tiles to many and, wherever that leaves less of space and time, closer. Many triangles are looked at by their boxes
+    /// until that no longer helps, those that are left by their edges.
+    pub fn closer(&mut self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
+        if !self.tighten() {
+            return Verdict::Apart;
+        }
+        let most = self.search.resolution;
+        let triangles = self.triangles() as u64;
+        let few = MOST_FRAGMENTS.saturating_sub(FRAGMENTS_LESS * triangles).max(LEAST_FRAGMENTS);
+        let mut effort = Effort::of(few + FRAGMENTS_EACH * triangles);
+        let mut fit = if self.triangles() > MANY { Fit::Boxes } else { Fit::Edges };
+        let first = (self.triangles() as f64 / TRIANGLES_A_TILE).sqrt() as u32;
+        let (mut resolution, mut last) = (first.max(FIRST_TILES).min(most), self.maybe(0, false));
+        for _ in 0..MOST_ROUNDS {
+            let (before, triangles) = (self.window, self.triangles());
+            let look = Look { resolution, bins: self.bins(resolution), fit };
+            let round = match self.round(look, &mut effort, scratch, watch) {
+                Outcome::Apart => return Verdict::Apart,
+                Outcome::GaveUp => break,
+                Outcome::Left(round) => round,
+            };
+            self.window = round.window;
+            last = self.maybe(round.tiles, round.seen);
+            if round.seen {
+                break;
+            }
+            if !self.tighten() {
+                return Verdict::Apart;
+            }
+            if self.triangles() <= MANY {
+                fit = Fit::Edges;
+            }
+            let stuck = round.window.share_of(&before) > STUCK;
+            let crowded = self.triangles() as f64 > STUCK * triangles as f64;
+            match (stuck && resolution < most, crowded, fit) {
+                (true, ..) => resolution = (2 * resolution).min(most),
+                (false, true, Fit::Boxes) => fit = Fit::Edges,
+                (false, true, Fit::Edges) if stuck => break,
+                _ => {}
+            }
+        }
+        last
+    }
+
+    /// Bins of time in which a triangle moves by a tile or so, and no more than asked for.
+    fn bins(&self, resolution: u32) -> u32 {
+        let [first, last] = self.window.time;
+        let step = |part: &Part<'_>| {
+            let some = part.list.iter().step_by(part.list.len().div_ceil(SOME).max(1));
+            let moved = |triangle: &u32| {
+                let [open, close] = &part.object.triangles[*triangle as usize];
+                let moved = |axis: usize| {
+                    let extent = self.window.space[axis][1] - self.window.space[axis][0];
+                    let way = (close[0][axis] - open[0][axis]).abs() * (last - first);
+                    if extent > 0.0 { way / extent } else { 0.0 }
+                };
+                moved(0).max(moved(1)).max(moved(2))
+            };
+            some.clone().map(moved).sum::<f64>() / some.len().max(1) as f64
+        };
+        let step = self.parts().iter().map(step).fold(0.0, f64::max);
+        ((step * f64::from(resolution)).ceil() as u32).clamp(1, self.search.bins)
+    }
+}
