@@ -16,6 +16,8 @@ use std::path::Path;
 
 /// Rows read at once.
 const ROWS: usize = 1 << 20;
+/// Rows decoded at once: they are looked at again while they are in the second cache.
+const BATCH: usize = 1 << 16;
 /// Offsets a thread takes at once, about.
 const TASK: usize = 1 << 16;
 /// How far around the lowest offset of the screen the lowest exact one may lie, and one more for its neighbours.
@@ -119,12 +121,17 @@ impl Plan {
 
     /// Appends the next rows of the file to a piece; how many there were.
     fn read(&self, rows: &mut Rows, chunk: &mut Chunk, piece: &mut Piece) -> Result<usize, ReadError> {
-        let read = rows.next(ROWS, chunk)?;
-        self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
-        if read > 0 {
+        let mut read = 0;
+        while read < ROWS {
+            let now = rows.next(BATCH, chunk)?;
+            if now == 0 {
+                break;
+            }
+            self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
             rows.channels(chunk, &mut piece.voltage_v, &mut piece.current_a);
+            piece.add_up();
+            read += now;
         }
-        piece.add_up();
         check_finite(rows, piece)?;
         Ok(read)
     }
