@@ -1,6 +1,7 @@
 //! When samples were taken, before all of them have been seen.
 
 use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, grid};
+use multiversion::multiversion;
 use std::path::Path;
 
 /// Rows from which the rate is first taken.
@@ -38,12 +39,7 @@ impl Clock {
             && let [a, b, ..] = times[..]
         {
             // Equal steps and both ends in place: so is all between.
-            let step = b.wrapping_sub(a);
-            // Without a way out on the way: many pairs are then held at once.
-            let apart =
-                times.iter().zip(&times[1..]).fold(0, |any, (a, b)| any | (b.wrapping_sub(*a) ^ step));
-            let even = apart == 0;
-            if even
+            if all_apart(times, b.wrapping_sub(a))
                 && self.off(stamps, 0, first).abs() <= OFF
                 && self.off(stamps, times.len() - 1, first).abs() <= OFF
             {
@@ -68,6 +64,12 @@ impl Clock {
     fn off(&self, stamps: &Stamps, row: usize, first: u64) -> f64 {
         self.position(stamps.time_s(row)) - (first + row as u64) as f64
     }
+}
+
+/// Whether each time is one step after the one before; without a way out on the way, so that many pairs are held at once.
+#[multiversion(targets("x86_64+avx2"))]
+fn all_apart(times: &[i64], step: i64) -> bool {
+    times.iter().zip(&times[1..]).fold(0, |any, (a, b)| any | (b.wrapping_sub(*a) ^ step)) == 0
 }
 
 /// Start, rate and number of a file's samples, from its description, its first rows and its last one.

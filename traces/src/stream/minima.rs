@@ -1,5 +1,7 @@
 //! Minima of one stretch of the profile, such that stretches join without a seam.
 
+use multiversion::multiversion;
+
 /// Offsets in `from..to` of `profile` (which begins before `from` and reaches beyond `to`) that are lowest within less
 /// than `spacing` on either side; `from` is a multiple of `spacing` in the whole. Of ties, the first of each stretch of
 /// `spacing`; who joins stretches drops those nearer than `spacing` to the one before.
@@ -23,6 +25,7 @@ pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mu
 }
 
 /// The lowest value, in lanes that the compiler keeps in one register.
+#[multiversion(targets("x86_64+avx2"))]
 fn lowest(values: &[f32]) -> f32 {
     let less = |a: f32, b: f32| if b < a { b } else { a };
     let mut lanes = [f32::INFINITY; 16];

@@ -11,6 +11,7 @@ use crate::frames::{Marks, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
 use crate::sum::PairSum;
 use core::ops::Range;
+use multiversion::multiversion;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -192,9 +193,8 @@ impl Plan {
         let place = |offset: u64| (offset - piece.base) as usize;
         let samples = place(begin)..place(end) + width - 1;
         let Workspace { signal, profile, buffers } = workspace;
-        let powers = piece.voltage_v[samples.clone()].iter().zip(&piece.current_a[samples]);
-        signal.clear();
-        signal.extend(powers.map(|(v, i)| v * i - self.mean_w));
+        signal.resize(samples.len(), 0.0);
+        centre(&piece.voltage_v[samples.clone()], &piece.current_a[samples], self.mean_w, signal);
         profile.clear();
         profile.resize((end - begin) as usize, f32::INFINITY);
         self.screens.iter().for_each(|screen| screen.lower(signal, profile, buffers));
@@ -247,6 +247,14 @@ impl Plan {
         let aligned = best as f64 + finer;
         let sum_w = piece.sum_to(aligned + self.placement.marks[mark].anchor);
         Candidate { offset, aligned, distance_w2, sum_w, mark: mark as u32 }
+    }
+}
+
+/// Powers (W) less a mean.
+#[multiversion(targets("x86_64+avx2"))]
+fn centre(voltage_v: &[f32], current_a: &[f32], mean_w: f32, into: &mut [f32]) {
+    for ((signal, v), i) in into.iter_mut().zip(voltage_v).zip(current_a) {
+        *signal = v * i - mean_w;
     }
 }
 

@@ -1,6 +1,7 @@
 //! The samples at hand.
 
 use crate::sum::PairSum;
+use multiversion::multiversion;
 
 /// Samples per stored sum.
 pub(super) const BLOCK: usize = 256;
@@ -70,6 +71,7 @@ impl Piece {
 }
 
 /// Sum of the powers of one block, in eight lanes: always the same order.
+#[multiversion(targets("x86_64+avx2"))]
 fn block_sum(voltage_v: &[f32], current_a: &[f32]) -> f64 {
     let mut lanes = [0.0; 8];
     for (v, i) in voltage_v[..BLOCK].chunks_exact(8).zip(current_a[..BLOCK].chunks_exact(8)) {

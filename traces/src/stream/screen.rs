@@ -1,5 +1,7 @@
 //! The distance of a template to every stretch, in f32: good enough to tell where minima are.
 
+use multiversion::multiversion;
+
 use crate::overlap::{self, OverlapSave};
 
 /// Least length of a transform: its arrays stay in the first cache.
@@ -38,11 +40,17 @@ impl Screen {
             let from = index * step;
             let crosses = self.overlap.block(self.overlap.stretch(signal, from), overlap);
             let (before, after) = (&squares[from..], &squares[from + self.width..]);
-            for (((value, cross), before), after) in out.iter_mut().zip(crosses).zip(before).zip(after) {
-                let distance = ((after - before) + self.own) as f32 + cross;
-                *value = if distance < *value { distance } else { *value };
-            }
+            lower(out, crosses, [before, after], self.own);
         }
+    }
+}
+
+/// Lowers values to the distances that their cross terms and the sums of squares before and after make.
+#[multiversion(targets("x86_64+avx2"))]
+fn lower(values: &mut [f32], crosses: &[f32], [before, after]: [&[f64]; 2], own: f64) {
+    for (((value, cross), before), after) in values.iter_mut().zip(crosses).zip(before).zip(after) {
+        let distance = ((after - before) + own) as f32 + cross;
+        *value = if distance < *value { distance } else { *value };
     }
 }
 

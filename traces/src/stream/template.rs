@@ -5,6 +5,7 @@ use super::clock::Clock;
 use super::piece::Piece;
 use crate::frames::{MarkError, Marks, Placement};
 use crate::io::{Chunk, ReadOptions, Rows};
+use multiversion::multiversion;
 use std::path::Path;
 
 /// The marks' windows, read by themselves.
@@ -32,7 +33,8 @@ pub(super) fn templates(
     Ok(templates)
 }
 
-/// Summed squared difference of powers and a template, in eight lanes: always the same order.
+/// Summed squared difference of powers and a template, in eight lanes: always the same order, whatever vectors there are.
+#[multiversion(targets("x86_64+avx2"))]
 pub(super) fn difference(voltage_v: &[f32], current_a: &[f32], template: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let whole = template.len() / 8 * 8;
