@@ -1,4 +1,5 @@
 //! The kept corpus of the fuzz targets (`fuzz/seeds/trace_*`): every file is read or refused, none ends the program.
+#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
