@@ -20,7 +20,7 @@ pub enum ReadError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// Parquet or CSV.
+        /// Parquet, JLS or CSV.
         format: &'static str,
         /// What the reader says.
         reason: String,
@@ -143,6 +143,19 @@ pub enum ReadError {
         off_periods: f64,
         /// The rate it was held against, Hz.
         rate_hz: f64,
+    },
+    /// Signals that do not make up rows.
+    #[error(
+        "{path}: {one}, but {other}: record them alike, or read one alone (its power, or its current with a voltage by \
+         specification)", path = path.display()
+    )]
+    Signals {
+        /// The file.
+        path: PathBuf,
+        /// A signal: samples, first one, rate.
+        one: String,
+        /// Another.
+        other: String,
     },
     /// There is no row.
     #[error("{path}: no samples: record at least one", path = path.display())]

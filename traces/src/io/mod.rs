@@ -1,6 +1,6 @@
 //! Trace files.
 //!
-//! [`read`] takes any of them, as [`ReadOptions`] say: Parquet, CSV, TSV, gzip. [`Rows`] reads in pieces what does not fit
+//! [`read`] takes any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces what does not fit
 //! into memory. [`csv`] and [`parquet`] write, and read by the native names alone.
 
 pub mod atomic;

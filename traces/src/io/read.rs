@@ -26,7 +26,7 @@ pub(super) struct Columns {
     pub current_a: Vec<f32>,
 }
 
-/// Reads a trace from Parquet, CSV or TSV (the latter also with gzip), told apart by their first bytes.
+/// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), told apart by their first bytes.
 ///
 /// # Errors
 /// [`ReadError`] names the file, the row and how to mend it.

@@ -1,6 +1,7 @@
 //! Rows of a file in pieces, so that no file has to fit into memory.
 
 mod csv;
+mod jls;
 mod lines;
 mod parquet;
 mod zstd;
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// The first bytes of formats that are not read, and what to do about them.
 const FOREIGN: [(&[u8], &str, &str); 3] = [
-    (b"jlsfmt\r\n", "a JLS recording", "export it with pyjls or the Joulescope UI to CSV or Parquet"),
+    (b"\xd3tagfmt", "a JLS recording of version 1", "export it to CSV from the program that made it"),
     (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
     (
         b"PK\x03\x04",
@@ -42,6 +43,7 @@ impl Default for Chunk {
 
 enum Source {
     Csv(Box<csv::CsvRows>),
+    Jls(Box<jls::JlsRows>),
     Parquet(Box<parquet::ParquetRows>),
 }
 
@@ -55,13 +57,14 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Opens Parquet, CSV, TSV, or the latter two compressed with gzip; which it is, its first bytes tell.
+    /// Opens Parquet, JLS, CSV, TSV, or the latter two compressed with gzip; which it is, its first bytes tell.
     ///
     /// # Errors
     /// [`ReadError`] if there is no such file, it is of no known format, or columns are missing.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         match first_bytes(path)? {
             start if start.starts_with(b"PAR1") => Self::parquet(path, options),
+            start if start.starts_with(b"jlsfmt\r\n") => Self::jls(path, options),
             start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
                 Some((_, found, mend)) => Err(ReadError::Format { path: path.to_owned(), found, mend }),
                 None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),
@@ -78,6 +81,11 @@ impl Rows {
     pub(crate) fn csv(path: &Path, options: &ReadOptions, gzip: bool) -> Result<Self, ReadError> {
         let (source, layout, header) = csv::CsvRows::open(path, options, gzip)?;
         Self::new(path, Source::Csv(Box::new(source)), layout, header, options, "time_s")
+    }
+
+    fn jls(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let (source, layout, header) = jls::JlsRows::open(path, options)?;
+        Self::new(path, Source::Jls(Box::new(source)), layout, header, options, "time_s")
     }
 
     fn new(
@@ -109,6 +117,7 @@ impl Rows {
     pub fn count(&self) -> Option<u64> {
         match &self.source {
             Source::Csv(_) => None,
+            Source::Jls(rows) => Some(rows.count()),
             Source::Parquet(rows) => Some(rows.count()),
         }
     }
@@ -128,6 +137,7 @@ impl Rows {
         let path = self.path.clone();
         match &mut self.source {
             Source::Csv(source) => source.skip(rows),
+            Source::Jls(source) => source.skip(rows),
             Source::Parquet(source) => {
                 catch_unwind(AssertUnwindSafe(|| source.skip(rows))).unwrap_or_else(|_| Err(gave_up(&path)))
             }
@@ -141,6 +151,7 @@ impl Rows {
         let path = &self.path;
         match &mut self.source {
             Source::Csv(source) => source.next(&self.layout, limit, self.repair, chunk),
+            Source::Jls(source) => source.next(limit, chunk),
             Source::Parquet(source) => {
                 let read = catch_unwind(AssertUnwindSafe(|| source.next(limit, chunk)));
                 read.unwrap_or_else(|_| Err(gave_up(path)))
@@ -191,6 +202,7 @@ impl Source {
     fn names(&self) -> &[String] {
         match self {
             Self::Csv(rows) => rows.names(),
+            Self::Jls(rows) => rows.names(),
             Self::Parquet(rows) => rows.names(),
         }
     }

@@ -53,7 +53,7 @@ pub enum TraceCommand {
 /// A trace and how to read it.
 #[derive(Debug, Args)]
 pub struct InputArgs {
-    /// A trace: Parquet, CSV or TSV, the latter two also compressed with gzip
+    /// A trace: Parquet, JLS (Joulescope), CSV or TSV, the latter two also compressed with gzip
     #[arg(value_name = "TRACE")]
     pub trace: PathBuf,
     /// A rail to read, by the name its columns carry; several are added up. All without it

@@ -1,0 +1,86 @@
+//! Rows of JLS version 2, what Joulescope instruments record: each signal by a reader of its own, all of them at once.
+//!
+//! A file is a row of chunks; those of one kind are linked. Signals are defined in one list, and each has a list of its
+//! data, with indices and summaries above it (pyjls 0.17, `jls/format.h`). Summaries, annotations and UTC are not read.
+
+mod chunk;
+mod crc;
+mod sample;
+mod signal;
+#[cfg(test)]
+mod tests;
+mod track;
+
+use super::Chunk;
+use crate::io::columns::{Layout, layout};
+use crate::io::header::Header;
+use crate::io::timing::Stamps;
+use crate::io::{ReadError, ReadOptions};
+use chunk::ChunkFile;
+use rayon::prelude::*;
+use signal::Definitions;
+use std::path::Path;
+use track::Track;
+
+/// A JLS file being read.
+pub(super) struct JlsRows {
+    names: Vec<String>,
+    tracks: Vec<Track>,
+}
+
+impl JlsRows {
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Header), ReadError> {
+        let definitions = Definitions::read(&mut ChunkFile::open(path)?)?;
+        let names = definitions.names();
+        let mut layout = layout(path, &names, options)?;
+        // Rates are fixed: no signal holds times.
+        layout.time = None;
+        let mut tracks = Vec::with_capacity(layout.values.len());
+        for picked in &mut layout.values {
+            let signal = &definitions.signals[picked.index];
+            picked.scale = signal.scale().unwrap_or(picked.scale);
+            tracks.push(Track::open(path, signal)?);
+        }
+        check_alike(path, &tracks)?;
+        let mut header = Header::default();
+        if let (Some(track), Some(picked)) = (tracks.first(), layout.values.first()) {
+            header.rate_hz = Some(f64::from(track.rate_hz)).filter(|&rate_hz| rate_hz > 0.0);
+            header.metadata.device = definitions.device(&definitions.signals[picked.index]);
+        }
+        Ok((Self { names, tracks }, layout, header))
+    }
+
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub fn count(&self) -> u64 {
+        self.tracks.first().map_or(0, |track| track.rows)
+    }
+
+    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        self.tracks.iter_mut().try_for_each(|track| track.skip(rows))
+    }
+
+    pub fn next(&mut self, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
+        chunk.stamps = Stamps::Absent;
+        let each = self.tracks.par_iter_mut().zip(&mut chunk.values);
+        let read: Vec<_> = each.map(|(track, list)| track.values(limit, list)).collect();
+        // All have as many: each was held against its own number, and the numbers are alike.
+        read.into_iter().try_fold(0, |_, rows| rows)
+    }
+}
+
+/// Rows are made of signals of one rate, from one sample to another.
+fn check_alike(path: &Path, tracks: &[Track]) -> Result<(), ReadError> {
+    let Some((one, others)) = tracks.split_first() else { return Ok(()) };
+    let key = |track: &Track| (track.rate_hz, track.first, track.rows);
+    let told = |track: &Track| {
+        let (name, rows, first, rate_hz) = (&track.name, track.rows, track.first, track.rate_hz);
+        format!("{name} has {rows} samples from number {first} on at {rate_hz} Hz")
+    };
+    match others.iter().find(|other| key(other) != key(one)) {
+        Some(other) => Err(ReadError::Signals { path: path.to_owned(), one: told(one), other: told(other) }),
+        None => Ok(()),
+    }
+}
