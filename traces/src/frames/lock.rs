@@ -42,7 +42,7 @@ pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Tic
     if (many as f64) < MOSTLY * gaps.len() as f64 {
         return None;
     }
-    let period = slope(positions, period);
+    let period = slope(positions, &periods);
     let tick = |position: f64| libm::round((position - positions[fixed]) / period);
     let off: Vec<f64> = positions.iter().map(|x| x - positions[fixed] - tick(*x) * period).collect();
     let share =
@@ -57,16 +57,15 @@ pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Tic
 }
 
 /// The period by which the sum of the distances of all positions to ticks is least (iteratively reweighted least squares; Schlossmacher
-/// 1973), from a first guess.
-fn slope(positions: &[f64], guess: f64) -> f64 {
-    let mut count = 0.0;
+/// 1973); `periods` lie between each and the next.
+fn slope(positions: &[f64], periods: &[f64]) -> f64 {
     let mut ticks = vec![0.0];
-    for two in positions.windows(2) {
-        count += libm::round((two[1] - two[0]) / guess);
-        ticks.push(count);
-    }
+    ticks.extend(periods.iter().scan(0.0, |tick, periods| {
+        *tick += periods;
+        Some(*tick)
+    }));
     let mut weights = vec![1.0; ticks.len()];
-    let mut period = guess;
+    let mut period = 0.0;
     for _ in 0..ROUNDS {
         let total: f64 = weights.iter().sum();
         let mean = |of: &[f64]| of.iter().zip(&weights).map(|(x, w)| x * w).sum::<f64>() / total;

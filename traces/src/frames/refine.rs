@@ -1,6 +1,7 @@
 //! Frame starts finer than a sample.
 
 use super::profile::difference;
+use core::ops::RangeInclusive;
 
 /// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared difference within
 /// `reach` of it and the vertex of the parabola through it and its two neighbours.
@@ -24,6 +25,17 @@ pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) 
     best as f64 + vertex(at(best - 1), lowest, at(best + 1))
 }
 
+/// Where in a range of shifts the residual is least, looked at in steps and then about the best of them.
+pub(super) fn nearest(shifts: RangeInclusive<usize>, step: usize, residual: impl Fn(usize) -> f64) -> usize {
+    let (first, last) = shifts.into_inner();
+    let least = |from: usize, to: usize, step: usize| {
+        let judged = (from..=to).step_by(step).map(|shift| (residual(shift), shift));
+        judged.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(first, |(_, shift)| shift)
+    };
+    let rough = least(first, last, step);
+    if step == 1 { rough } else { least(first.max(rough.saturating_sub(step)), last.min(rough + step), 1) }
+}
+
 /// Where the parabola through three equally spaced values is lowest, relative to the middle one, within half a step.
 pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     let curvature = before - 2.0 * middle + after;
@@ -33,6 +45,15 @@ pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn oracle_steps_find_the_lowest_of_a_smooth_residual() {
+        for lowest in [1, 77, 500, 998] {
+            let residual = |shift: usize| (shift as f64 - f64::from(lowest)).abs();
+            assert_eq!(nearest(1..=999, 16, residual), lowest as usize);
+        }
+        assert_eq!(nearest(1..=11, 1, |shift| (shift as f64 - 4.0).abs()), 4);
+    }
 
     /// Box samples of an edge from 0 to 1 at `at`, low-passed by a ramp of `width` samples.
     fn edge(at: f64, width: f64, samples: usize) -> Vec<f64> {

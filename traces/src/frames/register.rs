@@ -6,6 +6,7 @@
 //! `c_i` the position by template and marks held fixed. It is solved by Gauss-Seidel sweeps. An edge just where the compared stretch
 //! ends enters at some shifts only and pulls the result by up to a quarter of a sample (a test shows it).
 
+use super::refine::{nearest, vertex};
 use super::stretch::Pair;
 use rayon::prelude::*;
 
@@ -99,33 +100,18 @@ fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Opti
     let from = b.checked_sub(reach)?;
     let stretch = power.get(from..b + reach + length)?;
     let residual = |shift: usize| unlike(&stretch[shift..shift + length], template);
-    let at = nearest(1, 2 * reach - 1, residual);
+    let last = 2 * reach - 1;
+    let at = nearest(1..=last, (last - 1).div_ceil(TRIED).max(1), residual);
     let [left, middle, right] = [at - 1, at, at + 1].map(residual);
     let curvature = left - 2.0 * middle + right;
     if middle > left.min(right) || curvature <= 0.0 || middle > UNLIKE * unlike(template, &vec![0.0; length])
     {
         return None;
     }
-    let vertex = (0.5 * (left - right) / curvature).clamp(-0.5, 0.5);
     // Of a parabola `c d^2 / 2` with noise of variance v a sample in each stretch, the vertex has about variance 2 v / c; the floor is the
     // parabola's own error on sharp edges.
     let variance = 2.0 * middle / length as f64 / curvature + 0.01;
-    Some((1.0, at as f64 - reach as f64 + vertex, 1.0 / variance))
-}
-
-/// Where between two shifts, both included, the residual is least, looked at in steps and then about the best.
-fn nearest(first: usize, last: usize, residual: impl Fn(usize) -> f64) -> usize {
-    let least = |shifts: core::iter::StepBy<core::ops::RangeInclusive<usize>>| {
-        let judged = shifts.map(|shift| (residual(shift), shift));
-        judged.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(first, |(_, shift)| shift)
-    };
-    let step = (last - first).div_ceil(TRIED).max(1);
-    let rough = least((first..=last).step_by(step));
-    if step == 1 {
-        rough
-    } else {
-        least((first.max(rough.saturating_sub(step))..=last.min(rough + step)).step_by(1))
-    }
+    Some((1.0, at as f64 - reach as f64 + vertex(left, middle, right), 1.0 / variance))
 }
 
 /// Summed squared difference of two stretches beyond their difference in mean.
@@ -221,15 +207,6 @@ mod tests {
         let worst = found.iter().zip(&at).map(|(f, a)| (f - (a - 50.0)).abs()).fold(0.0, f64::max);
         let errors: Vec<f64> = found.iter().zip(&at).map(|(f, a)| (f - (a - 50.0)).round()).collect();
         assert!(worst < 1.0, "{errors:?}");
-    }
-
-    #[test]
-    fn oracle_steps_find_the_lowest_of_a_smooth_residual() {
-        for lowest in [1, 77, 500, 998] {
-            let residual = |shift: usize| (shift as f64 - f64::from(lowest)).abs();
-            assert_eq!(nearest(1, 999, residual), lowest as usize);
-        }
-        assert_eq!(nearest(1, 11, |shift| (shift as f64 - 4.0).abs()), 4);
     }
 
     #[test]

@@ -4,6 +4,8 @@
 //! of the other, drawn out in time. Compared as they are, the two fit best where the start is up to a sixth of the window off. So the
 //! earlier stretch is drawn out about its start by one ratio after another, and the shift is taken from the ratio that fits best.
 
+use super::refine::{nearest, vertex};
+
 /// Ratios of durations that are tried: powers of this, up and down.
 const STEP: f64 = 1.06;
 /// The greatest power: clocks of a device lie within a factor of two.
@@ -38,12 +40,8 @@ pub(super) struct Pair<'a> {
 impl Pair<'_> {
     /// The ratio and the shift that leave least unexplained; `None` where the trace ends too early or nothing fits best.
     pub fn best(&self) -> Option<Fit> {
-        let first = self.starts[1].checked_sub(self.before + self.reach)?;
-        let stretch = self.power.get(first..self.starts[1] + self.after + self.reach)?;
-        let fits = (-POWERS..=POWERS).filter_map(|power| {
-            let ratio = libm::pow(STEP, f64::from(power));
-            Some((power, self.fit(&self.drawn_out(ratio)?, stretch, ratio)?))
-        });
+        let fits = (-POWERS..=POWERS)
+            .filter_map(|power| Some((power, self.fit(libm::pow(STEP, f64::from(power)))?)));
         let (power, fit) = fits.min_by(|a, b| a.1.unlike.total_cmp(&b.1.unlike))?;
         // What fits best by the greatest ratio would fit better by a greater one.
         (power.abs() < POWERS).then_some(fit)
@@ -51,9 +49,13 @@ impl Pair<'_> {
 
     /// The fit of clocks that are the same.
     pub fn plain(&self) -> Option<Fit> {
+        self.fit(1.0)
+    }
+
+    /// What of the later frame is compared at one shift or another.
+    fn searched(&self) -> Option<&[f64]> {
         let first = self.starts[1].checked_sub(self.before + self.reach)?;
-        let stretch = self.power.get(first..self.starts[1] + self.after + self.reach)?;
-        self.fit(&self.drawn_out(1.0)?, stretch, 1.0)
+        self.power.get(first..self.starts[1] + self.after + self.reach)
     }
 
     /// What lies about the start of the earlier frame, drawn out about it, of mean 0.
@@ -70,20 +72,18 @@ impl Pair<'_> {
         Some(values)
     }
 
-    fn fit(&self, template: &[f64], stretch: &[f64], ratio: f64) -> Option<Fit> {
+    /// The best shift at one ratio.
+    fn fit(&self, ratio: f64) -> Option<Fit> {
+        let (stretch, template) = (self.searched()?, self.drawn_out(ratio)?);
         let own: f64 = template.iter().map(|x| x * x).sum();
-        let unlike = |shift: usize| unexplained(template, own, &stretch[shift..shift + template.len()]);
-        let least = |shifts: &mut dyn Iterator<Item = usize>| {
-            shifts.map(|shift| (unlike(shift), shift)).min_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        let (_, rough) = least(&mut (1..2 * self.reach).step_by(ROUGH))?;
-        let around = rough.saturating_sub(ROUGH - 1).max(1)..=(rough + ROUGH - 1).min(2 * self.reach - 1);
-        let (middle, at) = least(&mut around.into_iter())?;
-        let [left, right] = [at - 1, at + 1].map(unlike);
+        let unlike = |shift: usize| unexplained(&template, own, &stretch[shift..shift + template.len()]);
+        let last = (2 * self.reach).checked_sub(1)?;
+        let at = nearest(1..=last, ROUGH, unlike);
+        let [left, middle, right] = [at - 1, at, at + 1].map(unlike);
         let curvature = left - 2.0 * middle + right;
         (middle <= left.min(right) && curvature > 0.0).then(|| Fit {
             ratio,
-            shift: at as f64 - self.reach as f64 + (0.5 * (left - right) / curvature).clamp(-0.5, 0.5),
+            shift: at as f64 - self.reach as f64 + vertex(left, middle, right),
             unlike: middle,
             curvature,
         })
