@@ -12,8 +12,8 @@ const WHOLE: f64 = 2e-3;
 const MOSTLY: f64 = 0.5;
 /// and this share of its starts lie within so many periods of a tick.
 const ON_TICKS: [f64; 2] = [0.8, 0.1];
-/// Ticks are used only if this share of the starts lie farther than this share of the window from theirs.
-const SPREAD: [f64; 2] = [0.1, 0.06];
+/// Ticks are used only if this share of the starts lie farther than this share of the window from theirs: more than a few by chance.
+const SPREAD: [f64; 2] = [0.02, 0.06];
 /// Fewest gaps that tell.
 const LEAST: usize = 16;
 /// Rounds of reweighting.

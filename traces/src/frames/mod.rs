@@ -20,6 +20,7 @@ mod propose;
 mod refine;
 mod register;
 mod regularity;
+mod settle;
 mod spans;
 mod split;
 mod stretch;

@@ -42,6 +42,13 @@ pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
+/// Power between two samples, taken to be linear there; `None` outside of the trace.
+pub(super) fn between(power: &[f64], place: f64) -> Option<f64> {
+    let whole = libm::floor(place);
+    let (a, b) = (power.get(whole as usize)?, power.get(whole as usize + 1)?);
+    (place >= 0.0).then(|| a + (place - whole) * (b - a))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

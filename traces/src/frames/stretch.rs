@@ -4,7 +4,7 @@
 //! of the other, drawn out in time. Compared as they are, the two fit best where the start is up to a sixth of the window off. So the
 //! earlier stretch is drawn out about its start by one ratio after another, and the shift is taken from the ratio that fits best.
 
-use super::refine::{nearest, vertex};
+use super::refine::{between, nearest, vertex};
 
 /// Ratios of durations that are tried: powers of this, up and down.
 const STEP: f64 = 1.06;
@@ -62,9 +62,7 @@ impl Pair<'_> {
     fn drawn_out(&self, ratio: f64) -> Option<Vec<f64>> {
         let value = |index: usize| {
             let place = self.starts[0] as f64 + (index as f64 - self.before as f64) / ratio;
-            let whole = libm::floor(place);
-            let (a, b) = (self.power.get(whole as usize)?, self.power.get(whole as usize + 1)?);
-            (place >= 0.0).then(|| a + (place - whole) * (b - a))
+            between(self.power, place)
         };
         let mut values = (0..self.before + self.after).map(value).collect::<Option<Vec<f64>>>()?;
         let mean = values.iter().sum::<f64>() / values.len() as f64;

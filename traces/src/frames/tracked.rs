@@ -6,6 +6,7 @@ use super::lock::{Ticks, ticks};
 use super::marks::{MarkError, Marks, Placed};
 use super::method::Method;
 use super::register::register;
+use super::settle::settle;
 use super::threshold::choose;
 use super::track::{Start, track};
 use super::uncovered::uncovered;
@@ -25,6 +26,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
+    let positions = settle(&power, positions, &fixed, anchor, placement.samples);
     let as_they_are = |positions: Vec<f64>| Ticks { between: vec![false; positions.len()], positions };
     let first_mark = fixed.iter().position(|fixed| *fixed);
     let Ticks { positions, between } = first_mark

@@ -15,27 +15,90 @@ pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
     !within(ratio, ODD) && (ratio - 2.0).abs() > TWO && within(after / before, SAME)
 }
 
-/// What is left of the confidence of each start: less by each slip between it and the nearest mark, and where that mark is itself off
-/// the beat of the starts around it. Without marks all of it.
-pub(super) fn left(offsets: &[usize], marks: &[usize]) -> Vec<f64> {
-    let gaps: Vec<f64> = offsets.windows(2).map(|two| (two[1] - two[0]) as f64).collect();
-    // How many slips lie before each start.
-    let slips: Vec<i32> = (0..offsets.len())
-        .scan(0, |count, index| {
-            *count += i32::from(slipped(&gaps[..gaps.len().min(index + 1)]));
-            Some(*count)
-        })
-        .collect();
-    let marked: Vec<(usize, bool)> = marks
-        .iter()
-        .filter_map(|mark| offsets.binary_search(mark).ok())
-        .map(|mark| (mark, off_beat(&gaps, mark)))
-        .collect();
-    let nearest = |start: usize| marked.iter().copied().min_by_key(|(mark, _)| mark.abs_diff(start));
-    let between = |start: usize, (mark, off): (usize, bool)| {
-        libm::pow(LEFT, f64::from((slips[start] - slips[mark]).abs() + i32::from(off)))
+/// What is left of the confidence of each start: less by each slip between it and the nearest of the places that are `known`, and where
+/// that is itself off the beat of the starts around it, or was put right beyond a slip from the nearest one of `marks`. A slip does not
+/// say which of its sides is in the right phase, so it counts on this side, too, back to where the clock stepped, as the phase may
+/// have been lost there. Without marks all of it.
+pub(super) fn left(offsets: &[usize], marks: &[usize], known: &[usize]) -> Vec<f64> {
+    let beat = Beat::new(offsets);
+    let among = |places: &[usize]| -> Vec<usize> {
+        places.iter().filter_map(|place| offsets.binary_search(place).ok()).collect()
     };
-    (0..offsets.len()).map(|start| nearest(start).map_or(1.0, |mark| between(start, mark))).collect()
+    let (marks, known) = (among(marks), among(known));
+    let nearest = |places: &[usize], start: usize| places.iter().copied().min_by_key(|p| p.abs_diff(start));
+    let doubted = |place: usize| {
+        let beyond = nearest(&marks, place)
+            .is_some_and(|mark| beat.slips_between(place, mark) > 0 || beat.may_have_been_lost(place, mark));
+        usize::from(off_beat(&beat.gaps, place)) + usize::from(beyond)
+    };
+    let of_start = |start: usize| {
+        nearest(&known, start).map_or(1.0, |place| {
+            let doubts = beat.slips_between(start, place) + doubted(place);
+            let lost = doubts == 0 && beat.may_have_been_lost(start, place);
+            libm::pow(LEFT, (doubts + usize::from(lost)) as f64)
+        })
+    };
+    (0..offsets.len()).map(of_start).collect()
+}
+
+/// The gaps between starts, and where their beat breaks.
+struct Beat {
+    gaps: Vec<f64>,
+    /// How many slips, and how many clock steps, lie before each start.
+    slips: Vec<usize>,
+    steps: Vec<usize>,
+    /// Whether a slip lies between each two steps.
+    slipped: Vec<bool>,
+}
+
+impl Beat {
+    fn new(offsets: &[usize]) -> Self {
+        let gaps: Vec<f64> = offsets.windows(2).map(|two| (two[1] - two[0]) as f64).collect();
+        let count = |breaks: &dyn Fn(&[f64]) -> bool| -> Vec<usize> {
+            let count = |count: &mut usize, index: usize| {
+                *count += usize::from(gaps.get(..=index).is_some_and(breaks));
+                Some(*count)
+            };
+            (0..offsets.len()).scan(0, count).collect()
+        };
+        let slips = count(&|gaps| slipped(gaps) || step_slipped(gaps));
+        let steps = count(&|gaps| step(gaps).is_some());
+        let mut slipped = vec![false; steps.last().map_or(0, |last| last + 1)];
+        for start in 1..slips.len() {
+            if slips[start] > slips[start - 1] {
+                slipped[steps[start - 1]] = true;
+                slipped[steps[start]] = true;
+            }
+        }
+        Self { gaps, slips, steps, slipped }
+    }
+
+    fn slips_between(&self, a: usize, b: usize) -> usize {
+        self.slips[a].abs_diff(self.slips[b])
+    }
+
+    /// Whether the clock stepped between a start and a place, and the beat around the start slips.
+    fn may_have_been_lost(&self, start: usize, place: usize) -> bool {
+        self.steps[start] != self.steps[place] && self.slipped[self.steps[start]]
+    }
+}
+
+/// The beats before and after the gap before the last two of these, where the clock steps in it.
+fn step(gaps: &[f64]) -> Option<[f64; 2]> {
+    let same = |a: f64, b: f64| within(b / a, SAME);
+    match *gaps {
+        [.., a, b, _, c, d] if same(a, b) && same(c, d) && !same(b, c) && !whole(c / b) => Some([b, c]),
+        _ => None,
+    }
+}
+
+/// Whether the frame in which the clock steps is too short or too long for one of either beat, and for two.
+fn step_slipped(gaps: &[f64]) -> bool {
+    let Some([before, after]) = step(gaps) else { return false };
+    let between = gaps[gaps.len() - 3];
+    let (least, most) = (before.min(after), before.max(after));
+    let outside = |frames: f64| !(ODD[0] * frames * least..ODD[1] * frames * most).contains(&between);
+    outside(1.0) && outside(2.0)
 }
 
 /// Whether the last of these gaps takes up the beat from before one odd gap, or two, in another phase.
@@ -80,11 +143,39 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_in_which_the_clock_steps_lasts_between_the_beats_or_is_a_slip() {
+        let slipped =
+            |before: f64, between: f64, after: f64| step_slipped(&[before, before, between, after, after]);
+        assert!(slipped(144.0, 107.0, 187.0) && slipped(187.0, 240.0, 144.0));
+        assert!(!slipped(144.0, 160.0, 187.0) && !slipped(187.0, 150.0, 144.0));
+        // A start was missed where the clock stepped; a steady beat is not of concern here, nor is a single start off the beat.
+        assert!(!slipped(144.0, 330.0, 187.0) && !slipped(100.0, 60.0, 100.0));
+        assert!(!step_slipped(&[100.0, 130.0, 70.0, 100.0, 100.0]));
+        assert_eq!(left(&[0, 144, 288, 395, 582, 769], &[0], &[0]), [1.0, 1.0, 1.0, 1.0, LEFT, LEFT]);
+    }
+
+    #[test]
     fn doubt_is_on_the_far_side_of_the_slip() {
         let offsets = [0, 100, 200, 300, 450, 550, 650];
-        assert_eq!(left(&offsets, &[100]), [1.0, 1.0, 1.0, 1.0, LEFT, LEFT, LEFT]);
-        assert_eq!(left(&offsets, &[650]), [LEFT, LEFT, LEFT, LEFT, 1.0, 1.0, 1.0]);
-        assert_eq!(left(&offsets, &[]), [1.0; 7]);
+        assert_eq!(left(&offsets, &[100], &[100]), [1.0, 1.0, 1.0, 1.0, LEFT, LEFT, LEFT]);
+        assert_eq!(left(&offsets, &[650], &[650]), [LEFT, LEFT, LEFT, LEFT, 1.0, 1.0, 1.0]);
+        assert_eq!(left(&offsets, &[], &[]), [1.0; 7]);
+    }
+
+    #[test]
+    fn what_was_put_right_beyond_a_slip_is_no_surer_than_what_lies_there() {
+        let offsets = [0, 100, 200, 300, 450, 550, 650];
+        assert_eq!(left(&offsets, &[100], &[100, 550])[5], LEFT);
+        assert_eq!(left(&offsets, &[100], &[100, 300])[3], 1.0);
+    }
+
+    #[test]
+    fn a_slip_leaves_doubt_on_this_side_of_it_back_to_the_last_clock_step() {
+        // Beats of 100 at the mark, of 150 from 300 on, and a slip at 750.
+        let offsets = [0, 100, 200, 300, 450, 600, 750, 830, 980, 1130];
+        let left = left(&offsets, &[0], &[0]);
+        assert_eq!(left[..3], [1.0; 3]);
+        assert!(left[5..].iter().all(|left| *left <= LEFT), "{left:?}");
     }
 
     #[test]
@@ -96,9 +187,9 @@ mod tests {
     #[test]
     fn a_mark_that_is_off_the_beat_of_all_others_leaves_them_in_doubt() {
         let offsets = [0, 100, 200, 330, 400, 500, 600];
-        assert!(left(&offsets, &[330]).iter().all(|left| *left <= LEFT));
-        assert_eq!(left(&offsets, &[200]), [1.0; 7]);
+        assert!(left(&offsets, &[330], &[330]).iter().all(|left| *left <= LEFT));
+        assert_eq!(left(&offsets, &[200], &[200]), [1.0; 7]);
         let missed = [0, 100, 200, 400, 600, 700, 800];
-        assert_eq!(left(&missed, &[400]), [1.0; 7]);
+        assert_eq!(left(&missed, &[400], &[400]), [1.0; 7]);
     }
 }

@@ -207,7 +207,7 @@ impl Tracker {
 
     /// The sequence; of `marks` everything is sure.
     fn conclude(self, marks: &[usize]) -> Tracked {
-        let left = doubt::left(&self.starts(), &self.marks);
+        let left = doubt::left(&self.starts(), marks, &self.marks);
         let start = |((&node, &support), left): ((&usize, &f64), f64)| {
             let offset = self.candidates[node].offset;
             let marked = marks.contains(&offset);

@@ -1,0 +1,178 @@
+//! Starts put where neighbouring frames agree.
+//!
+//! Frames are aligned by what follows their start. Where what lies between the start and that has become shorter since the mark (a
+//! front end with less to do), a start kept at the mark's distance lies before its frame, in the end of the one before. That ends at
+//! another time in each frame, so there neighbours differ, and the energy from start to start changes with them. What is common to
+//! all begins at the right place: so a start is moved on to the first sample from which on neighbours agree about as well as anywhere
+//! near. Where they agree already, as in a rest or in a steady beat, nothing moves; nor at an edge, of which each frame is sampled at
+//! another phase.
+
+use super::refine::between;
+use crate::median::median;
+use rayon::prelude::*;
+
+/// How far a start may move, and how much before it is looked at, as shares of the window.
+const REACH: f64 = 0.12;
+const BEFORE: f64 = 0.04;
+/// Differences of so many neighbours on either side are averaged, and those of this many samples on either side.
+const FRAMES: usize = 16;
+const SAMPLES: usize = 1;
+/// A start no more than so many samples before those that agree is at their edge: neighbours differ in the edge itself.
+const EDGE: usize = 3;
+/// Neighbours agree where their squared difference is below this many times the least within reach.
+const AGREE: f64 = 6.0;
+/// and wherever it is below this share of the variance of the trace: steps of a coarse recorder may hide all noise.
+const ALIKE: f64 = 1e-4;
+/// Moves are smoothed over so many neighbours on either side, as content changes slowly.
+const SMOOTH: usize = 8;
+
+/// Positions of windows, samples, moved on; `anchor` is the place of the start in a window of `width` samples. What is `fixed` stays.
+pub(super) fn settle(
+    power: &[f64],
+    positions: Vec<f64>,
+    fixed: &[bool],
+    anchor: f64,
+    width: usize,
+) -> Vec<f64> {
+    let [reach, before] = [REACH, BEFORE].map(|share| (share * width as f64) as usize);
+    let first: Vec<f64> = positions.iter().map(|position| position + anchor - before as f64).collect();
+    let differences = differences(power, &first, before + reach + 1);
+    let alike_w2 = ALIKE * variance(power);
+    let moves: Vec<f64> = (0..positions.len())
+        .map(|frame| {
+            let near = frame.saturating_sub(FRAMES)..(frame + FRAMES).min(differences.len());
+            let differ = mean_of_each(&differences[near], before + reach + 1);
+            first_alike(differ.split_at(before), alike_w2)
+        })
+        .collect();
+    let moves = smoothed(&smoothed(&moves, median), |near| mean(near));
+    let settled = positions.iter().zip(moves).zip(fixed);
+    settled.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
+}
+
+/// How much each frame and the next differ at each of the `length` samples from `first` of each on, W^2.
+fn differences(power: &[f64], first: &[f64], length: usize) -> Vec<Vec<f64>> {
+    let sample = |first: f64, index: usize| between(power, first + index as f64 - SAMPLES as f64);
+    let square = |pair: &[f64], index: usize| match [pair[0], pair[1]].map(|first| sample(first, index)) {
+        [Some(a), Some(b)] => (a - b) * (a - b),
+        _ => 0.0,
+    };
+    let of_pair = |pair: &[f64]| -> Vec<f64> {
+        let squares: Vec<f64> = (0..length + 2 * SAMPLES).map(|index| square(pair, index)).collect();
+        squares.windows(1 + 2 * SAMPLES).map(mean).collect()
+    };
+    first.par_windows(2).map(of_pair).collect()
+}
+
+/// The element-wise mean of some rows of `columns` values.
+fn mean_of_each(rows: &[Vec<f64>], columns: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; columns];
+    for row in rows {
+        sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value / rows.len() as f64);
+    }
+    sums
+}
+
+/// The first sample at which neighbours agree, in samples from the start, by how they differ before it and from it on.
+fn first_alike((before, after): (&[f64], &[f64]), alike_w2: f64) -> f64 {
+    let least = after.iter().copied().fold(f64::INFINITY, f64::min);
+    let limit = alike_w2.max(AGREE * least);
+    if median(&mut before.to_vec()) <= limit {
+        return 0.0;
+    }
+    after.iter().position(|value| *value <= limit).filter(|first| *first > EDGE).unwrap_or(0) as f64
+}
+
+/// Each value by its neighbours.
+fn smoothed(values: &[f64], by: impl Fn(&mut [f64]) -> f64) -> Vec<f64> {
+    let near = |index: usize| index.saturating_sub(SMOOTH)..(index + SMOOTH + 1).min(values.len());
+    (0..values.len()).map(|index| by(&mut values[near(index)].to_vec())).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let centre = mean(values);
+    values.iter().map(|value| (value - centre) * (value - centre)).sum::<f64>() / values.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const WIDTH: usize = 250;
+
+    /// Frames with a rest of 8 to 12 samples of 0.1 W, a front end of `front` samples of 0.2 W, and draws of 1 to 1.5 W; and where each
+    /// starts.
+    fn frames(count: usize, front: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<f64>) {
+        let (mut power, mut starts) = (vec![1.0; 60], Vec::new());
+        for frame in 0..count {
+            power.extend(vec![0.1; 8 + frame * 7 % 5]);
+            starts.push(power.len() as f64);
+            power.extend(vec![0.2; front(frame)]);
+            power.extend((0..300).map(|sample| 1.0 + f64::from(sample / 2 * 37 % 11) / 22.0));
+        }
+        power.iter_mut().enumerate().for_each(|(i, watts)| *watts += 1e-3 * ((i * 7919 % 97) as f64 / 97.0));
+        (power, starts)
+    }
+
+    #[test]
+    fn a_start_in_the_end_of_the_frame_before_is_moved_out_of_it() {
+        // The front end was 20 samples at the mark and is 4 now: starts are 16 early, before the rest.
+        let (power, right) = frames(60, |_| 4);
+        let early: Vec<f64> = right.iter().map(|start| start - 16.0).collect();
+        for (found, right) in settle(&power, early, &[false; 60], 0.0, WIDTH).iter().zip(&right) {
+            // Into the rest, of which all have the last 8 samples.
+            assert!((-8.0..=0.0).contains(&(found - right)), "{found} for {right}");
+        }
+    }
+
+    #[test]
+    fn where_neighbours_agree_nothing_moves_and_marks_never_do() {
+        let (power, right) = frames(40, |_| 20);
+        assert_eq!(settle(&power, right.clone(), &[false; 40], 0.0, WIDTH), right);
+        let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
+        assert_eq!(settle(&power, early.clone(), &[true; 40], 0.0, WIDTH), early);
+    }
+
+    #[test]
+    fn exact_equality_of_a_coarse_recorder_moves_nothing() {
+        // Without noise some samples are equal to the last bit; those before them differ by less than what matters.
+        let power: Vec<f64> = (0..6000)
+            .map(|i| match i % 300 {
+                0..10 => 0.1 + 1e-4 * f64::from((i / 300) % 2),
+                10..30 => 0.1,
+                _ => 1.0,
+            })
+            .collect();
+        let starts: Vec<f64> = (0..19).map(|i| f64::from(300 * i + 2)).collect();
+        assert_eq!(settle(&power, starts.clone(), &[false; 19], 0.0, WIDTH), starts);
+    }
+
+    #[test]
+    fn few_starts_and_coarse_windows_are_left_alone() {
+        let (power, right) = frames(1, |_| 20);
+        assert_eq!(settle(&power, right.clone(), &[false], 0.0, WIDTH), right);
+        assert!(settle(&power, Vec::new(), &[], 0.0, WIDTH).is_empty());
+        let (power, right) = frames(20, |_| 4);
+        let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
+        assert_eq!(settle(&power, early.clone(), &[false; 20], 0.0, 8), early);
+    }
+
+    proptest! {
+        #[test]
+        fn moves_go_on_and_no_farther_than_the_reach(
+            power in proptest::collection::vec(0.0..9.0_f64, 400..600),
+            gaps in proptest::collection::vec(5.0..40.0_f64, 1..20),
+        ) {
+            let starts: Vec<f64> = gaps.iter().scan(0.0, |at, gap| { *at += gap; Some(*at) }).collect();
+            let found = settle(&power, starts.clone(), &vec![false; starts.len()], 3.0, 100);
+            for (found, start) in found.iter().zip(&starts) {
+                prop_assert!((0.0..=12.0).contains(&(found - start)));
+            }
+        }
+    }
+}
