@@ -5,15 +5,14 @@
 //! another time in each frame, so there neighbours differ, and the energy from start to start changes with them. What is common to
 //! all begins at the right place: so a start is moved on to the first sample from which on neighbours agree about as well as anywhere
 //! near. Where they agree already, as in a rest or in a steady beat, nothing moves; nor at an edge, of which each frame is sampled at
-//! another phase.
+//! another phase, nor up into more power, as the way out of a frame leads down.
 
 use super::refine::between;
 use crate::median::median;
 use rayon::prelude::*;
 
-/// How far a start may move, and how much before it is looked at, as shares of the window.
+/// How far a start may move, as a share of the window.
 const REACH: f64 = 0.12;
-const BEFORE: f64 = 0.04;
 /// Differences of so many neighbours on either side are averaged, and those of this many samples on either side.
 const FRAMES: usize = 16;
 const SAMPLES: usize = 1;
@@ -34,15 +33,15 @@ pub(super) fn settle(
     anchor: f64,
     width: usize,
 ) -> Vec<f64> {
-    let [reach, before] = [REACH, BEFORE].map(|share| (share * width as f64) as usize);
-    let first: Vec<f64> = positions.iter().map(|position| position + anchor - before as f64).collect();
-    let differences = differences(power, &first, before + reach + 1);
+    let reach = (REACH * width as f64) as usize;
+    let starts: Vec<f64> = positions.iter().map(|position| position + anchor).collect();
+    let differences = differences(power, &starts, reach + 1);
     let alike_w2 = ALIKE * variance(power);
     let moves: Vec<f64> = (0..positions.len())
         .map(|frame| {
             let near = frame.saturating_sub(FRAMES)..(frame + FRAMES).min(differences.len());
-            let differ = mean_of_each(&differences[near], before + reach + 1);
-            first_alike(differ.split_at(before), alike_w2)
+            let by = first_alike(&mean_of_each(&differences[near.clone()], reach + 1), alike_w2);
+            if level(power, &starts[near.clone()], by) < level(power, &starts[near], 0.0) { by } else { 0.0 }
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, median), |near| mean(near));
@@ -50,10 +49,10 @@ pub(super) fn settle(
     settled.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
 }
 
-/// How much each frame and the next differ at each of the `length` samples from `first` of each on, W^2.
-fn differences(power: &[f64], first: &[f64], length: usize) -> Vec<Vec<f64>> {
-    let sample = |first: f64, index: usize| between(power, first + index as f64 - SAMPLES as f64);
-    let square = |pair: &[f64], index: usize| match [pair[0], pair[1]].map(|first| sample(first, index)) {
+/// How much each frame and the next differ at each of `length` samples from their starts on, W^2.
+fn differences(power: &[f64], starts: &[f64], length: usize) -> Vec<Vec<f64>> {
+    let sample = |start: f64, index: usize| between(power, start + index as f64 - SAMPLES as f64);
+    let square = |pair: &[f64], index: usize| match [pair[0], pair[1]].map(|start| sample(start, index)) {
         [Some(a), Some(b)] => (a - b) * (a - b),
         _ => 0.0,
     };
@@ -61,7 +60,7 @@ fn differences(power: &[f64], first: &[f64], length: usize) -> Vec<Vec<f64>> {
         let squares: Vec<f64> = (0..length + 2 * SAMPLES).map(|index| square(pair, index)).collect();
         squares.windows(1 + 2 * SAMPLES).map(mean).collect()
     };
-    first.par_windows(2).map(of_pair).collect()
+    starts.par_windows(2).map(of_pair).collect()
 }
 
 /// The element-wise mean of some rows of `columns` values.
@@ -73,14 +72,17 @@ fn mean_of_each(rows: &[Vec<f64>], columns: usize) -> Vec<f64> {
     sums
 }
 
-/// The first sample at which neighbours agree, in samples from the start, by how they differ before it and from it on.
-fn first_alike((before, after): (&[f64], &[f64]), alike_w2: f64) -> f64 {
-    let least = after.iter().copied().fold(f64::INFINITY, f64::min);
+/// The first sample at which neighbours agree, in samples from the start.
+fn first_alike(differ: &[f64], alike_w2: f64) -> f64 {
+    let least = differ.iter().copied().fold(f64::INFINITY, f64::min);
     let limit = alike_w2.max(AGREE * least);
-    if median(&mut before.to_vec()) <= limit {
-        return 0.0;
-    }
-    after.iter().position(|value| *value <= limit).filter(|first| *first > EDGE).unwrap_or(0) as f64
+    differ.iter().position(|value| *value <= limit).filter(|first| *first > EDGE).unwrap_or(0) as f64
+}
+
+/// Mean power so many samples after some starts, W.
+fn level(power: &[f64], starts: &[f64], after: f64) -> f64 {
+    let sampled: Vec<f64> = starts.iter().filter_map(|start| between(power, start + after)).collect();
+    mean(&sampled)
 }
 
 /// Each value by its neighbours.
