@@ -180,3 +180,161 @@ fn sampling_alignment_energy_and_frontiers_answer() {
     assert_eq!(on(&[]), [true, false, true]);
     assert_eq!(on(&["--idle-w", "14"]), [true, true, true]);
 }
+
+/// The output of a call that has to fail as one that was asked wrongly, in one line.
+fn refused(folder: &Path, args: &[&str], says: &str) {
+    let output = quintile(folder, args);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
+    assert!(message.contains(says) && !message.contains("fault of the program"), "{args:?}: {message}");
+}
+
+#[test]
+fn numbers_that_are_none_and_flags_that_would_do_nothing_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    let cases: [(&[&str], &str); 15] = [
+        (&["energy", "t.csv", "--mark", "0.2", "--idle-w", "nan"], "no finite number"),
+        (&["energy", "t.csv", "--mark", "0.2", "--busy-above", "inf"], "no finite number"),
+        (&["energy", "t.csv", "--mark", "0.2", "--from", "0.1"], "cannot be used with"),
+        (&["energy", "t.csv", "--from", "0.1", "--drop-outliers"], "cannot be used with"),
+        (&["energy", "t.csv", "--mark", "0.2", "--idle-by", "instant"], "--idle-trace"),
+        (&["energy", "t.csv", "--mark", "0.2", "--stream"], "--stream"),
+        (&["frames", "t.csv", "--mark", "0.2", "--pixels", "0"], "--pixels"),
+        (&["frames", "t.csv", "--mark", "0.2", "--voltage", "nan"], "no finite number"),
+        (&["frames", "t.csv", "--mark", "0.2", "--start", "nan"], "no finite number"),
+        (&["frames", "t.csv", "--mark", "0.2", "--rate", "1e99"], "a rate has to be from"),
+        (&["frames", "t.csv", "--mark", "0.2", "--rail", "main", "--power-column", "1"], "leave one out"),
+        (&["plot", "t.csv", "--low-pass", "nan", "--out", "a.svg"], "no finite number at or above 0"),
+        (
+            &["plot", "t.csv", "--kind", "energy", "--mark", "0.2", "--from", "0.1", "--out", "a.svg"],
+            "--kind curve",
+        ),
+        (&["sample", "t.csv", "--device-rate", "0.5", "--out", "a.csv"], "--device-rate 0.5"),
+        (&["pareto", "t.csv", "--idle-w", "-1"], "at or above 0"),
+    ];
+    for (args, says) in cases {
+        refused(folder.path(), args, says);
+    }
+}
+
+#[test]
+fn times_before_zero_are_times() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    let text = fs::read_to_string(folder.path().join("t.csv")).unwrap();
+    let values = text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned() + "\n");
+    fs::write(
+        folder.path().join("n.csv"),
+        "Main Voltage(V),Main(mA)\n".to_owned() + &values.collect::<String>(),
+    )
+    .unwrap();
+    let early = ["n.csv", "--rate", "5000", "--start", "-5"];
+    let of = |args: &[&str]| json(folder.path(), &[&args[..1], &early[..], &args[1..]].concat());
+    let whole = json(folder.path(), &["energy", "t.csv", "--from", "0", "--to", "0.52"]);
+    let same = of(&["energy", "--from", "-5", "--to", "-4.48"]);
+    assert!((same["energy_J"].as_f64().unwrap() / whole["energy_J"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    let frames = of(&["frames", "--mark", "-4.8", "--end", "-4.5"]);
+    assert_eq!(frames["frames"].as_array().unwrap().len(), 40);
+    let idle = of(&[
+        "energy",
+        "--mark",
+        "-4.8",
+        "--end",
+        "-4.5",
+        "--idle",
+        "-5..-4.91",
+        "--pixels",
+        "1000",
+        "--drop-outliers",
+    ]);
+    assert!(
+        (idle["pooled"]["mean"].as_f64().unwrap() - 0.0568).abs() < 5e-4 && idle["pixels"] == 1000,
+        "{idle}"
+    );
+    fs::write(folder.path().join("s.csv"), "0\n10\n").unwrap();
+    let aligned = of(&["align", "s.csv", "--anchor", "-10=-4.9", "--anchor", "0=-4.8"]);
+    assert!((aligned["times_s"][1].as_f64().unwrap() + 4.7).abs() < 1e-12);
+}
+
+#[test]
+fn marks_in_the_file_are_taken_in_pieces_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    fs::write(
+        folder.path().join("t.json"),
+        r#"{"marks": [{"time_s": 0.2, "kind": "frame_start"}, {"time_s": 0.5, "kind": "end"}]}"#,
+    )
+    .unwrap();
+    let starts = |args: &[&str]| {
+        let report = json(folder.path(), &[&["frames", "t.csv", "--method", "squares"], args].concat());
+        report["frames"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|frame| frame["start_s"].as_f64().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let (whole, pieces) = (starts(&[]), starts(&["--stream"]));
+    assert_eq!((whole.len(), pieces.len()), (40, 40));
+    assert!(whole.iter().zip(&pieces).all(|(a, b)| (a - b).abs() < 1e-6));
+}
+
+#[test]
+fn stamps_that_are_equal_or_not_named_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    fs::write(folder.path().join("same.csv"), "5\n".repeat(6)).unwrap();
+    refused(folder.path(), &["align", "t.csv", "same.csv", "--mark", "0.2"], "stamps are the same");
+    fs::write(folder.path().join("table.csv"), "frame,when\n1,0\n2,10\n").unwrap();
+    let anchors = ["--anchor", "0=0.1", "--anchor", "10=0.2"];
+    refused(
+        folder.path(),
+        &[&["align", "t.csv", "table.csv"], &anchors[..]].concat(),
+        "none of its columns (frame, when)",
+    );
+    fs::write(folder.path().join("table.csv"), "frame,stamp_s\n1,0\n2,10\n").unwrap();
+    let aligned = json(folder.path(), &[&["align", "t.csv", "table.csv"], &anchors[..]].concat());
+    assert_eq!(aligned["times_s"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_plot_tells_gaps_and_mends_them_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    let text = fs::read_to_string(folder.path().join("t.csv")).unwrap();
+    let kept = text.lines().enumerate().filter(|(line, _)| !(1001..1101).contains(line));
+    let kept: String = kept.map(|(_, line)| line.to_owned() + "\n").collect();
+    fs::write(folder.path().join("gap.csv"), kept).unwrap();
+    let output = quintile(folder.path(), &["plot", "gap.csv", "--out", "a.svg"]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && message.contains("row 1001"), "{message}");
+    let output = quintile(folder.path(), &["plot", "gap.csv", "--repair", "--out", "a.svg"]);
+    let (message, shown) = (String::from_utf8_lossy(&output.stderr), String::from_utf8_lossy(&output.stdout));
+    assert!(
+        message.contains("100 samples were missing") && shown.contains("0 s to 0.52 s"),
+        "{message}{shown}"
+    );
+}
+
+#[test]
+fn what_is_no_setting_is_refused_and_deviations_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |name: &str, rows: &str| {
+        fs::write(folder.path().join(name), format!("time_ms,energy_mJ,sd\n{rows}")).unwrap();
+    };
+    table("none.csv", "");
+    table("zero.csv", "1,10,0\n0,5,0\n");
+    table("negative.csv", "1,10,0\n2,5,-1\n");
+    table("good.csv", "1,10,1\n2,5,1\n3,20,1\n");
+    refused(folder.path(), &["pareto", "none.csv"], "has no row");
+    refused(folder.path(), &["pareto", "zero.csv"], "row 2: time_ms is not above 0");
+    refused(folder.path(), &["pareto", "negative.csv", "--energy-sd", "sd"], "row 2: a standard deviation");
+    let svg = |args: &[&str]| {
+        json(folder.path(), &[&["pareto", "good.csv", "--out", "p.svg"], args].concat());
+        fs::read_to_string(folder.path().join("p.svg")).unwrap()
+    };
+    assert!(svg(&["--energy-sd", "sd"]).contains("one standard deviation"));
+    assert!(!svg(&[]).contains("one standard deviation"));
+    assert!(svg(&["--show", "power"]).contains("mean power"));
+}

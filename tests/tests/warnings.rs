@@ -42,7 +42,7 @@ const NOT_PROVOKED: [(&str, &str); 11] = [
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 35] = [
+const PROVOKED: [&str; 36] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -69,6 +69,7 @@ const PROVOKED: [&str; 35] = [
     "occlusion-small-occluders",
     "only-mark",
     "orthographic-view",
+    "packets-lost",
     "points-thin-voids",
     "primitive-dropped",
     "short-frame",
@@ -122,6 +123,20 @@ const SPHERE: &str = "(shape: Sphere(radius: 1, segments: 12))";
 fn frames_too_short_for_the_recorder() {
     let results = quintile!().run("tiny", &[]);
     assert_warns(&results, "short-frame");
+}
+
+#[test]
+fn packets_that_the_recorder_lost_are_gaps_in_its_file() {
+    let lossy = ["--packet-loss", "0.2", "--packet-samples", "64"];
+    let results = quintile!().run("tiny", &lossy);
+    assert_warns(&results, "packets-lost");
+    let trace = results.path("trace.parquet");
+    let refused = traces::io::read(&trace, &traces::io::ReadOptions::default()).unwrap_err();
+    assert!(matches!(refused, traces::io::ReadError::Uneven { .. }), "{refused}");
+    let mended = traces::io::ReadOptions { repair: true, ..Default::default() };
+    assert!(!traces::io::read(&trace, &mended).unwrap().repairs.is_empty());
+    let ended = quintile!().call(["run", "tiny", "--packet-loss", "1"]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("packet loss: 1"), "{}", ended.stderr);
 }
 
 #[test]

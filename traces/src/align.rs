@@ -30,6 +30,12 @@ pub enum AlignError {
         /// Starts found.
         starts: usize,
     },
+    /// Stamps that do not tell times apart.
+    #[error("too many of the {stamps} stamps are the same for a fit; give two anchors instead")]
+    Equal {
+        /// Stamps given.
+        stamps: usize,
+    },
 }
 
 /// `time = offset + scale x stamp`.
@@ -68,7 +74,7 @@ impl Alignment {
     /// The pairing of stamps with starts, one after another from some shift on, that leaves least. Both sorted, s.
     ///
     /// # Errors
-    /// [`AlignError::Few`] for fewer than four of either.
+    /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same.
     pub fn by_fit(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
         let fewer = stamps_s.len().min(starts_s.len());
         if fewer < LEAST_PAIRS {
@@ -78,7 +84,10 @@ impl Alignment {
         // Stamps before `skip` lie before the first start, starts before `skip` before the first stamp.
         let later_starts = (0..=starts_s.len() - overlap).map(|skip| fit(stamps_s, &starts_s[skip..]));
         let later_stamps = (1..=stamps_s.len() - overlap).map(|skip| fit(&stamps_s[skip..], starts_s));
-        let mut fits: Vec<Self> = later_starts.chain(later_stamps).collect();
+        let mut fits: Vec<Self> = later_starts.chain(later_stamps).filter(|fit| fit.scale > 0.0).collect();
+        if fits.is_empty() {
+            return Err(AlignError::Equal { stamps: stamps_s.len() });
+        }
         fits.sort_by(|a, b| a.residual_s.total_cmp(&b.residual_s));
         // Of all that fit about as well, the one that pairs most.
         let limit_s = RIVAL * fits[0].residual_s.max(EXACT_S);
@@ -133,5 +142,6 @@ mod tests {
         assert!(Alignment::by_fit(&beat[..10], &beat).unwrap().ambiguous);
         assert!(Alignment::by_fit(&beat[..2], &beat).unwrap_err().to_string().contains("2 stamps"));
         assert!(Alignment::by_anchors((1.0, 2.0), (1.0, 3.0)).is_err());
+        assert_eq!(Alignment::by_fit(&[5.0; 6], &beat), Err(AlignError::Equal { stamps: 6 }));
     }
 }

@@ -1,8 +1,11 @@
 //! Overviews of any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks of blocks,
 //! and so on, made once and kept in a file beside the trace.
 
-use crate::io::{Chunk, ReadError, ReadOptions, Rows};
-use crate::stream::{Clock, clock};
+mod build;
+
+use crate::io::{ReadError, ReadOptions, read};
+use crate::stream::Clock;
+use crate::trace::Trace;
 use std::fs::{self, File};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -15,8 +18,6 @@ pub const BLOCK: u64 = 64;
 const FAN: usize = 16;
 /// Blocks a column is made of at least, where the level below has them.
 const PER_COLUMN: u64 = 4;
-/// Rows read at once.
-const ROWS: usize = 1 << 20;
 const MAGIC: u64 = 0x3130_5259_505f_5451;
 const HEADER_BYTES: u64 = 64;
 const ENTRY_BYTES: u64 = 12;
@@ -82,36 +83,31 @@ impl Pyramid {
         Ok(pyramid)
     }
 
-    /// Reads a whole trace, in pieces.
+    /// Reads a whole trace, in pieces; one that is to be mended at once, as the places of its samples depend on all of them.
     ///
     /// # Errors
-    /// [`ReadError`] if the trace cannot be read.
+    /// [`ReadError`] if the trace cannot be read, or its samples are not even or finite.
     pub fn build(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let clock = clock(path, options)?;
-        let mut rows = Rows::open(path, options)?;
-        let mut chunk = Chunk::default();
-        let (mut voltage_v, mut current_a) = (Vec::new(), Vec::new());
-        let (mut base, mut samples) = (Vec::new(), 0);
-        loop {
-            let read = rows.next(ROWS, &mut chunk)? as u64;
-            rows.channels(&mut chunk, &mut voltage_v, &mut current_a);
-            samples += read;
-            let whole =
-                if read == 0 { voltage_v.len() } else { voltage_v.len() / BLOCK as usize * BLOCK as usize };
-            let blocks =
-                voltage_v[..whole].chunks(BLOCK as usize).zip(current_a[..whole].chunks(BLOCK as usize));
-            base.extend(blocks.map(|(v, i)| Entry::of_samples(v, i)));
-            voltage_v.drain(..whole);
-            current_a.drain(..whole);
-            if read == 0 {
-                break;
-            }
+        if options.repair {
+            Ok(Self::of_trace(&read(path, options)?.trace))
+        } else {
+            build::of_file(path, options)
         }
+    }
+
+    /// The pyramid of a trace in memory.
+    pub fn of_trace(trace: &Trace) -> Self {
+        let samples = trace.samples() as u64;
+        let clock = Clock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
+        Self::of_blocks(clock, samples, build::blocks(trace.voltage_v(), trace.current_a()).collect())
+    }
+
+    fn of_blocks(clock: Clock, samples: u64, base: Vec<Entry>) -> Self {
         let mut levels = vec![base];
         while levels[levels.len() - 1].len() > FAN {
             levels.push(levels[levels.len() - 1].chunks(FAN).map(Entry::of_entries).collect());
         }
-        Ok(Self { clock, samples, store: Store::Memory(levels) })
+        Self { clock, samples, store: Store::Memory(levels) }
     }
 
     /// Left edge of the first sample, s.

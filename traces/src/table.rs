@@ -1,6 +1,7 @@
 //! Small tables of text and numbers, from CSV, TSV or Parquet.
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
 use std::fs::File;
 use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -131,13 +132,18 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 fn from_parquet(path: &Path) -> Result<Content, String> {
     let file = File::open(path).map_err(|error| error.to_string())?;
     let file = SerializedFileReader::new(file).map_err(|error| error.to_string())?;
-    let columns = file.metadata().file_metadata().schema_descr().columns();
-    let names = columns.iter().map(|column| column.path().string()).collect();
+    // Columns of columns count as one, as they do in a row.
+    let names = file.metadata().file_metadata().schema().get_fields();
+    let names = names.iter().map(|field| field.name().to_owned()).collect();
     let mut rows = Vec::new();
     for row in file.get_row_iter(None).map_err(|error| error.to_string())? {
         let row = row.map_err(|error| error.to_string())?;
-        let plain = |text: String| text.trim_matches('"').to_owned();
-        rows.push(row.get_column_iter().map(|(_, field)| plain(field.to_string())).collect());
+        let text = |field: &Field| match field {
+            Field::Str(text) => text.clone(),
+            Field::Null => String::new(),
+            other => other.to_string(),
+        };
+        rows.push(row.get_column_iter().map(|(_, field)| text(field)).collect());
     }
     Ok((names, rows))
 }
@@ -161,5 +167,38 @@ mod tests {
                 .to_string()
                 .contains("no column energy (found: Algorithm, time_ms)")
         );
+    }
+
+    #[test]
+    fn columns_of_columns_count_as_one_and_texts_keep_their_quotes() {
+        use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
+        use parquet::file::properties::WriterProperties;
+        use parquet::file::writer::SerializedFileWriter;
+        use parquet::schema::parser::parse_message_type;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        let schema = "message t { required group at { required double x; required double y; } \
+                      required binary name (UTF8); required double time_ms; }";
+        let schema = std::sync::Arc::new(parse_message_type(schema).unwrap());
+        let file = File::create(&path).unwrap();
+        let mut writer =
+            SerializedFileWriter::new(file, schema, WriterProperties::builder().build().into()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        for value in [Some(1.0), Some(2.0), None, Some(3.5)] {
+            let mut column = group.next_column().unwrap().unwrap();
+            match value {
+                Some(value) => column.typed::<DoubleType>().write_batch(&[value], None, None).unwrap(),
+                None => {
+                    let name = [ByteArray::from("\"VB\"")];
+                    column.typed::<ByteArrayType>().write_batch(&name, None, None).unwrap()
+                }
+            };
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        writer.close().unwrap();
+        let table = Table::read(&path).unwrap();
+        assert_eq!(table.numbers("time_ms").unwrap(), [3.5]);
+        assert_eq!(table.texts("name").unwrap(), ["\"VB\""]);
     }
 }

@@ -170,6 +170,59 @@ fn a_recording_that_was_not_closed_says_what_mends_it() {
 }
 
 #[test]
+fn a_recording_that_was_cut_and_mended_gives_what_all_its_signals_have() {
+    // What pyjls finds in them: current and voltage (m2_*.npz of `make_jls.py`'s reader).
+    for (name, current, voltage) in
+        [("pyjls_mended_19000.jls", 960, 640), ("pyjls_mended_44500.jls", 2560, 1920)]
+    {
+        let (path, whole) = (foreign(name), whole());
+        refused(
+            &path,
+            &ReadOptions::default(),
+            &[
+                &format!("voltage has {voltage} samples from number 1000"),
+                &format!("current has {current} samples"),
+            ],
+        );
+        let loaded = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
+        let told: Vec<_> = loaded.repairs.iter().map(|repair| (repair.code, repair.count)).collect();
+        assert_eq!(told, [("cut-signals", current as u64 - voltage as u64)]);
+        assert_eq!(bits(loaded.trace.voltage_v()), bits(&whole.voltage_v()[..voltage]));
+        assert_eq!(bits(loaded.trace.current_a()), bits(&whole.current_a()[..voltage]));
+        let alone =
+            ReadOptions { fixed_voltage_v: Some(5.0), current: Some("current".into()), ..Default::default() };
+        let alone = read(&path, &alone).unwrap().trace;
+        assert_eq!(bits(alone.current_a()), bits(&whole.current_a()[..current]));
+    }
+}
+
+#[test]
+fn signals_that_begin_and_end_apart_are_cut_on_request_but_not_where_rates_differ() {
+    let mend = |voltage: &str| ReadOptions { repair: true, ..named(voltage, "current") };
+    let path = foreign("pyjls_rates.jls");
+    refused(&path, &mend("voltage"), &["at 500 Hz"]);
+    let values = |voltage| {
+        let loaded = read(&path, &mend(voltage)).unwrap();
+        assert!(
+            loaded.repairs[0].message.contains("399 samples from number"),
+            "{}",
+            loaded.repairs[0].message
+        );
+        loaded
+            .trace
+            .voltage_v()
+            .iter()
+            .zip(loaded.trace.current_a())
+            .map(|(v, i)| (*v, *i))
+            .collect::<Vec<_>>()
+    };
+    // All were written from the same numbers: that of the late one's sample 1 is the first.
+    assert!(values("short voltage").iter().all(|(v, i)| v == i));
+    let late = values("late voltage");
+    assert!(late.len() == 399 && late.windows(2).all(|two| two[1].0 == two[0].1));
+}
+
+#[test]
 fn a_recording_cut_anywhere_is_an_error() {
     let (whole, trace) = (std::fs::read(foreign("pyjls.jls")).unwrap(), whole());
     let folder = tempfile::tempdir().unwrap();

@@ -59,6 +59,8 @@ fn options(args: &RunArgs) -> RunOptions {
             PacingArg::Free => PacingChoice::Free,
         },
         trace_rate_hz: args.trace_rate,
+        packet_samples: args.packet_samples,
+        packet_loss: args.packet_loss,
         seed: args.seed,
         exr: args.exr,
         heat: args.heat.clone(),

@@ -86,6 +86,8 @@ fn device_spec(plan: &Plan, powers: &[&FramePower]) -> DeviceSpec {
         voltage_noise_v: default.voltage_noise_v * range_v / default.voltage_range_v[1],
         // A tenth of a volt of sag at full scale at most, so that the rail carries any load in range.
         rail_ohm: default.rail_ohm.min(0.1 / range_a),
+        packet_samples: plan.options.packet_samples,
+        packet_loss: plan.options.packet_loss,
         seed: plan.options.seed,
         ..default
     }

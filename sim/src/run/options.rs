@@ -53,7 +53,11 @@ pub struct RunOptions {
     pub pacing: PacingChoice,
     /// Samples per second of the recorder.
     pub trace_rate_hz: f64,
-    /// Seed of samples and noise.
+    /// Samples of the recorder that travel together and are lost together.
+    pub packet_samples: u32,
+    /// Share of these packets that are lost, 0 to below 1.
+    pub packet_loss: f64,
+    /// Seed of samples, noise and losses.
     pub seed: u64,
     /// Whether images are written as EXR, too.
     pub exr: bool,
@@ -77,6 +81,8 @@ impl Default for RunOptions {
             verify: false,
             pacing: PacingChoice::default(),
             trace_rate_hz: 50e3,
+            packet_samples: 512,
+            packet_loss: 0.0,
             seed: 1,
             exr: false,
             heat: Vec::new(),
@@ -116,6 +122,12 @@ impl Plan {
             let rate = options.trace_rate_hz;
             return Err(RunError::Setting(format!(
                 "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
+            )));
+        }
+        if !(0.0..1.0).contains(&options.packet_loss) {
+            let loss = options.packet_loss;
+            return Err(RunError::Setting(format!(
+                "packet loss: {loss}; a share from 0 to below 1 can be lost"
             )));
         }
         let (work, table) = work(&options)?;

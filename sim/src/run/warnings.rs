@@ -24,6 +24,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(short_frames(measurement));
     all.extend(detection(measurement));
     all.extend(clipped(measurement));
+    all.extend(lost(measurement));
     all.extend(unsure(simulated));
     all.extend(regime_warnings::gather(simulated));
     all.sort();
@@ -163,6 +164,18 @@ fn clipped(measurement: &Measurement) -> Option<Warning> {
         Warning::new(
             "clipped-samples",
             format!("{} samples are beyond the recorder's range", measurement.clipped),
+        )
+    })
+}
+
+fn lost(measurement: &Measurement) -> Option<Warning> {
+    let (trace, lost) = (&measurement.trace, measurement.trace.lost());
+    lost.first().map(|first| {
+        let samples: usize = lost.iter().map(ExactSizeIterator::len).sum();
+        let (stretches, after_s) = (lost.len(), trace.time_s(first.start - 1));
+        Warning::new(
+            "packets-lost",
+            format!("{samples} samples in {stretches} stretches are missing, the first after {after_s} s"),
         )
     })
 }

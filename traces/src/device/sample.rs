@@ -7,6 +7,9 @@ use crate::random::Random;
 use crate::trace::{Trace, TraceError};
 use thiserror::Error;
 
+/// The most samples: 16 bytes each while they are made.
+const MOST: f64 = (1_u64 << 29) as f64;
+
 /// Why a curve cannot be sampled.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SampleError {
@@ -35,6 +38,21 @@ pub enum SampleError {
         end_s: f64,
         /// The device's rate, Hz.
         rate_hz: f64,
+    },
+    /// More samples than are made at once.
+    #[error(
+        "{start_s} s to {end_s} s at {rate_hz} Hz are {count:.0} samples, more than the 2^29 that are made at once: \
+         lower the rate or sample a part"
+    )]
+    TooLong {
+        /// Asked start, s.
+        start_s: f64,
+        /// Asked end, s.
+        end_s: f64,
+        /// The device's rate, Hz.
+        rate_hz: f64,
+        /// How many they would be.
+        count: f64,
     },
     /// The rail cannot deliver the power.
     #[error(
@@ -135,6 +153,9 @@ impl Device {
         if count < 1.0 {
             return Err(SampleError::TooShort { start_s, end_s, rate_hz: self.spec.rate_hz });
         }
+        if count > MOST {
+            return Err(SampleError::TooLong { start_s, end_s, rate_hz: self.spec.rate_hz, count });
+        }
         Ok(count as usize)
     }
 
@@ -185,6 +206,14 @@ mod tests {
 
     fn curve(watts: f64) -> Curve {
         Curve::new(vec![0.0, 1.0], vec![watts]).unwrap()
+    }
+
+    #[test]
+    fn more_samples_than_memory_holds_are_refused() {
+        let year = Curve::new(vec![0.0, 3e7], vec![10.0]).unwrap();
+        let device = Device::new(DeviceSpec { rate_hz: 1e7, ..DeviceSpec::default() }).unwrap();
+        let message = device.sample(&year, 0.0, 3e7).unwrap_err().to_string();
+        assert!(message.contains("300000000000000 samples"), "{message}");
     }
 
     #[test]

@@ -4,46 +4,35 @@ use super::{FrameEnergy, PowerIntegral};
 use crate::trace::Trace;
 
 /// Idle power to take off.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Idle {
+#[derive(Clone, Debug)]
+pub enum Idle<'a> {
     /// The same at all times, W: the mean over a stretch or a recording. Less noisy.
     Mean(f64),
     /// Instant by instant: what an idle recording shows as long after its start (repeated where it is shorter); it takes
     /// periodic patterns off, and adds the noise of both.
-    Instant(Box<Trace>),
+    Instant(PowerIntegral<'a>),
 }
 
-impl Idle {
+impl Idle<'_> {
     /// Energy of idling from `a_s` to `b_s` of a trace that starts at `start_s`, J.
     pub fn energy_j(&self, start_s: f64, a_s: f64, b_s: f64) -> f64 {
         match self {
             Self::Mean(watts) => watts * (b_s - a_s),
-            Self::Instant(trace) => {
-                let integral = PowerIntegral::new(trace);
-                since(&integral, trace, b_s - start_s) - since(&integral, trace, a_s - start_s)
-            }
+            Self::Instant(recording) => since(recording, b_s - start_s) - since(recording, a_s - start_s),
         }
     }
 
     /// Takes the idle energy off every frame.
     pub fn take_off(&self, start_s: f64, frames: &mut [FrameEnergy]) {
-        match self {
-            Self::Mean(watts) => {
-                frames.iter_mut().for_each(|frame| frame.energy_j -= watts * frame.duration_s());
-            }
-            Self::Instant(trace) => {
-                let integral = PowerIntegral::new(trace);
-                for frame in frames {
-                    let (a_s, b_s) = (frame.start_s - start_s, frame.end_s - start_s);
-                    frame.energy_j -= since(&integral, trace, b_s) - since(&integral, trace, a_s);
-                }
-            }
+        for frame in frames {
+            frame.energy_j -= self.energy_j(start_s, frame.start_s, frame.end_s);
         }
     }
 }
 
 /// Energy of the recording, repeated, from its start on, J.
-fn since(integral: &PowerIntegral<'_>, trace: &Trace, time_s: f64) -> f64 {
+fn since(integral: &PowerIntegral<'_>, time_s: f64) -> f64 {
+    let trace = integral.trace();
     let length_s = trace.end_s() - trace.start_s();
     let whole = libm::floor(time_s / length_s);
     let rest_s = time_s - whole * length_s;
@@ -77,7 +66,7 @@ mod tests {
     fn a_constant_idle_is_the_same_by_mean_and_by_instant_also_beyond_its_recording() {
         let recording = trace(vec![2.0; 7]);
         for (a_s, b_s) in [(0.0, 0.3), (0.55, 3.21)] {
-            let by_instant = Idle::Instant(Box::new(recording.clone())).energy_j(0.0, a_s, b_s);
+            let by_instant = Idle::Instant(PowerIntegral::new(&recording)).energy_j(0.0, a_s, b_s);
             assert!((by_instant - Idle::Mean(2.0).energy_j(0.0, a_s, b_s)).abs() < 1e-12);
         }
     }

@@ -33,6 +33,11 @@ impl<'a> PowerIntegral<'a> {
         Self { trace, prefix_w }
     }
 
+    /// The trace.
+    pub fn trace(&self) -> &'a Trace {
+        self.trace
+    }
+
     /// Energy from `a_s` to `b_s`, J; negative if `b_s < a_s`.
     pub fn energy_j(&self, a_s: f64, b_s: f64) -> f64 {
         self.power_sum_to(b_s).minus(self.power_sum_to(a_s)) / self.trace.rate_hz()

@@ -25,4 +25,4 @@ pub use rows::Rows;
 pub const COLUMNS: [&str; 4] = ["time_ns", "time_s", "voltage_V", "current_A"];
 
 pub(crate) use rows::Chunk;
-pub(crate) use timing::{Stamps, grid};
+pub(crate) use timing::{Stamps, grid, rounded_rate_hz};

@@ -43,7 +43,10 @@ pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     }
     rows.header.check_rows(&path, read as u64)?;
     let mut header = std::mem::take(&mut rows.header);
-    let repairs = if rows.mends() { mend(&path, &mut columns, &mut header)? } else { Vec::new() };
+    let mut repairs: Vec<Repair> = rows.cut().cloned().into_iter().collect();
+    if rows.mends() {
+        repairs.extend(mend(&path, &mut columns, &mut header)?);
+    }
     let Columns { stamps, voltage_v, current_a } = columns;
     let grid = timing::grid(&path, &stamps, &header)?;
     let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata)

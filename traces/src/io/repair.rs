@@ -3,7 +3,7 @@
 use super::ReadError;
 use super::header::Header;
 use super::read::Columns;
-use super::timing::Stamps;
+use super::timing::{Stamps, rounded_rate_hz};
 use serde::Serialize;
 use std::path::Path;
 
@@ -15,7 +15,7 @@ const LONGER: usize = 16;
 /// Something that was mended.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
+    /// `cut-signals`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
     pub code: &'static str,
     /// The first row (from 1, as rows stand in the file; after sorting, as they stand then).
     pub row: u64,
@@ -187,12 +187,19 @@ fn space(
     Ok(())
 }
 
+/// The rate that all rows agree on, those with missing samples between them too. The usual step alone would not do: where
+/// stamps are rounded, it is off by up to that much, which adds up over the rows.
 fn usual_rate_hz(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let middle = steps.len() / 2;
-    let step_s = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let rate_hz = 1.0 / step_s;
-    if (libm::round(rate_hz) / rate_hz - 1.0).abs() < 1e-4 { libm::round(rate_hz) } else { rate_hz }
+    let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut sorted: Vec<f64> = steps().collect();
+    let middle = sorted.len() / 2;
+    let usual_s = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let (sum_s, count) = steps()
+        .filter(|step_s| (step_s / usual_s - 1.0).abs() < 0.5)
+        .fold((0.0, 0.0), |(sum_s, count), step_s| (sum_s + step_s, count + 1.0));
+    let period_s = sum_s / count;
+    let periods: f64 = steps().map(|step_s| libm::round(step_s / period_s).max(1.0)).sum();
+    rounded_rate_hz(periods, times[times.len() - 1] - times[0], f64::INFINITY)
 }
 
 /// Values at the grid's times: a row's own within `near_s`, else on the line between the rows around.
@@ -209,4 +216,43 @@ fn interpolated(times: &[f64], values: &[f32], grid: &[f64], near_s: f64) -> Vec
         (f64::from(values[row]) + share * (f64::from(values[row + 1]) - f64::from(values[row]))) as f32
     };
     grid.iter().map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Stamps in whole microseconds at 44.1 kHz, without some of them.
+    fn rounded(lost: core::ops::Range<u32>) -> Vec<f64> {
+        (0..20_000)
+            .filter(|row| !lost.contains(row))
+            .map(|row| libm::round(f64::from(row) * 1e6 / 44_100.0) / 1e6)
+            .collect()
+    }
+
+    fn mended(times: Vec<f64>, spoilt: usize) -> (Vec<Repair>, Columns, Header) {
+        let mut current_a: Vec<f32> = (0..times.len()).map(|row| row as f32).collect();
+        current_a[spoilt] = f32::NAN;
+        let mut columns =
+            Columns { voltage_v: vec![1.0; times.len()], current_a, stamps: Stamps::Seconds(times) };
+        let mut header = Header::default();
+        let told = mend(Path::new("t.csv"), &mut columns, &mut header).unwrap();
+        (told, columns, header)
+    }
+
+    #[test]
+    fn rounded_stamps_of_an_even_rate_stay_as_they_are() {
+        let (told, columns, _) = mended(rounded(0..0), 777);
+        assert_eq!(told.iter().map(|repair| repair.code).collect::<Vec<_>>(), ["filled-values"]);
+        assert!(columns.current_a.iter().enumerate().all(|(row, amps)| *amps == row as f32));
+    }
+
+    #[test]
+    fn a_gap_in_rounded_stamps_is_filled_with_as_many_as_are_missing() {
+        let (told, columns, header) = mended(rounded(5000..5100), 3);
+        assert_eq!(header.rate_hz, Some(44_100.0));
+        let gaps: Vec<_> = told.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
+        assert_eq!(gaps, [("filled-values", 4, 1), ("filled-gap", 5000, 100)]);
+        assert_eq!((columns.current_a.len(), columns.current_a[19_999]), (20_000, 19_899.0));
+    }
 }

@@ -120,7 +120,7 @@ fn fitted_rate_hz(path: &Path, stamps: &Stamps) -> Result<f64, ReadError> {
 }
 
 /// The roundest rate (the one with most zeros) that moves the last sample by no more than the stamps can tell.
-fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
+pub(crate) fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
     let rate_hz = periods / span_s;
     let tolerance = f64::min(SNAP, resolution_s * rate_hz);
     let round_to = |unit_hz: f64| libm::round(rate_hz / unit_hz) * unit_hz;

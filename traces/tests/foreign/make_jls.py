@@ -2,7 +2,7 @@
 import os
 import sys
 import numpy as np
-from pyjls import DataType, SignalType, Writer
+from pyjls import DataType, Reader, SignalType, Writer
 
 FOLDER = sys.argv[1]
 
@@ -111,10 +111,22 @@ def unclosed():
     os.wait()
 
 
+def mended():
+    """The instrument's recording cut off, then mended by opening it: lists still lead to where the next chunks were."""
+    with open(path("pyjls.jls"), "rb") as file:
+        whole = file.read()
+    for length in 19_000, 44_500:
+        with open(path(f"pyjls_mended_{length}.jls"), "wb") as file:
+            file.write(whole[:length])
+        with Reader(path(f"pyjls_mended_{length}.jls")) as reader:
+            assert reader.signals[3].length > reader.signals[4].length
+
+
 instrument()
 types()
 gaps()
 rates()
 unclosed()
+mended()
 for name in os.listdir(FOLDER):
     os.chmod(path(name), 0o644)

@@ -94,7 +94,13 @@ pub struct RunArgs {
     /// Samples per second of the recorder
     #[arg(long, value_name = "HZ", default_value_t = 50e3, allow_negative_numbers = true)]
     pub trace_rate: f64,
-    /// Seed of samples and noise
+    /// Samples of the recorder that travel together, and are lost together
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..))]
+    pub packet_samples: u32,
+    /// Share of these packets that are lost, 0 to below 1: gaps in trace.parquet
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub packet_loss: f64,
+    /// Seed of samples, noise and losses
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
     pub seed: u64,
     /// Write every frame as EXR, too (linear light)

@@ -24,7 +24,7 @@ pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
         [a, b] => Alignment::by_anchors(a, b)?,
         [] => {
             let (trace, _) = args.input.load()?;
-            let (found, _) = args.find.found(&trace)?;
+            let found = args.find.found_at_once(&trace)?;
             let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
             Alignment::by_fit(&stamps, &starts)?
         }

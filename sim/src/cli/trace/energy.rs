@@ -11,38 +11,44 @@ use crate::cli::terminal::{complain, print, print_json};
 
 pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
     let (trace, repairs) = args.input.load()?;
-    let idle = idle(args, &trace)?;
+    let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path)).transpose()?;
+    let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
+    let idle = idle(args, &trace, recording.as_ref())?;
     if args.from.is_some() || args.to.is_some() {
         return stretch(args, &trace, idle.as_ref());
     }
+    let pixels = args.find.pixels.or(trace.metadata.pixels);
     let mut runs = vec![one_run(args, &trace, idle.as_ref())?];
     for path in &args.run {
         let (other, _) = args.input.load_other(path)?;
-        runs.push(one_run(args, &other, self::idle(args, &other)?.as_ref())?);
+        runs.push(one_run(args, &other, self::idle(args, &other, recording.as_ref())?.as_ref())?);
     }
     let energies: Vec<Vec<f64>> =
         runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
     let pool = pooled(&energies).ok_or_else(|| wrong("no frame is left; discard fewer"))?;
     if args.json {
         let runs: Vec<_> = runs.iter().map(Run::json).collect();
-        return print_json(&json!({ "runs": runs, "pooled": pool, "repairs": repairs }), true);
+        let report = json!({ "runs": runs, "pooled": pool, "pixels": pixels, "repairs": repairs });
+        return print_json(&report, true);
     }
     let text: String = runs.iter().map(Run::text).collect();
-    print(&(text + &pooled_text(&pool)))
+    print(&(text + &pooled_text(&pool, pixels)))
 }
 
-fn pooled_text(pool: &Pooled) -> String {
+fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
+    let per_pixel = pixels.filter(|&pixels| pixels > 0).map(|pixels| pool.mean / pixels as f64 * 1e9);
     format!(
-        "{} runs, {} frames: {:.4} mJ/frame, pooled standard deviation {:.4} mJ",
+        "{} runs, {} frames: {:.4} mJ/frame{}, pooled standard deviation {:.4} mJ",
         pool.runs,
         pool.values,
         pool.mean * 1e3,
+        per_pixel.map_or(String::new(), |nj| format!(", {nj:.3} nJ/pixel")),
         pool.deviation * 1e3
     )
 }
 
 /// Energy between two times.
-fn stretch(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle>) -> Result<(), Failure> {
+fn stretch(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<(), Failure> {
     let (from_s, to_s) = (args.from.unwrap_or(trace.start_s()), args.to.unwrap_or(trace.end_s()));
     check(trace, from_s, to_s, "--from and --to")?;
     let total_j = PowerIntegral::new(trace).energy_j(from_s, to_s);
@@ -59,23 +65,27 @@ fn stretch(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle>) -> Result<(), 
 
 fn check(trace: &Trace, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
     let (start_s, end_s) = (trace.start_s(), trace.end_s());
-    if from_s >= start_s && to_s <= end_s * (1.0 + 1e-12) && from_s < to_s {
+    let rounding_s = 1e-12 * start_s.abs().max(end_s.abs());
+    if from_s >= start_s - rounding_s && to_s <= end_s + rounding_s && from_s < to_s {
         return Ok(());
     }
     Err(wrong(format!("{what}: {from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s")))
 }
 
-fn idle(args: &EnergyArgs, trace: &Trace) -> Result<Option<Idle>, Failure> {
+fn idle<'a>(
+    args: &EnergyArgs,
+    trace: &Trace,
+    recording: Option<&PowerIntegral<'a>>,
+) -> Result<Option<Idle<'a>>, Failure> {
     if let Some((from_s, to_s)) = args.idle {
         check(trace, from_s, to_s, "--idle")?;
         return Ok(Some(Idle::Mean(PowerIntegral::new(trace).energy_j(from_s, to_s) / (to_s - from_s))));
     }
-    if let Some(path) = &args.idle_trace {
-        let (recording, _) = args.input.load_other(path)?;
-        let length_s = recording.end_s() - recording.start_s();
+    if let Some(recording) = recording {
+        let length_s = recording.trace().end_s() - recording.trace().start_s();
         return Ok(Some(match args.idle_by {
-            IdleBy::Mean => Idle::Mean(PowerIntegral::new(&recording).total_j() / length_s),
-            IdleBy::Instant => Idle::Instant(Box::new(recording)),
+            IdleBy::Mean => Idle::Mean(recording.total_j() / length_s),
+            IdleBy::Instant => Idle::Instant(recording.clone()),
         }));
     }
     Ok(args.idle_w.map(Idle::Mean))
@@ -91,8 +101,8 @@ struct Run {
     passes: Vec<(String, Spread)>,
 }
 
-fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle>) -> Result<Run, Failure> {
-    let (found, _) = args.find.found(trace)?;
+fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<Run, Failure> {
+    let found = args.find.found_at_once(trace)?;
     for warning in &found.warnings {
         complain(&format!("warning {}: {}", warning.code, warning.message));
     }
@@ -142,7 +152,7 @@ fn passes(
     args: &EnergyArgs,
     integral: &PowerIntegral<'_>,
     frames: &[FrameEnergy],
-    idle: Option<&Idle>,
+    idle: Option<&Idle<'_>>,
     start_s: f64,
 ) -> Result<Vec<(String, Spread)>, Failure> {
     let mut marks = args.pass.clone();

@@ -134,7 +134,7 @@ fn text(frames: &Frames, table: &FrameTable, pixels: Option<u64>) -> String {
 
 /// Inverse units from the mean energy, and what their own average would wrongly be (Paper II).
 fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
-    let energies: Vec<f64> = table.frames().iter().map(|frame| frame.energy_j).filter(|j| *j > 0.0).collect();
+    let energies: Vec<f64> = table.frames().iter().map(|frame| frame.energy_j).collect();
     let count = energies.len() as f64;
     let right = count / energies.iter().sum::<f64>();
     let naive = energies.iter().map(|j| 1.0 / j).sum::<f64>() / count;

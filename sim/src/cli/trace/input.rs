@@ -7,6 +7,7 @@ use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
 use traces::io::{ReadError, ReadOptions, Repair, Rows, WriteError, read};
 use traces::stream::{self, StreamError};
+use traces::trace::RATE_LIMITS_HZ;
 use traces::{MarkKind, Metadata, Trace, Warning};
 
 use super::args::{FindArgs, InputArgs};
@@ -54,8 +55,12 @@ pub(super) fn wrong(message: impl Into<String>) -> Failure {
 
 impl InputArgs {
     pub(super) fn options(&self) -> Result<ReadOptions, Failure> {
-        if let Some(rate_hz) = self.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-            return Err(wrong(format!("--rate {rate_hz}: a rate has to be above 0 Hz")));
+        let [low, high] = RATE_LIMITS_HZ;
+        if let Some(rate_hz) = self.rate.filter(|rate| !(low..=high).contains(rate)) {
+            return Err(wrong(format!("--rate {rate_hz}: a rate has to be from {low:e} to {high:e} Hz")));
+        }
+        if self.power_column.is_some() && !self.rail.is_empty() {
+            return Err(wrong("--rail chooses by name what --power-column chooses by hand: leave one out"));
         }
         Ok(ReadOptions {
             rails: self.rail.clone(),
@@ -152,8 +157,10 @@ impl FindArgs {
         if self.auto {
             return Err(wrong("--auto looks at traces that fit into memory; mark a frame with --mark"));
         }
-        let starts_s = self.marks(&Metadata::default())?;
-        let marks = Marks { starts_s, window: self.window_s()?, end_s: self.end.unwrap_or(f64::INFINITY) };
+        let rows = Rows::open(&input.trace, &options)?;
+        let starts_s = self.marks(rows.metadata())?;
+        let end_s = self.end.or_else(|| end_mark(rows.metadata())).unwrap_or(f64::INFINITY);
+        let marks = Marks { starts_s, window: self.window_s()?, end_s };
         let streamed = stream::find(&input.trace, &options, &marks)?;
         let clock = streamed.clock;
         Ok(Frames {
@@ -169,8 +176,16 @@ impl FindArgs {
         })
     }
 
+    /// Frames of a trace in memory, where nothing is read in pieces.
+    pub(super) fn found_at_once(&self, trace: &Trace) -> Result<Found, Failure> {
+        if self.stream {
+            return Err(wrong("--stream goes with `trace frames` alone; leave it out"));
+        }
+        Ok(self.found(trace)?.0)
+    }
+
     /// Frames of a trace in memory.
-    pub(super) fn found(&self, trace: &Trace) -> Result<(Found, Option<Proposal>), Failure> {
+    fn found(&self, trace: &Trace) -> Result<(Found, Option<Proposal>), Failure> {
         let proposal = if self.auto {
             let none = || wrong("--auto found no rise of power to propose as a start: mark one with --mark");
             Some(propose(trace).ok_or_else(none)?)
@@ -216,22 +231,21 @@ fn end_mark(metadata: &Metadata) -> Option<f64> {
     metadata.marks.iter().rev().find(|mark| mark.kind == MarkKind::End).map(|mark| mark.time_s)
 }
 
-/// Times from a file: a number in each line, or the column `start_s`, `time_s` or `mark_s` of a table.
+/// Names of columns of times.
+const TIMES: [&str; 4] = ["start_s", "time_s", "mark_s", "stamp_s"];
+
+/// Times from a file: a number in each line, or the first of the columns [`TIMES`] that a table has.
 pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
     let text = fs::read_to_string(path)
         .map_err(|error| wrong(format!("{}: cannot be read: {error}", path.display())))?;
     let mut column = 0;
     let mut times = Vec::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let fields: Vec<&str> = line.split([',', '\t', ';']).map(str::trim).collect();
+        let fields: Vec<&str> =
+            line.trim_start_matches('\u{feff}').split([',', '\t', ';']).map(str::trim).collect();
         match fields.get(column).and_then(|field| field.parse::<f64>().ok()).filter(|time| time.is_finite()) {
             Some(time) => times.push(time),
-            None if times.is_empty() && index == 0 => {
-                let named = |field: &&str| {
-                    ["start_s", "time_s", "mark_s"].iter().any(|n| field.eq_ignore_ascii_case(n))
-                };
-                column = fields.iter().position(named).unwrap_or(0);
-            }
+            None if times.is_empty() && index == 0 => column = time_column(path, &fields)?,
             None => {
                 let message = format!(
                     "{}: line {}: `{line}` holds no time in seconds; mend it",
@@ -243,4 +257,14 @@ pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
         }
     }
     if times.is_empty() { Err(wrong(format!("{}: holds no time", path.display()))) } else { Ok(times) }
+}
+
+/// Where times stand in a table; a single column may be called anything.
+fn time_column(path: &Path, names: &[&str]) -> Result<usize, Failure> {
+    let named = |time: &&str| names.iter().position(|name| name.eq_ignore_ascii_case(time));
+    let only = (names.len() == 1).then_some(0);
+    TIMES.iter().find_map(named).or(only).ok_or_else(|| {
+        let (found, times) = (names.join(", "), TIMES.join(", "));
+        wrong(format!("{}: none of its columns ({found}) is called {times}: rename one", path.display()))
+    })
 }

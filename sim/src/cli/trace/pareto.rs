@@ -8,7 +8,7 @@ use traces::io::atomic::write_file;
 use traces::pareto::{Point, Standing, frontier};
 use traces::table::Table as Columns;
 
-use super::args::ParetoArgs;
+use super::args::{ParetoArgs, ParetoShow};
 use super::input::wrong;
 use super::plot::{Ending, write};
 use crate::cli::Failure;
@@ -66,6 +66,7 @@ fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
     let labels = args.label.as_ref().map(texts).transpose()?;
     let keys = args.group.iter().map(texts).collect::<Result<Vec<_>, _>>()?;
     let mut groups: BTreeMap<String, Vec<Point>> = BTreeMap::new();
+    check(args, &times, &time_sd, &energy_sd)?;
     for row in 0..table.rows() {
         let named = args.group.iter().zip(&keys).map(|(column, values)| format!("{column}={}", values[row]));
         let key = named.collect::<Vec<_>>().join(", ");
@@ -78,6 +79,23 @@ fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
         });
     }
     Ok(groups.into_iter().map(|(key, points)| (key, frontier(&points, args.idle_w, args.seed))).collect())
+}
+
+/// Refuses what is no setting.
+fn check(args: &ParetoArgs, times: &[f64], time_sd: &[f64], energy_sd: &[f64]) -> Result<(), Failure> {
+    let refuse = |row: usize, what: &str| {
+        wrong(format!("{}: row {}: {what}: mend or drop the row", args.table.display(), row + 1))
+    };
+    if times.is_empty() {
+        return Err(wrong(format!("{}: has no row: give one for each setting", args.table.display())));
+    }
+    if let Some(row) = times.iter().position(|time_s| *time_s <= 0.0) {
+        return Err(refuse(row, &format!("{} is not above 0", args.time)));
+    }
+    match time_sd.iter().chain(energy_sd).position(|deviation| *deviation < 0.0) {
+        Some(at) => Err(refuse(at % times.len(), "a standard deviation is below 0")),
+        None => Ok(()),
+    }
 }
 
 fn text(groups: &Groups) -> String {
@@ -126,21 +144,38 @@ fn write_table(groups: &Groups, out: &mut impl Write) -> std::io::Result<()> {
     rows.flush()
 }
 
-/// All groups in one picture: points, and each group's frontier as a line.
+/// Where a setting stands in the plot, and its deviations.
+fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
+    match show {
+        ParetoShow::Energy => (p.time_s, p.energy_j, p.time_deviation_s, p.energy_deviation_j),
+        ParetoShow::Power => {
+            let power_w = p.energy_j / p.time_s;
+            let shares = libm::hypot(p.time_deviation_s / p.time_s, p.energy_deviation_j / p.energy_j);
+            (p.time_s, power_w, p.time_deviation_s, (power_w * shares).abs())
+        }
+    }
+}
+
+/// All groups in one picture: points with their deviations, and each group's frontier as a line.
 fn picture(args: &ParetoArgs, groups: &Groups) -> crate::output::plot::Picture {
+    let place = |s: &Standing| place(args.show, &s.point);
     let all = || groups.values().flatten();
     let of = |on: bool| {
         let chosen = all().filter(|s| s.on_frontier == on);
         let label = |s: &Standing| if on { s.point.label.clone() } else { String::new() };
-        Mark::Dots(chosen.map(|s| (s.point.time_s, s.point.energy_j, label(s))).collect())
+        Mark::Dots(chosen.map(|s| (place(s).0, place(s).1, label(s))).collect())
     };
     let mut series = vec![
         Series { name: "beaten by another".to_owned(), mark: of(false) },
         Series { name: "on the frontier".to_owned(), mark: of(true) },
     ];
+    let blurred: Vec<_> = all().map(place).filter(|(_, _, dx, dy)| *dx > 0.0 || *dy > 0.0).collect();
+    if !blurred.is_empty() {
+        series.push(Series { name: "one standard deviation".to_owned(), mark: Mark::Crosses(blurred) });
+    }
     for (group, standings) in groups {
         let on = standings.iter().filter(|s| s.on_frontier);
-        let mut line: Vec<(f64, f64)> = on.map(|s| (s.point.time_s, s.point.energy_j)).collect();
+        let mut line: Vec<(f64, f64)> = on.map(|s| (place(s).0, place(s).1)).collect();
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
         if line.len() > 1 && series.len() < 8 {
             series.push(Series {
@@ -150,6 +185,9 @@ fn picture(args: &ParetoArgs, groups: &Groups) -> crate::output::plot::Picture {
         }
     }
     let subject = format!("{} - idle power charged: {} W", args.table.display(), args.idle_w);
-    Lines { title: "Time and energy", subject: &subject, x: ("time", "s"), y: ("energy", "J"), series }
-        .picture()
+    let (title, y) = match args.show {
+        ParetoShow::Energy => ("Time and energy", ("energy", "J")),
+        ParetoShow::Power => ("Time and mean power", ("power", "W")),
+    };
+    Lines { title, subject: &subject, x: ("time", "s"), y, series }.picture()
 }

@@ -10,7 +10,7 @@ use traces::pyramid::{Column, Pyramid};
 use super::args::{PlotArgs, PlotKind};
 use super::input::wrong;
 use crate::cli::Failure;
-use crate::cli::terminal::{print, print_json};
+use crate::cli::terminal::{complain, print, print_json};
 use crate::output::plot::{Lines, Mark, Picture, Series};
 use crate::output::table::si;
 
@@ -74,7 +74,12 @@ fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure
 /// Lowest, highest and mean power of each column, from the pyramid beside the file.
 fn curve(args: &PlotArgs) -> Result<(Picture, String), Failure> {
     let options = args.input.options()?;
-    let pyramid = Pyramid::of_file(&args.input.trace, &options)?;
+    // What is mended is told, so it is mended anew each time.
+    let pyramid = if args.input.repair {
+        Pyramid::of_trace(&args.input.load()?.0)
+    } else {
+        Pyramid::of_file(&args.input.trace, &options)?
+    };
     let (from_s, to_s) = span(args, pyramid.start_s(), pyramid.end_s())?;
     let columns = pyramid.columns(from_s, to_s, COLUMNS);
     let middle = |column: &Column| 0.5 * (column.from_s + column.to_s);
@@ -110,8 +115,11 @@ fn smoothed(columns: &[Column], width_s: f64) -> Vec<f64> {
 
 /// The kinds that need frames.
 fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
+    if args.from.is_some() || args.to.is_some() {
+        return Err(wrong("--from and --to choose a part of --kind curve; leave them out"));
+    }
     let (trace, _) = args.input.load()?;
-    let (found, _) = args.find.found(&trace)?;
+    let found = args.find.found_at_once(&trace)?;
     let frames = PowerIntegral::new(&trace).frames(&found);
     let energies: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
     let shown = format!("{} frames", frames.len());
@@ -209,10 +217,16 @@ fn repeats(args: &PlotArgs, first: Vec<f64>) -> Result<Drawn, Failure> {
     let mut runs = vec![first];
     for path in &args.run {
         let (trace, _) = args.input.load_other(path)?;
-        let (found, _) = args.find.found(&trace)?;
+        let found = args.find.found_at_once(&trace)?;
         runs.push(PowerIntegral::new(&trace).frames(&found).iter().map(|frame| frame.energy_j).collect());
     }
-    let frames = runs.iter().map(Vec::len).min().unwrap_or(0);
+    let (frames, most) =
+        (runs.iter().map(Vec::len).min().unwrap_or(0), runs.iter().map(Vec::len).max().unwrap_or(0));
+    if frames < most {
+        complain(&format!(
+            "warning uneven-runs: runs have {frames} to {most} frames; the first {frames} are shown"
+        ));
+    }
     let spreads =
         (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));
     let spreads: Vec<Spread> = spreads.collect();

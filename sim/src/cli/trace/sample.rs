@@ -1,5 +1,7 @@
 //! `quintile trace sample`.
 
+use std::ops::RangeInclusive;
+
 use serde_json::json;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::PowerIntegral;
@@ -9,6 +11,9 @@ use super::convert::{check, save};
 use super::input::wrong;
 use crate::cli::Failure;
 use crate::cli::terminal::{complain, print, print_json};
+
+/// Rates of the devices that are modelled, Hz.
+const RATES_HZ: RangeInclusive<f64> = 1.0..=1e7;
 
 pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     check(&args.out)?;
@@ -22,10 +27,11 @@ pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
         ));
     }
     let lost = sampled.trace.lost();
+    let lost_samples = lost.iter().map(|range| range.len()).sum::<usize>();
     if let Some(first) = lost.first() {
         complain(&format!(
             "warning packets-lost: {} samples in {} stretches are missing, the first after {} s; --repair fills them",
-            lost.iter().map(|range| range.len()).sum::<usize>(),
+            lost_samples,
             lost.len(),
             sampled.trace.time_s(first.start - 1)
         ));
@@ -38,7 +44,7 @@ pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     if args.json {
         return print_json(
             &json!({ "samples": samples, "device": device.spec(), "energy_J": before_j, "sampled_energy_J": after_j,
-                "relative_error": error, "clipped_currents": sampled.clipped_currents,
+                "relative_error": error, "lost_samples": lost_samples, "clipped_currents": sampled.clipped_currents,
                 "clipped_voltages": sampled.clipped_voltages }),
             true,
         );
@@ -78,5 +84,11 @@ fn spec(args: &SampleArgs) -> Result<DeviceSpec, Failure> {
     spec.packet_samples = args.packet_samples.unwrap_or(spec.packet_samples);
     set(&mut spec.packet_loss, args.packet_loss);
     spec.seed = args.seed.unwrap_or(spec.seed);
+    if !RATES_HZ.contains(&spec.rate_hz) {
+        return Err(wrong(format!(
+            "--device-rate {}: a device takes 1 to 1e7 samples per second",
+            spec.rate_hz
+        )));
+    }
     Ok(spec)
 }

@@ -16,6 +16,8 @@ pub enum Mark {
     Faint(Vec<Vec<(f64, f64)>>),
     /// Dots, each with a name that may be empty.
     Dots(Vec<(f64, f64, String)>),
+    /// Crosses that reach so far to either side, `(x, y, dx, dy)`.
+    Crosses(Vec<(f64, f64, f64, f64)>),
     /// Bars from zero, `(from, to, height)`.
     Bars(Vec<(f64, f64, f64)>),
 }
@@ -105,6 +107,9 @@ impl Mark {
             Self::Line(line) => line.clone(),
             Self::Faint(lines) => lines.concat(),
             Self::Dots(dots) => dots.iter().map(|&(x, y, _)| (x, y)).collect(),
+            Self::Crosses(crosses) => {
+                crosses.iter().flat_map(|&(x, y, dx, dy)| [(x - dx, y - dy), (x + dx, y + dy)]).collect()
+            }
             Self::Bars(bars) => bars.iter().flat_map(|&(from, to, y)| [(from, 0.0), (to, y)]).collect(),
         };
         points.into_iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
@@ -113,7 +118,7 @@ impl Mark {
     fn key(&self, colour: Colour) -> Key {
         match self {
             Self::Band(_) | Self::Bars(_) => Key::Area(colour),
-            Self::Line(_) | Self::Faint(_) => Key::Line(colour),
+            Self::Line(_) | Self::Faint(_) | Self::Crosses(_) => Key::Line(colour),
             Self::Dots(_) => Key::Dot(colour),
         }
     }
@@ -122,11 +127,10 @@ impl Mark {
         let path = |line: &[(f64, f64)]| line.iter().map(|&(x, y)| panel.at(x, y)).collect::<Vec<_>>();
         match self {
             Self::Band(band) => {
-                // A column is never thinner than a pixel: a lone spike is still seen.
-                for &(x, low, high) in band {
+                for (index, &(_, low, high)) in band.iter().enumerate() {
                     let (top, bottom) = (panel.y_px(high), panel.y_px(low));
-                    let x = panel.x_px(x);
-                    picture.rect((x - 0.5, top - 0.5), (x + 0.5, bottom.max(top) + 0.5), colour.alpha(0.55));
+                    let (left, right) = width_px(band, index, panel);
+                    picture.rect((left, top - 0.5), (right, bottom.max(top) + 0.5), colour.alpha(0.55));
                 }
             }
             Self::Line(line) => picture.polyline(path(line), colour, 1.6),
@@ -148,6 +152,12 @@ impl Mark {
                     }
                 }
             }
+            Self::Crosses(crosses) => {
+                for &(x, y, dx, dy) in crosses {
+                    picture.polyline(path(&[(x - dx, y), (x + dx, y)]), colour, 1.0);
+                    picture.polyline(path(&[(x, y - dy), (x, y + dy)]), colour, 1.0);
+                }
+            }
             Self::Bars(bars) => {
                 for &(from, to, y) in bars {
                     picture.rect(
@@ -159,6 +169,17 @@ impl Mark {
             }
         }
     }
+}
+
+/// From where to where a place of a band is drawn: halfway to its neighbours, and never thinner than a pixel, so that a
+/// lone spike is still seen.
+fn width_px(band: &[(f64, f64, f64)], index: usize, panel: &Panel) -> (f64, f64) {
+    let x_px = |index: usize| band.get(index).map(|place| panel.x_px(place.0));
+    let x = panel.x_px(band[index].0);
+    let before = index.checked_sub(1).and_then(x_px).map(|before| 0.5 * (x - before));
+    let after = x_px(index + 1).map(|after| 0.5 * (after - x));
+    let reach = |side: Option<f64>, other: Option<f64>| side.or(other).unwrap_or(0.0).max(0.5);
+    ((x - reach(before, after)).max(panel.left), (x + reach(after, before)).min(panel.right))
 }
 
 #[cfg(test)]
@@ -175,8 +196,28 @@ mod tests {
             series(Mark::Faint(vec![vec![(0.0, 1.0), (1.0, 2.0)]])),
             series(Mark::Dots(vec![(0.5, 1.5, "named".to_owned())])),
             series(Mark::Bars(vec![(0.0, 1.0, 3.0)])),
+            series(Mark::Crosses(vec![(0.5, 1.5, 0.1, 0.2)])),
         ];
         assert!(lines(all).picture().svg().unwrap().contains("named"));
         assert!(lines(vec![]).picture().svg().unwrap().contains("nothing to show"));
+    }
+
+    #[test]
+    fn places_of_a_band_touch_however_few_there_are() {
+        let panel = |right: f64| Panel {
+            left: 0.0,
+            top: 0.0,
+            right,
+            bottom: 100.0,
+            x: Axis::new("time", "s", 0.0, 4.0),
+            y: Axis::new("power", "W", 0.0, 1.0),
+        };
+        let band = [(1.0, 0.0, 1.0), (2.0, 0.0, 1.0), (3.0, 0.0, 1.0)];
+        let ends: Vec<_> = (0..3).map(|index| width_px(&band, index, &panel(400.0))).collect();
+        assert_eq!(ends, [(50.0, 150.0), (150.0, 250.0), (250.0, 350.0)]);
+        let (left, right) = width_px(&band[..1], 0, &panel(400.0));
+        assert_eq!(right - left, 1.0);
+        let (left, right) = width_px(&band, 1, &panel(1.0));
+        assert!(right - left >= 0.75, "{left} {right}");
     }
 }

@@ -5,4 +5,6 @@ mod read;
 mod write;
 
 pub use read::read;
+#[cfg(test)]
+pub(crate) use write::bare;
 pub use write::{save, write};

@@ -40,6 +40,13 @@ pub fn save(trace: &Trace, path: &Path) -> Result<(), WriteError> {
     atomic::write_file(path, |out| write(trace, out))
 }
 
+/// Without a description, as others write: rate and number of rows are then not stated.
+#[cfg(test)]
+pub(crate) fn bare(trace: &Trace, path: &Path) -> Result<(), WriteError> {
+    let encode = |error: ParquetError| WriteError::Encode(error.to_string());
+    atomic::write_file(path, |out| write_file(trace, "{}".to_owned(), out).map_err(encode))
+}
+
 fn write_file<W: Write + Send>(trace: &Trace, json: String, out: W) -> Result<(), ParquetError> {
     let mut writer = SerializedFileWriter::new(out, Arc::new(schema()?), Arc::new(properties(json)))?;
     for start in (0..trace.samples()).step_by(GROUP_ROWS) {

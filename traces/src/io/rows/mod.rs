@@ -9,7 +9,8 @@ mod zstd;
 use super::columns::{Layout, Rail};
 use super::header::Header;
 use super::timing::Stamps;
-use super::{ReadError, ReadOptions};
+use super::{ReadError, ReadOptions, Repair};
+use crate::metadata::Metadata;
 use std::fs::File;
 use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -113,6 +114,11 @@ impl Rows {
         &self.path
     }
 
+    /// What the file says about itself.
+    pub fn metadata(&self) -> &Metadata {
+        &self.header.metadata
+    }
+
     /// How many rows there are, where the file says so before it has been read.
     pub fn count(&self) -> Option<u64> {
         match &self.source {
@@ -120,6 +126,11 @@ impl Rows {
             Source::Jls(rows) => Some(rows.count()),
             Source::Parquet(rows) => Some(rows.count()),
         }
+    }
+
+    /// What was mended when the file was opened.
+    pub(crate) fn cut(&self) -> Option<&Repair> {
+        if let Source::Jls(rows) = &self.source { rows.cut() } else { None }
     }
 
     /// Names of the columns that are read, in order: of the trace's rails.

@@ -16,11 +16,11 @@ pub struct AlignArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
-    /// Recorded stamps in seconds: a number in each line, or a table with a column start_s or time_s
+    /// Recorded stamps in seconds: a number in each line, or a table with a column start_s, time_s, mark_s or stamp_s
     #[arg(value_name = "STAMPS")]
     pub stamps: PathBuf,
     /// A stamp and its time in the trace, twice; without them the best fit to the frames found
-    #[arg(long, value_name = "STAMP=TIME", value_parser = anchor)]
+    #[arg(long, value_name = "STAMP=TIME", value_parser = anchor, allow_hyphen_values = true)]
     pub anchor: Vec<(f64, f64)>,
     /// The frames.
     #[command(flatten)]

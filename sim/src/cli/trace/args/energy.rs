@@ -4,8 +4,23 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::{discard, pass, stretch};
+use super::parse::{discard, finite, pass, stretch};
 use super::{FindArgs, InputArgs};
+
+/// What is asked of frames, not of a stretch.
+const OF_FRAMES: [&str; 11] = [
+    "mark",
+    "mark_file",
+    "auto",
+    "end",
+    "stream",
+    "pixels",
+    "pass",
+    "discard",
+    "drop_outliers",
+    "run",
+    "busy_above",
+];
 
 /// Arguments of `trace energy`.
 #[derive(Debug, Args)]
@@ -19,23 +34,23 @@ pub struct EnergyArgs {
     /// The frames.
     #[command(flatten)]
     pub find: FindArgs,
-    /// Begin of the stretch
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Begin of the stretch, which needs no frames
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = OF_FRAMES)]
     pub from: Option<f64>,
     /// End of the stretch
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = OF_FRAMES)]
     pub to: Option<f64>,
     /// A stretch without rendering: its mean power is taken off
-    #[arg(long, value_name = "A..B", value_parser = stretch, conflicts_with_all = ["idle_w", "idle_trace"])]
+    #[arg(long, value_name = "A..B", value_parser = stretch, allow_hyphen_values = true, conflicts_with_all = ["idle_w", "idle_trace"])]
     pub idle: Option<(f64, f64)>,
     /// Idle power to take off
-    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_negative_numbers = true)]
+    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_negative_numbers = true, value_parser = finite)]
     pub idle_w: Option<f64>,
     /// A recording without rendering to take off
     #[arg(long, value_name = "TRACE")]
     pub idle_trace: Option<PathBuf>,
     /// How the recording is taken off
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, requires = "idle_trace")]
     pub idle_by: IdleBy,
     /// A pass within every frame, from so many milliseconds after its start to the next pass
     #[arg(long, value_name = "NAME=MS", value_parser = pass)]
@@ -50,7 +65,7 @@ pub struct EnergyArgs {
     #[arg(long, value_name = "TRACE")]
     pub run: Vec<PathBuf>,
     /// Power above which the old method takes a frame's work to go on; a tenth above idle without it
-    #[arg(long, value_name = "W", allow_negative_numbers = true)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = finite)]
     pub busy_above: Option<f64>,
     /// Print everything as JSON and nothing else
     #[arg(long)]

@@ -9,7 +9,7 @@ mod sample;
 
 pub use convert::{AlignArgs, ConvertArgs};
 pub use energy::{Discard, EnergyArgs, IdleBy};
-pub use pareto::ParetoArgs;
+pub use pareto::{ParetoArgs, ParetoShow};
 pub use plot::{PlotArgs, PlotKind};
 pub use sample::SampleArgs;
 
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use traces::frames::Method;
 
-use parse::window;
+use parse::{finite, window};
 
 /// Arguments of `trace`.
 #[derive(Debug, Args)]
@@ -72,13 +72,13 @@ pub struct InputArgs {
     #[arg(long, value_name = "COLUMN")]
     pub power_column: Option<String>,
     /// Voltage by specification instead of a measured one
-    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     pub voltage: Option<f64>,
     /// Samples per second, where the file does not say
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Time of the first sample, where the file does not say
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = finite)]
     pub start: Option<f64>,
     /// The first line holds numbers, not names
     #[arg(long)]
@@ -104,7 +104,7 @@ pub struct FindArgs {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub end: Option<f64>,
     /// What is compared, in milliseconds before and after the mark
-    #[arg(long, value_name = "PRE,POST", value_parser = window, default_value = "1,4")]
+    #[arg(long, value_name = "PRE,POST", value_parser = window, default_value = "1,4", allow_hyphen_values = true)]
     pub window: (f64, f64),
     /// How: `squares`, `tracking`, or `auto`
     #[arg(long, value_name = "METHOD", default_value_t)]
@@ -113,7 +113,7 @@ pub struct FindArgs {
     #[arg(long)]
     pub stream: bool,
     /// Pixels in a frame, for energy per pixel
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub pixels: Option<u64>,
 }
 

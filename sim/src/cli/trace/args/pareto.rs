@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+
+use super::parse::not_negative;
 
 /// Arguments of `trace pareto`.
 #[derive(Debug, Args)]
@@ -32,15 +34,28 @@ pub struct ParetoArgs {
     #[arg(long, value_name = "COLUMN")]
     pub group: Vec<String>,
     /// Idle power that the faster of two is charged for the time it saves
-    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = not_negative)]
     pub idle_w: f64,
     /// Seed of the draws for probabilities
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// File for a plot (.svg, .png) or a table (.csv)
+    /// What the plot shows over time: energy, or mean power as Paper IV does
+    #[arg(long, value_enum, default_value_t)]
+    pub show: ParetoShow,
+    /// File for a plot (.svg, .png, .pdf) or a table (.csv)
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Print as JSON and nothing else
     #[arg(long)]
     pub json: bool,
+}
+
+/// What a plot of frontiers shows over time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ParetoShow {
+    /// Energy
+    #[default]
+    Energy,
+    /// Energy by time (Paper IV, Figures 7 to 9)
+    Power,
 }

@@ -9,6 +9,19 @@ fn two(text: &str, between: &str, form: &str) -> Result<(f64, f64), String> {
     Ok((number(a)?, number(b)?))
 }
 
+fn number(text: &str, must: &str, fits: impl Fn(f64) -> bool) -> Result<f64, String> {
+    let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite() && fits(*value));
+    value.ok_or_else(|| format!("`{text}` is no {must}"))
+}
+
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    number(text, "finite number", |_| true)
+}
+
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    number(text, "finite number at or above 0", |value| value >= 0.0)
+}
+
 pub(super) fn window(text: &str) -> Result<(f64, f64), String> {
     two(text, ",", "PRE,POST in milliseconds, for example 1,4")
 }

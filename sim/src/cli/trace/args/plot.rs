@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::parse::not_negative;
 use super::{FindArgs, InputArgs};
 
 /// Arguments of `trace plot`.
@@ -21,14 +22,14 @@ pub struct PlotArgs {
     /// What to draw
     #[arg(long, value_enum, default_value_t)]
     pub kind: PlotKind,
-    /// Begin of what is shown
+    /// Begin of what is shown of the curve
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub from: Option<f64>,
-    /// End of what is shown
+    /// End of what is shown of the curve
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub to: Option<f64>,
     /// Time over which the curve's mean is drawn, in milliseconds; the whole range over 50 without it
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = not_negative)]
     pub low_pass: Option<f64>,
     /// Which frame, for `frame`; the middle one without it
     #[arg(long, value_name = "N")]
@@ -36,7 +37,7 @@ pub struct PlotArgs {
     /// Another run of the same thing, for `repeats`
     #[arg(long, value_name = "TRACE")]
     pub run: Vec<PathBuf>,
-    /// File: .svg or .png
+    /// File: .svg, .png or .pdf
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Print what was drawn as JSON

@@ -15,7 +15,7 @@ pub struct SampleArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
-    /// The device in a JSON or RON-like JSON file; the flags below change it
+    /// The device in a JSON file; the flags below change it
     #[arg(long, value_name = "FILE.json")]
     pub device: Option<PathBuf>,
     /// Samples per second, 1 to 10 million

@@ -130,6 +130,25 @@ impl ChunkFile {
         }
     }
 
+    /// The chunk that a list goes on with. In a recording that was cut off and mended, the last chunk of a list still
+    /// leads to where the next one was: beyond the end, or into others. There it ends.
+    pub fn follow(&mut self, head: &Head) -> Result<Option<Head>, ReadError> {
+        let Some(next) = head.next.filter(|&next| next < self.size_bytes) else { return Ok(None) };
+        match self.head(next) {
+            Err(_) if !self.begins(next, head)? => Ok(None),
+            found => found.map(Some),
+        }
+    }
+
+    /// Whether a chunk begins at a place, counted from one before.
+    fn begins(&mut self, at: u64, before: &Head) -> Result<bool, ReadError> {
+        let mut place = before.end();
+        while place < at {
+            place = self.head(place)?.end();
+        }
+        Ok(place == at)
+    }
+
     /// Reads the payload of a chunk over what was in `into`.
     pub fn payload(&mut self, head: &Head, into: &mut Vec<u8>) -> Result<(), ReadError> {
         into.clear();

@@ -15,7 +15,7 @@ use super::Chunk;
 use crate::io::columns::{Layout, layout};
 use crate::io::header::Header;
 use crate::io::timing::Stamps;
-use crate::io::{ReadError, ReadOptions};
+use crate::io::{ReadError, ReadOptions, Repair};
 use chunk::ChunkFile;
 use rayon::prelude::*;
 use signal::Definitions;
@@ -26,6 +26,9 @@ use track::Track;
 pub(super) struct JlsRows {
     names: Vec<String>,
     tracks: Vec<Track>,
+    count: u64,
+    /// What was left out so that signals make up rows.
+    cut: Option<Repair>,
 }
 
 impl JlsRows {
@@ -41,13 +44,18 @@ impl JlsRows {
             picked.scale = signal.scale().unwrap_or(picked.scale);
             tracks.push(Track::open(path, signal)?);
         }
-        check_alike(path, &tracks)?;
+        let cut = if options.repair {
+            cut(path, &mut tracks)?
+        } else {
+            check_alike(path, &tracks).map(|()| None)?
+        };
+        let count = tracks.first().map_or(0, Track::left);
         let mut header = Header::default();
         if let (Some(track), Some(picked)) = (tracks.first(), layout.values.first()) {
             header.rate_hz = Some(f64::from(track.rate_hz)).filter(|&rate_hz| rate_hz > 0.0);
             header.metadata.device = definitions.device(&definitions.signals[picked.index]);
         }
-        Ok((Self { names, tracks }, layout, header))
+        Ok((Self { names, tracks, count, cut }, layout, header))
     }
 
     pub fn names(&self) -> &[String] {
@@ -55,7 +63,11 @@ impl JlsRows {
     }
 
     pub fn count(&self) -> u64 {
-        self.tracks.first().map_or(0, |track| track.rows)
+        self.count
+    }
+
+    pub fn cut(&self) -> Option<&Repair> {
+        self.cut.as_ref()
     }
 
     pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
@@ -69,6 +81,25 @@ impl JlsRows {
         // All have as many: each was held against its own number, and the numbers are alike.
         read.into_iter().try_fold(0, |_, rows| rows)
     }
+}
+
+/// Leaves of signals of one rate, which need not begin and end together, what all have.
+fn cut(path: &Path, tracks: &mut [Track]) -> Result<Option<Repair>, ReadError> {
+    let from = tracks.iter().map(|track| i128::from(track.first)).max().unwrap_or(0);
+    let to = tracks.iter().map(Track::end).min().unwrap_or(0);
+    let longest = tracks.iter().map(|track| track.rows).max().unwrap_or(0);
+    let rate_hz = tracks.first().map_or(0, |track| track.rate_hz);
+    let kept = u64::try_from(to - from).unwrap_or(0);
+    if kept == longest || kept == 0 || tracks.iter().any(|track| track.rate_hz != rate_hz) {
+        return check_alike(path, tracks).map(|()| None);
+    }
+    tracks.iter_mut().try_for_each(|track| track.cut(from, to))?;
+    let count = longest - kept;
+    let message = format!(
+        "signals do not begin and end together: the {kept} samples from number {from} on are read, which all have; the \
+         longest signal has {count} more"
+    );
+    Ok(Some(Repair { code: "cut-signals", row: 1, time_s: 0.0, count, message }))
 }
 
 /// Rows are made of signals of one rate, from one sample to another.

@@ -122,7 +122,7 @@ fn each(file: &mut ChunkFile, tag: u8, mut take: impl FnMut(&Head, &[u8])) -> Re
     while let Some(head) = at {
         file.payload(&head, &mut payload)?;
         take(&head, &payload);
-        at = head.next.map(|next| file.head(next)).transpose()?;
+        at = file.follow(&head)?;
     }
     Ok(())
 }

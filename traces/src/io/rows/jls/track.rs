@@ -21,6 +21,8 @@ pub(super) struct Track {
     /// The number of the first sample: instruments count on.
     pub first: i64,
     pub rows: u64,
+    /// How many of them are given out: all, or as many as other signals have.
+    until: u64,
     /// Rows before the ones to come.
     row: u64,
     next: Option<u64>,
@@ -50,6 +52,7 @@ impl Track {
             rate_hz: signal.rate_hz,
             first: 0,
             rows: 0,
+            until: 0,
             row: 0,
             next: Some(signal.heads[0]).filter(|&at| at != 0),
             payload: Vec::new(),
@@ -60,10 +63,29 @@ impl Track {
             let (last, count, _) = track.front(last)?;
             let rows = i128::from(last) + count as i128 - i128::from(first);
             track.rows = u64::try_from(rows).map_err(|_| track.file.damaged(at, "sample numbers go back"))?;
-            track.first = first;
+            (track.first, track.until) = (first, track.rows);
             track.payload.clear();
         }
         Ok(track)
+    }
+
+    /// The number of the sample after the last one.
+    pub fn end(&self) -> i128 {
+        i128::from(self.first) + i128::from(self.rows)
+    }
+
+    /// How many are still to be given out.
+    pub fn left(&self) -> u64 {
+        self.until - self.row
+    }
+
+    /// Gives out samples from one number to another alone, both within the signal.
+    pub fn cut(&mut self, from: i128, to: i128) -> Result<(), ReadError> {
+        let within =
+            |number: i128| u64::try_from(number - i128::from(self.first)).unwrap_or(0).min(self.rows);
+        let (from, until) = (within(from), within(to));
+        self.until = until;
+        self.skip(from)
     }
 
     /// The header of a chunk that must be of this signal.
@@ -107,11 +129,19 @@ impl Track {
         self.end_of_list(at, DATA)
     }
 
-    fn end_of_list(&mut self, mut at: u64, tag: u8) -> Result<u64, ReadError> {
-        while let Some(next) = self.head(at, tag)?.next {
-            at = next;
+    fn end_of_list(&mut self, at: u64, tag: u8) -> Result<u64, ReadError> {
+        let mut head = self.head(at, tag)?;
+        while let Some(next) = self.follow(&head)? {
+            head = next;
         }
-        Ok(at)
+        Ok(head.at)
+    }
+
+    /// The next chunk of the same list. Where a mended list leads to another chunk it ends; that no samples are missing
+    /// before their end is seen by their numbers.
+    fn follow(&mut self, head: &Head) -> Result<Option<Head>, ReadError> {
+        let next = self.file.follow(head)?;
+        Ok(next.filter(|next| next.tag == head.tag && next.meta & SIGNAL_MASK == self.id))
     }
 
     /// Loads the next chunk; `false` at the end.
@@ -119,7 +149,7 @@ impl Track {
         let Some(at) = self.next else { return self.ended() };
         let (first, count, head) = self.front(at)?;
         self.taken = FRONT;
-        self.next = head.next;
+        self.next = self.follow(&head)?.map(|next| next.at);
         let jump = i128::from(first) - i128::from(self.first) - i128::from(self.row);
         if jump != 0 {
             return Err(ReadError::Uneven {
@@ -149,6 +179,8 @@ impl Track {
 
     /// Appends samples until there are `limit` or no more.
     pub fn values(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, ReadError> {
+        let left = usize::try_from(self.left()).unwrap_or(usize::MAX);
+        let limit = limit.min(left.saturating_add(into.len()));
         while into.len() < limit {
             let bytes = self.sample.bytes();
             let rest = &self.payload[self.taken.min(self.payload.len())..];
@@ -181,7 +213,8 @@ impl Track {
             if whole > rows {
                 self.advance()?;
             } else {
-                (self.next, self.row, rows) = (head.next, self.row + whole, rows - whole);
+                self.next = self.follow(&head)?.map(|next| next.at);
+                (self.row, rows) = (self.row + whole, rows - whole);
             }
         }
         Ok(())
