@@ -9,7 +9,7 @@ use ::parquet::schema::types::Type;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-use traces::io::{ReadError, csv, parquet};
+use traces::io::{self, ReadError, ReadOptions, csv, parquet};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 fn in_folder(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
@@ -55,6 +55,17 @@ fn csv_errors_name_file_row_and_column() {
     says(&with("0,1,2\n"), &["single row", "rate_hz"]);
     says(&with("0,1,2\n1e-12,1,2\n"), &["bad.csv: sample rate 1000000000000 Hz"]);
     assert!(matches!(with("0,1,2\n1e-12,1,2\n"), ReadError::Trace { .. }));
+}
+
+#[test]
+fn a_row_of_units_is_refused_and_not_dropped_by_repair() {
+    // Dropped, its "mA" would be read as A.
+    let (_folder, path) =
+        in_folder("units.csv", b"time_s,voltage_V,current_A\ns,V,mA\n0,1,100\n0.001,1,110\n0.002,1,90\n");
+    for repair in [false, true] {
+        let options = ReadOptions { repair, ..ReadOptions::default() };
+        says(&io::read(&path, &options).unwrap_err(), &["units.csv", "row 1", "units"]);
+    }
 }
 
 #[test]

@@ -103,6 +103,12 @@ pub enum ReadError {
         /// The types that can be read.
         must: &'static str,
     },
+    /// The first row under the names holds none of the values: units, most likely.
+    #[error("{path}: row 1 holds words, no values: if these are units, take the row out and see that columns are in s, V, A or W", path = path.display())]
+    Words {
+        /// The file.
+        path: PathBuf,
+    },
     /// A value is missing, not a number, or not finite.
     #[error("{path}: row {row}: {column} is {value}, not a finite number: mend it or cut the stretch out", path = path.display())]
     Value {

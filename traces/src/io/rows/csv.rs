@@ -117,6 +117,9 @@ impl CsvRows {
                 let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
                 return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
             }
+            if self.row == 1 && self.record.iter().all(is_word) {
+                return Err(ReadError::Words { path: self.path.clone() });
+            }
             if let Some(time) = &layout.time {
                 times.push(self.field::<f64>(time, repair, f64::NAN)? * time.scale);
             }
@@ -164,6 +167,11 @@ fn unnamed(columns: usize) -> Vec<String> {
     (0..columns)
         .map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned()))
         .collect()
+}
+
+/// Whether there is something in a field that is no number, not even one that is not finite.
+fn is_word(field: &[u8]) -> bool {
+    !field.is_empty() && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_err())
 }
 
 fn number<T: std::str::FromStr + Finite>(field: &[u8]) -> Option<T> {
