@@ -5,7 +5,7 @@
 //! everywhere and another above.
 //!
 //! With `n` the cross product of vertices `i` and `j` as homogeneous points `(x, y, w)`, seen from the middle of the tile, the edge seen
-//! from `(X, Y)` is `n_x X + n_y Y + n_z` (Olano and Greer 1997, section 3), so over the tile it is `n_z` give or take `|n_x|` and
+//! from `(X, Y)` is `n_x X + n_y Y + n_z` (Olano and Greer 1997), so over the tile it is `n_z` give or take `|n_x|` and
 //! `|n_y|` times half the tile's sides. `n` is linear in each of u and v and quadratic in t, so what it is at their corners, and in t
 //! its three Bernstein coefficients, bound it.
 
