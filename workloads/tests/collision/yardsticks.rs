@@ -7,11 +7,8 @@ use workloads::collision::{Method, Object, Search, candidates, detect};
 /// Looking once at 128 pixels.
 const ONCE: Search = Search { resolution: 128, bins: 1, method: Method::FragmentBox, zoom: false };
 
-/// Cases of each kind of two objects and of many: 330 in all, as many as the yardsticks were measured over.
-const CASES: [usize; 2] = [30, 30];
-
-/// Bins of time with the bars of two objects and of many.
-const BARS: [(u32, [f64; 2]); 3] = [(1, [0.435, 0.032]), (16, [0.429, 0.016]), (64, [0.424, 0.012])];
+/// Cases of each kind of two objects and of each of many.
+const CASES: [usize; 2] = [30, 3];
 
 /// Two objects of a case.
 type Pair<'a> = [&'a Object; 2];
@@ -36,27 +33,37 @@ fn kept(pairs: &[Pair<'_>], search: &Search) -> usize {
     pairs.par_iter().filter(may).count()
 }
 
-/// The bars: `cargo test -p workloads --release --test collision yardsticks -- --ignored --nocapture`. What `quintile ccd` does by
-/// default, looking closer, has to be under those of 16 bins.
-#[test]
-#[ignore = "a quarter of an hour: images of 128 pixels, drawn by edges in up to 64 bins"]
-fn yardsticks_are_beaten() {
+/// Prints the share kept in vain by each way; the bars are those of some numbers of bins. What `quintile ccd` does by default, looking
+/// closer, has to be under that of as many bins.
+fn beaten(many: bool, bars: [(u32, f64); 3]) {
     let cases = like_yardsticks(1, CASES);
-    for (many, name) in ["two", "many"].into_iter().enumerate() {
-        let (near, count) = apart(cases.iter().filter(|case| usize::from(case.objects.len() > 2) == many));
-        let share = |left: usize| left as f64 / count as f64;
-        let triangles = near.iter().filter(|[a, b]| triangles_boxes_touch(a, b)).count();
-        println!("{name}: {count} do not collide");
-        println!("boxes of objects {:.4}, of triangles {:.4}", share(near.len()), share(triangles));
-        let depth_only = Search { method: Method::DepthOnly, ..ONCE };
-        println!("depth only {:.4}", share(kept(&near, &depth_only)));
-        let closer = share(kept(&near, &Search::default()));
-        println!("looking closer {closer:.4}");
-        for (bins, bars) in BARS {
-            let share = share(kept(&near, &Search { bins, ..ONCE }));
-            println!("{bins} bins {share:.4}");
-            assert!(share < bars[many] || bins > 1 && share == bars[many], "{name}: {bins} bins");
-            assert!(bins > 16 || closer <= bars[many], "{name}: looking closer");
-        }
+    let (near, count) = apart(cases.iter().filter(|case| (case.objects.len() > 2) == many));
+    let share = |left: usize| left as f64 / count as f64;
+    let triangles = near.iter().filter(|[a, b]| triangles_boxes_touch(a, b)).count();
+    println!("{count} do not collide");
+    println!("boxes of objects {:.4}, of triangles {:.4}", share(near.len()), share(triangles));
+    let depth_only = Search { method: Method::DepthOnly, ..ONCE };
+    println!("depth only {:.4}", share(kept(&near, &depth_only)));
+    let closer = share(kept(&near, &Search::default()));
+    println!("looking closer {closer:.4}");
+    for (bins, bar) in bars {
+        let share = share(kept(&near, &Search { bins, ..ONCE }));
+        println!("{bins} bins {share:.4}");
+        // One bin has to be better than what the bar was measured with, more as good.
+        assert!(share < bar || bins > 1 && share == bar, "{bins} bins");
+        assert!(bins > Search::default().bins || closer <= bar, "looking closer");
     }
+}
+
+/// Both: `cargo test -p workloads --release --test collision yardsticks -- --ignored --nocapture --test-threads 1`.
+#[test]
+#[ignore = "minutes: images of 128 pixels, drawn by edges in up to 64 bins"]
+fn yardsticks_of_two_are_beaten() {
+    beaten(false, [(1, 0.435), (16, 0.429), (64, 0.424)]);
+}
+
+#[test]
+#[ignore = "minutes, as above"]
+fn yardsticks_of_many_are_beaten() {
+    beaten(true, [(1, 0.032), (16, 0.016), (64, 0.012)]);
 }
