@@ -227,7 +227,7 @@ fn no_exact_contact_is_missed() {
 
 /// `cargo test -p workloads --release --test collision exact -- --ignored --nocapture`.
 #[test]
-#[ignore = "an hour: 80,000 searches"]
+#[ignore = "minutes to an hour: 80,000 searches"]
 fn none_of_twenty_thousand_is_missed() {
     let mut apart = 0;
     for start in (0..20_000).step_by(1000) {
