@@ -68,6 +68,26 @@ fn a_triangle_that_may_be_off_is_reported_as_far_as_it_may_be() {
     assert!(touched.iter().all(|(_, touch)| touch.z[0] <= 2.0 && touch.z[1] >= 4.0));
 }
 
+/// What may be off on one axis alone may be moved along it, its slanted edge too.
+#[test]
+fn a_slanted_edge_is_reported_as_far_as_either_coordinate_may_be_off() {
+    let points = [[0.25, 0.25, 3.0], [3.5, 0.25, 3.0], [0.25, 3.5, 3.0]];
+    let tiles = |triangle: &MovingTriangle| -> HashSet<_> {
+        all(&Rasterizer::new(View::orthographic()), triangle, &GRID)
+            .into_iter()
+            .map(|(tile, _)| tile)
+            .collect()
+    };
+    for axis in [0, 1] {
+        let (mut off, mut moved) = ([0.0; 3], points);
+        off[axis] = 0.5;
+        moved.iter_mut().for_each(|corner| corner[axis] += 0.5);
+        let unsure = tiles(&MovingTriangle::uncertain(points, points, off).unwrap());
+        let (sure, moved) = (tiles(&still(points)), tiles(&still(moved)));
+        assert!(!moved.is_subset(&sure) && moved.is_subset(&unsure), "{axis}: {moved:?} {unsure:?}");
+    }
+}
+
 #[test]
 fn numbers_that_would_overflow_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, 1e61] {

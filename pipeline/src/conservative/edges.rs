@@ -1,59 +1,66 @@
 //! The edges of a triangle over a tile, lens and time.
 //!
-//! Seen from a point of the tile and of the lens, with that point for origin, vertex `k` is `P_k`. Where the origin is in the
-//! triangle, whatever its area, `P_i x P_j` are the weights of the third vertex times one number, so no two of them differ in sign. A tile
-//! is culled when one edge is below zero everywhere and another above. `P_i x P_j` is linear in each of X, u, Y and v and
-//! quadratic in t, so its values at their corners, and in t its three Bernstein coefficients, bound it.
+//! With a point of the image for origin, vertex `k` is `P_k`. Where the origin is in the triangle, whatever its area, `P_i x P_j` are
+//! the weights of the third vertex times one number, so no two of them differ in sign. A tile is culled when one edge is below zero
+//! everywhere and another above.
+//!
+//! With `n` the cross product of vertices `i` and `j` as homogeneous points `(x, y, w)`, seen from the middle of the tile, the edge seen
+//! from `(X, Y)` is `n_x X + n_y Y + n_z` (Olano and Greer 1997), so over the tile it is `n_z` give or take `|n_x|` and
+//! `|n_y|` times half the tile's sides. `n` is linear in each of u and v and quadratic in t, so what it is at their corners, and in t
+//! its three Bernstein coefficients, bound it.
+
+use glam::DVec3;
 
 use super::Region;
-use super::seen::Seen;
+use super::seen::{ROUNDING, Seen};
+use crate::depth::Real;
 
-/// One coordinate of the three vertices at both ends of the time, for each corner of side and lens.
-struct Corners {
-    values: [[[f64; 2]; 3]; 4],
-    count: usize,
-    reach: f64,
-}
+/// The vertices at both ends as homogeneous points.
+type Points = [[DVec3; 3]; 2];
 
 /// Whether two edges say that the triangle cannot touch the tile.
 pub(super) fn miss(seen: &Seen, region: &Region) -> bool {
-    let (across, down) = (corners(seen, 0, region.u), corners(seen, 1, region.v));
-    let noise = 4.0 * (seen.noise[0] * down.reach + seen.noise[1] * across.reach)
-        + 4.0 * seen.noise[0] * seen.noise[1]
-        + super::seen::ROUNDING * across.reach * down.reach;
+    if !seen.view.has_lens() {
+        return apart(seen, &[seen.homogeneous()]);
+    }
+    let places = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| [region.u[i], region.v[j]]);
+    apart(seen, &places.map(|place| seen.homogeneous_from(place)))
+}
+
+/// The same by the vertices as they are seen from each of some places on the lens.
+fn apart<const PLACES: usize>(seen: &Seen, places: &[Points; PLACES]) -> bool {
+    let half = seen.tile.map(|[low, high]| high.most(-low));
+    let noise = noise(seen, places, half);
     let (mut below, mut above) = (false, false);
     for (i, j) in [(1, 2), (2, 0), (0, 1)] {
-        let [lo, hi] = edge(&across, &down, i, j);
-        below |= hi < -noise;
-        above |= lo > noise;
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for points in places {
+            for normal in normals(points, i, j) {
+                let reach = half[0] * normal.x.abs() + half[1] * normal.y.abs();
+                range = [range[0].least(normal.z - reach), range[1].most(normal.z + reach)];
+            }
+        }
+        below |= range[1] < -noise;
+        above |= range[0] > noise;
     }
     below && above
 }
 
-fn corners(seen: &Seen, axis: usize, lens: [f64; 2]) -> Corners {
-    let mut found = Corners { values: [[[0.0; 2]; 3]; 4], count: 0, reach: 0.0 };
-    let places = if seen.view.has_lens() { &lens[..] } else { &lens[..1] };
-    for &place in places {
-        for side in seen.tile[axis] {
-            let values = [0, 1, 2].map(|k| [0, 1].map(|end| seen.from(axis, k, end, place, side)));
-            found.reach = values.iter().flatten().fold(found.reach, |reach, value| reach.max(value.abs()));
-            found.values[found.count] = values;
-            found.count += 1;
-        }
-    }
-    found
+/// What an edge may be off by: vertices by their noise, twice that for good measure, and products of them by rounding. The sum of
+/// magnitudes in one is at most twice the product of how far vertices are from a point of the tile on the two axes.
+fn noise<const PLACES: usize>(seen: &Seen, places: &[Points; PLACES], half: [f64; 2]) -> f64 {
+    let all = || places.as_flattened().as_flattened().iter();
+    let [across, down] = [0, 1].map(|axis| {
+        let far = |p: &DVec3| p[axis].abs() + half[axis] * p.z.abs();
+        all().fold(0.0, |most: f64, p| most.most(far(p)))
+    });
+    4.0 * (seen.noise[0] * down + seen.noise[1] * across)
+        + 4.0 * seen.noise[0] * seen.noise[1]
+        + ROUNDING * across * down
 }
 
-/// Between what the edge from vertex `i` to `j` lies.
-fn edge(across: &Corners, down: &Corners, i: usize, j: usize) -> [f64; 2] {
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for x in &across.values[..across.count] {
-        for y in &down.values[..down.count] {
-            let product = |a: usize, b: usize| x[i][a] * y[j][b] - x[j][a] * y[i][b];
-            for value in [product(0, 0), 0.5 * (product(0, 1) + product(1, 0)), product(1, 1)] {
-                range = [range[0].min(value), range[1].max(value)];
-            }
-        }
-    }
-    range
+/// The Bernstein coefficients in t of the cross product of vertices `i` and `j`.
+fn normals(points: &Points, i: usize, j: usize) -> [DVec3; 3] {
+    let product = |a: usize, b: usize| points[a][i].cross(points[b][j]);
+    [product(0, 0), 0.5 * (product(0, 1) + product(1, 0)), product(1, 1)]
 }

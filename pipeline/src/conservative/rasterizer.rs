@@ -84,7 +84,8 @@ impl Rasterizer {
     /// The intervals in which a prepared triangle may touch `rect` within `region`, or `None` where it does not. For those who walk
     /// tiles of their own: what holds for a tile holds for the tiles in it.
     pub fn touch(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Touch> {
-        self.halved(prepared, rect, region, self.halvings)
+        let seen = Seen::new(&self.view, prepared, rect, region);
+        self.halved(prepared, seen, region, self.halvings)
     }
 
     fn descend(
@@ -106,7 +107,8 @@ impl Rasterizer {
             }
             return;
         }
-        let Some(region) = self.region(prepared, &rect, region) else { return };
+        let mut seen = Seen::new(&self.view, prepared, &rect, region);
+        let Some(region) = part(&mut seen, prepared, region) else { return };
         let middle = |range: &Range<u32>| range.start + (range.end - range.start).div_ceil(2);
         let (column, row) = (middle(&columns), middle(&rows));
         for rows in [rows.start..row, row..rows.end] {
@@ -116,25 +118,19 @@ impl Rasterizer {
         }
     }
 
-    /// The part of `region` in which the triangle may touch `rect`.
-    fn region(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Region> {
-        let region = narrow(&self.view, prepared, rect, region)?;
-        let seen = Seen::new(&self.view, prepared, rect, &region);
-        (!miss(&seen, &region)).then_some(region)
-    }
-
-    fn halved(&self, prepared: &Prepared, rect: &Rect, region: &Region, halvings: u32) -> Option<Touch> {
-        let region = self.region(prepared, rect, region)?;
+    fn halved(&self, prepared: &Prepared, mut seen: Seen, region: &Region, halvings: u32) -> Option<Touch> {
+        let region = part(&mut seen, prepared, region)?;
         if halvings == 0 || !prepared.moving || region.t[0] == region.t[1] {
-            return self.depths(prepared, rect, &region).map(|z| Touch::new(&region, z));
+            return self.depths(&seen, &region).map(|z| Touch::new(&region, z));
         }
-        let halves = region.halves().map(|half| self.halved(prepared, rect, &half, halvings - 1));
+        let halves = region
+            .halves()
+            .map(|half| self.halved(prepared, seen.within(prepared, &half), &half, halvings - 1));
         halves.into_iter().flatten().reduce(|a, b| a.hull(&b))
     }
 
-    /// The depths at which the triangle may touch `rect` (thesis, Paper VI, Appendix A, both tests), or `None` where it cannot.
-    fn depths(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<[f64; 2]> {
-        let seen = Seen::new(&self.view, prepared, rect, region);
+    /// The depths at which the triangle may touch the tile (thesis, Paper VI, Appendix A, both tests), or `None` where it cannot.
+    fn depths(&self, seen: &Seen, region: &Region) -> Option<[f64; 2]> {
         let vertices = seen.points.iter().flatten().map(|p| p[2]);
         let vertices =
             vertices.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
@@ -153,4 +149,10 @@ impl Rasterizer {
         let (lo, hi) = ((lo - widened(lo)).max(self.view.near()), hi + widened(hi));
         (lo <= hi).then_some([lo, hi])
     }
+}
+
+/// The part of `region` in which the triangle may touch the tile. It is `seen` within `region`, and then within that part.
+fn part(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
+    let region = narrow(seen, prepared, region)?;
+    (!miss(seen, &region)).then_some(region)
 }

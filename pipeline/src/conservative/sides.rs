@@ -5,16 +5,48 @@
 //! the hull over the vertices of where `d` is not negative at one end of `u`, and for `u` alike.
 
 use super::seen::Seen;
-use super::{Prepared, Rect, Region, View};
+use super::{Prepared, Region, View};
+use crate::depth::Real;
 
-/// The part of `region` in which the triangle may lie within the sides of the tile and beyond the near depth, or `None`.
-pub(super) fn narrow(view: &View, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Region> {
+/// The part of `region` in which the triangle may lie within the sides of the tile and beyond the near depth, or `None`. It is
+/// `seen` within `region`, and then within that part.
+pub(super) fn narrow(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
+    let left = if seen.view.has_lens() {
+        through_lens(seen, prepared, region)?
+    } else {
+        Region { t: through_pinhole(seen, region.t)?, ..*region }
+    };
+    let left = beyond_near(&seen.view, prepared, &left)?;
+    if left != *region {
+        *seen = seen.within(prepared, &left);
+    }
+    Some(left)
+}
+
+/// By all sides at once: what each says is linear in t alone.
+fn through_pinhole(seen: &Seen, t: [f64; 2]) -> Option<[f64; 2]> {
+    let mut left = t;
+    for axis in [0, 1] {
+        for (sign, border) in [(1.0, seen.tile[axis][0]), (-1.0, seen.tile[axis][1])] {
+            let d = [0, 1, 2].map(|k| [0, 1].map(|end| sign * seen.through_pinhole(axis, k, end, border)));
+            if d.iter().any(|&[opening, closing]| opening >= 0.0 && closing >= 0.0) {
+                continue;
+            }
+            let times = d.map(|[opening, closing]| above(t, opening, closing, seen.noise[axis]));
+            left = meet(left, times.into_iter().fold(None, union)?)?;
+        }
+    }
+    Some(left)
+}
+
+/// Side by side: each says more of the part of lens and time that the others have left.
+fn through_lens(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
     let mut region = *region;
     for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        let seen = Seen::new(view, prepared, rect, &region);
-        region = narrow_side(&seen, axis, side, &region)?;
+        region = narrow_side(seen, axis, side, &region)?;
+        *seen = seen.within(prepared, &region);
     }
-    beyond_near(view, prepared, &region)
+    Some(region)
 }
 
 fn narrow_side(seen: &Seen, axis: usize, side: usize, region: &Region) -> Option<Region> {
@@ -31,9 +63,7 @@ fn narrow_side(seen: &Seen, axis: usize, side: usize, region: &Region) -> Option
         }
     }
     let mut next = Region { t: times?, ..*region };
-    if seen.view.has_lens() {
-        *if axis == 0 { &mut next.u } else { &mut next.v } = places?;
-    }
+    *if axis == 0 { &mut next.u } else { &mut next.v } = places?;
     Some(next)
 }
 
@@ -62,6 +92,12 @@ fn above(range: [f64; 2], lo: f64, hi: f64, noise: f64) -> Option<[f64; 2]> {
         (true, false) => Some([range[0], (root() + nudge).min(range[1])]),
         (false, true) => Some([(root() - nudge).max(range[0]), range[1]]),
     }
+}
+
+/// What two ranges share; touching counts.
+fn meet(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
+    let both = [a[0].most(b[0]), a[1].least(b[1])];
+    (both[0] <= both[1]).then_some(both)
 }
 
 fn union(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::collision::CollisionChart;
+use super::collision::{CollisionChart, Set};
 use super::frames::{Axis, FramesChart, Outcome, Way};
 use super::glossy::GlossyChart;
 use super::growth::GrowthChart;
@@ -163,7 +163,7 @@ impl Standings for CollisionChart {
             );
             standing("pairs that may collide", &level, error, format!("{:.3} ms a pair", 1e3 * row.pair_s))
         };
-        self.rows.iter().map(row).collect()
+        self.rows.iter().filter(|row| row.cases == Set::Families).map(row).collect()
     }
 }
 

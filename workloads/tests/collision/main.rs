@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod contacts;
+mod exact;
 mod oracle;
 mod public;
 mod yardsticks;

@@ -5,7 +5,7 @@ use workloads::collision::families::{Case, slide, triangles_boxes_touch};
 use workloads::collision::{Search, candidates, detect};
 
 use super::super::ChartError;
-use super::{Effort, Row, Slide, Way};
+use super::{Effort, Row, Set, Slide, Way};
 use crate::output::progress::Progress;
 
 /// Whether a case is one of many objects, as an index.
@@ -25,7 +25,7 @@ pub(super) fn pairs(cases: &[Case]) -> [[usize; 2]; 2] {
 }
 
 /// All cases by one way, on a thread of its own so that its time is its own.
-pub(super) fn row(way: &Way, cases: &[Case]) -> Result<Row, ChartError> {
+pub(super) fn row(way: &Way, set: Set, cases: &[Case]) -> Result<Row, ChartError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(|| {
         let (mut vain, mut missed, mut candidates) = ([0; 2], 0, 0);
@@ -40,7 +40,7 @@ pub(super) fn row(way: &Way, cases: &[Case]) -> Result<Row, ChartError> {
         let of = pairs(cases);
         let share = |kind: usize| f64::from(vain[kind] as u32) / of[kind][1].max(1) as f64;
         let (two, many) = (share(0), share(1));
-        Row { way: way.name(), resolution: way.resolution(), two, many, missed, pair_s }
+        Row { cases: set, way: way.name(), resolution: way.resolution(), two, many, missed, pair_s }
     }))
 }
 

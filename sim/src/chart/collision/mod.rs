@@ -7,7 +7,7 @@ mod output;
 use std::path::Path;
 
 use serde::Serialize;
-use workloads::collision::families::{Case, cases};
+use workloads::collision::families::{Case, cases, like_yardsticks};
 use workloads::collision::{Method, Search};
 
 use super::ChartError;
@@ -27,6 +27,10 @@ pub struct Effort {
     pub gaps: &'static [f64],
     /// Ways in which they lie, for each gap.
     pub slides: usize,
+    /// Cases of each kind of the yardsticks of the book, of two objects and of many.
+    pub yardsticks: [usize; 2],
+    /// Bins of time in a pixel for these.
+    pub yardstick_bins: &'static [u32],
 }
 
 impl Effort {
@@ -37,6 +41,8 @@ impl Effort {
         bins: &[1, 4, 16],
         gaps: &[0.3, 0.1, 0.03, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6],
         slides: 16,
+        yardsticks: [12, 3],
+        yardstick_bins: &[1, 16, 64],
     };
     /// A look in seconds.
     pub const QUICK: Self = Self {
@@ -45,6 +51,8 @@ impl Effort {
         bins: &[1, 4],
         gaps: &[0.3, 0.1, 1e-2, 1e-3],
         slides: 6,
+        yardsticks: [1, 1],
+        yardstick_bins: &[1, 16],
     };
 }
 
@@ -78,9 +86,21 @@ impl Way {
     }
 }
 
-/// What a way makes of all cases.
+/// Which cases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Set {
+    /// The families.
+    Families,
+    /// Cases like those that the yardsticks of the book were measured over.
+    LikeYardsticks,
+}
+
+/// What a way makes of all cases of a set.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
+    /// The set.
+    pub cases: Set,
     /// The way.
     pub way: String,
     /// Pixels across; 0 where there is no image.
@@ -113,7 +133,9 @@ pub struct CollisionChart {
     pub effort: Effort,
     /// Pairs that collide and pairs that do not, of two objects and of many.
     pub pairs: [[usize; 2]; 2],
-    /// Way by way.
+    /// The same of the cases like those of the yardsticks.
+    pub yardstick_pairs: [[usize; 2]; 2],
+    /// Way by way: over the families, then over cases like those of the yardsticks.
     pub rows: Vec<Row>,
     /// Plates that slide, looked at closer.
     pub slides: Vec<Slide>,
@@ -130,6 +152,18 @@ impl CollisionChart {
 fn all_cases(effort: &Effort) -> Vec<Case> {
     let two = cases(301, effort.cases[0]).into_iter().filter(|case| case.objects.len() == 2);
     two.chain(cases(301, effort.cases[1]).into_iter().filter(|case| case.objects.len() > 2)).collect()
+}
+
+/// Pixels across at which the yardsticks were measured.
+const YARDSTICK_PIXELS: u32 = 128;
+
+/// The ways of the yardsticks.
+fn yardstick_ways(effort: &Effort) -> Vec<Way> {
+    let once = Search { resolution: YARDSTICK_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
+    let depth_only = Search { method: Method::DepthOnly, ..once };
+    let binned = effort.yardstick_bins.iter().map(|&bins| Search { bins, ..once });
+    let images = [depth_only].into_iter().chain(binned).chain([Search::default()]).map(Way::Images);
+    [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(images).collect()
 }
 
 /// All ways, from the cheapest on.
@@ -155,15 +189,21 @@ fn ways(effort: &Effort) -> Vec<Way> {
 pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<CollisionChart, ChartError> {
     let dir = OutDir::create(out)?;
     output::remove_stale(&dir)?;
-    let (cases, ways) = (all_cases(&effort), ways(&effort));
-    let bar = progress.bar("ways", ways.len() as u64);
-    let row = |way: &Way| {
-        bar.inc();
-        measure::row(way, &cases)
-    };
-    let rows = ways.iter().map(row).collect::<Result<_, _>>()?;
+    let sets = [
+        (Set::Families, all_cases(&effort), ways(&effort)),
+        (Set::LikeYardsticks, like_yardsticks(1, effort.yardsticks), yardstick_ways(&effort)),
+    ];
+    let bar = progress.bar("ways", sets.iter().map(|(_, _, ways)| ways.len() as u64).sum());
+    let mut rows = Vec::new();
+    for (set, cases, ways) in &sets {
+        for way in ways {
+            rows.push(measure::row(way, *set, cases)?);
+            bar.inc();
+        }
+    }
     let slides = measure::slides(&effort, progress);
-    let chart = CollisionChart { effort, pairs: measure::pairs(&cases), rows, slides };
+    let [pairs, yardstick_pairs] = sets.each_ref().map(|(_, cases, _)| measure::pairs(cases));
+    let chart = CollisionChart { effort, pairs, yardstick_pairs, rows, slides };
     output::write(&chart, &dir)?;
     Ok(chart)
 }

@@ -1,6 +1,6 @@
 //! The files of the chart.
 
-use super::{CollisionChart, Row};
+use super::{CollisionChart, Row, Set};
 use crate::output::dir::BoxError;
 use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
 use crate::output::table::Table;
@@ -13,7 +13,7 @@ pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
 
 /// Writes pictures and numbers; `collision.json` comes last.
 pub(super) fn write(chart: &CollisionChart, dir: &OutDir) -> Result<(), OutputError> {
-    let subject = chart.subject();
+    let subject = subject(&chart.pairs);
     let title = "Pairs kept in vain by collision detection";
     Curves { title, subject: &subject, panels: chart.panels() }.picture().write(dir, "collision")?;
     let (title, subject) = (
@@ -27,14 +27,34 @@ pub(super) fn write(chart: &CollisionChart, dir: &OutDir) -> Result<(), OutputEr
     Ok(())
 }
 
+/// What shares are of.
+fn subject([[two_hit, two], [many_hit, many]]: &[[usize; 2]; 2]) -> String {
+    format!(
+        "shares of pairs that do not collide: {two} of two objects (beside {two_hit} that do), {many} of many ({many_hit})"
+    )
+}
+
 /// The share from which on a run warns.
 const NEARLY_ALWAYS: f64 = 0.9;
 
 impl CollisionChart {
     /// What is printed: a row for each way.
     pub fn text(&self) -> String {
+        let [families, yardsticks] = [Set::Families, Set::LikeYardsticks].map(|set| self.table(set));
+        let mut slides = Table::new(["plates that slide: gap", "px", "kept in vain"]);
+        for slide in &self.slides {
+            let (gap, kept) = (format!("{:e}", slide.gap), format!("{:.2}", slide.kept));
+            slides.row([gap, slide.resolution.to_string(), kept]);
+        }
+        let [of_families, of_yardsticks] = [self.pairs, self.yardstick_pairs].map(|pairs| subject(&pairs));
+        format!(
+            "{families}{of_families}\n\n{yardsticks}{of_yardsticks}, cases like those of the yardsticks\n\n{slides}"
+        )
+    }
+
+    fn table(&self, set: Set) -> Table {
         let mut table = Table::new(["", "px", "two objects", "many", "missed", "ms a pair"]);
-        for row in &self.rows {
+        for row in self.rows.iter().filter(|row| row.cases == set) {
             table.row([
                 row.way.clone(),
                 if row.resolution == 0 { "-".to_owned() } else { row.resolution.to_string() },
@@ -44,32 +64,21 @@ impl CollisionChart {
                 format!("{:.3}", 1e3 * row.pair_s),
             ]);
         }
-        let mut slides = Table::new(["plates that slide: gap", "px", "kept in vain"]);
-        for slide in &self.slides {
-            let (gap, kept) = (format!("{:e}", slide.gap), format!("{:.2}", slide.kept));
-            slides.row([gap, slide.resolution.to_string(), kept]);
-        }
-        format!("{table}{}\n\n{slides}", self.subject())
-    }
-
-    fn subject(&self) -> String {
-        let [[two_hit, two], [many_hit, many]] = self.pairs;
-        format!(
-            "shares of pairs that do not collide: {two} of two objects (beside {two_hit} that do), {many} of many ({many_hit})"
-        )
+        table
     }
 
     /// Two objects and many over resolution, and over time.
     fn panels(&self) -> Vec<CurvePanel> {
         let mut names: Vec<&str> = Vec::new();
-        for row in self.rows.iter().filter(|row| row.resolution > 0) {
+        let in_images = || self.rows.iter().filter(|row| row.cases == Set::Families && row.resolution > 0);
+        for row in in_images() {
             if !names.contains(&row.way.as_str()) {
                 names.push(&row.way);
             }
         }
         let curves = |point: &dyn Fn(&Row) -> (f64, f64)| -> Vec<Curve> {
             let of = |name: &&str| {
-                let rows = self.rows.iter().filter(|row| row.way == *name);
+                let rows = in_images().filter(|row| row.way == *name);
                 Curve::new(*name, rows.map(point))
             };
             names.iter().map(of).collect()
