@@ -37,7 +37,7 @@ fn coarse(chart: &CausticsChart) -> CurvePanel {
 fn by_cells(chart: &CausticsChart, of: fn(&Crossed) -> f64) -> impl Iterator<Item = Curve> {
     chart.effort.pleated_cells.iter().map(move |&cells| {
         let rows = chart.crossed.iter().filter(move |row| row.cells == cells);
-        Curve::new(format!("{cells} squares along a side"), rows.map(|row| (100.0 * row.crossing, of(row))))
+        Curve::new(format!("{cells} squares"), rows.map(|row| (100.0 * row.crossing, of(row))))
     })
 }
 
@@ -50,16 +50,20 @@ fn over_crossing(title: &str, up: &str, curves: Vec<Curve>) -> CurvePanel {
 fn error(chart: &CausticsChart) -> CurvePanel {
     let floor = by_cells(chart, |row| row.floor_error);
     let volume = by_cells(chart, |row| row.volume_error)
-        .map(|curve| Curve { name: format!("{}: in the volume, same triangles", curve.name), ..curve });
-    over_crossing("error of all methods that lose no light", "error over mean", floor.chain(volume).collect())
+        .map(|curve| Curve { name: format!("{}: in the volume", curve.name), ..curve });
+    over_crossing(
+        "all methods: on the floor and in the volume",
+        "error over mean",
+        floor.chain(volume).collect(),
+    )
 }
 
 fn lost(chart: &CausticsChart) -> CurvePanel {
     let named = |of: fn(&Crossed) -> f64, what: &'static str| {
         by_cells(chart, of).map(move |curve| Curve { name: format!("{}: {what}", curve.name), ..curve })
     };
-    let all = named(|row| 100.0 * row.missing, "all that lose none");
-    let curves = all.chain(named(|row| 100.0 * row.lost, "refined bound, uncut, beside them")).collect();
+    let all = named(|row| 100.0 * row.missing, "all methods");
+    let curves = all.chain(named(|row| 100.0 * row.lost, "lost by the uncut bound")).collect();
     over_crossing("light in the volume", "light missing (%)", curves)
 }
 
