@@ -154,9 +154,9 @@ mod tests {
             sweep_px: [32, 18],
             slopes: &[0.05, 0.3],
             coarse_cells: &[2, 8],
-            pleated_cells: &[6],
+            pleated_cells: &[24],
             pleats: &[0.0, 0.4],
-            rays: 100,
+            rays: 300,
             floor_px: 48,
             repeats: 1,
         };
