@@ -410,7 +410,8 @@ fn code_of(argument: &str, file: &str) -> Option<String> {
 
 #[test]
 fn beams_whose_sides_cross() {
-    let args = ["--size", "64x36", "--set", "cells=24", "--set", "slope=1"];
+    let set = ["cells=24", "slope=0.3", "depth_m=10", "pleat=0.6"].map(|option| ["--set", option]);
+    let args = [&["--size", "64x36"][..], set.as_flattened()].concat();
     let results = quintile!().run("caustics", &args);
     assert_warns(&results, "caustics-crossed");
     assert_warns(&results, "caustics-coarse");

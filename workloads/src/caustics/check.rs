@@ -1,5 +1,6 @@
 //! Coverage against brute force.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::draw::draw_with_work;
@@ -34,7 +35,8 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
         for x in 0..width {
             let Some(point) = floor.point(eye, eye.middle([x, y])) else { continue };
             for (number, seen) in (0..).zip(&seen) {
-                let hits = seen.as_ref().map_or(0, |seen| seen.image.inside(point).count() as u64);
+                let near = seen.as_ref().filter(|seen| near(&seen.image, point));
+                let hits = near.map_or(0, |seen| seen.image.inside(point).count() as u64);
                 if hits > 0 {
                     found.lit += 1;
                     found.hits += hits;
@@ -47,4 +49,31 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
     let add =
         |a: Found, b: Found| Found { lit: a.lit + b.lit, missed: a.missed + b.missed, hits: a.hits + b.hits };
     (0..height).into_par_iter().map(row).reduce(Found::default, add)
+}
+
+/// Whether a point is in the box about the corners of a beam, with room for more than rounding: what is not cannot be in the beam.
+fn near(beam: &Beam, point: DVec3) -> bool {
+    let corners = || beam.open.iter().chain(&beam.close).copied();
+    let low = corners().fold(DVec3::INFINITY, DVec3::min);
+    let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let room = DVec3::splat(1e-3 * (1.0 + (high - low).max_element()));
+    point.cmpge(low - room).all() && point.cmple(high + room).all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::caustics::generator::tests::{Uniform, turned, warped};
+
+    #[test]
+    fn no_point_of_a_beam_is_far_from_it() {
+        let mut random = Uniform::new(8);
+        for round in 0..2000 {
+            let beam = if round % 2 == 0 { warped(&mut random, 0.8) } else { turned(&mut random) };
+            let inside = beam.point(&random.hit());
+            assert!(near(&beam, inside));
+            let far = inside + DVec3::splat(12.0);
+            assert!(!near(&beam, far) && beam.inside(far).count() == 0);
+        }
+    }
 }

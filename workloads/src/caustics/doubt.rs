@@ -5,8 +5,9 @@ use activity::Warning;
 use super::Beam;
 use super::generator::Ocean;
 
-/// Sides of beams cross for more than this part of their length on average.
-pub const CROSSED: f64 = 0.005;
+/// Sides of beams cross for more than this part of their length on average: half a percent of the light in the volume is missing there
+/// (`quintile chart caustics`).
+pub const CROSSED: f64 = 0.1;
 /// Fewer squares than this along the shortest wave.
 pub const SQUARES: f64 = 4.0;
 
@@ -23,9 +24,9 @@ pub fn doubts(ocean: &Ocean, beams: &[Beam]) -> Vec<Warning> {
         Warning::new(
             "caustics-crossed",
             format!(
-                "the sides of beams cross for {:.2} % of their length on average (a warning from {:.1} % on): beams are strongly warped, the corners of \
-                 generator triangles stand badly for the light between them, and bodies around them lose their use; more cells, flatter waves or \
-                 shallower water help",
+                "the sides of beams cross for {:.1} % of their length on average (a warning from {:.0} % on): triangles stand along the light for much \
+                 of its way, which then differs in length within a beam, and light in the water is missing, half a percent from there on and more beyond; \
+                 more cells, flatter waves or deeper water help",
                 100.0 * crossed,
                 100.0 * CROSSED
             ),

@@ -40,6 +40,8 @@ pub struct Options {
     pub wave_m: f64,
     /// Root mean square of the slope of the surface, 0 to 1.
     pub slope: f64,
+    /// How far every other column of corners lies down its light, as a part of its way, 0 to 0.9: the light stays, sides of beams cross.
+    pub pleat: f64,
     /// How beams are rasterized.
     pub method: Method,
     /// What is looked at.
@@ -54,6 +56,7 @@ impl Default for Options {
             depth_m: 5.0,
             wave_m: 4.0,
             slope: 0.15,
+            pleat: 0.0,
             method: Method::Moving,
             look: Look::Volume,
         }
@@ -74,6 +77,9 @@ impl Options {
         }
         if !(0.0..=1.0).contains(&self.slope) {
             return refuse("slope", format!("{}: it has to be 0 to 1", self.slope));
+        }
+        if !(0.0..=0.9).contains(&self.pleat) {
+            return refuse("pleat", format!("{}: it has to be 0 to 0.9", self.pleat));
         }
         Ok(())
     }
@@ -98,6 +104,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     let settings = settings.with(request.overrides)?;
     let Options { cells, side_m, depth_m, wave_m, slope, .. } = options;
     let mut ocean = Ocean::new(cells, side_m, depth_m, [wave_m, slope], request.seed);
+    ocean.pleat = options.pleat;
     if options.look == Look::Floor {
         ocean.overshoot = 0.02;
     }
@@ -254,14 +261,24 @@ mod tests {
     #[test]
     fn warped_beams_and_coarse_surfaces_are_warned_of() {
         let codes = |set| drawn(set).warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
-        assert_eq!(codes(&[("cells", "26"), ("wave_m", "8"), ("slope", "1")]), ["caustics-crossed"]);
+        let crossed =
+            [("cells", "26"), ("wave_m", "8"), ("slope", "0.5"), ("depth_m", "16"), ("pleat", "0.5")];
+        assert_eq!(codes(&crossed), ["caustics-crossed"]);
+        assert!(codes(&crossed[..4]).is_empty(), "steep, but not crossed");
         assert_eq!(codes(&[("cells", "6")]), ["caustics-coarse"]);
     }
 
     #[test]
     fn options_that_make_no_sense_are_named() {
         let overrides = Overrides::default();
-        for (name, value) in [("cells", "0"), ("depth_m", "-1"), ("slope", "2"), ("method", "\"prsm\"")] {
+        for (name, value) in [
+            ("cells", "0"),
+            ("depth_m", "-1"),
+            ("slope", "2"),
+            ("pleat", "1"),
+            ("method", "\"prsm\""),
+            ("method", "\"uncut\""),
+        ] {
             let set = vec![(name.to_owned(), value.to_owned())];
             let made = job(&OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 });
             let error = made.err().map(|error| error.to_string()).unwrap_or_default();

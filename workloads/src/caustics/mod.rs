@@ -10,6 +10,7 @@
 //! - [`generator`]: beams of an ocean, of a water surface with one wave, of a mirror ring, of a ball lens.
 //! - [`Method`]: the moving triangle, and bodies around it: the prism of Ernst et al. (2005), the refined bound of Liktor and Dachsbacher
 //!   (2011), the convex hull.
+//! - [`Squares`]: the same light by photons, to hold images against.
 //! - [`Eye`], [`draw`]: light and shader executions of every pixel, in the volume ([`Light::Volume`]) or on the floor ([`Light::Floor`]).
 //!
 //! All is drawn orthographically. In perspective a beam may reach behind the camera, and no method here clips.
@@ -26,6 +27,7 @@ pub mod generator;
 mod job;
 mod light;
 pub mod optics;
+mod photons;
 
 pub use beam::{Beam, Hit};
 pub use bound::Method;
@@ -35,3 +37,4 @@ pub use draw::{Picture, draw};
 pub use eye::Eye;
 pub use job::{Look, Options, job};
 pub use light::{Floor, Light};
+pub use photons::{Squares, error};

@@ -5,9 +5,11 @@ use glam::DVec3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
-use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, SQUARES, crossing, doubts, draw};
+use workloads::caustics::{
+    Eye, Floor, Light, Method, Picture, SQUARES, Squares, crossing, doubts, draw, error,
+};
 
-use super::{CausticsChart, Coarse, Effort, Row};
+use super::{CausticsChart, Coarse, Effort, Row, crossed};
 use crate::chart::ChartError;
 use crate::output::progress::{Bar, Progress};
 
@@ -22,7 +24,7 @@ const SEED: u64 = 1;
 /// Slopes of the oceans that get coarser.
 const COARSE_SLOPES: [f64; 5] = [0.05, 0.15, 0.4, 0.7, 1.0];
 /// Pixels along a side of the squares that are compared: next to a focus single pixels have no bound.
-const SQUARE_PX: usize = 8;
+const SQUARE_PX: u32 = 8;
 
 /// What every method does for one ocean seen from the side.
 #[derive(Clone, Debug, Serialize)]
@@ -40,11 +42,11 @@ pub struct Ocean {
     pub runs: Vec<Vec<u32>>,
 }
 
-fn water(cells: u32, slope: f64) -> Water {
+pub(super) fn water(cells: u32, slope: f64) -> Water {
     Water::new(cells, SIDE_M, DEPTH_M, [WAVE_M, slope], SEED)
 }
 
-fn refused() -> ChartError {
+pub(super) fn refused() -> ChartError {
     ChartError::Pipeline("a view without extent".to_owned())
 }
 
@@ -53,6 +55,11 @@ fn aside(size: [u32; 2]) -> Result<Eye, ChartError> {
     let middle = DVec3::new(0.6, -2.5, 0.3);
     let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
     Eye::new([from, middle, DVec3::Y], 6.5, size).ok_or_else(refused)
+}
+
+/// The middle of the floor from above.
+pub(super) fn above(side: u32) -> Result<Eye, ChartError> {
+    Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.3 * SIDE_M, [side; 2]).ok_or_else(refused)
 }
 
 /// Counts the executions of every method on an ocean of `2 cells^2` volumes.
@@ -78,7 +85,9 @@ pub fn ocean(cells: u32, size: [u32; 2], progress: &Progress) -> Result<Ocean, C
 
 pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, ChartError> {
     let ocean = ocean(effort.ocean_cells, effort.ocean_px, progress)?;
-    let steps = effort.slopes.len() * 4 + COARSE_SLOPES.len() * (1 + effort.coarse_cells.len());
+    let steps = effort.slopes.len() * 4
+        + COARSE_SLOPES.len() * effort.coarse_cells.len()
+        + effort.pleated_cells.len() * effort.pleats.len();
     let bar = progress.bar("caustics", steps as u64);
     let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut rows = Vec::new();
@@ -89,7 +98,8 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsCha
     for slope in COARSE_SLOPES {
         coarse.extend(by_cells(&effort, slope, &bar)?);
     }
-    Ok(CausticsChart { effort, ocean, resolved_cells: resolved_cells(), rows, coarse })
+    let crossed = crossed::measure(&effort, &bar)?;
+    Ok(CausticsChart { effort, ocean, resolved_cells: resolved_cells(), rows, coarse, crossed })
 }
 
 /// Every method on one surface: the light in the volume.
@@ -123,27 +133,23 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
     Ok(Method::ALL.map(row).into())
 }
 
-/// One surface of fewer and fewer triangles against that of many: the light on the floor, from above.
+/// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the light on the floor.
 fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, ChartError> {
-    let side = effort.floor_px;
-    let eye = Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.3 * SIDE_M, [side; 2]);
-    let eye = eye.ok_or_else(refused)?;
-    let floor = Light::Floor(Floor { height_m: -DEPTH_M });
+    let eye = above(effort.floor_px)?;
+    let squares = Squares { eye: &eye, side_px: SQUARE_PX };
+    let floor = Floor { height_m: -DEPTH_M };
     let surface = |cells: u32| Water { overshoot: 0.02, ..water(cells, slope) };
-    let image = |beams: &[Beam]| {
-        let light = draw(beams, &eye, Method::Moving, Some(floor)).light;
-        bar.inc();
-        squares(&light, side as usize)
-    };
-    let known = image(&surface(effort.reference_cells).beams(0.0));
-    let sum: f64 = known.iter().sum();
+    let photons = |seed: u32| squares.on_floor(&surface(1), 0.0, &floor, [effort.rays, seed]);
+    let known = photons(1);
+    let noise = error(&photons(2), &known);
     let row = |&cells: &u32| {
         let surface = surface(cells);
         let beams = surface.beams(0.0);
-        let found = image(&beams);
-        let error = found.iter().zip(&known).map(|(a, b)| (a - b).abs()).sum::<f64>() / sum;
+        let found = draw(&beams, &eye, Method::Moving, Some(Light::Floor(floor))).light;
+        bar.inc();
         let warned = !doubts(&surface, &beams).is_empty();
-        Coarse { cells, slope, crossing: crossing(&beams), error, warned }
+        let error = error(&squares.of_image(&found), &known);
+        Coarse { cells, slope, crossing: crossing(&beams), error, noise, warned }
     };
     Ok(effort.coarse_cells.iter().map(row).collect())
 }
@@ -151,14 +157,4 @@ fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, Chart
 /// So many squares along a side, and a run does not warn of a surface that is too coarse.
 fn resolved_cells() -> f64 {
     SQUARES * SIDE_M / water(1, SLOPE).shortest_m()
-}
-
-/// Sums over squares of the image.
-fn squares(light: &[f64], side: usize) -> Vec<f64> {
-    let across = side.div_ceil(SQUARE_PX);
-    let mut sums = vec![0.0; across * across];
-    for (place, light) in light.iter().enumerate() {
-        sums[place / side / SQUARE_PX * across + place % side / SQUARE_PX] += light;
-    }
-    sums
 }

@@ -1,5 +1,7 @@
 //! `quintile chart caustics`: shader executions and images of caustics, by how beams are bounded, and where beams fail.
 
+mod crossed;
+mod failures;
 mod measure;
 mod output;
 
@@ -12,6 +14,7 @@ use super::ChartError;
 use crate::output::OutDir;
 use crate::output::progress::Progress;
 
+pub use crossed::Crossed;
 pub use measure::{Ocean, ocean};
 
 /// How much is measured.
@@ -29,8 +32,12 @@ pub struct Effort {
     pub slopes: &'static [f64],
     /// Squares along a side of an ocean that gets coarser.
     pub coarse_cells: &'static [u32],
-    /// Squares along a side of the ocean that it is held against.
-    pub reference_cells: u32,
+    /// Squares along a side of oceans whose triangles are pleated along the light.
+    pub pleated_cells: &'static [u32],
+    /// Their pleats.
+    pub pleats: &'static [f64],
+    /// Photons across and down that surfaces are held against.
+    pub rays: u32,
     /// Pixels along a side of the floor they light.
     pub floor_px: u32,
     /// Times are medians of so many.
@@ -46,7 +53,9 @@ impl Effort {
         sweep_px: [128, 72],
         slopes: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0],
         coarse_cells: &[8, 16, 32, 64, 128],
-        reference_cells: 320,
+        pleated_cells: &[24, 48, 96],
+        pleats: &[0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+        rays: 2400,
         floor_px: 512,
         repeats: 3,
     };
@@ -58,7 +67,9 @@ impl Effort {
         sweep_px: [64, 36],
         slopes: &[0.02, 0.1, 0.4, 1.0],
         coarse_cells: &[8, 16, 32, 64],
-        reference_cells: 192,
+        pleated_cells: &[32],
+        pleats: &[0.0, 0.05, 0.2, 0.5],
+        rays: 1000,
         floor_px: 192,
         repeats: 1,
     };
@@ -92,8 +103,10 @@ pub struct Coarse {
     pub slope: f64,
     /// For how much of their length sides of beams cross.
     pub crossing: f64,
-    /// Mean difference from the image of many triangles, as a part of its mean.
+    /// Mean difference from photons refracted at the waves themselves, as a part of its mean.
     pub error: f64,
+    /// That of other photons of that kind.
+    pub noise: f64,
     /// Whether the run warns.
     pub warned: bool,
 }
@@ -111,6 +124,8 @@ pub struct CausticsChart {
     pub rows: Vec<Row>,
     /// By slope and number of triangles.
     pub coarse: Vec<Coarse>,
+    /// By number of triangles and pleat.
+    pub crossed: Vec<Crossed>,
 }
 
 /// Measures the chart and writes it into `out`.
@@ -139,7 +154,9 @@ mod tests {
             sweep_px: [32, 18],
             slopes: &[0.05, 0.3],
             coarse_cells: &[2, 8],
-            reference_cells: 24,
+            pleated_cells: &[24],
+            pleats: &[0.0, 0.4],
+            rays: 300,
             floor_px: 48,
             repeats: 1,
         };
@@ -149,7 +166,10 @@ mod tests {
         assert_eq!(json["rows"].as_array().unwrap().len(), 2 * 4);
         let coarse = json["coarse"].as_array().unwrap().len();
         assert!(coarse >= 2 * 2, "every slope with every number of triangles");
-        assert_eq!(read("caustics.csv").lines().count(), 1 + 2 * 4 + coarse);
+        assert_eq!(read("caustics.csv").lines().count(), 1 + 2 * 4 + coarse + 2 * 4);
+        let [straight, crossed] = [&chart.crossed[0], &chart.crossed[1]];
+        assert!(crossed.crossing > straight.crossing + 0.02);
+        assert!(chart.crossed.iter().all(|row| row.difference == 0.0 && row.floor_error > row.noise));
         assert!(
             read("caustics.svg").contains("moving") && folder.path().join("caustics_map_prism.png").exists()
         );

@@ -1,8 +1,8 @@
 //! The files of the chart.
 
-use workloads::caustics::{CROSSED, Method};
+use workloads::caustics::Method;
 
-use super::{CausticsChart, Coarse, Ocean, Row};
+use super::{CausticsChart, Ocean, Row, failures};
 use crate::output::dir::BoxError;
 use crate::output::plot::{Curve, CurvePanel, Curves, HeatMapPlot, HeatTile, Picture, Scale};
 use crate::output::table::Table;
@@ -16,7 +16,7 @@ pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
 /// Writes pictures and numbers; `caustics.json` comes last.
 pub(super) fn write(chart: &CausticsChart, dir: &OutDir) -> Result<(), OutputError> {
     chart.picture().write(dir, "caustics")?;
-    chart.failures().write(dir, "caustics_failures")?;
+    failures::picture(chart).write(dir, "caustics_failures")?;
     for (method, name) in Method::ALL.into_iter().zip(["moving", "refined", "hull", "prism"]) {
         chart.ocean.map(method).write(dir, &format!("caustics_map_{name}"))?;
     }
@@ -100,16 +100,17 @@ impl CausticsChart {
                 if row.warned { "yes" } else { "no" }.to_owned(),
             ]);
         }
-        format!("{} volumes\n{table}\n{sweep}\n{coarse}\n", ocean.volumes)
+        let crossed = failures::table(self);
+        format!("{} volumes\n{table}\n{sweep}\n{coarse}\n{crossed}\n", ocean.volumes)
     }
 
     /// The first promise that was found broken.
     pub fn fault(&self) -> Option<String> {
-        let other = self.rows.iter().find(|row| row.difference > 0.0)?;
-        Some(format!(
-            "{} draws another image than the moving triangles; please report it",
-            other.method.name()
-        ))
+        let other = self.rows.iter().find(|row| row.difference > 0.0).map(|row| row.method.name());
+        let pleated =
+            self.crossed.iter().find(|row| row.difference > 0.0).map(|_| "a body about pleated beams");
+        let name = other.or(pleated)?;
+        Some(format!("{name} draws another image than the moving triangles; please report it"))
     }
 
     fn picture(&self) -> Picture {
@@ -139,50 +140,11 @@ impl CausticsChart {
         Curves { title: "Caustics: beams and bodies about them", subject: &subject, panels }.picture()
     }
 
-    /// Where beams fail: the error over the number of triangles, and over how much their sides cross.
-    fn failures(&self) -> Picture {
-        let all = |of: fn(&Coarse) -> f64| {
-            let mut values: Vec<f64> = self.coarse.iter().map(of).collect();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            values
-        };
-        let of_slope = |slope: f64| {
-            let rows = self.coarse.iter().filter(move |row| row.slope == slope);
-            Curve::new(format!("slope {slope}"), rows.map(|row| (f64::from(row.cells), row.error)))
-        };
-        let of_cells = |cells: f64| {
-            let crossed = self.coarse.iter().filter(|row| row.crossing > 0.0);
-            let rows = crossed.filter(move |row| f64::from(row.cells) == cells);
-            let mut points: Vec<_> = rows.map(|row| (100.0 * row.crossing, row.error)).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            Curve::new(format!("{cells} squares along a side"), points)
-        };
-        let up = "error over mean";
-        let slopes = all(|row| row.slope).into_iter().map(of_slope).collect();
-        let cells = all(|row| f64::from(row.cells)).into_iter().map(of_cells);
-        let cells = cells.filter(|curve| curve.points.len() > 1).collect();
-        let crossed = "length of beams for which their sides cross (%)";
-        let panels = vec![
-            CurvePanel::new("too few triangles", ["squares along a side", up], slopes)
-                .on(Scale::Doublings, Scale::Decades)
-                .failing(Some(0.0..self.resolved_cells), "a run warns: caustics-coarse"),
-            CurvePanel::new("crossed sides: dots are slopes", [crossed, up], cells)
-                .failing(Some(100.0 * CROSSED..f64::INFINITY), "caustics-crossed"),
-        ];
-        let subject = format!(
-            "light on the floor of ever steeper waves by moving triangles, in squares of 8x8 pixels, against {} squares along a side",
-            self.effort.reference_cells
-        );
-        Curves { title: "Where caustics fail: coarse surfaces and crossed sides", subject: &subject, panels }
-            .picture()
-    }
-
     fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record([
             "sweep",
-            "slope",
+            "slope_or_pleat",
             "cells",
             "crossing",
             "method",
@@ -221,6 +183,24 @@ impl CausticsChart {
                 "",
                 row.error,
             ))?;
+        }
+        for row in &self.crossed {
+            for (place, method) in Method::ALL.into_iter().enumerate() {
+                let (executions, useful) = (row.executions[place], row.useful[place]);
+                let (cells, crossing, error) = (row.cells, row.crossing, row.floor_error);
+                table.serialize((
+                    "pleat",
+                    row.pleat,
+                    cells,
+                    crossing,
+                    method,
+                    executions,
+                    useful,
+                    row.difference,
+                    "",
+                    error,
+                ))?;
+            }
         }
         Ok(table.flush()?)
     }

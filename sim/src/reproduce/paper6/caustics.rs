@@ -6,6 +6,7 @@ use workloads::caustics::{Eye, Floor, Found, Method, receivers};
 
 use super::super::row::{Kind, Row, Verdict, numbers};
 use super::super::{Done, Effort, Figure};
+use super::caustics_figures::{light, warped};
 use crate::chart::caustics::{Effort as Size, ocean};
 use crate::output::progress::Progress;
 use crate::run::RunError;
@@ -55,8 +56,10 @@ fn executions(quick: bool, progress: &Progress) -> Result<Done, RunError> {
         ("VI_fig8_refined", Method::Refined),
         ("VI_fig8_prism", Method::Prism),
     ];
-    let figures = maps.map(|(name, method)| Figure { name, picture: ocean.map(method) });
-    Ok(Done { row, figures: figures.into() })
+    let mut figures = vec![warped()?];
+    figures.extend(maps.map(|(name, method)| Figure { name, picture: ocean.map(method) }));
+    figures.extend(light(quick)?);
+    Ok(Done { row, figures })
 }
 
 /// VI-7: every point of the floor that a beam holds is covered by it.

@@ -1,6 +1,7 @@
 //! Paper VI, "Design and Novel Uses of Higher-Dimensional Rasterization": a module for each use.
 
 mod caustics;
+mod caustics_figures;
 mod collision;
 mod glossy;
 mod occlusion;

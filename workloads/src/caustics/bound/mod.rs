@@ -20,6 +20,9 @@ pub enum Method {
     /// In the tetrahedra about its sides, cut where it folds (after Liktor and Dachsbacher 2011, "Real-time volume caustics with adaptive beam
     /// tracing").
     Refined,
+    /// The same without cuts, as it is published: it loses light where a beam folds, so it is for comparison only and not to be chosen.
+    #[serde(skip)]
+    Uncut,
     /// In the convex hull of its corners.
     Hull,
     /// In a prism with touching planes (after Ernst, Akenine-Moeller and Jensen 2005, "Interactive rendering of caustics using
@@ -31,7 +34,7 @@ pub enum Method {
 pub(super) type Body = Vec<[DVec3; 3]>;
 
 impl Method {
-    /// Every method, that of the paper first.
+    /// Every method that loses no light, that of the paper first.
     pub const ALL: [Self; 4] = [Self::Moving, Self::Refined, Self::Hull, Self::Prism];
 
     /// Its name in files and pictures.
@@ -39,6 +42,7 @@ impl Method {
         match self {
             Self::Moving => "moving triangle",
             Self::Refined => "refined bound",
+            Self::Uncut => "refined bound, uncut",
             Self::Hull => "convex hull",
             Self::Prism => "prism",
         }
@@ -58,6 +62,7 @@ impl Method {
         match self {
             Self::Moving => {}
             Self::Refined => refined::faces(beam, into),
+            Self::Uncut => refined::uncut(beam, into),
             Self::Hull => hull::faces(beam, into),
             Self::Prism => prism::faces(beam, into),
         }

@@ -20,6 +20,13 @@ pub(super) fn faces(beam: &Beam, into: &mut Body) {
     }
 }
 
+/// Adds the ends and outer faces of the whole beam, as if it never folded.
+pub(super) fn uncut(beam: &Beam, into: &mut Body) {
+    let folds = beam.cuts();
+    let first = beam.sign(0.5 * (folds[0] + folds[1]));
+    outer(beam, first.unwrap_or(1.0), into);
+}
+
 /// The ends and outer faces of a part that does not fold, its Jacobian having this sign.
 fn outer(part: &Beam, sign: f64, into: &mut Body) {
     let (v, p) = (&part.open, &part.close);

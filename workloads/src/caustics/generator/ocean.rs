@@ -32,6 +32,9 @@ pub struct Ocean {
     pub depth_m: f64,
     /// How far beams go on below the floor, as a part of their length: a receiver is to lie within them.
     pub overshoot: f64,
+    /// How far every other column of corners lies down its own light, as a part of its length, from 0 to below 1. The light stays what it
+    /// is, only triangles stand ever more along it, and their sides cross for longer where they fold.
+    pub pleat: f64,
     /// The waves.
     pub waves: Vec<Wave>,
     /// Where sunlight goes, downwards, of unit length.
@@ -61,7 +64,8 @@ impl Ocean {
         });
         let sun = DVec3::new(0.35, -1.0, 0.2).normalize();
         let (irradiance, index) = (1000.0, 1.33);
-        Self { cells, side_m, depth_m, overshoot: 0.0, waves: waves.collect(), sun, irradiance, index }
+        let waves = waves.collect();
+        Self { cells, side_m, depth_m, overshoot: 0.0, pleat: 0.0, waves, sun, irradiance, index }
     }
 
     /// The number of generator triangles.
@@ -78,7 +82,8 @@ impl Ocean {
     pub fn beams(&self, time_s: f64) -> Vec<Beam> {
         let side = self.cells as usize + 1;
         let at = |n: usize| self.side_m * (n as f64 / f64::from(self.cells) - 0.5);
-        let corner = |n: usize| self.corner(DVec2::new(at(n % side), at(n / side)), time_s);
+        let pleat = |n: usize| if n % side % 2 == 1 { self.pleat } else { 0.0 };
+        let corner = |n: usize| self.corner(DVec2::new(at(n % side), at(n / side)), time_s).pleated(pleat(n));
         let corners: Vec<Corner> = (0..side * side).map(corner).collect();
         let cell = |n: usize| {
             let first = n / self.cells as usize * side + n % self.cells as usize;
@@ -91,7 +96,17 @@ impl Ocean {
 
     /// The light that comes in through the square: that on the triangles, before any is reflected.
     pub fn incoming_w(&self, time_s: f64) -> f64 {
-        self.beams(time_s).iter().map(|beam| self.on(&beam.open)).sum()
+        let level = Self { pleat: 0.0, ..self.clone() };
+        level.beams(time_s).iter().map(|beam| self.on(&beam.open)).sum()
+    }
+
+    /// The light that enters at a place of the square, refracted at the waves themselves and not at triangles: where it starts and ends, and
+    /// watts for each square metre of the square.
+    pub fn ray(&self, at: DVec2, time_s: f64) -> ([DVec3; 2], f64) {
+        let (_, slope) = self.surface(at, time_s);
+        let corner = self.corner(at, time_s);
+        let upward = DVec3::new(-slope.x, 1.0, -slope.y);
+        ([corner.position, corner.end], -self.irradiance * upward.dot(self.sun) * corner.enters)
     }
 
     /// Height of the surface and its slopes along x and z.
@@ -111,13 +126,13 @@ impl Ocean {
         let direction = refract(self.sun, normal, 1.0 / self.index).unwrap_or(self.sun);
         let enters = transmission(-self.sun.dot(normal), -direction.dot(normal), 1.0 / self.index);
         let length = (height + self.depth_m) / -direction.y * (1.0 + self.overshoot);
-        Corner { position, end: position + length * direction, enters }
+        Corner { position, start: position, end: position + length * direction, enters }
     }
 
     fn beam(&self, corners: [&Corner; 3]) -> Beam {
-        let open = corners.map(|corner| corner.position);
         let enters = corners.iter().map(|corner| corner.enters).sum::<f64>() / 3.0;
-        Beam { open, close: corners.map(|corner| corner.end), flux_w: self.on(&open) * enters }
+        let flux_w = self.on(&corners.map(|corner| corner.position)) * enters;
+        Beam { open: corners.map(|corner| corner.start), close: corners.map(|corner| corner.end), flux_w }
     }
 
     /// The light that falls on a triangle.
@@ -133,10 +148,19 @@ const SHORTEST: f64 = 1.0 / 3.0;
 const SPREAD: f64 = 1.2;
 
 struct Corner {
+    /// On the surface.
     position: DVec3,
+    /// Where the beam starts.
+    start: DVec3,
     end: DVec3,
     /// The share of light that is not reflected.
     enters: f64,
+}
+
+impl Corner {
+    fn pleated(self, pleat: f64) -> Self {
+        Self { start: self.position.lerp(self.end, pleat), ..self }
+    }
 }
 
 #[cfg(test)]
@@ -154,6 +178,36 @@ mod tests {
         );
         let entered: f64 = ocean.beams(0.7).iter().map(|beam| beam.flux_w).sum();
         assert!(entered < 0.98 * flat && entered > 0.95 * flat, "{entered} of {flat}");
+    }
+
+    #[test]
+    fn pleats_keep_the_light_and_make_sides_cross() {
+        let flat = Ocean { overshoot: 0.25, ..Ocean::new(16, 16.0, 8.0, [4.0, 0.3], 1) };
+        let crossing = |ocean: &Ocean| crate::caustics::crossing(&ocean.beams(0.3));
+        let mut last = crossing(&flat);
+        for pleat in [0.1, 0.3, 0.5] {
+            let pleated = Ocean { pleat, ..flat.clone() };
+            assert_eq!(pleated.incoming_w(0.3), flat.incoming_w(0.3));
+            for (a, b) in pleated.beams(0.3).iter().zip(flat.beams(0.3)) {
+                assert_eq!((a.close, a.flux_w), (b.close, b.flux_w));
+                let aside = |k: usize| (a.open[k] - b.open[k]).cross(b.path(k)).length();
+                assert!((0..3).all(|k| aside(k) < 1e-9), "corners stay on their light");
+            }
+            let crossed = crossing(&pleated);
+            assert!(crossed > last + 0.005, "{pleat}: {crossed} {last}");
+            last = crossed;
+        }
+    }
+
+    #[test]
+    fn rays_carry_what_the_triangles_carry() {
+        let ocean = Ocean::new(96, 12.0, 5.0, [3.0, 0.2], 1);
+        let entered: f64 = ocean.beams(0.7).iter().map(|beam| beam.flux_w).sum();
+        let side = 400;
+        let at = |n: i32| ocean.side_m * ((f64::from(n) + 0.5) / f64::from(side) - 0.5);
+        let rays = (0..side * side).map(|n| ocean.ray(DVec2::new(at(n % side), at(n / side)), 0.7).1);
+        let sum = rays.sum::<f64>() * (ocean.side_m / f64::from(side)).powi(2);
+        assert!((sum / entered - 1.0).abs() < 1e-3, "{sum} {entered}");
     }
 
     #[test]
