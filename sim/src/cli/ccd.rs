@@ -80,8 +80,8 @@ struct Pair {
     time: [f64; 2],
     /// Where it may be: least and greatest x, y, z.
     space: [[f64; 2]; 3],
-    /// Pixels that are left, in the last image looked at.
-    pixels: u64,
+    /// Pixels that are left, in the last image looked at; none where the pair was kept before any image was whole.
+    pixels: Option<u64>,
     /// Whether two triangles were seen to cross.
     seen: bool,
 }
@@ -136,7 +136,8 @@ impl Found {
 
 fn pair(answer: &Answer) -> Option<Pair> {
     let Verdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
-    Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels: tiles, seen })
+    let pixels = (tiles > 0).then_some(tiles);
+    Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels, seen })
 }
 
 pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
