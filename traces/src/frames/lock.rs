@@ -36,7 +36,7 @@ pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Tic
         return None;
     }
     let period = median(&mut gaps.clone());
-    let periods: Vec<f64> = gaps.iter().map(|gap| libm::round(gap / period)).collect();
+    let periods = whole_periods(&gaps, period);
     let whole = |(gap, count): (&f64, &f64)| *count > 0.0 && (gap - count * period).abs() < WHOLE * period;
     let many = gaps.iter().zip(&periods).filter(|pair| whole(*pair)).count();
     if (many as f64) < MOSTLY * gaps.len() as f64 {
@@ -54,6 +54,20 @@ pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Tic
         positions: positions.iter().zip(&off).map(put).collect(),
         between: off.iter().map(|off| !near(*off)).collect(),
     })
+}
+
+/// How many periods each gap is, as whole numbers: what a start between two ticks leaves over is counted with the next gap.
+fn whole_periods(gaps: &[f64], period: f64) -> Vec<f64> {
+    let mut over = 0.0;
+    let whole = |gap: &f64| {
+        let periods = libm::round((gap + over) / period);
+        over += gap - periods * period;
+        if over.abs() < ON_TICKS[1] * period {
+            over = 0.0;
+        }
+        periods
+    };
+    gaps.iter().map(whole).collect()
 }
 
 /// The period by which the sum of the distances of all positions to ticks is least (iteratively reweighted least squares; Schlossmacher
@@ -113,6 +127,14 @@ mod tests {
         let free = |i: usize| 15.0 * libm::sin(i as f64) + 40.0 * libm::sin(0.1 * i as f64);
         assert_eq!(ticks(&starts(free), 60, 250), None);
         assert_eq!(ticks(&starts(|_| 0.0)[..10], 3, 250), None);
+    }
+
+    #[test]
+    fn starts_between_ticks_do_not_count_as_ticks_of_their_own() {
+        assert_eq!(
+            whole_periods(&[100.0, 52.0, 49.0, 201.0, 48.0, 151.0], 100.0),
+            [1.0, 1.0, 0.0, 2.0, 0.0, 2.0]
+        );
     }
 
     #[test]

@@ -27,21 +27,22 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
     let positions = settle(&power, positions, &fixed, anchor, placement.samples);
-    let as_they_are = |positions: Vec<f64>| Ticks { between: vec![false; positions.len()], positions };
     let first_mark = fixed.iter().position(|fixed| *fixed);
-    let Ticks { positions, between } = first_mark
-        .and_then(|mark| ticks(&positions, mark, placement.samples))
-        .unwrap_or_else(|| as_they_are(positions));
-    let start =
-        |(((start, position), between), marked): (((&Start, f64), bool), &Option<&Placed>)| FrameStart {
-            time_s: marked
-                .map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
-            distance_w2: start.distance_w2,
-            confidence: if between { BETWEEN } else { 1.0 } * start.confidence,
-            marked: marked.is_some(),
-        };
+    let (positions, kept) = match first_mark.and_then(|mark| ticks(&positions, mark, placement.samples)) {
+        // What begins on a tick is in the phase of the mark, whatever happened on the way.
+        Some(Ticks { positions, between }) => {
+            (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
+        }
+        None => (positions, tracked.starts.iter().map(|start| start.left).collect::<Vec<f64>>()),
+    };
+    let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
+        time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
+        distance_w2: start.distance_w2,
+        confidence: kept * start.confidence,
+        marked: marked.is_some(),
+    };
     let mut starts: Vec<FrameStart> =
-        tracked.starts.iter().zip(positions).zip(between).zip(&marked).map(start).collect();
+        tracked.starts.iter().zip(positions).zip(kept).zip(&marked).map(start).collect();
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
     let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);

@@ -51,6 +51,8 @@ pub(super) struct Start {
     pub distance_w2: f64,
     /// Whether the evidence is for it, 0 to 1.
     pub confidence: f64,
+    /// What is left of that, as the sequence may have slipped between it and the mark, 0 to 1.
+    pub left: f64,
 }
 
 /// A local minimum of the distance to the templates.
@@ -211,8 +213,9 @@ impl Tracker {
         let start = |((&node, &support), left): ((&usize, &f64), f64)| {
             let offset = self.candidates[node].offset;
             let marked = marks.contains(&offset);
-            let confidence = if marked { 1.0 } else { left / (1.0 + libm::exp(-support)) };
-            Start { offset, distance_w2: self.bank.squares_w2[offset], confidence }
+            let confidence = if marked { 1.0 } else { 1.0 / (1.0 + libm::exp(-support)) };
+            let left = if marked { 1.0 } else { left };
+            Start { offset, distance_w2: self.bank.squares_w2[offset], confidence, left }
         };
         let starts = self.chain.nodes.iter().zip(&self.chain.support).zip(left).map(start).collect();
         Tracked { starts }
