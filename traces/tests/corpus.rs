@@ -1,6 +1,10 @@
 //! The kept corpus of the fuzz targets (`fuzz/seeds/trace_*`): every file is read or refused, none ends the program.
 #![allow(clippy::unwrap_used)]
 
+#[allow(dead_code)]
+#[path = "common/jls.rs"]
+mod jls;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use traces::io::{self, ReadOptions};
@@ -31,6 +35,18 @@ fn failure_modes_of_the_fuzzed_csv_are_errors() {
 #[test]
 fn failure_modes_of_the_fuzzed_parquet_are_errors() {
     assert!(read("trace_parquet", io::parquet::read) > 0);
+}
+
+#[test]
+fn failure_modes_of_the_fuzzed_jls_are_errors() {
+    // As the fuzz target does, with their checksums made right.
+    let folder = tempfile::tempdir().unwrap();
+    let sealed = |path: &Path| {
+        let copy = folder.path().join("a.jls");
+        fs::write(&copy, jls::sealed(&fs::read(path).unwrap())).unwrap();
+        io::read(&copy, &ReadOptions { repair: true, ..ReadOptions::default() })
+    };
+    assert!(read("trace_jls", sealed) > 0);
 }
 
 #[test]
