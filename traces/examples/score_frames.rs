@@ -119,6 +119,8 @@ fn score_case(path: &Path, options: &Options) -> Result<serde_json::Value, Box<d
         "clean_median": median.energy.median, "floor_median": floor.median,
         "wrong": outcomes.iter().map(|o| o.wrong).sum::<usize>(),
         "wrong_flagged": outcomes.iter().map(|o| o.wrong_flagged).sum::<usize>(),
+        "right_flagged": outcomes.iter().map(|o| o.right_flagged).sum::<usize>(),
+        "frames": outcomes.iter().map(|o| o.frames).sum::<usize>(),
         "all_f1": outcomes.iter().map(|o| o.f1).collect::<Vec<_>>(),
         "seconds": seconds,
     }))

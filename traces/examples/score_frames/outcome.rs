@@ -20,6 +20,9 @@ pub struct Outcome {
     /// Frames one of whose ends is not a true one's, and those of them with a flag that says so.
     pub wrong: usize,
     pub wrong_flagged: usize,
+    /// Other frames with such a flag, and how many frames there are.
+    pub right_flagged: usize,
+    pub frames: usize,
     pub chosen: String,
 }
 
@@ -29,7 +32,7 @@ impl Outcome {
         let found = find_with(&case.trace, &marks, &Options { method })?;
         let frames = PowerIntegral::new(&case.trace).frames(&found);
         let score = score(&frames, &case.truth, TOLERANCE_S);
-        let (wrong, wrong_flagged) = wrong(case, &frames);
+        let (wrong, wrong_flagged, right_flagged) = wrong(case, &frames);
         let confidence = frames.iter().map(|frame| frame.confidence).sum::<f64>() / frames.len() as f64;
         let chosen = format!(
             "{:?} {}",
@@ -42,6 +45,8 @@ impl Outcome {
             energy: errors(&score.energy_errors),
             wrong,
             wrong_flagged,
+            right_flagged,
+            frames: frames.len(),
             chosen,
         })
     }
@@ -77,8 +82,9 @@ fn errors(relative: &[f64]) -> Errors {
     Errors { mean, median: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::NAN) }
 }
 
-/// Frames one of whose ends is wrong, and how many of them say so. The last one ends at the end mark, wherever that is.
-fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize) {
+/// Frames one of whose ends is wrong, how many of them say so, and how many say so in vain. The last one ends at the end mark, wherever
+/// that is.
+fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = case.truth.iter().map(|frame| frame.start_s).collect();
     let mut partner = vec![None; frames.len()];
@@ -86,12 +92,15 @@ fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize) {
         partner[f] = Some(t);
     }
     let told = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split, Flag::Odd];
-    let mut counts = (0, 0);
+    let mut counts = (0, 0, 0);
     for (pair, frame) in partner.windows(2).zip(frames) {
         let right = matches!(pair, [Some(a), Some(b)] if *b == a + 1);
-        if !right {
+        let told = usize::from(told.iter().any(|flag| frame.flags.contains(*flag)));
+        if right {
+            counts.2 += told;
+        } else {
             counts.0 += 1;
-            counts.1 += usize::from(told.iter().any(|flag| frame.flags.contains(*flag)));
+            counts.1 += told;
         }
     }
     counts
