@@ -15,7 +15,8 @@ use crate::error::LoadError;
 pub struct OptionSource {
     /// A file in RON.
     pub file: Option<PathBuf>,
-    /// Names and values that come after it. A value is a number, `true`, a list such as `[1, 2]`, or else text.
+    /// Names and values that come after it. A value is a number, `true`, a list such as `[1, 2]`, what RON has in round brackets, such as
+    /// `(pitch: 4.5)`, or else text.
     pub set: Vec<(String, String)>,
 }
 
@@ -55,10 +56,20 @@ fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -
         let known: Vec<&str> = fields.keys().map(String::as_str).collect();
         return Err(refused(format!("unknown option `{name}`, {}", spec::suggestion(name, &known))));
     }
-    let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.to_owned()));
-    fields.insert(name.to_owned(), parsed);
+    fields.insert(name.to_owned(), parsed(value));
     let told = |error: serde_json::Error| refused(format!("{name}: {}", plain(value, &error.to_string())));
     serde_json::from_value(Value::Object(fields)).map_err(told)
+}
+
+/// A value as it was written on the command line.
+fn parsed(value: &str) -> Value {
+    let text = || Value::String(value.to_owned());
+    if value.starts_with(['(', '[']) {
+        let as_ron =
+            ron::from_str::<ron::Value>(value).ok().and_then(|value| serde_json::to_value(value).ok());
+        return as_ron.unwrap_or_else(text);
+    }
+    serde_json::from_str(value).unwrap_or_else(|_| text())
 }
 
 #[cfg(test)]
@@ -97,6 +108,17 @@ mod tests {
         assert_eq!(set(&[]).unwrap(), Options::default());
         let changed = set(&[("boxes", "8"), ("method", "convex_hull"), ("depth", "1.5")]).unwrap();
         assert_eq!(changed, Options { method: Method::ConvexHull, boxes: 8, depth: Some(1.5) });
+    }
+
+    #[test]
+    fn structs_and_tuples_are_set_as_in_ron() {
+        assert_eq!(
+            parsed("(pitch: 4.5, slant: 0.1, offset: 0)"),
+            serde_json::json!({ "pitch": 4.5, "slant": 0.1, "offset": 0 })
+        );
+        assert_eq!(parsed("[(0.1, 0.2, 0.3), (0, 1, 2)]"), serde_json::json!([[0.1, 0.2, 0.3], [0, 1, 2]]));
+        assert_eq!(parsed("[4.5,0.1,0]"), serde_json::json!([4.5, 0.1, 0]));
+        assert_eq!((parsed("(a"), parsed("true")), (serde_json::json!("(a"), serde_json::json!(true)));
     }
 
     #[test]
