@@ -112,6 +112,22 @@ impl Trace {
         &self.lost
     }
 
+    /// How many samples they are.
+    pub fn lost_samples(&self) -> usize {
+        self.lost.iter().map(ExactSizeIterator::len).sum()
+    }
+
+    /// What the recorder lost and from when on, in words; `None` if nothing.
+    pub fn losses(&self) -> Option<String> {
+        let first = self.lost.first()?;
+        Some(format!(
+            "{} samples in {} stretches are missing, the first after {} s",
+            self.lost_samples(),
+            self.lost.len(),
+            self.time_s(first.start - 1)
+        ))
+    }
+
     /// Those of some samples that were not lost.
     pub(crate) fn kept(&self, rows: Range<usize>) -> impl Iterator<Item = usize> + '_ {
         let mut next = self.lost.partition_point(|lost| lost.end <= rows.start);

@@ -6,6 +6,7 @@ use activity::Event;
 use pipeline::Viewport;
 use pipeline::sampling::SampleSource;
 use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
+use traces::device::RATES_HZ;
 use workloads::job::OptionSource;
 use workloads::{Overrides, SampleChoice};
 
@@ -118,7 +119,7 @@ impl Plan {
     /// # Errors
     /// The first thing that is missing, broken or makes no sense.
     pub fn resolve(options: RunOptions) -> Result<Self, RunError> {
-        if !(1.0..=1e7).contains(&options.trace_rate_hz) {
+        if !RATES_HZ.contains(&options.trace_rate_hz) {
             let rate = options.trace_rate_hz;
             return Err(RunError::Setting(format!(
                 "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"

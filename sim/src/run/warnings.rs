@@ -169,15 +169,7 @@ fn clipped(measurement: &Measurement) -> Option<Warning> {
 }
 
 fn lost(measurement: &Measurement) -> Option<Warning> {
-    let (trace, lost) = (&measurement.trace, measurement.trace.lost());
-    lost.first().map(|first| {
-        let samples: usize = lost.iter().map(ExactSizeIterator::len).sum();
-        let (stretches, after_s) = (lost.len(), trace.time_s(first.start - 1));
-        Warning::new(
-            "packets-lost",
-            format!("{samples} samples in {stretches} stretches are missing, the first after {after_s} s"),
-        )
-    })
+    measurement.trace.losses().map(|losses| Warning::new("packets-lost", losses))
 }
 
 #[cfg(test)]

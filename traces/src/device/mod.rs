@@ -8,7 +8,7 @@ mod sample;
 mod spec;
 
 pub use sample::{SampleError, Sampled};
-pub use spec::{DeviceError, DeviceSpec};
+pub use spec::{DeviceError, DeviceSpec, RATES_HZ};
 
 use quantizer::Quantizer;
 use rail::Rail;

@@ -1,6 +1,7 @@
 //! What a device is described by.
 
 use crate::trace::RATE_LIMITS_HZ;
+use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -17,6 +18,9 @@ pub struct DeviceError {
     /// What it must be.
     pub must: &'static str,
 }
+
+/// Rates of the devices that are modelled, Hz.
+pub const RATES_HZ: RangeInclusive<f64> = 1.0..=1e7;
 
 /// A recorder and the rail it is put into. Take the default and change what differs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

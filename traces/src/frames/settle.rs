@@ -8,6 +8,7 @@
 //! another phase, nor up into more power, as the way out of a frame leads down.
 
 use super::refine::between;
+use super::split::moments;
 use crate::median::median;
 use rayon::prelude::*;
 
@@ -36,7 +37,8 @@ pub(super) fn settle(
     let reach = (REACH * width as f64) as usize;
     let starts: Vec<f64> = positions.iter().map(|position| position + anchor).collect();
     let differences = differences(power, &starts, reach + 1);
-    let alike_w2 = ALIKE * variance(power);
+    let deviation_w = moments(power).deviation;
+    let alike_w2 = ALIKE * deviation_w * deviation_w;
     let moves: Vec<f64> = (0..positions.len())
         .map(|frame| {
             let near = frame.saturating_sub(FRAMES)..(frame + FRAMES).min(differences.len());
@@ -93,11 +95,6 @@ fn smoothed(values: &[f64], by: impl Fn(&mut [f64]) -> f64) -> Vec<f64> {
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn variance(values: &[f64]) -> f64 {
-    let centre = mean(values);
-    values.iter().map(|value| (value - centre) * (value - centre)).sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, Rea
             None => clock.check(path, &chunk.stamps, samples)?,
         }
         rows.channels(&mut chunk, &mut voltage_v, &mut current_a);
-        check_finite(path, &voltage_v, &current_a, base.len() as u64 * BLOCK)?;
+        rows.check_finite(&voltage_v, &current_a, base.len() as u64 * BLOCK)?;
         samples += read;
         let whole =
             if read == 0 { voltage_v.len() } else { voltage_v.len() / BLOCK as usize * BLOCK as usize };
@@ -81,21 +81,6 @@ impl Steps {
         let (first_s, periods) = (self.first_s?, samples.checked_sub(1)? as f64);
         (periods > 0.0).then(|| rounded_rate_hz(periods, self.before_s - first_s, f64::INFINITY))
     }
-}
-
-/// `first` is the number of rows before.
-fn check_finite(path: &Path, voltage_v: &[f32], current_a: &[f32], first: u64) -> Result<(), ReadError> {
-    for (values, column) in [(voltage_v, "voltage_V"), (current_a, "current_A")] {
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            return Err(ReadError::Value {
-                path: path.to_owned(),
-                row: first + at as u64 + 1,
-                column: column.to_owned(),
-                value: values[at].to_string(),
-            });
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

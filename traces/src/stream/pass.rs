@@ -288,15 +288,5 @@ fn check_finite(rows: &Rows, piece: &Piece) -> Result<(), ReadError> {
     if piece.sum_to(piece.end() as f64).value().is_finite() {
         return Ok(());
     }
-    for (values, column) in [(&piece.voltage_v, "voltage_V"), (&piece.current_a, "current_A")] {
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            return Err(ReadError::Value {
-                path: rows.path().to_owned(),
-                row: piece.base + at as u64 + 1,
-                column: column.to_owned(),
-                value: values[at].to_string(),
-            });
-        }
-    }
-    Ok(())
+    rows.check_finite(&piece.voltage_v, &piece.current_a, piece.base)
 }

@@ -29,14 +29,15 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
         let at = work.binary_search_by_key(&(beam, tile), |work| (work.beam, work.tile));
         at.is_ok_and(|at| work[at].pixels >> (y % 8 * 8 + x % 8) & 1 != 0)
     };
-    let seen: Vec<Option<Seen>> = beams.iter().map(|beam| eye.see(beam)).collect();
+    let boxed = |seen: Seen| (Room::of(&seen.image), seen);
+    let seen: Vec<Option<(Room, Seen)>> = beams.iter().map(|beam| eye.see(beam).map(boxed)).collect();
     let row = |y: u32| {
         let mut found = Found::default();
         for x in 0..width {
             let Some(point) = floor.point(eye, eye.middle([x, y])) else { continue };
             for (number, seen) in (0..).zip(&seen) {
-                let near = seen.as_ref().filter(|seen| near(&seen.image, point));
-                let hits = near.map_or(0, |seen| seen.image.inside(point).count() as u64);
+                let near = seen.as_ref().filter(|(room, _)| room.holds(point));
+                let hits = near.map_or(0, |(_, seen)| seen.image.inside(point).count() as u64);
                 if hits > 0 {
                     found.lit += 1;
                     found.hits += hits;
@@ -51,13 +52,24 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
     (0..height).into_par_iter().map(row).reduce(Found::default, add)
 }
 
-/// Whether a point is in the box about the corners of a beam, with room for more than rounding: what is not cannot be in the beam.
-fn near(beam: &Beam, point: DVec3) -> bool {
-    let corners = || beam.open.iter().chain(&beam.close).copied();
-    let low = corners().fold(DVec3::INFINITY, DVec3::min);
-    let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
-    let room = DVec3::splat(1e-3 * (1.0 + (high - low).max_element()));
-    point.cmpge(low - room).all() && point.cmple(high + room).all()
+/// The box about the corners of a beam, with room for more than rounding: what is not in it cannot be in the beam.
+struct Room {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Room {
+    fn of(beam: &Beam) -> Self {
+        let corners = || beam.open.iter().chain(&beam.close).copied();
+        let low = corners().fold(DVec3::INFINITY, DVec3::min);
+        let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let room = DVec3::splat(1e-3 * (1.0 + (high - low).max_element()));
+        Self { low: low - room, high: high + room }
+    }
+
+    fn holds(&self, point: DVec3) -> bool {
+        point.cmpge(self.low).all() && point.cmple(self.high).all()
+    }
 }
 
 #[cfg(test)]
@@ -71,9 +83,10 @@ mod tests {
         for round in 0..2000 {
             let beam = if round % 2 == 0 { warped(&mut random, 0.8) } else { turned(&mut random) };
             let inside = beam.point(&random.hit());
-            assert!(near(&beam, inside));
+            let room = Room::of(&beam);
+            assert!(room.holds(inside));
             let far = inside + DVec3::splat(12.0);
-            assert!(!near(&beam, far) && beam.inside(far).count() == 0);
+            assert!(!room.holds(far) && beam.inside(far).count() == 0);
         }
     }
 }

@@ -42,6 +42,16 @@ impl Picture {
     pub fn total_runs(&self) -> u64 {
         self.runs.iter().map(|runs| u64::from(*runs)).sum()
     }
+
+    /// The share of them that finds light; 0 where nothing runs.
+    pub fn useful_share(&self) -> f64 {
+        self.useful as f64 / self.total_runs().max(1) as f64
+    }
+
+    /// The largest difference of the light of a pixel from that of another picture of the same view.
+    pub fn farthest(&self, other: &Self) -> f64 {
+        self.light.iter().zip(&other.light).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
 }
 
 /// Draws `beams` by `method`. With `light` it is summed up, in the order of the beams; without, executions are counted only.

@@ -2,9 +2,9 @@
 //! triangle, so that two share a point to the last bit. Nothing is allowed for rounding.
 
 use rayon::prelude::*;
-use workloads::collision::{Method, Object, Search, detect};
+use workloads::collision::{Method, Object, Search};
 
-use super::mix;
+use super::{mix, objects_may_collide};
 
 type Point = [i64; 3];
 /// Corners at both ends of the time, multiples of [`UNIT`].
@@ -198,10 +198,6 @@ fn search(draws: &mut Draws, triangles: usize) -> Search {
     Search { resolution, bins: 1 + draws.below(16) as u32, method: method[draws.below(5) as usize], zoom }
 }
 
-fn may_collide(objects: &[Object; 2], search: &Search) -> bool {
-    detect(objects, search).first().is_some_and(|found| found.verdict.may_collide())
-}
-
 /// Each contact by some searches; how many pairs are told apart with one of them moved aside.
 fn none_is_missed(seeds: std::ops::Range<u64>, searches: usize) -> usize {
     let checked = |seed: u64| {
@@ -210,10 +206,10 @@ fn none_is_missed(seeds: std::ops::Range<u64>, searches: usize) -> usize {
         let objects = scaled(&exact, unit, 0);
         for _ in 0..searches {
             let search = search(&mut draws, objects[0].len() + objects[1].len());
-            assert!(may_collide(&objects, &search), "{seed} is missed by {search:?}");
+            assert!(objects_may_collide(&objects, &search), "{seed} is missed by {search:?}");
         }
         let closer = Search { resolution: 64, ..Search::default() };
-        seed.is_multiple_of(20) && !may_collide(&scaled(&exact, unit, 20 * UNIT), &closer)
+        seed.is_multiple_of(20) && !objects_may_collide(&scaled(&exact, unit, 20 * UNIT), &closer)
     };
     seeds.into_par_iter().map(|seed| usize::from(checked(seed))).sum()
 }

@@ -26,8 +26,11 @@ const SEARCHES: [Search; 7] = [
 ];
 
 fn may_collide(a: Ends, b: Ends, search: &Search) -> bool {
-    let objects = [a, b].map(|ends| Object::from_ends(vec![ends], 0.0).unwrap());
-    detect(&objects, search).first().is_some_and(|answer| answer.verdict.may_collide())
+    objects_may_collide(&[a, b].map(|ends| Object::from_ends(vec![ends], 0.0).unwrap()), search)
+}
+
+fn objects_may_collide(objects: &[Object; 2], search: &Search) -> bool {
+    detect(objects, search).first().is_some_and(|answer| answer.verdict.may_collide())
 }
 
 /// A corner in a hash's unit cube.

@@ -6,7 +6,7 @@ use workloads::caustics::generator::Ocean as Water;
 use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, Squares, crossing, doubts, draw, error};
 
 use super::Effort;
-use super::measure::{above, refused, water};
+use super::view::{SQUARE_PX, above, from_the_side, water};
 use crate::chart::ChartError;
 use crate::output::progress::Bar;
 
@@ -16,8 +16,6 @@ const DEPTH_M: f64 = 8.0;
 const SLOPE: f64 = 0.3;
 /// Beams go on below the floor, so that it does not lie at their ends, where pleats would not matter.
 const OVERSHOOT: f64 = 0.25;
-/// Pixels along a side of the squares of both images.
-const SQUARE_PX: u32 = 8;
 /// Photons in the volume, of all beams.
 const PHOTONS: usize = 8_000_000;
 
@@ -80,8 +78,7 @@ impl Bench {
     fn new(effort: &Effort, cells: u32) -> Result<Self, ChartError> {
         let surface = Water { overshoot: OVERSHOOT, depth_m: DEPTH_M, ..water(cells, SLOPE) };
         let middle = DVec3::new(1.5, -0.6 * DEPTH_M, 1.0);
-        let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
-        let aside = Eye::new([from, middle, DVec3::Y], DEPTH_M, effort.sweep_px).ok_or_else(refused)?;
+        let aside = from_the_side(middle, DEPTH_M, effort.sweep_px)?;
         let above = above(effort.floor_px)?;
         let squares = Squares { eye: &above, side_px: SQUARE_PX };
         let known = [1, 2].map(|seed| squares.on_floor(&surface, 0.0, &floor(), [effort.rays, seed]));
@@ -95,11 +92,7 @@ impl Bench {
         let ours = &pictures[0];
         let uncut = draw(&beams, &self.aside, Method::Uncut, Some(Light::Volume));
         let sum = |picture: &Picture| picture.light.iter().sum::<f64>();
-        let useful = |picture: &Picture| picture.useful as f64 / picture.total_runs().max(1) as f64;
         let (volume_error, missing) = self.volume(&beams, ours);
-        let apart = |other: &Picture| {
-            ours.light.iter().zip(&other.light).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-        };
         Crossed {
             cells: surface.cells,
             pleat,
@@ -110,8 +103,8 @@ impl Bench {
             missing,
             lost: 1.0 - sum(&uncut) / sum(ours),
             executions: pictures.each_ref().map(Picture::total_runs),
-            useful: pictures.each_ref().map(useful),
-            difference: pictures.iter().map(apart).fold(0.0, f64::max),
+            useful: pictures.each_ref().map(Picture::useful_share),
+            difference: pictures.iter().map(|other| ours.farthest(other)).fold(0.0, f64::max),
             warned: doubts(&surface, &beams).iter().any(|doubt| doubt.code == "caustics-crossed"),
         }
     }

@@ -1,30 +1,18 @@
 //! Oceans, and what methods do for them.
 
 use cpu_time::ThreadTime;
-use glam::DVec3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
-use workloads::caustics::{
-    Eye, Floor, Light, Method, Picture, SQUARES, Squares, crossing, doubts, draw, error,
-};
+use workloads::caustics::{Floor, Light, Method, Picture, SQUARES, Squares, crossing, doubts, draw, error};
 
+use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, water};
 use super::{CausticsChart, Coarse, Effort, Row, crossed};
 use crate::chart::ChartError;
 use crate::output::progress::{Bar, Progress};
 
-/// Side and depth of the water and its longest waves, in metres.
-const SIDE_M: f64 = 16.0;
-const DEPTH_M: f64 = 5.0;
-const WAVE_M: f64 = 4.0;
-/// The slope of the paper's ocean is not given; this is a fresh breeze (Cox and Munk 1954 have 0.15 at some 4 m/s).
-const SLOPE: f64 = 0.15;
-/// Decides what the waves are like.
-const SEED: u64 = 1;
 /// Slopes of the oceans that get coarser.
 const COARSE_SLOPES: [f64; 5] = [0.05, 0.15, 0.4, 0.7, 1.0];
-/// Pixels along a side of the squares that are compared: next to a focus single pixels have no bound.
-const SQUARE_PX: u32 = 8;
 
 /// What every method does for one ocean seen from the side.
 #[derive(Clone, Debug, Serialize)]
@@ -40,26 +28,6 @@ pub struct Ocean {
     /// Executions of every pixel.
     #[serde(skip)]
     pub runs: Vec<Vec<u32>>,
-}
-
-pub(super) fn water(cells: u32, slope: f64) -> Water {
-    Water::new(cells, SIDE_M, DEPTH_M, [WAVE_M, slope], SEED)
-}
-
-pub(super) fn refused() -> ChartError {
-    ChartError::Pipeline("a view without extent".to_owned())
-}
-
-/// All of the water from the side, a little above and askew.
-fn aside(size: [u32; 2]) -> Result<Eye, ChartError> {
-    let middle = DVec3::new(0.6, -2.5, 0.3);
-    let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
-    Eye::new([from, middle, DVec3::Y], 6.5, size).ok_or_else(refused)
-}
-
-/// The middle of the floor from above.
-pub(super) fn above(side: u32) -> Result<Eye, ChartError> {
-    Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.3 * SIDE_M, [side; 2]).ok_or_else(refused)
 }
 
 /// Counts the executions of every method on an ocean of `2 cells^2` volumes.
@@ -118,15 +86,13 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
         runs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (cpu_s, picture) = &runs[runs.len() / 2];
         bar.inc();
-        let apart = ours.light.iter().zip(&picture.light).map(|(a, b)| (a - b).abs());
-        let (executions, useful) = (picture.total_runs(), picture.useful as f64);
         Row {
             slope,
             crossing,
             method,
-            executions,
-            useful: useful / executions.max(1) as f64,
-            difference: apart.fold(0.0, f64::max),
+            executions: picture.total_runs(),
+            useful: picture.useful_share(),
+            difference: ours.farthest(picture),
             cpu_s: *cpu_s,
         }
     };

@@ -4,6 +4,7 @@ mod crossed;
 mod failures;
 mod measure;
 mod output;
+pub(crate) mod view;
 
 use std::path::Path;
 

@@ -1,9 +1,7 @@
 //! `quintile trace sample`.
 
-use std::ops::RangeInclusive;
-
 use serde_json::json;
-use traces::device::{Device, DeviceSpec};
+use traces::device::{Device, DeviceSpec, RATES_HZ};
 use traces::energy::PowerIntegral;
 
 use super::args::SampleArgs;
@@ -11,9 +9,6 @@ use super::convert::{check, save};
 use super::input::wrong;
 use crate::cli::Failure;
 use crate::cli::terminal::{complain, print, print_json};
-
-/// Rates of the devices that are modelled, Hz.
-const RATES_HZ: RangeInclusive<f64> = 1.0..=1e7;
 
 pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     check(&args.out)?;
@@ -26,15 +21,8 @@ pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
             sampled.clipped_currents, sampled.clipped_voltages
         ));
     }
-    let lost = sampled.trace.lost();
-    let lost_samples = lost.iter().map(|range| range.len()).sum::<usize>();
-    if let Some(first) = lost.first() {
-        complain(&format!(
-            "warning packets-lost: {} samples in {} stretches are missing, the first after {} s; --repair fills them",
-            lost_samples,
-            lost.len(),
-            sampled.trace.time_s(first.start - 1)
-        ));
+    if let Some(losses) = sampled.trace.losses() {
+        complain(&format!("warning packets-lost: {losses}; --repair fills them"));
     }
     save(&sampled.trace, &args.out)?;
     let before_j = PowerIntegral::new(&trace).energy_j(sampled.trace.start_s(), sampled.trace.end_s());
@@ -44,7 +32,7 @@ pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     if args.json {
         return print_json(
             &json!({ "samples": samples, "device": device.spec(), "energy_J": before_j, "sampled_energy_J": after_j,
-                "relative_error": error, "lost_samples": lost_samples, "clipped_currents": sampled.clipped_currents,
+                "relative_error": error, "lost_samples": sampled.trace.lost_samples(), "clipped_currents": sampled.clipped_currents,
                 "clipped_voltages": sampled.clipped_voltages }),
             true,
         );

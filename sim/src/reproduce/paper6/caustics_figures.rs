@@ -5,17 +5,16 @@ use workloads::caustics::generator::Ocean;
 use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, draw};
 
 use super::super::Figure;
+use crate::chart::caustics::view;
 use crate::output::plot::{HeatMapPlot, HeatTile};
 use crate::run::RunError;
 
 /// Pixels across and down of the view of one method.
 const PANEL_PX: [u32; 2] = [120, 160];
-/// Depth of the ocean, in metres.
-const DEPTH_M: f64 = 5.0;
 
 /// Figure 7: which pixels each method shades for one warped beam, and in which of them there is light.
 pub(super) fn warped() -> Result<Figure, RunError> {
-    let eye = beside().ok_or_else(no_extent)?;
+    let eye = beside().ok_or_else(|| RunError::setting("a view without extent"))?;
     let pictures = Method::ALL.map(|method| draw(&[twisted()], &eye, method, Some(Light::Volume)));
     let tiles: Vec<HeatTile> =
         (0..).zip(&pictures).flat_map(|(panel, picture)| areas_of(panel, picture)).collect();
@@ -69,14 +68,11 @@ fn twisted() -> Beam {
 /// The light of the ocean in the water from the side, and on its floor from above.
 pub(super) fn light(quick: bool) -> Result<[Figure; 2], RunError> {
     let (cells, [width, height]) = if quick { (48, [128, 72]) } else { (128, [256, 144]) };
-    let water = Ocean { overshoot: 0.02, ..Ocean::new(cells, 16.0, DEPTH_M, [4.0, 0.15], 1) };
+    let water = Ocean { overshoot: 0.02, ..view::water(cells, view::SLOPE) };
     let beams = water.beams(0.0);
-    let middle = dvec3(0.6, -0.5 * DEPTH_M, 0.3);
-    let from = middle + 80.0 * dvec3(0.3, 0.35, 1.0).normalize();
-    let aside = Eye::new([from, middle, DVec3::Y], 6.5, [width, height]).ok_or_else(no_extent)?;
-    let above = Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 4.8, [height; 2]);
-    let above = above.ok_or_else(no_extent)?;
-    let floor = Light::Floor(Floor { height_m: -DEPTH_M });
+    let aside = view::aside([width, height]).map_err(RunError::setting)?;
+    let above = view::above(height).map_err(RunError::setting)?;
+    let floor = Light::Floor(Floor { height_m: -view::DEPTH_M });
     let image = |name, what: &str, label: &str, eye: &Eye, light| {
         let picture = draw(&beams, eye, Method::Moving, Some(light));
         let subject = format!("{} beams as moving triangles, waves of slope 0.15; {what}", beams.len());
@@ -102,10 +98,6 @@ fn tiles(light: &[f64], width: u32) -> Vec<HeatTile> {
         value: light.min(most),
     };
     (0..).zip(light).map(tile).collect()
-}
-
-fn no_extent() -> RunError {
-    RunError::Setting("a view without extent".to_owned())
 }
 
 #[cfg(test)]

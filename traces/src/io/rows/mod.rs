@@ -128,6 +128,26 @@ impl Rows {
         }
     }
 
+    /// Names the first value that is not finite, if one is; `first` is the number of rows before these.
+    pub(crate) fn check_finite(
+        &self,
+        voltage_v: &[f32],
+        current_a: &[f32],
+        first: u64,
+    ) -> Result<(), ReadError> {
+        for (values, column) in [(voltage_v, "voltage_V"), (current_a, "current_A")] {
+            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                return Err(ReadError::Value {
+                    path: self.path.clone(),
+                    row: first + at as u64 + 1,
+                    column: column.to_owned(),
+                    value: values[at].to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// What was mended when the file was opened.
     pub(crate) fn cut(&self) -> Option<&Repair> {
         if let Source::Jls(rows) = &self.source { rows.cut() } else { None }
