@@ -41,6 +41,7 @@
 
 pub mod align;
 pub mod curve;
+mod decimal;
 pub mod device;
 pub mod energy;
 pub mod frames;

@@ -1,15 +1,18 @@
 //! Correlation by overlap and save (Oppenheim and Schafer 2010, section 8.7.3), in f32 or f64.
+//!
+//! Templates are real, so two stretches of a signal share a transform, one as its real part and one as its imaginary part
+//! (Press et al. 2007, section 12.3): nothing has to be taken apart in between, and they come out as they went in.
 
-use realfft::num_complex::Complex;
-use realfft::num_traits::Zero;
-use realfft::{ComplexToReal, FftNum, RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex;
+use rustfft::num_traits::Zero;
+use rustfft::{Fft, FftNum, FftPlanner};
 use std::sync::Arc;
 
-/// The transform of one template and what is needed to apply it.
+/// The transforms of templates of one width and what is needed to apply them.
 pub(crate) struct OverlapSave<T: FftNum> {
-    forward: Arc<dyn RealToComplex<T>>,
-    inverse: Arc<dyn ComplexToReal<T>>,
-    spectrum: Vec<Complex<T>>,
+    forward: Arc<dyn Fft<T>>,
+    inverse: Arc<dyn Fft<T>>,
+    spectra: Vec<Vec<Complex<T>>>,
     width: usize,
     block: usize,
 }
@@ -17,25 +20,26 @@ pub(crate) struct OverlapSave<T: FftNum> {
 /// What a thread works in.
 #[derive(Default)]
 pub(crate) struct Buffers<T> {
-    real: Vec<T>,
-    complex: Vec<Complex<T>>,
+    signal: Vec<Complex<T>>,
+    product: Vec<Complex<T>>,
     scratch: Vec<Complex<T>>,
 }
 
 impl<T: FftNum> OverlapSave<T> {
-    /// Prepares a template, each of its values times `factor`, for transforms of `block` samples.
-    pub fn new(template: &[f64], factor: f64, block: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
+    /// Prepares templates of equal width, each value times `factor`, for transforms of `block` samples.
+    pub fn new(templates: &[Vec<f64>], factor: f64, block: usize) -> Self {
+        let mut planner = FftPlanner::new();
         let (forward, inverse) = (planner.plan_fft_forward(block), planner.plan_fft_inverse(block));
-        let mut padded = forward.make_input_vec();
-        let mut spectrum = forward.make_output_vec();
-        for (to, from) in padded.iter_mut().zip(template) {
-            *to = T::from_f64(factor * from / block as f64).unwrap_or_else(T::zero);
-        }
-        // Only a wrong length is refused, here and below, and the lengths are the plan's own.
-        let _ = forward.process(&mut padded, &mut spectrum);
-        spectrum.iter_mut().for_each(|value| *value = value.conj());
-        Self { forward, inverse, spectrum, width: template.len(), block }
+        let value = |&watts: &f64| T::from_f64(factor * watts / block as f64).unwrap_or_else(T::zero);
+        let spectrum = |template: &Vec<f64>| {
+            let mut padded: Vec<Complex<T>> = template.iter().map(|watts| value(watts).into()).collect();
+            padded.resize(block, Complex::zero());
+            forward.process(&mut padded);
+            padded.iter().map(Complex::conj).collect()
+        };
+        let spectra = templates.iter().map(spectrum).collect();
+        let width = templates.first().map_or(1, Vec::len);
+        Self { forward, inverse, spectra, width, block }
     }
 
     /// How many offsets a block answers for.
@@ -43,29 +47,33 @@ impl<T: FftNum> OverlapSave<T> {
         self.block - self.width + 1
     }
 
-    /// The stretch of a signal for the block whose first offset is `from`.
-    pub fn stretch<'a>(&self, signal: &'a [T], from: usize) -> &'a [T] {
-        &signal[from..signal.len().min(from + self.block)]
+    /// Hands every template's correlation with two blocks, whose first offsets are `from` and a step later, to `take`: in
+    /// real and imaginary parts, cyclic beyond a step. Every pair is worked out alike by whichever thread.
+    pub fn pair(
+        &self,
+        signal: &[T],
+        from: usize,
+        buffers: &mut Buffers<T>,
+        mut take: impl FnMut(usize, &[Complex<T>]),
+    ) {
+        let scratches = [self.forward.get_inplace_scratch_len(), self.inverse.get_inplace_scratch_len()];
+        buffers.scratch.resize(scratches[0].max(scratches[1]), Complex::zero());
+        let [first, second] = [from, from + self.step()].map(|from| self.stretch(signal, from));
+        buffers.signal.clear();
+        buffers.signal.extend(first.iter().zip(second).map(|(&re, &im)| Complex { re, im }));
+        buffers.signal.extend(first[second.len()..].iter().map(|&re| Complex::from(re)));
+        buffers.signal.resize(self.block, Complex::zero());
+        self.forward.process_with_scratch(&mut buffers.signal, &mut buffers.scratch[..scratches[0]]);
+        for (index, spectrum) in self.spectra.iter().enumerate() {
+            buffers.product.clear();
+            buffers.product.extend(buffers.signal.iter().zip(spectrum).map(|(a, b)| a * b));
+            self.inverse.process_with_scratch(&mut buffers.product, &mut buffers.scratch[..scratches[1]]);
+            take(index, &buffers.product);
+        }
     }
 
-    /// The correlation with one block, cyclic beyond its end. Every block is worked out alike by whichever thread.
-    pub fn block<'a>(&self, stretch: &[T], buffers: &'a mut Buffers<T>) -> &'a [T] {
-        let Buffers { real, complex, scratch } = buffers;
-        let scratches = [self.forward.get_scratch_len(), self.inverse.get_scratch_len()];
-        real.resize(self.block, T::zero());
-        complex.resize(self.block / 2 + 1, Complex::zero());
-        scratch.resize(scratches[0].max(scratches[1]), Complex::zero());
-        real[..stretch.len()].copy_from_slice(stretch);
-        real[stretch.len()..].fill(T::zero());
-        let _ = self.forward.process_with_scratch(real, complex, &mut scratch[..scratches[0]]);
-        for (value, factor) in complex.iter_mut().zip(&self.spectrum) {
-            *value = *value * *factor;
-        }
-        // The first and the last bin of a real signal are real; rounding may leave them not quite so, which would be refused.
-        for bin in [0, complex.len() - 1] {
-            complex[bin].im = T::zero();
-        }
-        let _ = self.inverse.process_with_scratch(complex, real, &mut scratch[..scratches[1]]);
-        real
+    /// The samples of the block whose first offset is `from`, as far as there are any.
+    fn stretch<'a>(&self, signal: &'a [T], from: usize) -> &'a [T] {
+        &signal[from.min(signal.len())..signal.len().min(from + self.block)]
     }
 }

@@ -1,7 +1,7 @@
 //! `frames.csv`.
 
 use super::{FrameEnergy, TrueFrame, outliers};
-use core::fmt;
+use crate::decimal;
 use core::ops::Range;
 use rayon::prelude::*;
 use std::io::Write;
@@ -113,26 +113,26 @@ impl FrameTable {
     fn row(&self, index: usize, out: &mut Vec<u8>) {
         let frame = &self.frames[index];
         let truth = self.truth.get(index).and_then(Option::as_ref);
-        let per_pixel_j = Cell(self.pixels.and_then(|pixels| frame.energy_per_pixel_j(pixels)));
-        let (true_start_s, true_energy_j) = (Cell(truth.map(|t| t.start_s)), Cell(truth.map(|t| t.energy_j)));
-        let FrameEnergy { start_s, end_s, energy_j, confidence, flags } = frame;
-        let (duration_s, power_w, outlier) =
-            (frame.duration_s(), frame.power_w(), u8::from(self.outliers[index]));
+        let per_pixel_j = self.pixels.and_then(|pixels| frame.energy_per_pixel_j(pixels));
+        let known = |value: f64| Some(value);
         // Writing to memory does not fail.
-        let _ = writeln!(
-            out,
-            "{index},{start_s},{end_s},{duration_s},{energy_j},{power_w},{per_pixel_j},{confidence},{flags},\
-             {true_start_s},{true_energy_j},{outlier}"
-        );
+        let _ = write!(out, "{index}");
+        let measured = [frame.start_s, frame.end_s, frame.duration_s(), frame.energy_j, frame.power_w()];
+        cells(out, measured.map(known));
+        cells(out, [per_pixel_j, known(frame.confidence)]);
+        let _ = write!(out, ",{}", frame.flags);
+        cells(out, [truth.map(|truth| truth.start_s), truth.map(|truth| truth.energy_j)]);
+        let _ = writeln!(out, ",{}", u8::from(self.outliers[index]));
     }
 }
 
-/// A number, or nothing where it is not known.
-struct Cell(Option<f64>);
-
-impl fmt::Display for Cell {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.map_or(Ok(()), |value| value.fmt(f))
+/// Appends numbers, or nothing where one is not known, each after a comma.
+fn cells<const N: usize>(out: &mut Vec<u8>, values: [Option<f64>; N]) {
+    for value in values {
+        out.push(b',');
+        if let Some(value) = value {
+            decimal::push(out, value);
+        }
     }
 }
 

@@ -2,16 +2,19 @@
 //! seldom keeps time.
 
 use crate::median::median;
+use rayon::prelude::*;
 
 /// How many gaps on either side tell what a usual one is here.
 const AROUND: usize = 4;
+/// Gaps a thread takes at once, at least.
+const TASK: usize = 1024;
 /// A gap is even if it differs from the usual one by less than this share of it.
 const EVEN: f64 = 0.1;
 
 /// Of each gap of `gaps`, the gaps around it: their median, and the median of how far they are from that. `None` where there are fewer
 /// than two.
-pub(super) fn usual(gaps: &[f64]) -> impl Iterator<Item = Option<[f64; 2]>> + '_ {
-    (0..gaps.len()).map(move |index| {
+pub(super) fn usual(gaps: &[f64]) -> Vec<Option<[f64; 2]>> {
+    let one = |index: usize| {
         let around = index.saturating_sub(AROUND)..gaps.len().min(index + AROUND + 1);
         let (mut held, mut count) = ([0.0; 2 * AROUND], 0);
         for other in around.filter(|&other| other != index) {
@@ -25,7 +28,8 @@ pub(super) fn usual(gaps: &[f64]) -> impl Iterator<Item = Option<[f64; 2]>> + '_
         let usual = median(around);
         around.iter_mut().for_each(|gap| *gap = (*gap - usual).abs());
         Some([usual, median(around)])
-    })
+    };
+    (0..gaps.len()).into_par_iter().with_min_len(TASK).map(one).collect()
 }
 
 /// Whether each gap is as long as those around it: within a tenth, and within `most`.

@@ -49,7 +49,7 @@ impl Correlator {
     /// Prepares a template.
     pub fn new(template: &[f64]) -> Self {
         let block = (8 * template.len()).next_power_of_two().max(LEAST_BLOCK);
-        Self { overlap: OverlapSave::new(template, 1.0, block), width: template.len() }
+        Self { overlap: OverlapSave::new(&[template.to_vec()], 1.0, block), width: template.len() }
     }
 
     /// `c[k] = sum over j of signal[k + j] template[j]`, at every offset at which the template fits.
@@ -57,9 +57,12 @@ impl Correlator {
         let Some(last) = signal.len().checked_sub(self.width) else { return Vec::new() };
         let mut out = vec![0.0; last + 1];
         let step = self.overlap.step();
-        out.par_chunks_mut(step).enumerate().for_each_init(Buffers::default, |buffers, (index, out)| {
-            let stretch = self.overlap.stretch(signal, index * step);
-            out.copy_from_slice(&self.overlap.block(stretch, buffers)[..out.len()]);
+        out.par_chunks_mut(2 * step).enumerate().for_each_init(Buffers::default, |buffers, (index, out)| {
+            let (first, second) = out.split_at_mut(step.min(out.len()));
+            self.overlap.pair(signal, 2 * step * index, buffers, |_, pair| {
+                first.iter_mut().zip(pair).for_each(|(to, pair)| *to = pair.re);
+                second.iter_mut().zip(pair).for_each(|(to, pair)| *to = pair.im);
+            });
         });
         out
     }

@@ -5,6 +5,7 @@ use super::find::FrameStart;
 use super::matched::{REACH, View};
 use super::profile::summed_squared_difference;
 use super::refine::align;
+use crate::median::median;
 
 /// How far before the first found start, in median distances of starts, the first frame may begin.
 const REACH_BACK: f64 = 1.6;
@@ -55,6 +56,5 @@ impl View<'_> {
 /// The median distance between neighbours, s; `None` for fewer than two starts.
 fn median_gap_s(starts: &[FrameStart]) -> Option<f64> {
     let mut gaps: Vec<f64> = starts.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-    gaps.sort_by(f64::total_cmp);
-    gaps.get(gaps.len() / 2).copied()
+    (!gaps.is_empty()).then(|| median(&mut gaps))
 }

@@ -1,5 +1,7 @@
 //! Splitting sorted numbers into populations.
 
+use rayon::prelude::*;
+
 /// Mean and standard deviation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Moments {
@@ -23,15 +25,15 @@ pub(super) struct Split {
 pub(super) fn otsu_tree(sorted: &[f64], depth: usize) -> Vec<Split> {
     let mut ranges = vec![(0, sorted.len())];
     let mut splits = Vec::new();
+    let split = |&(from, to): &(usize, usize)| {
+        let count = from + otsu(&sorted[from..to])?;
+        let (low, high) = rayon::join(|| moments(&sorted[..count]), || moments(&sorted[count..to]));
+        Some(([(from, count), (count, to)], Split { count, low, high }))
+    };
     for _ in 0..depth {
-        let mut next = Vec::new();
-        for (from, to) in ranges {
-            let Some(below) = otsu(&sorted[from..to]) else { continue };
-            let count = from + below;
-            splits.push(Split { count, low: moments(&sorted[..count]), high: moments(&sorted[count..to]) });
-            next.extend([(from, count), (count, to)]);
-        }
-        ranges = next;
+        let (sides, level): (Vec<_>, Vec<Split>) = ranges.par_iter().filter_map(split).unzip();
+        splits.extend(level);
+        ranges = sides.into_flattened();
     }
     splits
 }

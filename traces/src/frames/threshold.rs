@@ -108,7 +108,7 @@ pub(crate) fn choose(
     background_w2: f64,
     noise_w2: f64,
     alignment_w2: f64,
-    regularity: impl Fn(f64) -> f64,
+    regularity: impl Fn(f64) -> f64 + Sync,
 ) -> Threshold {
     let none = Threshold { alignment_w2, ..nothing(distances, background_w2, noise_w2) };
     let log = |distance_w2: &f64| libm::log(none.excess_w2(*distance_w2));
@@ -163,13 +163,14 @@ fn nothing(distances: &[f64], background_w2: f64, noise_w2: f64) -> Threshold {
 /// The first split, unless another eligible one makes the spacing distinctly more regular.
 fn most_regular(
     splits: &[Split],
-    eligible: impl Fn(&Split) -> bool,
-    regularity: impl Fn(&Split) -> f64,
+    eligible: impl Fn(&Split) -> bool + Sync,
+    regularity: impl Fn(&Split) -> f64 + Sync,
 ) -> usize {
-    let mut best = (0, splits.first().map_or(0.0, &regularity) + MORE_REGULAR);
-    for (index, split) in splits.iter().enumerate().skip(1).filter(|(_, split)| eligible(split)) {
-        let regular = regularity(split);
-        if regular > best.1 {
+    let judged = |(index, split): (usize, &Split)| (index == 0 || eligible(split)).then(|| regularity(split));
+    let regular: Vec<Option<f64>> = splits.par_iter().enumerate().map(judged).collect();
+    let mut best = (0, regular.first().copied().flatten().unwrap_or(0.0) + MORE_REGULAR);
+    for (index, regular) in regular.into_iter().enumerate().skip(1) {
+        if let Some(regular) = regular.filter(|regular| *regular > best.1) {
             best = (index, regular);
         }
     }

@@ -12,6 +12,7 @@ use crate::metadata::Metadata;
 use crate::sum::PairSum;
 use crate::trace::Trace;
 use core::f64::consts::SQRT_2;
+use rayon::prelude::*;
 
 /// A start and the sum of powers (W) before it.
 type Summed = (FrameStart, PairSum);
@@ -29,8 +30,8 @@ pub(super) fn conclude(
     let threshold = plan.threshold(&mut gathered);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };
-    let below = gathered.candidates.iter().filter(|c| c.distance_w2 < threshold.value_w2);
-    starts.extend(below.map(|candidate| view.start(candidate)));
+    let below = gathered.candidates.par_iter().filter(|c| c.distance_w2 < threshold.value_w2);
+    starts.par_extend(below.map(|candidate| view.start(candidate)));
     drop(std::mem::take(&mut gathered.candidates));
     starts.sort_by(|a, b| a.0.time_s.total_cmp(&b.0.time_s));
     starts.dedup_by(|later, earlier| later.0.time_s <= earlier.0.time_s);
@@ -113,7 +114,7 @@ impl Plan {
 
     fn threshold(&self, gathered: &mut Gathered) -> crate::frames::Threshold {
         let candidates = &gathered.candidates;
-        let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
+        let distances: Vec<f64> = candidates.par_iter().map(|candidate| candidate.distance_w2).collect();
         let sigma = median(&mut gathered.steps_w) / (0.674_489_75 * SQRT_2);
         let noise_w2 = 2.0 * self.placement.samples as f64 * sigma * sigma;
         let background_w2 = median(&mut gathered.distances_w2);
@@ -122,10 +123,10 @@ impl Plan {
             _ => 0,
         };
         choose(&distances, background_w2, noise_w2, self.misalignment_w2(), |value_w2| {
-            let below = candidates.iter().filter(|candidate| candidate.distance_w2 < value_w2);
+            let below = distances.iter().zip(candidates).filter(|(distance_w2, _)| **distance_w2 < value_w2);
             let marks = self.placement.marks.iter().map(|mark| mark.first);
             let mut offsets: Vec<usize> =
-                below.map(|candidate| candidate.offset as usize).chain(marks).collect();
+                below.map(|(_, candidate)| candidate.offset as usize).chain(marks).collect();
             // All but the marks are in order, which is found out quickly.
             offsets.sort();
             regularity(&offsets, span)

@@ -9,34 +9,50 @@ pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mu
     let mut block = from;
     while block < to {
         let values = &profile[block..to.min(block + spacing)];
-        let lowest = lowest(values);
-        let Some(at) = values.iter().position(|&value| value == lowest) else {
-            block += spacing;
-            continue;
-        };
-        let offset = block + at;
-        let before = &profile[(offset + 1).saturating_sub(spacing)..offset];
-        let after = &profile[offset + 1..profile.len().min(offset + spacing)];
-        if !before.iter().chain(after).any(|&other| other < lowest) {
-            take(offset);
+        let least = lowest(values);
+        if let Some(at) = first(values, least) {
+            let offset = block + at;
+            let before = &profile[(offset + 1).saturating_sub(spacing)..offset];
+            let after = &profile[offset + 1..profile.len().min(offset + spacing)];
+            if least <= lowest(before) && least <= lowest(after) {
+                take(offset);
+            }
         }
         block += spacing;
     }
 }
 
-/// The lowest value, in lanes that the compiler keeps in one register.
+/// Values that are compared at once: what the compiler keeps in few registers.
+const LANES: usize = 16;
+
+/// The lowest value; infinity of none.
 #[multiversion(targets("x86_64+avx2"))]
 fn lowest(values: &[f32]) -> f32 {
     let less = |a: f32, b: f32| if b < a { b } else { a };
-    let mut lanes = [f32::INFINITY; 16];
-    let chunks = values.chunks_exact(16);
-    let rest = chunks.remainder().iter().fold(f32::INFINITY, |low, &value| less(low, value));
-    for chunk in chunks {
+    let mut lanes = [f32::INFINITY; LANES];
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    // The last lanes once more, rather than the rest one by one.
+    let again = values.last_chunk::<LANES>().filter(|_| !rest.is_empty());
+    for chunk in chunks.iter().chain(again) {
         for (low, &value) in lanes.iter_mut().zip(chunk) {
             *low = less(*low, value);
         }
     }
-    lanes.into_iter().fold(rest, less)
+    let few = if chunks.is_empty() { rest } else { &[] };
+    few.iter().copied().chain(lanes).fold(f32::INFINITY, less)
+}
+
+/// Where a value stands first.
+#[multiversion(targets("x86_64+avx2"))]
+fn first(values: &[f32], value: f32) -> Option<usize> {
+    let (chunks, _) = values.as_chunks::<LANES>();
+    // Without a way out from within a chunk.
+    let without = chunks
+        .iter()
+        .take_while(|chunk| !chunk.iter().fold(false, |any, &other| any | (other == value)))
+        .count();
+    let from = without * LANES;
+    Some(from + values[from..].iter().position(|&other| other == value)?)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::conclude::conclude;
 use super::minima::minima;
 use super::piece::Piece;
 use super::screen::{Buffers, Screen};
-use super::template::{difference, templates};
+use super::template::{difference, powers, templates};
 use super::{StreamError, Streamed};
 use crate::frames::{Marks, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
@@ -64,7 +64,7 @@ pub(super) struct Plan {
     pub templates: Vec<Vec<f64>>,
     pub spacing: usize,
     mean_w: f32,
-    screens: Vec<Screen>,
+    screen: Screen,
     stride: u64,
     /// Marks' positions, then that of the end mark.
     positions: Vec<f64>,
@@ -85,13 +85,13 @@ impl Plan {
         let placement = marks.place_on(clock.start_s, clock.rate_hz, samples)?;
         let templates = templates(path, options, &placement, marks, clock)?;
         let mean_w = (templates[0].iter().sum::<f64>() / templates[0].len() as f64) as f32;
-        let centred = |t: &Vec<f64>| t.iter().map(|watts| watts - f64::from(mean_w)).collect::<Vec<_>>();
-        let screens = templates.iter().map(|template| Screen::new(&centred(template))).collect();
+        let centred = |t: &Vec<f64>| t.iter().map(|watts| watts - f64::from(mean_w)).collect();
+        let screen = Screen::new(&templates.iter().map(centred).collect::<Vec<_>>());
         let mut positions: Vec<f64> = marks.starts_s.iter().map(|&mark_s| clock.position(mark_s)).collect();
         positions.push(clock.position(marks.end_s));
         let spacing = (placement.samples / 2).max(1);
         let stride = clock.samples.map_or(1024, |samples| samples.div_ceil(MEDIAN_OF).max(1));
-        Ok(Self { clock, placement, templates, spacing, mean_w, screens, stride, positions })
+        Ok(Self { clock, placement, templates, spacing, mean_w, screen, stride, positions })
     }
 
     fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
@@ -192,49 +192,51 @@ impl Plan {
         let end = all.min(to + self.spacing as u64 - 1);
         let place = |offset: u64| (offset - piece.base) as usize;
         let samples = place(begin)..place(end) + width - 1;
-        let Workspace { signal, profile, buffers } = workspace;
+        let Workspace { signal, profile, power_w, buffers } = workspace;
         signal.resize(samples.len(), 0.0);
         centre(&piece.voltage_v[samples.clone()], &piece.current_a[samples], self.mean_w, signal);
-        profile.clear();
-        profile.resize((end - begin) as usize, f32::INFINITY);
-        self.screens.iter().for_each(|screen| screen.lower(signal, profile, buffers));
+        profile.resize((end - begin) as usize, 0.0);
+        self.screen.profile(signal, profile, buffers);
         let mut found = Found::default();
         let inside = ((from - begin) as usize, (to - begin) as usize);
         minima(profile, inside.0, inside.1, self.spacing, |offset| {
-            found.candidates.push(self.candidate(piece, begin + offset as u64, all));
+            found.candidates.push(self.candidate(piece, begin + offset as u64, all, power_w));
         });
         let first = from.next_multiple_of(self.stride);
         for offset in (first..to).step_by(self.stride as usize) {
-            found.distances_w2.push(self.nearest(piece, offset).0);
             let place = place(offset);
+            self.powers(piece, place..place + width, power_w);
+            found.distances_w2.push(self.nearest(power_w).0);
             found.steps_w.push((piece.power_w(place + 1) - piece.power_w(place)).abs());
         }
         found
     }
 
-    /// Exact distance and number of the nearest template.
-    fn nearest(&self, piece: &Piece, offset: u64) -> (f64, usize) {
-        let each = (0..self.templates.len()).map(|mark| (self.distance_w2(piece, offset, mark), mark));
+    fn powers(&self, piece: &Piece, places: Range<usize>, into: &mut Vec<f64>) {
+        powers(&piece.voltage_v[places.clone()], &piece.current_a[places], into);
+    }
+
+    /// Exact distance and number of the template nearest to some powers.
+    fn nearest(&self, power_w: &[f64]) -> (f64, usize) {
+        let each =
+            self.templates.iter().zip(0..).map(|(template, mark)| (difference(power_w, template), mark));
         each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
-    fn distance_w2(&self, piece: &Piece, offset: u64, mark: usize) -> f64 {
-        let from = (offset - piece.base) as usize;
-        let (v, i) = (&piece.voltage_v[from..], &piece.current_a[from..]);
-        difference(v, i, &self.templates[mark])
-    }
-
-    fn candidate(&self, piece: &Piece, offset: u64, all: u64) -> Candidate {
-        let (mut distance_w2, mark) = self.nearest(piece, offset);
-        let at = |offset: u64| self.distance_w2(piece, offset, mark);
+    fn candidate(&self, piece: &Piece, offset: u64, all: u64, power_w: &mut Vec<f64>) -> Candidate {
+        // All samples of this offset and of those that may be better, and one more on either side.
+        let reach = REACH as u64 + 1;
+        let low = offset.saturating_sub(reach).max(piece.base);
+        let high = (offset + reach).min(all - 1);
+        let place = |offset: u64| (offset - piece.base) as usize;
+        self.powers(piece, place(low)..place(high) + self.placement.samples, power_w);
+        let (mut distance_w2, mark) = self.nearest(&power_w[(offset - low) as usize..]);
+        let at = |offset: u64| difference(&power_w[(offset - low) as usize..], &self.templates[mark]);
         let mut best = offset;
-        let inside = |offset: u64| offset > piece.base && offset + 1 < all;
         let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
+        let inside = |offset: u64| low < offset && offset < high;
         // The screen may be off by its rounding: downhill to the lowest, a few offsets at most.
-        for _ in 0..=REACH {
-            if !inside(best) {
-                break;
-            }
+        while inside(best) {
             (before, after) = (at(best - 1), at(best + 1));
             match (before < distance_w2, after < distance_w2) {
                 (true, _) if before <= after => (best, distance_w2) = (best - 1, before),
@@ -263,6 +265,8 @@ fn centre(voltage_v: &[f32], current_a: &[f32], mean_w: f32, into: &mut [f32]) {
 struct Workspace {
     signal: Vec<f32>,
     profile: Vec<f32>,
+    /// Powers about one offset, W.
+    power_w: Vec<f64>,
     buffers: Buffers,
 }
 

@@ -1,6 +1,7 @@
 //! The samples at hand.
 
 use crate::sum::PairSum;
+use core::ops::Range;
 use multiversion::multiversion;
 
 /// Samples per stored sum.
@@ -40,8 +41,8 @@ impl Piece {
         let done = self.prefix_w.len() - 1;
         let whole = self.len() / BLOCK;
         for block in done..whole {
-            let sum = block_sum(&self.voltage_v[block * BLOCK..], &self.current_a[block * BLOCK..]);
-            self.prefix_w.push(self.prefix_w[block].plus(sum));
+            let sum_w = self.sum_w(block * BLOCK..(block + 1) * BLOCK);
+            self.prefix_w.push(self.prefix_w[block].plus(sum_w));
         }
     }
 
@@ -50,9 +51,12 @@ impl Piece {
         let place = (position - self.base as f64).clamp(0.0, self.len() as f64);
         let whole = (place as usize).min(self.len());
         let block = (whole / BLOCK).min(self.prefix_w.len() - 1);
-        let rest: f64 = (block * BLOCK..whole).map(|place| self.power_w(place)).sum();
-        let sum = self.prefix_w[block].plus(rest);
+        let sum = self.prefix_w[block].plus(self.sum_w(block * BLOCK..whole));
         if whole < self.len() { sum.plus_product(self.power_w(whole), place - whole as f64) } else { sum }
+    }
+
+    fn sum_w(&self, places: Range<usize>) -> f64 {
+        sum_of_powers(&self.voltage_v[places.clone()], &self.current_a[places])
     }
 
     /// Takes over the end of another piece, from a sample on, rounded down to a whole block.
@@ -70,14 +74,17 @@ impl Piece {
     }
 }
 
-/// Sum of the powers of one block, in eight lanes: always the same order.
+/// Sum of the powers of some samples, in eight lanes: always the same order.
 #[multiversion(targets("x86_64+avx2"))]
-fn block_sum(voltage_v: &[f32], current_a: &[f32]) -> f64 {
+fn sum_of_powers(voltage_v: &[f32], current_a: &[f32]) -> f64 {
     let mut lanes = [0.0; 8];
-    for (v, i) in voltage_v[..BLOCK].chunks_exact(8).zip(current_a[..BLOCK].chunks_exact(8)) {
+    let (v, i) = (voltage_v.chunks_exact(8), current_a.chunks_exact(8));
+    let rest = v.remainder().iter().zip(i.remainder()).map(|(&v, &i)| f64::from(v) * f64::from(i));
+    let rest: f64 = rest.sum();
+    for (v, i) in v.zip(i) {
         for lane in 0..8 {
             lanes[lane] += f64::from(v[lane]) * f64::from(i[lane]);
         }
     }
-    lanes.iter().sum()
+    lanes.iter().sum::<f64>() + rest
 }

@@ -33,22 +33,24 @@ pub(super) fn templates(
     Ok(templates)
 }
 
+/// Powers of some samples, W.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn powers(voltage_v: &[f32], current_a: &[f32], into: &mut Vec<f64>) {
+    into.clear();
+    into.extend(voltage_v.iter().zip(current_a).map(|(&v, &i)| f64::from(v) * f64::from(i)));
+}
+
 /// Summed squared difference of powers and a template, in eight lanes: always the same order, whatever vectors there are.
 #[multiversion(targets("x86_64+avx2"))]
-pub(super) fn difference(voltage_v: &[f32], current_a: &[f32], template: &[f64]) -> f64 {
+pub(super) fn difference(power_w: &[f64], template: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let whole = template.len() / 8 * 8;
-    let term = |j: usize| {
-        let difference = f64::from(voltage_v[j]) * f64::from(current_a[j]) - template[j];
-        difference * difference
-    };
-    let chunks =
-        template[..whole].chunks_exact(8).zip(voltage_v.chunks_exact(8)).zip(current_a.chunks_exact(8));
-    for ((t, v), i) in chunks {
+    for (t, power) in template[..whole].chunks_exact(8).zip(power_w.chunks_exact(8)) {
         for lane in 0..8 {
-            let difference = f64::from(v[lane]) * f64::from(i[lane]) - t[lane];
+            let difference = power[lane] - t[lane];
             lanes[lane] += difference * difference;
         }
     }
-    lanes.iter().sum::<f64>() + (whole..template.len()).map(term).sum::<f64>()
+    let rest = template.iter().zip(power_w).skip(whole).map(|(t, power)| (power - t) * (power - t));
+    lanes.iter().sum::<f64>() + rest.sum::<f64>()
 }
