@@ -1,5 +1,6 @@
 //! Which method, where none was asked for.
 
+use super::alike;
 use super::beat;
 use super::find::Found;
 use super::marks::{MarkError, Marks};
@@ -8,8 +9,10 @@ use super::method::Method;
 use super::tracked::find_tracked;
 use crate::trace::Trace;
 
-/// With fewer starts than this there is too little to learn from: the sum of squares is kept.
+/// With fewer starts than this there is too little to learn from: the sum of squares is kept, unless what tracking finds is plain.
 const FEW: usize = 16;
+/// It is where so much of it has an even beat, and neighbours correlate so well: in noise it is 0.05, in frames at 0 dB 0.3 to 0.5.
+const PLAIN: [f64; 2] = [0.9, 0.5];
 /// With fewer samples in the window shapes are too coarse to be followed: of all methods that with the most even beat is taken.
 const COARSE: usize = 20;
 /// With fewer yet, the sum of squares is kept: any beat can be found among so many look-alikes.
@@ -23,8 +26,13 @@ const BETTER: f64 = 0.02;
 pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let squares = find_matched(trace, marks, Method::SumOfSquares)?;
     let samples = marks.place(trace)?.samples;
-    if squares.starts.len() < FEW || samples < COARSEST {
+    if samples < COARSEST {
         return Ok(squares);
+    }
+    if squares.starts.len() < FEW {
+        // A mark whose like comes back seldom finds itself alone among frames that are plainly there.
+        let tracked = (trace.samples() <= LONG).then(|| find_tracked(trace, marks)).transpose()?;
+        return Ok(tracked.filter(|tracked| plain(trace, tracked)).unwrap_or(squares));
     }
     if samples < COARSE {
         return Ok(steadiest(
@@ -34,6 +42,14 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     }
     let long_and_clear = trace.samples() > LONG && squares.threshold.clarity() >= 1.0;
     if long_and_clear { Ok(squares) } else { find_tracked(trace, marks) }
+}
+
+/// Whether starts are beyond doubt: many, even, and alike.
+fn plain(trace: &Trace, found: &Found) -> bool {
+    let [even, alike] = PLAIN;
+    found.starts.len() >= FEW
+        && covered_s(found) >= even * span_s(found)
+        && alike::neighbours(trace, found) >= alike
 }
 
 /// That of the results whose even beat covers most time.
@@ -51,4 +67,58 @@ fn covered_s(found: &Found) -> f64 {
 
 fn span_s(found: &Found) -> f64 {
     found.starts.last().zip(found.starts.first()).map_or(0.0, |(last, first)| last.time_s - first.time_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Window;
+    use crate::metadata::Metadata;
+    use crate::random::Random;
+
+    const RATE_HZ: f64 = 50e3;
+
+    fn found(power: impl Fn(usize) -> f32, samples: usize, mark: usize) -> Found {
+        let power: Vec<f32> = (0..samples).map(power).collect();
+        let trace = Trace::new(vec![1.0; samples], power, RATE_HZ, 0.0, Metadata::default()).unwrap();
+        let marks = Marks {
+            starts_s: vec![mark as f64 / RATE_HZ],
+            window: Window { pre_s: 1e-3, post_s: 4e-3 },
+            end_s: trace.end_s(),
+        };
+        find_auto(&trace, &marks).unwrap()
+    }
+
+    fn noise(sample: usize) -> f32 {
+        Random::new(1, 0).between(sample as u64, [-0.5, 0.5]) as f32
+    }
+
+    #[test]
+    fn a_mark_whose_like_does_not_come_back_is_tracked_if_frames_are_plainly_there() {
+        // After one of idle, each frame of 400 samples is busy for six stretches of 50, whose levels go their own ways from frame to frame.
+        let power = |sample: usize| {
+            let (frame, stretch) = ((sample / 400) as f32, sample % 400 / 50);
+            let level = 3.0 + 2.0 * (0.1 * frame + 2.1 * stretch as f32).sin();
+            0.1 * noise(sample) + if sample >= 400 && stretch < 6 { level } else { 0.5 }
+        };
+        let found = found(power, 400 * 60, 400 * 30);
+        assert_eq!((found.method, found.starts.len()), (Method::Tracking, 59));
+    }
+
+    #[test]
+    fn a_mark_in_noise_stays_alone() {
+        for level in [0.1, 1.0] {
+            let found = found(|sample| 2.0 + level * noise(sample), 100_000, 50_000);
+            assert_eq!((found.method, found.starts.len()), (Method::SumOfSquares, 1));
+        }
+    }
+
+    #[test]
+    fn a_lone_frame_stays_alone() {
+        let power = |sample: usize| {
+            let busy = (50_000..50_400).contains(&sample);
+            0.1 * noise(sample) + if busy { 3.0 + (sample as f32 / 17.0).sin() } else { 0.5 }
+        };
+        assert_eq!(found(power, 100_000, 50_000).starts.len(), 1);
+    }
 }

@@ -2,6 +2,7 @@
 //! compared with every stretch of the trace by summed squared difference; a threshold chosen from the trace itself
 //! tells starts from the rest, and where it cannot, the result carries a [`Warning`](crate::Warning).
 
+mod alike;
 mod assess;
 mod auto;
 mod beat;

@@ -124,12 +124,12 @@ impl Plan {
     fn read(&self, rows: &mut Rows, chunk: &mut Chunk, piece: &mut Piece) -> Result<usize, ReadError> {
         let mut read = 0;
         while read < ROWS {
-            let now = rows.next(BATCH, chunk)?;
+            let end = piece.end();
+            let now = rows.append(BATCH, chunk, &mut piece.voltage_v, &mut piece.current_a)?;
             if now == 0 {
                 break;
             }
-            self.clock.check(rows.path(), &chunk.stamps, piece.end())?;
-            rows.channels(chunk, &mut piece.voltage_v, &mut piece.current_a);
+            self.clock.check(rows.path(), &chunk.stamps, end)?;
             piece.add_up();
             read += now;
         }

@@ -12,21 +12,53 @@ use crate::median::median;
 const UNLIKE: [f64; 2] = [2.0, 0.06];
 /// At most so many such places are looked at: the most unlike.
 const MOST: usize = 200;
-/// Frames on either side that are aligned, the nearest ones: of the earlier side and of the later.
-const ALIGNED: [[usize; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
-/// How many of them have to agree,
-const AGREE: usize = 3;
-/// within this share of the window, and ratios of clocks within this one of themselves; so far from 1 clocks are not the same.
-const WITHIN: f64 = 0.03;
+/// Ratios of clocks agree within this share of themselves; so far from 1 clocks are not the same.
 const SAME: f64 = 0.09;
 /// What is off by less than this share is not misplaced: that is for finer alignment, and small errors must not add up on the way.
 const MISPLACED: f64 = 0.1;
-/// Shares of the window before and after the start that are compared.
-const COMPARED: [f64; 2] = [0.1, 0.6];
-/// An alignment leaves at most this share of the variance,
-const ALIKE: f64 = 0.3;
-/// and at most this share of what is left where the stretch was thought to be.
+/// The share of the window before the start that is compared, and after it, of a beginning.
+const BEFORE: f64 = 0.1;
+const BEGINNING: f64 = 0.6;
+/// An alignment leaves at most this share of what is left where the stretch was thought to be.
 const BETTER: f64 = 0.5;
+
+/// How frames of both sides of a step are held against each other.
+struct Comparison {
+    /// Which frames are aligned: how many from the step on the known side, and how many on the other.
+    pairs: &'static [[usize; 2]],
+    /// How many of these have to agree on one place,
+    agree: usize,
+    /// within this share of the window.
+    within: f64,
+    /// How much after the start is compared.
+    after: After,
+    /// An alignment leaves at most this share of the variance.
+    alike: f64,
+}
+
+/// How much after a start is compared: a share of the window, or of a period.
+enum After {
+    Window(f64),
+    Period(f64),
+}
+
+/// The beginnings of the nearest frames: they lie closest to each other in content.
+const NEAREST: Comparison = Comparison {
+    pairs: &[[1, 1], [1, 2], [2, 1], [2, 2]],
+    agree: 3,
+    within: 0.03,
+    after: After::Window(BEGINNING),
+    alike: 0.3,
+};
+/// Nearly whole frames, for where beginnings are too much like something else in the frame: by noise, at a slow clock. The nearest frames
+/// are left out, as the clock may have stepped in the midst of one.
+const WHOLE: Comparison = Comparison {
+    pairs: &[[2, 2], [2, 3], [3, 2], [3, 3], [3, 4], [4, 3]],
+    agree: 4,
+    within: 0.06,
+    after: After::Period(0.8),
+    alike: 0.5,
+};
 
 /// Offsets of windows of starts, put right, one for each stretch of `starts` that lies elsewhere; `anchor` is the place of the start in a
 /// window of `width` samples.
@@ -93,39 +125,58 @@ impl View<'_> {
     /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say that they should: the start
     /// that fits best, and by how many samples. `None` where the two sides do not agree on one ratio of clocks and one place.
     fn moved(&self, here: usize, moved: isize, there: usize, way: isize) -> Option<(usize, isize)> {
-        let fits: Vec<(usize, Fit)> = ALIGNED
-            .into_iter()
+        let by = |comparison| self.moved_by(comparison, [here, there], moved, way);
+        by(&NEAREST).or_else(|| by(&WHOLE))
+    }
+
+    fn moved_by(
+        &self,
+        comparison: &Comparison,
+        [here, there]: [usize; 2],
+        moved: isize,
+        way: isize,
+    ) -> Option<(usize, isize)> {
+        let fits: Vec<(usize, Fit)> = comparison
+            .pairs
+            .iter()
             .filter_map(|[back, on]| {
-                let from = here.checked_add_signed(-way * (back as isize - 1))?;
-                let to = there.checked_add_signed(way * (on as isize - 1))?;
-                Some((to, self.fit(from, to, moved)?))
+                let from = here.checked_add_signed(-way * (*back as isize - 1))?;
+                let to = there.checked_add_signed(way * (*on as isize - 1))?;
+                Some((to, self.fit(comparison, from, to, moved)?))
             })
             .collect();
         let shift = median(&mut fits.iter().map(|(_, fit)| fit.shift).collect::<Vec<_>>());
         let ratio = median(&mut fits.iter().map(|(_, fit)| fit.ratio).collect::<Vec<_>>());
+        let within = self.share(comparison.within) as f64;
         let near = |(_, fit): &&(usize, Fit)| {
-            (fit.shift - shift).abs() <= self.share(WITHIN) as f64 && (fit.ratio / ratio - 1.0).abs() < SAME
+            (fit.shift - shift).abs() <= within && (fit.ratio / ratio - 1.0).abs() < SAME
         };
         let agreed: Vec<&(usize, Fit)> = fits.iter().filter(near).collect();
         let best = agreed.iter().min_by(|a, b| a.1.unlike.total_cmp(&b.1.unlike))?;
-        (agreed.len() >= AGREE).then(|| (best.0, libm::round(best.1.shift) as isize))
+        (agreed.len() >= comparison.agree).then(|| (best.0, libm::round(best.1.shift) as isize))
     }
 
     /// The fit of a start to another over a period, if it is a good one, and either at hand or at another clock and much better than
     /// what is at hand.
-    fn fit(&self, from: usize, to: usize, moved: isize) -> Option<Fit> {
-        let fit = self.pair([from, to], moved, self.period(to)? / 2).best()?;
+    fn fit(&self, comparison: &Comparison, from: usize, to: usize, moved: isize) -> Option<Fit> {
+        let period = self.period(to)?;
+        let after = match comparison.after {
+            After::Window(share) => self.share(share),
+            After::Period(share) => (share * period as f64) as usize,
+        };
+        let best = |reach: usize| Pair { after, ..self.pair([from, to], moved, reach) }.best();
+        let fit = best(period / 2)?;
         let at_hand = libm::fabs(fit.shift) <= self.share(MISPLACED) as f64;
-        let near = || self.pair([from, to], moved, self.share(MISPLACED)).best();
-        let better = || near().is_none_or(|near| fit.unlike < BETTER * near.unlike);
-        let good = fit.unlike < ALIKE && (at_hand || (fit.ratio - 1.0).abs() > SAME && better());
+        let better = || best(self.share(MISPLACED)).is_none_or(|near| fit.unlike < BETTER * near.unlike);
+        let good = fit.unlike < comparison.alike && (at_hand || (fit.ratio - 1.0).abs() > SAME && better());
         good.then_some(fit)
     }
 
+    /// The beginnings of two frames.
     fn pair(&self, starts: [usize; 2], moved: isize, reach: usize) -> Pair<'_> {
         let place =
             |start: usize| self.starts.get(start).map_or(usize::MAX / 2, |offset| offset + self.anchor);
-        let [before, after] = COMPARED.map(|share| self.share(share));
+        let [before, after] = [BEFORE, BEGINNING].map(|share| self.share(share));
         let starts = [place(starts[0]).saturating_add_signed(moved), place(starts[1])];
         Pair { power: self.power, starts, before, after, reach }
     }
@@ -145,6 +196,7 @@ impl View<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     const ANCHOR: usize = 50;
     const WIDTH: usize = 250;
@@ -165,17 +217,37 @@ mod tests {
         (power, starts)
     }
 
+    /// Starts of which those at the other clock are found so many samples late.
+    fn late(right: &[usize], by: usize) -> Vec<usize> {
+        right.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + by }).collect()
+    }
+
+    #[test]
+    fn frames_whose_beginnings_noise_hides_are_told_by_the_whole_of_them() {
+        let (mut power, right) = trace(12, 1);
+        let noise = Random::new(7, 0);
+        for start in right[12..].iter().map(|start| start + ANCHOR) {
+            let beginning = (start as u64..).zip(&mut power[start..start + 150]);
+            beginning.for_each(|(sample, watts)| *watts += 0.13 * noise.normals(sample).0);
+        }
+        let found = misplaced(&power, &late(&right, 200), &[right[3]], ANCHOR, WIDTH);
+        let off = |found: &usize| right.iter().map(|start| start.abs_diff(*found)).min();
+        assert!(
+            found.len() == 1 && off(&found[0]) <= Some(15),
+            "{found:?} {:?}",
+            found.iter().map(off).collect::<Vec<_>>()
+        );
+        assert!(misplaced(&power, &right, &[right[3]], ANCHOR, WIDTH).is_empty());
+    }
+
     #[test]
     fn frames_at_another_clock_that_were_followed_elsewhere_are_found_again() {
         let (power, right) = trace(12, 1);
-        let moved = |by: usize| -> Vec<usize> {
-            right.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + by }).collect()
-        };
-        let found = misplaced(&power, &moved(90), &[right[3]], ANCHOR, WIDTH);
+        let found = misplaced(&power, &late(&right, 90), &[right[3]], ANCHOR, WIDTH);
         assert_eq!(found.len(), 1, "{found:?}");
         let off = right.iter().map(|start| start.abs_diff(found[0])).min();
         assert!(off <= Some(3), "{found:?}");
-        assert!(misplaced(&power, &moved(0), &[right[3]], ANCHOR, WIDTH).is_empty());
+        assert!(misplaced(&power, &right, &[right[3]], ANCHOR, WIDTH).is_empty());
     }
 
     #[test]
@@ -184,9 +256,7 @@ mod tests {
         let (other, _) = trace(12, 2);
         let from = starts[12] - 20;
         power[from..].copy_from_slice(&other[from..]);
-        let moved: Vec<usize> =
-            starts.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + 90 }).collect();
-        assert!(misplaced(&power, &moved, &[starts[3]], ANCHOR, WIDTH).is_empty());
+        assert!(misplaced(&power, &late(&starts, 90), &[starts[3]], ANCHOR, WIDTH).is_empty());
     }
 
     #[test]

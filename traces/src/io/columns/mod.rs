@@ -34,6 +34,18 @@ pub(super) struct Layout {
     pub names: Vec<String>,
 }
 
+impl Layout {
+    /// Where the voltage and the current of the only rail are, if nothing has to be worked out of them.
+    pub fn as_they_stand(&self) -> Option<[usize; 2]> {
+        match self.rails[..] {
+            [Rail::Measured { voltage, current }] => {
+                self.values.iter().all(|column| column.scale == 1.0).then_some([voltage, current])
+            }
+            _ => None,
+        }
+    }
+}
+
 /// The columns of each rail, by what they measure.
 type Rails = BTreeMap<String, BTreeMap<Quantity, Picked>>;
 

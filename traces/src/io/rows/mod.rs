@@ -179,6 +179,37 @@ impl Rows {
     pub(crate) fn next(&mut self, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
         chunk.values.resize_with(self.layout.values.len(), Vec::new);
         chunk.values.iter_mut().for_each(Vec::clear);
+        self.read(limit, chunk)
+    }
+
+    /// Reads up to `limit` rows and appends them, all rails together, to voltages (V) and currents (A); how many there were.
+    pub(crate) fn append(
+        &mut self,
+        limit: usize,
+        chunk: &mut Chunk,
+        voltage_v: &mut Vec<f32>,
+        current_a: &mut Vec<f32>,
+    ) -> Result<usize, ReadError> {
+        let (Source::Parquet(_), Some([voltage, current])) = (&self.source, self.layout.as_they_stand())
+        else {
+            let read = self.next(limit, chunk)?;
+            self.channels(chunk, voltage_v, current_a);
+            return Ok(read);
+        };
+        // Decoded where they belong: copies of long traces cost a twentieth of all.
+        chunk.values.resize_with(self.layout.values.len(), Vec::new);
+        let mut exchange = |chunk: &mut Chunk| {
+            std::mem::swap(&mut chunk.values[voltage], voltage_v);
+            std::mem::swap(&mut chunk.values[current], current_a);
+        };
+        exchange(chunk);
+        let read = self.read(limit, chunk);
+        exchange(chunk);
+        read
+    }
+
+    /// Appends up to `limit` rows to what `chunk` holds of values; the stamps are those of these rows alone.
+    fn read(&mut self, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
         let path = &self.path;
         match &mut self.source {
             Source::Csv(source) => source.next(&self.layout, limit, self.repair, chunk),

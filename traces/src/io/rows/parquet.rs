@@ -238,10 +238,12 @@ impl Column {
         Ok(())
     }
 
+    /// Appends up to `limit` values; how many there were.
     fn values(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, ReadError> {
         let mut doubles: Vec<f64> = Vec::new();
-        while into.len() < limit && self.open_group()? {
-            let want = (limit - into.len()).min(BATCH);
+        let from = into.len();
+        while into.len() - from < limit && self.open_group()? {
+            let want = (limit - (into.len() - from)).min(BATCH);
             let (max, levels) = (self.max_definition, &mut self.levels);
             let got = match &mut self.reader {
                 Some(ColumnReader::FloatColumnReader(reader)) => batch(reader, want, max, levels, into),
@@ -255,7 +257,7 @@ impl Column {
             };
             self.account(got)?;
         }
-        Ok(into.len())
+        Ok(into.len() - from)
     }
 
     fn times(&mut self, limit: usize, stamps: &mut Stamps) -> Result<usize, ReadError> {
