@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from fractions import Fraction
 
 import numpy as np
 from pyjls import DataType, Reader, Writer
@@ -54,14 +55,14 @@ def statistics_alike(reader, number, truth):
     spans = [(0, n, 1)] if n > 1 else []
     step = ENTRY
     while step <= n:
-        spans += [(0, step, n // step), (0, 25 * step, max(1, n // (25 * step)))]
+        spans += [(0, step, n // step), (0, 3 * step, n // (3 * step)), (step, step, n // step - 1)]
         step *= FANOUT
     for _ in range(200):
         span = int(min(n, np.exp(rng.uniform(np.log(2), np.log(max(n, 3))))))
         spans.append((int(rng.integers(0, n - span + 1)), span, 1))
     checked = 0
     for start, span, count in spans:
-        if span < 2 or start + span * count > n:
+        if span < 2 or count < 1:
             continue
         parts = truth[start : start + span * count].reshape(count, span)
         for said, part in zip(reader.fsr_statistics(number, start, span, count), parts):
@@ -108,11 +109,11 @@ def entries_alike(path, number, truth):
 def times_alike(reader, number, samples, rate_hz, start_s):
     last = samples - 1
     for sample in {0, last // 3, last}:
+        truth = (Fraction(start_s) + Fraction(sample) / Fraction(rate_hz) - UNIX_2018) * SECOND
         said = reader.sample_id_to_timestamp(number, sample)
-        # pyjls gives seconds since 1970 in f64.
-        near(said, start_s + sample / rate_hz, 3e-16, 3e-9, f"time of sample {sample}")
+        assert abs(said - truth) <= 2, f"time of sample {sample}: {said}, not {float(truth)}"
     pairs = []
-    reader.utc(number, lambda entries: pairs.extend(entries) and False)
+    reader.utc(number, 0, lambda entries: pairs.extend(entries) and False)
     assert [pair[0] for pair in pairs] == [0, last][: min(samples, 2)], pairs
 
 
@@ -178,7 +179,7 @@ def lost(program, folder):
 
     samples = 500_000
     rng = np.random.default_rng(7)
-    current = (0.5 + 0.2 * rng.standard_normal(samples)).astype(np.float32)
+    current = (0.5 + 0.2 * rng.random(samples)).astype(np.float32)
     source = os.path.join(folder, "b.parquet")
     parquet(source, current, np.full(samples, 5, np.float32), 50e3, 0.0)
     paths = [os.path.join(folder, name) for name in ("lost.parquet", "lost.jls")]
@@ -222,6 +223,8 @@ def theirs(samples, path):
         for at in range(0, samples, len(piece)):
             for number in 1, 2:
                 writer.fsr(number, at, piece[: samples - at])
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())  # ours does
     written = samples / (time.perf_counter() - t0) / 1e6
     size = os.path.getsize(path) / samples
     t0 = time.perf_counter()
