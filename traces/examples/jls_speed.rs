@@ -1,4 +1,5 @@
-//! Times writing and reading of JLS: `jls_speed SAMPLES FILE`; prints million samples/s of both. `--keep` leaves the file.
+//! Times writing and reading of JLS: `jls_speed SAMPLES FILE`; prints million samples/s of both. With `--write` the
+//! file is written, and kept.
 
 use std::error::Error;
 use std::path::Path;
@@ -11,7 +12,9 @@ const PIECE: usize = 1 << 16;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let [samples, path, rest @ ..] = &words[..] else { return Err("jls_speed SAMPLES FILE [--keep]".into()) };
+    let [samples, path, rest @ ..] = &words[..] else {
+        return Err("jls_speed SAMPLES FILE [--write]".into());
+    };
     let (samples, path): (u64, _) = (samples.parse()?, Path::new(path));
     let noise: Vec<f32> =
         (0..PIECE as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 12) as f32 * 1e-6).collect();
@@ -29,12 +32,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     })?;
     tell("write", clock);
     println!("bytes_per_sample {:.3}", std::fs::metadata(path)?.len() as f64 / samples as f64);
+    if !rest.is_empty() {
+        return Ok(());
+    }
     let clock = Instant::now();
     let trace = read(path, &ReadOptions::default())?.trace;
     tell("read", clock);
-    if rest.is_empty() {
-        std::fs::remove_file(path)?;
-    }
+    std::fs::remove_file(path)?;
     assert_eq!(trace.samples() as u64, samples);
     Ok(())
 }

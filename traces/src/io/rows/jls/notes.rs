@@ -32,3 +32,19 @@ pub(super) fn placed(mut header: Header, rate_hz: f64, first: i128) -> Header {
     }
     header
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_description_counts_from_sample_0_and_only_at_its_own_rate() {
+        let header =
+            || Header { rate_hz: Some(999.6), start_s: Some(5.0), samples: Some(3), ..Header::default() };
+        let of = |header: Header| (header.rate_hz, header.start_s, header.samples);
+        assert_eq!(of(placed(header(), 1000.0, 0)), (Some(999.6), Some(5.0), None));
+        assert_eq!(of(placed(header(), 1000.0, 2499)), (Some(999.6), Some(7.5), None));
+        assert_eq!(of(placed(header(), 1001.0, 2499)), (Some(1001.0), None, None));
+        assert_eq!(of(placed(Header::default(), 50.0, 7)), (Some(50.0), None, None));
+    }
+}
