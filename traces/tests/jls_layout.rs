@@ -121,9 +121,9 @@ fn check_level<'a>(
 fn check_index(bytes: &[u8], index: &Chunk, below: &[&Chunk]) -> usize {
     let chunk_samples = 8192 * if index.level > 1 { 10 * 20_u64.pow(u32::from(index.level) - 2) } else { 1 };
     let count = word(index.payload, 8) as usize;
-    for entry in 0..count {
+    for (entry, chunk) in below[..count].iter().enumerate() {
         let at = long(index.payload, 16 + 8 * entry);
-        assert_eq!(at, below[entry].at);
+        assert_eq!(at, chunk.at);
         let first = long(index.payload, 0) + entry as u64 * chunk_samples;
         assert_eq!(long(bytes, at as usize + 32), first);
     }

@@ -18,7 +18,7 @@ const OFF: f64 = 1e-3;
 
 /// A JLS file being written: voltage and current of one trace, in pieces of any size, which leave no trace in the bytes.
 ///
-/// Memory does not grow with the samples: 3 MiB, and 25 KiB for each level of summaries (five at 1e9 samples).
+/// Memory does not grow with the samples: about 4 MiB, and 25 KiB a signal for each level of summaries (five at 1e9).
 ///
 /// ```
 /// use traces::io::{atomic, jls};
