@@ -56,12 +56,15 @@ fn frames_of_a_recorders_csv_have_the_columns_and_add_up() {
 fn converted_files_hold_the_same_and_streaming_finds_the_same() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
-    for (from, to) in [("t.csv", "t.parquet"), ("t.parquet", "u.tsv.gz"), ("u.tsv.gz", "v.csv")] {
-        json(folder.path(), &["convert", from, to]);
+    let chain = ["t.csv", "t.parquet", "u.tsv.gz", "v.jls", "v.csv"];
+    for pair in chain.windows(2) {
+        json(folder.path(), &["convert", pair[0], pair[1]]);
     }
     let of = |args: &[&str]| json(folder.path(), &[args, &MARK[..]].concat())["frames"].clone();
     let first = of(&["frames", "t.parquet", "--method", "squares"]);
-    assert_eq!(of(&["frames", "v.csv", "--method", "squares"]), first);
+    for same in ["v.jls", "v.csv"] {
+        assert_eq!(of(&["frames", same, "--method", "squares"]), first);
+    }
     let streamed = of(&["frames", "t.parquet", "--stream"]);
     for (a, b) in first.as_array().unwrap().iter().zip(streamed.as_array().unwrap()) {
         assert!((a["energy_J"].as_f64().unwrap() / b["energy_J"].as_f64().unwrap() - 1.0).abs() < 1e-6);
@@ -85,6 +88,31 @@ fn repairs_are_made_on_request_alone_and_told() {
     let current: Vec<&str> = good.lines().skip(1).map(|line| line.rsplit(',').next().unwrap()).collect();
     assert_eq!(current.len(), 8);
     assert_eq!(current[2..4], ["2", "3"]);
+}
+
+#[test]
+fn samples_that_a_device_loses_are_missing_in_jls_and_filled_as_in_parquet() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    for out in ["a.parquet", "a.jls"] {
+        let lossy = ["--device-rate", "5000", "--packet-samples", "50", "--packet-loss", "0.1", "--out", out];
+        let report = json(folder.path(), &[&["sample", "t.csv"], &lossy[..]].concat());
+        assert!(report["lost_samples"].as_u64().unwrap() > 0);
+        let refused = quintile(folder.path(), &["convert", out, "b.csv"]);
+        assert_eq!(refused.status.code(), Some(1));
+    }
+    let filled = |from: &str, to: &str| {
+        json(folder.path(), &["convert", from, to, "--repair"]);
+        fs::read_to_string(folder.path().join(to)).unwrap()
+    };
+    let (rows, nan) = (filled("a.parquet", "a.csv"), filled("a.jls", "b.csv"));
+    let numbers = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).flat_map(|line| line.split(',')).map(|field| field.parse().unwrap()).collect()
+    };
+    let (rows, nan) = (numbers(&rows), numbers(&nan));
+    // The last packets may be lost: Parquet then ends before.
+    assert!(rows.len() <= nan.len() && rows.len() > nan.len() - 450);
+    assert!(rows.iter().zip(&nan).all(|(a, b)| (a - b).abs() < 1e-6), "filled alike");
 }
 
 #[test]

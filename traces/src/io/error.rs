@@ -232,6 +232,22 @@ pub enum WriteError {
     /// Encoding or writing failed.
     #[error("cannot write the trace: {0}")]
     Encode(String),
+    /// A rate that a JLS file cannot say.
+    #[error(
+        "a JLS file holds whole rates from 1 Hz on and {rate_hz} Hz is none to 1 in 1000: write Parquet or CSV, or sample it anew"
+    )]
+    JlsRate {
+        /// The rate, Hz.
+        rate_hz: f64,
+    },
+    /// A time that a JLS file cannot say.
+    #[error(
+        "a JLS file reaches 8.5e9 s to either side of 2018 and the trace {time_s} s from 1970: write Parquet or CSV"
+    )]
+    JlsTime {
+        /// The time, s from 1970.
+        time_s: f64,
+    },
     /// A mark is not a finite time.
     #[error("mark {index} is at {time_s} s: a mark must be at a finite time")]
     Mark {

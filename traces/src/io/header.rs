@@ -20,6 +20,7 @@ pub(crate) struct Header {
     #[serde(alias = "sample_rate_hz")]
     pub rate_hz: Option<f64>,
     pub start_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub samples: Option<u64>,
     pub units: BTreeMap<String, serde_json::Value>,
     #[serde(flatten)]
@@ -28,26 +29,53 @@ pub(crate) struct Header {
 
 /// The description of a trace as JSON, on one line if it is to be put into a file's metadata.
 pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError> {
-    if let Some((index, mark)) =
-        trace.metadata.marks.iter().enumerate().find(|(_, mark)| !mark.time_s.is_finite())
+    let samples = trace.kept(0..trace.samples()).count() as u64;
+    let header = describe(trace.rate_hz(), trace.start_s(), Some(samples), &trace.metadata)?;
+    let json = if pretty { serde_json::to_string_pretty(&header) } else { serde_json::to_string(&header) };
+    json.map_err(|error| WriteError::Encode(error.to_string()))
+}
+
+/// The description of a trace.
+pub(super) fn describe(
+    rate_hz: f64,
+    start_s: f64,
+    samples: Option<u64>,
+    metadata: &Metadata,
+) -> Result<Header, WriteError> {
+    if let Some((index, mark)) = metadata.marks.iter().enumerate().find(|(_, mark)| !mark.time_s.is_finite())
     {
         return Err(WriteError::Mark { index, time_s: mark.time_s });
     }
-    let mut metadata = trace.metadata.clone();
+    let mut metadata = metadata.clone();
     for key in ["version", "rate_hz", "sample_rate_hz", "start_s", "samples", "units"] {
         metadata.other.remove(key);
     }
     let unit = |(column, unit): (&str, &str)| (column.to_owned(), serde_json::Value::from(unit));
-    let header = Header {
+    Ok(Header {
         version: VERSION,
-        rate_hz: Some(trace.rate_hz()),
-        start_s: Some(trace.start_s()),
-        samples: Some(trace.kept(0..trace.samples()).count() as u64),
+        rate_hz: Some(rate_hz),
+        start_s: Some(start_s),
+        samples,
         units: [("time_ns", "ns"), ("time_s", "s"), ("voltage_V", "V"), ("current_A", "A")].map(unit).into(),
         metadata,
-    };
-    let json = if pretty { serde_json::to_string_pretty(&header) } else { serde_json::to_string(&header) };
+    })
+}
+
+/// A description under its key, on one line, to be told from other programs' notes.
+pub(super) fn wrapped(header: &Header) -> Result<String, WriteError> {
+    let json = serde_json::to_string(&BTreeMap::from([(KEYS[0], header)]));
     json.map_err(|error| WriteError::Encode(error.to_string()))
+}
+
+/// The description among a program's notes in JSON; `None` if it is not there.
+pub(super) fn unwrapped(path: &Path, json: &str) -> Result<Option<Header>, ReadError> {
+    let Ok(mut notes) = serde_json::from_str::<BTreeMap<String, serde_json::Value>>(json) else {
+        return Ok(None);
+    };
+    match KEYS.iter().find_map(|key| notes.remove(*key)) {
+        Some(header) if header.is_object() => from_json(path, &header.to_string()).map(Some),
+        _ => Ok(None),
+    }
 }
 
 /// Reads a description. Keys it does not know are kept in [`Metadata::other`].

@@ -1,13 +1,14 @@
 //! Trace files.
 //!
 //! [`read`] takes any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces what does not fit
-//! into memory. [`csv`] and [`parquet`] write, and read by the native names alone.
+//! into memory. [`csv`] and [`parquet`] write, and read by the native names alone; [`jls`] writes.
 
 pub mod atomic;
 mod columns;
 pub mod csv;
 mod error;
 mod header;
+pub mod jls;
 mod options;
 pub mod parquet;
 mod read;

@@ -1,7 +1,7 @@
 //! JLS files whose checksums are made right, so that what is behind them is reached: for tests and the fuzz target.
 
 /// CRC-32C bit by bit.
-fn crc32c(bytes: &[u8]) -> [u8; 4] {
+pub fn crc32c(bytes: &[u8]) -> [u8; 4] {
     let crc = bytes.iter().fold(!0_u32, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0x82f6_3b78 * (crc & 1)))
     });

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 use traces::Trace;
-use traces::io::{atomic, csv, parquet};
+use traces::io::{atomic, csv, jls, parquet};
 
 use super::args::ConvertArgs;
 use super::input::wrong;
@@ -37,7 +37,7 @@ fn name(path: &Path) -> String {
 
 /// Refuses a file of unknown kind before anything is read.
 pub(super) fn check(path: &Path) -> Result<(), Failure> {
-    let known = [".parquet", ".csv", ".tsv", ".csv.gz", ".tsv.gz", ".perfetto-trace"];
+    let known = [".parquet", ".jls", ".csv", ".tsv", ".csv.gz", ".tsv.gz", ".perfetto-trace"];
     if known.iter().any(|end| name(path).ends_with(end)) {
         return Ok(());
     }
@@ -50,6 +50,9 @@ pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
     let plain = name.trim_end_matches(".gz");
     if name.ends_with(".parquet") {
         return Ok(parquet::save(trace, path)?);
+    }
+    if name.ends_with(".jls") {
+        return Ok(jls::save(trace, path)?);
     }
     if name.ends_with(".perfetto-trace") {
         return perfetto(trace, path);

@@ -40,7 +40,7 @@ pub struct ConvertArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
-    /// File to write: .parquet, .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace
+    /// File to write: .parquet, .jls (Joulescope), .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace
     #[arg(value_name = "OUT")]
     pub out: PathBuf,
     /// Print what was read, mended and written as JSON

@@ -40,7 +40,7 @@ pub enum TraceCommand {
     Energy(Box<EnergyArgs>),
     /// Put recorded time stamps onto the time of a trace
     Align(Box<AlignArgs>),
-    /// Read a trace and write it as Parquet, CSV, TSV (with .gz if so named) or a Perfetto timeline
+    /// Read a trace and write it as Parquet, JLS (Joulescope), CSV, TSV (with .gz if so named) or a Perfetto timeline
     Convert(ConvertArgs),
     /// Record a trace anew with a coarser device: rate, range, bits, errors, noise
     Sample(Box<SampleArgs>),

@@ -1,20 +1,12 @@
-//! Chunks of a JLS file: a header and a payload, each with a checksum. Layout: pyjls 0.17, `jls/format.h`; all numbers
-//! are little-endian.
+//! Chunks of a JLS file: a header and a payload, each with a checksum.
 
-use super::crc::crc32c;
 use crate::io::ReadError;
+use crate::io::jls::crc32c;
+use crate::io::jls::format::{FILE_HEADER_BYTES, HEADER_BYTES, IDENTIFICATION, LONGEST_BYTES, on_disk};
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// What every file begins with.
-const IDENTIFICATION: &[u8; 16] = b"jlsfmt\r\n \n \x1a  \xb2\x1c";
-/// Identification, length (8), version (4), checksum (4).
-const FILE_HEADER_BYTES: u64 = 32;
-const HEADER_BYTES: usize = 32;
-const CRC_BYTES: u64 = 4;
-/// A payload longer than this is not read: what a file claims is not allocated on trust. pyjls makes 32 KiB.
-const LONGEST_BYTES: u32 = 1 << 26;
 /// What mends a recording that was not brought to its end.
 const MEND: &str = "the Joulescope UI or pyjls mends a copy of it by opening it";
 
@@ -32,11 +24,9 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// Where the next chunk of the file begins: payloads are padded so that they end on 8 with their checksum.
+    /// Where the next chunk of the file begins.
     pub fn end(&self) -> u64 {
-        let payload = u64::from(self.bytes);
-        let on_disk = if payload == 0 { 0 } else { (payload + CRC_BYTES).next_multiple_of(8) };
-        self.at + HEADER_BYTES as u64 + on_disk
+        self.at + HEADER_BYTES as u64 + on_disk(self.bytes)
     }
 }
 

@@ -1,10 +1,11 @@
 //! Rows of JLS version 2, what Joulescope instruments record: each signal by a reader of its own, all of them at once.
 //!
 //! A file is a row of chunks; those of one kind are linked. Signals are defined in one list, and each has a list of its
-//! data, with indices and summaries above it (pyjls 0.17, `jls/format.h`). Summaries, annotations and UTC are not read.
+//! data, with indices and summaries above it ([`format`](crate::io::jls::format)). Summaries, annotations and UTC are not
+//! read.
 
 mod chunk;
-mod crc;
+mod notes;
 mod sample;
 mod signal;
 #[cfg(test)]
@@ -33,7 +34,8 @@ pub(super) struct JlsRows {
 
 impl JlsRows {
     pub fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Header), ReadError> {
-        let definitions = Definitions::read(&mut ChunkFile::open(path)?)?;
+        let mut file = ChunkFile::open(path)?;
+        let definitions = Definitions::read(&mut file)?;
         let names = definitions.names();
         let mut layout = layout(path, &names, options)?;
         // Rates are fixed: no signal holds times.
@@ -52,8 +54,10 @@ impl JlsRows {
         let count = tracks.first().map_or(0, Track::left);
         let mut header = Header::default();
         if let (Some(track), Some(picked)) = (tracks.first(), layout.values.first()) {
-            header.rate_hz = Some(f64::from(track.rate_hz)).filter(|&rate_hz| rate_hz > 0.0);
             header.metadata.device = definitions.device(&definitions.signals[picked.index]);
+            let described = notes::description(&mut file)?.unwrap_or(header);
+            header = notes::placed(described, f64::from(track.rate_hz), track.at());
+            header.rate_hz = header.rate_hz.filter(|&rate_hz| rate_hz > 0.0);
         }
         Ok((Self { names, tracks, count, cut }, layout, header))
     }

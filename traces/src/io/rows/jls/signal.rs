@@ -2,16 +2,11 @@
 
 use super::chunk::{ChunkFile, Head, field};
 use crate::io::ReadError;
+use crate::io::jls::format::{FIXED_RATE, HEAD, LEVELS, SIGNAL, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS};
 use std::collections::BTreeMap;
 
-const SOURCE_DEFINITION: u8 = 0x01;
-const SIGNAL_DEFINITION: u8 = 0x02;
 /// Where the data of a signal of fixed rate begin, and its indices, one per level.
-const FIXED_HEAD: u8 = 0x21;
-/// Zeros before the texts of a source.
-const SOURCE_TEXTS: usize = 64;
-/// Where the texts of a signal begin: numbers and zeros before.
-const SIGNAL_TEXTS: usize = 128;
+const FIXED_HEAD: u8 = FIXED_RATE + HEAD;
 /// The lower bits of a chunk's mark are the signal's number.
 pub(super) const SIGNAL_MASK: u16 = 0x0fff;
 const MOST: u16 = 256;
@@ -41,7 +36,7 @@ pub(super) struct Signal {
     pub data_type: u32,
     pub rate_hz: u32,
     /// Of the first chunk of data and of the first index of each level; 0 where there is none.
-    pub heads: [u64; 16],
+    pub heads: [u64; LEVELS],
 }
 
 impl Signal {
@@ -75,15 +70,15 @@ fn texts(payload: &[u8], from: usize) -> Vec<String> {
 impl Definitions {
     pub fn read(file: &mut ChunkFile) -> Result<Self, ReadError> {
         let mut sources = BTreeMap::new();
-        each(file, SOURCE_DEFINITION, |head, payload| {
+        each(file, SOURCE, |head, payload| {
             if head.meta < MOST {
                 sources.insert(head.meta, texts(payload, SOURCE_TEXTS));
             }
         })?;
         let mut signals = BTreeMap::<u16, Signal>::new();
-        each(file, SIGNAL_DEFINITION, |head, payload| match (head.tag, head.meta & SIGNAL_MASK) {
+        each(file, SIGNAL, |head, payload| match (head.tag, head.meta & SIGNAL_MASK) {
             // The third byte tells fixed rates (0) from variable ones.
-            (SIGNAL_DEFINITION, id) if id < MOST && payload.get(2) == Some(&0) => {
+            (SIGNAL, id) if id < MOST && payload.get(2) == Some(&0) => {
                 signals.insert(id, signal(id, payload));
             }
             (FIXED_HEAD, id) if payload.len() == 128 => {
@@ -116,7 +111,11 @@ impl Definitions {
 }
 
 /// Walks a list from the first chunk of a kind on.
-fn each(file: &mut ChunkFile, tag: u8, mut take: impl FnMut(&Head, &[u8])) -> Result<(), ReadError> {
+pub(super) fn each(
+    file: &mut ChunkFile,
+    tag: u8,
+    mut take: impl FnMut(&Head, &[u8]),
+) -> Result<(), ReadError> {
     let mut payload = Vec::new();
     let mut at = file.first(tag)?;
     while let Some(head) = at {
@@ -136,6 +135,6 @@ fn signal(id: u16, payload: &[u8]) -> Signal {
         unit: texts.next().unwrap_or_default(),
         data_type: u32::from_le_bytes(field(payload, 4)),
         rate_hz: u32::from_le_bytes(field(payload, 8)),
-        heads: [0; 16],
+        heads: [0; LEVELS],
     }
 }

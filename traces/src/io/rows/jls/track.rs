@@ -4,12 +4,11 @@ use super::chunk::{ChunkFile, Head, field};
 use super::sample::{MUST, Sample};
 use super::signal::{SIGNAL_MASK, Signal};
 use crate::io::ReadError;
+use crate::io::jls::format::{self, FIXED_RATE, FRONT};
 use std::path::Path;
 
-const DATA: u8 = 0x22;
-const INDEX: u8 = 0x23;
-/// Before the entries of a payload: number of the first sample (8), entries (4), bits of an entry (2), zeros (2).
-const FRONT: usize = 16;
+const DATA: u8 = FIXED_RATE + format::DATA;
+const INDEX: u8 = FIXED_RATE + format::INDEX;
 
 /// A signal being read.
 pub(super) struct Track {
@@ -72,6 +71,11 @@ impl Track {
     /// The number of the sample after the last one.
     pub fn end(&self) -> i128 {
         i128::from(self.first) + i128::from(self.rows)
+    }
+
+    /// The number of the sample to be given out next.
+    pub fn at(&self) -> i128 {
+        i128::from(self.first) + i128::from(self.row)
     }
 
     /// How many are still to be given out.

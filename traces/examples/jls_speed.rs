@@ -1,0 +1,44 @@
+//! Times writing and reading of JLS: `jls_speed SAMPLES FILE`; prints million samples/s of both. With `--write` the
+//! file is written, and kept.
+
+use std::error::Error;
+use std::path::Path;
+use std::time::Instant;
+use traces::Metadata;
+use traces::io::{ReadOptions, atomic, jls, read};
+
+/// Samples pushed at once.
+const PIECE: usize = 1 << 16;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let [samples, path, rest @ ..] = &words[..] else {
+        return Err("jls_speed SAMPLES FILE [--write]".into());
+    };
+    let (samples, path): (u64, _) = (samples.parse()?, Path::new(path));
+    let noise: Vec<f32> =
+        (0..PIECE as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 12) as f32 * 1e-6).collect();
+    let tell = |what: &str, clock: Instant| {
+        println!("{what} {:.2}", samples as f64 / 1e6 / clock.elapsed().as_secs_f64());
+    };
+    let clock = Instant::now();
+    atomic::write_file(path, |out| {
+        let mut file = jls::Writer::new(out, 1e6, 0.0, &Metadata::default())?;
+        while file.samples() < samples {
+            let count = (samples - file.samples()).min(PIECE as u64) as usize;
+            file.push(&noise[..count], &noise[..count])?;
+        }
+        file.finish()
+    })?;
+    tell("write", clock);
+    println!("bytes_per_sample {:.3}", std::fs::metadata(path)?.len() as f64 / samples as f64);
+    if !rest.is_empty() {
+        return Ok(());
+    }
+    let clock = Instant::now();
+    let trace = read(path, &ReadOptions::default())?.trace;
+    tell("read", clock);
+    std::fs::remove_file(path)?;
+    assert_eq!(trace.samples() as u64, samples);
+    Ok(())
+}
