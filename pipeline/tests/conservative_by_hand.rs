@@ -4,7 +4,7 @@
 
 use std::collections::HashSet;
 
-use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
 
 const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
 
@@ -85,6 +85,27 @@ fn a_slanted_edge_is_reported_as_far_as_either_coordinate_may_be_off() {
         let unsure = tiles(&MovingTriangle::uncertain(points, points, off).unwrap());
         let (sure, moved) = (tiles(&still(points)), tiles(&still(moved)));
         assert!(!moved.is_subset(&sure) && moved.is_subset(&unsure), "{axis}: {moved:?} {unsure:?}");
+    }
+}
+
+/// Seen from the middle of the tile all corners are low, but from its top those far behind are a long way off: the near one may reach the
+/// tile, and then the edges to it lie elsewhere.
+#[test]
+fn an_edge_may_be_off_by_more_at_the_border_of_a_tile_than_in_its_middle() {
+    let points = [[2000.0, 1.0, 1000.0], [2000.0, -1.0, 1000.0], [1.875, 0.875, 1.0]];
+    let mut moved = points;
+    moved[2][0] -= 1.0;
+    let rasterizer = Rasterizer::new(View::pinhole(0.25));
+    let tile = Rect { x: [-1.0, 1.0], y: [-1.0, 1.0] };
+    let turned = |points: [[f64; 3]; 3]| points.map(|[x, y, w]| [y, x, w]);
+    for (points, moved, off) in
+        [(points, moved, [1.0, 0.0, 0.0]), (turned(points), turned(moved), [0.0, 1.0, 0.0])]
+    {
+        let unsure = MovingTriangle::uncertain(points, points, off).unwrap();
+        let touches = |triangle: &MovingTriangle| {
+            rasterizer.touch(&rasterizer.prepare(triangle), &tile, &Region::WHOLE).is_some()
+        };
+        assert!(touches(&still(moved)) && touches(&unsure) && !touches(&still(points)));
     }
 }
 

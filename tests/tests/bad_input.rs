@@ -59,6 +59,8 @@ fn a_frame_rate_that_cannot_be() {
 fn names_of_nothing() {
     let mut refusals = refusals();
     refusals.call(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
+    refusals.call(&["samplng"], 2, &["samplng", "did you mean `sampling`?", "workloads: caustics, ccd, "]);
+    refusals.call(&["wibble-wobble"], 2, &["built in: default, tiny; workloads: caustics, ccd, "]);
     refusals.call(&["scene.blend"], 2, &["scene.blend", ".gltf"]);
     refusals.call(&[""], 2, &["scene"]);
     refusals.call(&["."], 2, &["`.`"]);

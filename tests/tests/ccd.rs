@@ -58,3 +58,74 @@ fn what_cannot_be_is_told() {
     }
     assert!(std::fs::read(&good).is_ok_and(|bytes| bytes == mts()));
 }
+
+/// The same with another first coordinate.
+fn mts_at(number: f64) -> Vec<u8> {
+    let mut data = mts();
+    data[40..48].copy_from_slice(&number.to_le_bytes());
+    data
+}
+
+#[test]
+fn what_cannot_be_answered_keeps_no_other_from_it() {
+    let inputs = Inputs::new();
+    let (first, last) = (inputs.put("first.mts", mts()), inputs.put("last.mts", mts()));
+    let (csv, gone) = (inputs.path("pairs.csv"), inputs.path("gone.mts"));
+    let mut bad: Vec<String> = [1e61, f64::NAN, f64::INFINITY]
+        .into_iter()
+        .zip(["far.mts", "nan.mts", "endless.mts"])
+        .map(|(number, name)| inputs.put(name, mts_at(number)))
+        .collect();
+    bad.extend([inputs.put("cut.mts", &mts()[..100]), gone]);
+    for bad in bad {
+        let ended = quintile!().call(["ccd", &first, &bad, &last, "--csv", &csv, "--json"]);
+        assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+        assert!(ended.stderr.contains(&bad) && ended.stderr.contains("1 of 3 cases"), "{}", ended.stderr);
+        let rows = |case: &str| format!("{case},0,1,1\n{case},0,2,0\n{case},1,2,0\n");
+        let written = std::fs::read_to_string(&csv).unwrap_or_default();
+        assert_eq!(written, format!("case_id,a,b,may_collide\n{}{}", rows("first"), rows("last")));
+        let json: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+        assert!(json[1]["error"].as_str().is_some_and(|error| error.contains(&bad)), "{json}");
+        assert!(json[1].get("may_collide").is_none() && json[0].get("error").is_none(), "{json}");
+        assert_eq!(json[2]["case_id"], "last");
+        assert_eq!(json[2]["may_collide"].as_array().map(Vec::len), Some(1), "{json}");
+    }
+}
+
+#[test]
+fn cases_of_one_name_are_refused() {
+    let inputs = [Inputs::new(), Inputs::new()];
+    let [one, other] = inputs.each_ref().map(|inputs| inputs.put("x.mts", mts()));
+    for (second, says) in [(&other, "both called `x`"), (&one, "give it once")] {
+        let ended = quintile!().call(["ccd", &one, second]);
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        for says in [&one, second, says] {
+            assert!(ended.stderr.contains(says), "{says}: {}", ended.stderr);
+        }
+        assert!(ended.stdout.is_empty());
+    }
+}
+
+#[test]
+fn ends_that_do_not_go_together_are_refused() {
+    let inputs = Inputs::new();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let whole = inputs.put("whole.obj", format!("{corners}f 1 2 3\n"));
+    let more = inputs.put("more.obj", format!("{corners}v 5 5 5\nf 1 2 3\n"));
+    let [none, other] = ["none.obj", "other.obj"].map(|name| inputs.put(name, corners));
+    let header = "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 0";
+    let empty = format!(
+        "ply\nformat ascii 1.0\n{header}\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n"
+    );
+    let [hollow, void] = ["hollow.ply", "void.ply"].map(|name| inputs.put(name, &empty));
+    for (open, close, says) in [
+        (&whole, &more, [more.as_str(), "4 vertices"]),
+        (&none, &other, [none.as_str(), "it has none"]),
+        (&hollow, &void, [hollow.as_str(), "it has none"]),
+        (&whole, &none, [none.as_str(), "it has none"]),
+    ] {
+        let ended = quintile!().call(["ccd", open, close]);
+        assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+        assert!(says.iter().all(|says| ended.stderr.contains(says)), "{says:?}: {}", ended.stderr);
+    }
+}

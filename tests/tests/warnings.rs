@@ -434,4 +434,7 @@ fn points_on_numbers_that_are_too_coarse() {
 fn occluders_smaller_than_tiles() {
     let args = ["--size", "96x54", "--set", "slats=24", "--set", "gaps=0.02", "--set", "walls=40"];
     assert_warns(&quintile!().run("occlusion", &args), "occlusion-small-occluders");
+    let nothing_asked = [&args[..], &["--set", "objects=0"]].concat();
+    let codes = quintile!().run("occlusion", &nothing_asked).warning_codes();
+    assert!(!codes.contains(&"occlusion-small-occluders".to_owned()), "{codes:?}");
 }

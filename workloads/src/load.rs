@@ -21,14 +21,19 @@ pub fn load(name_or_path: &str) -> Result<Scene, LoadError> {
     match import::Format::of(Path::new(name_or_path)) {
         Some(format) => Scene::new(import::import(Path::new(name_or_path), format)?)
             .map_err(|error| error.in_file(name_or_path)),
-        None => Err(unknown(name_or_path)),
+        None => Err(unknown(name_or_path, &[])),
     }
 }
 
-fn unknown(name: &str) -> LoadError {
-    let names: Vec<&str> = builtin_names().map(|(name, _)| name).collect();
-    let list = names.join(", ");
-    let mut known = format!("built in: {list}; or a path to a .ron, .gltf, .glb, .ply or .obj file");
+/// The error for a name that is no scene, and none of `workloads` where these could have been meant.
+pub(crate) fn unknown(name: &str, workloads: &[&str]) -> LoadError {
+    let mut names: Vec<&str> = builtin_names().map(|(name, _)| name).collect();
+    let mut known = format!("built in: {}; ", names.join(", "));
+    if !workloads.is_empty() {
+        known += &format!("workloads: {}; ", workloads.join(", "));
+    }
+    known += "or a path to a .ron, .gltf, .glb, .ply or .obj file";
+    names.extend(workloads);
     let near = suggestion(name, &names);
     if near.starts_with("did you mean") {
         known = format!("{near} {known}");

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{Files, expect, failure};
-use workloads::{Overrides, load};
+use workloads::job::{OptionSource, Request, find};
+use workloads::{LoadError, Overrides, load};
 
 #[test]
 fn files_that_cannot_be_read_say_what_to_do() {
@@ -81,6 +82,89 @@ fn materials_named_in_an_obj_file_are_a_warning() {
             let codes: Vec<_> = scene.warnings().iter().map(|warning| warning.code).collect();
             assert_eq!(codes == ["obj-materials-ignored"], warned, "{statement:?}: {codes:?}");
             assert!(warned || codes.is_empty(), "{codes:?}");
+        }
+    }
+}
+
+/// Why a workload is not made with these options.
+fn refusal(job: &str, options: &OptionSource) -> Option<LoadError> {
+    find(job, options, &Request { overrides: &Overrides::default(), seed: 1 }).unwrap().err()
+}
+
+#[test]
+fn options_out_of_range_say_what_would_do() {
+    for (job, name, value, says) in [
+        ("occlusion", "walls", "1001", "0 to 1000"),
+        ("occlusion", "boxes", "[0, 1, 1]", "1 to 16"),
+        ("ccd", "file", "", "leave it out"),
+        ("ccd", "balls", "1", "2 to 100"),
+        ("ccd", "resolution", "0", "1 to 1024"),
+        ("caustics", "cells", "0", "1 to 1024"),
+        ("caustics", "pleat", "1", "0 to 0.9"),
+        ("sampling", "radius", "0.6", "0.005 to 0.5"),
+        ("glossy", "texels", "0", "1 to 16384"),
+        ("glossy", "map_samples", "257", "1 to 256"),
+        ("soft-shadows", "map_px", "3", "an even number"),
+        ("soft-shadows", "light", "(fov_deg: 180)", "1 to 170 degrees"),
+        ("multiview", "views", "129", "1 to 128"),
+        ("multiview", "spacing", "1e30", "move the views closer or widen the aperture"),
+        ("multiview", "aperture", "1e-30", "move the views closer or widen the aperture"),
+        ("multiview", "panel", "(pitch: 0)", "one subpixel or more"),
+    ] {
+        let set = vec![(name.to_owned(), value.to_owned())];
+        let error = refusal(job, &OptionSource { file: None, set }).unwrap();
+        assert!(error.is_usage(), "{job} {name}: {error}");
+        expect(&error.to_string(), &[name, says]);
+        let set = vec![(format!("{name}x"), value.to_owned())];
+        let error = refusal(job, &OptionSource { file: None, set }).unwrap();
+        expect(&error.to_string(), &[&format!("unknown option `{name}x`, did you mean `{name}`?")]);
+    }
+}
+
+#[test]
+fn options_that_are_no_numbers_are_refused() {
+    let files = Files::new();
+    let numbers: [(&str, &[&str]); 6] = [
+        ("occlusion", &["gaps: #", "motion: #", "lens: #"]),
+        ("caustics", &["side_m: #", "depth_m: #", "wave_m: #", "slope: #", "pleat: #"]),
+        ("sampling", &["radius: #"]),
+        ("glossy", &["roughness: #", "fresnel: #", "index: Some(#)", "half: (1, #)", "centre: (0, #, 0)"]),
+        (
+            "soft-shadows",
+            &[
+                "bias: #",
+                "light: (radius: #)",
+                "light: (near: #)",
+                "light: (fov_deg: #)",
+                "light: (position: (0, #, 0))",
+            ],
+        ),
+        (
+            "multiview",
+            &[
+                "spacing: #",
+                "aperture: #",
+                "focus: Some(#)",
+                "panel: (pitch: #)",
+                "panel: (slant: #)",
+                "panel: (offset: #)",
+            ],
+        ),
+    ];
+    for (job, options) in numbers {
+        for (option, bad) in
+            options.iter().flat_map(|option| ["NaN", "inf", "-inf", "-1e30"].map(|bad| (option, bad)))
+        {
+            // A place and an offset may be anywhere.
+            if bad == "-1e30"
+                && ["centre", "position", "offset", "slant"].iter().any(|free| option.contains(free))
+            {
+                continue;
+            }
+            let text = format!("({})", option.replace('#', bad));
+            let file = Some(files.put("options.ron", &text).into());
+            let error = refusal(job, &OptionSource { file, set: Vec::new() });
+            assert!(error.as_ref().is_some_and(LoadError::is_usage), "{job} {text}: {error:?}");
         }
     }
 }

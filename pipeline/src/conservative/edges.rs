@@ -12,7 +12,7 @@
 use glam::DVec3;
 
 use super::Region;
-use super::seen::{ROUNDING, Seen};
+use super::seen::Seen;
 use crate::depth::Real;
 
 /// The vertices at both ends as homogeneous points.
@@ -46,17 +46,20 @@ fn apart<const PLACES: usize>(seen: &Seen, places: &[Points; PLACES]) -> bool {
     below && above
 }
 
-/// What an edge may be off by: vertices by their noise, twice that for good measure, and products of them by rounding. The sum of
-/// magnitudes in one is at most twice the product of how far vertices are from a point of the tile on the two axes.
+/// What an edge may be off by. From any point of the tile vertices are at most `across` and `down` away on the two axes, so vertices off
+/// by their noise `a` and `b` make a product of two off by `2 (a down + b across) + 2 a b`.
+///
+/// Twice that pays for rounding, too. The noise of a vertex is at least `ROUNDING` times the magnitudes that entered it (see [`Seen`]),
+/// which are at least `across` and `down`: of a tile from `lo` to `hi`, `half` and the magnitude of the middle add up to that of the farther
+/// side. So the half that vertices leave is at least `4 ROUNDING across down`. The magnitudes in an edge add up to at most twice `across down`,
+/// and none passes more than six operations of 2^-53 each: 12 / 32 of `ROUNDING across down`.
 fn noise<const PLACES: usize>(seen: &Seen, places: &[Points; PLACES], half: [f64; 2]) -> f64 {
     let all = || places.as_flattened().as_flattened().iter();
     let [across, down] = [0, 1].map(|axis| {
         let far = |p: &DVec3| p[axis].abs() + half[axis] * p.z.abs();
         all().fold(0.0, |most: f64, p| most.most(far(p)))
     });
-    4.0 * (seen.noise[0] * down + seen.noise[1] * across)
-        + 4.0 * seen.noise[0] * seen.noise[1]
-        + ROUNDING * across * down
+    4.0 * (seen.noise[0] * down + seen.noise[1] * across) + 4.0 * seen.noise[0] * seen.noise[1]
 }
 
 /// The Bernstein coefficients in t of the cross product of vertices `i` and `j`.

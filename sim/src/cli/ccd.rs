@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use workloads::collision::{Answer, Method, Object, Search, Verdict, candidates, detect_each};
-use workloads::visibility::{CollisionCase, load_cases};
+use workloads::visibility::CaseFiles;
 
 use super::Failure;
-use super::terminal::{print, print_json};
+use super::terminal::{complain, print, print_json};
 use crate::output::progress::{Bar, Progress};
 use crate::output::table::{Table, grouped};
 
@@ -17,7 +17,9 @@ use crate::output::table::{Table, grouped};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  quintile ccd armadillo-rollers.mts.gz --json\n  \
     quintile ccd cases/*.mts --resolution 128 --csv pairs.csv\n  quintile ccd start.ply end.ply\n\n\
-    Every vertex moves on a straight line from time 0 to time 1. A pair that is not reported does not collide; one that is may.")]
+    Every vertex moves on a straight line from time 0 to time 1. A pair that is not reported does not collide; one that is may.\n\
+    A file that is broken or has coordinates beyond 1e60 does not keep the others from being answered: it is told, the exit code is 1, and\n\
+    its case has no row in the CSV and an `error` in the JSON. A case without a row is one that nothing is known of.")]
 pub struct CcdArgs {
     /// .mts files (gzipped or not), a case each, or .ply or .obj files two by two: a mesh at time 0 and at time 1
     #[arg(value_name = "FILE", required = true)]
@@ -97,25 +99,49 @@ struct Found {
     may_collide: Vec<Pair>,
 }
 
-/// The objects of a case.
-fn objects(case: &CollisionCase) -> Result<Vec<Object>, Failure> {
+/// A case that nothing is known of.
+#[derive(Serialize)]
+struct Unknown {
+    case_id: String,
+    error: String,
+}
+
+/// What is known of a case, or why nothing is.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Outcome {
+    Found(Found),
+    Unknown(Unknown),
+}
+
+impl Outcome {
+    fn found(&self) -> Option<&Found> {
+        match self {
+            Self::Found(found) => Some(found),
+            Self::Unknown(_) => None,
+        }
+    }
+}
+
+/// The objects of a case, or why there are none.
+fn objects(files: &CaseFiles) -> Result<Vec<Object>, String> {
+    let case = files.load().map_err(|error| error.to_string())?;
     let object = |(number, mesh)| {
-        Object::new(mesh, case.uncertainty).ok_or_else(|| Failure {
-            message: format!(
+        Object::new(mesh, case.uncertainty).ok_or_else(|| {
+            format!(
                 "{}: object {number}: a coordinate is beyond 1e60 or not a number; scale it",
-                case.id
-            ),
-            code: 1,
+                files.start().display()
+            )
         })
     };
     case.objects.iter().enumerate().map(object).collect()
 }
 
 impl Found {
-    fn new(case: &CollisionCase, objects: &[Object], search: &Search, bar: &Bar) -> Self {
+    fn new(case_id: &str, objects: &[Object], search: &Search, bar: &Bar) -> Self {
         let answers = detect_each(objects, search, || bar.inc());
         Self {
-            case_id: case.id.clone(),
+            case_id: case_id.to_owned(),
             objects: objects.len(),
             triangles: objects.iter().map(Object::len).sum(),
             candidates: answers.len(),
@@ -142,7 +168,7 @@ fn pair(answer: &Answer) -> Option<Pair> {
 
 pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
     super::not_an_input(("--csv", args.csv.as_deref()), args.files.iter().map(PathBuf::as_path))?;
-    let (search, cases) = (args.search(), load_cases(&args.files)?);
+    let (search, cases) = (args.search(), CaseFiles::of(&args.files)?);
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
     if !search.zoom && search.resolution * search.bins > SLOW {
@@ -150,30 +176,63 @@ pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
             "looking once at so many pixels and bins takes minutes for a pair; without --no-zoom it is seconds",
         );
     }
-    let all = cases.iter().map(objects).collect::<Result<Vec<_>, _>>()?;
-    let bar = progress.bar("pairs", all.iter().map(|objects| candidates(objects).len() as u64).sum());
-    let found = |(case, objects): (_, &Vec<Object>)| Found::new(case, objects, &search, &bar);
-    let found: Vec<Found> = pool.install(|| cases.iter().zip(&all).map(found).collect());
+    let outcomes = pool.install(|| answered(&cases, &search, &progress));
     if let Some(path) = &args.csv {
-        write_csv(path, &found)?;
+        write_csv(path, &outcomes)?;
     }
-    if args.json { print_json(&found, false) } else { print(&text(&found)) }
+    let unanswered = unanswered(&outcomes);
+    if args.json {
+        print_json(&outcomes, false)?;
+    } else if outcomes.iter().any(|outcome| outcome.found().is_some()) || outcomes.is_empty() {
+        print(&text(&outcomes))?;
+    }
+    unanswered
 }
 
-fn write_csv(path: &Path, found: &[Found]) -> Result<(), Failure> {
+/// Every case, one after the other.
+fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Outcome> {
+    let all: Vec<_> = cases.iter().map(objects).collect();
+    let pairs = all.iter().flatten().map(|objects| candidates(objects).len() as u64).sum();
+    let bar = progress.bar("pairs", pairs);
+    let outcome = |(case, objects): (&CaseFiles, Result<Vec<Object>, String>)| match objects {
+        Ok(objects) => Outcome::Found(Found::new(&case.id, &objects, search, &bar)),
+        Err(error) => Outcome::Unknown(Unknown { case_id: case.id.clone(), error }),
+    };
+    cases.iter().zip(all).map(outcome).collect()
+}
+
+/// Fails where nothing is known of a case, and names each.
+fn unanswered(outcomes: &[Outcome]) -> Result<(), Failure> {
+    let errors = outcomes.iter().filter_map(|outcome| match outcome {
+        Outcome::Found(_) => None,
+        Outcome::Unknown(unknown) => Some(unknown.error.clone()),
+    });
+    let errors: Vec<String> = errors.collect();
+    let message = match (&errors[..], outcomes.len()) {
+        ([], _) => return Ok(()),
+        ([error], 1) => error.clone(),
+        (several, all) => {
+            several.iter().for_each(|error| complain(error));
+            format!("{} of {all} cases have no answer: mend their files or leave them out", several.len())
+        }
+    };
+    Err(Failure { message, code: 1 })
+}
+
+fn write_csv(path: &Path, outcomes: &[Outcome]) -> Result<(), Failure> {
     let written = traces::io::atomic::write_file(path, |out| {
         let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         csv.write_record(["case_id", "a", "b", "may_collide"])?;
-        found.iter().try_for_each(|case| case.lines(&mut csv))?;
+        outcomes.iter().filter_map(Outcome::found).try_for_each(|case| case.lines(&mut csv))?;
         Ok::<(), csv::Error>(csv.flush()?)
     });
     written.map_err(|error| Failure { message: error.to_string(), code: 1 })
 }
 
-fn text(found: &[Found]) -> String {
+fn text(outcomes: &[Outcome]) -> String {
     let mut table =
         Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "seen to cross"]);
-    for case in found {
+    for case in outcomes.iter().filter_map(Outcome::found) {
         table.row([
             case.case_id.clone(),
             case.objects.to_string(),

@@ -65,6 +65,11 @@ pub(super) fn duration(text: &str) -> Result<f64, String> {
     if value > 0.0 && value.is_finite() { Ok(value * unit_s) } else { Err(wrong()) }
 }
 
+/// A seed.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| format!("a seed has to be a whole number from 0 to {}", u64::MAX))
+}
+
 /// Width and height.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("`{text}` is not a size; write it as 1280x720");
@@ -102,6 +107,14 @@ mod tests {
         );
         for wrong in ["30", "s", "-1s", "0s", "infs", "NaNs", "3 days"] {
             assert!(duration(wrong).unwrap_err().contains("30s"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn seeds_are_whole_numbers_from_zero() {
+        assert_eq!([seed("0"), seed("18446744073709551615")], [Ok(0), Ok(u64::MAX)]);
+        for wrong in ["-1", "1.5", "18446744073709551616", "one", ""] {
+            assert!(seed(wrong).unwrap_err().contains("from 0 to 18446744073709551615"), "{wrong}");
         }
     }
 

@@ -43,12 +43,13 @@ impl Work {
         if let Some(job) = job::find(name, options, &Request { overrides, seed }) {
             return Ok(Self::Job { name: name.to_owned(), job: job? });
         }
+        let scene = workloads::load(name).map_err(job::or_job)?;
         if *options != OptionSource::default() {
             let jobs: Vec<&str> = job::names().map(|(name, _)| name).collect();
             let message = format!("`{name}` is a scene; only workloads have options: {}", jobs.join(", "));
             return Err(LoadError::Setting { setting: "set", message });
         }
-        Ok(Self::Scene(Box::new(workloads::load(name)?.with_overrides(overrides)?)))
+        Ok(Self::Scene(Box::new(scene.with_overrides(overrides)?)))
     }
 
     /// Its name.

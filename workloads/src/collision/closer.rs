@@ -32,9 +32,7 @@ impl Pair<'_> {
             return Verdict::Apart;
         }
         let most = self.search.resolution;
-        let triangles = self.triangles() as u64;
-        let few = MOST_FRAGMENTS.saturating_sub(FRAGMENTS_LESS * triangles).max(LEAST_FRAGMENTS);
-        let mut effort = Effort::of(few + FRAGMENTS_EACH * triangles);
+        let mut effort = self.effort();
         let mut fit = if self.triangles() > MANY { Fit::Boxes } else { Fit::Edges };
         let first = (self.triangles() as f64 / TRIANGLES_A_TILE).sqrt() as u32;
         let (mut resolution, mut last) = (first.max(FIRST_TILES).min(most), self.maybe(0, false));
@@ -69,6 +67,30 @@ impl Pair<'_> {
         last
     }
 
+    /// By depths alone, from few tiles to many: apart by few is apart by many. What is still together after so many fragments stays.
+    pub fn closer_by_depth(&self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
+        let most = self.search.resolution;
+        let (mut effort, mut resolution, mut last) = (self.effort(), FIRST_TILES.min(most), 0);
+        while let Some(tiles) = self.depths(resolution, &mut effort, scratch, watch) {
+            if tiles == 0 {
+                return Verdict::Apart;
+            }
+            last = tiles;
+            if resolution == most {
+                break;
+            }
+            resolution = (2 * resolution).min(most);
+        }
+        self.maybe(last, false)
+    }
+
+    /// What may be drawn for the pair.
+    fn effort(&self) -> Effort {
+        let triangles = self.triangles() as u64;
+        let few = MOST_FRAGMENTS.saturating_sub(FRAGMENTS_LESS * triangles).max(LEAST_FRAGMENTS);
+        Effort::of(few + FRAGMENTS_EACH * triangles)
+    }
+
     /// Bins of time in which a triangle moves by a tile or so, and no more than asked for.
     fn bins(&self, resolution: u32) -> u32 {
         let [first, last] = self.window.time;
@@ -87,5 +109,34 @@ impl Pair<'_> {
         };
         let step = self.parts().iter().map(step).fold(0.0, f64::max);
         ((step * f64::from(resolution)).ceil() as u32).clamp(1, self.search.bins)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pass::{Fragment, Pass};
+    use super::super::{Method, Object, Search};
+    use super::*;
+
+    /// Counts what is drawn.
+    struct Drawn(u64);
+
+    impl Watch for Drawn {
+        fn fragment(&mut self, _: &Pass, _: usize, _: &Fragment) {
+            self.0 += 1;
+        }
+    }
+
+    /// Two triangles that lie closer than any tile can tell.
+    #[test]
+    fn no_method_draws_for_ever_where_it_may_look_closer() {
+        let slanted = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
+        let object = |x: f64| Object::from_ends(vec![[slanted(x); 2]], 0.0).unwrap();
+        for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
+            let search = Search { resolution: 1024, bins: 16, method, zoom: true };
+            let mut drawn = Drawn(0);
+            let verdict = search.watched(&object(0.0), &object(1e-7), &mut Scratch::default(), &mut drawn);
+            assert!(verdict.may_collide() && drawn.0 <= MOST_FRAGMENTS + 8, "{method:?}: {}", drawn.0);
+        }
     }
 }

@@ -103,14 +103,26 @@ impl Comparison<'_> {
         watch: &mut impl Watch,
     ) -> Option<()> {
         let (boxes, kept) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
-        boxes.clear(self.pass.tiles() * self.bins.len());
         kept.clear();
+        self.boxed(which, boxes, effort, watch, |kept_one| kept.push(kept_one))
+    }
+
+    /// Draws part `which` into the boxes of its tiles, and hands `each` of its fragments; as above.
+    fn boxed(
+        &self,
+        which: usize,
+        boxes: &mut TzBuffer,
+        effort: &mut Effort,
+        watch: &mut impl Watch,
+        mut each: impl FnMut(Kept),
+    ) -> Option<()> {
+        boxes.clear(self.pass.tiles() * self.bins.len());
         watch.part(self.pass, which, self.parts[which]);
         let all = self.pass.draw(self.parts[which], self.bins, effort, |fragment| {
             watch.fragment(self.pass, which, fragment);
             let place = self.pass.place(fragment.tile, fragment.bin);
             boxes.add(place, &fragment.inside);
-            kept.push(Kept { place, item: fragment.item, inside: fragment.inside });
+            each(Kept { place, item: fragment.item, inside: fragment.inside });
         });
         all.then_some(())
     }
@@ -175,10 +187,17 @@ impl Comparison<'_> {
         Some(left)
     }
 
-    /// Depths alone: tiles in which the second is in front of the farthest of the first, and behind its nearest.
-    pub fn depths(&self, scratch: &mut Scratch, watch: &mut impl Watch) -> [u64; 2] {
-        self.fill(0, scratch, &mut Effort::endless(), watch);
-        self.fill(1, scratch, &mut Effort::endless(), watch);
+    /// Depths alone: tiles in which the second is in front of the farthest of the first, and behind its nearest. `None` where that takes
+    /// more than `effort`.
+    pub fn depths(
+        &self,
+        scratch: &mut Scratch,
+        effort: &mut Effort,
+        watch: &mut impl Watch,
+    ) -> Option<[u64; 2]> {
+        for which in [0, 1] {
+            self.boxed(which, &mut scratch.boxes[which], effort, watch, |_| ())?;
+        }
         let [first, second] = &scratch.boxes;
         let both = || {
             let shared = first.used().map(|(place, one)| (one.z, second.at(place).z));
@@ -186,6 +205,6 @@ impl Comparison<'_> {
         };
         let in_front = both().filter(|(one, other)| other[0] <= one[1]).count() as u64;
         let behind = both().filter(|(one, other)| other[1] >= one[0]).count() as u64;
-        [in_front, behind]
+        Some([in_front, behind])
     }
 }

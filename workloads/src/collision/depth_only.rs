@@ -6,13 +6,15 @@
 
 use super::Bounds;
 use super::compare::{Comparison, Scratch, Watch};
-use super::pass::{Fit, Part, Pass};
+use super::pass::{Effort, Fit, Part, Pass};
 
-/// Tiles that keep the two together in the pass with the fewest, or `None` where one of the six sets them apart.
+/// Tiles that keep the two together in the pass with the fewest, none where one of the six sets them apart. `None` where that takes more
+/// than `effort`.
 pub(super) fn tiles(
     parts: [Part<'_>; 2],
     window: &Bounds,
     resolution: u32,
+    effort: &mut Effort,
     scratch: &mut Scratch,
     watch: &mut impl Watch,
 ) -> Option<u64> {
@@ -20,8 +22,8 @@ pub(super) fn tiles(
     for axis in 0..3 {
         let pass = Pass::new(axis, window, resolution, Fit::Edges);
         let comparison = Comparison { pass: &pass, parts, bins: &[Some(*window)] };
-        let [in_front, behind] = comparison.depths(scratch, watch);
+        let [in_front, behind] = comparison.depths(scratch, effort, watch)?;
         fewest = fewest.min(in_front).min(behind);
     }
-    (fewest > 0).then_some(fewest)
+    Some(fewest)
 }

@@ -40,6 +40,11 @@ impl Default for Options {
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
         must_hold([
+            (
+                "file",
+                self.file.as_deref().is_none_or(|file| !file.as_os_str().is_empty()),
+                "the path of a file; leave it out for balls",
+            ),
             ("balls", (2..=100).contains(&self.balls), "2 to 100"),
             ("resolution", (1..=1024).contains(&self.resolution), "1 to 1024 tiles"),
             ("bins", (1..=256).contains(&self.bins), "1 to 256"),

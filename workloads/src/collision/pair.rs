@@ -57,8 +57,22 @@ impl<'a> Pair<'a> {
 
     /// Without time, as the method knows none.
     pub fn by_depth(&self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
-        let tiles = depth_only::tiles(self.parts(), &self.window, self.search.resolution, scratch, watch);
-        tiles.map_or(Verdict::Apart, |tiles| Verdict::Maybe { bounds: self.window, tiles, seen: false })
+        let resolution = self.search.resolution;
+        match self.depths(resolution, &mut Effort::endless(), scratch, watch) {
+            Some(0) => Verdict::Apart,
+            tiles => self.maybe(tiles.unwrap_or(0), false),
+        }
+    }
+
+    /// Tiles that keep both together by their depths alone, none where they are apart; `None` where that takes more than `effort`.
+    pub fn depths(
+        &self,
+        resolution: u32,
+        effort: &mut Effort,
+        scratch: &mut Scratch,
+        watch: &mut impl Watch,
+    ) -> Option<u64> {
+        depth_only::tiles(self.parts(), &self.window, resolution, effort, scratch, watch)
     }
 
     /// At the resolution asked for.

@@ -106,7 +106,8 @@ impl Search {
 
     fn looked_at(&self, objects: [&Object; 2], scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
         let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
-        if self.method == Method::DepthOnly {
+        let by_depth = self.method == Method::DepthOnly;
+        if by_depth && !self.zoom {
             return pair.by_depth(scratch, watch);
         }
         if !pair.tighten() {
@@ -117,6 +118,9 @@ impl Search {
         }
         if glance::crosses(pair.parts(), &pair.window) {
             return pair.maybe(0, true);
+        }
+        if by_depth {
+            return pair.closer_by_depth(scratch, watch);
         }
         let Some(seen) = Seen::new(pair.parts(), &pair.window) else { return pair.closer(scratch, watch) };
         let moved = Pair::new(seen.objects.each_ref(), pair.window.time, self);

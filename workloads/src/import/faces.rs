@@ -15,8 +15,9 @@ pub(crate) struct Face {
     pub corners: [i64; 3],
 }
 
-/// The triangles of the OBJ file at `path`, faces with more corners as fans. Tells nothing of what is no face as it should be.
-pub(crate) fn faces(path: &Path) -> Result<Vec<Face>, LoadError> {
+/// The number of vertices of the OBJ file at `path`, used or not, and its triangles, faces with more corners as fans. Tells nothing of what
+/// is no face as it should be.
+pub(crate) fn faces(path: &Path) -> Result<(usize, Vec<Face>), LoadError> {
     let (mut faces, mut vertices) = (Vec::new(), 0);
     for (line, text) in (1..).zip(reader::open(path)?.split(b'\n')) {
         let text = text.map_err(|error| reader::damaged(path, &error))?;
@@ -32,7 +33,7 @@ pub(crate) fn faces(path: &Path) -> Result<Vec<Face>, LoadError> {
             _ => {}
         }
     }
-    Ok(faces)
+    Ok((vertices as usize, faces))
 }
 
 /// The number of a corner's position; those below zero count back from the last one.
@@ -50,8 +51,9 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n# f 9 9 9\nf 1/1/1 2//1 3/1 4\nvn 0 0 1\nf -1 -2 -3\nl 1 2\n";
         std::fs::write(file.path(), text).unwrap();
-        let found: Vec<_> =
-            faces(file.path()).unwrap().iter().map(|face| (face.line, face.corners)).collect();
+        let (vertices, found) = faces(file.path()).unwrap();
+        let found: Vec<_> = found.iter().map(|face| (face.line, face.corners)).collect();
+        assert_eq!(vertices, 4);
         assert_eq!(found, [(6, [1, 2, 3]), (6, [1, 3, 4]), (8, [4, 3, 2])]);
     }
 }

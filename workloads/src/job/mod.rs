@@ -141,6 +141,17 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     JOBS.iter().map(|(name, what, _)| (*name, *what))
 }
 
+/// What to say of a name that is neither a scene nor a job, where either could have been meant; other errors stay as they are.
+#[must_use]
+pub fn or_job(error: LoadError) -> LoadError {
+    match error {
+        LoadError::Unknown { name, .. } => {
+            crate::load::unknown(&name, &names().map(|(name, _)| name).collect::<Vec<_>>())
+        }
+        error => error,
+    }
+}
+
 /// The job called `name`, if there is one.
 ///
 /// # Errors

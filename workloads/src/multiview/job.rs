@@ -94,6 +94,7 @@ impl MultiView {
         let size = overrides.size.or(Some((320, 180)));
         let scene = crate::load(&options.scene)?.with_overrides(&Overrides { size, ..overrides.clone() })?;
         options.panel.check()?;
+        options.layout().check()?;
         let settings = scene.settings().clone();
         let across = if options.show == Show::SideBySide { options.views.max(1) } else { 1 };
         let settings = Settings { width: settings.width.saturating_mul(across), ..settings };

@@ -31,6 +31,9 @@ impl Default for Layout {
 /// The most views: their samples have to fit in a pixel.
 const MOST_VIEWS: u32 = 128;
 
+/// Half the camera line over the radius of an aperture, at most: a hundredth of what single precision tells apart.
+const LONGEST: f64 = 1e5;
+
 impl Layout {
     /// Two small lenses of radius `aperture`, their middles `spacing` apart.
     pub const fn stereo(spacing: f64, aperture: f64) -> Self {
@@ -65,6 +68,16 @@ impl Layout {
         }
         if self.overlap > 16 {
             return refused("overlap", format!("{}: a filter takes 0 to 16 steps", self.overlap));
+        }
+        if self.radius() > LONGEST * self.aperture {
+            let message = format!(
+                "{:e}: half the line of views is {:e} long, and single precision keeps nothing of lenses of radius {:e} on it: it has to be at most \
+                 {LONGEST} of them; move the views closer or widen the aperture",
+                self.spacing,
+                self.radius(),
+                self.aperture
+            );
+            return refused("spacing", message);
         }
         Ok(())
     }

@@ -150,7 +150,7 @@ impl Job for Occlusion {
             moving: self.options.motion > 0.0,
             lens: camera.lens().is_some(),
             facts: facts(&answers),
-            warnings: warnings(pyramid.half_covered()),
+            warnings: warnings(&answers, pyramid.half_covered()),
         })
     }
 }
@@ -198,7 +198,7 @@ fn facts(answers: &[Answer]) -> Vec<Fact> {
     facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
 }
 
-fn warnings(half_covered: f64) -> Vec<Warning> {
+fn warnings(answers: &[Answer], half_covered: f64) -> Vec<Warning> {
     let message = || {
         format!(
             "{:.0} % of the tiles are covered for most of their samples, but not for all (a warning from {:.0} % on): many small occluders hide \
@@ -207,7 +207,8 @@ fn warnings(half_covered: f64) -> Vec<Warning> {
             100.0 * HALF_COVERED
         )
     };
-    (half_covered > HALF_COVERED)
+    // Where nothing is asked for, nothing is found in vain.
+    (half_covered > HALF_COVERED && !answers.is_empty())
         .then(|| Warning::new("occlusion-small-occluders", message()))
         .into_iter()
         .collect()

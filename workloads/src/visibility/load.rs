@@ -6,7 +6,6 @@ use super::camera::CameraSpec;
 use super::mesh::MovingMesh;
 use super::scene::{Subject, VisibilityScene};
 use super::{m5d, mts, pair};
-use crate::collision::components;
 use crate::error::LoadError;
 use crate::import::{Format, reader};
 
@@ -15,7 +14,7 @@ const KNOWN: &str = ".m5d, .mts, and .ply or .obj, alone or as a pair (each also
 
 /// Kinds of files that hold a mesh or half of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     M5d,
     Mts,
     Surface(Format),
@@ -23,7 +22,7 @@ enum Kind {
 
 impl Kind {
     /// What the file at `path` begins as or, where that says nothing, what its name ends in.
-    fn of(path: &Path) -> Result<Self, LoadError> {
+    pub fn of(path: &Path) -> Result<Self, LoadError> {
         let head = reader::head::<8>(path)?;
         let begins = |magic: &[u8]| head.starts_with(magic);
         if begins(m5d::MAGIC) {
@@ -39,7 +38,8 @@ impl Kind {
         named.ok_or_else(|| LoadError::Kind { file: path.display().to_string(), known: KNOWN })
     }
 
-    fn named(path: &Path) -> Option<Self> {
+    /// What its name ends in.
+    pub fn named(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?.to_ascii_lowercase();
         let bare = name.strip_suffix(".gz").unwrap_or(&name);
         match (bare.rsplit_once('.')?.1, Format::of(path)) {
@@ -77,39 +77,6 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&Path>) -> Result<Visibil
     VisibilityScene::seen(Subject { path, objects }, &spec.unwrap_or_default())
 }
 
-/// Loads cases of collision detection: an `.mts` each with its objects, or two PLY or OBJ files as the two instants of a mesh, whose
-/// parts that hang together are the objects. Coordinates of the latter are rounded to f32, and how far that may be is
-/// given with them.
-///
-/// # Errors
-/// As [`load`], and where a PLY or OBJ file has no partner.
-pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, LoadError> {
-    let mut files = files.iter().map(AsRef::as_ref);
-    if let Some(folder) = files.clone().find(|path| path.is_dir()) {
-        let message = format!("{} is a folder: give the .mts, .ply or .obj files in it", folder.display());
-        return Err(LoadError::Setting { setting: "files", message });
-    }
-    let mut cases = Vec::new();
-    while let Some(file) = files.next() {
-        let case = match Kind::of(file)? {
-            Kind::Mts => CollisionCase { id: stem(file), objects: mts::load_mts(file)?, uncertainty: 0.0 },
-            Kind::Surface(format) => {
-                let other =
-                    files.next().map(|other| Ok::<_, LoadError>((other, Kind::of(other)?))).transpose()?;
-                let Some((other, Kind::Surface(other_format))) = other else { return Err(no_partner(file)) };
-                let mesh = pair::moving((file, format), (other, other_format))?;
-                let largest =
-                    mesh.open.iter().chain(&mesh.close).map(|p| p.abs().max_element()).fold(0.0, f64::max);
-                let uncertainty = largest * f64::from(f32::EPSILON);
-                CollisionCase { id: stem(file), objects: components(&mesh), uncertainty }
-            }
-            Kind::M5d => return Err(no_partner(file)),
-        };
-        cases.push(case);
-    }
-    Ok(cases)
-}
-
 /// Loads a mesh that stays still from a PLY or OBJ file.
 ///
 /// # Errors
@@ -119,32 +86,6 @@ pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
         Kind::Surface(format) => pair::still((path, format)),
         _ => Err(LoadError::Kind { file: path.display().to_string(), known: ".ply and .obj (also gzipped)" }),
     }
-}
-
-/// Objects that may collide, and where they came from.
-#[derive(Clone, Debug)]
-pub struct CollisionCase {
-    /// The name of the file without its ending.
-    pub id: String,
-    /// An object each.
-    pub objects: Vec<MovingMesh>,
-    /// How far a coordinate may be from that of the file.
-    pub uncertainty: f64,
-}
-
-/// The name of a file without `.mts`, `.mts.gz` and the like.
-fn stem(path: &Path) -> String {
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let bare = name.strip_suffix(".gz").unwrap_or(&name);
-    bare.rsplit_once('.').map_or(bare, |(stem, _)| stem).to_owned()
-}
-
-fn no_partner(file: &Path) -> LoadError {
-    let message = format!(
-        "{}: give .mts files, or .ply and .obj files two by two: the mesh at time 0 and at time 1",
-        file.display()
-    );
-    LoadError::Setting { setting: "files", message }
 }
 
 fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {

@@ -6,6 +6,7 @@
 
 mod bytes;
 mod camera;
+mod cases;
 mod hits;
 mod load;
 mod m5d;
@@ -17,8 +18,9 @@ mod table;
 mod unshaded;
 
 pub use camera::CameraSpec;
+pub use cases::{CaseFiles, CollisionCase, load_cases};
 pub use hits::write_hits;
-pub use load::{CollisionCase, load, load_cases, load_surface};
+pub use load::{load, load_surface};
 pub use m5d::parse as parse_m5d;
 pub use mesh::MovingMesh;
 pub use mts::{load_mts, parse_mts};

@@ -22,9 +22,19 @@ pub(super) fn still((path, format): File<'_>) -> Result<MovingMesh, LoadError> {
     Ok(MovingMesh { close: open.clone(), open, triangles: mesh.triangles.to_vec() })
 }
 
+/// The mesh of one file, which has to have triangles.
+fn whole((path, format): File<'_>) -> Result<Mesh, LoadError> {
+    let mesh = surface(path, format)?;
+    if mesh.triangles.is_empty() {
+        let message = "it has none, so there is nothing that could move; export it with its faces";
+        return Err(Source { path }.broken("triangles", message));
+    }
+    Ok(mesh)
+}
+
 /// The mesh that is in one file when the shutter opens and in the other when it closes.
 pub(super) fn moving(start: File<'_>, end: File<'_>) -> Result<MovingMesh, LoadError> {
-    let [open, close] = [surface(start.0, start.1)?, surface(end.0, end.1)?];
+    let [open, close] = [whole(start)?, whole(end)?];
     let pair = Pair { paths: [start.0, end.0], open: &open, close: &close };
     let close = match (start.1, end.1) {
         (Format::Ply, Format::Ply) => pair.by_index()?,
@@ -63,9 +73,10 @@ impl Pair<'_> {
         }
     }
 
-    /// Whether the faces of two OBJ files name the same positions: triangles may match by chance where they do not.
+    /// Whether two OBJ files have as many positions and their faces name the same: triangles may match by chance where they do not.
     fn same_faces(&self) -> Result<(), LoadError> {
-        let [open, close] = [faces(self.paths[0])?, faces(self.paths[1])?];
+        let [(vertices, open), (others, close)] = [faces(self.paths[0])?, faces(self.paths[1])?];
+        self.same_count("vertices", vertices, others)?;
         match open.iter().zip(&close).find(|(from, to)| from.corners != to.corners) {
             None => Ok(()),
             Some((from, to)) => {

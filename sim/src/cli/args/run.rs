@@ -101,7 +101,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
     pub packet_loss: f64,
     /// Seed of samples, noise and losses
-    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
     /// Write every frame as EXR, too (linear light)
     #[arg(long)]

@@ -24,7 +24,7 @@ pub struct SamplesArgs {
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "64x64")]
     pub size: (u32, u32),
     /// Seed of the samples
-    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
     /// The file
     #[arg(long, value_name = "FILE")]

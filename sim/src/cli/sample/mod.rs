@@ -43,7 +43,7 @@ pub enum Kind {
 #[derive(Debug, Args)]
 pub struct Common {
     /// Other points by another seed
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
     /// File for the points: .csv, .npy or .bin
     #[arg(short, long, value_name = "FILE")]

@@ -142,6 +142,20 @@ mod tests {
     }
 
     #[test]
+    fn what_cannot_be_is_told_with_its_limits() {
+        let message = parsed(&["--r", "0.1", "--seed", "-1"]).err().unwrap_or_default();
+        assert!(message.contains("-1") && message.contains("from 0 to 18446744073709551615"), "{message}");
+        for (r, said) in
+            [("0.6", "r is 0.6; "), ("1e-300", "r is 1e-300; "), ("0", "r is 0; "), ("nan", "r is NaN; ")]
+        {
+            let args = parsed(&["--r", r]).unwrap();
+            let message = sample::<2>(&args).map_err(|failure| failure.message).unwrap_err();
+            let limits = "it has to be 1.4e-14 to 0.5, or from 0.707 on for a single point";
+            assert!(message.contains(said) && message.ends_with(limits), "{message}");
+        }
+    }
+
+    #[test]
     fn one_point_is_one_and_what_cannot_be_few_is_said() {
         let said = |count: &str| {
             let args = parsed(&["--count", count]).unwrap();

@@ -83,6 +83,9 @@ const HEIGHT: f64 = 372.0;
 /// Distance of lines of text.
 const LINE: f64 = 18.0;
 const LEGEND_LINE: f64 = 22.0;
+/// Size of the names in a legend below a panel, and the room across that is not theirs.
+const LEGEND_PX: f64 = 12.5;
+const NAME_ASIDE: f64 = ASIDE - 40.0 + 30.0;
 /// Size of the name of a marked range.
 const MARK_PX: f64 = 11.5;
 
@@ -123,7 +126,7 @@ impl Curves<'_> {
     }
 
     fn layout(&self) -> Layout {
-        let pitch = if self.panels.len() == 1 { ALONE_WIDTH } else { PANEL_WIDTH };
+        let pitch = self.pitch();
         let width = 40.0 + (pitch * self.panels.len() as f64).max(ALONE_WIDTH);
         let width = width.max(text_width(self.title, 19.0, true) + 48.0);
         let subject = wrapped(self.subject, 13.0, false, width - 48.0);
@@ -138,6 +141,18 @@ impl Curves<'_> {
         let below = if shared.is_none() { LEGEND_LINE * most(&|panel| panel.curves.len()) } else { 0.0 };
         let bottom = top + HEIGHT + 70.0 + below;
         Layout { width, pitch, subject, legend, apart: shared.is_none(), tops: [above, top], bottom }
+    }
+
+    /// Room of a panel across: more than is usual where the name of an axis, or of a curve in a legend of its own, needs it.
+    fn pitch(&self) -> f64 {
+        let usual = if self.panels.len() == 1 { ALONE_WIDTH } else { PANEL_WIDTH };
+        let apart = self.shared_curves().is_none();
+        let wide = |panel: &CurvePanel| {
+            let names = panel.curves.iter().filter(|_| apart);
+            let name = names.map(|curve| text_width(&curve.name, LEGEND_PX, false)).fold(0.0, f64::max);
+            (name + NAME_ASIDE).max(text_width(&panel.across, 13.0, false) + ASIDE)
+        };
+        self.panels.iter().map(wide).fold(usual, f64::max).min(ALONE_WIDTH)
     }
 
     /// The curves of the panel with the most, where those of all others are called like the first of them.

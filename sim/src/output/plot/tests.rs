@@ -174,6 +174,22 @@ fn curves_and_their_legends_fit() {
     }
 }
 
+/// Panels are as wide as their longest names need.
+#[test]
+fn names_of_curves_and_axes_are_whole() {
+    let names = ["64 squares along a side: lost by the bound that is not cut", "all methods"];
+    let panel = |name: &str| {
+        let across = "length of beams for which the sides that they have cross each other (%)";
+        CurvePanel::new("", [across, "y"], vec![Curve::new(name, [(1.0, 1.0), (2.0, 5.0)])])
+    };
+    let picture = Curves { title: "", subject: "", panels: names.map(panel).into() }.picture();
+    check(&picture);
+    for name in names {
+        let is_name = |shape: &Shape| matches!(shape, Shape::Text(text) if text.text == name);
+        assert!(picture.shapes.iter().any(is_name), "{name}");
+    }
+}
+
 #[test]
 fn heat_maps_of_any_shape_fit() {
     for (size, value) in [([1280, 720], 12.0), ([3, 800], 1e9), ([1, 1], 0.0), ([900, 2], f64::NAN)] {

@@ -75,9 +75,7 @@ pub struct PoissonSpec {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PoissonError {
     /// The radius cannot be.
-    #[error(
-        "r is {radius}; it has to be at least {least:e} and at most 0.5, or so large that one point fills all ({one:.3})"
-    )]
+    #[error("r is {}; it has to be {least:.1e} to 0.5, or from {one:.3} on for a single point", short(*.radius))]
     Radius {
         /// What it is.
         radius: f64,
@@ -98,6 +96,12 @@ pub enum PoissonError {
         /// How many points there may be about.
         most: f64,
     },
+}
+
+/// A number without a row of zeros.
+fn short(number: f64) -> String {
+    let plain = number == 0.0 || !number.is_finite() || (1e-4..1e6).contains(&number.abs());
+    if plain { number.to_string() } else { format!("{number:e}") }
 }
 
 /// Points that no other can be added to.

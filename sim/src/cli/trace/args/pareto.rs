@@ -37,7 +37,7 @@ pub struct ParetoArgs {
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = not_negative)]
     pub idle_w: f64,
     /// Seed of the draws for probabilities
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
     /// What the plot shows over time: energy, or mean power as Paper IV does
     #[arg(long, value_enum, default_value_t)]

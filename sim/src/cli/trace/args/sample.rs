@@ -67,7 +67,7 @@ pub struct SampleArgs {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub packet_loss: Option<f64>,
     /// Seed of noise and losses
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: Option<u64>,
     /// File to write, as for `trace convert`
     #[arg(long, value_name = "FILE")]
