@@ -113,23 +113,24 @@ impl View<'_> {
     fn walk(&self, steps: impl Iterator<Item = [usize; 2]>, way: isize, found: &mut Vec<usize>) {
         let mut moved = 0;
         for [here, there] in steps {
-            let Some((at, by)) = self.moved(here, moved, there, way) else { return };
+            let by = |comparison| self.moved(comparison, [here, there], moved, way);
+            let near = by(&NEAREST);
+            let Some((at, by)) = near.or_else(|| by(&WHOLE)) else { return };
             let misplaced = by.unsigned_abs() > self.share(MISPLACED);
             moved = if misplaced { by } else { 0 };
             if misplaced {
                 found.extend(self.starts[at].checked_add_signed(by));
+                // From where it takes whole frames to tell, the sequence had better be followed anew.
+                if near.is_none() {
+                    return;
+                }
             }
         }
     }
 
     /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say that they should: the start
     /// that fits best, and by how many samples. `None` where the two sides do not agree on one ratio of clocks and one place.
-    fn moved(&self, here: usize, moved: isize, there: usize, way: isize) -> Option<(usize, isize)> {
-        let by = |comparison| self.moved_by(comparison, [here, there], moved, way);
-        by(&NEAREST).or_else(|| by(&WHOLE))
-    }
-
-    fn moved_by(
+    fn moved(
         &self,
         comparison: &Comparison,
         [here, there]: [usize; 2],

@@ -27,7 +27,7 @@ const FIRST_PERIODS: usize = 12;
 /// Rounds after the whole trace has been reached.
 const LAST_ROUNDS: usize = 3;
 /// How often what lies in another phase of the frame is put right.
-const PASSES: usize = 2;
+const PASSES: usize = 4;
 /// Candidates kept of every stretch of one period.
 const KEPT: usize = 10;
 /// Candidates nearer than so many samples are one; none is so near to a mark.

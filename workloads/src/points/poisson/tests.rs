@@ -157,7 +157,7 @@ fn one_point_fills_all_from_half_a_diagonal_on() {
             let spec = PoissonSpec { spacing, ..spec(radius, domain, 1) };
             assert_eq!(check::<3>(&spec).points.len(), 1);
             let less = PoissonSpec { radius: radius - 1e-9, ..spec };
-            assert!(poisson_disk::<3>(&less).unwrap_err().to_string().contains("so large that one point"));
+            assert!(poisson_disk::<3>(&less).unwrap_err().to_string().contains("for a single point"));
         }
     }
     assert_ne!(
