@@ -183,6 +183,12 @@ pub enum ReadError {
         /// What is wrong.
         reason: String,
     },
+    /// The file is no longer what it was a moment ago.
+    #[error("{path}: changed while it was read: wait until it is written, or copy it", path = path.display())]
+    Changed {
+        /// The file.
+        path: PathBuf,
+    },
     /// The content is no valid trace.
     #[error("{path}: {source}", path = path.display())]
     Trace {
@@ -240,6 +246,9 @@ pub enum WriteError {
         /// Its time, s.
         time_s: f64,
     },
+    /// The samples to be written could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// Something else failed while a file was written.
     #[error("{path}: {source}", path = path.display())]
     Content {

@@ -1,8 +1,8 @@
 //! The JSON description that goes with every trace.
 
+use super::source::Heading;
 use super::{ReadError, WriteError};
 use crate::metadata::Metadata;
-use crate::trace::Trace;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub(crate) struct Header {
 }
 
 /// The description of a trace as JSON, on one line if it is to be put into a file's metadata.
-pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError> {
+pub(super) fn to_json(trace: &Heading, pretty: bool) -> Result<String, WriteError> {
     if let Some((index, mark)) =
         trace.metadata.marks.iter().enumerate().find(|(_, mark)| !mark.time_s.is_finite())
     {
@@ -40,9 +40,9 @@ pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError>
     let unit = |(column, unit): (&str, &str)| (column.to_owned(), serde_json::Value::from(unit));
     let header = Header {
         version: VERSION,
-        rate_hz: Some(trace.rate_hz()),
-        start_s: Some(trace.start_s()),
-        samples: Some(trace.kept(0..trace.samples()).count() as u64),
+        rate_hz: Some(trace.rate_hz),
+        start_s: Some(trace.start_s),
+        samples: Some(trace.samples - trace.lost_samples),
         units: [("time_ns", "ns"), ("time_s", "s"), ("voltage_V", "V"), ("current_A", "A")].map(unit).into(),
         metadata,
     };

@@ -1,15 +1,15 @@
 //! From time stamps to a start and a rate, or to the row where they are not even.
 
+mod fit;
+
 use super::ReadError;
 use super::header::Header;
+pub(crate) use fit::{Fit, Fitted};
+use multiversion::multiversion;
 use std::path::Path;
 
-/// How far a stamp may be off its place, in sample periods: rounded stamps are, by less.
-const OFF: f64 = 0.25;
 /// A rate is rounded only if that moves the last sample by less than this share of a period.
 const SNAP: f64 = 0.05;
-/// From how many steps the period is first guessed.
-const GUESS_FROM: usize = 1001;
 
 /// Time stamps as a file has them.
 #[derive(Clone, Debug)]
@@ -36,11 +36,6 @@ impl Stamps {
         }
     }
 
-    /// How finely the stamps tell time, s. Of seconds in a text it is not known; [`SNAP`] limits them.
-    fn resolution_s(&self) -> f64 {
-        if matches!(self, Self::Nanoseconds(_)) { 1.5e-9 } else { f64::INFINITY }
-    }
-
     pub(crate) fn time_s(&self, row: usize) -> f64 {
         match self {
             Self::Nanoseconds(times) => times[row] as f64 / 1e9,
@@ -61,62 +56,13 @@ impl Stamps {
 
 /// The grid all stamps lie on.
 pub(crate) fn grid(path: &Path, stamps: &Stamps, header: &Header) -> Result<Grid, ReadError> {
-    if stamps.len() == 0 {
-        let rate_hz = header.rate_hz.ok_or(ReadError::NoRate { path: path.to_owned() })?;
-        return Ok(Grid { start_s: header.start_s.unwrap_or(0.0), rate_hz });
-    }
-    check_order(path, stamps)?;
-    let rate_hz = match (header.rate_hz, stamps.len()) {
-        (Some(rate_hz), _) => rate_hz,
-        (None, 1) => return Err(ReadError::NoRate { path: path.to_owned() }),
-        (None, _) => fitted_rate_hz(path, stamps)?,
+    let fit = |rate_hz: Option<f64>| {
+        let mut fit = Fit::new(path, rate_hz, header.start_s);
+        fit.push(stamps);
+        fit.conclude()
     };
-    for row in 1..stamps.len() {
-        let off_periods = stamps.since_s(row, 0) * rate_hz - row as f64;
-        if off_periods.abs() > OFF {
-            return Err(uneven(path, stamps, row, off_periods, rate_hz));
-        }
-    }
-    let first_s = stamps.time_s(0);
-    // The stated start is exact where the first stamp was rounded; if it is another time, the file was edited.
-    let stated = header.start_s.filter(|start_s| (start_s - first_s).abs() * rate_hz <= OFF);
-    Ok(Grid { start_s: stated.unwrap_or(first_s), rate_hz })
-}
-
-fn check_order(path: &Path, stamps: &Stamps) -> Result<(), ReadError> {
-    for row in 0..stamps.len() {
-        let time_s = stamps.time_s(row);
-        if !time_s.is_finite() {
-            let value = time_s.to_string();
-            return Err(ReadError::Value {
-                path: path.to_owned(),
-                row: row as u64 + 1,
-                column: "time_s".to_owned(),
-                value,
-            });
-        }
-        if row > 0 && stamps.since_s(row, row - 1) <= 0.0 {
-            let before_s = stamps.time_s(row - 1);
-            return Err(ReadError::Unsorted { path: path.to_owned(), row: row as u64 + 1, time_s, before_s });
-        }
-    }
-    Ok(())
-}
-
-fn fitted_rate_hz(path: &Path, stamps: &Stamps) -> Result<f64, ReadError> {
-    let mut steps: Vec<f64> =
-        (1..stamps.len().min(GUESS_FROM + 1)).map(|row| stamps.since_s(row, row - 1)).collect();
-    let middle = steps.len() / 2;
-    let guess_s = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    for row in 1..stamps.len() {
-        let off_periods = stamps.since_s(row, row - 1) / guess_s - 1.0;
-        if off_periods.abs() > 0.5 {
-            return Err(uneven(path, stamps, row, off_periods, 1.0 / guess_s));
-        }
-    }
-    let periods = (stamps.len() - 1) as f64;
-    let span_s = stamps.since_s(stamps.len() - 1, 0);
-    Ok(rounded_rate_hz(periods, span_s, stamps.resolution_s()))
+    let fitted = fit(header.rate_hz)?;
+    if fitted.sure { Ok(fitted.grid) } else { Ok(fit(Some(fitted.grid.rate_hz))?.grid) }
 }
 
 /// The roundest rate (the one with most zeros) that moves the last sample by no more than the stamps can tell.
@@ -128,14 +74,10 @@ pub(crate) fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f
     [1e6, 1e5, 1e4, 1e3, 100.0, 10.0, 1.0].map(round_to).into_iter().find(snaps).unwrap_or(rate_hz)
 }
 
-fn uneven(path: &Path, stamps: &Stamps, row: usize, off_periods: f64, rate_hz: f64) -> ReadError {
-    ReadError::Uneven {
-        path: path.to_owned(),
-        row: row as u64 + 1,
-        time_s: stamps.time_s(row),
-        off_periods,
-        rate_hz,
-    }
+/// Whether each time is one step after the one before; without a way out on the way, so that many pairs are held at once.
+#[multiversion(targets("x86_64+avx2"))]
+pub(crate) fn all_apart(times: &[i64], step: i64) -> bool {
+    times.iter().zip(&times[1..]).fold(0, |any, (a, b)| any | (b.wrapping_sub(*a) ^ step)) == 0
 }
 
 #[cfg(test)]
