@@ -5,7 +5,7 @@ use std::path::Path;
 
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadError, ReadOptions, Repair, Rows, WriteError, read};
+use traces::io::{ReadError, ReadOptions, Recording, Repair, Rows, Source, WriteError, read};
 use traces::stream::{self, StreamError};
 use traces::trace::RATE_LIMITS_HZ;
 use traces::{MarkKind, Metadata, Trace, Warning};
@@ -44,7 +44,10 @@ impl From<StreamError> for Failure {
 
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
-        Self { message: error.to_string(), code: 1 }
+        match error {
+            WriteError::Read(error) => error.into(),
+            error => Self { message: error.to_string(), code: 1 },
+        }
     }
 }
 
@@ -85,10 +88,31 @@ impl InputArgs {
     /// Another trace, read in the same way.
     pub(super) fn load_other(&self, path: &Path) -> Result<(Trace, Vec<Repair>), Failure> {
         let loaded = read(path, &self.options()?)?;
-        for repair in &loaded.repairs {
-            complain(&format!("{}: mended: {}", path.display(), repair.message));
-        }
+        tell_repairs(path, &loaded.repairs);
         Ok((loaded.trace, loaded.repairs))
+    }
+
+    /// The trace as a source of samples, read in pieces; one that has to be mended is in memory, as what is mended depends
+    /// on all of it. What was mended is told.
+    pub(super) fn source(&self) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
+        match Recording::open(&self.trace, &self.options()?) {
+            Ok(recording) => {
+                let repairs = recording.repairs().to_vec();
+                tell_repairs(&self.trace, &repairs);
+                Ok((Box::new(recording), repairs))
+            }
+            Err(_) if self.repair => {
+                let (trace, repairs) = self.load()?;
+                Ok((Box::new(trace), repairs))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+fn tell_repairs(path: &Path, repairs: &[Repair]) {
+    for repair in repairs {
+        complain(&format!("{}: mended: {}", path.display(), repair.message));
     }
 }
 

@@ -81,44 +81,4 @@ pub(crate) fn all_apart(times: &[i64], step: i64) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn fit(stamps: Stamps) -> Result<Grid, ReadError> {
-        grid(Path::new("t.csv"), &stamps, &Header::default())
-    }
-
-    #[test]
-    fn rates_come_out_whole_from_rounded_stamps() {
-        let nanoseconds = |rate: f64| {
-            Stamps::Nanoseconds((0..5000).map(|i| (f64::from(i) * 1e9 / rate).round() as i64).collect())
-        };
-        assert_eq!(fit(nanoseconds(50e3)).unwrap().rate_hz, 50e3);
-        assert_eq!(fit(nanoseconds(3e6)).unwrap().rate_hz, 3e6);
-        let microseconds =
-            Stamps::Seconds((0..5000).map(|i| (f64::from(i) * 1e6 / 44_100.0).round() / 1e6).collect());
-        assert_eq!(fit(microseconds).unwrap().rate_hz, 44_100.0);
-        let slow = fit(Stamps::Seconds((0..9).map(|i| 100.0 + 2.5 * f64::from(i)).collect())).unwrap();
-        assert_eq!(slow, Grid { start_s: 100.0, rate_hz: 0.4 });
-    }
-
-    #[test]
-    fn each_bad_stamp_is_named_with_its_row() {
-        let message = |times: &[f64]| fit(Stamps::Seconds(times.to_vec())).unwrap_err().to_string();
-        assert!(message(&[0.0, 1.0, 1.0]).contains("t.csv: row 3: time 1 s is not after 1 s"));
-        assert!(
-            message(&[0.0, 1.0, 2.0, 4.0, 5.0])
-                .contains("row 4: time 4 s is 1.00 sample periods off an even rate of 1 Hz")
-        );
-        assert!(message(&[0.0, 1.0, 2.0, 3.4, 4.0]).contains("row 4"));
-        assert!(message(&[0.0, f64::NAN]).contains("row 2: time_s is NaN"));
-        assert!(message(&[0.0]).contains("sample rate is unknown"));
-    }
-
-    #[test]
-    fn a_wrong_stated_rate_is_found() {
-        let header = Header { rate_hz: Some(2.0), ..Header::default() };
-        let error = grid(Path::new("t.csv"), &Stamps::Seconds(vec![0.0, 1.0]), &header).unwrap_err();
-        assert!(error.to_string().contains("row 2") && error.to_string().contains("2 Hz"), "{error}");
-    }
-}
+mod tests;

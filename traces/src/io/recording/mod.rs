@@ -4,6 +4,7 @@ use super::rows::{Chunk, Rows};
 use super::source::{Heading, Sink, Source, Stretch};
 use super::timing::{Fit, Fitted};
 use super::{ReadError, ReadOptions, Repair, WriteError};
+use crate::metadata::Metadata;
 use crate::trace::check_times;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +17,8 @@ const PIECE: usize = 1 << 18;
 pub struct Recording {
     path: PathBuf,
     options: ReadOptions,
+    /// Rows read at once.
+    piece: usize,
     heading: Heading,
     repairs: Vec<Repair>,
 }
@@ -26,10 +29,14 @@ impl Recording {
     /// # Errors
     /// [`ReadError`] as [`read`](super::read()) without [`ReadOptions::repair`]: what is to be mended needs the whole trace.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let seen = Seen::of(path, options, None)?;
+        Self::in_pieces(path, options, PIECE)
+    }
+
+    fn in_pieces(path: &Path, options: &ReadOptions, piece: usize) -> Result<Self, ReadError> {
+        let seen = Seen::of(path, options, piece, None)?;
         let Fitted { mut grid, sure } = seen.fit.conclude()?;
         if !sure {
-            grid = Seen::of(path, options, Some(grid.rate_hz))?.fit.conclude()?.grid;
+            grid = Seen::of(path, options, piece, Some(grid.rate_hz))?.fit.conclude()?.grid;
         }
         check_times(seen.rows, grid.rate_hz, grid.start_s).map_err(|error| ReadError::trace(path, error))?;
         if let Some(error) = seen.voltage.or(seen.current) {
@@ -42,7 +49,7 @@ impl Recording {
             lost_samples: 0,
             metadata: seen.metadata,
         };
-        Ok(Self { path: path.to_owned(), options: options.clone(), heading, repairs: seen.repairs })
+        Ok(Self { path: path.to_owned(), options: options.clone(), piece, heading, repairs: seen.repairs })
     }
 
     /// What was mended when the file was opened.
@@ -59,7 +66,7 @@ impl Recording {
 struct Seen {
     fit: Fit,
     rows: u64,
-    metadata: crate::metadata::Metadata,
+    metadata: Metadata,
     repairs: Vec<Repair>,
     /// The first value of each channel that is not finite.
     voltage: Option<ReadError>,
@@ -67,12 +74,12 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(path: &Path, options: &ReadOptions, rate_hz: Option<f64>) -> Result<Self, ReadError> {
+    fn of(path: &Path, options: &ReadOptions, limit: usize, rate_hz: Option<f64>) -> Result<Self, ReadError> {
         let mut rows = Rows::open(path, options)?;
         let mut fit = Fit::new(path, rate_hz.or(rows.header.rate_hz), rows.header.start_s);
         let (mut voltage, mut current, mut count) = (None, None, 0);
         let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
-        while piece.read(&mut rows, &mut chunk)? > 0 {
+        while piece.read(&mut rows, limit, &mut chunk)? > 0 {
             fit.push(&chunk.stamps);
             voltage = voltage.or_else(|| rows.check_finite(&piece.voltage_v, &[], count).err());
             current = current.or_else(|| rows.check_finite(&[], &piece.current_a, count).err());
@@ -96,10 +103,10 @@ struct Piece {
 
 impl Piece {
     /// Reads the next samples over those before; how many rows there were, 0 at the end.
-    fn read(&mut self, rows: &mut Rows, chunk: &mut Chunk) -> Result<usize, ReadError> {
+    fn read(&mut self, rows: &mut Rows, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
         self.voltage_v.clear();
         self.current_a.clear();
-        let read = rows.next(PIECE, chunk)?;
+        let read = rows.next(limit, chunk)?;
         if read > 0 {
             rows.channels(chunk, &mut self.voltage_v, &mut self.current_a);
         }
@@ -115,7 +122,7 @@ impl Source for Recording {
     fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
         let mut rows = Rows::open(&self.path, &self.options)?;
         let (mut piece, mut coming, mut chunk) = (Piece::default(), Piece::default(), Chunk::default());
-        let (mut first, mut read) = (0, piece.read(&mut rows, &mut chunk)?);
+        let (mut first, mut read) = (0, piece.read(&mut rows, self.piece, &mut chunk)?);
         while read > 0 {
             let Piece { voltage_v, current_a } = &piece;
             if rows.check_finite(voltage_v, current_a, first).is_err() {
@@ -123,7 +130,8 @@ impl Source for Recording {
             }
             let stretch = Stretch { first, voltage_v, current_a, lost: false };
             // The next rows are decoded while these are taken.
-            let (next, taken) = rayon::join(|| coming.read(&mut rows, &mut chunk), || sink.take(&stretch));
+            let (next, taken) =
+                rayon::join(|| coming.read(&mut rows, self.piece, &mut chunk), || sink.take(&stretch));
             taken?;
             (first, read) = (first + stretch.len() as u64, next?);
             std::mem::swap(&mut piece, &mut coming);
@@ -131,3 +139,6 @@ impl Source for Recording {
         if first == self.heading.samples { Ok(()) } else { Err(self.changed()) }
     }
 }
+
+#[cfg(test)]
+mod tests;
