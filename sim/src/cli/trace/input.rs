@@ -141,29 +141,45 @@ fn tell(warning: &Warning) {
 
 impl FindArgs {
     /// Finds frames in memory, or in pieces where the trace is long.
-    pub(super) fn frames(&self, input: &InputArgs) -> Result<Frames, Failure> {
-        if self.streams(input)? {
-            return self.in_pieces(input);
+    pub(super) fn frames(&self, input: &InputArgs, path: &Path) -> Result<Frames, Failure> {
+        if self.streams(input, path)? {
+            return self.in_pieces(input, path);
         }
-        let (trace, repairs) = input.load()?;
-        let (found, proposal) = self.found(&trace)?;
-        let integral = PowerIntegral::new(&trace);
-        let (energies, total_j) = (integral.frames(&found), integral.total_j());
-        let (samples, rate_hz, start_s) = (trace.samples() as u64, trace.rate_hz(), trace.start_s());
+        let (trace, repairs) = input.load_other(path)?;
+        self.at_once(&trace, repairs)
+    }
+
+    /// As [`FindArgs::frames`], with the samples they were found in.
+    pub(super) fn frames_and_samples(
+        &self,
+        input: &InputArgs,
+        path: &Path,
+    ) -> Result<(Frames, Box<dyn Source>), Failure> {
+        if self.streams(input, path)? {
+            let recording = Recording::open(path, &input.options()?)?;
+            return Ok((self.in_pieces(input, path)?, Box::new(recording)));
+        }
+        let (trace, repairs) = input.load_other(path)?;
+        Ok((self.at_once(&trace, repairs)?, Box::new(trace)))
+    }
+
+    fn at_once(&self, trace: &Trace, repairs: Vec<Repair>) -> Result<Frames, Failure> {
+        let (found, proposal) = self.found(trace)?;
+        let integral = PowerIntegral::new(trace);
         Ok(Frames {
+            energies: integral.frames(&found),
             found,
-            energies,
-            samples,
-            rate_hz,
-            start_s,
-            total_j,
+            samples: trace.samples() as u64,
+            rate_hz: trace.rate_hz(),
+            start_s: trace.start_s(),
+            total_j: integral.total_j(),
             proposal,
             repairs,
-            metadata: trace.metadata,
+            metadata: trace.metadata.clone(),
         })
     }
 
-    fn streams(&self, input: &InputArgs) -> Result<bool, Failure> {
+    fn streams(&self, input: &InputArgs, path: &Path) -> Result<bool, Failure> {
         if matches!(self.method, Method::Tracking | Method::Normalized) || input.repair {
             return if self.stream {
                 Err(wrong("--stream goes with the sum of squares and without --repair; leave one out"))
@@ -171,21 +187,21 @@ impl FindArgs {
                 Ok(false)
             };
         }
-        let rows = Rows::open(&input.trace, &input.options()?)?;
-        let bytes = fs::metadata(&input.trace).map_or(0, |metadata| metadata.len());
+        let rows = Rows::open(path, &input.options()?)?;
+        let bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
         Ok(self.stream || rows.count().map_or(bytes > LONG_BYTES, |count| count > LONG))
     }
 
-    fn in_pieces(&self, input: &InputArgs) -> Result<Frames, Failure> {
+    fn in_pieces(&self, input: &InputArgs, path: &Path) -> Result<Frames, Failure> {
         let options = input.options()?;
         if self.auto {
             return Err(wrong("--auto looks at traces that fit into memory; mark a frame with --mark"));
         }
-        let rows = Rows::open(&input.trace, &options)?;
+        let rows = Rows::open(path, &options)?;
         let starts_s = self.marks(rows.metadata())?;
         let end_s = self.end.or_else(|| end_mark(rows.metadata())).unwrap_or(f64::INFINITY);
         let marks = Marks { starts_s, window: self.window_s()?, end_s };
-        let streamed = stream::find(&input.trace, &options, &marks)?;
+        let streamed = stream::find(path, &options, &marks)?;
         let clock = streamed.clock;
         Ok(Frames {
             found: streamed.found,
@@ -203,7 +219,7 @@ impl FindArgs {
     /// Frames of a trace in memory, where nothing is read in pieces.
     pub(super) fn found_at_once(&self, trace: &Trace) -> Result<Found, Failure> {
         if self.stream {
-            return Err(wrong("--stream goes with `trace frames` alone; leave it out"));
+            return Err(wrong("--stream: to draw frames, all samples are held; leave it out"));
         }
         Ok(self.found(trace)?.0)
     }
