@@ -112,13 +112,7 @@ impl Trace {
 
     /// What the recorder lost and from when on, in words; `None` if nothing.
     pub fn losses(&self) -> Option<String> {
-        let first = self.lost.first()?;
-        Some(format!(
-            "{} samples in {} stretches are missing, the first after {} s",
-            self.lost_samples(),
-            self.lost.len(),
-            self.time_s(first.start - 1)
-        ))
+        losses(&self.lost, |index| self.time_s(index))
     }
 
     /// Number of samples; never 0.
@@ -185,6 +179,17 @@ impl Trace {
     }
 }
 
+/// Stretches that were lost, in words; `None` if there are none.
+pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Option<String> {
+    let first = lost.first()?;
+    Some(format!(
+        "{} samples in {} stretches are missing, the first after {} s",
+        lost.iter().map(ExactSizeIterator::len).sum::<usize>(),
+        lost.len(),
+        time_s(first.start - 1)
+    ))
+}
+
 /// Left edge of a sample to the nearest nanosecond.
 pub(crate) fn time_ns(start_s: f64, rate_hz: f64, index: u64) -> i64 {
     // A float-to-int cast saturates; the constructor keeps times within i64.
@@ -195,10 +200,15 @@ pub(crate) fn time_ns(start_s: f64, rate_hz: f64, index: u64) -> i64 {
 fn bridge(values: &mut [f32], lost: Range<usize>) {
     let before = values[lost.start - 1];
     let after = values.get(lost.end).copied().unwrap_or(before);
-    let steps = (lost.len() + 1) as f32;
+    let len = lost.len();
     for (at, value) in values[lost].iter_mut().enumerate() {
-        *value = before + (after - before) * ((at + 1) as f32 / steps);
+        *value = on_line(before, after, at, len);
     }
+}
+
+/// The value `at` (from 0) of `len` that are missing between two.
+pub(crate) fn on_line(before: f32, after: f32, at: usize, len: usize) -> f32 {
+    before + (after - before) * ((at + 1) as f32 / (len + 1) as f32)
 }
 
 /// Whether rate, start and end are within their limits.

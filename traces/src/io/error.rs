@@ -1,5 +1,6 @@
 //! What can be wrong with a file.
 
+use crate::device::SampleError;
 use crate::trace::TraceError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -246,6 +247,9 @@ pub enum WriteError {
         /// Its time, s.
         time_s: f64,
     },
+    /// What is to be written cannot be sampled from its trace.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
     /// The samples to be written could not be read.
     #[error(transparent)]
     Read(#[from] ReadError),

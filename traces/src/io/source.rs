@@ -34,6 +34,11 @@ impl Heading {
         self.start_s + index as f64 / self.rate_hz
     }
 
+    /// Position of a time in samples, fractional, not limited to the trace.
+    pub fn position(&self, time_s: f64) -> f64 {
+        (time_s - self.start_s) * self.rate_hz
+    }
+
     /// Right edge of the last sample, s.
     pub fn end_s(&self) -> f64 {
         self.time_s(self.samples)
@@ -54,6 +59,11 @@ pub struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
+    /// Power of each, W.
+    pub fn powers_w(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
+        self.voltage_v.iter().zip(self.current_a).map(|(&v, &i)| f64::from(v) * f64::from(i))
+    }
+
     /// How many samples.
     pub fn len(&self) -> usize {
         self.voltage_v.len()

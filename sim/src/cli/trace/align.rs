@@ -7,7 +7,8 @@ use traces::align::{AlignError, Alignment};
 use traces::io::atomic::write_file;
 
 use super::args::AlignArgs;
-use super::input::{times, wrong};
+use super::input::wrong;
+use super::times::times;
 use crate::cli::Failure;
 use crate::cli::terminal::{complain, print, print_json};
 

@@ -12,7 +12,7 @@ use traces::io::{Heading, Repair, Source};
 use super::args::{Discard, EnergyArgs, IdleBy};
 use super::input::wrong;
 use crate::cli::Failure;
-use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::terminal::{print, print_json};
 
 /// Samples from which the lowest power is taken, about.
 const LEVELS: u64 = 65_536;
