@@ -267,3 +267,36 @@ fn marks_that_are_no_times_are_not_written() {
     assert!(error.to_string().contains("t.parquet: mark 0 is at NaN s"), "{error}");
     assert!(!path.exists());
 }
+
+/// A disk with some room left, bytes.
+struct Full(usize);
+
+impl std::io::Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 = self.0.checked_sub(bytes.len()).ok_or(std::io::ErrorKind::StorageFull)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_disk_is_told_to_be_full_wherever_it_fills_up() {
+    let ramp: Vec<f32> = (0..30_000_u16).map(f32::from).collect();
+    let trace = Trace::new(ramp.clone(), ramp, 50e3, 0.0, Metadata::default()).unwrap();
+    let of = |writes: &dyn Fn(&mut Full) -> Result<(), traces::io::WriteError>| {
+        let mut roomy = Full(1 << 30);
+        writes(&mut roomy).unwrap();
+        let length = (1 << 30) - roomy.0;
+        for room in [0, 1, 20, length / 2, length - 1] {
+            let message = writes(&mut Full(room)).unwrap_err().to_string();
+            assert!(message.starts_with("cannot write the trace: "), "{room} of {length}: {message}");
+        }
+        writes(&mut Full(length)).unwrap();
+    };
+    of(&|out| parquet::write(&trace, out));
+    of(&|out| csv::write(&trace, out));
+    of(&|out| csv::write_sidecar(&trace, out));
+}

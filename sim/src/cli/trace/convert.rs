@@ -43,7 +43,7 @@ pub(super) fn check(path: &Path) -> Result<(), Failure> {
     Err(wrong(format!("{}: its ending is none of {}", path.display(), known.join(", "))))
 }
 
-/// Writes a trace in the format its name asks for, in pieces.
+/// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].
 pub(super) fn save(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
     let name = name(path);
     let plain = name.trim_end_matches(".gz");
