@@ -189,6 +189,31 @@ fn parquet_errors_name_file_row_and_column() {
 }
 
 #[test]
+fn of_several_faults_a_recording_names_the_one_that_a_trace_in_memory_names() {
+    use Values::{Float, Int};
+    let (nan, times) = (f32::NAN, || Int(vec![0, 1000, 2000, 3000]));
+    let late = || Float(vec![1.0, 1.0, 1.0, nan]);
+    let early = || Float(vec![1.0, nan, 1.0, 1.0]);
+    let uneven = || Int(vec![0, 1000, 2000, 9000]);
+    for (times, voltage, current, says) in [
+        (times(), late(), early(), "row 4: voltage_V is NaN"),
+        (times(), early(), late(), "row 2: voltage_V is NaN"),
+        (uneven(), late(), early(), "row 4: time 0.000009 s"),
+    ] {
+        let (_folder, path) =
+            parquet_file(vec![("time_ns", times), ("voltage_V", voltage), ("current_A", current)]);
+        says_both(&path, says);
+    }
+}
+
+#[track_caller]
+fn says_both(path: &Path, part: &str) {
+    let options = ReadOptions::default();
+    says(&io::read(path, &options).unwrap_err(), &[part]);
+    says(&io::Recording::open(path, &options).unwrap_err(), &[part]);
+}
+
+#[test]
 fn a_compression_that_needs_c_is_named_with_the_mend() {
     // The footer ends with its length (4 bytes) and PAR1; in it each column's codec is the thrift i32 field 4, `15 00`
     // for none, `15 08` for Brotli (4, zigzag). Only the first such pair after the path `voltage_V` is changed.

@@ -84,7 +84,7 @@ proptest! {
         rows in 1_usize..2500,
         rate_hz in prop_oneof![Just(1000.0), Just(44_117.65), Just(1e6 / 3.0), 0.1..1e6_f64],
         whole in any::<bool>(),
-        stated in prop_oneof![Just(None), Just(Some(1.0)), Just(Some(1.0001)), Just(Some(1.3))],
+        stated in prop_oneof![Just(None), Just(Some(1.0)), Just(Some(1.0001)), Just(Some(1.0003)), Just(Some(1.3))],
         faults in prop::collection::vec((1_usize..2500, prop_oneof![Just(0.1), Just(0.3), Just(-3.0), Just(5.0), Just(f64::NAN)], any::<bool>()), 0..3),
         drift in prop_oneof![Just(0.0), Just(1e-7), Just(1e-5)],
         pieces in prop::collection::vec(1_usize..1500, 1..4),
@@ -121,9 +121,24 @@ fn a_rate_that_puts_one_late_row_a_hair_off_is_looked_at_again() {
 }
 
 #[test]
+fn a_step_between_two_pieces_is_held_against_the_others_too() {
+    for (at, periods) in [(1100, 5), (1100, -5), (1101, 5), (2199, 1), (2200, 1), (2201, 1)] {
+        let time = |row: i64| 1_000_000 * (row + if row < at { 0 } else { periods });
+        let stamps = Stamps::Nanoseconds((0..3000).map(time).collect());
+        let told = in_pieces(&stamps, &Header::default(), &[1100]).unwrap_err();
+        let says = oracle(&stamps, &Header::default()).unwrap_err();
+        assert!(told.contains(&says), "{told} {says}");
+    }
+}
+
+#[test]
 fn times_that_wrap_around_are_not_in_order() {
     let times = vec![i64::MAX - 3, i64::MAX - 1, i64::MIN, i64::MIN + 2, i64::MIN + 4];
     let header = Header { rate_hz: Some(5e8), ..Header::default() };
+    // Without a rate, after enough rows to know the step.
+    let wrapping = (0..1500_i64).map(|row| (i64::MAX - 2600).wrapping_add(2 * row)).collect();
+    let message = in_pieces(&Stamps::Nanoseconds(wrapping), &Header::default(), &[1100]).unwrap_err();
+    assert!(message.contains("row 1302") && message.contains("is not after"), "{message}");
     let message = in_pieces(&Stamps::Nanoseconds(times), &header, &[1, 4]).unwrap_err();
     assert!(message.contains("row 3") && message.contains("is not after"), "{message}");
 }
