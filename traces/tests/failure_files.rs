@@ -311,7 +311,7 @@ impl std::io::Write for Full {
 fn a_disk_is_told_to_be_full_wherever_it_fills_up() {
     let ramp: Vec<f32> = (0..30_000_u16).map(f32::from).collect();
     let trace = Trace::new(ramp.clone(), ramp, 50e3, 0.0, Metadata::default()).unwrap();
-    let of = |writes: &dyn Fn(&mut Full) -> Result<(), traces::io::WriteError>| {
+    let of = |writes: &dyn Fn(&mut Full) -> Result<(), io::WriteError>| {
         let mut roomy = Full(1 << 30);
         writes(&mut roomy).unwrap();
         let length = (1 << 30) - roomy.0;
