@@ -116,6 +116,68 @@ fn samples_that_a_device_loses_are_missing_in_jls_and_filled_as_in_parquet() {
 }
 
 #[test]
+fn a_refusal_names_the_place_and_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let row = |time_ms: u32, amperes: &str| format!("{},12,{amperes}\n", f64::from(time_ms) / 1000.0);
+    let text = |spoil: &dyn Fn(u32) -> String| {
+        "time_s,voltage_V,current_A\n".to_owned() + &(0..5000).map(spoil).collect::<String>()
+    };
+    let write =
+        |name: &str, spoil: &dyn Fn(u32) -> String| fs::write(folder.path().join(name), text(spoil)).unwrap();
+    write("good.csv", &|i| row(i, "1"));
+    write("nan.csv", &|i| row(i, if i == 4997 { "nan" } else { "1" }));
+    write("gap.csv", &|i| row(if i < 4000 { i } else { i + 30 }, "1"));
+    write("back.csv", &|i| row(if i == 4500 { 4400 } else { i }, "1"));
+    write("negative.csv", &|i| row(i, if i == 3210 { "-1" } else { "1" }));
+    let before = fs::read_dir(folder.path()).unwrap().count();
+    let cases: [(&[&str], &str, i32, &str); 6] = [
+        (&["convert", "nan.csv"], "out", 1, "nan.csv: row 4998: current_A"),
+        (&["convert", "gap.csv"], "out", 1, "gap.csv: row 4001: time 4.03 s is 30.00 sample periods off"),
+        (&["convert", "back.csv"], "out", 1, "back.csv: row 4501: time 4.4 s is not after"),
+        (&["convert", "good.csv"], "no/such/folder/out", 1, "cannot be written"),
+        (&["convert", "good.csv"], "/proc/self/out", 1, "cannot be written"),
+        (&["sample", "negative.csv"], "out", 2, "segment 3210: power -12 W"),
+    ];
+    for (args, out, code, says) in cases {
+        for end in ["parquet", "csv", "tsv.gz", "perfetto-trace"] {
+            let out = format!("{out}.{end}");
+            let name: &[&str] = if args[0] == "sample" { &["--out", &out] } else { &[&out] };
+            let output = quintile(folder.path(), &[args, name].concat());
+            let message = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(code), "{args:?} {out}: {message}");
+            assert!(message.contains(says) && message.lines().count() == 1, "{args:?} {out}: {message}");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), before, "{args:?} {out}");
+        }
+    }
+}
+
+#[test]
+fn energies_and_plots_of_energies_are_the_same_in_pieces() {
+    let folder = tempfile::tempdir().unwrap();
+    write_trace(folder.path());
+    let of = |more: &[&str]| {
+        let args = [
+            "energy", "t.csv", "--method", "squares", "--idle", "0..0.09", "--pass", "rest=4", "--run",
+            "t.csv",
+        ];
+        json(folder.path(), &[&args, &MARK[..], more].concat())
+    };
+    let (whole, pieces) = (of(&[]), of(&["--stream"]));
+    for path in [
+        "/pooled/mean",
+        "/runs/0/energy_J/mean",
+        "/runs/1/begin_to_finish_J/mean",
+        "/runs/0/passes/0/energy_J/mean",
+    ] {
+        let value = |report: &Value| report.pointer(path).and_then(Value::as_f64).unwrap();
+        assert!((value(&pieces) / value(&whole) - 1.0).abs() < 1e-6, "{path}: {whole} {pieces}");
+    }
+    assert_eq!(whole["runs"][0]["frames"], pieces["runs"][0]["frames"]);
+    let plot = ["plot", "t.csv", "--kind", "energy", "--stream", "--out", "e.svg"];
+    assert_eq!(json(folder.path(), &[&plot, &MARK[..]].concat())["shown"], "40 frames");
+}
+
+#[test]
 fn wrong_input_is_one_line_and_the_right_code() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
@@ -227,7 +289,7 @@ fn numbers_that_are_none_and_flags_that_would_do_nothing_are_refused() {
         (&["energy", "t.csv", "--mark", "0.2", "--from", "0.1"], "cannot be used with"),
         (&["energy", "t.csv", "--from", "0.1", "--drop-outliers"], "cannot be used with"),
         (&["energy", "t.csv", "--mark", "0.2", "--idle-by", "instant"], "--idle-trace"),
-        (&["energy", "t.csv", "--mark", "0.2", "--stream"], "--stream"),
+        (&["plot", "t.csv", "--kind", "frame", "--mark", "0.2", "--stream", "--out", "a.svg"], "--stream"),
         (&["frames", "t.csv", "--mark", "0.2", "--pixels", "0"], "--pixels"),
         (&["frames", "t.csv", "--mark", "0.2", "--voltage", "nan"], "no finite number"),
         (&["frames", "t.csv", "--mark", "0.2", "--start", "nan"], "no finite number"),

@@ -79,14 +79,7 @@ impl Trace {
         if voltage_v.is_empty() {
             return Err(TraceError::Empty);
         }
-        if !(RATE_LIMITS_HZ[0]..=RATE_LIMITS_HZ[1]).contains(&rate_hz) {
-            return Err(TraceError::Rate { rate_hz });
-        }
-        for time_s in [start_s, start_s + voltage_v.len() as f64 / rate_hz] {
-            if !time_s.is_finite() || time_s.abs() > TIME_LIMIT_S {
-                return Err(TraceError::Time { time_s });
-            }
-        }
+        check_times(voltage_v.len() as u64, rate_hz, start_s)?;
         check_finite(&voltage_v, "voltage_V")?;
         check_finite(&current_a, "current_A")?;
         Ok(Self { voltage_v, current_a, rate_hz, start_s, lost: Vec::new(), metadata })
@@ -119,24 +112,7 @@ impl Trace {
 
     /// What the recorder lost and from when on, in words; `None` if nothing.
     pub fn losses(&self) -> Option<String> {
-        let first = self.lost.first()?;
-        Some(format!(
-            "{} samples in {} stretches are missing, the first after {} s",
-            self.lost_samples(),
-            self.lost.len(),
-            self.time_s(first.start - 1)
-        ))
-    }
-
-    /// Those of some samples that were not lost.
-    pub(crate) fn kept(&self, rows: Range<usize>) -> impl Iterator<Item = usize> + '_ {
-        let mut next = self.lost.partition_point(|lost| lost.end <= rows.start);
-        rows.filter(move |row| {
-            while self.lost.get(next).is_some_and(|lost| lost.end <= *row) {
-                next += 1;
-            }
-            !self.lost.get(next).is_some_and(|lost| lost.contains(row))
-        })
+        losses(&self.lost, |index| self.time_s(index))
     }
 
     /// Number of samples; never 0.
@@ -181,8 +157,7 @@ impl Trace {
 
     /// Left edge of sample `index` to the nearest nanosecond, as trace files store it. Saturates beyond i64.
     pub fn time_ns(&self, index: usize) -> i64 {
-        // A float-to-int cast saturates; the constructor keeps times within i64.
-        libm::round(self.start_s * 1e9 + index as f64 * 1e9 / self.rate_hz) as i64
+        time_ns(self.start_s, self.rate_hz, index as u64)
     }
 
     /// Position of a time in samples, fractional, not limited to the trace.
@@ -204,14 +179,49 @@ impl Trace {
     }
 }
 
+/// Stretches that were lost, in words; `None` if there are none.
+pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Option<String> {
+    let first = lost.first()?;
+    Some(format!(
+        "{} samples in {} stretches are missing, the first after {} s",
+        lost.iter().map(ExactSizeIterator::len).sum::<usize>(),
+        lost.len(),
+        time_s(first.start - 1)
+    ))
+}
+
+/// Left edge of a sample to the nearest nanosecond.
+pub(crate) fn time_ns(start_s: f64, rate_hz: f64, index: u64) -> i64 {
+    // A float-to-int cast saturates; the constructor keeps times within i64.
+    libm::round(start_s * 1e9 + index as f64 * 1e9 / rate_hz) as i64
+}
+
 /// The straight line from the value before to the one after, or that before where there is none after.
 fn bridge(values: &mut [f32], lost: Range<usize>) {
     let before = values[lost.start - 1];
     let after = values.get(lost.end).copied().unwrap_or(before);
-    let steps = (lost.len() + 1) as f32;
+    let len = lost.len();
     for (at, value) in values[lost].iter_mut().enumerate() {
-        *value = before + (after - before) * ((at + 1) as f32 / steps);
+        *value = on_line(before, after, at, len);
     }
+}
+
+/// The value `at` (from 0) of `len` that are missing between two.
+pub(crate) fn on_line(before: f32, after: f32, at: usize, len: usize) -> f32 {
+    before + (after - before) * ((at + 1) as f32 / (len + 1) as f32)
+}
+
+/// Whether rate, start and end are within their limits.
+pub(crate) fn check_times(samples: u64, rate_hz: f64, start_s: f64) -> Result<(), TraceError> {
+    if !(RATE_LIMITS_HZ[0]..=RATE_LIMITS_HZ[1]).contains(&rate_hz) {
+        return Err(TraceError::Rate { rate_hz });
+    }
+    for time_s in [start_s, start_s + samples as f64 / rate_hz] {
+        if !time_s.is_finite() || time_s.abs() > TIME_LIMIT_S {
+            return Err(TraceError::Time { time_s });
+        }
+    }
+    Ok(())
 }
 
 fn check_finite(values: &[f32], channel: &'static str) -> Result<(), TraceError> {

@@ -189,6 +189,31 @@ fn parquet_errors_name_file_row_and_column() {
 }
 
 #[test]
+fn of_several_faults_a_recording_names_the_one_that_a_trace_in_memory_names() {
+    use Values::{Float, Int};
+    let (nan, times) = (f32::NAN, || Int(vec![0, 1000, 2000, 3000]));
+    let late = || Float(vec![1.0, 1.0, 1.0, nan]);
+    let early = || Float(vec![1.0, nan, 1.0, 1.0]);
+    let uneven = || Int(vec![0, 1000, 2000, 9000]);
+    for (times, voltage, current, says) in [
+        (times(), late(), early(), "row 4: voltage_V is NaN"),
+        (times(), early(), late(), "row 2: voltage_V is NaN"),
+        (uneven(), late(), early(), "row 4: time 0.000009 s"),
+    ] {
+        let (_folder, path) =
+            parquet_file(vec![("time_ns", times), ("voltage_V", voltage), ("current_A", current)]);
+        says_both(&path, says);
+    }
+}
+
+#[track_caller]
+fn says_both(path: &Path, part: &str) {
+    let options = ReadOptions::default();
+    says(&io::read(path, &options).unwrap_err(), &[part]);
+    says(&io::Recording::open(path, &options).unwrap_err(), &[part]);
+}
+
+#[test]
 fn a_compression_that_needs_c_is_named_with_the_mend() {
     // The footer ends with its length (4 bytes) and PAR1; in it each column's codec is the thrift i32 field 4, `15 00`
     // for none, `15 08` for Brotli (4, zigzag). Only the first such pair after the path `voltage_V` is changed.
@@ -266,4 +291,37 @@ fn marks_that_are_no_times_are_not_written() {
     let error = parquet::save(&trace, &path).unwrap_err();
     assert!(error.to_string().contains("t.parquet: mark 0 is at NaN s"), "{error}");
     assert!(!path.exists());
+}
+
+/// A disk with some room left, bytes.
+struct Full(usize);
+
+impl std::io::Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 = self.0.checked_sub(bytes.len()).ok_or(std::io::ErrorKind::StorageFull)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_disk_is_told_to_be_full_wherever_it_fills_up() {
+    let ramp: Vec<f32> = (0..30_000_u16).map(f32::from).collect();
+    let trace = Trace::new(ramp.clone(), ramp, 50e3, 0.0, Metadata::default()).unwrap();
+    let of = |writes: &dyn Fn(&mut Full) -> Result<(), io::WriteError>| {
+        let mut roomy = Full(1 << 30);
+        writes(&mut roomy).unwrap();
+        let length = (1 << 30) - roomy.0;
+        for room in [0, 1, 20, length / 2, length - 1] {
+            let message = writes(&mut Full(room)).unwrap_err().to_string();
+            assert!(message.starts_with("cannot write the trace: "), "{room} of {length}: {message}");
+        }
+        writes(&mut Full(length)).unwrap();
+    };
+    of(&|out| parquet::write(&trace, out));
+    of(&|out| csv::write(&trace, out));
+    of(&|out| csv::write_sidecar(&trace, out));
 }

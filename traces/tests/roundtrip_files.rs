@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use traces::io::{csv, parquet};
+use traces::io::{Heading, Sink, Source, Stretch, WriteError, csv, parquet};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 fn metadata() -> Metadata {
@@ -55,6 +55,96 @@ proptest! {
             prop_assert_eq!(&read.metadata, &trace.metadata);
         }
     }
+}
+
+/// A trace whose stretches are handed on in other pieces.
+struct Cut<'a>(&'a Trace, &'a [usize]);
+
+struct Cutter<'a> {
+    into: &'a mut dyn Sink,
+    sizes: std::iter::Cycle<std::slice::Iter<'a, usize>>,
+}
+
+impl Source for Cut<'_> {
+    fn heading(&self) -> Heading {
+        self.0.heading()
+    }
+
+    fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
+        self.0.pour(&mut Cutter { into: sink, sizes: self.1.iter().cycle() })
+    }
+}
+
+impl Sink for Cutter<'_> {
+    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+        let mut from = 0;
+        while from < stretch.len() {
+            let to = stretch.len().min(from + self.sizes.next().unwrap());
+            self.into.take(&stretch.part(from, to))?;
+            from = to;
+        }
+        Ok(())
+    }
+}
+
+/// The bytes of every format.
+fn written(trace: &dyn Source) -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |end: &str| folder.path().join(format!("t.{end}"));
+    parquet::save(trace, &path("parquet")).unwrap();
+    csv::save_as(trace, &path("tsv"), b'\t', false).unwrap();
+    csv::save_as(trace, &path("csv.gz"), b',', true).unwrap();
+    ["parquet", "tsv", "csv.gz", "json"].map(|end| std::fs::read(path(end)).unwrap()).into()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn property_pieces_of_any_size_give_the_bytes_of_one(
+        samples in 1_usize..6000,
+        rate_hz in prop_oneof![Just(50e3), 0.1..1e7_f64],
+        sizes in prop::collection::vec(prop_oneof![1_usize..10, 100..3000_usize], 1..5),
+        lost in prop::collection::vec((0_usize..400, 1_usize..300), 0..4),
+    ) {
+        let mut end = 0;
+        let lost = lost.into_iter().map(|(apart, length)| {
+            let range = end + apart + 1..end + apart + 1 + length;
+            end = range.end;
+            range
+        });
+        let trace = trace(samples, rate_hz, 0.3).without(lost.collect::<Vec<_>>());
+        prop_assert!(written(&Cut(&trace, &sizes)) == written(&trace));
+    }
+}
+
+#[test]
+fn pieces_across_row_groups_with_losses_at_their_ends_give_the_same_bytes() {
+    let group = 1 << 20;
+    for lost in [group - 10..group + 20, group..group + 1, 100_000..group, group - 1..group + 400_000] {
+        let trace = trace(group + 400_000, 50e3, 0.3).without([lost]);
+        let bytes = |trace: &dyn Source| {
+            let mut bytes = Vec::new();
+            parquet::write(trace, &mut bytes).unwrap();
+            bytes
+        };
+        assert!(bytes(&Cut(&trace, &[77_777])) == bytes(&trace));
+    }
+}
+
+#[test]
+fn a_row_group_has_the_rows_of_its_2_to_the_20_samples_that_were_not_lost() {
+    use ::parquet::file::reader::{FileReader, SerializedFileReader};
+    let group = 1 << 20;
+    let rows = |lost: std::ops::Range<usize>| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        parquet::save(&trace(2 * group + 400_000, 50e3, 0.3).without([lost]), &path).unwrap();
+        let file = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();
+        file.metadata().row_groups().iter().map(|group| group.num_rows() as usize).collect::<Vec<_>>()
+    };
+    assert_eq!(rows(0..0), [group, group, 400_000]);
+    assert_eq!(rows(group - 10..group + 20), [group - 10, group - 20, 400_000]);
+    assert_eq!(rows(group..2 * group), [group, 400_000]);
 }
 
 #[test]

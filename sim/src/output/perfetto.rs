@@ -13,7 +13,7 @@ use super::protobuf::Message;
 
 mod decimate;
 
-pub use decimate::{BusySlice, MAX_POINTS, MAX_SLICES, decimate, slices_of_bins};
+pub use decimate::{BusySlice, MAX_POINTS, MAX_SLICES, Thinner, decimate, slices_of_bins};
 
 /// What the timeline shows. Times are in ns from the start of the run.
 #[derive(Clone, Debug, Default)]

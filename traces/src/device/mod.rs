@@ -1,12 +1,15 @@
 //! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
 
 mod bound;
+mod gaps;
 mod packets;
 mod quantizer;
 mod rail;
+mod resample;
 mod sample;
 mod spec;
 
+pub use resample::Resampled;
 pub use sample::{SampleError, Sampled};
 pub use spec::{DeviceError, DeviceSpec, RATES_HZ};
 

@@ -41,7 +41,7 @@ pub enum SampleError {
     },
     /// More samples than are made at once.
     #[error(
-        "{start_s} s to {end_s} s at {rate_hz} Hz are {count:.0} samples, more than the 2^29 that are made at once: \
+        "{start_s} s to {end_s} s at {rate_hz} Hz are {count:.0} samples, more than are made: \
          lower the rate or sample a part"
     )]
     TooLong {
@@ -87,11 +87,11 @@ pub struct Sampled {
 }
 
 /// The channels while they are filled.
-struct Channels {
-    voltage_v: Vec<f32>,
-    current_a: Vec<f32>,
-    clipped_voltages: usize,
-    clipped_currents: usize,
+pub(super) struct Channels {
+    pub voltage_v: Vec<f32>,
+    pub current_a: Vec<f32>,
+    pub clipped_voltages: usize,
+    pub clipped_currents: usize,
 }
 
 impl Device {
@@ -104,14 +104,13 @@ impl Device {
     /// # Errors
     /// [`SampleError`]: span outside the curve or too short, rail overloaded.
     pub fn sample(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<Sampled, SampleError> {
-        let count = self.periods_in(curve, start_s, end_s)?;
+        let count = self.periods([start_s, end_s], [curve.start_s(), curve.end_s()], MOST)?;
         let mut means_w = curve.sample_means_w(start_s, self.spec.rate_hz, count);
-        if let Some(time_constant_s) = self.spec.low_pass_s {
-            low_pass(&mut means_w, time_constant_s * self.spec.rate_hz);
+        if let Some(mut low_pass) = self.low_pass() {
+            low_pass.apply(&mut means_w);
         }
-        let channels = self.convert(&means_w, start_s)?;
-        let metadata =
-            Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..Metadata::default() };
+        let channels = self.convert(0, &means_w, start_s)?;
+        let metadata = self.metadata(Metadata::default());
         let trace = Trace::new(channels.voltage_v, channels.current_a, self.spec.rate_hz, start_s, metadata)?;
         Ok(Sampled {
             trace: trace.without(self.lost(count)),
@@ -128,10 +127,17 @@ impl Device {
         let edges_s = (0..=trace.samples()).map(|index| trace.time_s(index)).collect();
         let curve = Curve::new(edges_s, trace.powers_w().collect())?;
         let mut sampled = self.sample(&curve, trace.start_s(), curve.end_s())?;
-        let of_device = std::mem::replace(&mut sampled.trace.metadata, trace.metadata.clone());
-        sampled.trace.metadata.device = of_device.device;
-        sampled.trace.metadata.seed = of_device.seed;
+        sampled.trace.metadata = self.metadata(trace.metadata.clone());
         Ok(sampled)
+    }
+
+    /// What a trace says of itself once it was recorded by this device.
+    pub(super) fn metadata(&self, of: Metadata) -> Metadata {
+        Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..of }
+    }
+
+    pub(super) fn low_pass(&self) -> Option<LowPass> {
+        self.spec.low_pass_s.map(|time_constant_s| LowPass::new(time_constant_s * self.spec.rate_hz))
     }
 
     fn amperes(&self, current_a: f64) -> f64 {
@@ -142,8 +148,13 @@ impl Device {
         self.spec.voltage_gain * voltage_v + self.spec.voltage_offset_v
     }
 
-    fn periods_in(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<usize, SampleError> {
-        let (curve_start_s, curve_end_s) = (curve.start_s(), curve.end_s());
+    /// Whole periods between two times within a curve, `most` at most.
+    pub(super) fn periods(
+        &self,
+        [start_s, end_s]: [f64; 2],
+        [curve_start_s, curve_end_s]: [f64; 2],
+        most: f64,
+    ) -> Result<usize, SampleError> {
         if !(start_s >= curve_start_s && end_s <= curve_end_s && start_s <= end_s) {
             return Err(SampleError::Span { start_s, end_s, curve_start_s, curve_end_s });
         }
@@ -153,13 +164,14 @@ impl Device {
         if count < 1.0 {
             return Err(SampleError::TooShort { start_s, end_s, rate_hz: self.spec.rate_hz });
         }
-        if count > MOST {
+        if count > most {
             return Err(SampleError::TooLong { start_s, end_s, rate_hz: self.spec.rate_hz, count });
         }
         Ok(count as usize)
     }
 
-    fn convert(&self, means_w: &[f64], start_s: f64) -> Result<Channels, SampleError> {
+    /// Turns means, of which `first` went before, into samples.
+    pub(super) fn convert(&self, first: u64, means_w: &[f64], start_s: f64) -> Result<Channels, SampleError> {
         let noise = Random::new(self.spec.seed, 0);
         let noisy = self.spec.current_noise_a > 0.0 || self.spec.voltage_noise_v > 0.0;
         let mut channels = Channels {
@@ -168,12 +180,12 @@ impl Device {
             clipped_voltages: 0,
             clipped_currents: 0,
         };
-        for (index, &power_w) in means_w.iter().enumerate() {
+        for (index, &power_w) in (first..).zip(means_w) {
             let Some((volts, amperes)) = self.rail.solve(power_w) else {
                 let time_s = start_s + index as f64 / self.spec.rate_hz;
                 return Err(SampleError::Overload { time_s, power_w, limit_w: self.rail.limit_w() });
             };
-            let (a, v) = if noisy { noise.normals(index as u64) } else { (0.0, 0.0) };
+            let (a, v) = if noisy { noise.normals(index) } else { (0.0, 0.0) };
             let (voltage, voltage_clipped) =
                 self.voltage.quantize(self.volts(volts) + self.spec.voltage_noise_v * v);
             let (current, current_clipped) =
@@ -189,13 +201,23 @@ impl Device {
 
 /// One pole with a time constant in samples, started at rest: `y += (1 - exp(-1/tau)) (x - y)`, the step response
 /// of an RC filter taken at sample steps.
-fn low_pass(values: &mut [f64], time_constant_samples: f64) {
-    let share = -libm::expm1(-1.0 / time_constant_samples);
-    let Some(&first) = values.first() else { return };
-    let mut state = first;
-    for value in values {
-        state += share * (*value - state);
-        *value = state;
+pub(super) struct LowPass {
+    share: f64,
+    state: Option<f64>,
+}
+
+impl LowPass {
+    fn new(time_constant_samples: f64) -> Self {
+        Self { share: -libm::expm1(-1.0 / time_constant_samples), state: None }
+    }
+
+    /// Filters the values that follow those filtered before.
+    pub fn apply(&mut self, values: &mut [f64]) {
+        for value in values {
+            let mut state = self.state.unwrap_or(*value);
+            state += self.share * (*value - state);
+            (*value, self.state) = (state, Some(state));
+        }
     }
 }
 
@@ -237,7 +259,7 @@ mod tests {
     fn the_filter_reaches_63_percent_of_a_step_after_its_time_constant() {
         let mut values = vec![0.0; 1];
         values.extend(vec![1.0; 100]);
-        low_pass(&mut values, 50.0);
+        LowPass::new(50.0).apply(&mut values);
         assert!((values[50] - (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
     }
 

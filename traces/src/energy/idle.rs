@@ -1,7 +1,6 @@
 //! Idle power: measured, and taken off.
 
 use super::{FrameEnergy, PowerIntegral};
-use crate::trace::Trace;
 
 /// Idle power to take off.
 #[derive(Clone, Debug)]
@@ -39,20 +38,12 @@ fn since(integral: &PowerIntegral<'_>, time_s: f64) -> f64 {
     whole * integral.total_j() + integral.energy_j(trace.start_s(), trace.start_s() + rest_s)
 }
 
-/// When a frame's work ends, s: the end of its last sample above `watts`; its start where there is none. What the old
-/// method, from begin to finish, takes as the end of the frame.
-pub fn finish_s(trace: &Trace, frame: &FrameEnergy, watts: f64) -> f64 {
-    let place = |time_s: f64| trace.position(time_s).clamp(0.0, trace.samples() as f64) as usize;
-    let (from, to) = (place(frame.start_s), place(frame.end_s));
-    let last = (from..to).rev().find(|&index| trace.power_w(index) > watts);
-    last.map_or(frame.start_s, |last| trace.time_s(last + 1).clamp(frame.start_s, frame.end_s))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::frames::Flags;
     use crate::metadata::Metadata;
+    use crate::trace::Trace;
 
     fn trace(power: Vec<f32>) -> Trace {
         Trace::new(vec![1.0; power.len()], power, 10.0, 0.0, Metadata::default()).unwrap()
@@ -69,13 +60,6 @@ mod tests {
             let by_instant = Idle::Instant(PowerIntegral::new(&recording)).energy_j(0.0, a_s, b_s);
             assert!((by_instant - Idle::Mean(2.0).energy_j(0.0, a_s, b_s)).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn the_old_method_leaves_out_the_idle_at_the_end() {
-        let trace = trace(vec![5.0, 5.0, 1.0, 5.0, 1.0, 1.0]);
-        assert!((finish_s(&trace, &frame(0.0, 0.6, 1.8), 2.0) - 0.4).abs() < 1e-12);
-        assert_eq!(finish_s(&trace, &frame(0.4, 0.6, 0.2), 2.0), 0.4);
     }
 
     #[test]

@@ -41,7 +41,10 @@ pub fn warm_up(energies_j: &[f64]) -> WarmUp {
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
     let (early, late) = energies_j.split_at(split);
     let excess_j = mean(early) - mean(late);
-    let squares = |part: &[f64]| part.iter().map(|e| (e - mean(part)) * (e - mean(part))).sum::<f64>();
+    let squares = |part: &[f64]| {
+        let mean = mean(part);
+        part.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>()
+    };
     let variance = (squares(early) + squares(late)) / (count - 2) as f64;
     let error_j = libm::sqrt(variance * (1.0 / split as f64 + 1.0 / (count - split) as f64));
     let clearness = excess_j / error_j.max(1e-12 * mean(late).abs()).max(f64::MIN_POSITIVE);

@@ -47,6 +47,24 @@ where
     fs::rename(temporary, path).map_err(io)
 }
 
+/// As [`write_file`], for samples: what is wrong with where they come from is told as it is, by the name of that file alone.
+pub(super) fn write_trace(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteError>,
+) -> Result<(), WriteError> {
+    let mut unread = None;
+    let written = write_file(path, |out| {
+        fill(out).map_err(|error| match error {
+            WriteError::Read(error) => {
+                unread = Some(error);
+                WriteError::Encode("the samples cannot be read".to_owned())
+            }
+            error => error,
+        })
+    });
+    unread.map_or(written, |error| Err(WriteError::Read(error)))
+}
+
 /// Where a file called `path` is or is to be.
 fn destination(path: &Path) -> Result<PathBuf, WriteError> {
     match fs::metadata(path) {

@@ -1,5 +1,6 @@
 //! What can be wrong with a file.
 
+use crate::device::SampleError;
 use crate::trace::TraceError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -183,6 +184,12 @@ pub enum ReadError {
         /// What is wrong.
         reason: String,
     },
+    /// The file is no longer what it was a moment ago.
+    #[error("{path}: changed while it was read: wait until it is written, or copy it", path = path.display())]
+    Changed {
+        /// The file.
+        path: PathBuf,
+    },
     /// The content is no valid trace.
     #[error("{path}: {source}", path = path.display())]
     Trace {
@@ -256,6 +263,12 @@ pub enum WriteError {
         /// Its time, s.
         time_s: f64,
     },
+    /// What is to be written cannot be sampled from its trace.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
+    /// The samples to be written could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// Something else failed while a file was written.
     #[error("{path}: {source}", path = path.display())]
     Content {

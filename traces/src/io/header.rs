@@ -1,8 +1,8 @@
 //! The JSON description that goes with every trace.
 
+use super::source::Heading;
 use super::{ReadError, WriteError};
 use crate::metadata::Metadata;
-use crate::trace::Trace;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,9 +28,9 @@ pub(crate) struct Header {
 }
 
 /// The description of a trace as JSON, on one line if it is to be put into a file's metadata.
-pub(super) fn to_json(trace: &Trace, pretty: bool) -> Result<String, WriteError> {
-    let samples = trace.kept(0..trace.samples()).count() as u64;
-    let header = describe(trace.rate_hz(), trace.start_s(), Some(samples), &trace.metadata)?;
+pub(super) fn to_json(trace: &Heading, pretty: bool) -> Result<String, WriteError> {
+    let samples = trace.samples - trace.lost_samples;
+    let header = describe(trace.rate_hz, trace.start_s, Some(samples), &trace.metadata)?;
     let json = if pretty { serde_json::to_string_pretty(&header) } else { serde_json::to_string(&header) };
     json.map_err(|error| WriteError::Encode(error.to_string()))
 }

@@ -1,7 +1,6 @@
 //! When samples were taken, before all of them have been seen.
 
-use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, grid};
-use multiversion::multiversion;
+use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, all_apart, grid};
 use std::path::Path;
 
 /// Rows from which the rate is first taken.
@@ -66,12 +65,6 @@ impl Clock {
     fn off(&self, stamps: &Stamps, row: usize, first: u64) -> f64 {
         self.position(stamps.time_s(row)) - (first + row as u64) as f64
     }
-}
-
-/// Whether each time is one step after the one before; without a way out on the way, so that many pairs are held at once.
-#[multiversion(targets("x86_64+avx2"))]
-fn all_apart(times: &[i64], step: i64) -> bool {
-    times.iter().zip(&times[1..]).fold(0, |any, (a, b)| any | (b.wrapping_sub(*a) ^ step)) == 0
 }
 
 /// Start, rate and number of a file's samples, from its description, its first rows and its last one.

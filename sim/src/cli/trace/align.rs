@@ -7,7 +7,8 @@ use traces::align::{AlignError, Alignment};
 use traces::io::atomic::write_file;
 
 use super::args::AlignArgs;
-use super::input::{times, wrong};
+use super::input::wrong;
+use super::times::times;
 use crate::cli::Failure;
 use crate::cli::terminal::{complain, print, print_json};
 
@@ -23,8 +24,7 @@ pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
     let alignment = match args.anchor[..] {
         [a, b] => Alignment::by_anchors(a, b)?,
         [] => {
-            let (trace, _) = args.input.load()?;
-            let found = args.find.found_at_once(&trace)?;
+            let found = args.find.frames(&args.input, &args.input.trace)?.found;
             let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
             Alignment::by_fit(&stamps, &starts)?
         }

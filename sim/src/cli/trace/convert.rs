@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use serde_json::json;
-use traces::Trace;
-use traces::io::{atomic, csv, jls, parquet};
+use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, parquet};
 
 use super::args::ConvertArgs;
 use super::input::wrong;
 use crate::cli::Failure;
 use crate::cli::terminal::{complain, print, print_json};
-use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Timeline, decimate};
+use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
 
 /// Bytes of a row of CSV, about; larger files than this many are announced.
 const ROW_BYTES: u64 = 50;
@@ -18,9 +17,9 @@ const LARGE_BYTES: u64 = 1 << 30;
 
 pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     check(&args.out)?;
-    let (trace, repairs) = args.input.load()?;
-    save(&trace, &args.out)?;
-    let (samples, rate_hz) = (trace.samples(), trace.rate_hz());
+    let (trace, repairs) = args.input.source()?;
+    save(&*trace, &args.out)?;
+    let Heading { samples, rate_hz, .. } = trace.heading();
     if args.json {
         let out = args.out.display().to_string();
         return print_json(
@@ -44,8 +43,8 @@ pub(super) fn check(path: &Path) -> Result<(), Failure> {
     Err(wrong(format!("{}: its ending is none of {}", path.display(), known.join(", "))))
 }
 
-/// Writes a trace in the format its name asks for.
-pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
+/// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].
+pub(super) fn save(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
     let name = name(path);
     let plain = name.trim_end_matches(".gz");
     if name.ends_with(".parquet") {
@@ -57,7 +56,7 @@ pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
     if name.ends_with(".perfetto-trace") {
         return perfetto(trace, path);
     }
-    let bytes = trace.samples() as u64 * ROW_BYTES;
+    let bytes = trace.heading().samples * ROW_BYTES;
     if bytes > LARGE_BYTES {
         complain(&format!(
             "{}: about {:.1} GB as text; Parquet takes a tenth",
@@ -70,23 +69,32 @@ pub(super) fn save(trace: &Trace, path: &Path) -> Result<(), Failure> {
 }
 
 /// A counter track of the power, thinned out to what the viewer holds.
-fn perfetto(trace: &Trace, path: &Path) -> Result<(), Failure> {
-    let start_ns = trace.time_ns(0);
-    let points = trace
-        .powers_w()
-        .enumerate()
-        .map(|(index, watts)| ((trace.time_ns(index) - start_ns).unsigned_abs(), watts));
-    let points: Vec<(u64, f64)> = points.collect();
-    let thinned = decimate(&points, MAX_POINTS);
-    if thinned.len() < points.len() {
-        complain(&format!(
-            "{}: {} of {} samples kept, extremes among them",
-            path.display(),
-            thinned.len(),
-            points.len()
-        ));
+fn perfetto(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
+    let heading = trace.heading();
+    let mut track = Track { thinner: Thinner::new(heading.samples, MAX_POINTS) };
+    trace.pour(&mut track)?;
+    let start_ns = heading.time_ns(0);
+    let place = |(index, watts): (u64, f64)| ((heading.time_ns(index) - start_ns).unsigned_abs(), watts);
+    let points: Vec<(u64, f64)> = track.thinner.kept().into_iter().map(place).collect();
+    let (kept, samples) = (points.len() as u64, heading.samples);
+    if kept < samples {
+        complain(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
     }
-    let counters = vec![CounterTrack { name: "power", unit: "W", points: thinned }];
+    let counters = vec![CounterTrack { name: "power", unit: "W", points }];
     let timeline = Timeline { process: "trace", counters, ..Timeline::default() };
     Ok(atomic::write_file(path, |out| perfetto::write(&timeline, out))?)
+}
+
+/// The samples' power on its way to the viewer.
+struct Track {
+    thinner: Thinner,
+}
+
+impl Sink for Track {
+    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+        for (volts, amperes) in stretch.voltage_v.iter().zip(stretch.current_a) {
+            self.thinner.push(f64::from(*volts) * f64::from(*amperes));
+        }
+        Ok(())
+    }
 }

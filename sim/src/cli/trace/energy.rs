@@ -1,27 +1,34 @@
 //! `quintile trace energy`.
 
+use std::path::Path;
+
 use serde_json::json;
-use traces::Trace;
-use traces::energy::{FrameEnergy, Idle, Pooled, PowerIntegral, Spread, finish_s, outliers, pooled, warm_up};
+use traces::energy::{
+    FrameEnergy, Idle, Pooled, PowerIntegral, Spread, energies_j, finishes_s, levels_w, outliers, pooled,
+    warm_up,
+};
+use traces::io::{Heading, Repair, Source};
 
 use super::args::{Discard, EnergyArgs, IdleBy};
 use super::input::wrong;
 use crate::cli::Failure;
-use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::terminal::{print, print_json};
+
+/// Samples from which the lowest power is taken, about.
+const LEVELS: u64 = 65_536;
 
 pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
-    let (trace, repairs) = args.input.load()?;
     let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
-    let idle = idle(args, &trace, recording.as_ref())?;
     if args.from.is_some() || args.to.is_some() {
-        return stretch(args, &trace, idle.as_ref());
+        let (trace, _) = args.input.source()?;
+        return stretch(args, &*trace, recording.as_ref());
     }
-    let pixels = args.find.pixels.or(trace.metadata.pixels);
-    let mut runs = vec![one_run(args, &trace, idle.as_ref())?];
+    let (first, repairs, of_file) = one_run(args, &args.input.trace, recording.as_ref())?;
+    let pixels = args.find.pixels.or(of_file);
+    let mut runs = vec![first];
     for path in &args.run {
-        let (other, _) = args.input.load_other(path)?;
-        runs.push(one_run(args, &other, self::idle(args, &other, recording.as_ref())?.as_ref())?);
+        runs.push(one_run(args, path, recording.as_ref())?.0);
     }
     let energies: Vec<Vec<f64>> =
         runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
@@ -48,11 +55,17 @@ fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
 }
 
 /// Energy between two times.
-fn stretch(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<(), Failure> {
-    let (from_s, to_s) = (args.from.unwrap_or(trace.start_s()), args.to.unwrap_or(trace.end_s()));
-    check(trace, from_s, to_s, "--from and --to")?;
-    let total_j = PowerIntegral::new(trace).energy_j(from_s, to_s);
-    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(trace.start_s(), from_s, to_s));
+fn stretch(
+    args: &EnergyArgs,
+    trace: &dyn Source,
+    recording: Option<&PowerIntegral<'_>>,
+) -> Result<(), Failure> {
+    let heading = trace.heading();
+    let idle = idle(args, trace, recording)?;
+    let (from_s, to_s) = (args.from.unwrap_or(heading.start_s), args.to.unwrap_or(heading.end_s()));
+    check(&heading, from_s, to_s, "--from and --to")?;
+    let total_j = energies_j(trace, &[(from_s, to_s)])?[0];
+    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(heading.start_s, from_s, to_s));
     let (energy_j, power_w) = (total_j - idle_j, (total_j - idle_j) / (to_s - from_s));
     if args.json {
         return print_json(
@@ -63,8 +76,8 @@ fn stretch(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<
     print(&format!("{from_s} s to {to_s} s: {energy_j:.6} J, {power_w:.4} W (idle taken off: {idle_j:.6} J)"))
 }
 
-fn check(trace: &Trace, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
-    let (start_s, end_s) = (trace.start_s(), trace.end_s());
+fn check(trace: &Heading, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
+    let (start_s, end_s) = (trace.start_s, trace.end_s());
     let rounding_s = 1e-12 * start_s.abs().max(end_s.abs());
     if from_s >= start_s - rounding_s && to_s <= end_s + rounding_s && from_s < to_s {
         return Ok(());
@@ -74,12 +87,12 @@ fn check(trace: &Trace, from_s: f64, to_s: f64, what: &str) -> Result<(), Failur
 
 fn idle<'a>(
     args: &EnergyArgs,
-    trace: &Trace,
+    trace: &dyn Source,
     recording: Option<&PowerIntegral<'a>>,
 ) -> Result<Option<Idle<'a>>, Failure> {
     if let Some((from_s, to_s)) = args.idle {
-        check(trace, from_s, to_s, "--idle")?;
-        return Ok(Some(Idle::Mean(PowerIntegral::new(trace).energy_j(from_s, to_s) / (to_s - from_s))));
+        check(&trace.heading(), from_s, to_s, "--idle")?;
+        return Ok(Some(Idle::Mean(energies_j(trace, &[(from_s, to_s)])?[0] / (to_s - from_s))));
     }
     if let Some(recording) = recording {
         let length_s = recording.trace().end_s() - recording.trace().start_s();
@@ -101,13 +114,18 @@ struct Run {
     passes: Vec<(String, Spread)>,
 }
 
-fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<Run, Failure> {
-    let found = args.find.found_at_once(trace)?;
-    for warning in &found.warnings {
-        complain(&format!("warning {}: {}", warning.code, warning.message));
-    }
-    let integral = PowerIntegral::new(trace);
-    let mut frames = integral.frames(&found);
+/// One recording: its frames, what was mended in it, and the pixels of its frames if it says so.
+fn one_run(
+    args: &EnergyArgs,
+    path: &Path,
+    recording: Option<&PowerIntegral<'_>>,
+) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
+    let (found, trace) = args.find.frames_and_samples(&args.input, path)?;
+    found.warn();
+    let mut frames = found.energies;
+    let (trace, start_s) = (&*trace, trace.heading().start_s);
+    let idle = idle(args, trace, recording)?;
+    let idle_j = |a_s: f64, b_s: f64| idle.as_ref().map_or(0.0, |idle| idle.energy_j(start_s, a_s, b_s));
     let all: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
     let warm = warm_up(&all);
     let discarded = match args.discard {
@@ -116,14 +134,10 @@ fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<
     };
     let out = outliers(&all);
     let count = out.iter().skip(discarded).filter(|out| **out).count();
-    let busy_w = busy_above(args, trace, &frames);
-    let begin_to_finish = |frame: &FrameEnergy| {
-        let (a_s, b_s) = (frame.start_s, finish_s(trace, frame, busy_w));
-        integral.energy_j(a_s, b_s) - idle.map_or(0.0, |idle| idle.energy_j(trace.start_s(), a_s, b_s))
-    };
-    let old: Vec<f64> = frames.iter().map(begin_to_finish).collect();
-    if let Some(idle) = idle {
-        idle.take_off(trace.start_s(), &mut frames);
+    let old = begin_to_finish(args, trace, &frames)?.into_iter();
+    let old: Vec<f64> = old.map(|((a_s, b_s), energy_j)| energy_j - idle_j(a_s, b_s)).collect();
+    if let Some(idle) = &idle {
+        idle.take_off(start_s, &mut frames);
     }
     let keep = |index: usize| index >= discarded && !(args.drop_outliers && out[index]);
     let kept: Vec<FrameEnergy> =
@@ -131,29 +145,45 @@ fn one_run(args: &EnergyArgs, trace: &Trace, idle: Option<&Idle<'_>>) -> Result<
     let old: Vec<f64> = old.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, j)| j).collect();
     let none = || wrong(format!("of {} frames none is left after {discarded} are discarded", frames.len()));
     let old = Spread::of(&old).ok_or_else(none)?;
-    let passes = passes(args, &integral, &kept, idle, trace.start_s())?;
-    Ok(Run { kept, discarded, clearness: warm.clearness, outliers: count, old, passes })
+    let passes = passes(args, trace, &kept, &idle_j)?;
+    let run = Run { kept, discarded, clearness: warm.clearness, outliers: count, old, passes };
+    Ok((run, found.repairs, found.metadata.pixels))
+}
+
+/// A span of time, s.
+type Span = (f64, f64);
+
+/// From when to when each frame's work goes on, and its energy, J: the old method.
+fn begin_to_finish(
+    args: &EnergyArgs,
+    trace: &dyn Source,
+    frames: &[FrameEnergy],
+) -> Result<Vec<(Span, f64)>, Failure> {
+    let busy_w = match args.busy_above {
+        Some(watts) => watts,
+        None => busy_above(levels_w(trace, LEVELS)?, frames),
+    };
+    let finishes_s = finishes_s(trace, frames, busy_w)?;
+    let spans: Vec<Span> = frames.iter().map(|frame| frame.start_s).zip(finishes_s).collect();
+    let energies = energies_j(trace, &spans)?;
+    Ok(spans.into_iter().zip(energies).collect())
 }
 
 /// A tenth of the way from the lowest to the mean power of the frames.
-fn busy_above(args: &EnergyArgs, trace: &Trace, frames: &[FrameEnergy]) -> f64 {
-    args.busy_above.unwrap_or_else(|| {
-        let mut powers: Vec<f64> = trace.powers_w().step_by(trace.samples().div_ceil(65_536)).collect();
-        powers.sort_by(f64::total_cmp);
-        let low = powers[powers.len() / 20];
-        let mean = frames.iter().map(FrameEnergy::power_w).sum::<f64>() / frames.len().max(1) as f64;
-        low + 0.1 * (mean - low).max(0.0)
-    })
+fn busy_above(mut powers: Vec<f64>, frames: &[FrameEnergy]) -> f64 {
+    powers.sort_by(f64::total_cmp);
+    let low = powers[powers.len() / 20];
+    let mean = frames.iter().map(FrameEnergy::power_w).sum::<f64>() / frames.len().max(1) as f64;
+    low + 0.1 * (mean - low).max(0.0)
 }
 
 /// Energy of each pass, from its mark to the next one, or to the end of the frame; what is before the first is a pass
 /// of its own, so that they add up.
 fn passes(
     args: &EnergyArgs,
-    integral: &PowerIntegral<'_>,
+    trace: &dyn Source,
     frames: &[FrameEnergy],
-    idle: Option<&Idle<'_>>,
-    start_s: f64,
+    idle_j: &dyn Fn(f64, f64) -> f64,
 ) -> Result<Vec<(String, Spread)>, Failure> {
     let mut marks = args.pass.clone();
     if marks.is_empty() {
@@ -165,14 +195,13 @@ fn passes(
     }
     let mut passes = Vec::new();
     for (index, (name, ms)) in marks.iter().enumerate() {
-        let energies: Vec<f64> = frames
-            .iter()
-            .map(|frame| {
-                let at = |ms: f64| (frame.start_s + ms * 1e-3).min(frame.end_s);
-                let (a_s, b_s) = (at(*ms), marks.get(index + 1).map_or(frame.end_s, |next| at(next.1)));
-                integral.energy_j(a_s, b_s) - idle.map_or(0.0, |idle| idle.energy_j(start_s, a_s, b_s))
-            })
-            .collect();
+        let span = |frame: &FrameEnergy| {
+            let at = |ms: f64| (frame.start_s + ms * 1e-3).min(frame.end_s);
+            (at(*ms), marks.get(index + 1).map_or(frame.end_s, |next| at(next.1)))
+        };
+        let spans: Vec<Span> = frames.iter().map(span).collect();
+        let less_idle = |(energy_j, (a_s, b_s)): (f64, &Span)| energy_j - idle_j(*a_s, *b_s);
+        let energies: Vec<f64> = energies_j(trace, &spans)?.into_iter().zip(&spans).map(less_idle).collect();
         passes.extend(Spread::of(&energies).map(|spread| (name.clone(), spread)));
     }
     Ok(passes)

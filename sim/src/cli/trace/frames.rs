@@ -15,7 +15,7 @@ const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
     let (frames, table, pixels) = threads(args.threads)?.install(|| {
-        let mut frames = args.find.frames(&args.input)?;
+        let mut frames = args.find.frames(&args.input, &args.input.trace)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
         if let Some(out) = &args.out {

@@ -5,12 +5,13 @@ use std::path::Path;
 
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadError, ReadOptions, Repair, Rows, WriteError, read};
+use traces::io::{ReadError, ReadOptions, Recording, Repair, Rows, Source, WriteError, read};
 use traces::stream::{self, StreamError};
 use traces::trace::RATE_LIMITS_HZ;
 use traces::{MarkKind, Metadata, Trace, Warning};
 
 use super::args::{FindArgs, InputArgs};
+use super::times::times;
 use crate::cli::Failure;
 use crate::cli::terminal::complain;
 
@@ -44,7 +45,11 @@ impl From<StreamError> for Failure {
 
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
-        Self { message: error.to_string(), code: 1 }
+        match error {
+            WriteError::Read(error) => error.into(),
+            WriteError::Sample(error) => wrong(error.to_string()),
+            error => Self { message: error.to_string(), code: 1 },
+        }
     }
 }
 
@@ -85,10 +90,31 @@ impl InputArgs {
     /// Another trace, read in the same way.
     pub(super) fn load_other(&self, path: &Path) -> Result<(Trace, Vec<Repair>), Failure> {
         let loaded = read(path, &self.options()?)?;
-        for repair in &loaded.repairs {
-            complain(&format!("{}: mended: {}", path.display(), repair.message));
-        }
+        tell_repairs(path, &loaded.repairs);
         Ok((loaded.trace, loaded.repairs))
+    }
+
+    /// The trace as a source of samples, read in pieces; one that has to be mended is in memory, as what is mended depends
+    /// on all of it. What was mended is told.
+    pub(super) fn source(&self) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
+        match Recording::open(&self.trace, &self.options()?) {
+            Ok(recording) => {
+                let repairs = recording.repairs().to_vec();
+                tell_repairs(&self.trace, &repairs);
+                Ok((Box::new(recording), repairs))
+            }
+            Err(_) if self.repair => {
+                let (trace, repairs) = self.load()?;
+                Ok((Box::new(trace), repairs))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+fn tell_repairs(path: &Path, repairs: &[Repair]) {
+    for repair in repairs {
+        complain(&format!("{}: mended: {}", path.display(), repair.message));
     }
 }
 
@@ -117,29 +143,45 @@ fn tell(warning: &Warning) {
 
 impl FindArgs {
     /// Finds frames in memory, or in pieces where the trace is long.
-    pub(super) fn frames(&self, input: &InputArgs) -> Result<Frames, Failure> {
-        if self.streams(input)? {
-            return self.in_pieces(input);
+    pub(super) fn frames(&self, input: &InputArgs, path: &Path) -> Result<Frames, Failure> {
+        if self.streams(input, path)? {
+            return self.in_pieces(input, path);
         }
-        let (trace, repairs) = input.load()?;
-        let (found, proposal) = self.found(&trace)?;
-        let integral = PowerIntegral::new(&trace);
-        let (energies, total_j) = (integral.frames(&found), integral.total_j());
-        let (samples, rate_hz, start_s) = (trace.samples() as u64, trace.rate_hz(), trace.start_s());
+        let (trace, repairs) = input.load_other(path)?;
+        self.at_once(&trace, repairs)
+    }
+
+    /// As [`FindArgs::frames`], with the samples they were found in.
+    pub(super) fn frames_and_samples(
+        &self,
+        input: &InputArgs,
+        path: &Path,
+    ) -> Result<(Frames, Box<dyn Source>), Failure> {
+        if self.streams(input, path)? {
+            let recording = Recording::open(path, &input.options()?)?;
+            return Ok((self.in_pieces(input, path)?, Box::new(recording)));
+        }
+        let (trace, repairs) = input.load_other(path)?;
+        Ok((self.at_once(&trace, repairs)?, Box::new(trace)))
+    }
+
+    fn at_once(&self, trace: &Trace, repairs: Vec<Repair>) -> Result<Frames, Failure> {
+        let (found, proposal) = self.found(trace)?;
+        let integral = PowerIntegral::new(trace);
         Ok(Frames {
+            energies: integral.frames(&found),
             found,
-            energies,
-            samples,
-            rate_hz,
-            start_s,
-            total_j,
+            samples: trace.samples() as u64,
+            rate_hz: trace.rate_hz(),
+            start_s: trace.start_s(),
+            total_j: integral.total_j(),
             proposal,
             repairs,
-            metadata: trace.metadata,
+            metadata: trace.metadata.clone(),
         })
     }
 
-    fn streams(&self, input: &InputArgs) -> Result<bool, Failure> {
+    fn streams(&self, input: &InputArgs, path: &Path) -> Result<bool, Failure> {
         if matches!(self.method, Method::Tracking | Method::Normalized) || input.repair {
             return if self.stream {
                 Err(wrong("--stream goes with the sum of squares and without --repair; leave one out"))
@@ -147,21 +189,21 @@ impl FindArgs {
                 Ok(false)
             };
         }
-        let rows = Rows::open(&input.trace, &input.options()?)?;
-        let bytes = fs::metadata(&input.trace).map_or(0, |metadata| metadata.len());
+        let rows = Rows::open(path, &input.options()?)?;
+        let bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
         Ok(self.stream || rows.count().map_or(bytes > LONG_BYTES, |count| count > LONG))
     }
 
-    fn in_pieces(&self, input: &InputArgs) -> Result<Frames, Failure> {
+    fn in_pieces(&self, input: &InputArgs, path: &Path) -> Result<Frames, Failure> {
         let options = input.options()?;
         if self.auto {
             return Err(wrong("--auto looks at traces that fit into memory; mark a frame with --mark"));
         }
-        let rows = Rows::open(&input.trace, &options)?;
+        let rows = Rows::open(path, &options)?;
         let starts_s = self.marks(rows.metadata())?;
         let end_s = self.end.or_else(|| end_mark(rows.metadata())).unwrap_or(f64::INFINITY);
         let marks = Marks { starts_s, window: self.window_s()?, end_s };
-        let streamed = stream::find(&input.trace, &options, &marks)?;
+        let streamed = stream::find(path, &options, &marks)?;
         let clock = streamed.clock;
         Ok(Frames {
             found: streamed.found,
@@ -179,7 +221,7 @@ impl FindArgs {
     /// Frames of a trace in memory, where nothing is read in pieces.
     pub(super) fn found_at_once(&self, trace: &Trace) -> Result<Found, Failure> {
         if self.stream {
-            return Err(wrong("--stream goes with `trace frames` alone; leave it out"));
+            return Err(wrong("--stream: to draw frames, all samples are held; leave it out"));
         }
         Ok(self.found(trace)?.0)
     }
@@ -229,42 +271,4 @@ impl FindArgs {
 
 fn end_mark(metadata: &Metadata) -> Option<f64> {
     metadata.marks.iter().rev().find(|mark| mark.kind == MarkKind::End).map(|mark| mark.time_s)
-}
-
-/// Names of columns of times.
-const TIMES: [&str; 4] = ["start_s", "time_s", "mark_s", "stamp_s"];
-
-/// Times from a file: a number in each line, or the first of the columns [`TIMES`] that a table has.
-pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
-    let text = fs::read_to_string(path)
-        .map_err(|error| wrong(format!("{}: cannot be read: {error}", path.display())))?;
-    let mut column = 0;
-    let mut times = Vec::new();
-    for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let fields: Vec<&str> =
-            line.trim_start_matches('\u{feff}').split([',', '\t', ';']).map(str::trim).collect();
-        match fields.get(column).and_then(|field| field.parse::<f64>().ok()).filter(|time| time.is_finite()) {
-            Some(time) => times.push(time),
-            None if times.is_empty() && index == 0 => column = time_column(path, &fields)?,
-            None => {
-                let message = format!(
-                    "{}: line {}: `{line}` holds no time in seconds; mend it",
-                    path.display(),
-                    index + 1
-                );
-                return Err(wrong(message));
-            }
-        }
-    }
-    if times.is_empty() { Err(wrong(format!("{}: holds no time", path.display()))) } else { Ok(times) }
-}
-
-/// Where times stand in a table; a single column may be called anything.
-fn time_column(path: &Path, names: &[&str]) -> Result<usize, Failure> {
-    let named = |time: &&str| names.iter().position(|name| name.eq_ignore_ascii_case(time));
-    let only = (names.len() == 1).then_some(0);
-    TIMES.iter().find_map(named).or(only).ok_or_else(|| {
-        let (found, times) = (names.join(", "), TIMES.join(", "));
-        wrong(format!("{}: none of its columns ({found}) is called {times}: rename one", path.display()))
-    })
 }

@@ -9,6 +9,7 @@ mod input;
 mod pareto;
 mod plot;
 mod sample;
+mod times;
 
 use super::Failure;
 use args::{TraceArgs, TraceCommand};

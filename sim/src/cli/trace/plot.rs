@@ -118,14 +118,37 @@ fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
     if args.from.is_some() || args.to.is_some() {
         return Err(wrong("--from and --to choose a part of --kind curve; leave them out"));
     }
+    let (count, (title, x, y, series)) = match args.kind {
+        PlotKind::Frame | PlotKind::Overlay => samples(args)?,
+        _ => energies(args)?,
+    };
+    let shown = format!("{count} frames");
+    let subject = format!("{} - {shown}", args.input.trace.display());
+    Ok((Lines { title, subject: &subject, x, y, series }.picture(), shown))
+}
+
+/// The kinds that show samples of frames, which are held.
+fn samples(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
     let (trace, _) = args.input.load()?;
     let found = args.find.found_at_once(&trace)?;
     let frames = PowerIntegral::new(&trace).frames(&found);
-    let energies: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
-    let shown = format!("{} frames", frames.len());
-    let (title, x, y, series) = match args.kind {
+    let drawn = match args.kind {
         PlotKind::Frame => one_frame(args, &trace, &frames)?,
-        PlotKind::Overlay => overlay(&trace, &frames),
+        _ => overlay(&trace, &frames),
+    };
+    Ok((frames.len(), drawn))
+}
+
+/// The energy of each frame of one recording, J, in pieces where it is long.
+fn energies_of(args: &PlotArgs, path: &Path) -> Result<Vec<f64>, Failure> {
+    let frames = args.find.frames(&args.input, path)?;
+    Ok(frames.energies.iter().map(|frame| frame.energy_j).collect())
+}
+
+/// The kinds that show energies of frames.
+fn energies(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
+    let energies = energies_of(args, &args.input.trace)?;
+    let drawn = match args.kind {
         PlotKind::Histogram => histogram(&energies),
         PlotKind::Discard => {
             let means = mean_over_discarded(&energies);
@@ -138,8 +161,8 @@ fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
                 vec![series("mean of the rest", Mark::Line(line))],
             )
         }
-        PlotKind::Repeats => repeats(args, energies)?,
-        PlotKind::Energy | PlotKind::Curve => {
+        PlotKind::Repeats => repeats(args, &energies)?,
+        _ => {
             let out = traces::energy::outliers(&energies);
             let of = |odd: bool| {
                 let chosen = energies.iter().enumerate().filter(|(index, _)| out[*index] == odd);
@@ -149,8 +172,7 @@ fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
             ("Energy per frame", ("frame", ""), ("energy", "J"), series)
         }
     };
-    let subject = format!("{} - {shown}", args.input.trace.display());
-    Ok((Lines { title, subject: &subject, x, y, series }.picture(), shown))
+    Ok((energies.len(), drawn))
 }
 
 type Drawn = (&'static str, (&'static str, &'static str), (&'static str, &'static str), Vec<Series>);
@@ -213,12 +235,10 @@ fn histogram(energies: &[f64]) -> Drawn {
 }
 
 /// Mean and deviation of the n-th frame over all runs.
-fn repeats(args: &PlotArgs, first: Vec<f64>) -> Result<Drawn, Failure> {
-    let mut runs = vec![first];
+fn repeats(args: &PlotArgs, first: &[f64]) -> Result<Drawn, Failure> {
+    let mut runs = vec![first.to_vec()];
     for path in &args.run {
-        let (trace, _) = args.input.load_other(path)?;
-        let found = args.find.found_at_once(&trace)?;
-        runs.push(PowerIntegral::new(&trace).frames(&found).iter().map(|frame| frame.energy_j).collect());
+        runs.push(energies_of(args, path)?);
     }
     let (frames, most) =
         (runs.iter().map(Vec::len).min().unwrap_or(0), runs.iter().map(Vec::len).max().unwrap_or(0));

@@ -2,7 +2,8 @@
 
 use serde_json::json;
 use traces::device::{Device, DeviceSpec, RATES_HZ};
-use traces::energy::PowerIntegral;
+use traces::energy::energies_j;
+use traces::io::Source;
 
 use super::args::SampleArgs;
 use super::convert::{check, save};
@@ -13,26 +14,27 @@ use crate::cli::terminal::{complain, print, print_json};
 pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     check(&args.out)?;
     let device = Device::new(spec(args)?).map_err(|error| wrong(error.to_string()))?;
-    let (trace, _) = args.input.load()?;
-    let sampled = device.resample(&trace).map_err(|error| wrong(error.to_string()))?;
+    let (trace, _) = args.input.source()?;
+    let sampled = device.resample_in_pieces(&*trace)?;
     if sampled.clipped_currents + sampled.clipped_voltages > 0 {
         complain(&format!(
             "warning clipped: {} currents and {} voltages were beyond the device's range",
             sampled.clipped_currents, sampled.clipped_voltages
         ));
     }
-    if let Some(losses) = sampled.trace.losses() {
+    if let Some(losses) = sampled.losses() {
         complain(&format!("warning packets-lost: {losses}; --repair fills them"));
     }
-    save(&sampled.trace, &args.out)?;
-    let before_j = PowerIntegral::new(&trace).energy_j(sampled.trace.start_s(), sampled.trace.end_s());
-    let after_j = PowerIntegral::new(&sampled.trace).total_j();
+    save(&sampled, &args.out)?;
+    let heading = sampled.heading();
+    let before_j = energies_j(&*trace, &[(heading.start_s, heading.end_s())])?[0];
+    let after_j = sampled.energy_j;
     let error = after_j / before_j - 1.0;
-    let samples = sampled.trace.samples();
+    let samples = heading.samples;
     if args.json {
         return print_json(
             &json!({ "samples": samples, "device": device.spec(), "energy_J": before_j, "sampled_energy_J": after_j,
-                "relative_error": error, "lost_samples": sampled.trace.lost_samples(), "clipped_currents": sampled.clipped_currents,
+                "relative_error": error, "lost_samples": heading.lost_samples, "clipped_currents": sampled.clipped_currents,
                 "clipped_voltages": sampled.clipped_voltages }),
             true,
         );

@@ -17,27 +17,61 @@ pub struct BusySlice {
     pub utilisation: f64,
 }
 
-/// At most `limit` (at least 4) of `points`, in order: all of them where they are few enough, else the lowest and the
-/// highest of each of `limit / 2 - 1` stretches of equal length in points, beside the first and the last of all.
-/// Points that are not finite are left out.
+/// At most `limit` (at least 4) of `points`, in order, as [`Thinner`] keeps them. Points that are not finite are left out.
 pub fn decimate(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
     let finite: Vec<(u64, f64)> = points.iter().copied().filter(|(_, value)| value.is_finite()).collect();
-    if finite.len() <= limit.max(4) {
-        return finite;
+    let mut thinner = Thinner::new(finite.len() as u64, limit);
+    finite.iter().for_each(|(_, value)| thinner.push(*value));
+    thinner.kept().into_iter().map(|(index, _)| finite[index as usize]).collect()
+}
+
+/// Keeps at most `limit` (at least 4) of many values that are seen once: all of them where they are few enough, else the
+/// lowest and the highest of each of `limit / 2 - 1` stretches of equal length, beside the first and the last of all.
+#[derive(Clone, Debug)]
+pub struct Thinner {
+    count: u64,
+    /// Values in a stretch; 1 keeps all.
+    length: u64,
+    seen: u64,
+    low: (u64, f64),
+    high: (u64, f64),
+    kept: Vec<(u64, f64)>,
+}
+
+impl Thinner {
+    /// For `count` finite values.
+    pub fn new(count: u64, limit: usize) -> Self {
+        let limit = limit.max(4) as u64;
+        let length = if count <= limit { 1 } else { count.div_ceil(limit / 2 - 1) };
+        Self { count, length, seen: 0, low: (0, 0.0), high: (0, 0.0), kept: Vec::new() }
     }
-    let stretches = limit.max(4) / 2 - 1;
-    let length = finite.len().div_ceil(stretches);
-    let last = finite.len() - 1;
-    let mut kept = vec![0, last];
-    for start in (0..finite.len()).step_by(length) {
-        let stretch = start..(start + length).min(finite.len());
-        let value = |index: &usize| finite[*index].1;
-        kept.extend(stretch.clone().min_by(|a, b| value(a).total_cmp(&value(b))));
-        kept.extend(stretch.max_by(|a, b| value(a).total_cmp(&value(b))));
+
+    /// The next value.
+    pub fn push(&mut self, value: f64) {
+        let point = (self.seen, value);
+        let fresh = self.seen.is_multiple_of(self.length);
+        if fresh || value.total_cmp(&self.low.1).is_lt() {
+            self.low = point;
+        }
+        if fresh || value.total_cmp(&self.high.1).is_ge() {
+            self.high = point;
+        }
+        self.seen += 1;
+        let last = self.seen == self.count;
+        if point.0 == 0 || last {
+            self.kept.push(point);
+        }
+        if last || self.seen.is_multiple_of(self.length) {
+            self.kept.extend([self.low, self.high]);
+        }
     }
-    kept.sort_unstable();
-    kept.dedup();
-    kept.into_iter().map(|index| finite[index]).collect()
+
+    /// The values kept, each with its number from 0, in order.
+    pub fn kept(mut self) -> Vec<(u64, f64)> {
+        self.kept.sort_unstable_by_key(|(index, _)| *index);
+        self.kept.dedup_by_key(|(index, _)| *index);
+        self.kept
+    }
 }
 
 /// The slices of a unit whose busy fraction in bin `i`, the time from `start_ns + i bin_ns` to the next, is `busy[i]`.
@@ -100,6 +134,35 @@ mod tests {
         assert!(kept.contains(&(333_330, 50.0)) && kept.contains(&(777_770, -1.0)));
         assert_eq!((kept[0].0, kept[kept.len() - 1].0), (0, 999_990));
         assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
+    }
+
+    /// The rule as it was written first, for points that are all at hand.
+    fn of_all(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
+        if points.len() <= limit.max(4) {
+            return points.to_vec();
+        }
+        let length = points.len().div_ceil(limit.max(4) / 2 - 1);
+        let mut kept = vec![0, points.len() - 1];
+        for start in (0..points.len()).step_by(length) {
+            let stretch = start..(start + length).min(points.len());
+            let value = |index: &usize| points[*index].1;
+            kept.extend(stretch.clone().min_by(|a, b| value(a).total_cmp(&value(b))));
+            kept.extend(stretch.max_by(|a, b| value(a).total_cmp(&value(b))));
+        }
+        kept.sort_unstable();
+        kept.dedup();
+        kept.into_iter().map(|index| points[index]).collect()
+    }
+
+    #[test]
+    fn oracle_values_seen_once_are_thinned_as_if_all_were_at_hand() {
+        for count in [0_u64, 1, 4, 5, 6, 7, 99, 100, 101, 1000, 1001, 4097] {
+            // Few levels, so that lowest and highest are tied.
+            let points: Vec<(u64, f64)> = (0..count).map(|i| (i * 3, (i * 7919 % 13) as f64)).collect();
+            for limit in [0, 4, 7, 20, 100, 1000] {
+                assert_eq!(decimate(&points, limit), of_all(&points, limit), "{count} {limit}");
+            }
+        }
     }
 
     #[test]

@@ -5,9 +5,8 @@ use super::definitions::{self, Heads, Named};
 use super::format::{END, LONGEST_BYTES};
 use super::signal::Signal;
 use super::utc::{self, Times};
-use crate::io::{WriteError, atomic, header};
+use crate::io::{Sink, Source, Stretch, WriteError, atomic, header};
 use crate::metadata::Metadata;
-use crate::trace::Trace;
 use std::io::{self, Seek, Write};
 use std::path::Path;
 
@@ -172,19 +171,24 @@ impl<W: Write + Seek> Writer<W> {
     }
 }
 
-/// Writes a trace, lost samples as NaN. The same trace gives the same bytes.
+impl<W: Write + Seek + Send> Sink for Writer<W> {
+    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+        if stretch.lost {
+            self.skip(stretch.len() as u64)
+        } else {
+            self.push(stretch.voltage_v, stretch.current_a)
+        }
+    }
+}
+
+/// Writes a trace, lost samples as NaN. The same trace gives the same bytes, whatever pieces it comes in.
 ///
 /// # Errors
-/// As [`Writer`].
-pub fn write<W: Write + Seek>(trace: &Trace, out: W) -> Result<(), WriteError> {
-    let mut writer = Writer::new(out, trace.rate_hz(), trace.start_s(), &trace.metadata)?;
-    let mut from = 0;
-    for lost in trace.lost() {
-        writer.push(&trace.voltage_v()[from..lost.start], &trace.current_a()[from..lost.start])?;
-        writer.skip(lost.len() as u64)?;
-        from = lost.end;
-    }
-    writer.push(&trace.voltage_v()[from..], &trace.current_a()[from..])?;
+/// As [`Writer`], or [`WriteError::Read`] where the samples cannot be read.
+pub fn write<W: Write + Seek + Send>(trace: &dyn Source, out: W) -> Result<(), WriteError> {
+    let heading = trace.heading();
+    let mut writer = Writer::new(out, heading.rate_hz, heading.start_s, &heading.metadata)?;
+    trace.pour(&mut writer)?;
     writer.finish()
 }
 
@@ -192,6 +196,6 @@ pub fn write<W: Write + Seek>(trace: &Trace, out: W) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// [`WriteError`] names the file.
-pub fn save(trace: &Trace, path: &Path) -> Result<(), WriteError> {
-    atomic::write_file(path, |out| write(trace, out))
+pub fn save(trace: &dyn Source, path: &Path) -> Result<(), WriteError> {
+    atomic::write_trace(path, |out| write(trace, out))
 }

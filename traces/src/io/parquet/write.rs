@@ -1,8 +1,8 @@
 //! Writing.
 
 use crate::io::header::{self, KEYS};
+use crate::io::source::{Heading, Sink, Source, Stretch};
 use crate::io::{WriteError, atomic};
-use crate::trace::Trace;
 use parquet::basic::{Compression, Encoding, Repetition, Type as Physical};
 use parquet::data_type::{DataType, FloatType, Int64Type};
 use parquet::errors::ParquetError;
@@ -14,56 +14,112 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rows per row group: 20 s at 50 kHz; bounds the memory of readers that take one at a time.
-const GROUP_ROWS: usize = 1 << 20;
+/// Rows per row group: 20 s at 50 kHz; bounds the memory of readers that take one at a time, and ours.
+const GROUP_ROWS: u64 = 1 << 20;
 /// The columns, in order.
 const FIELDS: [(&str, Physical); 3] =
     [("time_ns", Physical::INT64), ("voltage_V", Physical::FLOAT), ("current_A", Physical::FLOAT)];
 
-/// Writes a trace. The same trace gives the same bytes.
+/// Writes a trace, one row group after the other. The same trace gives the same bytes, whatever pieces it comes in.
 ///
 /// Times are delta encoded, values a dictionary of the device's codes (byte planes where there are too many), both
 /// compressed with Snappy, which needs no C.
 ///
 /// # Errors
-/// [`WriteError`] if a mark is not finite or the writer fails.
-pub fn write<W: Write + Send>(trace: &Trace, out: W) -> Result<(), WriteError> {
-    let json = header::to_json(trace, false)?;
-    write_file(trace, json, out).map_err(|error| WriteError::Encode(error.to_string()))
+/// [`WriteError`] if a mark is not finite, the writer fails, or the samples cannot be read.
+pub fn write<W: Write + Send>(trace: &dyn Source, out: W) -> Result<(), WriteError> {
+    let heading = trace.heading();
+    let json = header::to_json(&heading, false)?;
+    write_described(trace, heading, json, out)
 }
 
 /// Writes a file, whole or not at all.
 ///
 /// # Errors
 /// [`WriteError`] names the file.
-pub fn save(trace: &Trace, path: &Path) -> Result<(), WriteError> {
-    atomic::write_file(path, |out| write(trace, out))
+pub fn save(trace: &dyn Source, path: &Path) -> Result<(), WriteError> {
+    atomic::write_trace(path, |out| write(trace, out))
 }
 
 /// Without a description, as others write: rate and number of rows are then not stated.
 #[cfg(test)]
-pub(crate) fn bare(trace: &Trace, path: &Path) -> Result<(), WriteError> {
-    let encode = |error: ParquetError| WriteError::Encode(error.to_string());
-    atomic::write_file(path, |out| write_file(trace, "{}".to_owned(), out).map_err(encode))
+pub(crate) fn bare(trace: &dyn Source, path: &Path) -> Result<(), WriteError> {
+    atomic::write_trace(path, |out| write_described(trace, trace.heading(), "{}".to_owned(), out))
 }
 
-fn write_file<W: Write + Send>(trace: &Trace, json: String, out: W) -> Result<(), ParquetError> {
-    let mut writer = SerializedFileWriter::new(out, Arc::new(schema()?), Arc::new(properties(json)))?;
-    for start in (0..trace.samples()).step_by(GROUP_ROWS) {
-        let rows: Vec<usize> = trace.kept(start..trace.samples().min(start + GROUP_ROWS)).collect();
-        if rows.is_empty() {
-            continue;
+fn write_described<W: Write + Send>(
+    trace: &dyn Source,
+    heading: Heading,
+    json: String,
+    out: W,
+) -> Result<(), WriteError> {
+    let mut writer = Writer::new(heading, json, out).map_err(encode)?;
+    trace.pour(&mut writer)?;
+    writer.finish().map_err(encode)
+}
+
+fn encode(error: ParquetError) -> WriteError {
+    WriteError::Encode(error.to_string())
+}
+
+/// A file being written: the rows of one group are held until it is full.
+struct Writer<W: Write + Send> {
+    file: SerializedFileWriter<W>,
+    heading: Heading,
+    /// Number of the group at hand, as the numbers of samples have it: of groups that were lost whole nothing is written.
+    group: u64,
+    times_ns: Vec<i64>,
+    voltage_v: Vec<f32>,
+    current_a: Vec<f32>,
+}
+
+impl<W: Write + Send> Sink for Writer<W> {
+    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+        let mut rest = *stretch;
+        while !rest.is_empty() && !rest.lost {
+            let group = rest.first / GROUP_ROWS;
+            if group != self.group {
+                self.write_group().map_err(encode)?;
+                self.group = group;
+            }
+            let room = ((group + 1) * GROUP_ROWS - rest.first) as usize;
+            let now = rest.part(0, rest.len().min(room));
+            self.times_ns
+                .extend((now.first..now.first + now.len() as u64).map(|row| self.heading.time_ns(row)));
+            self.voltage_v.extend_from_slice(now.voltage_v);
+            self.current_a.extend_from_slice(now.current_a);
+            rest = rest.part(now.len(), rest.len());
         }
-        let of = |channel: &[f32]| -> Vec<f32> { rows.iter().map(|&row| channel[row]).collect() };
-        let mut group = writer.next_row_group()?;
-        let times_ns: Vec<i64> = rows.iter().map(|&row| trace.time_ns(row)).collect();
-        write_column::<Int64Type, W>(&mut group, &times_ns)?;
-        write_column::<FloatType, W>(&mut group, &of(trace.voltage_v()))?;
-        write_column::<FloatType, W>(&mut group, &of(trace.current_a()))?;
-        group.close()?;
+        Ok(())
     }
-    writer.close()?;
-    Ok(())
+}
+
+impl<W: Write + Send> Writer<W> {
+    fn new(heading: Heading, json: String, out: W) -> Result<Self, ParquetError> {
+        let file = SerializedFileWriter::new(out, Arc::new(schema()?), Arc::new(properties(json)))?;
+        let (times_ns, voltage_v, current_a) = Default::default();
+        Ok(Self { file, heading, group: 0, times_ns, voltage_v, current_a })
+    }
+
+    fn write_group(&mut self) -> Result<(), ParquetError> {
+        if self.times_ns.is_empty() {
+            return Ok(());
+        }
+        let mut group = self.file.next_row_group()?;
+        write_column::<Int64Type, W>(&mut group, &self.times_ns)?;
+        write_column::<FloatType, W>(&mut group, &self.voltage_v)?;
+        write_column::<FloatType, W>(&mut group, &self.current_a)?;
+        group.close()?;
+        self.times_ns.clear();
+        self.voltage_v.clear();
+        self.current_a.clear();
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<(), ParquetError> {
+        self.write_group()?;
+        self.file.close().map(|_| ())
+    }
 }
 
 fn write_column<T: DataType, W: Write + Send>(
@@ -97,7 +153,7 @@ fn properties(json: String) -> WriterProperties {
         .set_column_dictionary_enabled(time.clone(), false)
         .set_column_encoding(time, Encoding::DELTA_BINARY_PACKED)
         .set_statistics_enabled(EnabledStatistics::Chunk)
-        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .set_max_row_group_row_count(Some(GROUP_ROWS as usize))
         .set_key_value_metadata(Some(vec![KeyValue::new(KEYS[0].to_owned(), json)]))
         .build()
 }

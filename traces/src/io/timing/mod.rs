@@ -1,0 +1,84 @@
+//! From time stamps to a start and a rate, or to the row where they are not even.
+
+mod fit;
+
+use super::ReadError;
+use super::header::Header;
+pub(crate) use fit::{Fit, Fitted};
+use multiversion::multiversion;
+use std::path::Path;
+
+/// A rate is rounded only if that moves the last sample by less than this share of a period.
+const SNAP: f64 = 0.05;
+
+/// Time stamps as a file has them.
+#[derive(Clone, Debug)]
+pub(crate) enum Stamps {
+    Nanoseconds(Vec<i64>),
+    Seconds(Vec<f64>),
+    /// No column of times; the description must state the rate.
+    Absent,
+}
+
+/// When the first sample begins (s) and the rate (Hz).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Grid {
+    pub start_s: f64,
+    pub rate_hz: f64,
+}
+
+impl Stamps {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Nanoseconds(times) => times.len(),
+            Self::Seconds(times) => times.len(),
+            Self::Absent => 0,
+        }
+    }
+
+    pub(crate) fn time_s(&self, row: usize) -> f64 {
+        match self {
+            Self::Nanoseconds(times) => times[row] as f64 / 1e9,
+            Self::Seconds(times) => times[row],
+            Self::Absent => 0.0,
+        }
+    }
+
+    /// Seconds since an earlier row; nanoseconds are subtracted as integers, so a large start costs no precision.
+    pub(crate) fn since_s(&self, row: usize, earlier: usize) -> f64 {
+        match self {
+            Self::Nanoseconds(times) => (i128::from(times[row]) - i128::from(times[earlier])) as f64 / 1e9,
+            Self::Seconds(times) => times[row] - times[earlier],
+            Self::Absent => 0.0,
+        }
+    }
+}
+
+/// The grid all stamps lie on.
+pub(crate) fn grid(path: &Path, stamps: &Stamps, header: &Header) -> Result<Grid, ReadError> {
+    let fit = |rate_hz: Option<f64>| {
+        let mut fit = Fit::new(path, rate_hz, header.start_s);
+        fit.push(stamps);
+        fit.conclude()
+    };
+    let fitted = fit(header.rate_hz)?;
+    if fitted.sure { Ok(fitted.grid) } else { Ok(fit(Some(fitted.grid.rate_hz))?.grid) }
+}
+
+/// The roundest rate (the one with most zeros) that moves the last sample by no more than the stamps can tell.
+pub(crate) fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
+    let rate_hz = periods / span_s;
+    let tolerance = f64::min(SNAP, resolution_s * rate_hz);
+    let round_to = |unit_hz: f64| libm::round(rate_hz / unit_hz) * unit_hz;
+    let snaps = |candidate: &f64| *candidate > 0.0 && (span_s * candidate - periods).abs() <= tolerance;
+    [1e6, 1e5, 1e4, 1e3, 100.0, 10.0, 1.0].map(round_to).into_iter().find(snaps).unwrap_or(rate_hz)
+}
+
+/// Whether each time is one step after the one before; without a way out on the way, so that many pairs are held at once.
+#[multiversion(targets("x86_64+avx2"))]
+pub(crate) fn all_apart(times: &[i64], step: i64) -> bool {
+    times.iter().zip(&times[1..]).fold(0, |any, (a, b)| any | (b.wrapping_sub(*a) ^ step)) == 0
+}
+
+#[cfg(test)]
+mod tests;
