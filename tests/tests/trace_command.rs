@@ -182,7 +182,7 @@ fn wrong_input_is_one_line_and_the_right_code() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
     fs::write(folder.path().join("cut.parquet"), b"PAR1 and no more").unwrap();
-    let cases: [(&[&str], i32, &str); 9] = [
+    let cases: [(&[&str], i32, &str); 11] = [
         (&["frames", "t.csv"], 2, "--mark"),
         (&["frames", "t.csv", "--mark", "99"], 2, "marked at 99 s"),
         (&["frames", "t.csv", "--mark", "nan"], 2, "NaN"),
@@ -192,6 +192,12 @@ fn wrong_input_is_one_line_and_the_right_code() {
         (&["convert", "t.csv", "t.xyz"], 2, "ending"),
         (&["plot", "t.csv", "--from", "5", "--out", "a.svg"], 2, "--from 5"),
         (&["pareto", "t.csv"], 2, "time_ms"),
+        (&["convert", "t.csv", "t.parquet", "--rail", "main", "--rail", "Main"], 2, "Main is given twice"),
+        (
+            &["energy", "t.csv", "--mark", "0.2", "--end", "0.5", "--pass", "late=50"],
+            2,
+            "--pass late=50: no frame is longer than 10.",
+        ),
     ];
     for (args, code, says) in cases {
         let output = quintile(folder.path(), args);

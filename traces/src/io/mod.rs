@@ -25,6 +25,8 @@ pub use read::{Loaded, read};
 pub use recording::Recording;
 pub use repair::Repair;
 pub use rows::Rows;
+#[cfg(test)]
+pub(crate) use source::Cut;
 pub use source::{Heading, Sink, Source, Stretch};
 
 /// The names of the columns that files are written with; read without regard to case.

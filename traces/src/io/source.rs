@@ -130,3 +130,21 @@ impl Source for Trace {
         sink.take(&whole.part(from, self.samples()))
     }
 }
+
+/// For tests: a trace that comes in pieces of some size.
+#[cfg(test)]
+pub(crate) struct Cut<'a>(pub &'a Trace, pub usize);
+
+#[cfg(test)]
+impl Source for Cut<'_> {
+    fn heading(&self) -> Heading {
+        self.0.heading()
+    }
+
+    fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
+        let (voltage_v, current_a) = (self.0.voltage_v(), self.0.current_a());
+        let whole = Stretch { first: 0, voltage_v, current_a, lost: false };
+        let ends = |from: usize| whole.part(from, whole.len().min(from + self.1));
+        (0..whole.len()).step_by(self.1).try_for_each(|from| sink.take(&ends(from)))
+    }
+}

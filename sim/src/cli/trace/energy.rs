@@ -12,7 +12,7 @@ use traces::io::{Heading, Repair, Source};
 use super::args::{Discard, EnergyArgs, IdleBy};
 use super::input::wrong;
 use crate::cli::Failure;
-use crate::cli::terminal::{print, print_json};
+use crate::cli::terminal::{complain, print, print_json};
 
 /// Samples from which the lowest power is taken, about.
 const LEVELS: u64 = 65_536;
@@ -189,6 +189,7 @@ fn passes(
     if marks.is_empty() {
         return Ok(Vec::new());
     }
+    marks.iter().try_for_each(|mark| within_frames(mark, frames))?;
     marks.sort_by(|a, b| a.1.total_cmp(&b.1));
     if marks[0].1 > 0.0 {
         marks.insert(0, ("before".to_owned(), 0.0));
@@ -205,6 +206,25 @@ fn passes(
         passes.extend(Spread::of(&energies).map(|spread| (name.clone(), spread)));
     }
     Ok(passes)
+}
+
+/// Refuses a pass that begins in no frame, and tells of one that begins in some alone.
+fn within_frames((name, ms): &(String, f64), frames: &[FrameEnergy]) -> Result<(), Failure> {
+    let beyond = frames.iter().filter(|frame| frame.duration_s() <= ms * 1e-3).count();
+    if beyond == frames.len() {
+        let longest_s = frames.iter().map(FrameEnergy::duration_s).fold(0.0, f64::max);
+        return Err(wrong(format!(
+            "--pass {name}={ms}: no frame is longer than {:.3} ms; let the pass begin before that",
+            longest_s * 1e3
+        )));
+    }
+    if beyond > 0 {
+        let frames = frames.len();
+        complain(&format!(
+            "warning pass-beyond: {beyond} of {frames} frames end before pass {name} begins, {ms} ms after their start: it has no energy there"
+        ));
+    }
+    Ok(())
 }
 
 impl Run {

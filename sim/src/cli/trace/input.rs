@@ -67,6 +67,12 @@ impl InputArgs {
         if self.power_column.is_some() && !self.rail.is_empty() {
             return Err(wrong("--rail chooses by name what --power-column chooses by hand: leave one out"));
         }
+        let twice = |(index, rail): &(usize, &String)| {
+            self.rail[..*index].iter().any(|other| other.eq_ignore_ascii_case(rail))
+        };
+        if let Some((_, rail)) = self.rail.iter().enumerate().find(twice) {
+            return Err(wrong(format!("--rail {rail} is given twice: rails are added up, each once")));
+        }
         Ok(ReadOptions {
             rails: self.rail.clone(),
             time: self.time_column.clone(),

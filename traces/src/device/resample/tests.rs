@@ -2,25 +2,10 @@
 
 use super::*;
 use crate::device::DeviceSpec;
+use crate::io::Cut;
 use crate::metadata::Metadata;
 use crate::trace::Trace;
 use proptest::prelude::*;
-
-/// A trace that comes in pieces of some size.
-struct Cut<'a>(&'a Trace, usize);
-
-impl Source for Cut<'_> {
-    fn heading(&self) -> Heading {
-        self.0.heading()
-    }
-
-    fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
-        let (voltage_v, current_a) = (self.0.voltage_v(), self.0.current_a());
-        let whole = Stretch { first: 0, voltage_v, current_a, lost: false };
-        let ends = |from: usize| whole.part(from, whole.len().min(from + self.1));
-        (0..whole.len()).step_by(self.1).try_for_each(|from| sink.take(&ends(from)))
-    }
-}
 
 /// Puts pieces together again.
 #[derive(Default)]
