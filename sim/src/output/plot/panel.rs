@@ -158,7 +158,9 @@ pub(super) fn legend_column(
         key.draw(picture, (from.0, y));
         let room = right - from.0 - 30.0 - text_width(value, size, false);
         picture.text(Text { size, colour: INK, ..text(&shortened(label, size, room), (from.0 + 22.0, y)) });
-        picture.text(Text { size, colour: MUTED, across: Across::Right, ..text(value, (right, y)) });
+        if !value.is_empty() {
+            picture.text(Text { size, colour: MUTED, across: Across::Right, ..text(value, (right, y)) });
+        }
     }
 }
 

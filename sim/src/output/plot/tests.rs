@@ -32,7 +32,11 @@ fn check_texts(picture: &Picture) {
     for (index, text) in texts.iter().enumerate() {
         let [left, top, right, bottom] = extent(text);
         let inside = left >= 0.0 && top >= 0.0 && right <= picture.width && bottom <= picture.height;
-        assert!(inside, "{:?} leaves {}", text.text, picture.title);
+        assert!(
+            inside,
+            "{:?} at {:?} leaves {} of {}x{}",
+            text.text, text.at, picture.title, picture.width, picture.height
+        );
         for other in &texts[..index] {
             let [l, t, r, b] = extent(other);
             let apart = right <= l || r <= left || bottom <= t || b <= top;
@@ -180,9 +184,9 @@ fn names_of_curves_and_axes_are_whole() {
     let names = ["64 squares along a side: lost by the bound that is not cut", "all methods"];
     let panel = |name: &str| {
         let across = "length of beams for which the sides that they have cross each other (%)";
-        CurvePanel::new("", [across, "y"], vec![Curve::new(name, [(1.0, 1.0), (2.0, 5.0)])])
+        CurvePanel::new("panel", [across, "y"], vec![Curve::new(name, [(1.0, 1.0), (2.0, 5.0)])])
     };
-    let picture = Curves { title: "", subject: "", panels: names.map(panel).into() }.picture();
+    let picture = Curves { title: "Names", subject: "long ones", panels: names.map(panel).into() }.picture();
     check(&picture);
     for name in names {
         let is_name = |shape: &Shape| matches!(shape, Shape::Text(text) if text.text == name);
