@@ -22,9 +22,11 @@ pub fn pooled(runs: &[Vec<f64>]) -> Option<Pooled> {
     if values == 0 {
         return None;
     }
-    let mean_of = |run: &[f64]| run.iter().sum::<f64>() / run.len() as f64;
-    let squares: f64 =
-        runs.iter().map(|run| run.iter().map(|v| (v - mean_of(run)) * (v - mean_of(run))).sum::<f64>()).sum();
+    let about_mean = |run: &&Vec<f64>| {
+        let mean = run.iter().sum::<f64>() / run.len() as f64;
+        run.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>()
+    };
+    let squares: f64 = runs.iter().map(about_mean).sum();
     let freedom = values - runs.len();
     let deviation = if freedom > 0 { libm::sqrt(squares / freedom as f64) } else { 0.0 };
     let mean = runs.iter().flat_map(|run| run.iter()).sum::<f64>() / values as f64;
@@ -40,5 +42,13 @@ mod tests {
         let pool = pooled(&[vec![1.0, 2.0, 3.0], vec![11.0, 12.0, 13.0], vec![]]).unwrap();
         assert_eq!((pool.runs, pool.values, pool.mean, pool.deviation), (2, 6, 7.0, 1.0));
         assert_eq!(pooled(&[vec![]]), None);
+    }
+
+    #[test]
+    fn a_million_frames_take_no_longer_than_their_number_says() {
+        // Taking the mean anew for each of them once took minutes.
+        let run: Vec<f64> = (0..1_000_000).map(|i| f64::from(i % 2)).collect();
+        let pool = pooled(&[run]).unwrap();
+        assert!(pool.mean == 0.5 && (pool.deviation - 0.5).abs() < 1e-6);
     }
 }
