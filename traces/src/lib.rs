@@ -53,6 +53,7 @@ pub mod pareto;
 pub mod pyramid;
 pub mod random;
 pub mod score;
+mod squares;
 pub mod stream;
 mod sum;
 pub mod synth;

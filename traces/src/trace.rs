@@ -107,7 +107,7 @@ impl Trace {
 
     /// How many samples they are.
     pub fn lost_samples(&self) -> usize {
-        self.lost.iter().map(ExactSizeIterator::len).sum()
+        lost_samples(&self.lost)
     }
 
     /// What the recorder lost and from when on, in words; `None` if nothing.
@@ -179,12 +179,17 @@ impl Trace {
     }
 }
 
+/// How many samples are in stretches that were lost.
+pub(crate) fn lost_samples(lost: &[Range<usize>]) -> usize {
+    lost.iter().map(ExactSizeIterator::len).sum()
+}
+
 /// Stretches that were lost, in words; `None` if there are none.
 pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Option<String> {
     let first = lost.first()?;
     Some(format!(
         "{} samples in {} stretches are missing, the first after {} s",
-        lost.iter().map(ExactSizeIterator::len).sum::<usize>(),
+        lost_samples(lost),
         lost.len(),
         time_s(first.start - 1)
     ))

@@ -6,7 +6,7 @@ use crate::curve::CurveError;
 use crate::energy::Sums;
 use crate::io::{Heading, Sink, Source, Stretch, WriteError};
 use crate::sum::PairSum;
-use crate::trace::{check_times, losses};
+use crate::trace::{check_times, losses, lost_samples};
 use core::ops::Range;
 use rayon::prelude::*;
 
@@ -47,7 +47,7 @@ impl Device {
             start_s,
             rate_hz: self.spec.rate_hz,
             samples: samples as u64,
-            lost_samples: lost.iter().map(ExactSizeIterator::len).sum::<usize>() as u64,
+            lost_samples: lost_samples(&lost) as u64,
             metadata: self.metadata(metadata),
         };
         let (energy_j, clipped_currents, clipped_voltages) = (0.0, 0, 0);

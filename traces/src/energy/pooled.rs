@@ -1,5 +1,6 @@
 //! Several runs of the same thing.
 
+use crate::squares::about_mean;
 use serde::Serialize;
 
 /// Runs taken together.
@@ -22,11 +23,7 @@ pub fn pooled(runs: &[Vec<f64>]) -> Option<Pooled> {
     if values == 0 {
         return None;
     }
-    let about_mean = |run: &&Vec<f64>| {
-        let mean = run.iter().sum::<f64>() / run.len() as f64;
-        run.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>()
-    };
-    let squares: f64 = runs.iter().map(about_mean).sum();
+    let squares: f64 = runs.iter().map(|run| about_mean(run).1).sum();
     let freedom = values - runs.len();
     let deviation = if freedom > 0 { libm::sqrt(squares / freedom as f64) } else { 0.0 };
     let mean = runs.iter().flat_map(|run| run.iter()).sum::<f64>() / values as f64;

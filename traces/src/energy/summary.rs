@@ -1,6 +1,7 @@
 //! Frames in a few numbers.
 
 use super::FrameEnergy;
+use crate::squares::about_mean;
 use serde::Serialize;
 
 /// Mean, sample standard deviation (over `n - 1`; 0 for one value) and median.
@@ -21,8 +22,7 @@ impl Spread {
             return None;
         }
         let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        let (mean, squares) = about_mean(values);
         let deviation = if values.len() > 1 { libm::sqrt(squares / (count - 1.0)) } else { 0.0 };
         let mut others = values.to_vec();
         let (below, &mut upper, _) = others.select_nth_unstable_by(values.len() / 2, f64::total_cmp);

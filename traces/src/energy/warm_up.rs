@@ -1,5 +1,6 @@
 //! The first frames after launch draw more (Paper III, Figure 5); how many they are.
 
+use crate::squares::about_mean;
 use serde::Serialize;
 
 /// A change of the mean must be this many of its standard errors to count.
@@ -38,16 +39,12 @@ pub fn warm_up(energies_j: &[f64]) -> WarmUp {
     if split == 0 {
         return none;
     }
-    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
     let (early, late) = energies_j.split_at(split);
-    let excess_j = mean(early) - mean(late);
-    let squares = |part: &[f64]| {
-        let mean = mean(part);
-        part.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>()
-    };
-    let variance = (squares(early) + squares(late)) / (count - 2) as f64;
+    let [(early_j, early_squares), (late_j, late_squares)] = [early, late].map(about_mean);
+    let excess_j = early_j - late_j;
+    let variance = (early_squares + late_squares) / (count - 2) as f64;
     let error_j = libm::sqrt(variance * (1.0 / split as f64 + 1.0 / (count - split) as f64));
-    let clearness = excess_j / error_j.max(1e-12 * mean(late).abs()).max(f64::MIN_POSITIVE);
+    let clearness = excess_j / error_j.max(1e-12 * late_j.abs()).max(f64::MIN_POSITIVE);
     // A split after one frame is that frame's own oddness.
     WarmUp { frames: if clearness > CLEAR && split > 1 { split } else { 0 }, excess_j, clearness }
 }

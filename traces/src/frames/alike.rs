@@ -17,9 +17,9 @@ pub(super) fn neighbours(trace: &Trace, found: &Found) -> f64 {
         .filter(|&first| first >= 0.0 && first as usize + width <= trace.samples())
         .map(|first| first as usize)
         .collect();
-    let window =
-        |first: usize| (first..first + width).map(|sample| trace.power_w(sample)).collect::<Vec<_>>();
-    let alike = |pair: &[usize]| correlation(&window(pair[0]), &window(pair[1]));
+    let power: Vec<f64> = trace.powers_w().collect();
+    let window = |first: usize| &power[first..first + width];
+    let alike = |pair: &[usize]| correlation(window(pair[0]), window(pair[1]));
     let mut all: Vec<f64> = firsts.par_windows(2).map(alike).collect();
     median(&mut all)
 }

@@ -1,5 +1,6 @@
 //! Splitting sorted numbers into populations.
 
+use crate::squares::about_mean;
 use rayon::prelude::*;
 
 /// Mean and standard deviation.
@@ -61,9 +62,8 @@ pub(super) fn moments(values: &[f64]) -> Moments {
         return Moments::default();
     }
     let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count;
-    Moments { mean, deviation: libm::sqrt(variance) }
+    let (mean, squares) = about_mean(values);
+    Moments { mean, deviation: libm::sqrt(squares / count) }
 }
 
 #[cfg(test)]

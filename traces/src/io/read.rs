@@ -57,13 +57,12 @@ pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
 fn gather(rows: &mut Rows) -> Result<Columns, ReadError> {
     let mut all = Columns { stamps: Stamps::Absent, voltage_v: Vec::new(), current_a: Vec::new() };
     let mut chunk = Chunk::default();
-    while rows.next(PIECE, &mut chunk)? > 0 {
+    while rows.append(PIECE, &mut chunk, &mut all.voltage_v, &mut all.current_a)? > 0 {
         match (&mut all.stamps, &chunk.stamps) {
             (Stamps::Nanoseconds(all), Stamps::Nanoseconds(more)) => all.extend_from_slice(more),
             (Stamps::Seconds(all), Stamps::Seconds(more)) => all.extend_from_slice(more),
             (all, more) => *all = more.clone(),
         }
-        rows.channels(&mut chunk, &mut all.voltage_v, &mut all.current_a);
     }
     Ok(all)
 }

@@ -19,12 +19,11 @@ pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, Rea
     let (mut voltage_v, mut current_a) = (Vec::new(), Vec::new());
     let (mut base, mut samples) = (Vec::new(), 0);
     loop {
-        let read = rows.next(ROWS, &mut chunk)? as u64;
+        let read = rows.append(ROWS, &mut chunk, &mut voltage_v, &mut current_a)? as u64;
         match &mut steps {
             Some(steps) => steps.check(path, &chunk.stamps, samples, clock.rate_hz)?,
             None => clock.check(path, &chunk.stamps, samples)?,
         }
-        rows.channels(&mut chunk, &mut voltage_v, &mut current_a);
         rows.check_finite(&voltage_v, &current_a, base.len() as u64 * BLOCK)?;
         samples += read;
         let whole =

@@ -21,8 +21,13 @@ pub(super) fn templates(
         let mut rows = Rows::open(path, options)?;
         rows.skip(placed.first as u64)?;
         let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
-        while piece.len() < placement.samples && rows.next(placement.samples - piece.len(), &mut chunk)? > 0 {
-            rows.channels(&mut chunk, &mut piece.voltage_v, &mut piece.current_a);
+        let mut missing = placement.samples;
+        while missing > 0 {
+            let read = rows.append(missing, &mut chunk, &mut piece.voltage_v, &mut piece.current_a)?;
+            if read == 0 {
+                break;
+            }
+            missing -= read;
         }
         if piece.len() < placement.samples {
             let end_s = clock.time_s((placed.first + piece.len()) as f64);

@@ -1,5 +1,6 @@
 //! Files of collision detection: which of them make a case, and what it holds.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::load::Kind;
@@ -52,7 +53,7 @@ impl CaseFiles {
                 folder.display()
             )));
         }
-        let mut cases: Vec<Self> = Vec::new();
+        let (mut cases, mut numbers) = (Vec::<Self>::new(), HashMap::new());
         while let Some(file) = files.next() {
             let content = match kind(file)? {
                 Kind::Mts => Content::Objects,
@@ -64,8 +65,8 @@ impl CaseFiles {
                 Kind::M5d => return Err(no_partner(file)),
             };
             let case = Self { id: stem(file), start: file.to_owned(), content };
-            if let Some(known) = cases.iter().find(|known| known.id == case.id) {
-                return Err(same_id(known, &case));
+            if let Some(known) = numbers.insert(case.id.clone(), cases.len()) {
+                return Err(same_id(&cases[known], &case));
             }
             cases.push(case);
         }

@@ -71,11 +71,11 @@ pub(super) fn save(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
 /// A counter track of the power, thinned out to what the viewer holds.
 fn perfetto(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
     let heading = trace.heading();
-    let mut track = Track { thinner: Thinner::new(heading.samples, MAX_POINTS) };
-    trace.pour(&mut track)?;
+    let mut thinner = Thinner::new(heading.samples, MAX_POINTS);
+    trace.pour(&mut thinner)?;
     let start_ns = heading.time_ns(0);
     let place = |(index, watts): (u64, f64)| ((heading.time_ns(index) - start_ns).unsigned_abs(), watts);
-    let points: Vec<(u64, f64)> = track.thinner.kept().into_iter().map(place).collect();
+    let points: Vec<(u64, f64)> = thinner.kept().into_iter().map(place).collect();
     let (kept, samples) = (points.len() as u64, heading.samples);
     if kept < samples {
         complain(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
@@ -85,16 +85,10 @@ fn perfetto(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
     Ok(atomic::write_file(path, |out| perfetto::write(&timeline, out))?)
 }
 
-/// The samples' power on its way to the viewer.
-struct Track {
-    thinner: Thinner,
-}
-
-impl Sink for Track {
+/// Of the samples, their power.
+impl Sink for Thinner {
     fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
-        for (volts, amperes) in stretch.voltage_v.iter().zip(stretch.current_a) {
-            self.thinner.push(f64::from(*volts) * f64::from(*amperes));
-        }
+        stretch.powers_w().for_each(|watts| self.push(watts));
         Ok(())
     }
 }

@@ -194,18 +194,17 @@ fn passes(
     if marks[0].1 > 0.0 {
         marks.insert(0, ("before".to_owned(), 0.0));
     }
-    let mut passes = Vec::new();
-    for (index, (name, ms)) in marks.iter().enumerate() {
-        let span = |frame: &FrameEnergy| {
-            let at = |ms: f64| (frame.start_s + ms * 1e-3).min(frame.end_s);
-            (at(*ms), marks.get(index + 1).map_or(frame.end_s, |next| at(next.1)))
-        };
-        let spans: Vec<Span> = frames.iter().map(span).collect();
-        let less_idle = |(energy_j, (a_s, b_s)): (f64, &Span)| energy_j - idle_j(*a_s, *b_s);
-        let energies: Vec<f64> = energies_j(trace, &spans)?.into_iter().zip(&spans).map(less_idle).collect();
-        passes.extend(Spread::of(&energies).map(|spread| (name.clone(), spread)));
-    }
-    Ok(passes)
+    let span = &|index: usize, frame: &FrameEnergy| {
+        let at = |mark: &(String, f64)| (frame.start_s + mark.1 * 1e-3).min(frame.end_s);
+        (at(&marks[index]), marks.get(index + 1).map_or(frame.end_s, at))
+    };
+    // Pass by pass, and all at once: the samples may have to be read anew for each question.
+    let of_pass = |index: usize| frames.iter().map(move |frame| span(index, frame));
+    let spans: Vec<Span> = (0..marks.len()).flat_map(of_pass).collect();
+    let less_idle = |(energy_j, (a_s, b_s)): (f64, &Span)| energy_j - idle_j(*a_s, *b_s);
+    let energies: Vec<f64> = energies_j(trace, &spans)?.into_iter().zip(&spans).map(less_idle).collect();
+    let spreads = energies.chunks(frames.len()).map(Spread::of);
+    Ok(marks.iter().zip(spreads).filter_map(|((name, _), spread)| Some((name.clone(), spread?))).collect())
 }
 
 /// Refuses a pass that begins in no frame, and tells of one that begins in some alone.

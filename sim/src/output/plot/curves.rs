@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::palette::{GRID, MARK, MUTED, part_colour};
-use super::panel::{Key, Panel, legend_column, legend_line, legend_lines, wrapped};
+use super::panel::{Key, LEGEND_PX, Panel, legend_column, legend_line, legend_lines, wrapped};
 use super::picture::{Across, Picture, Text, text};
 use super::render::text_width;
 use super::scale::{Scale, Way};
@@ -83,8 +83,7 @@ const HEIGHT: f64 = 372.0;
 /// Distance of lines of text.
 const LINE: f64 = 18.0;
 const LEGEND_LINE: f64 = 22.0;
-/// Size of the names in a legend below a panel, and the room across that is not theirs.
-const LEGEND_PX: f64 = 12.5;
+/// The room across that is not that of names in a legend below a panel.
 const NAME_ASIDE: f64 = ASIDE - 40.0 + 30.0;
 /// Size of the name of a marked range.
 const MARK_PX: f64 = 11.5;

@@ -144,6 +144,9 @@ pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<Stri
     lines
 }
 
+/// Size of the names in a legend, where there is room.
+pub(super) const LEGEND_PX: f64 = 12.5;
+
 /// A legend in one column, top entry at `from`; each entry has a label and a value that ends at `right`.
 pub(super) fn legend_column(
     picture: &mut Picture,
@@ -152,7 +155,7 @@ pub(super) fn legend_column(
     entries: &[(Key, String, String)],
 ) {
     let pitch = (470.0 / entries.len().max(1) as f64).min(22.0);
-    let size = (pitch * 0.62).clamp(7.0, 12.5);
+    let size = (pitch * 0.62).clamp(7.0, LEGEND_PX);
     for (index, (key, label, value)) in entries.iter().enumerate() {
         let y = from.1 + pitch * index as f64;
         key.draw(picture, (from.0, y));

@@ -75,7 +75,8 @@ pub(super) fn light(quick: bool) -> Result<[Figure; 2], RunError> {
     let floor = Light::Floor(Floor { height_m: -view::DEPTH_M });
     let image = |name, what: &str, label: &str, eye: &Eye, light| {
         let picture = draw(&beams, eye, Method::Moving, Some(light));
-        let subject = format!("{} beams as moving triangles, waves of slope 0.15; {what}", beams.len());
+        let subject =
+            format!("{} beams as moving triangles, waves of slope {}; {what}", beams.len(), view::SLOPE);
         let size = [eye.viewport().width(), eye.viewport().height()];
         let title = "Caustics under waves (Paper VI, section 4)";
         let tiles = &tiles(&picture.light, size[0]);

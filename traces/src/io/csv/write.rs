@@ -1,6 +1,7 @@
 //! Writing.
 
 use super::sidecar_path;
+use crate::decimal;
 use crate::io::source::{Heading, Sink, Source, Stretch};
 use crate::io::{WriteError, atomic, header};
 use flate2::Compression;
@@ -56,7 +57,7 @@ impl<W: Write + Send> Sink for Writer<W> {
         for from in (0..stretch.len()).step_by(HELD_ROWS) {
             let held = stretch.part(from, stretch.len().min(from + HELD_ROWS));
             for text in self.texts(&held) {
-                self.out.write_all(&text.map_err(encode)?).map_err(encode)?;
+                self.out.write_all(&text).map_err(encode)?;
             }
         }
         Ok(())
@@ -70,7 +71,7 @@ impl<W: Write + Send> Writer<W> {
     }
 
     /// The rows in order, made side by side.
-    fn texts(&self, held: &Stretch<'_>) -> Vec<std::io::Result<Vec<u8>>> {
+    fn texts(&self, held: &Stretch<'_>) -> Vec<Vec<u8>> {
         let (heading, delimiter) = (&self.heading, self.delimiter);
         let tasks = (0..held.len().div_ceil(TASK_ROWS)).into_par_iter();
         let part = |task: usize| held.part(task * TASK_ROWS, held.len().min((task + 1) * TASK_ROWS));
@@ -79,7 +80,7 @@ impl<W: Write + Send> Writer<W> {
 }
 
 /// The rows of a stretch.
-fn text(heading: &Heading, rows: &Stretch<'_>, c: char) -> std::io::Result<Vec<u8>> {
+fn text(heading: &Heading, rows: &Stretch<'_>, c: char) -> Vec<u8> {
     let mut out = Vec::with_capacity(rows.len() * 56);
     for (index, (voltage, current)) in rows.voltage_v.iter().zip(rows.current_a).enumerate() {
         let time_ns = heading.time_ns(rows.first + index as u64);
@@ -89,10 +90,15 @@ fn text(heading: &Heading, rows: &Stretch<'_>, c: char) -> std::io::Result<Vec<u
             fraction /= 10;
             digits -= 1;
         }
-        let (voltage, current) = (f64::from(*voltage), f64::from(*current));
-        writeln!(out, "{sign}{seconds}.{fraction:0digits$}{c}{voltage}{c}{current}")?;
+        // Writing to memory does not fail.
+        let _ = write!(out, "{sign}{seconds}.{fraction:0digits$}");
+        for value in [voltage, current] {
+            let _ = write!(out, "{c}");
+            decimal::push(&mut out, f64::from(*value));
+        }
+        out.push(b'\n');
     }
-    Ok(out)
+    out
 }
 
 /// Writes the JSON description: exact rate and start, number of samples, units, and the trace's metadata.

@@ -106,11 +106,7 @@ impl Piece {
     fn read(&mut self, rows: &mut Rows, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
         self.voltage_v.clear();
         self.current_a.clear();
-        let read = rows.next(limit, chunk)?;
-        if read > 0 {
-            rows.channels(chunk, &mut self.voltage_v, &mut self.current_a);
-        }
-        Ok(read)
+        rows.append(limit, chunk, &mut self.voltage_v, &mut self.current_a)
     }
 }
 

@@ -227,7 +227,7 @@ impl Rows {
 
     /// Appends a chunk's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
     /// power is known, the voltage is 1 V and the current stands for the power.
-    pub(crate) fn channels(&self, chunk: &mut Chunk, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
+    fn channels(&self, chunk: &mut Chunk, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
         for (values, column) in chunk.values.iter_mut().zip(&self.layout.values) {
             if column.scale != 1.0 {
                 values.iter_mut().for_each(|value| *value = (f64::from(*value) * column.scale) as f32);

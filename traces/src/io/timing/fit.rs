@@ -1,6 +1,6 @@
 //! The grid of stamps that are seen once, piece by piece.
 
-use super::{Grid, Stamps, all_apart, rounded_rate_hz};
+use super::{Grid, Stamp, Stamps, all_apart, rounded_rate_hz};
 use crate::io::ReadError;
 use std::path::{Path, PathBuf};
 
@@ -12,47 +12,6 @@ const STEP_OFF: f64 = 0.5;
 const GUESS_FROM: usize = 1001;
 /// Share of a rate within which rounding may decide whether a row is in its place.
 const DOUBT: f64 = 1e-13;
-
-/// One stamp as a file has it.
-#[derive(Clone, Copy, Debug)]
-enum Stamp {
-    Nanoseconds(i64),
-    Seconds(f64),
-}
-
-impl Stamp {
-    fn time_s(self) -> f64 {
-        match self {
-            Self::Nanoseconds(time) => time as f64 / 1e9,
-            Self::Seconds(time) => time,
-        }
-    }
-
-    /// Seconds since an earlier one; nanoseconds are subtracted as integers, so a large start costs no precision.
-    fn since_s(self, earlier: Self) -> f64 {
-        match (self, earlier) {
-            (Self::Nanoseconds(time), Self::Nanoseconds(earlier)) => {
-                (i128::from(time) - i128::from(earlier)) as f64 / 1e9
-            }
-            _ => self.time_s() - earlier.time_s(),
-        }
-    }
-
-    /// How finely it tells time, s. Of seconds in a text it is not known.
-    fn resolution_s(self) -> f64 {
-        if matches!(self, Self::Nanoseconds(_)) { 1.5e-9 } else { f64::INFINITY }
-    }
-}
-
-impl Stamps {
-    fn stamp(&self, row: usize) -> Stamp {
-        match self {
-            Self::Nanoseconds(times) => Stamp::Nanoseconds(times[row]),
-            Self::Seconds(times) => Stamp::Seconds(times[row]),
-            Self::Absent => Stamp::Seconds(0.0),
-        }
-    }
-}
 
 /// Looks at stamps in order. What is wrong is told in the end, what forbids any rate first: a row out of order, then a step
 /// unlike the others, then a row off its place.

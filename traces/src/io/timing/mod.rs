@@ -20,6 +20,37 @@ pub(crate) enum Stamps {
     Absent,
 }
 
+/// One stamp as a file has it.
+#[derive(Clone, Copy, Debug)]
+enum Stamp {
+    Nanoseconds(i64),
+    Seconds(f64),
+}
+
+impl Stamp {
+    fn time_s(self) -> f64 {
+        match self {
+            Self::Nanoseconds(time) => time as f64 / 1e9,
+            Self::Seconds(time) => time,
+        }
+    }
+
+    /// Seconds since an earlier one; nanoseconds are subtracted as integers, so a large start costs no precision.
+    fn since_s(self, earlier: Self) -> f64 {
+        match (self, earlier) {
+            (Self::Nanoseconds(time), Self::Nanoseconds(earlier)) => {
+                (i128::from(time) - i128::from(earlier)) as f64 / 1e9
+            }
+            _ => self.time_s() - earlier.time_s(),
+        }
+    }
+
+    /// How finely it tells time, s. Of seconds in a text it is not known.
+    fn resolution_s(self) -> f64 {
+        if matches!(self, Self::Nanoseconds(_)) { 1.5e-9 } else { f64::INFINITY }
+    }
+}
+
 /// When the first sample begins (s) and the rate (Hz).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Grid {
@@ -37,19 +68,19 @@ impl Stamps {
     }
 
     pub(crate) fn time_s(&self, row: usize) -> f64 {
-        match self {
-            Self::Nanoseconds(times) => times[row] as f64 / 1e9,
-            Self::Seconds(times) => times[row],
-            Self::Absent => 0.0,
-        }
+        self.stamp(row).time_s()
     }
 
-    /// Seconds since an earlier row; nanoseconds are subtracted as integers, so a large start costs no precision.
+    /// Seconds since an earlier row.
     pub(crate) fn since_s(&self, row: usize, earlier: usize) -> f64 {
+        self.stamp(row).since_s(self.stamp(earlier))
+    }
+
+    fn stamp(&self, row: usize) -> Stamp {
         match self {
-            Self::Nanoseconds(times) => (i128::from(times[row]) - i128::from(times[earlier])) as f64 / 1e9,
-            Self::Seconds(times) => times[row] - times[earlier],
-            Self::Absent => 0.0,
+            Self::Nanoseconds(times) => Stamp::Nanoseconds(times[row]),
+            Self::Seconds(times) => Stamp::Seconds(times[row]),
+            Self::Absent => Stamp::Seconds(0.0),
         }
     }
 }
