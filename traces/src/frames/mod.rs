@@ -21,6 +21,7 @@ mod propose;
 mod refine;
 mod register;
 mod regularity;
+mod rest;
 mod settle;
 mod spans;
 mod split;

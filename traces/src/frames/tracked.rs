@@ -6,6 +6,7 @@ use super::lock::{Ticks, ticks};
 use super::marks::{MarkError, Marks, Placed};
 use super::method::Method;
 use super::register::register;
+use super::rest;
 use super::settle::settle;
 use super::threshold::choose;
 use super::track::{Start, track};
@@ -33,7 +34,13 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
         Some(Ticks { positions, between }) => {
             (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
         }
-        None => (positions, tracked.starts.iter().map(|start| start.left).collect::<Vec<f64>>()),
+        None => {
+            let places: Vec<f64> = positions.iter().map(|position| position + anchor).collect();
+            let rests = rest::left(&power, &places, &fixed, placement.samples);
+            let kept: Vec<f64> =
+                tracked.starts.iter().zip(rests).map(|(start, rest)| start.left * rest).collect();
+            (positions, kept)
+        }
     };
     let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
         time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),

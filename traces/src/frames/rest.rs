@@ -1,0 +1,148 @@
+//! Doubt where the rest that frames begin in is another than at the mark.
+//!
+//! A frame begins in little power, between the end of the one before and its own draws. What is aligned are the draws. If the rest
+//! before them has become longer, power does not tell whether the wait for the frame has, or its own quiet beginning (the front end):
+//! the start may be anywhere in what was added. So starts whose rest begins or ends at another distance than it did at the mark, by
+//! more than a start may be off, are in doubt.
+
+use super::split::moments;
+use crate::median::median;
+use rayon::prelude::*;
+
+/// The stretch looked at on either side of a start, as a share of the window.
+const REACH: f64 = 0.32;
+/// Shares of the window before and after the start in which the lowest power is looked for.
+const LOWEST: [f64; 2] = [0.2, 0.12];
+/// The rest ends where power is this share of the way from the lowest to the median.
+const ENDS: f64 = 0.35;
+/// So many frames on either side are averaged, and so many samples.
+const FRAMES: usize = 8;
+const SAMPLES: usize = 3;
+/// An end of the rest that has moved by this share of the window is a doubt; where that is less than so many samples, it is noise.
+const MOVED: f64 = 0.08;
+const LEAST: f64 = 4.0;
+/// What is left of the confidence then.
+const LEFT: f64 = 0.4;
+
+/// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
+pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
+    let moved = MOVED * width as f64;
+    let marks: Vec<usize> = (0..starts.len()).filter(|&start| marked[start]).collect();
+    if moved < LEAST || marks.is_empty() {
+        return vec![1.0; starts.len()];
+    }
+    let near = |start: usize| &starts[start.saturating_sub(FRAMES)..starts.len().min(start + FRAMES + 1)];
+    let rest = |start: usize| rest(&profile(power, near(start), width)?, width);
+    let rests: Vec<Option<[usize; 2]>> = (0..starts.len()).into_par_iter().map(rest).collect();
+    let of_start = |start: usize| {
+        let mark = marks.iter().copied().min_by_key(|mark| mark.abs_diff(start))?;
+        let (here, there) = (rests[start]?, rests[mark]?);
+        let changed = here.iter().zip(there).any(|(a, b)| a.abs_diff(b) as f64 > moved);
+        Some(if changed { LEFT } else { 1.0 })
+    };
+    (0..starts.len()).map(|start| of_start(start).unwrap_or(1.0)).collect()
+}
+
+fn reach(width: usize) -> usize {
+    (REACH * width as f64) as usize
+}
+
+/// The mean power about some starts, W; `None` where none lies well within the trace.
+fn profile(power: &[f64], starts: &[f64], width: usize) -> Option<Vec<f64>> {
+    let stretch = |start: &f64| {
+        let place = libm::round(*start) as usize;
+        power.get(place.checked_sub(reach(width))?..place + reach(width))
+    };
+    let stretches: Vec<&[f64]> = starts.iter().filter_map(stretch).collect();
+    let mean = |sample: usize| moments(&stretches.iter().map(|of| of[sample]).collect::<Vec<_>>()).mean;
+    let means: Vec<f64> = (0..2 * reach(width)).map(mean).collect();
+    (!stretches.is_empty()).then(|| means.windows(SAMPLES).map(|near| moments(near).mean).collect())
+}
+
+/// The samples of a profile at which the rest in its middle, or next to that, begins and ends.
+fn rest(profile: &[f64], width: usize) -> Option<[usize; 2]> {
+    let [before, after] = LOWEST.map(|share| (share * width as f64) as usize);
+    let middle = reach(width);
+    let places = middle.saturating_sub(before)..(middle + after).min(profile.len());
+    let lowest_w = profile[places.clone()].iter().copied().fold(f64::INFINITY, f64::min);
+    let ends_w = lowest_w + ENDS * (median(&mut profile.to_vec()) - lowest_w);
+    let within =
+        places.filter(|place| profile[*place] <= ends_w).min_by_key(|place| place.abs_diff(middle))?;
+    let works = |watts: &f64| *watts > ends_w;
+    let first = profile[..within].iter().rposition(works).unwrap_or(0);
+    let last = profile[within..].iter().position(works).map_or(profile.len(), |after| within + after);
+    Some([first, last])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 250;
+
+    /// Frames with a rest of `rest(frame)` samples before draws of 300; each starts, as it was found by its draws, 10 before those.
+    fn frames(count: usize, rest: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<f64>) {
+        let (mut power, mut starts) = (vec![1.2; 300], Vec::new());
+        for frame in 0..count {
+            power.extend(vec![0.2; rest(frame)]);
+            starts.push(power.len() as f64 - 10.0);
+            power.extend((0..300).map(|sample| 1.0 + f64::from(sample / 2 * 37 % 11) / 22.0));
+        }
+        (power, starts)
+    }
+
+    fn doubted(count: usize, mark: usize, rest: impl Fn(usize) -> usize) -> Vec<usize> {
+        let (power, starts) = frames(count, rest);
+        let marked: Vec<bool> = (0..count).map(|frame| frame == mark).collect();
+        let left = left(&power, &starts, &marked, WIDTH);
+        (0..count).filter(|&frame| left[frame] < 1.0).collect()
+    }
+
+    #[test]
+    fn a_rest_that_has_grown_by_more_than_a_start_may_be_off_is_a_doubt() {
+        // From 15 samples at the mark to 45: 0.12 of the window.
+        let doubted = doubted(120, 10, |frame| if frame < 60 { 15 } else { 45 });
+        assert!(doubted.iter().all(|frame| (50..120).contains(frame)), "{doubted:?}");
+        assert!((70..112).all(|frame| doubted.contains(&frame)), "{doubted:?}");
+    }
+
+    #[test]
+    fn a_rest_that_stays_or_changes_a_little_is_none() {
+        assert!(doubted(60, 10, |_| 15).is_empty());
+        assert!(doubted(60, 10, |frame| 12 + frame * 7 % 5).is_empty());
+        assert!(doubted(120, 10, |frame| if frame < 60 { 15 } else { 25 }).is_empty());
+    }
+
+    #[test]
+    fn a_quiet_end_of_the_frame_before_is_not_the_rest() {
+        // 30 samples at the end of each frame, 25 before its rest, draw as little as that, and for some frames even less.
+        let (mut power, starts) = frames(120, |_| 12);
+        for (frame, start) in starts.iter().enumerate() {
+            let end = *start as usize - 30;
+            power[end - 30..end].fill(if frame < 60 { 0.21 } else { 0.19 });
+        }
+        let marked: Vec<bool> = (0..120).map(|frame| frame == 10).collect();
+        assert_eq!(left(&power, &starts, &marked, WIDTH), [1.0; 120]);
+    }
+
+    #[test]
+    fn the_nearest_mark_is_what_a_rest_is_compared_with() {
+        let (power, starts) = frames(120, |frame| if frame < 60 { 15 } else { 45 });
+        let marked: Vec<bool> = (0..120).map(|frame| frame == 10 || frame == 100).collect();
+        let left = left(&power, &starts, &marked, WIDTH);
+        assert!(
+            (0..120).filter(|frame| left[*frame] < 1.0).all(|frame| (45..75).contains(&frame)),
+            "{left:?}"
+        );
+    }
+
+    #[test]
+    fn without_marks_or_with_few_samples_nothing_is_doubted() {
+        let (power, starts) = frames(60, |frame| 15 + frame);
+        assert_eq!(left(&power, &starts, &[false; 60], WIDTH), [1.0; 60]);
+        let marked: Vec<bool> = (0..60).map(|frame| frame == 1).collect();
+        assert_eq!(left(&power, &starts, &marked, 40), [1.0; 60]);
+        assert_eq!(left(&[1.0; 9], &[3.0], &[true], WIDTH), [1.0]);
+        assert!(left(&[], &[], &[], WIDTH).is_empty());
+    }
+}
