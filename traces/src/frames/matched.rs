@@ -145,7 +145,7 @@ pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
 
 /// Variance of the sensor noise, W^2, from the median step between neighbours: `median |p[i+1] - p[i]|` is
 /// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a median.
-fn noise_variance(power: &[f64]) -> f64 {
+pub(super) fn noise_variance(power: &[f64]) -> f64 {
     let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let sigma = median_of(steps, power.len().saturating_sub(1)) / (0.674_489_75 * core::f64::consts::SQRT_2);
     sigma * sigma

@@ -30,6 +30,7 @@ mod threshold;
 mod track;
 mod tracked;
 mod uncovered;
+mod unrested;
 
 pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_only};
 pub use flags::{Flag, Flags};

@@ -4,6 +4,7 @@ use super::assess;
 use super::find::{Found, FrameStart, spacing};
 use super::lock::{Ticks, ticks};
 use super::marks::{MarkError, Marks, Placed};
+use super::matched::noise_variance;
 use super::method::Method;
 use super::register::register;
 use super::rest;
@@ -11,6 +12,7 @@ use super::settle::settle;
 use super::threshold::choose;
 use super::track::{Start, track};
 use super::uncovered::uncovered;
+use super::unrested;
 use crate::trace::Trace;
 
 /// What is left of the confidence of a start between the ticks of the display that the others wait for.
@@ -28,20 +30,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
     let positions = settle(&power, positions, &fixed, anchor, placement.samples);
-    let first_mark = fixed.iter().position(|fixed| *fixed);
-    let (positions, kept) = match first_mark.and_then(|mark| ticks(&positions, mark, placement.samples)) {
-        // What begins on a tick is in the phase of the mark, whatever happened on the way.
-        Some(Ticks { positions, between }) => {
-            (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
-        }
-        None => {
-            let places: Vec<f64> = positions.iter().map(|position| position + anchor).collect();
-            let rests = rest::left(&power, &places, &fixed, placement.samples);
-            let kept: Vec<f64> =
-                tracked.starts.iter().zip(rests).map(|(start, rest)| start.left * rest).collect();
-            (positions, kept)
-        }
-    };
+    let (positions, kept) = phases(&power, positions, &tracked.starts, &fixed, anchor, placement.samples);
     let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
         time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
         distance_w2: start.distance_w2,
@@ -60,4 +49,36 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     found.warnings.extend(uncovered(&power[..end], &places));
     found.method = Method::Tracking;
     Ok(found)
+}
+
+/// Positions on the ticks of the display, where there are any, and what is left of the confidence of each start.
+fn phases(
+    power: &[f64],
+    positions: Vec<f64>,
+    starts: &[Start],
+    fixed: &[bool],
+    anchor: f64,
+    width: usize,
+) -> (Vec<f64>, Vec<f64>) {
+    let places =
+        |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
+    let first_mark = fixed.iter().position(|fixed| *fixed);
+    let (positions, in_phase) = match first_mark.and_then(|mark| ticks(&positions, mark, width)) {
+        // What begins on a tick is in the phase of the mark, whatever happened on the way.
+        Some(Ticks { positions, between }) => {
+            (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
+        }
+        None => {
+            let rests = rest::left(power, &places(&positions), fixed, width);
+            (positions, product(starts.iter().map(|start| start.left), rests))
+        }
+    };
+    let noise_w = libm::sqrt(noise_variance(power));
+    let rested = unrested::left(power, &places(&positions), width, noise_w).into_iter().zip(fixed);
+    let rested = rested.map(|(left, fixed)| if *fixed { 1.0 } else { left }).collect();
+    (positions, product(in_phase, rested))
+}
+
+fn product(a: impl IntoIterator<Item = f64>, b: Vec<f64>) -> Vec<f64> {
+    a.into_iter().zip(b).map(|(a, b)| a * b).collect()
 }
