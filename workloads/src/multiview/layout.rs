@@ -56,12 +56,12 @@ impl Layout {
         }
         for (setting, value) in [("spacing", self.spacing), ("aperture", self.aperture)] {
             if !(value > 0.0 && value.is_finite()) {
-                return refused(setting, format!("{value}: it has to be a finite length above zero"));
+                return refused(setting, format!("{value:?}: it has to be a finite length above zero"));
             }
         }
         if self.overlap == 0 && self.views > 1 && self.spacing < 2.0 * self.aperture {
             let message = format!(
-                "{}: apart, lenses of radius {} need twice that; or give an `overlap` of 1 or more",
+                "{:?}: apart, lenses of radius {:?} need twice that; or give an `overlap` of 1 or more",
                 self.spacing, self.aperture
             );
             return refused("spacing", message);
