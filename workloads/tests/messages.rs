@@ -110,6 +110,7 @@ fn options_out_of_range_say_what_would_do() {
         ("multiview", "spacing", "1e30", "move the views closer or widen the aperture"),
         ("multiview", "aperture", "1e-30", "move the views closer or widen the aperture"),
         ("multiview", "panel", "(pitch: 0)", "1 to 1000000 subpixels"),
+        ("multiview", "aperture", "1e-300", "1e-35 or more"),
         ("multiview", "panel", "(slant: 1e300)", "slant 1e300: it has to be -1000000 to 1000000"),
         ("caustics", "wave_m", "1e300", "1e300: it has to be 0.001 to 10000 metres"),
         ("glossy", "half", "[1e300, 1]", "[1e300, 1.0]: both have to be 1e-15 to 1e15"),
@@ -128,6 +129,15 @@ fn options_out_of_range_say_what_would_do() {
         let error = refusal(job, &OptionSource { file: None, set }).unwrap();
         expect(&error.to_string(), &[&format!("unknown option `{name}x`, did you mean `{name}`?")]);
     }
+}
+
+#[test]
+fn views_that_see_no_scene_in_common_are_refused() {
+    let set =
+        [("aperture", "1e10"), ("spacing", "1e11")].map(|(name, value)| (name.into(), value.into())).to_vec();
+    let error = refusal("multiview", &OptionSource { file: None, set }).unwrap();
+    assert!(error.is_usage());
+    expect(&error.to_string(), &["aperture: ", "100 times the depth at which views agree"]);
 }
 
 #[test]

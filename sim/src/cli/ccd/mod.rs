@@ -118,6 +118,14 @@ enum Outcome {
 }
 
 impl Outcome {
+    fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[Answer]) -> Self {
+        let case_id = case.id.clone();
+        match objects {
+            Ok(objects) => Self::Found(Found::new(case_id, &objects, answers)),
+            Err(error) => Self::Unknown(Unknown { case_id, error }),
+        }
+    }
+
     fn found(&self) -> Option<&Found> {
         match self {
             Self::Found(found) => Some(found),
@@ -190,14 +198,8 @@ fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Ou
     let pairs = known.iter().map(|objects| candidates(objects).len() as u64).sum();
     let bar = progress.bar("pairs", pairs);
     let answers = detect_each(&known, search, || bar.inc());
-    let outcome = |(case, (objects, answers)): (&CaseFiles, (&Result<Vec<Object>, String>, Vec<Answer>))| {
-        let case_id = case.id.clone();
-        match objects {
-            Ok(objects) => Outcome::Found(Found::new(case_id, objects, &answers)),
-            Err(error) => Outcome::Unknown(Unknown { case_id, error: error.clone() }),
-        }
-    };
-    cases.iter().zip(all.iter().zip(answers)).map(outcome).collect()
+    let outcomes = cases.iter().zip(all).zip(answers);
+    outcomes.map(|((case, objects), answers)| Outcome::new(case, objects, &answers)).collect()
 }
 
 /// Fails where nothing is known of a case, and names each.
