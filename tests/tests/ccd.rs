@@ -44,7 +44,8 @@ fn what_cannot_be_is_told() {
     let inputs = Inputs::new();
     let (good, cut) = (inputs.put("good.mts", mts()), inputs.put("cut.mts", &mts()[..100]));
     let alone = inputs.put("alone.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    let cases: [(&[&str], i32, &str); 5] = [
+    let cases: [(&[&str], i32, &str); 6] = [
+        (&["/dev/null"], 2, "known here: .mts, and .ply or .obj two by two"),
         (&[&good, "--resolution", "0"], 2, "1..=1024"),
         (&[&good, "--method", "guess"], 2, "fragment-box"),
         (&[&good, "--csv", &good], 2, "name another file"),
@@ -128,4 +129,20 @@ fn ends_that_do_not_go_together_are_refused() {
         assert_eq!(ended.code, Some(1), "{}", ended.stderr);
         assert!(says.iter().all(|says| ended.stderr.contains(says)), "{says:?}: {}", ended.stderr);
     }
+}
+
+/// Copies of one triangle: every two of them touch all over, and no image tells them apart.
+#[test]
+fn coincident_triangles_are_told_at_once() {
+    let inputs = Inputs::new();
+    let copies = 200;
+    let corners = "v 0 0 0\nv 1 0 0.1\nv 0.1 1 0\n".repeat(copies);
+    let faces: String =
+        (0..copies).map(|n| format!("f {} {} {}\n", 3 * n + 1, 3 * n + 2, 3 * n + 3)).collect();
+    let [open, close] = ["open.obj", "close.obj"].map(|name| inputs.put(name, format!("{corners}{faces}")));
+    let ended = quintile!().call(["ccd", &open, &close, "--csv", "-"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let rows: Vec<&str> = ended.stdout.lines().skip(1).collect();
+    assert_eq!(rows.len(), copies * (copies - 1) / 2);
+    assert!(rows.iter().all(|row| row.ends_with(",1")));
 }

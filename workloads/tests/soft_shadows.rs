@@ -219,7 +219,8 @@ fn points_of_ones_own_are_the_set() {
     let found: Vec<_> = set.samples().iter().map(|s| (s.u, s.v, s.t)).collect();
     assert_eq!(found, points);
     for bad in [
-        Options { points: vec![(2.0, 0.0, 0.0)], ..Options::default() },
+        Options { points: Some(vec![(2.0, 0.0, 0.0)]), ..Options::default() },
+        Options { points: Some(Vec::new()), ..Options::default() },
         Options { map_px: 33, ..Options::default() },
         Options { bias: f64::NAN, ..Options::default() },
         Options { scene: Some("no such scene".to_owned()), ..Options::default() },

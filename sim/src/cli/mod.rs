@@ -4,6 +4,7 @@ mod args;
 mod ccd;
 mod chart;
 mod list;
+mod outputs;
 mod parse;
 mod reproduce;
 mod run;
@@ -14,7 +15,6 @@ mod terminal;
 mod trace;
 mod visibility;
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -68,21 +68,6 @@ impl From<workloads::LoadError> for Failure {
 fn threads(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(asked.unwrap_or(0))).build();
     pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
-}
-
-/// Refuses a result that would be written over one of its own inputs.
-fn not_an_input<'a>(
-    (flag, out): (&str, Option<&Path>),
-    inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), Failure> {
-    let Some(Ok(place)) = out.map(std::fs::canonicalize) else { return Ok(()) };
-    let same =
-        inputs.into_iter().find(|input| std::fs::canonicalize(input).is_ok_and(|input| input == place));
-    let refused = |input: &Path| {
-        let message = format!("{flag}: {} is what is read; name another file", input.display());
-        Failure { message, code: 2 }
-    };
-    same.map_or(Ok(()), |input| Err(refused(input)))
 }
 
 fn dispatch(cli: &Cli) -> Result<(), Failure> {

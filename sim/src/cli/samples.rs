@@ -25,7 +25,7 @@ struct Written {
 }
 
 pub(super) fn run(args: &SamplesArgs) -> Result<(), Failure> {
-    super::not_an_input(("--out", Some(&args.out)), [Path::new(&args.table)])?;
+    super::outputs::may_hold_results(("--out", Some(&args.out)), [Path::new(&args.table)])?;
     let (width, height) = args.size;
     let wrong = |message: String| Failure { message, code: 2 };
     let viewport = Viewport::new(width, height)

@@ -36,7 +36,10 @@ struct Found {
 
 pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
     let inputs = args.files.iter().chain(&args.camera).map(PathBuf::as_path);
-    super::not_an_input(("--out", args.out.as_deref()), inputs.chain([Path::new(&args.samples)]))?;
+    super::outputs::may_hold_results(
+        ("--out", args.out.as_deref()),
+        inputs.chain([Path::new(&args.samples)]),
+    )?;
     let scene = visibility::load(&args.files, args.camera.as_deref())?;
     if args.print_camera {
         return print_camera(args, &scene);

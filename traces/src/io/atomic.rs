@@ -30,6 +30,17 @@ where
     written
 }
 
+/// Finds out whether a file could be written at `path` by making the temporary one and removing it: before long work, not after it.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn try_place(path: &Path) -> Result<(), WriteError> {
+    let path = &destination(path)?;
+    let temporary = temporary_name(path)?;
+    let made = File::create(&temporary).and_then(|_| fs::remove_file(&temporary));
+    made.map_err(|source| WriteError::Io { path: path.to_owned(), source })
+}
+
 fn write_whole<E>(
     path: &Path,
     temporary: &Path,

@@ -72,14 +72,14 @@ impl Options {
         for (setting, value) in [("side_m", self.side_m), ("depth_m", self.depth_m), ("wave_m", self.wave_m)]
         {
             if !(1e-3..=1e4).contains(&value) {
-                return refuse(setting, format!("{value}: it has to be 0.001 to 10000 metres"));
+                return refuse(setting, format!("{value:?}: it has to be 0.001 to 10000 metres"));
             }
         }
         if !(0.0..=1.0).contains(&self.slope) {
-            return refuse("slope", format!("{}: it has to be 0 to 1", self.slope));
+            return refuse("slope", format!("{:?}: it has to be 0 to 1", self.slope));
         }
         if !(0.0..=0.9).contains(&self.pleat) {
-            return refuse("pleat", format!("{}: it has to be 0 to 0.9", self.pleat));
+            return refuse("pleat", format!("{:?}: it has to be 0 to 0.9", self.pleat));
         }
         Ok(())
     }

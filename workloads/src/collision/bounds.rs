@@ -60,6 +60,11 @@ impl Bounds {
         Self { space: self.space.map(|[low, high]| [low - margin, high + margin]), ..*self }
     }
 
+    /// What a few operations on coordinates in it are rounded by.
+    pub(super) fn rounding(&self) -> f64 {
+        8.0 * f64::EPSILON * self.space.as_flattened().iter().fold(0.0, |size: f64, at| size.max(at.abs()))
+    }
+
     /// What is left of it, as the product of the shares of each extent; an extent of zero stays what it is.
     pub fn share_of(&self, whole: &Self) -> f64 {
         let ranges = self.space.iter().chain([&self.time]).zip(whole.space.iter().chain([&whole.time]));

@@ -1,4 +1,5 @@
-//! Whether two triangles cross at an instant. Never trusted to say no: where it says yes, a pair need not be looked at any closer.
+//! Whether two triangles cross or share a corner at an instant. Never trusted to say no: where it says yes, a pair need not be
+//! looked at any closer.
 
 use glam::DVec3;
 
@@ -9,9 +10,13 @@ fn at(ends: &Ends, t: f64) -> [DVec3; 3] {
     [0, 1, 2].map(|corner| DVec3::from(ends[0][corner]).lerp(DVec3::from(ends[1][corner]), t))
 }
 
-/// Whether an edge of one of the triangles passes through the other at time `t`, as far as rounding can tell.
+/// Whether an edge of one of the triangles passes through the other at time `t`, or both have a corner in the same place, as far as
+/// rounding can tell.
 pub(super) fn cross(a: &Ends, b: &Ends, t: f64) -> bool {
     let (a, b) = (at(a, t), at(b, t));
+    if a.iter().any(|corner| b.contains(corner)) {
+        return true;
+    }
     // Most lie on one side of the other's plane.
     if !on_both_sides(&a, &b) || !on_both_sides(&b, &a) {
         return false;
@@ -82,10 +87,19 @@ mod tests {
         let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
         let wall = |x: f64| [[0.5, x, 0.0], [0.5, x + 1.0, 0.2], [0.5, x, 1.0]];
         let posed = |ends: [[f64; 3]; 3]| ends.map(|p| (turn * DVec3::from(p)).to_array());
-        for n in 0..100 {
+        for n in 1..100 {
             let x = f64::from(n) * 0.01;
             let (one, other) = ([posed(wall(0.0)); 2], [posed(wall(x - 0.5)), posed(wall(x + 0.5))]);
             assert!(!cross(&one, &other, 0.5), "{x}");
         }
+    }
+
+    #[test]
+    fn a_corner_of_both_is_a_contact_while_it_is() {
+        let one = [[0.25, 0.5, 0.75], [1.25, 0.5, 0.75], [0.25, 1.5, 0.75]];
+        let other = |y: f64| [[-0.75, y, 0.5], [0.25, y, 0.75], [-0.75, y, 1.0]];
+        let passing = [other(1.5), other(-0.5)];
+        assert!(cross(&[one; 2], &passing, 0.5) && !cross(&[one; 2], &passing, 0.25));
+        assert!(cross(&[one; 2], &[one; 2], 0.3), "in one plane, too");
     }
 }

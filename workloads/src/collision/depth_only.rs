@@ -8,19 +8,19 @@ use super::Bounds;
 use super::compare::{Comparison, Scratch, Watch};
 use super::pass::{Effort, Fit, Part, Pass};
 
-/// Tiles that keep the two together in the pass with the fewest, none where one of the six sets them apart. `None` where that takes more
-/// than `effort`.
+/// Tiles, of so many and not narrower `across`, that keep the two together in the pass with the fewest, none where one of the six
+/// sets them apart. `None` where that takes more than `effort`.
 pub(super) fn tiles(
     parts: [Part<'_>; 2],
     window: &Bounds,
-    resolution: u32,
+    across: (u32, f64),
     effort: &mut Effort,
     scratch: &mut Scratch,
     watch: &mut impl Watch,
 ) -> Option<u64> {
     let mut fewest = u64::MAX;
     for axis in 0..3 {
-        let pass = Pass::new(axis, window, resolution, Fit::Edges);
+        let pass = Pass::new(axis, window, across, Fit::Edges);
         let comparison = Comparison { pass: &pass, parts, bins: &[Some(*window)] };
         let [in_front, behind] = comparison.depths(scratch, effort, watch)?;
         fewest = fewest.min(in_front).min(behind);

@@ -1,4 +1,5 @@
-//! A glance at a pair at a few instants: does anything cross? Never trusted to say no; where it says yes, nothing closer is needed.
+//! A glance at a pair at a few instants: does anything cross, or share a corner? Never trusted to say no; where it says yes, nothing
+//! closer is needed.
 
 use std::ops::RangeInclusive;
 

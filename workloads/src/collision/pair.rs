@@ -16,7 +16,7 @@ pub(super) struct Round {
     pub window: Bounds,
     /// Tiles in which both may touch.
     pub tiles: u64,
-    /// Whether two triangles were seen to cross.
+    /// Whether two triangles were seen to cross or to share a corner.
     pub seen: bool,
 }
 
@@ -72,7 +72,8 @@ impl<'a> Pair<'a> {
         scratch: &mut Scratch,
         watch: &mut impl Watch,
     ) -> Option<u64> {
-        depth_only::tiles(self.parts(), &self.window, resolution, effort, scratch, watch)
+        let across = (resolution, self.grain());
+        depth_only::tiles(self.parts(), &self.window, across, effort, scratch, watch)
     }
 
     /// At the resolution asked for.
@@ -89,6 +90,12 @@ impl<'a> Pair<'a> {
     /// What is left of it may collide.
     pub fn maybe(&self, tiles: u64, seen: bool) -> Verdict {
         Verdict::Maybe { bounds: self.window, tiles, seen }
+    }
+
+    /// Tiles narrower than this tell nothing more: their borders are rounded, and corners are unsure, by as much.
+    pub fn grain(&self) -> f64 {
+        let unsure = self.objects.iter().map(|object| object.uncertainty);
+        unsure.fold(self.window.rounding(), f64::max)
     }
 
     /// How many are left.
@@ -131,7 +138,7 @@ impl<'a> Pair<'a> {
         let (mut tiles, mut seen) = (0, false);
         for axis in 0..3 {
             let Some(hull) = joined(&left) else { return Outcome::Apart };
-            let pass = Pass::new(axis, &hull, look.resolution, look.fit);
+            let pass = Pass::new(axis, &hull, (look.resolution, self.grain()), look.fit);
             let Some(found) = self.compare(&pass, &left, effort, scratch, watch) else {
                 return Outcome::GaveUp;
             };

@@ -71,19 +71,18 @@ pub(super) struct Fragment {
 }
 
 impl Pass {
-    /// A pass along `axis` over `hull` with `resolution` tiles across, one where there is no extent.
-    pub fn new(axis: usize, hull: &Bounds, resolution: u32, fit: Fit) -> Self {
+    /// A pass along `axis` over `hull` with `resolution` tiles across, fewer where they would be narrower than `grain`.
+    pub fn new(axis: usize, hull: &Bounds, (resolution, grain): (u32, f64), fit: Fit) -> Self {
         let side = |across: usize| {
             let [low, high] = hull.space[(axis + across) % 3];
             // Borders are rounded; the margin keeps the last of them outside.
             let margin = (low.abs() + high.abs()) * 4.0 * f64::EPSILON + 1e-300;
-            let count = if low == high { 1 } else { resolution };
+            let count = (((high - low) / grain) as u32).clamp(1, resolution);
             (low - margin, (high - low + 2.0 * margin) / f64::from(count), count)
         };
         let [x, y] = [side(1), side(2)];
         let grid = Grid { origin: [x.0, y.0], tile: [x.1, y.1], columns: x.2, rows: y.2 };
-        let size = hull.space.as_flattened().iter().fold(0.0, |size: f64, at| size.max(at.abs()));
-        Self { axis, grid, hull: *hull, fit, slack: 8.0 * f64::EPSILON * size }
+        Self { axis, grid, hull: *hull, fit, slack: hull.rounding() }
     }
 
     /// Tiles of the pass.

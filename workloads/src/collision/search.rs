@@ -52,7 +52,7 @@ pub enum Verdict {
         bounds: Bounds,
         /// Tiles in which they may, in the last pass that was looked at.
         tiles: u64,
-        /// Whether two triangles were seen to cross, as far as rounding can tell.
+        /// Whether two triangles were seen to cross or to share a corner, as far as rounding can tell.
         seen: bool,
     },
 }

@@ -55,22 +55,26 @@ impl Default for Options {
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
         let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
-        if !self.half.iter().all(|half| *half > 0.0 && half.is_finite()) {
-            return refused("half", format!("{:?}: both have to be finite lengths above zero", self.half));
+        if !self.half.iter().all(|half| (LEAST..=FARTHEST).contains(half)) {
+            return refused("half", format!("{:?}: both have to be {LEAST:e} to {FARTHEST:e}", self.half));
+        }
+        if !self.centre.iter().all(|at| (-FARTHEST..=FARTHEST).contains(at)) {
+            let message = format!("{:?}: all have to be -{FARTHEST:e} to {FARTHEST:e}", self.centre);
+            return refused("centre", message);
         }
         let most = WIDEST * self.half[0].min(self.half[1]);
-        if !(0.0..=most).contains(&self.roughness) {
+        if self.roughness != 0.0 && !(LEAST..=most).contains(&self.roughness) {
             let why = format!(
-                "{}: it is a radius of 0 to {most} scene units, {WIDEST} times the receiver's",
+                "{:?}: it has to be 0, or a radius of {LEAST:e} to {most:?} scene units, {WIDEST} times the receiver's",
                 self.roughness
             );
             return refused("roughness", format!("{why} smaller half side"));
         }
         if let Some(index) = self.index.filter(|index| !(1.0..=10.0).contains(index)) {
-            return refused("index", format!("{index}: an index of refraction is 1 to 10 here"));
+            return refused("index", format!("{index:?}: an index of refraction is 1 to 10 here"));
         }
         if !(0.0..=1.0).contains(&self.fresnel) {
-            return refused("fresnel", format!("{}: it is a share, 0 to 1", self.fresnel));
+            return refused("fresnel", format!("{:?}: it is a share, 0 to 1", self.fresnel));
         }
         match self.map_samples {
             1..=SampleTable::MAX_PER_PIXEL => Ok(()),
@@ -93,6 +97,9 @@ fn refused(error: impl std::fmt::Display) -> JobError {
 
 /// The widest lens over the receiver's smaller half side: far beyond where it stands for a surface.
 const WIDEST: f64 = 100.0;
+/// Lengths and coordinates that single precision holds with room for their products.
+const LEAST: f64 = 1e-15;
+const FARTHEST: f64 = 1e15;
 /// Linear RGB radiance of the receiver's own surface.
 const BASE: Vec3 = Vec3::new(0.10, 0.11, 0.12);
 

@@ -57,7 +57,7 @@ impl Map {
         let [wide, high] = receiver.half;
         let columns = (f64::from(rows) * wide / high).ceil();
         let viewport = Viewport::new(columns as u32, rows).ok_or_else(|| {
-            refused("texels", format!("{columns} x {rows}: a map is 1 to 16384 texels wide"))
+            refused("texels", format!("{columns:?} x {rows}: a map is 1 to 16384 texels wide and high"))
         })?;
         let shift = Vec2::new((-0.5 * x / high) as f32, (0.5 * y / high) as f32);
         let camera = Camera::new(stand.pose(), (high / distance) as f32, distance as f32)

@@ -31,6 +31,9 @@ impl Default for Layout {
 /// The most views: their samples have to fit in a pixel.
 const MOST_VIEWS: u32 = 128;
 
+/// The shortest length: single precision holds it.
+const SHORTEST: f64 = 1e-35;
+
 /// Half the camera line over the radius of an aperture, at most: a hundredth of what single precision tells apart.
 const LONGEST: f64 = 1e5;
 
@@ -55,13 +58,16 @@ impl Layout {
             return refused("views", format!("{}: there can be 1 to {MOST_VIEWS}", self.views));
         }
         for (setting, value) in [("spacing", self.spacing), ("aperture", self.aperture)] {
-            if !(value > 0.0 && value.is_finite()) {
-                return refused(setting, format!("{value}: it has to be a finite length above zero"));
+            if !(value >= SHORTEST && value.is_finite()) {
+                return refused(
+                    setting,
+                    format!("{value:?}: it has to be a finite length of {SHORTEST:e} or more"),
+                );
             }
         }
         if self.overlap == 0 && self.views > 1 && self.spacing < 2.0 * self.aperture {
             let message = format!(
-                "{}: apart, lenses of radius {} need twice that; or give an `overlap` of 1 or more",
+                "{:?}: apart, lenses of radius {:?} need twice that; or give an `overlap` of 1 or more",
                 self.spacing, self.aperture
             );
             return refused("spacing", message);

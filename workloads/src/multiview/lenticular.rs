@@ -31,6 +31,9 @@ impl Default for Panel {
     }
 }
 
+/// Subpixels, and tangents, beyond which a panel is none: all of an image lies under one lens.
+const MOST: f64 = 1e6;
+
 impl Panel {
     /// Checks every value.
     ///
@@ -38,11 +41,13 @@ impl Panel {
     /// Names the first that cannot be.
     pub fn check(&self) -> Result<(), LoadError> {
         let refused = |message| Err(LoadError::Setting { setting: "panel", message });
-        if !(self.pitch >= 1.0 && self.pitch.is_finite()) {
-            return refused(format!("pitch {}: a lens covers one subpixel or more", self.pitch));
+        if !(1.0..=MOST).contains(&self.pitch) {
+            return refused(format!("pitch {:?}: a lens covers 1 to {MOST} subpixels", self.pitch));
         }
-        if !(self.slant.is_finite() && self.offset.is_finite()) {
-            return refused("slant and offset have to be finite".to_owned());
+        for (name, value) in [("slant", self.slant), ("offset", self.offset)] {
+            if !(-MOST..=MOST).contains(&value) {
+                return refused(format!("{name} {value:?}: it has to be -{MOST} to {MOST}"));
+            }
         }
         Ok(())
     }

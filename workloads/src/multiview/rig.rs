@@ -44,6 +44,9 @@ pub struct Rig {
     pub(super) runs: Vec<Range<u32>>,
 }
 
+/// Half the line of views over the depth at which they agree, at most: from farther apart they have no scene in common.
+const WIDEST: f64 = 100.0;
+
 impl Rig {
     /// A rig of `layout` where `camera` stands, all views sharp at depth `focus`, with `samples` for each view of a pixel.
     ///
@@ -59,6 +62,15 @@ impl Rig {
         layout.check()?;
         let refused = |setting, message: String| LoadError::Setting { setting, message };
         let lens = Lens::new(layout.radius() as f32, focus).map_err(|e| refused("focus", e.to_string()))?;
+        let most = WIDEST * f64::from(focus);
+        if layout.radius() > most {
+            let message = format!(
+                "{:?}: half the line of views is {:?} long; it has to be at most {most:?}, {WIDEST} times the depth at which views agree",
+                layout.aperture,
+                layout.radius()
+            );
+            return Err(refused("aperture", message));
+        }
         let strips = layout.overlap.max(1);
         let per_strip = samples / strips;
         if per_strip == 0 || !samples.is_multiple_of(strips) {

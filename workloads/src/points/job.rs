@@ -50,7 +50,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     let options: Options = options.read()?;
     let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
     if !(0.005..=0.5).contains(&options.radius) {
-        return refused("radius", format!("{}: it has to be 0.005 to 0.5", options.radius));
+        return refused("radius", format!("{:?}: it has to be 0.005 to 0.5", options.radius));
     }
     if !(1..=8).contains(&options.rounds) {
         return refused("rounds", format!("{}: it has to be 1 to 8", options.rounds));

@@ -30,7 +30,7 @@ pub struct Options {
     /// Depth by which a point may lie behind what the map holds and still be lit, scene units.
     pub bias: f64,
     /// Places `(u, v, t)` of one's own instead of the first points of a scrambled Sobol sequence, at least as many as samples.
-    pub points: Vec<(f32, f32, f32)>,
+    pub points: Option<Vec<(f32, f32, f32)>>,
     /// Accumulation buffering instead of one pass: the same image at another cost.
     pub accumulate: bool,
 }
@@ -38,7 +38,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         let light = LightSpec::default();
-        Self { scene: None, light, map_px: 256, bias: 0.06, points: Vec::new(), accumulate: false }
+        Self { scene: None, light, map_px: 256, bias: 0.06, points: None, accumulate: false }
     }
 }
 
@@ -50,7 +50,7 @@ impl Options {
             return refused("map_px", message);
         }
         if !(self.bias >= 0.0 && self.bias.is_finite()) {
-            return refused("bias", format!("{}: the bias is a finite depth, 0 or above", self.bias));
+            return refused("bias", format!("{:?}: the bias is a finite depth, 0 or above", self.bias));
         }
         Ok(())
     }
@@ -75,11 +75,12 @@ impl SoftShadows {
         let light = AreaLight::new(&options.light)?;
         let samples = scene.settings().samples;
         let spec = SampleSpec::default();
-        let set = if options.points.is_empty() {
-            SharedSamples::interleaved(&spec, samples, seed)
-        } else {
-            let pattern = Pattern::Given { points: options.points.clone() };
-            SharedSamples::from_spec(&SampleSpec { pattern, ..spec }, samples, seed)
+        let set = match options.points.clone() {
+            None => SharedSamples::interleaved(&spec, samples, seed),
+            Some(points) => {
+                let pattern = Pattern::Given { points };
+                SharedSamples::from_spec(&SampleSpec { pattern, ..spec }, samples, seed)
+            }
         };
         let set =
             set.map_err(|error| LoadError::Setting { setting: "points", message: error.to_string() })?;

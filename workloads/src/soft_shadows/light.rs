@@ -42,6 +42,11 @@ pub struct AreaLight {
 /// As good as infinitely far, in scene units: the lens moves the image of a texel by less than its rounding.
 const INFINITY: f32 = 1e30;
 
+/// The widest light over its distance from the target: beyond it the map sees nothing of what is lit.
+const WIDEST: f64 = 100.0;
+/// The smallest, in scene units: single precision holds it.
+const SMALLEST: f64 = 1e-30;
+
 impl AreaLight {
     /// The light that is described.
     ///
@@ -55,7 +60,14 @@ impl AreaLight {
             refused("position and target coincide or are not finite: move one of them".to_owned())
         })?;
         if !(1.0..=170.0).contains(&spec.fov_deg) {
-            return Err(refused(format!("fov_deg {}: a map sees 1 to 170 degrees", spec.fov_deg)));
+            return Err(refused(format!("fov_deg {:?}: a map sees 1 to 170 degrees", spec.fov_deg)));
+        }
+        let most = WIDEST * (DVec3::from_array(spec.target) - position).length();
+        if !(SMALLEST..=most).contains(&spec.radius) {
+            return Err(refused(format!(
+                "radius {:?}: it has to be {SMALLEST:e} to {most:?} scene units, {WIDEST} times the way to the target",
+                spec.radius
+            )));
         }
         let view = View::Perspective { tan_half_height: tan_half(spec.fov_deg) };
         let camera = view.camera(stand.pose(), spec.near as f32).map_err(|e| refused(e.to_string()))?;
@@ -123,6 +135,8 @@ mod tests {
         for bad in [
             LightSpec { target: base.position, ..base },
             LightSpec { radius: 0.0, ..base },
+            LightSpec { radius: 1e-300, ..base },
+            LightSpec { radius: 1e4, ..base },
             LightSpec { fov_deg: 200.0, ..base },
             LightSpec { near: -1.0, ..base },
         ] {

@@ -1,6 +1,6 @@
 //! Files of collision detection: which of them make a case, and what it holds.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::load::Kind;
@@ -9,6 +9,9 @@ use super::{mts, pair};
 use crate::collision::components;
 use crate::error::LoadError;
 use crate::import::Format;
+
+/// What a case can be loaded from, for messages.
+const KNOWN: &str = ".mts, and .ply or .obj two by two (each also gzipped)";
 
 /// Objects that may collide, and where they came from.
 #[derive(Clone, Debug)]
@@ -53,7 +56,7 @@ impl CaseFiles {
                 folder.display()
             )));
         }
-        let (mut cases, mut numbers) = (Vec::<Self>::new(), HashMap::new());
+        let (mut cases, mut places) = (Vec::<Self>::new(), BTreeMap::new());
         while let Some(file) = files.next() {
             let content = match kind(file)? {
                 Kind::Mts => Content::Objects,
@@ -65,7 +68,7 @@ impl CaseFiles {
                 Kind::M5d => return Err(no_partner(file)),
             };
             let case = Self { id: stem(file), start: file.to_owned(), content };
-            if let Some(known) = numbers.insert(case.id.clone(), cases.len()) {
+            if let Some(known) = places.insert(case.id.clone(), cases.len()) {
                 return Err(same_id(&cases[known], &case));
             }
             cases.push(case);
@@ -105,6 +108,7 @@ pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, Load
 
 fn kind(path: &Path) -> Result<Kind, LoadError> {
     match Kind::of(path) {
+        Err(LoadError::Kind { file, .. }) => Err(LoadError::Kind { file, known: KNOWN }),
         Err(error) if !error.is_usage() => Kind::named(path).ok_or(error),
         found => found,
     }

@@ -91,9 +91,11 @@ impl Common {
         ))
     }
 
-    /// Refuses a file whose ending says nothing, before any work.
-    fn check(&self) -> Result<(), Failure> {
-        self.out.as_deref().map_or(Ok(()), |path: &Path| file::Format::of(path).map(|_| ()))
+    /// Refuses a file whose ending says nothing, that cannot be written or that is the `input`, before any work.
+    fn check(&self, input: Option<&Path>) -> Result<(), Failure> {
+        let out = self.out.as_deref();
+        out.map(file::Format::of).transpose()?;
+        super::outputs::may_hold_results(("--out", out), input)
     }
 }
 

@@ -50,7 +50,7 @@ struct Facts {
 }
 
 pub(super) fn run(args: &PoissonArgs) -> Result<(), Failure> {
-    args.common.check()?;
+    args.common.check(None)?;
     match args.dim {
         1 => sample::<1>(args),
         2 => sample::<2>(args),
@@ -64,12 +64,29 @@ fn radius(count: u32, dimensions: usize, domain: Domain) -> f64 {
     if count == 1 { span(dimensions, domain) } else { radius_for(f64::from(count), dimensions).min(0.5) }
 }
 
-/// Makes the points, with a bar on a terminal.
+/// Points made in a second by the number of dimensions, about (two cores, 22 November 2026): the order of what to expect.
+const POINTS_A_SECOND: [f64; 4] = [2.5e6, 6e5, 1.1e5, 1.1e4];
+/// What takes less is not worth a word.
+const LONG_S: f64 = 20.0;
+
+/// What to say beforehand of many points.
+fn long(points: f64, dimensions: usize) -> Option<String> {
+    let seconds = points / POINTS_A_SECOND[dimensions - 1];
+    let time = if seconds < 120.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) };
+    let told = format!("about {points:.1e} points in {dimensions} dimensions take of the order of {time}");
+    (LONG_S..f64::INFINITY).contains(&seconds).then_some(told)
+}
+
+/// Makes the points, with a bar and a word of warning on a terminal.
 fn make<const D: usize>(spec: &PoissonSpec, args: &PoissonArgs) -> Result<PoissonDisk<D>, Failure> {
     let pool = crate::cli::threads(args.common.threads)?;
     let volume = ball(D) * spec.radius.powi(D as i32);
     let progress = Progress::new(false);
-    let bar = progress.bar("points, about", (saturation(D) / volume) as u64);
+    let points = saturation(D) / volume;
+    if let Some(note) = long(points, D) {
+        progress.note(&note);
+    }
+    let bar = progress.bar("points, about", points as u64);
     pool.install(|| poisson_disk_telling(spec, &mut |points| bar.set(points as u64))).map_err(usage)
 }
 
@@ -153,6 +170,15 @@ mod tests {
             let limits = "it has to be 1.4e-14 to 0.5, or from 0.707 on for a single point";
             assert!(message.contains(said) && message.ends_with(limits), "{message}");
         }
+    }
+
+    #[test]
+    fn what_takes_long_is_told_beforehand() {
+        assert_eq!((long(1e5, 2), long(1e5, 4), long(f64::INFINITY, 4)), (None, None, None));
+        let [short, much] = [long(1e6, 4), long(1e7, 4)].map(Option::unwrap_or_default);
+        assert!(
+            short == "about 1.0e6 points in 4 dimensions take of the order of 91 s" && much.ends_with(" min")
+        );
     }
 
     #[test]

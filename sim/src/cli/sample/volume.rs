@@ -38,6 +38,13 @@ pub struct VolumeArgs {
     pub common: Common,
 }
 
+impl VolumeArgs {
+    /// How many points are asked for where no density is.
+    fn points(&self) -> u32 {
+        self.count.unwrap_or(10_000)
+    }
+}
+
 /// What is to be said of the points.
 #[derive(Serialize)]
 struct Facts {
@@ -51,11 +58,10 @@ struct Facts {
 }
 
 pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
-    args.common.check()?;
+    args.common.check(args.mesh.as_deref())?;
     let pool = crate::cli::threads(args.common.threads)?;
     pool.install(|| match &args.mesh {
         Some(path) => {
-            crate::cli::not_an_input(("--out", args.common.out.as_deref()), [path.as_path()])?;
             let mesh = load_surface(path)?;
             let solid = Solid::new(&mesh.open, &mesh.triangles, args.tiles)
                 .map_err(|error| Failure { message: format!("{}: {error}", path.display()), code: 1 })?;
@@ -65,23 +71,42 @@ pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
             let torus = Torus { ring: args.ring, tube: args.tube };
             if !(args.tube > 0.0 && args.tube < args.ring && args.ring + args.tube <= 0.5) {
                 return Err(usage(format!(
-                    "--ring {}, --tube {}: the tube has to be above 0 and below the ring, and both together at most 0.5",
+                    "--ring {:?}, --tube {:?}: the tube has to be above 0 and below the ring, and both together at most 0.5",
                     args.ring, args.tube
                 )));
             }
-            sample(args, &torus, &torus.bounds(args.tiles), torus.volume())
+            let bounds = torus.bounds(args.tiles);
+            thick_enough(args, torus.volume() / bounds.volume())?;
+            sample(args, &torus, &bounds, torus.volume())
         }
     })
 }
 
+/// Candidates that are tested at most: some minutes.
+const MOST_CANDIDATES: f64 = 1e10;
+
+/// Refuses a torus that fills so little of its bounds that its points would take too long to find.
+fn thick_enough(args: &VolumeArgs, share: f64) -> Result<(), Failure> {
+    let count = args.points();
+    let candidates = f64::from(count) / share;
+    if candidates <= MOST_CANDIDATES {
+        return Ok(());
+    }
+    Err(usage(format!(
+        "--tube {:?}: {count} points in it take about {candidates:.0e} candidates, more than {MOST_CANDIDATES:.0e}; \
+         make the tube wider or ask for fewer points",
+        args.tube
+    )))
+}
+
 fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -> Result<(), Failure> {
     let seed = args.common.seed;
-    let count = args.count.unwrap_or(10_000) as usize;
+    let count = args.points() as usize;
     let Sampled { points, candidates } = match args.density {
-        Some(density) if !(density > 0.0 && density * bounds.volume() < 1e10) => {
+        Some(density) if !(density > 0.0 && density * bounds.volume() < MOST_CANDIDATES) => {
             return Err(usage(format!(
-                "--density {density}: it has to be above 0, and times the volume of {:e} below 1e10",
-                bounds.volume()
+                "--density {density:?}: it has to be above 0 and below {:.1e}: {MOST_CANDIDATES:.0e} candidates in the bounds",
+                MOST_CANDIDATES / bounds.volume()
             )));
         }
         Some(density) => bounds.sample_density(solid, density, seed),
@@ -95,4 +120,38 @@ fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -
     let facts = Facts { seed, volume, volume_by_count, bounds_volume: bounds.volume(), candidates };
     let line = format!("volume {volume:.6}, by count {volume_by_count:.6}; {candidates} candidates");
     args.common.deliver(&Points::new(&points), facts, &line)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use crate::cli::args::{Cli, Command};
+
+    fn refusal(typed: &[&str]) -> String {
+        let typed = ["quintile", "sample", "volume"].iter().chain(typed);
+        let Ok(Cli { command: Command::Sample(args) }) = Cli::try_parse_from(typed) else {
+            return String::new();
+        };
+        super::super::run(&args).err().map_or_else(String::new, |failure| {
+            assert_eq!(failure.code, 2);
+            failure.message
+        })
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_are_told_in_a_line() {
+        for (typed, says) in [
+            (["--tube", "1e-300"], "--tube 1e-300: 10000 points in it take about"),
+            (["--tube", "1e-9"], "make the tube wider or ask for fewer points"),
+            (["--tube", "nan"], "--tube NaN: the tube has to be above 0"),
+            (["--ring", "1e300"], "--ring 1e300, --tube 0.15: the tube has to be"),
+            (["--ring", "inf"], "both together at most 0.5"),
+            (["--density", "1e30"], "--density 1e30: it has to be above 0 and below"),
+            (["--density", "inf"], "--density inf: "),
+        ] {
+            let message = refusal(&typed);
+            assert!(message.contains(says) && message.len() < 160, "{typed:?}: {message}");
+        }
+    }
 }

@@ -50,12 +50,11 @@ struct Facts {
 }
 
 pub(super) fn run(args: &WhiteArgs) -> Result<(), Failure> {
-    args.common.check()?;
+    args.common.check(args.image.as_deref())?;
     if let Some(path) = &args.image {
         if args.dim != 2 {
             return Err(usage("--image: a picture is a density of two dimensions; leave --dim out or say 2"));
         }
-        crate::cli::not_an_input(("--out", args.common.out.as_deref()), [path.as_path()])?;
         let image = ImageDensity::load(path).map_err(|e| Failure { message: e.to_string(), code: 1 })?;
         return sample::<2>(args, &image);
     }

@@ -10,6 +10,7 @@ use super::args::AlignArgs;
 use super::input::wrong;
 use super::times::times;
 use crate::cli::Failure;
+use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{complain, print, print_json};
 
 impl From<AlignError> for Failure {
@@ -19,6 +20,7 @@ impl From<AlignError> for Failure {
 }
 
 pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
+    may_hold_results(("--out", args.out.as_deref()), [])?;
     let mut stamps = times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {

@@ -8,6 +8,7 @@ use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, p
 use super::args::ConvertArgs;
 use super::input::wrong;
 use crate::cli::Failure;
+use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{complain, print, print_json};
 use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
 
@@ -17,6 +18,7 @@ const LARGE_BYTES: u64 = 1 << 30;
 
 pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     check(&args.out)?;
+    may_hold_results(("OUT", Some(&args.out)), [])?;
     let (trace, repairs) = args.input.source()?;
     save(&*trace, &args.out)?;
     let Heading { samples, rate_hz, .. } = trace.heading();

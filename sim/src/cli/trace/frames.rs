@@ -6,6 +6,7 @@ use traces::energy::{FrameTable, Summary};
 
 use super::args::FramesArgs;
 use super::input::Frames;
+use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{complain, print, print_json};
 use crate::cli::{Failure, threads};
 use crate::output::table::{Table, si, si_digits};
@@ -14,6 +15,7 @@ use crate::output::table::{Table, si, si_digits};
 const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
+    may_hold_results(("--out", args.out.as_deref()), [])?;
     let (frames, table, pixels) = threads(args.threads)?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);

@@ -12,6 +12,7 @@ use super::args::{ParetoArgs, ParetoShow};
 use super::input::wrong;
 use super::plot::{Ending, write};
 use crate::cli::Failure;
+use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{print, print_json};
 use crate::output::plot::{Lines, Mark, Series};
 use crate::output::table::{Table, si_digits};
@@ -19,6 +20,7 @@ use crate::output::table::{Table, si_digits};
 type Groups = BTreeMap<String, Vec<Standing>>;
 
 pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
+    may_hold_results(("--out", args.out.as_deref()), [])?;
     let table = Columns::read(&args.table).map_err(|error| wrong(error.to_string()))?;
     let groups = groups(args, &table)?;
     if let Some(out) = &args.out {

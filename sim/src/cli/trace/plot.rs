@@ -10,6 +10,7 @@ use traces::pyramid::{Column, Pyramid};
 use super::args::{PlotArgs, PlotKind};
 use super::input::wrong;
 use crate::cli::Failure;
+use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{complain, print, print_json};
 use crate::output::plot::{Lines, Mark, Picture, Series};
 use crate::output::table::si;
@@ -23,6 +24,7 @@ const OVERLAID: usize = 400;
 
 pub(super) fn run(args: &PlotArgs) -> Result<(), Failure> {
     let kind = Ending::of(&args.out)?;
+    may_hold_results(("--out", Some(&args.out)), [])?;
     let (picture, shown) = match args.kind {
         PlotKind::Curve => curve(args)?,
         _ => framed(args)?,

@@ -1,17 +1,20 @@
 //! `quintile ccd`.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+mod rows;
+
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 use serde::Serialize;
 use workloads::collision::{Answer, Method, Object, Search, Verdict, candidates, detect_each};
 use workloads::visibility::CaseFiles;
 
 use super::Failure;
 use super::terminal::{complain, print, print_json};
-use crate::output::progress::{Bar, Progress};
+use crate::output::progress::Progress;
 use crate::output::table::{Table, grouped};
+use rows::Rows;
 
 /// Arguments of `ccd`.
 #[derive(Debug, Args)]
@@ -36,7 +39,7 @@ pub struct CcdArgs {
     /// Look once at the resolution asked for, and not closer at what is left
     #[arg(long)]
     pub no_zoom: bool,
-    /// File for every pair of every case: case_id,a,b,may_collide
+    /// File for every pair of every case: case_id,a,b,may_collide; `-` prints that and nothing else
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Worker threads; all cores without it. The results do not depend on it
@@ -84,7 +87,7 @@ struct Pair {
     space: [[f64; 2]; 3],
     /// Pixels that are left, in the last image looked at; none where the pair was kept before any image was whole.
     pixels: Option<u64>,
-    /// Whether two triangles were seen to cross.
+    /// Whether two triangles were seen to cross or to share a corner.
     seen: bool,
 }
 
@@ -115,6 +118,14 @@ enum Outcome {
 }
 
 impl Outcome {
+    fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[Answer]) -> Self {
+        let case_id = case.id.clone();
+        match objects {
+            Ok(objects) => Self::Found(Found::new(case_id, &objects, answers)),
+            Err(error) => Self::Unknown(Unknown { case_id, error }),
+        }
+    }
+
     fn found(&self) -> Option<&Found> {
         match self {
             Self::Found(found) => Some(found),
@@ -138,25 +149,14 @@ fn objects(files: &CaseFiles) -> Result<Vec<Object>, String> {
 }
 
 impl Found {
-    fn new(case_id: &str, objects: &[Object], search: &Search, bar: &Bar) -> Self {
-        let answers = detect_each(objects, search, || bar.inc());
+    fn new(case_id: String, objects: &[Object], answers: &[Answer]) -> Self {
         Self {
-            case_id: case_id.to_owned(),
+            case_id,
             objects: objects.len(),
             triangles: objects.iter().map(Object::len).sum(),
             candidates: answers.len(),
             may_collide: answers.iter().filter_map(pair).collect(),
         }
-    }
-
-    /// A line for each pair of objects.
-    fn lines(&self, csv: &mut csv::Writer<impl Write>) -> csv::Result<()> {
-        let mut left = self.may_collide.iter().map(|pair| (pair.a, pair.b)).peekable();
-        for (a, b) in (0..self.objects).flat_map(|a| (a + 1..self.objects).map(move |b| (a, b))) {
-            let may = left.next_if_eq(&(a, b)).is_some();
-            csv.serialize((&self.case_id, a, b, u8::from(may)))?;
-        }
-        Ok(())
     }
 }
 
@@ -167,8 +167,8 @@ fn pair(answer: &Answer) -> Option<Pair> {
 }
 
 pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
-    super::not_an_input(("--csv", args.csv.as_deref()), args.files.iter().map(PathBuf::as_path))?;
-    let (search, cases) = (args.search(), CaseFiles::of(&args.files)?);
+    let (search, rows) = (args.search(), Rows::of(args)?);
+    let cases = CaseFiles::of(&args.files)?;
     let pool = super::threads(args.threads)?;
     let progress = Progress::new(args.json);
     if !search.zoom && search.resolution * search.bins > SLOW {
@@ -177,28 +177,29 @@ pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
         );
     }
     let outcomes = pool.install(|| answered(&cases, &search, &progress));
-    if let Some(path) = &args.csv {
-        write_csv(path, &outcomes)?;
+    // Where nothing is known of any case, there is nothing to say, and what an older file says stays.
+    let known = outcomes.is_empty() || outcomes.iter().any(|outcome| outcome.found().is_some());
+    if known {
+        rows.write(&outcomes)?;
     }
     let unanswered = unanswered(&outcomes);
     if args.json {
         print_json(&outcomes, false)?;
-    } else if outcomes.iter().any(|outcome| outcome.found().is_some()) || outcomes.is_empty() {
+    } else if known && rows != Rows::Printed {
         print(&text(&outcomes))?;
     }
     unanswered
 }
 
-/// Every case, one after the other.
+/// Every case, in order; the pairs of all are shared out among the threads.
 fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Outcome> {
-    let all: Vec<_> = cases.iter().map(objects).collect();
-    let pairs = all.iter().flatten().map(|objects| candidates(objects).len() as u64).sum();
+    let all: Vec<_> = cases.par_iter().map(objects).collect();
+    let known: Vec<&[Object]> = all.iter().map(|case| case.as_deref().unwrap_or_default()).collect();
+    let pairs = known.iter().map(|objects| candidates(objects).len() as u64).sum();
     let bar = progress.bar("pairs", pairs);
-    let outcome = |(case, objects): (&CaseFiles, Result<Vec<Object>, String>)| match objects {
-        Ok(objects) => Outcome::Found(Found::new(&case.id, &objects, search, &bar)),
-        Err(error) => Outcome::Unknown(Unknown { case_id: case.id.clone(), error }),
-    };
-    cases.iter().zip(all).map(outcome).collect()
+    let answers = detect_each(&known, search, || bar.inc());
+    let outcomes = cases.iter().zip(all).zip(answers);
+    outcomes.map(|((case, objects), answers)| Outcome::new(case, objects, &answers)).collect()
 }
 
 /// Fails where nothing is known of a case, and names each.
@@ -219,19 +220,9 @@ fn unanswered(outcomes: &[Outcome]) -> Result<(), Failure> {
     Err(Failure { message, code: 1 })
 }
 
-fn write_csv(path: &Path, outcomes: &[Outcome]) -> Result<(), Failure> {
-    let written = traces::io::atomic::write_file(path, |out| {
-        let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(out);
-        csv.write_record(["case_id", "a", "b", "may_collide"])?;
-        outcomes.iter().filter_map(Outcome::found).try_for_each(|case| case.lines(&mut csv))?;
-        Ok::<(), csv::Error>(csv.flush()?)
-    });
-    written.map_err(|error| Failure { message: error.to_string(), code: 1 })
-}
-
 fn text(outcomes: &[Outcome]) -> String {
     let mut table =
-        Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "seen to cross"]);
+        Table::new(["case", "objects", "triangles", "boxes touch", "may collide", "seen to touch"]);
     for case in outcomes.iter().filter_map(Outcome::found) {
         table.row([
             case.case_id.clone(),

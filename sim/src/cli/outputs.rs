@@ -1,0 +1,69 @@
+//! Files for results, looked at before any work is done for them.
+
+use std::path::{Path, PathBuf};
+
+use super::Failure;
+
+/// Refuses a file that results could not be written to, or that is one of its own inputs.
+pub(super) fn may_hold_results<'a>(
+    (flag, out): (&str, Option<&Path>),
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    let Some(out) = out else { return Ok(()) };
+    not_an_input((flag, out), inputs)?;
+    let folder = match out.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        let message = format!(
+            "{flag}: {}: there is no folder {}; make it, or name a file in one that is there",
+            out.display(),
+            folder.display()
+        );
+        return Err(Failure { message, code: 2 });
+    }
+    traces::io::atomic::try_place(out).map_err(|error| Failure { message: error.to_string(), code: 1 })
+}
+
+fn not_an_input<'a>(
+    (flag, out): (&str, &Path),
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    let place = |path: &Path| -> Option<PathBuf> { std::fs::canonicalize(path).ok() };
+    let Some(taken) = place(out) else { return Ok(()) };
+    let refused = |input: &Path| {
+        let message = format!("{flag}: {} is what is read; name another file", input.display());
+        Failure { message, code: 2 }
+    };
+    let same = inputs.into_iter().find(|input| place(input).is_some_and(|input| input == taken));
+    same.map_or(Ok(()), |input| Err(refused(input)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_written_is_refused_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        ["old.csv", "in.csv"].iter().for_each(|name| std::fs::write(at(name), "old").unwrap());
+        let told = |name: &str| {
+            let held = may_hold_results(("--out", Some(&at(name))), [at("in.csv").as_path()]);
+            held.err().map(|failure| (failure.code, failure.message))
+        };
+        assert_eq!([told("new.csv"), told("old.csv")], [None, None]);
+        for (name, expected, says) in [
+            ("no/new.csv", 2, "there is no folder"),
+            ("old.csv/new.csv", 2, "there is no folder"),
+            ("in.csv", 2, "is what is read"),
+            ("", 1, "name a file"),
+        ] {
+            let (code, message) = told(name).unwrap();
+            assert!(code == expected && message.contains(says), "{message}");
+        }
+        assert_eq!(std::fs::read(at("old.csv")).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+}
