@@ -25,9 +25,11 @@ pub const TABLE_COLUMNS: [&str; 12] = [
     "outlier",
 ];
 
-/// Rows that a thread writes down at once, and how many such batches are held.
+/// Rows that a thread writes down at once, and how many such batches go to the file at once.
 const ROWS: usize = 4096;
-const BATCHES: usize = 64;
+const BATCHES: usize = 8;
+/// Bytes of a row, about.
+const ROW_BYTES: usize = 136;
 
 /// Why a table could not be built or written.
 #[derive(Debug, Error)]
@@ -90,20 +92,31 @@ impl FrameTable {
     /// [`TableError`] if the writer fails.
     pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), TableError> {
         writeln!(out, "{}", TABLE_COLUMNS.join(","))?;
-        // Numbers take longer to write down than to find: many rows at once on every thread, batch by batch.
-        for from in (0..self.frames.len()).step_by(BATCHES * ROWS) {
-            let to = self.frames.len().min(from + BATCHES * ROWS);
-            let firsts = (from..to).into_par_iter().step_by(ROWS);
-            let batches: Vec<Vec<u8>> = firsts.map(|first| self.rows(first..to.min(first + ROWS))).collect();
-            batches.iter().try_for_each(|rows| out.write_all(rows))?;
+        // Numbers take longer to write down than to find: many rows at once on every thread, the next while some go to the file.
+        let step = BATCHES * ROWS;
+        let mut batches = self.batches(0, step);
+        for from in (step..self.frames.len() + step).step_by(step) {
+            let mut next = Vec::new();
+            rayon::in_place_scope(|scope| {
+                scope.spawn(|_| next = self.batches(from, from + step));
+                batches.iter().try_for_each(|rows| out.write_all(rows))
+            })?;
+            batches = next;
         }
         out.flush()?;
         Ok(())
     }
 
+    /// Rows as they stand in the file, made side by side.
+    fn batches(&self, from: usize, to: usize) -> Vec<Vec<u8>> {
+        let to = to.min(self.frames.len());
+        let firsts = (from..to).into_par_iter().step_by(ROWS);
+        firsts.map(|first| self.rows(first..to.min(first + ROWS))).collect()
+    }
+
     /// Some rows as they stand in the file. No cell needs quotes.
     fn rows(&self, range: Range<usize>) -> Vec<u8> {
-        let mut rows = Vec::new();
+        let mut rows = Vec::with_capacity(range.len() * ROW_BYTES);
         for index in range {
             self.row(index, &mut rows);
         }

@@ -15,16 +15,18 @@ const IRREGULAR: f64 = 0.1;
 /// Share of unsure frames from which the whole result is called so.
 const MANY_UNSURE: f64 = 0.1;
 
-/// 1 at or below the mean distance of the matches, 0 at or above that of the rest, linear in the logarithm between;
-/// scaled down where neither the populations are distinct nor the starts evenly spaced.
-pub(crate) fn confidence(distance_w2: f64, threshold: &Threshold) -> f64 {
-    let low = libm::log(threshold.matched.mean_w2.max(f64::MIN_POSITIVE));
-    let high = libm::log(threshold.rest.mean_w2.max(f64::MIN_POSITIVE));
-    if high <= low {
-        return 0.0;
+/// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest, linear in the logarithm
+/// between; scaled down where neither the populations are distinct nor the starts evenly spaced.
+pub(crate) fn confidence(threshold: &Threshold) -> impl Fn(f64) -> f64 {
+    let [low, high] =
+        [threshold.matched, threshold.rest].map(|of| libm::log(of.mean_w2.max(f64::MIN_POSITIVE)));
+    move |distance_w2| {
+        if high <= low {
+            return 0.0;
+        }
+        let nearness = (high - libm::log(threshold.excess_w2(distance_w2))) / (high - low);
+        nearness.clamp(0.0, 1.0) * threshold.clarity()
     }
-    let nearness = (high - libm::log(threshold.excess_w2(distance_w2))) / (high - low);
-    nearness.clamp(0.0, 1.0) * threshold.clarity()
 }
 
 /// Frames, flags and warnings from the starts.
@@ -59,14 +61,15 @@ pub(crate) fn conclude_at(
         threshold,
         warnings: Vec::new(),
     };
+    let median_s = median_duration_s(&found.frames);
     found.warnings = [
         window_cut(placement, &found),
         only_marks(&found),
         weak_separation(&found),
         irregular(&found),
         many_unsure(&found),
-        window_too_long(&found),
-        few_samples(&found, rate_hz),
+        median_s.and_then(|median_s| window_too_long(&found, median_s)),
+        median_s.and_then(|median_s| few_samples(median_s, rate_hz)),
     ]
     .into_iter()
     .flatten()
@@ -129,19 +132,18 @@ fn many_unsure(found: &Found) -> Option<Warning> {
     })
 }
 
-fn window_too_long(found: &Found) -> Option<Warning> {
+fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
     let window_s = found.window.pre_s + found.window.post_s;
-    let median_s = median_duration_s(&found.frames).filter(|_| found.frames.len() > 1)?;
     // A tenth of slack: a window of just the period is what default_window gives.
-    (window_s > 1.1 * median_s).then(|| {
+    (found.frames.len() > 1 && window_s > 1.1 * median_s).then(|| {
         Warning::new("window-longer-than-frame", format!(
             "the window of {:.3} ms is longer than the median frame of {:.3} ms: shorter frames may be missed; shrink it",
             window_s * 1e3, median_s * 1e3))
     })
 }
 
-fn few_samples(found: &Found, rate_hz: f64) -> Option<Warning> {
-    let samples = median_duration_s(&found.frames)? * rate_hz;
+fn few_samples(median_s: f64, rate_hz: f64) -> Option<Warning> {
+    let samples = median_s * rate_hz;
     (samples < FEW_SAMPLES).then(|| {
         Warning::new("few-samples", format!(
             "the median frame has {samples:.1} samples, fewer than {FEW_SAMPLES}: starts and energies are coarse; \

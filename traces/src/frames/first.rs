@@ -37,7 +37,7 @@ impl View<'_> {
         Some(FrameStart {
             time_s,
             distance_w2,
-            confidence: confidence(distance_w2, self.threshold),
+            confidence: confidence(self.threshold)(distance_w2),
             marked: false,
         })
     }

@@ -34,14 +34,14 @@ pub(super) struct View<'a> {
 
 impl View<'_> {
     /// The start at a candidate, finer than a sample.
-    fn start_near(&self, candidate: &Candidate, mark: usize) -> FrameStart {
+    fn start_near(&self, candidate: &Candidate, mark: usize, confidence: impl Fn(f64) -> f64) -> FrameStart {
         let mark = &self.placement.marks[mark];
         let template = &self.power[mark.first..mark.first + self.placement.samples];
         let aligned = refine::align(self.power, template, candidate.offset, REACH);
         FrameStart {
             time_s: mark.mark_s + (aligned - mark.first as f64) * self.trace.period_s(),
             distance_w2: candidate.distance_w2,
-            confidence: assess::confidence(candidate.distance_w2, self.threshold),
+            confidence: confidence(candidate.distance_w2),
             marked: false,
         }
     }
@@ -77,8 +77,10 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
 
     let mut starts = marked_starts(&placement, &profile);
     let view = View { trace, power: &power, placement: &placement, threshold: &threshold };
+    let confidence = assess::confidence(&threshold);
     for candidate in candidates.iter().filter(|candidate| candidate.distance_w2 < threshold.value_w2) {
-        starts.push(view.start_near(candidate, nearest.get(candidate.offset).copied().unwrap_or(0)));
+        let mark = nearest.get(candidate.offset).copied().unwrap_or(0);
+        starts.push(view.start_near(candidate, mark, &confidence));
     }
     starts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s);

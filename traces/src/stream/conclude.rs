@@ -30,8 +30,9 @@ pub(super) fn conclude(
     let threshold = plan.threshold(&mut gathered);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };
+    let confidence = confidence(&threshold);
     let below = gathered.candidates.par_iter().filter(|c| c.distance_w2 < threshold.value_w2);
-    starts.par_extend(below.map(|candidate| view.start(candidate)));
+    starts.par_extend(below.map(|candidate| view.start(candidate, &confidence)));
     drop(std::mem::take(&mut gathered.candidates));
     starts.sort_by(|a, b| a.0.time_s.total_cmp(&b.0.time_s));
     starts.dedup_by(|later, earlier| later.0.time_s <= earlier.0.time_s);
@@ -61,12 +62,12 @@ struct Starter<'a> {
 }
 
 impl Starter<'_> {
-    fn start(&self, candidate: &Candidate) -> Summed {
+    fn start(&self, candidate: &Candidate, confidence: impl Fn(f64) -> f64) -> Summed {
         let mark = &self.plan.placement.marks[candidate.mark as usize];
         let start = FrameStart {
             time_s: mark.mark_s + (candidate.aligned - mark.first as f64) / self.plan.clock.rate_hz,
             distance_w2: candidate.distance_w2,
-            confidence: confidence(candidate.distance_w2, &self.threshold),
+            confidence: confidence(candidate.distance_w2),
             marked: false,
         };
         (start, candidate.sum_w)

@@ -14,6 +14,7 @@ use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// Rows read at once.
 const ROWS: usize = 1 << 20;
@@ -98,24 +99,27 @@ impl Plan {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
         let (mut piece, mut chunk, mut coming) = (Piece::default(), Chunk::default(), Piece::default());
         let mut read = self.read(rows, &mut chunk, &mut piece)?;
-        let (mut from, mut fresh) = (0, 0);
+        let (mut from, mut fresh, workspaces) = (0, 0, Workspaces::new());
         loop {
-            gathered.keep_head(&piece, fresh);
             self.look_up(&piece, &mut gathered);
             let to = self.ready(&piece, read == 0).max(from);
             if read == 0 {
-                self.search(&piece, from..to, &mut gathered);
+                gathered.keep_head(&piece, fresh);
+                self.search(&piece, from..to, &workspaces, &mut gathered);
                 (gathered.total_w, gathered.samples) = (piece.sum_to(piece.end() as f64), piece.end());
                 return Ok(gathered);
             }
             coming.begin_with(&piece, to.saturating_sub((self.spacing + MARGIN) as u64));
-            fresh = coming.len();
+            let old = coming.len();
             // The next rows are decoded while these are searched.
             let (next, ()) = rayon::join(
                 || self.read(rows, &mut chunk, &mut coming),
-                || self.search(&piece, from..to, &mut gathered),
+                || {
+                    gathered.keep_head(&piece, fresh);
+                    self.search(&piece, from..to, &workspaces, &mut gathered);
+                },
             );
-            (read, from) = (next?, to);
+            (read, from, fresh) = (next?, to, old);
             std::mem::swap(&mut piece, &mut coming);
         }
     }
@@ -159,18 +163,17 @@ impl Plan {
     }
 
     /// Searches a range of offsets.
-    fn search(&self, piece: &Piece, range: Range<u64>, gathered: &mut Gathered) {
+    fn search(&self, piece: &Piece, range: Range<u64>, workspaces: &Workspaces, gathered: &mut Gathered) {
         let Range { start: from, end: to } = range;
         let (all, spacing) = (self.all(piece), self.spacing as u64);
         let task = (TASK as u64).div_ceil(spacing) * spacing;
         let tasks = to.saturating_sub(from).div_ceil(task);
-        let found: Vec<Found> = (0..tasks)
-            .into_par_iter()
-            .map_init(Workspace::default, |workspace, index| {
-                let begin = from + index * task;
-                self.task(piece, begin, to.min(begin + task), all, workspace)
-            })
-            .collect();
+        let one = |index: usize| {
+            let begin = from + index as u64 * task;
+            workspaces.with(|workspace| self.task(piece, begin, to.min(begin + task), all, workspace))
+        };
+        // One by one, as who has read the next rows comes late and takes of what is left.
+        let found: Vec<Found> = (0..tasks as usize).into_par_iter().with_max_len(1).map(one).collect();
         for found in found {
             gathered.distances_w2.extend(found.distances_w2);
             gathered.steps_w.extend(found.steps_w);
@@ -268,6 +271,21 @@ struct Workspace {
     /// Powers about one offset, W.
     power_w: Vec<f64>,
     buffers: Buffers,
+}
+
+/// One for each thread, from the first piece to the last: making them anew for each took a twentieth of the time.
+struct Workspaces(Vec<Mutex<Workspace>>);
+
+impl Workspaces {
+    fn new() -> Self {
+        Self((0..rayon::current_num_threads()).map(|_| Mutex::default()).collect())
+    }
+
+    /// Does something in that of the thread it is called by.
+    fn with<T>(&self, work: impl FnOnce(&mut Workspace) -> T) -> T {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        work(&mut self.0[thread % self.0.len()].lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }
 
 /// What one task finds.

@@ -16,20 +16,22 @@ const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [])?;
-    let (frames, table, pixels) = threads(args.threads)?.install(|| {
+    let (frames, table, summary) = threads(args.threads)?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
-        if let Some(out) = &args.out {
-            traces::io::atomic::write_file(out, |file| table.write_csv(file))?;
-        }
-        Ok::<_, Failure>((frames, table, pixels))
+        let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
+        let (written, summary) =
+            rayon::join(|| args.out.as_deref().map_or(Ok(()), write), || Summary::of(table.frames()));
+        written?;
+        Ok::<_, Failure>((frames, table, summary))
     })?;
+    let pixels = args.find.pixels.or(frames.metadata.pixels);
     if args.json {
-        return print_json(&report(&frames, &table, pixels, args.inverse), true);
+        return print_json(&report(&frames, &table, summary, pixels, args.inverse), true);
     }
     frames.warn();
-    print(&text(&frames, &table, pixels))?;
+    print(&text(&frames, &table, summary, pixels))?;
     if args.inverse {
         print(&inverse_text(&table, pixels))?;
     }
@@ -49,7 +51,13 @@ struct Row {
     outlier: u8,
 }
 
-fn report(frames: &Frames, table: &FrameTable, pixels: Option<u64>, inverse: bool) -> Value {
+fn report(
+    frames: &Frames,
+    table: &FrameTable,
+    summary: Option<Summary>,
+    pixels: Option<u64>,
+    inverse: bool,
+) -> Value {
     let rows: Vec<Row> = table
         .frames()
         .iter()
@@ -70,7 +78,7 @@ fn report(frames: &Frames, table: &FrameTable, pixels: Option<u64>, inverse: boo
         "method": frames.found.method, "threshold": frames.found.threshold,
         "window_s": [window.pre_s, window.post_s], "end_s": frames.found.end_s,
         "warnings": frames.found.warnings, "repairs": frames.repairs, "proposal": frames.proposal,
-        "pixels": pixels, "summary": Summary::of(table.frames()), "frames": rows,
+        "pixels": pixels, "summary": summary, "frames": rows,
     });
     if inverse {
         report["inverse"] = inverse_units(table, pixels);
@@ -78,7 +86,7 @@ fn report(frames: &Frames, table: &FrameTable, pixels: Option<u64>, inverse: boo
     report
 }
 
-fn text(frames: &Frames, table: &FrameTable, pixels: Option<u64>) -> String {
+fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: Option<u64>) -> String {
     let mut lines = String::new();
     if let Some(p) = &frames.proposal {
         lines += &format!(
@@ -117,7 +125,7 @@ fn text(frames: &Frames, table: &FrameTable, pixels: Option<u64>) -> String {
     if table.frames().len() > SHOWN {
         lines += &format!("... {} more\n", table.frames().len() - SHOWN);
     }
-    if let Some(s) = Summary::of(table.frames()) {
+    if let Some(s) = summary {
         lines += &format!(
             "mean: {:.4} mJ/frame (deviation {:.4}), {:.3} ms, {}",
             s.energy_j.mean * 1e3,
