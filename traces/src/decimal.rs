@@ -4,7 +4,9 @@
 pub(crate) fn push(out: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
     let text = buffer.format(value);
-    if value.is_finite() && !text.contains('e') {
+    // An exponent has four characters at most.
+    let exponent = text.bytes().rev().take(5).any(|byte| byte == b'e');
+    if value.is_finite() && !exponent {
         out.extend_from_slice(text.strip_suffix(".0").unwrap_or(text).as_bytes());
     } else {
         out.extend_from_slice(value.to_string().as_bytes());

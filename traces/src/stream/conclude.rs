@@ -52,7 +52,7 @@ pub(super) fn conclude(
         confidence: span.confidence,
         flags: span.flags,
     };
-    let energies = found.frames.iter().zip(sums.windows(2)).map(energy).collect();
+    let energies = found.frames.par_iter().zip(sums.par_windows(2)).map(energy).collect();
     Ok(Streamed { found, energies, clock, total_j: gathered.total_w.value() / clock.rate_hz, metadata })
 }
 
