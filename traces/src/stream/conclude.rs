@@ -26,7 +26,6 @@ pub(super) fn conclude(
     let clock = Clock { samples: Some(gathered.samples), ..plan.clock };
     let trace_end_s = clock.time_s(gathered.samples as f64);
     let marks = Marks { end_s: marks.end_s.min(trace_end_s), ..marks.clone() };
-    plan.beside_marks(&mut gathered.candidates);
     let threshold = plan.threshold(&mut gathered);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };
@@ -102,17 +101,6 @@ impl Starter<'_> {
 }
 
 impl Plan {
-    /// Leaves out the marks and their surroundings.
-    fn beside_marks(&self, candidates: &mut Vec<Candidate>) {
-        let far = |offset: u64| {
-            self.placement
-                .marks
-                .iter()
-                .all(|mark| (mark.first as u64).abs_diff(offset) >= self.spacing as u64)
-        };
-        candidates.retain(|candidate| far(candidate.offset));
-    }
-
     fn threshold(&self, gathered: &mut Gathered) -> crate::frames::Threshold {
         let candidates = &gathered.candidates;
         let distances: Vec<f64> = candidates.par_iter().map(|candidate| candidate.distance_w2).collect();
@@ -123,13 +111,13 @@ impl Plan {
             (Some(first), Some(last)) => (last.offset - first.offset) as usize,
             _ => 0,
         };
+        let offsets: Vec<usize> = candidates.par_iter().map(|candidate| candidate.offset as usize).collect();
         choose(&distances, background_w2, noise_w2, self.misalignment_w2(), |value_w2| {
-            let below = distances.iter().zip(candidates).filter(|(distance_w2, _)| **distance_w2 < value_w2);
-            let marks = self.placement.marks.iter().map(|mark| mark.first);
-            let mut offsets: Vec<usize> =
-                below.map(|(_, candidate)| candidate.offset as usize).chain(marks).collect();
-            // All but the marks are in order, which is found out quickly.
-            offsets.sort();
+            let below = distances.iter().zip(&offsets).filter(|(distance_w2, _)| **distance_w2 < value_w2);
+            let mut offsets: Vec<usize> = below.map(|(_, offset)| *offset).collect();
+            for mark in &self.placement.marks {
+                offsets.insert(offsets.partition_point(|offset| *offset < mark.first), mark.first);
+            }
             regularity(&offsets, span)
         })
     }

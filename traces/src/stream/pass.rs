@@ -7,7 +7,7 @@ use super::piece::Piece;
 use super::screen::{Buffers, Screen};
 use super::template::{difference, powers, templates};
 use super::{StreamError, Streamed};
-use crate::frames::{Marks, Placement, vertex};
+use crate::frames::{Marks, Placed, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
 use crate::sum::PairSum;
 use core::ops::Range;
@@ -46,7 +46,10 @@ pub(super) struct Candidate {
 /// What a pass gathers.
 #[derive(Default)]
 pub(super) struct Gathered {
+    /// All but those beside marks.
     pub candidates: Vec<Candidate>,
+    /// Offset of the last one, those included.
+    last: Option<u64>,
     /// Distances at evenly spaced offsets, W^2, and steps between neighbours, W.
     pub distances_w2: Vec<f64>,
     pub steps_w: Vec<f64>,
@@ -178,12 +181,11 @@ impl Plan {
             gathered.distances_w2.extend(found.distances_w2);
             gathered.steps_w.extend(found.steps_w);
             for candidate in found.candidates {
-                let tied = gathered
-                    .candidates
-                    .last()
-                    .is_some_and(|before| candidate.offset - before.offset < spacing);
-                if !tied {
-                    gathered.candidates.push(candidate);
+                let offset = candidate.offset;
+                if gathered.last.is_none_or(|last| offset - last >= spacing) {
+                    gathered.last = Some(offset);
+                    let far = |mark: &Placed| (mark.first as u64).abs_diff(offset) >= spacing;
+                    gathered.candidates.extend(self.placement.marks.iter().all(far).then_some(candidate));
                 }
             }
         }
