@@ -12,6 +12,7 @@ mod pass;
 mod piece;
 mod screen;
 mod template;
+mod workspace;
 
 pub use clock::{Clock, clock};
 pub use error::StreamError;

@@ -4,8 +4,9 @@ use super::clock::{Clock, clock};
 use super::conclude::conclude;
 use super::minima::minima;
 use super::piece::Piece;
-use super::screen::{Buffers, Screen};
+use super::screen::Screen;
 use super::template::{difference, powers, templates};
+use super::workspace::{Workspace, Workspaces};
 use super::{StreamError, Streamed};
 use crate::frames::{Marks, Placed, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
@@ -14,7 +15,6 @@ use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 /// Rows read at once.
 const ROWS: usize = 1 << 20;
@@ -262,31 +262,6 @@ impl Plan {
 fn centre(voltage_v: &[f32], current_a: &[f32], mean_w: f32, into: &mut [f32]) {
     for ((signal, v), i) in into.iter_mut().zip(voltage_v).zip(current_a) {
         *signal = v * i - mean_w;
-    }
-}
-
-/// What a thread works in: the signal and the profile of one task.
-#[derive(Default)]
-struct Workspace {
-    signal: Vec<f32>,
-    profile: Vec<f32>,
-    /// Powers about one offset, W.
-    power_w: Vec<f64>,
-    buffers: Buffers,
-}
-
-/// One for each thread, from the first piece to the last: making them anew for each took a twentieth of the time.
-struct Workspaces(Vec<Mutex<Workspace>>);
-
-impl Workspaces {
-    fn new() -> Self {
-        Self((0..rayon::current_num_threads()).map(|_| Mutex::default()).collect())
-    }
-
-    /// Does something in that of the thread it is called by.
-    fn with<T>(&self, work: impl FnOnce(&mut Workspace) -> T) -> T {
-        let thread = rayon::current_thread_index().unwrap_or(0);
-        work(&mut self.0[thread % self.0.len()].lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
