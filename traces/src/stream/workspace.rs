@@ -13,7 +13,7 @@ pub(super) struct Workspace {
     pub buffers: Buffers,
 }
 
-/// One for each thread, from the first piece to the last: making them anew for each took a twentieth of the time.
+/// One for each thread, not made anew for each piece.
 pub(super) struct Workspaces(Vec<Mutex<Workspace>>);
 
 impl Workspaces {
