@@ -120,6 +120,28 @@ fn numbers_that_would_overflow_are_refused() {
     assert!(!all(&Rasterizer::new(lens), &large, &GRID).is_empty());
 }
 
+/// A triangle in whole numbers that holds a point of them, its axes in units whose products are no numbers.
+#[test]
+fn products_that_vanish_miss_nothing() {
+    let corners = [[-7_i32, 5, 3], [9, 2, -6], [1, -11, 9]];
+    let weights = [2, 1, 1];
+    let at = |axis: usize| (0..3).map(|k| weights[k] * corners[k][axis]).sum::<i32>();
+    for exponents in (0..40_i32.pow(3)).map(|n| [n % 40, n / 40 % 40, n / 1600].map(|step| -26 * step)) {
+        let units = exponents.map(|e| 2_f64.powi(e / 2) * 2_f64.powi(e - e / 2));
+        let scaled = |p: [i32; 3]| [0, 1, 2].map(|axis| f64::from(4 * p[axis]) * units[axis]);
+        let point = [0, 1, 2].map(|axis| f64::from(at(axis)) * units[axis]);
+        let rasterizer = Rasterizer::new(View::orthographic());
+        let prepared = rasterizer.prepare(&still(corners.map(scaled)));
+        for reach in [0.0, 1.0, 7.0] {
+            let side = |axis: usize| [point[axis] - reach * units[axis], point[axis] + reach * units[axis]];
+            let tile = Rect { x: side(0), y: side(1) };
+            let touch = rasterizer.touch(&prepared, &tile, &Region::WHOLE);
+            let z = touch.unwrap_or_else(|| panic!("units of {units:?} are missed")).z;
+            assert!(z[0] <= point[2] && point[2] <= z[1], "{z:?} in units of {units:?}");
+        }
+    }
+}
+
 #[test]
 fn what_is_asked_of_depth_boxes_is_rounded_outward() {
     let third = 1.0 / 3.0;

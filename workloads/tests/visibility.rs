@@ -10,7 +10,8 @@ use common::{Files, expect, failure};
 use glam::Vec3;
 use proptest::prelude::*;
 use workloads::LoadError;
-use workloads::visibility::{CameraSpec, VisibilityScene, load, load_cases, parse_m5d, parse_mts};
+use workloads::collision::{Object, Search, detect};
+use workloads::visibility::{CameraSpec, CaseFiles, VisibilityScene, load, load_cases, parse_m5d, parse_mts};
 
 const SQUARE: [[f32; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
 const HALVES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
@@ -181,6 +182,19 @@ fn collision_cases_name_folders_and_numbers_beyond_f32() {
     let huge = files.put("a.obj", "v 1e308 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let text = failure(load_cases(&[&huge, &huge]).unwrap_err());
     expect(&text, &["vertex 0 has a coordinate that is infinite or beyond f32 (3.4e38)"]);
+}
+
+/// A point in the middle of a segment; read as f32 it is not.
+#[test]
+fn a_contact_below_the_smallest_normal_f32_is_not_missed() {
+    let files = Files::new();
+    let point = "v 0 0 2e-45\n".repeat(3);
+    let segment = "v -8e-44 0 0\nv 8e-44 0 4e-45\nv 8e-44 0 4e-45\n";
+    let mesh = files.put("a.obj", format!("{point}{segment}f 1 2 3\nf 4 5 6\n"));
+    let case = CaseFiles::of(&[&mesh, &mesh]).unwrap()[0].load().unwrap();
+    let objects = case.objects.iter().map(|mesh| Object::new(mesh, case.uncertainty).unwrap());
+    let found = detect(&objects.collect::<Vec<_>>(), &Search::default());
+    assert!(found.iter().any(|answer| answer.verdict.may_collide()), "{found:?}");
 }
 
 #[test]

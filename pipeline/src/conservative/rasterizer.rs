@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::edges::miss;
 use super::seen::{ROUNDING, Seen};
 use super::sides::narrow;
-use super::{MovingTriangle, Prepared, Rect, Region, Touch, View};
+use super::{LEAST_UNCERTAINTY, MovingTriangle, Prepared, Rect, Region, Touch, View};
 use crate::depth::plane::{Beam, MovingPlane, normal, tightest};
 
 /// Tiles of one size.
@@ -141,7 +141,12 @@ impl Rasterizer {
             View::Perspective { s, a, .. } => Beam::lens(seen.tile, [region.u, region.v], s, a),
         };
         let planes = seen.points.iter().map(|points| {
-            let plane = MovingPlane::new(normal(points), [&seen.points[0], &seen.points[1]], seen.size);
+            let normal = normal(points);
+            // A shorter one is made of what is left of products that vanish.
+            if normal.iter().all(|n| n.abs() < LEAST_UNCERTAINTY * LEAST_UNCERTAINTY) {
+                return None;
+            }
+            let plane = MovingPlane::new(normal, [&seen.points[0], &seen.points[1]], seen.size);
             plane.depths(plane.whole(), &beam, [0.0; 2])
         });
         let [lo, hi] = tightest(planes.chain([Some(vertices)]))?;

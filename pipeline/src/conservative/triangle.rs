@@ -36,6 +36,10 @@ impl MovingTriangle {
     }
 }
 
+/// No coordinate is taken to be surer than this: products of three that are off by as much are numbers that there are, so that what
+/// vanishes below the smallest of them stays within the noise.
+pub const LEAST_UNCERTAINTY: f64 = 1e-90;
+
 /// A triangle with what every tile asks of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared {
@@ -54,12 +58,13 @@ impl Prepared {
         let all = || triangle.open.iter().chain(&triangle.close);
         let size = [0, 1, 2].map(|axis| all().map(|p| p[axis].abs()).fold(0.0, f64::max));
         let perspective = matches!(view, View::Perspective { .. });
+        let uncertainty = triangle.uncertainty.map(|off| off.max(LEAST_UNCERTAINTY));
         Self {
-            triangle: *triangle,
+            triangle: MovingTriangle { uncertainty, ..*triangle },
             moving: triangle.open != triangle.close,
             size,
             weight: if perspective { size[2] } else { 1.0 },
-            weight_off: if perspective { triangle.uncertainty[2] } else { 0.0 },
+            weight_off: if perspective { uncertainty[2] } else { 0.0 },
         }
     }
 

@@ -1,6 +1,7 @@
 //! What may collide.
 
 use glam::DVec3;
+use pipeline::conservative::LEAST_UNCERTAINTY;
 
 use super::Bounds;
 use super::window::times_inside;
@@ -102,10 +103,15 @@ impl Object {
         self.triangles.is_empty()
     }
 
+    /// How far a coordinate may be off at least, which pays for products that are too small to be numbers. Boxes are exact without.
+    pub(super) fn unsure(&self) -> f64 {
+        self.uncertainty.max(LEAST_UNCERTAINTY)
+    }
+
     /// The times at which a triangle may be inside a box of space and time.
     pub(super) fn times_inside(&self, triangle: u32, within: &Bounds) -> Option<[f64; 2]> {
         let triangle = triangle as usize;
-        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.uncertainty)
+        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.unsure())
     }
 
     /// The box that it sweeps.

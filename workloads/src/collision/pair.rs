@@ -94,7 +94,7 @@ impl<'a> Pair<'a> {
 
     /// Tiles narrower than this tell nothing more: their borders are rounded, and corners are unsure, by as much.
     pub fn grain(&self) -> f64 {
-        let unsure = self.objects.iter().map(|object| object.uncertainty);
+        let unsure = self.objects.iter().map(|object| object.unsure());
         unsure.fold(self.window.rounding(), f64::max)
     }
 

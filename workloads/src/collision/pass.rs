@@ -218,7 +218,7 @@ impl Drawing<'_> {
     fn edges(&mut self) -> Option<&Prepared> {
         if self.pass.fit == Fit::Edges && self.prepared.is_none() {
             let ends = &self.object.triangles[self.triangle as usize];
-            self.prepared = self.pass.prepared(ends, self.object.uncertainty);
+            self.prepared = self.pass.prepared(ends, self.object.unsure());
         }
         self.prepared.as_ref()
     }
@@ -229,7 +229,7 @@ fn near(object: &Object, triangle: u32, t: [f64; 2], left: &Bounds) -> Option<[[
     let triangle = triangle as usize;
     let (ends, whole) = (&object.triangles[triangle], &object.boxes[triangle].space);
     let side = |axis: usize| {
-        let swept = if t == [0.0, 1.0] { whole[axis] } else { swept(ends, axis, t, object.uncertainty) };
+        let swept = if t == [0.0, 1.0] { whole[axis] } else { swept(ends, axis, t, object.unsure()) };
         meet(swept, left.space[axis])
     };
     Some([side(0)?, side(1)?, side(2)?])

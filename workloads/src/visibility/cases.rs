@@ -88,7 +88,8 @@ impl CaseFiles {
         };
         let mesh = pair::moving((&self.start, *opening), (end, *closing))?;
         let largest = mesh.open.iter().chain(&mesh.close).map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let uncertainty = largest * f64::from(f32::EPSILON);
+        // Below the smallest normal number what is rounded away is no share of the number.
+        let uncertainty = (largest * f64::from(f32::EPSILON)).max(f64::from(f32::from_bits(1)));
         Ok(CollisionCase { id, objects: components(&mesh), uncertainty })
     }
 

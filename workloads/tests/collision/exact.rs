@@ -181,9 +181,11 @@ fn case(draws: &mut Draws) -> ([Vec<Triangle>; 2], f64) {
 }
 
 /// The objects in numbers that the search takes, the second `aside`.
-fn scaled([first, second]: &[Vec<Triangle>; 2], unit: f64, aside: i64) -> [Object; 2] {
+fn scaled([first, second]: &[Vec<Triangle>; 2], units: [f64; 3], aside: i64) -> [Object; 2] {
     [(first, 0), (second, aside)].map(|(object, by)| {
-        let ends = |triangle: &Triangle| triangle.map(|end| end.map(|p| p.map(|at| (at + by) as f64 * unit)));
+        let ends = |triangle: &Triangle| {
+            triangle.map(|end| end.map(|p| [0, 1, 2].map(|axis| (p[axis] + by) as f64 * units[axis])))
+        };
         Object::from_ends(object.iter().map(ends).collect(), 0.0).unwrap()
     })
 }
@@ -203,13 +205,13 @@ fn none_is_missed(seeds: std::ops::Range<u64>, searches: usize) -> usize {
     let checked = |seed: u64| {
         let mut draws = Draws(mix(seed));
         let (exact, unit) = case(&mut draws);
-        let objects = scaled(&exact, unit, 0);
+        let objects = scaled(&exact, [unit; 3], 0);
         for _ in 0..searches {
             let search = search(&mut draws, objects[0].len() + objects[1].len());
             assert!(objects_may_collide(&objects, &search), "{seed} is missed by {search:?}");
         }
         let closer = Search { resolution: 64, ..Search::default() };
-        seed.is_multiple_of(20) && !objects_may_collide(&scaled(&exact, unit, 20 * UNIT), &closer)
+        seed.is_multiple_of(20) && !objects_may_collide(&scaled(&exact, [unit; 3], 20 * UNIT), &closer)
     };
     seeds.into_par_iter().map(|seed| usize::from(checked(seed))).sum()
 }
@@ -219,6 +221,26 @@ fn no_exact_contact_is_missed() {
     let apart = none_is_missed(0..200, 2);
     println!("moved aside, {apart} of 10 are told apart");
     assert!(apart >= 3);
+}
+
+/// What is long along one axis may be so thin along others that products of both are no numbers.
+#[test]
+fn no_exact_contact_is_missed_whatever_units_axes_have() {
+    (0..1500_u64).into_par_iter().for_each(|seed| {
+        let mut draws = Draws(mix(seed ^ 0x5EED));
+        let (exact, _) = case(&mut draws);
+        let unit = |draws: &mut Draws| {
+            let exponent = draws.below(1170) as i32 - 1070;
+            2_f64.powi(exponent / 2) * 2_f64.powi(exponent - exponent / 2)
+        };
+        let units = [(); 3].map(|()| unit(&mut draws));
+        let objects = scaled(&exact, units, 0);
+        let search = search(&mut draws, objects[0].len() + objects[1].len());
+        assert!(
+            objects_may_collide(&objects, &search),
+            "{seed} in units of {units:?} is missed by {search:?}"
+        );
+    });
 }
 
 /// `cargo test -p workloads --release --test collision exact -- --ignored --nocapture`.
