@@ -11,8 +11,8 @@
 //! the rounding of its own, a few parts in 2^48 of the magnitudes that entered it. Rounding outward to `f32` instead would widen
 //! a triangle by a part in 2^24 of its distance from the origin, a whole pixel at 1e7, and would need a bound to be carried
 //! beside every number; the mode runs per tile, not per sample, so the wider type is affordable. A bound on input that is not exact
-//! ([`MovingTriangle::uncertain`]) is carried as inflation; none
-//! is taken to be less than [`LEAST_UNCERTAINTY`], which pays for products that are too small to be numbers.
+//! ([`MovingTriangle::uncertain`]) is carried as inflation; none is taken to be less than [`LEAST_UNCERTAINTY`], which pays for products
+//! that are too small to be numbers.
 //!
 //! ```
 //! use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};

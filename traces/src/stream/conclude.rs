@@ -111,10 +111,9 @@ impl Plan {
             (Some(first), Some(last)) => (last.offset - first.offset) as usize,
             _ => 0,
         };
-        let offsets: Vec<usize> = candidates.par_iter().map(|candidate| candidate.offset as usize).collect();
         choose(&distances, background_w2, noise_w2, self.misalignment_w2(), |value_w2| {
-            let below = distances.iter().zip(&offsets).filter(|(distance_w2, _)| **distance_w2 < value_w2);
-            let mut offsets: Vec<usize> = below.map(|(_, offset)| *offset).collect();
+            let below = distances.iter().zip(candidates).filter(|(distance_w2, _)| **distance_w2 < value_w2);
+            let mut offsets: Vec<usize> = below.map(|(_, candidate)| candidate.offset as usize).collect();
             for mark in &self.placement.marks {
                 offsets.insert(offsets.partition_point(|offset| *offset < mark.first), mark.first);
             }
