@@ -1,8 +1,13 @@
 //! What spreads are made of.
 
+/// The mean of some values; no values have none.
+pub(crate) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
 /// The mean of some values and the sum of their squared differences from it; no values have no mean.
 pub(crate) fn about_mean(values: &[f64]) -> (f64, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let mean = mean(values);
     (mean, values.iter().map(|value| (value - mean) * (value - mean)).sum())
 }
 

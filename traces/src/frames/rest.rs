@@ -5,8 +5,8 @@
 //! the start may be anywhere in what was added. So starts whose rest begins or ends at another distance than it did at the mark, by
 //! more than a start may be off, are in doubt.
 
-use super::split::moments;
 use crate::median::median;
+use crate::squares::mean;
 use rayon::prelude::*;
 
 /// The stretch looked at on either side of a start, as a share of the window.
@@ -22,7 +22,7 @@ const SAMPLES: usize = 3;
 const MOVED: f64 = 0.08;
 const LEAST: f64 = 4.0;
 /// What is left of the confidence then.
-const LEFT: f64 = 0.4;
+pub(super) const LEFT: f64 = 0.4;
 
 /// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
 pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
@@ -31,8 +31,7 @@ pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize)
     if moved < LEAST || marks.is_empty() {
         return vec![1.0; starts.len()];
     }
-    let near = |start: usize| &starts[start.saturating_sub(FRAMES)..starts.len().min(start + FRAMES + 1)];
-    let rest = |start: usize| rest(&profile(power, near(start), width)?, width);
+    let rest = |start: usize| rest(&profile(power, near(starts, start), width)?, width);
     let rests: Vec<Option<[usize; 2]>> = (0..starts.len()).into_par_iter().map(rest).collect();
     let of_start = |start: usize| {
         let mark = marks.iter().copied().min_by_key(|mark| mark.abs_diff(start))?;
@@ -43,26 +42,32 @@ pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize)
     (0..starts.len()).map(|start| of_start(start).unwrap_or(1.0)).collect()
 }
 
-fn reach(width: usize) -> usize {
-    (REACH * width as f64) as usize
+/// One of some starts and those near it.
+pub(super) fn near<T>(starts: &[T], start: usize) -> &[T] {
+    &starts[start.saturating_sub(FRAMES)..starts.len().min(start + FRAMES + 1)]
+}
+
+/// The power about a start, by shares of the window before and after it; `None` where that is not all in the trace.
+pub(super) fn about(power: &[f64], start: f64, shares: [f64; 2], width: usize) -> Option<&[f64]> {
+    let [before, after] = shares.map(|share| (share * width as f64) as usize);
+    let place = libm::round(start) as usize;
+    power.get(place.checked_sub(before)?..place + after)
 }
 
 /// The mean power about some starts, W; `None` where none lies well within the trace.
 fn profile(power: &[f64], starts: &[f64], width: usize) -> Option<Vec<f64>> {
-    let stretch = |start: &f64| {
-        let place = libm::round(*start) as usize;
-        power.get(place.checked_sub(reach(width))?..place + reach(width))
-    };
-    let stretches: Vec<&[f64]> = starts.iter().filter_map(stretch).collect();
-    let mean = |sample: usize| moments(&stretches.iter().map(|of| of[sample]).collect::<Vec<_>>()).mean;
-    let means: Vec<f64> = (0..2 * reach(width)).map(mean).collect();
-    (!stretches.is_empty()).then(|| means.windows(SAMPLES).map(|near| moments(near).mean).collect())
+    let stretches: Vec<&[f64]> =
+        starts.iter().filter_map(|start| about(power, *start, [REACH; 2], width)).collect();
+    let length = stretches.first()?.len();
+    let at = |sample: usize| mean(&stretches.iter().map(|of| of[sample]).collect::<Vec<_>>());
+    let means: Vec<f64> = (0..length).map(at).collect();
+    Some(means.windows(SAMPLES).map(mean).collect())
 }
 
 /// The samples of a profile at which the rest in its middle, or next to that, begins and ends.
 fn rest(profile: &[f64], width: usize) -> Option<[usize; 2]> {
     let [before, after] = LOWEST.map(|share| (share * width as f64) as usize);
-    let middle = reach(width);
+    let middle = (REACH * width as f64) as usize;
     let places = middle.saturating_sub(before)..(middle + after).min(profile.len());
     let lowest_w = profile[places.clone()].iter().copied().fold(f64::INFINITY, f64::min);
     let ends_w = lowest_w + ENDS * (median(&mut profile.to_vec()) - lowest_w);

@@ -10,6 +10,7 @@
 use super::refine::between;
 use super::split::moments;
 use crate::median::median;
+use crate::squares::mean;
 use rayon::prelude::*;
 
 /// How far a start may move, as a share of the window.
@@ -91,10 +92,6 @@ fn level(power: &[f64], starts: &[f64], after: f64) -> f64 {
 fn smoothed(values: &[f64], by: impl Fn(&mut [f64]) -> f64) -> Vec<f64> {
     let near = |index: usize| index.saturating_sub(SMOOTH)..(index + SMOOTH + 1).min(values.len());
     (0..values.len()).map(|index| by(&mut values[near(index)].to_vec())).collect()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

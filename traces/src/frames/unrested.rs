@@ -3,8 +3,9 @@
 //! A frame begins in little power, after the end of the one before. What was found amidst work, where others near have a rest, may lie
 //! within a frame: where a frame takes two ticks of the display at a slow clock, its middle is on a tick, too.
 
-use super::split::moments;
+use super::rest::{LEFT, about, near};
 use crate::median::median;
+use crate::squares::mean;
 
 /// Shares of the window before and after a start in which it has its rest, and that of a rest that counts.
 const OWN: [f64; 2] = [0.1, 0.06];
@@ -16,28 +17,24 @@ const NONE: f64 = 0.6;
 /// That must be so many deviations of the noise, or nothing is said.
 const CLEAR: f64 = 6.0;
 
-/// So many neighbours on either side are looked at.
-const FRAMES: usize = 8;
-/// What is left of the confidence of a start without a rest.
-const LEFT: f64 = 0.4;
-
 /// What is left of the confidence of each start from their places (samples, in order), the width of the window
 /// and the deviation of the noise in a sample.
 pub(super) fn left(power: &[f64], starts: &[f64], width: usize, noise_w: f64) -> Vec<f64> {
     let brief = (BRIEF * width as f64) as usize;
-    let Some(depths) = (brief > 0).then(|| starts.iter().map(|start| Depth::of(power, *start, width, brief)))
-    else {
+    if brief == 0 {
         return vec![1.0; starts.len()];
-    };
-    let depths: Vec<Option<Depth>> = depths.collect();
+    }
+    let depths: Vec<Option<Depth>> =
+        starts.iter().map(|start| Depth::of(power, *start, width, brief)).collect();
     let clear_w = CLEAR * noise_w / libm::sqrt(brief as f64);
     let of_start = |start: usize| {
-        let near = &depths[start.saturating_sub(FRAMES)..starts.len().min(start + FRAMES + 1)];
+        let own_w = depths[start]?.lowest_w;
+        let near = near(&depths, start);
         let mut lowest: Vec<f64> = near.iter().flatten().map(|depth| depth.lowest_w).collect();
         let quarter = lowest.len() / 4;
         let low_w = *lowest.select_nth_unstable_by(quarter, f64::total_cmp).1;
         let usual_w = median(&mut near.iter().flatten().map(|depth| depth.usual_w).collect::<Vec<_>>());
-        let none = usual_w - depths[start]?.lowest_w < NONE * (usual_w - low_w);
+        let none = usual_w - own_w < NONE * (usual_w - low_w);
         Some(if none && usual_w - low_w > clear_w { LEFT } else { 1.0 })
     };
     (0..starts.len()).map(|start| of_start(start).unwrap_or(1.0)).collect()
@@ -54,16 +51,9 @@ struct Depth {
 
 impl Depth {
     fn of(power: &[f64], start: f64, width: usize, brief: usize) -> Option<Self> {
-        let about = |shares: [f64; 2]| {
-            let [before, after] = shares.map(|share| (share * width as f64) as usize);
-            let place = libm::round(start) as usize;
-            power.get(place.checked_sub(before)?..place + after)
-        };
-        let means = about(OWN)?.windows(brief).map(|stretch| moments(stretch).mean);
-        Some(Self {
-            lowest_w: means.fold(f64::INFINITY, f64::min),
-            usual_w: median(&mut about(USUAL)?.to_vec()),
-        })
+        let means = about(power, start, OWN, width)?.windows(brief).map(mean);
+        let usual_w = median(&mut about(power, start, USUAL, width)?.to_vec());
+        Some(Self { lowest_w: means.fold(f64::INFINITY, f64::min), usual_w })
     }
 }
 
@@ -121,5 +111,10 @@ mod tests {
         assert!(doubted(&power, &starts, 2.0).is_empty());
         assert!(doubted(&[], &[], 0.0).is_empty());
         assert_eq!(left(&[1.0; 20], &[3.0, 9.0], 10, 0.0), [1.0; 2]);
+    }
+
+    #[test]
+    fn starts_at_the_ends_of_a_trace_have_nothing_to_be_compared_with() {
+        assert_eq!(left(&[1.0; 300], &[3.0, 290.0], WIDTH, 0.0), [1.0; 2]);
     }
 }

@@ -16,7 +16,7 @@ const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [])?;
-    let (frames, table, summary) = threads(args.threads)?.install(|| {
+    let (frames, table, summary, pixels) = threads(args.threads)?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
@@ -24,9 +24,8 @@ pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
         let (written, summary) =
             rayon::join(|| args.out.as_deref().map_or(Ok(()), write), || Summary::of(table.frames()));
         written?;
-        Ok::<_, Failure>((frames, table, summary))
+        Ok::<_, Failure>((frames, table, summary, pixels))
     })?;
-    let pixels = args.find.pixels.or(frames.metadata.pixels);
     if args.json {
         return print_json(&report(&frames, &table, summary, pixels, args.inverse), true);
     }
