@@ -5,6 +5,7 @@
 mod command;
 mod glb;
 mod inputs;
+mod mts;
 mod picture;
 mod refusals;
 mod results;
@@ -12,6 +13,7 @@ mod results;
 pub use command::{Ended, Quintile};
 pub use glb::Glb;
 pub use inputs::{Inputs, real_scenes, root};
+pub use mts::mts;
 pub use picture::{Bounds, lit_bounds, mean_where};
 pub use refusals::Refusals;
 pub use results::{FrameRow, Results, number};

@@ -1,27 +1,18 @@
 //! `quintile ccd`: the pairs of a file that may collide, as a table, as JSON and as CSV.
 
-use tests::{Inputs, quintile};
+use tests::{Inputs, mts, quintile};
 
-/// A triangle at rest, one that falls through it, and one far off, as `.mts` of 8-byte scalars.
-fn mts() -> Vec<u8> {
+/// A triangle at rest, one that falls through it, and one far off.
+fn falling() -> Vec<u8> {
     let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let at = |x: f64, z: f64| [[x, 0.2, z], [x + 0.1, 0.2, z + 0.1], [x, 0.3, z + 0.1]];
-    let objects: [[[[f64; 3]; 3]; 2]; 3] =
-        [[floor; 2], [at(0.2, 1.0), at(0.2, -1.0)], [at(9.0, 1.0), at(9.0, -1.0)]];
-    let mut data = b"MTS1".to_vec();
-    [8_u32, 3, 0].iter().for_each(|word| data.extend(word.to_le_bytes()));
-    objects.iter().for_each(|_| [3_u32, 1].iter().for_each(|word| data.extend(word.to_le_bytes())));
-    for ends in objects {
-        ends.as_flattened().as_flattened().iter().for_each(|number| data.extend(number.to_le_bytes()));
-        [0_u32, 1, 2].iter().for_each(|index| data.extend(index.to_le_bytes()));
-    }
-    data
+    mts(&[[floor; 2], [at(0.2, 1.0), at(0.2, -1.0)], [at(9.0, 1.0), at(9.0, -1.0)]])
 }
 
 #[test]
 fn pairs_come_as_csv_and_json_the_same_for_any_threads() {
     let inputs = Inputs::new();
-    let file = inputs.put("fall.mts", mts());
+    let file = inputs.put("fall.mts", falling());
     let mut seen = Vec::new();
     for threads in ["1", "2", "16"] {
         let csv = inputs.path("pairs.csv");
@@ -42,7 +33,7 @@ fn pairs_come_as_csv_and_json_the_same_for_any_threads() {
 #[test]
 fn what_cannot_be_is_told() {
     let inputs = Inputs::new();
-    let (good, cut) = (inputs.put("good.mts", mts()), inputs.put("cut.mts", &mts()[..100]));
+    let (good, cut) = (inputs.put("good.mts", falling()), inputs.put("cut.mts", &falling()[..100]));
     let alone = inputs.put("alone.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let cases: [(&[&str], i32, &str); 6] = [
         (&["/dev/null"], 2, "known here: .mts, and .ply or .obj two by two"),
@@ -57,12 +48,12 @@ fn what_cannot_be_is_told() {
         assert_eq!(ended.code, Some(code), "{args:?}: {}", ended.stderr);
         assert!(ended.stderr.contains(says), "{args:?}: {}", ended.stderr);
     }
-    assert!(std::fs::read(&good).is_ok_and(|bytes| bytes == mts()));
+    assert!(std::fs::read(&good).is_ok_and(|bytes| bytes == falling()));
 }
 
 /// The same with another first coordinate.
 fn mts_at(number: f64) -> Vec<u8> {
-    let mut data = mts();
+    let mut data = falling();
     data[40..48].copy_from_slice(&number.to_le_bytes());
     data
 }
@@ -70,14 +61,14 @@ fn mts_at(number: f64) -> Vec<u8> {
 #[test]
 fn what_cannot_be_answered_keeps_no_other_from_it() {
     let inputs = Inputs::new();
-    let (first, last) = (inputs.put("first.mts", mts()), inputs.put("last.mts", mts()));
+    let (first, last) = (inputs.put("first.mts", falling()), inputs.put("last.mts", falling()));
     let (csv, gone) = (inputs.path("pairs.csv"), inputs.path("gone.mts"));
     let mut bad: Vec<String> = [1e61, f64::NAN, f64::INFINITY]
         .into_iter()
         .zip(["far.mts", "nan.mts", "endless.mts"])
         .map(|(number, name)| inputs.put(name, mts_at(number)))
         .collect();
-    bad.extend([inputs.put("cut.mts", &mts()[..100]), gone]);
+    bad.extend([inputs.put("cut.mts", &falling()[..100]), gone]);
     for bad in bad {
         let ended = quintile!().call(["ccd", &first, &bad, &last, "--csv", &csv, "--json"]);
         assert_eq!(ended.code, Some(1), "{}", ended.stderr);
@@ -96,7 +87,7 @@ fn what_cannot_be_answered_keeps_no_other_from_it() {
 #[test]
 fn cases_of_one_name_are_refused() {
     let inputs = [Inputs::new(), Inputs::new()];
-    let [one, other] = inputs.each_ref().map(|inputs| inputs.put("x.mts", mts()));
+    let [one, other] = inputs.each_ref().map(|inputs| inputs.put("x.mts", falling()));
     for (second, says) in [(&other, "both called `x`"), (&one, "give it once")] {
         let ended = quintile!().call(["ccd", &one, second]);
         assert_eq!(ended.code, Some(2), "{}", ended.stderr);

@@ -2,27 +2,20 @@
 
 use std::fs::read_to_string;
 
-use tests::{Inputs, quintile};
+use tests::{Inputs, mts, quintile};
 
-/// Two triangles that cross, as `.mts` of 8-byte scalars.
-fn mts() -> Vec<u8> {
+/// Two triangles that cross.
+fn crossing() -> Vec<u8> {
     let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let blade = [[0.2, 0.2, -0.5], [0.3, 0.2, 0.5], [0.2, 0.3, 0.5]];
-    let mut data = b"MTS1".to_vec();
-    [8_u32, 2, 0, 3, 1, 3, 1].iter().for_each(|word| data.extend(word.to_le_bytes()));
-    for object in [floor, blade] {
-        let numbers: [[[f64; 3]; 3]; 2] = [object; 2];
-        numbers.as_flattened().as_flattened().iter().for_each(|number| data.extend(number.to_le_bytes()));
-        [0_u32, 1, 2].iter().for_each(|index| data.extend(index.to_le_bytes()));
-    }
-    data
+    mts(&[[floor; 2], [blade; 2]])
 }
 
 #[test]
 fn a_folder_that_is_not_there_is_told_before_the_work() {
     let inputs = Inputs::new();
-    let case = inputs.put("cross.mts", mts());
-    let cut = inputs.put("cut.mts", &mts()[..60]);
+    let case = inputs.put("cross.mts", crossing());
+    let cut = inputs.put("cut.mts", &crossing()[..60]);
     let [csv, points, samples] =
         ["no/pairs.csv", "no/points.csv", "no/table.smp"].map(|name| inputs.path(name));
     let [hits, plot] = ["no/a.hit", "no/a.svg"].map(|name| inputs.path(name));
@@ -52,7 +45,7 @@ fn a_folder_that_is_not_there_is_told_before_the_work() {
 #[test]
 fn an_old_file_stays_where_nothing_is_known() {
     let inputs = Inputs::new();
-    let (cut, whole) = (inputs.put("cut.mts", &mts()[..60]), inputs.put("cross.mts", mts()));
+    let (cut, whole) = (inputs.put("cut.mts", &crossing()[..60]), inputs.put("cross.mts", crossing()));
     let csv = inputs.put("pairs.csv", "old");
     for (cases, code, left) in [
         (vec![&cut], 1, "old"),
@@ -69,7 +62,7 @@ fn an_old_file_stays_where_nothing_is_known() {
 #[test]
 fn rows_are_printed_where_asked_for() {
     let inputs = Inputs::new();
-    let case = inputs.put("cross.mts", mts());
+    let case = inputs.put("cross.mts", crossing());
     for printed in ["-", "/dev/stdout"] {
         let ended = quintile!().call(["ccd", &case, "--csv", printed]);
         assert_eq!(ended.code, Some(0), "{}", ended.stderr);
