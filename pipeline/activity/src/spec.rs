@@ -82,8 +82,12 @@ fn message(code: &Error) -> String {
 /// "did you mean `x`?" for the nearest of `known`, or the whole list where none is near.
 pub fn suggestion(found: &str, known: &[&str]) -> String {
     let nearest = known.iter().map(|name| (strsim::damerau_levenshtein(found, name), *name)).min();
+    // Half of a short word is no slip of the hand: `foo` is not `look`.
+    let slip = |distance: usize, name: &str| {
+        distance <= 1 + found.len() / 3 && 2 * distance < found.len().max(name.len())
+    };
     match nearest {
-        Some((distance, name)) if distance <= 1 + found.len() / 3 => format!("did you mean `{name}`?"),
+        Some((distance, name)) if slip(distance, name) => format!("did you mean `{name}`?"),
         Some(_) => format!("known here: {}", known.join(", ")),
         None => "none is known here".to_owned(),
     }
@@ -115,6 +119,7 @@ mod tests {
     fn a_far_name_lists_the_known_ones() {
         let error = parse::<Gpu>("(wibble: 1)", "gpu.ron").unwrap_err();
         assert!(error.to_string().contains("known here: tile_size, clock_hz"), "{error}");
+        assert_eq!(suggestion("foo", &["look", "seconds"]), "known here: look, seconds");
     }
 
     #[test]

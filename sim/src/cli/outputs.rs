@@ -10,6 +10,11 @@ pub(super) fn may_hold_results<'a>(
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Failure> {
     let Some(out) = out else { return Ok(()) };
+    if out.is_dir() || out.file_name().is_none() {
+        let message =
+            format!("{flag}: {:?} is no name of a file; name one in a folder that is there", out.as_os_str());
+        return Err(Failure { message, code: 2 });
+    }
     not_an_input((flag, out), inputs)?;
     let folder = match out.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -58,11 +63,16 @@ mod tests {
             ("no/new.csv", 2, "there is no folder"),
             ("old.csv/new.csv", 2, "there is no folder"),
             ("in.csv", 2, "is what is read"),
-            ("", 1, "name a file"),
+            ("", 2, "name one"),
+            (".", 2, "name one"),
+            ("..", 2, "name one"),
         ] {
             let (code, message) = told(name).unwrap();
             assert!(code == expected && message.contains(says), "{message}");
         }
+        assert!(
+            may_hold_results(("--csv", Some(Path::new("/"))), []).is_err_and(|failure| failure.code == 2)
+        );
         assert_eq!(std::fs::read(at("old.csv")).unwrap(), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }

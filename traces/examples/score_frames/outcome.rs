@@ -3,7 +3,7 @@
 use crate::case::Case;
 use std::error::Error;
 use traces::energy::{FrameEnergy, PowerIntegral};
-use traces::frames::{Flag, Flags, Marks, Method, Options, find_with};
+use traces::frames::{Flags, Marks, Method, Options, find_with};
 use traces::score::{TOLERANCE_S, pairs, score};
 
 /// Relative errors of energy.
@@ -91,11 +91,10 @@ fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     for (f, t) in pairs(&found_s, &truth_s, TOLERANCE_S) {
         partner[f] = Some(t);
     }
-    let told = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split, Flag::Odd];
     let mut counts = (0, 0, 0);
     for (pair, frame) in partner.windows(2).zip(frames) {
         let right = matches!(pair, [Some(a), Some(b)] if *b == a + 1);
-        let told = usize::from(told.iter().any(|flag| frame.flags.contains(*flag)));
+        let told = usize::from(frame.flags.doubted());
         if right {
             counts.2 += told;
         } else {

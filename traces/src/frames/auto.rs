@@ -11,6 +11,8 @@ use crate::trace::Trace;
 
 /// With fewer starts than this there is too little to learn from: the sum of squares is kept, unless what tracking finds is plain.
 const FEW: usize = 16;
+/// So few are plain too where the sum of squares doubts itself and found more: three gaps are the fewest that can be told to be even.
+const FEWEST: usize = 4;
 /// It is where so much of it has an even beat, and neighbours correlate so well: in noise it is 0.05, in frames at 0 dB 0.3 to 0.5.
 const PLAIN: [f64; 2] = [0.9, 0.5];
 /// With fewer samples in the window shapes are too coarse to be followed: of all methods that with the most even beat is taken.
@@ -32,7 +34,8 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     if squares.starts.len() < FEW {
         // A mark whose like comes back seldom finds itself alone among frames that are plainly there.
         let tracked = (trace.samples() <= LONG).then(|| find_tracked(trace, marks)).transpose()?;
-        return Ok(tracked.filter(|tracked| plain(trace, tracked)).unwrap_or(squares));
+        let plain = |tracked: &Found| enough(tracked, &squares) && even_and_alike(trace, tracked);
+        return Ok(tracked.filter(plain).unwrap_or(squares));
     }
     if samples < COARSE {
         return Ok(steadiest(
@@ -44,12 +47,20 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     if long_and_clear { Ok(squares) } else { find_tracked(trace, marks) }
 }
 
-/// Whether starts are beyond doubt: many, even, and alike.
-fn plain(trace: &Trace, found: &Found) -> bool {
+/// Whether tracking found starts enough to be asked how plain they are: many, or fewer than the sum of squares where that doubts itself,
+/// over as long a stretch.
+fn enough(tracked: &Found, squares: &Found) -> bool {
+    let count = tracked.starts.len();
+    let last_s = span_s(tracked) / count.max(2).saturating_sub(1) as f64;
+    let over = span_s(tracked) + last_s >= PLAIN[0] * span_s(squares);
+    count >= FEW
+        || (squares.threshold.clarity() < 1.0 && (FEWEST..squares.starts.len()).contains(&count) && over)
+}
+
+/// Whether starts keep time and are followed by the like.
+fn even_and_alike(trace: &Trace, found: &Found) -> bool {
     let [even, alike] = PLAIN;
-    found.starts.len() >= FEW
-        && covered_s(found) >= even * span_s(found)
-        && alike::neighbours(trace, found) >= alike
+    covered_s(found) >= even * span_s(found) && alike::neighbours(trace, found) >= alike
 }
 
 /// That of the results whose even beat covers most time.
@@ -103,6 +114,20 @@ mod tests {
         };
         let found = found(power, 400 * 60, 400 * 30);
         assert_eq!((found.method, found.starts.len()), (Method::Tracking, 59));
+    }
+
+    #[test]
+    fn four_frames_of_passes_that_look_alike_are_four() {
+        // After one of idle, each frame is of four passes, unevenly apart, whose levels differ as much as frames do.
+        let power = |sample: usize| {
+            let (frame, at) = (sample / 1600, sample % 1600);
+            let pass = [0, 480, 700, 1040].partition_point(|&from| from <= at) - 1;
+            let level = 3.0 + 0.8 * noise(10 * frame + pass);
+            let busy = at - [0, 480, 700, 1040][pass] < [440, 180, 300, 260][pass];
+            0.1 * noise(sample) + if frame > 0 && busy { level } else { 0.5 }
+        };
+        let found = found(power, 1600 * 5, 3200);
+        assert_eq!((found.method, found.starts.len()), (Method::Tracking, 4));
     }
 
     #[test]

@@ -21,11 +21,13 @@ pub enum Flag {
     Split,
     /// Its length breaks the even beat of the frames around it: one of its ends may be misplaced.
     Odd,
+    /// Of fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of it and more.
+    Coarse,
 }
 
 impl Flag {
     /// Every flag, in the order in which they are written.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Marked,
         Self::Last,
         Self::Long,
@@ -34,7 +36,12 @@ impl Flag {
         Self::Merged,
         Self::Split,
         Self::Odd,
+        Self::Coarse,
     ];
+
+    /// Those that tell of ends that may not be where they are said to be.
+    pub const DOUBTS: [Self; 7] =
+        [Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split, Self::Odd, Self::Coarse];
 
     /// The word in the `flags` column.
     pub fn name(self) -> &'static str {
@@ -47,6 +54,7 @@ impl Flag {
             Self::Merged => "merged",
             Self::Split => "split",
             Self::Odd => "odd",
+            Self::Coarse => "coarse",
         }
     }
 
@@ -68,6 +76,11 @@ impl Flags {
     /// Whether a flag is set.
     pub fn contains(self, flag: Flag) -> bool {
         self.0 & flag.bit() != 0
+    }
+
+    /// Whether any of [`Flag::DOUBTS`] is set.
+    pub fn doubted(self) -> bool {
+        Flag::DOUBTS.iter().any(|flag| self.contains(*flag))
     }
 }
 

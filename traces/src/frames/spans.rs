@@ -20,6 +20,8 @@ const MOSTLY: [(usize, f64); 2] = [(COARSE, 0.9), (50, 0.6)];
 const ROOM: f64 = 1.2;
 /// What is left of the confidence where window and beat say nothing.
 const LEFT: f64 = 0.4;
+/// A frame of fewer samples is coarse: half of one, which is as near as its ends are known, is a thirtieth of it.
+const COARSE_FRAME: f64 = 16.0;
 
 /// How finely a window is sampled.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +54,11 @@ pub(super) fn spans(starts: &[FrameStart], end_s: f64, sampling: Sampling) -> Ve
     doubt_coarse(&mut frames, sampling);
     for frame in frames.iter_mut().filter(|frame| frame.confidence < 0.5) {
         frame.flags.insert(Flag::Unsure);
+    }
+    for frame in
+        frames.iter_mut().filter(|frame| (frame.end_s - frame.start_s) * sampling.rate_hz < COARSE_FRAME)
+    {
+        frame.flags.insert(Flag::Coarse);
     }
     flag_lengths(&mut frames);
     flag_beside_others(&mut frames);
@@ -159,6 +166,14 @@ mod tests {
         let gaps_s = [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0, 1.0];
         assert_eq!((flagged(&gaps_s, Flag::Merged), flagged(&gaps_s, Flag::Split)), (vec![3], vec![6, 7]));
         assert!(flagged(&gaps_s, Flag::Odd).is_empty());
+    }
+
+    #[test]
+    fn frames_of_a_handful_of_samples_are_coarse() {
+        let starts = starts(&[0.9, 1.7, 1.5], 1.0);
+        let frames = spans(&starts, 4.2, Sampling { window: 5, rate_hz: 10.0 });
+        let coarse: Vec<bool> = frames.iter().map(|frame| frame.flags.contains(Flag::Coarse)).collect();
+        assert_eq!(coarse, [true, false, true, true]);
     }
 
     fn unsure(gaps_s: &[f64], sampling: Sampling) -> Vec<usize> {

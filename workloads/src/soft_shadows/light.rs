@@ -30,6 +30,28 @@ impl Default for LightSpec {
     }
 }
 
+impl LightSpec {
+    /// Refuses an angle or a length that cannot be, `way` scene units from the target.
+    fn must_fit(&self, way: f64) -> Result<(), String> {
+        let Self { radius, fov_deg, near, .. } = *self;
+        let widest = WIDEST * way;
+        if !(1.0..=170.0).contains(&fov_deg) {
+            return Err(format!("fov_deg {fov_deg:?}: a map sees 1 to 170 degrees"));
+        }
+        if near >= way {
+            return Err(format!(
+                "near {near:?}: nothing before the target would throw a shadow; it has to be below {way:?}, the way to it"
+            ));
+        }
+        if !(SMALLEST..=widest).contains(&radius) {
+            return Err(format!(
+                "radius {radius:?}: it has to be {SMALLEST:e} to {widest:?} scene units, {WIDEST} times the way to the target"
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// An area light: its camera, whose lens is the light.
 #[derive(Clone, Copy, Debug)]
 pub struct AreaLight {
@@ -59,16 +81,8 @@ impl AreaLight {
         let stand = stand.ok_or_else(|| {
             refused("position and target coincide or are not finite: move one of them".to_owned())
         })?;
-        if !(1.0..=170.0).contains(&spec.fov_deg) {
-            return Err(refused(format!("fov_deg {:?}: a map sees 1 to 170 degrees", spec.fov_deg)));
-        }
-        let most = WIDEST * (DVec3::from_array(spec.target) - position).length();
-        if !(SMALLEST..=most).contains(&spec.radius) {
-            return Err(refused(format!(
-                "radius {:?}: it has to be {SMALLEST:e} to {most:?} scene units, {WIDEST} times the way to the target",
-                spec.radius
-            )));
-        }
+        let way = (DVec3::from_array(spec.target) - position).length();
+        spec.must_fit(way).map_err(refused)?;
         let view = View::Perspective { tan_half_height: tan_half(spec.fov_deg) };
         let camera = view.camera(stand.pose(), spec.near as f32).map_err(|e| refused(e.to_string()))?;
         let lens = Lens::new(spec.radius as f32, INFINITY).map_err(|e| refused(e.to_string()))?;
@@ -139,6 +153,7 @@ mod tests {
             LightSpec { radius: 1e4, ..base },
             LightSpec { fov_deg: 200.0, ..base },
             LightSpec { near: -1.0, ..base },
+            LightSpec { near: 1e30, ..base },
         ] {
             assert!(AreaLight::new(&bad).unwrap_err().is_usage());
         }

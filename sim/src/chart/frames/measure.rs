@@ -5,7 +5,7 @@ use std::time::Instant;
 use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral};
-use traces::frames::{Flag, Marks, Method, Options, default_window, find_with};
+use traces::frames::{Marks, Method, Options, default_window, find_with};
 use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Recording, Scenario, Scene};
 
@@ -16,9 +16,6 @@ use crate::chart::ChartError;
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
 /// How far off the marks are, s.
 const HAND_S: [f64; 5] = [0.05e-3, -0.1e-3, 0.1e-3, 0.0, -0.05e-3];
-/// What tells of a wrong frame.
-const TELLING: [Flag; 6] = [Flag::Unsure, Flag::Long, Flag::Short, Flag::Merged, Flag::Split, Flag::Odd];
-
 /// What came out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Outcome {
@@ -71,6 +68,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, ChartError
         Way::Normalized => (1, Method::Normalized),
         Way::Templates => (MARKED.len(), Method::SumOfSquares),
         Way::Tracking => (1, Method::Tracking),
+        Way::Auto => (1, Method::Auto),
     };
     let frame = |share: f64| &scene.truth[(share * scene.truth.len() as f64) as usize];
     let marks_s = MARKED.iter().zip(HAND_S).map(|(&share, hand_s)| frame(share).start_s + hand_s);
@@ -100,7 +98,7 @@ fn flagged(frames: &[FrameEnergy], scene: &Scene) -> Outcome {
     let mut outcome = Outcome::default();
     for (two, frame) in partner.windows(2).zip(frames) {
         let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);
-        let told = usize::from(TELLING.iter().any(|flag| frame.flags.contains(*flag)));
+        let told = usize::from(frame.flags.doubted());
         if right {
             (outcome.right, outcome.right_flagged) = (outcome.right + 1, outcome.right_flagged + told);
         } else {

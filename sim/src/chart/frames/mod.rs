@@ -69,11 +69,13 @@ pub enum Way {
     Templates,
     /// Tracking from one mark, templates learnt.
     Tracking,
+    /// One mark and no method asked for: that of the others which fits what is found.
+    Auto,
 }
 
 impl Way {
     /// All of them, in the order of their colours.
-    pub const ALL: [Self; 4] = [Self::Squares, Self::Normalized, Self::Templates, Self::Tracking];
+    pub const ALL: [Self; 5] = [Self::Squares, Self::Normalized, Self::Templates, Self::Tracking, Self::Auto];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -82,6 +84,7 @@ impl Way {
             Self::Normalized => "normalized",
             Self::Templates => "five templates",
             Self::Tracking => "tracking",
+            Self::Auto => "auto",
         }
     }
 }

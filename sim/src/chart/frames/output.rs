@@ -144,7 +144,7 @@ pub(super) fn markdown(chart: &FramesChart) -> String {
     let usual = chart.values(Axis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
     let rows: Vec<&Row> =
         chart.rows.iter().filter(|row| row.axis == Axis::Rate && row.value == usual).collect();
-    let _ = writeln!(text, "| scene | {ways} | energy error, tracking |\n|---|---|---|---|---|---|");
+    let _ = writeln!(text, "| scene | {ways} | energy error, auto |\n|---|---|---|---|---|---|---|");
     for rows in rows.chunk_by(|a, b| a.scene == b.scene) {
         let cell = |row: &&Row| {
             if row.fails { format!("**{:.3}**", row.outcome.f1) } else { format!("{:.3}", row.outcome.f1) }
@@ -156,15 +156,15 @@ pub(super) fn markdown(chart: &FramesChart) -> String {
     for axis in Axis::ALL {
         let _ = writeln!(
             text,
-            "\n| {} | {ways} | energy error, tracking | wrong frames flagged | right ones flagged |",
+            "\n| {} | {ways} | energy error, auto | wrong frames flagged | right ones flagged |",
             axis.name()
         );
-        let _ = writeln!(text, "|---|---|---|---|---|---|---|---|");
+        let _ = writeln!(text, "|---|---|---|---|---|---|---|---|---|");
         for value in chart.values(axis) {
             let cells = Way::ALL.map(|way| chart.cell(axis, value, way, "**", "**")).join(" | ");
-            let error = chart.mean(axis, value, Way::Tracking, |o| o.energy_error);
+            let error = chart.mean(axis, value, Way::Auto, |o| o.energy_error);
             let sum = |of: fn(&Outcome) -> usize| -> usize {
-                chart.at(axis, value, Way::Tracking).map(|row| of(&row.outcome)).sum()
+                chart.at(axis, value, Way::Auto).map(|row| of(&row.outcome)).sum()
             };
             let _ = writeln!(
                 text,

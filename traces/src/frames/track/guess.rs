@@ -56,7 +56,7 @@ pub(super) fn first(bank: &Bank, spacing: usize, marks: &[usize]) -> (usize, Vec
 }
 
 /// The starts and those between them, where what divides every gap of a period into so many equal parts resembles the mark as well as
-/// half a sample lets anything: of V-synchronized frames whose period is no whole number of samples, only some fall on the mark's place
+/// half a sample and noise let anything: of V-synchronized frames whose period is no whole number of samples, only some fall on the mark's place
 /// between samples, and they keep a beat of their own.
 fn between(
     profile: &[f64],
@@ -77,8 +77,12 @@ fn between(
         return None;
     }
     let more: Vec<usize> = starts.windows(2).filter(even).flat_map(divided).collect();
-    let mut values: Vec<f64> = more.iter().map(|&offset| profile[offset]).collect();
-    if values.is_empty() || median(&mut values) > half_a_sample(profile, marks) {
+    // At edges half a sample leaves half of what a whole one does. Parts of whole samples would fall on the mark's place, too.
+    let off = if period.is_multiple_of(parts) { 1.0 } else { 2.0 } * half_a_sample(profile, marks);
+    // Noise leaves as much of them as of the starts.
+    let usual =
+        |offsets: &[usize]| median(&mut offsets.iter().map(|&offset| profile[offset]).collect::<Vec<_>>());
+    if more.is_empty() || usual(&more) > off + usual(starts) {
         return None;
     }
     let mut all = [starts, &more].concat();
