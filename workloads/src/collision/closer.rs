@@ -12,6 +12,9 @@ const FIRST_TILES: u32 = 8;
 const TRIANGLES_A_TILE: f64 = 16.0;
 /// So many triangles are looked at by their boxes first.
 const MANY: usize = 64;
+/// Up to so many, edges are tried before closer tiles: they leave fewer fragments, and so enough for those. Of more, boxes find most
+/// that is not needed for less.
+const VERY_MANY: usize = 1024;
 /// Fragments that may be drawn for a pair before it is let stand: many for few triangles, which are cheap all the same and often
 /// nearly touch, and a few for each of many.
 const MOST_FRAGMENTS: u64 = 1 << 18;
@@ -57,10 +60,11 @@ impl Pair<'_> {
             }
             let stuck = round.window.share_of(&before) > STUCK;
             let crowded = self.triangles() as f64 > STUCK * triangles as f64;
-            match (stuck && resolution < most, crowded, fit) {
-                (true, ..) => resolution = (2 * resolution).min(most),
-                (false, true, Fit::Boxes) => fit = Fit::Edges,
-                (false, true, Fit::Edges) if stuck => break,
+            let may_double = stuck && resolution < most;
+            match fit {
+                Fit::Boxes if crowded && (!may_double || self.triangles() <= VERY_MANY) => fit = Fit::Edges,
+                _ if may_double => resolution = (2 * resolution).min(most),
+                Fit::Edges if crowded && stuck => break,
                 _ => {}
             }
         }
@@ -114,8 +118,9 @@ impl Pair<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::families::slide;
     use super::super::pass::{Fragment, Pass};
-    use super::super::{Method, Object, Search};
+    use super::super::{Method, Object, Search, detect};
     use super::*;
 
     /// Counts what is drawn.
@@ -137,6 +142,19 @@ mod tests {
             let mut drawn = Drawn(0);
             let verdict = search.watched(&object(0.0), &object(1e-7), &mut Scratch::default(), &mut drawn);
             assert!(verdict.may_collide() && drawn.0 <= MOST_FRAGMENTS + 8, "{method:?}: {}", drawn.0);
+        }
+    }
+
+    #[test]
+    fn more_tiles_keep_no_more_plates_that_slide_along_each_other() {
+        for gap in [0.03, 0.1] {
+            let kept = |resolution: u32| {
+                let search = Search { resolution, ..Search::default() };
+                let keeps = |seed: &u64| detect(&slide(*seed, gap), &search)[0].verdict.may_collide();
+                (0..8).filter(keeps).count()
+            };
+            let kept = [8, 16, 64].map(kept);
+            assert!(kept.is_sorted_by(|few, more| few >= more), "gap {gap}: {kept:?}");
         }
     }
 
