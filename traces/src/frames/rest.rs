@@ -21,6 +21,8 @@ const SAMPLES: usize = 3;
 /// An end of the rest that has moved by this share of the window is a doubt; where that is less than so many samples, it is noise.
 const MOVED: f64 = 0.08;
 const LEAST: f64 = 4.0;
+/// Where so many of the starts near are in doubt, a start is, too.
+const ENOUGH: f64 = 0.125;
 /// What is left of the confidence then.
 pub(super) const LEFT: f64 = 0.4;
 
@@ -40,6 +42,16 @@ pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize)
         Some(if changed { LEFT } else { 1.0 })
     };
     (0..starts.len()).map(|start| of_start(start).unwrap_or(1.0)).collect()
+}
+
+/// Doubts spread to all starts near which enough others are in doubt: what moved does not move for a frame and back.
+pub(super) fn spread(left: Vec<f64>) -> Vec<f64> {
+    let of_start = |start: usize| {
+        let near = near(&left, start);
+        let doubted = near.iter().filter(|left| **left < 1.0).count();
+        if doubted as f64 >= ENOUGH * near.len() as f64 { LEFT.min(left[start]) } else { left[start] }
+    };
+    (0..left.len()).map(of_start).collect()
 }
 
 /// One of some starts and those near it.
@@ -139,6 +151,18 @@ mod tests {
             (0..120).filter(|frame| left[*frame] < 1.0).all(|frame| (45..75).contains(&frame)),
             "{left:?}"
         );
+    }
+
+    #[test]
+    fn a_few_doubts_make_all_near_them_doubtful_and_one_does_not() {
+        let mut left = vec![1.0; 60];
+        left[50] = 0.3;
+        assert_eq!(spread(left.clone()), left);
+        left[18..22].fill(LEFT);
+        let spread = spread(left);
+        assert!(spread[13..27].iter().all(|left| *left == LEFT), "{spread:?}");
+        assert!(spread[..10].iter().chain(&spread[30..50]).all(|left| *left == 1.0), "{spread:?}");
+        assert_eq!(spread[50], 0.3);
     }
 
     #[test]

@@ -62,6 +62,11 @@ fn phases(
 ) -> (Vec<f64>, Vec<f64>) {
     let places =
         |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
+    // Marks are where they were put.
+    let spread = |left: Vec<f64>| -> Vec<f64> {
+        let spread = rest::spread(left).into_iter().zip(fixed);
+        spread.map(|(left, fixed)| if *fixed { 1.0 } else { left }).collect()
+    };
     let first_mark = fixed.iter().position(|fixed| *fixed);
     let (positions, in_phase) = match first_mark.and_then(|mark| ticks(&positions, mark, width)) {
         // What begins on a tick is in the phase of the mark, whatever happened on the way.
@@ -69,13 +74,12 @@ fn phases(
             (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
         }
         None => {
-            let rests = rest::left(power, &places(&positions), fixed, width);
+            let rests = spread(rest::left(power, &places(&positions), fixed, width));
             (positions, product(starts.iter().map(|start| start.left), rests))
         }
     };
     let noise_w = libm::sqrt(noise_variance(power));
-    let rested = unrested::left(power, &places(&positions), width, noise_w).into_iter().zip(fixed);
-    let rested = rested.map(|(left, fixed)| if *fixed { 1.0 } else { left }).collect();
+    let rested = spread(unrested::left(power, &places(&positions), width, noise_w));
     (positions, product(in_phase, rested))
 }
 
