@@ -17,6 +17,6 @@ pub use outliers::outliers;
 pub(crate) use pieces::Sums;
 pub use pieces::{energies_j, finishes_s, levels_w};
 pub use pooled::{Pooled, pooled};
-pub use summary::{Spread, Summary};
+pub use summary::{Spread, Summary, whole};
 pub use table::{FrameTable, TABLE_COLUMNS, TableError};
 pub use warm_up::{WarmUp, mean_over_discarded, warm_up};

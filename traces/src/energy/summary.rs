@@ -1,6 +1,7 @@
 //! Frames in a few numbers.
 
 use super::FrameEnergy;
+use crate::frames::{Flag, Flags};
 use crate::squares::about_mean;
 use serde::Serialize;
 
@@ -43,8 +44,10 @@ pub struct Summary {
     pub energy_j: Spread,
     /// Duration of a frame, s.
     pub duration_s: Spread,
-    /// Mean power of a frame, W.
+    /// Mean power of a frame, W; frames count alike, however long they are.
     pub power_w: Spread,
+    /// All energy over all time, W.
+    pub overall_power_w: f64,
 }
 
 impl Summary {
@@ -52,13 +55,28 @@ impl Summary {
     pub fn of(frames: &[FrameEnergy]) -> Option<Self> {
         let spread =
             |value: fn(&FrameEnergy) -> f64| Spread::of(&frames.iter().map(value).collect::<Vec<_>>());
+        let total_j: f64 = frames.iter().map(|frame| frame.energy_j).sum();
+        let total_s: f64 = frames.iter().map(FrameEnergy::duration_s).sum();
         Some(Self {
             frames: frames.len(),
-            total_j: frames.iter().map(|frame| frame.energy_j).sum(),
+            total_j,
+            overall_power_w: if total_s > 0.0 { total_j / total_s } else { 0.0 },
             energy_j: spread(|frame| frame.energy_j)?,
             duration_s: spread(FrameEnergy::duration_s)?,
             power_w: spread(FrameEnergy::power_w)?,
         })
+    }
+}
+
+/// The frames without a last one that ends with the trace, or at an end mark, rather than where a frame would: it is much longer or
+/// shorter than the others.
+pub fn whole(frames: &[FrameEnergy]) -> &[FrameEnergy] {
+    let cut = |flags: Flags| {
+        flags.contains(Flag::Last) && (flags.contains(Flag::Long) || flags.contains(Flag::Short))
+    };
+    match frames.split_last() {
+        Some((last, others)) if cut(last.flags) && !others.is_empty() => others,
+        _ => frames,
     }
 }
 

@@ -10,6 +10,7 @@ mod correlate;
 mod find;
 mod first;
 mod flags;
+mod flat;
 mod lock;
 mod marks;
 mod matched;

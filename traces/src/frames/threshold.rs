@@ -47,6 +47,8 @@ pub enum Rule {
     NoneAlike,
     /// There was no minimum besides the marks.
     NoCandidates,
+    /// Tracking has none: it takes the sequence of starts that has the most evidence as a whole.
+    Sequence,
 }
 
 /// One side of the threshold.

@@ -9,7 +9,7 @@ use super::method::Method;
 use super::register::register;
 use super::rest;
 use super::settle::settle;
-use super::threshold::choose;
+use super::threshold::{Rule, Threshold, choose};
 use super::track::{Start, track};
 use super::uncovered::uncovered;
 use super::unrested;
@@ -42,7 +42,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
     let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
-    let nothing = choose(&[], 0.0, 0.0, 0.0, |_| 0.0);
+    let nothing = Threshold { rule: Rule::Sequence, ..choose(&[], 0.0, 0.0, 0.0, |_| 0.0) };
     let mut found = assess::conclude(trace, marks, &placement, starts, nothing);
     let places: Vec<f64> = found.starts.iter().map(|start| trace.position(start.time_s)).collect();
     let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());

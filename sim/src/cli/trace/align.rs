@@ -20,7 +20,7 @@ impl From<AlignError> for Failure {
 }
 
 pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
-    may_hold_results(("--out", args.out.as_deref()), [])?;
+    may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {

@@ -1,6 +1,6 @@
 //! `quintile trace convert`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, parquet};
@@ -18,7 +18,7 @@ const LARGE_BYTES: u64 = 1 << 30;
 
 pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     check(&args.out)?;
-    may_hold_results(("OUT", Some(&args.out)), [])?;
+    may_be_saved("OUT", &args.out, [args.input.trace.as_path()])?;
     let (trace, repairs) = args.input.source()?;
     save(&*trace, &args.out)?;
     let Heading { samples, rate_hz, .. } = trace.heading();
@@ -43,6 +43,31 @@ pub(super) fn check(path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     Err(wrong(format!("{}: its ending is none of {}", path.display(), known.join(", "))))
+}
+
+/// Refuses what [`save`] could not write, or would write over: an input, or a description that is not that of an older `out`.
+pub(super) fn may_be_saved<'a>(
+    flag: &str,
+    out: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    may_hold_results((flag, Some(out)), inputs)?;
+    let beside = description_path(out).filter(|beside| beside.exists() && !out.exists());
+    beside.map_or(Ok(()), |beside| {
+        Err(wrong(format!(
+            "{flag}: {} is there already, where the description of {} goes; name another file, or move it",
+            beside.display(),
+            out.display()
+        )))
+    })
+}
+
+/// The file that tells what a text does not.
+fn description_path(out: &Path) -> Option<PathBuf> {
+    let name = name(out);
+    let text = if name.ends_with(".gz") { out.with_extension("") } else { out.to_owned() };
+    let plain = name.trim_end_matches(".gz");
+    (plain.ends_with(".csv") || plain.ends_with(".tsv")).then(|| csv::sidecar_path(&text))
 }
 
 /// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use serde_json::json;
+use traces::Trace;
 use traces::energy::{
     FrameEnergy, Idle, Pooled, PowerIntegral, Spread, energies_j, finishes_s, levels_w, outliers, pooled,
-    warm_up,
+    warm_up, whole,
 };
 use traces::io::{Heading, Repair, Source};
 
@@ -21,8 +22,8 @@ pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
     let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
-        let (trace, _) = args.input.source()?;
-        return stretch(args, &*trace, recording.as_ref());
+        let (trace, repairs) = args.input.source()?;
+        return stretch(args, (&*trace, &repairs), recording.as_ref());
     }
     let (first, repairs, of_file) = one_run(args, &args.input.trace, recording.as_ref())?;
     let pixels = args.find.pixels.or(of_file);
@@ -57,7 +58,7 @@ fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
 /// Energy between two times.
 fn stretch(
     args: &EnergyArgs,
-    trace: &dyn Source,
+    (trace, repairs): (&dyn Source, &[Repair]),
     recording: Option<&PowerIntegral<'_>>,
 ) -> Result<(), Failure> {
     let heading = trace.heading();
@@ -69,7 +70,8 @@ fn stretch(
     let (energy_j, power_w) = (total_j - idle_j, (total_j - idle_j) / (to_s - from_s));
     if args.json {
         return print_json(
-            &json!({ "from_s": from_s, "to_s": to_s, "energy_J": energy_j, "power_W": power_w, "idle_J": idle_j }),
+            &json!({ "from_s": from_s, "to_s": to_s, "energy_J": energy_j, "power_W": power_w, "idle_J": idle_j,
+                "repairs": repairs }),
             true,
         );
     }
@@ -98,10 +100,24 @@ fn idle<'a>(
         let length_s = recording.trace().end_s() - recording.trace().start_s();
         return Ok(Some(match args.idle_by {
             IdleBy::Mean => Idle::Mean(recording.total_j() / length_s),
-            IdleBy::Instant => Idle::Instant(recording.clone()),
+            IdleBy::Instant => {
+                covers(recording.trace(), &trace.heading())?;
+                Idle::Instant(recording.clone())
+            }
         }));
     }
     Ok(args.idle_w.map(Idle::Mean))
+}
+
+/// Refuses an idle recording that ends before the trace does: instants are compared from the starts of both on.
+fn covers(idle: &Trace, trace: &Heading) -> Result<(), Failure> {
+    let [idle_s, trace_s] = [idle.end_s() - idle.start_s(), trace.end_s() - trace.start_s];
+    if idle_s >= trace_s * (1.0 - 1e-9) {
+        return Ok(());
+    }
+    Err(wrong(format!(
+        "--idle-by instant: the idle recording lasts {idle_s} s, the trace {trace_s} s; record it as long, or take --idle-by mean"
+    )))
 }
 
 /// Frames of one run and what was made of them.
@@ -122,7 +138,7 @@ fn one_run(
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
     let (found, trace) = args.find.frames_and_samples(&args.input, path)?;
     found.warn();
-    let mut frames = found.energies;
+    let mut frames = whole(&found.energies).to_vec();
     let (trace, start_s) = (&*trace, trace.heading().start_s);
     let idle = idle(args, trace, recording)?;
     let idle_j = |a_s: f64, b_s: f64| idle.as_ref().map_or(0.0, |idle| idle.energy_j(start_s, a_s, b_s));

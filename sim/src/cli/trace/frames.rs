@@ -1,11 +1,14 @@
 //! `quintile trace frames`.
 
+use std::path::Path;
+
 use serde::Serialize;
 use serde_json::{Value, json};
-use traces::energy::{FrameTable, Summary};
+use traces::energy::{FrameTable, Summary, whole};
+use traces::frames::{Rule, Threshold};
 
 use super::args::FramesArgs;
-use super::input::Frames;
+use super::input::{Frames, wrong};
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{complain, print, print_json};
 use crate::cli::{Failure, threads};
@@ -15,14 +18,16 @@ use crate::output::table::{Table, si, si_digits};
 const SHOWN: usize = 12;
 
 pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
-    may_hold_results(("--out", args.out.as_deref()), [])?;
+    let inputs = args.find.mark_file.as_deref().into_iter().chain([args.input.trace.as_path()]);
+    may_hold_results(("--out", args.out.as_deref()), inputs)?;
+    args.out.as_deref().map_or(Ok(()), is_table)?;
     let (frames, table, summary, pixels) = threads(args.threads)?.install(|| {
         let mut frames = args.find.frames(&args.input, &args.input.trace)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
         let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
         let (written, summary) =
-            rayon::join(|| args.out.as_deref().map_or(Ok(()), write), || Summary::of(table.frames()));
+            rayon::join(|| args.out.as_deref().map_or(Ok(()), write), || Summary::of(whole(table.frames())));
         written?;
         Ok::<_, Failure>((frames, table, summary, pixels))
     })?;
@@ -35,6 +40,20 @@ pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
         print(&inverse_text(&table, pixels))?;
     }
     args.out.as_ref().map_or(Ok(()), |out| print(&format!("frames: {}", out.display())))
+}
+
+/// Refuses a name that promises another kind of file.
+fn is_table(out: &Path) -> Result<(), Failure> {
+    let ending = out.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    match ending.as_deref() {
+        Some(
+            other @ ("parquet" | "json" | "jls" | "tsv" | "gz" | "svg" | "png" | "pdf" | "perfetto-trace"),
+        ) => Err(wrong(format!(
+            "--out {}: frames are written as CSV, which is no .{other}; name a file that ends in .csv",
+            out.display()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 #[derive(Serialize)]
@@ -96,16 +115,13 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
             100.0 * p.regularity
         );
     }
-    let t = &frames.found.threshold;
     lines += &format!(
-        "{} samples at {}, {} frames by {}; threshold {:.4e} W^2 ({:?}, separation {:.2})\n",
+        "{} samples at {}, {} frames by {}; {}\n",
         frames.samples,
         si(frames.rate_hz, "Hz"),
         table.frames().len(),
         frames.found.method,
-        t.value_w2,
-        t.rule,
-        t.separation
+        reason(&frames.found.threshold)
     );
     let mut shown = Table::new(["frame", "start", "time", "energy", "power", "confidence", "flags"]);
     for (index, (frame, outlier)) in table.frames().iter().zip(table.outliers()).enumerate().take(SHOWN) {
@@ -130,15 +146,27 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
             s.energy_j.mean * 1e3,
             s.energy_j.deviation * 1e3,
             s.duration_s.mean * 1e3,
-            si_digits(s.power_w.mean, "W", 4)
+            si_digits(s.overall_power_w, "W", 4)
         );
         if let Some(pixels) = pixels.filter(|&pixels| pixels > 0) {
             lines += &format!(", {:.3} nJ/pixel", s.energy_j.mean / pixels as f64 * 1e9);
         }
         let outliers = table.outliers().iter().filter(|out| **out).count();
-        lines += &format!("; {outliers} outliers\n");
+        let cut = if s.frames < table.frames().len() { "; without the last, which is cut" } else { "" };
+        lines += &format!("; {outliers} outliers{cut}\n");
     }
     lines
+}
+
+/// Why just these are starts.
+fn reason(threshold: &Threshold) -> String {
+    match threshold.rule {
+        Rule::Sequence => "no threshold: the sequence with the most evidence as a whole".to_owned(),
+        rule => format!(
+            "threshold {:.4e} W^2 ({rule:?}, separation {:.2})",
+            threshold.value_w2, threshold.separation
+        ),
+    }
 }
 
 /// Inverse units from the mean energy, and what their own average would wrongly be (Paper II).

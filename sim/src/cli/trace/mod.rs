@@ -10,6 +10,7 @@ mod pareto;
 mod plot;
 mod sample;
 mod times;
+mod units;
 
 use super::Failure;
 use args::{TraceArgs, TraceCommand};

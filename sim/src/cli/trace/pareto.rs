@@ -11,6 +11,7 @@ use traces::table::Table as Columns;
 use super::args::{ParetoArgs, ParetoShow};
 use super::input::wrong;
 use super::plot::{Ending, write};
+use super::units::{Quantity, scale};
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{print, print_json};
@@ -20,7 +21,7 @@ use crate::output::table::{Table, si_digits};
 type Groups = BTreeMap<String, Vec<Standing>>;
 
 pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
-    may_hold_results(("--out", args.out.as_deref()), [])?;
+    may_hold_results(("--out", args.out.as_deref()), [args.table.as_path()])?;
     let table = Columns::read(&args.table).map_err(|error| wrong(error.to_string()))?;
     let groups = groups(args, &table)?;
     if let Some(out) = &args.out {
@@ -37,34 +38,23 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Unit at the end of a column's name: what to multiply by for s or J.
-fn scale(column: &str) -> Option<f64> {
-    let unit = column.rsplit(['_', ' ', '(']).next().unwrap_or_default().trim_end_matches(')');
-    match unit.to_ascii_lowercase().as_str() {
-        "s" | "j" => Some(1.0),
-        "ms" | "mj" => Some(1e-3),
-        "us" | "uj" => Some(1e-6),
-        "ns" | "nj" => Some(1e-9),
-        _ => None,
-    }
-}
-
 fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
     let numbers = |column: &str, scale: f64| -> Result<Vec<f64>, Failure> {
         let values = table.numbers(column).map_err(|error| wrong(error.to_string()))?;
         Ok(values.into_iter().map(|value| value * scale).collect())
     };
+    let unit = |column: &str, of: Quantity| scale(column, of).map_err(wrong);
     // A deviation whose name tells no unit has that of what it belongs to.
-    let unit = |column: &str| scale(column).unwrap_or(1.0);
-    let deviations = |column: &Option<String>, of: &str| match column {
-        Some(column) => numbers(column, scale(column).unwrap_or(unit(of))),
+    let deviations = |column: &Option<String>, (of, quantity): (&str, Quantity)| match column {
+        Some(column) => numbers(column, unit(column, quantity)?.or(unit(of, quantity)?).unwrap_or(1.0)),
         None => Ok(vec![0.0; table.rows()]),
     };
     let texts = |column: &String| table.texts(column).map_err(|error| wrong(error.to_string()));
-    let (times, energies) =
-        (numbers(&args.time, unit(&args.time))?, numbers(&args.energy, unit(&args.energy))?);
-    let (time_sd, energy_sd) =
-        (deviations(&args.time_sd, &args.time)?, deviations(&args.energy_sd, &args.energy)?);
+    let (time, energy) = ((args.time.as_str(), Quantity::Time), (args.energy.as_str(), Quantity::Energy));
+    let [times, energies] =
+        [time, energy].map(|(column, of)| numbers(column, unit(column, of)?.unwrap_or(1.0)));
+    let (times, energies) = (times?, energies?);
+    let (time_sd, energy_sd) = (deviations(&args.time_sd, time)?, deviations(&args.energy_sd, energy)?);
     let labels = args.label.as_ref().map(texts).transpose()?;
     let keys = args.group.iter().map(texts).collect::<Result<Vec<_>, _>>()?;
     let mut groups: BTreeMap<String, Vec<Point>> = BTreeMap::new();

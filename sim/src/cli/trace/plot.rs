@@ -24,7 +24,7 @@ const OVERLAID: usize = 400;
 
 pub(super) fn run(args: &PlotArgs) -> Result<(), Failure> {
     let kind = Ending::of(&args.out)?;
-    may_hold_results(("--out", Some(&args.out)), [])?;
+    may_hold_results(("--out", Some(&args.out)), [args.input.trace.as_path()])?;
     let (picture, shown) = match args.kind {
         PlotKind::Curve => curve(args)?,
         _ => framed(args)?,

@@ -6,15 +6,15 @@ use traces::energy::energies_j;
 use traces::io::Source;
 
 use super::args::SampleArgs;
-use super::convert::{check, save};
+use super::convert::{check, may_be_saved, save};
 use super::input::wrong;
 use crate::cli::Failure;
-use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{complain, print, print_json};
 
 pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
     check(&args.out)?;
-    may_hold_results(("--out", Some(&args.out)), [])?;
+    let inputs = args.device.as_deref().into_iter().chain([args.input.trace.as_path()]);
+    may_be_saved("--out", &args.out, inputs)?;
     let device = Device::new(spec(args)?).map_err(|error| wrong(error.to_string()))?;
     let (trace, _) = args.input.source()?;
     let sampled = device.resample_in_pieces(&*trace)?;

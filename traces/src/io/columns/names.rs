@@ -18,18 +18,21 @@ pub(super) struct Named {
     pub rail: String,
 }
 
-const UNITS: [(&str, Quantity, f64); 14] = [
+const UNITS: [(&str, Quantity, f64); 17] = [
     ("s", Quantity::Time, 1.0),
     ("ms", Quantity::Time, 1e-3),
     ("us", Quantity::Time, 1e-6),
     ("ns", Quantity::Time, 1e-9),
+    ("kv", Quantity::Voltage, 1e3),
     ("v", Quantity::Voltage, 1.0),
     ("mv", Quantity::Voltage, 1e-3),
     ("uv", Quantity::Voltage, 1e-6),
+    ("ka", Quantity::Current, 1e3),
     ("a", Quantity::Current, 1.0),
     ("ma", Quantity::Current, 1e-3),
     ("ua", Quantity::Current, 1e-6),
     ("na", Quantity::Current, 1e-9),
+    ("kw", Quantity::Power, 1e3),
     ("w", Quantity::Power, 1.0),
     ("mw", Quantity::Power, 1e-3),
     ("uw", Quantity::Power, 1e-6),
@@ -59,7 +62,7 @@ pub(super) fn understood(name: &str) -> Option<Named> {
     });
     let quantity_told = told.or(unit.map(|(_, of, _)| of))?;
     // A single letter is a unit only where nothing but a rail stands beside it or the quantity is told as well.
-    let scale = unit.map_or(1.0, |(_, _, scale)| scale);
+    let scale = if is_mega(name, unit) { 1e6 } else { unit.map_or(1.0, |(_, _, scale)| scale) };
     let mut unit = unit.map(|(token, _, _)| token);
     let mut rail: Vec<&str> = Vec::new();
     for token in tokens.iter().rev() {
@@ -71,6 +74,18 @@ pub(super) fn understood(name: &str) -> Option<Named> {
     }
     rail.reverse();
     Some(Named { quantity: quantity_told, scale, rail: rail.join("_") })
+}
+
+/// `power_MW` are megawatts; where all is in capitals, `M` says nothing.
+fn is_mega(name: &str, unit: Option<(&str, Quantity, f64)>) -> bool {
+    let mega = |token: &str| {
+        token.starts_with('M') && unit.is_some_and(|(unit, _, _)| token.eq_ignore_ascii_case(unit))
+    };
+    name.contains(char::is_lowercase)
+        && unit.is_some_and(|(unit, of, _)| of != Quantity::Time && unit.len() == 2)
+        && name
+            .split(|c: char| !c.is_alphanumeric())
+            .any(|token| mega(token) && token == token.to_uppercase())
 }
 
 #[cfg(test)]
@@ -93,5 +108,9 @@ mod tests {
         assert_eq!(read("gpu_power_W"), is(Quantity::Power, 1.0, "gpu"));
         assert_eq!(read("current_A_cpu"), is(Quantity::Current, 1.0, "cpu"));
         assert_eq!(read("note"), None);
+        assert_eq!(read("power_kW"), is(Quantity::Power, 1e3, ""));
+        assert_eq!(read("power_MW"), is(Quantity::Power, 1e6, ""));
+        assert_eq!(read("power_mW"), is(Quantity::Power, 1e-3, ""));
+        assert_eq!(read("POWER_MW"), is(Quantity::Power, 1e-3, ""));
     }
 }

@@ -106,7 +106,7 @@ pub struct FindArgs {
     /// What is compared, in milliseconds before and after the mark
     #[arg(long, value_name = "PRE,POST", value_parser = window, default_value = "1,4", allow_hyphen_values = true)]
     pub window: (f64, f64),
-    /// How: `squares`, `tracking`, or `auto`
+    /// How: `squares`, `normalized`, `tracking`, or `auto`
     #[arg(long, value_name = "METHOD", default_value_t)]
     pub method: Method,
     /// Read in pieces even if the trace would fit into memory (sum of squares)

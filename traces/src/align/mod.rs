@@ -1,5 +1,7 @@
 //! Recorded time stamps put onto the time of a curve: by two anchors, or by the best fit to the starts found in it.
 
+mod gaps;
+
 use serde::Serialize;
 use thiserror::Error;
 
@@ -7,6 +9,9 @@ use thiserror::Error;
 const LEAST_PAIRS: usize = 4;
 /// A second fit no worse than this many times the best leaves it open which is right.
 const RIVAL: f64 = 2.0;
+
+/// A fit that leaves more than this share of the median gap of the starts is none.
+const LEFT: f64 = 0.1;
 
 /// What is left by less than this is rounding, s.
 const EXACT_S: f64 = 1e-9;
@@ -29,6 +34,17 @@ pub enum AlignError {
         stamps: usize,
         /// Starts found.
         starts: usize,
+    },
+    /// No place where stamps and starts fit.
+    #[error(
+        "stamps fit the starts nowhere: the best pairing leaves {left_s:.3e} s of {gap_s:.3e} s between starts; look at the frames \
+         found, or give two anchors instead"
+    )]
+    Unlike {
+        /// Root mean square of what is left, s.
+        left_s: f64,
+        /// Median gap of the starts, s.
+        gap_s: f64,
     },
     /// Stamps that do not tell times apart.
     #[error("too many of the {stamps} stamps are the same for a fit; give two anchors instead")]
@@ -71,11 +87,30 @@ impl Alignment {
         Ok(Self { scale, offset_s: a.1 - scale * a.0, residual_s: 0.0, pairs: 2, ambiguous: false })
     }
 
-    /// The pairing of stamps with starts, one after another from some shift on, that leaves least. Both sorted, s.
+    /// The pairing of stamps with starts that leaves least: one after another from some shift on or, if that does not fit, with gaps
+    /// in either. Both sorted, s.
     ///
     /// # Errors
-    /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same.
+    /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same,
+    /// [`AlignError::Unlike`] where nothing fits.
     pub fn by_fit(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
+        let in_step = Self::in_step(stamps_s, starts_s)?;
+        let gap_s = gaps::usual_gap(starts_s).unwrap_or(0.0);
+        if in_step.residual_s <= EXACT_S.max(LEFT * LEFT * gap_s) {
+            return Ok(in_step);
+        }
+        let least = (stamps_s.len().min(starts_s.len()) / 2).max(LEAST_PAIRS);
+        let with_gaps =
+            gaps::paired(stamps_s, starts_s, least).filter(|fit| fit.residual_s < in_step.residual_s);
+        let best = with_gaps.unwrap_or(in_step);
+        if best.residual_s > LEFT * gap_s {
+            return Err(AlignError::Unlike { left_s: best.residual_s, gap_s });
+        }
+        Ok(best)
+    }
+
+    /// The shift by which one after another leaves least.
+    fn in_step(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
         let fewer = stamps_s.len().min(starts_s.len());
         if fewer < LEAST_PAIRS {
             return Err(AlignError::Few { stamps: stamps_s.len(), starts: starts_s.len() });
@@ -134,6 +169,31 @@ mod tests {
         let fit = Alignment::by_fit(&stamps, &starts).unwrap();
         assert!((fit.scale - 1.0001).abs() < 1e-9 && fit.residual_s < 1e-12 && fit.pairs == 23, "{fit:?}");
         assert!(!fit.ambiguous);
+    }
+
+    #[test]
+    fn stamps_that_are_missing_and_ones_too_many_are_left_out() {
+        let starts = uneven();
+        let stamp = |time: f64| (time - 1.5) / 1.0001;
+        let all: Vec<f64> = starts.iter().map(|&time| stamp(time)).collect();
+        let without = |every: usize| -> Vec<f64> {
+            all.iter().enumerate().filter(|(i, _)| i % every != every - 1).map(|(_, stamp)| *stamp).collect()
+        };
+        let mut extra = all.clone();
+        extra.insert(20, 0.5 * (all[19] + all[20]));
+        for stamps in [without(17), without(5), extra] {
+            let fit = Alignment::by_fit(&stamps, &starts).unwrap();
+            assert!((fit.scale - 1.0001).abs() < 1e-9 && !fit.ambiguous, "{fit:?}");
+            assert_eq!(fit.pairs, stamps.len().min(40));
+        }
+    }
+
+    #[test]
+    fn stamps_of_something_else_are_refused() {
+        let others: Vec<f64> =
+            (0..40).map(|i| 0.01 * f64::from(i) + 0.009 * f64::from(i * 37 % 11) / 11.0).collect();
+        let fit = Alignment::by_fit(&others, &uneven());
+        assert!(matches!(fit, Err(AlignError::Unlike { .. })), "{fit:?}");
     }
 
     #[test]
