@@ -136,8 +136,8 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
     let names = file.metadata().file_metadata().schema().get_fields();
     let names = names.iter().map(|field| field.name().to_owned()).collect();
     let mut rows = Vec::new();
-    for row in file.get_row_iter(None).map_err(|error| error.to_string())? {
-        let row = row.map_err(|error| error.to_string())?;
+    for row in file.get_row_iter(None).map_err(told)? {
+        let row = row.map_err(told)?;
         let text = |field: &Field| match field {
             Field::Str(text) => text.clone(),
             Field::Null => String::new(),
@@ -146,6 +146,15 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
         rows.push(row.get_column_iter().map(|(_, field)| text(field)).collect());
     }
     Ok((names, rows))
+}
+
+/// What is wrong, and what to do where that is how columns are packed.
+fn told(error: parquet::errors::ParquetError) -> String {
+    let message = error.to_string();
+    if message.contains("Disabled feature") {
+        return "its columns are packed in a way that is not read in tables; write it with snappy, or not packed".to_owned();
+    }
+    message
 }
 
 #[cfg(test)]
