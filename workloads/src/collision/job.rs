@@ -11,7 +11,7 @@ use super::easel::{Easel, Sheet};
 use super::families::swarm_of;
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Passes, Request, must_hold};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold};
 use crate::scene::Settings;
 use crate::visibility::load_cases;
 
@@ -77,12 +77,11 @@ struct Collision {
 /// # Errors
 /// [`LoadError`] when an option makes no sense, or the file cannot be read.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+/// Images are squares, looked at through the middles of pixels over the whole of the time.
+pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "resolution")] };
+
     let options: Options = options.read()?;
     options.check()?;
-    if request.overrides.size.is_some() {
-        let message = "the images of `ccd` are as large as its option `resolution` says".to_owned();
-        return Err(LoadError::Setting { setting: "size", message });
-    }
     let Options { resolution, bins, method, .. } = options;
     let settings = Settings { width: 3 * resolution, height: resolution, samples: 1, ..Settings::default() };
     let search = Search { resolution, bins, method, zoom: false };
@@ -177,8 +176,6 @@ mod tests {
     fn options_that_make_no_sense_are_refused() {
         assert!(made(&[("resolution", "0")]).is_err() && made(&[("bins", "257")]).is_err());
         assert!(made(&[("balls", "1")]).is_err() && made(&[("file", "nowhere.mts")]).is_err());
-        let size = Overrides { size: Some((4, 4)), ..Overrides::default() };
-        assert!(job(&OptionSource::default(), &Request { overrides: &size, seed: 1 }).is_err());
     }
 
     #[test]

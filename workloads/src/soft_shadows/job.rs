@@ -14,7 +14,7 @@ use super::shade::{Shadows, World};
 use super::stage::stage;
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Overrides, Scene, Settings};
 
 /// Options of the job.
@@ -183,3 +183,9 @@ pub(crate) fn parts<'a>(
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(SoftShadows::new(options.read()?, request.overrides, request.seed)?))
 }
+/// The lens of the map is the light; the camera is a pinhole, whatever the scene says.
+pub(crate) const FLAGS: Flags = Flags {
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Clip],
+    instead: &[(Flag::Table, "points")],
+};
+
