@@ -13,7 +13,7 @@ use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
 use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold};
 use crate::scene::Settings;
-use crate::visibility::load_cases;
+use crate::visibility::load_objects;
 
 /// What is drawn, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,9 +58,14 @@ impl Options {
             place: "objects".to_owned(),
             message: message.to_owned(),
         };
-        let case = load_cases(std::slice::from_ref(file))?.pop().ok_or_else(|| broken("there are none"))?;
-        let object = |mesh| Object::new(mesh, case.uncertainty);
-        let objects: Option<Vec<Object>> = case.objects.iter().map(object).collect();
+        let meshes = load_objects(file)?;
+        if meshes.is_empty() {
+            let message =
+                format!("{} holds no objects, so nothing can collide; give another file", file.display());
+            return Err(LoadError::Setting { setting: "file", message });
+        }
+        // What an .mts file says is exact.
+        let objects: Option<Vec<Object>> = meshes.iter().map(|mesh| Object::new(mesh, 0.0)).collect();
         objects.ok_or_else(|| broken("a coordinate is beyond 1e60 or not a number; scale it"))
     }
 }
@@ -72,14 +77,14 @@ struct Collision {
     settings: Settings,
 }
 
+/// Images are squares, looked at through the middles of pixels over the whole of the time.
+pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "resolution")] };
+
 /// Makes the job `ccd`.
 ///
 /// # Errors
 /// [`LoadError`] when an option makes no sense, or the file cannot be read.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
-/// Images are squares, looked at through the middles of pixels over the whole of the time.
-pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "resolution")] };
-
     let options: Options = options.read()?;
     options.check()?;
     let Options { resolution, bins, method, .. } = options;
