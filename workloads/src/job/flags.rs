@@ -30,7 +30,7 @@ impl Flags {
         let Some(flag) = given(overrides).find(|flag| !self.uses.contains(flag)) else { return Ok(()) };
         let option = self.instead.iter().find(|(other, _)| *other == flag);
         let mend = option
-            .map_or("leave it out".to_owned(), |(_, option)| format!("set its option, --set {option}=..."));
+            .map_or("leave it out".to_owned(), |(_, option)| format!("give --set {option}=... instead"));
         let message = format!("the workload `{job}` has no use for it: {mend}");
         Err(LoadError::Setting { setting: flag.name(), message })
     }
