@@ -4,7 +4,7 @@
 use std::fs;
 
 use serde_json::json;
-use tests::{Glb, Inputs, Refusals, quintile, real_scenes};
+use tests::{Glb, Inputs, Refusals, mts, quintile, real_scenes};
 
 fn refusals() -> Refusals {
     Refusals::of(|| quintile!())
@@ -44,6 +44,35 @@ fn flags() {
     ];
     for (flags, says) in cases {
         refusals.call(&[&["tiny"], flags].concat(), 2, says);
+    }
+}
+
+#[test]
+fn flags_that_a_workload_has_no_use_for() {
+    let mut refusals = refusals();
+    let cases: [(&[&str], &[&str]); 7] = [
+        (&["occlusion", "--lens", "0.3"], &["--lens", "`occlusion`", "--set lens="]),
+        (&["occlusion", "--timing", "sampled"], &["--timing sampled", "`occlusion`", "leave it out"]),
+        (&["ccd", "--samples", "8"], &["--samples", "`ccd`", "leave it out"]),
+        (&["ccd", "--size", "64x64"], &["--size", "--set resolution="]),
+        (&["ccd", "--heat", "samples_tested"], &["--heat", "leave it out"]),
+        (&["caustics", "--focus", "3"], &["--focus", "`caustics`"]),
+        (&["multiview", "--lens", "0.5"], &["--lens", "--set aperture="]),
+    ];
+    for (args, says) in cases {
+        refusals.call(args, 2, says);
+    }
+}
+
+#[test]
+fn files_that_hold_nothing_that_could_collide() {
+    let mut refusals = refusals();
+    let inputs = Inputs::new();
+    let empty = inputs.put("empty.mts", mts(&[]));
+    refusals.call(&["ccd", "--set", &format!("file={empty}")], 2, &[&empty, "holds no objects"]);
+    for name in ["a.ply", "a.obj", "a.txt"] {
+        let file = inputs.put(name, "nothing");
+        refusals.call(&["ccd", "--set", &format!("file={file}")], 2, &[&file, "is no .mts file"]);
     }
 }
 
@@ -150,6 +179,10 @@ fn vertices_that_are_no_numbers() {
     }
     refusals.file("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", 1, &["NaN"]);
     refusals.file("nan.ply", ply("3", "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"), 1, &["element vertex"]);
+    for bad in ["nan", "-inf"] {
+        let body = format!("0 0 0\n1 {bad} 0\n0 1 0\n3 0 1 2\n");
+        refusals.file("nan.ply", ply("3", &body), 1, &["line 11: the coordinate `y`", bad, "not finite"]);
+    }
 }
 
 #[test]

@@ -283,9 +283,15 @@ fn truncated_and_absurd_ply_files_are_failures() {
     let index = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 7\n";
     let text = failure(load(&files.put("a.ply", index)).unwrap_err());
     expect(&text, &["a.ply: geometry: triangle 0 uses vertex 7, but there are only 1"]);
-    let text = failure(load(&files.put("a.ply", index.replace("0 0 0\n3", "0 nan 0\n3"))).unwrap_err());
-    expect(&text, &["a.ply: element vertex: Line 10"]);
-    assert!(!text.contains('\n'));
+    for (word, says) in [
+        ("x", "a.ply: element vertex: Line 10"),
+        ("nan", "a.ply: line 10: the coordinate `y` is `nan`, which is not finite"),
+    ] {
+        let bad = index.replace("0 0 0\n3", &format!("0 {word} 0\n3"));
+        let text = failure(load(&files.put("a.ply", bad)).unwrap_err());
+        expect(&text, &[says]);
+        assert!(!text.contains('\n'));
+    }
     let mut nan = header("1").into_bytes();
     nan.extend([0.0, f32::NAN, 0.0].map(f32::to_le_bytes).concat());
     nan.extend([[3, 0, 0, 0], [0; 4], [0; 4], [0; 4]].concat());

@@ -86,6 +86,19 @@ fn materials_named_in_an_obj_file_are_a_warning() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pipe_is_told_from_a_file_that_was_cut() {
+    use std::io::Write;
+    use std::os::fd::AsRawFd;
+    let (reader, mut writer) = std::io::pipe().unwrap();
+    writer.write_all(&common::meshes::mts(&[[0.0; 3]; 3], &[[1.0; 3]; 3], &[[0, 1, 2]])).unwrap();
+    drop(writer);
+    let error = workloads::visibility::load_cases(&[format!("/dev/fd/{}", reader.as_raw_fd())]).unwrap_err();
+    assert!(error.is_usage());
+    expect(&error.to_string(), &["/dev/fd/", "is a pipe", "write it to a file"]);
+}
+
 /// Why a workload is not made with these options.
 fn refusal(job: &str, options: &OptionSource) -> Option<LoadError> {
     find(job, options, &Request { overrides: &Overrides::default(), seed: 1 }).unwrap().err()

@@ -17,6 +17,31 @@ use workloads::visibility::Unshaded;
 mod common;
 use common::{bits, spec};
 
+/// Samples at one place are one step of a penumbra, however many they are.
+#[test]
+fn places_that_differ_are_counted_for_the_bands() {
+    let many: Vec<_> = (0..16_u8).map(|n| (f32::from(n) / 16.0, 0.0, 0.0)).collect();
+    let warned = |points: Option<Vec<(f32, f32, f32)>>, samples: u32| {
+        let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
+        let options = Options { points, map_px: 16, ..Options::default() };
+        let job = SoftShadows::new(options, &overrides, 1).unwrap();
+        let first = job.settings().frames.start;
+        let warnings = job.frame(first, &spec(), &mut |_, _| ()).unwrap().warnings;
+        warnings.into_iter().find(|warning| warning.code == "shadow-banding").map(|warning| warning.message)
+    };
+    let one = warned(Some(vec![(0.0, 0.0, 0.0)]), 64).unwrap();
+    assert!(
+        one.starts_with("1 places on the light") && one.contains("16 or more `points` that differ"),
+        "{one}"
+    );
+    assert!(warned(Some(many.clone()), 8).unwrap().starts_with("8 places"));
+    assert!(
+        warned(Some([[(0.0, 0.0, 0.0), (-0.0, 0.0, 0.0)]; 8].concat()), 16).unwrap().starts_with("1 places")
+    );
+    assert_eq!((warned(Some(many), 64), warned(None, 16)), (None, None));
+    assert!(warned(None, 8).is_some());
+}
+
 fn set(count: u32, seed: u64) -> SharedSamples {
     SharedSamples::interleaved(&SampleSpec::default(), count, seed).unwrap()
 }

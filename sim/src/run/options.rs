@@ -135,6 +135,9 @@ impl Plan {
         if !options.heat.is_empty() {
             work.scene("--heat")?;
         }
+        if options.sampling != Sampling::Every {
+            work.scene("--timing sampled")?;
+        }
         let settings = work.settings();
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| RunError::Setting(format!("size: {}x{}", settings.width, settings.height)))?;

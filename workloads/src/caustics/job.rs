@@ -11,7 +11,7 @@ use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, Touch,
+    Drawn, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, Touch,
 };
 use crate::scene::Settings;
 
@@ -91,6 +91,9 @@ struct Caustics {
     ocean: Ocean,
     settings: Settings,
 }
+
+/// An image of light without samples, lens or shutter: a frame is an instant.
+pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 
 /// Makes the job `caustics`.
 ///

@@ -35,6 +35,7 @@ pub use check::{Found, receivers};
 pub use doubt::{CROSSED, SQUARES, crossing, doubts};
 pub use draw::{Picture, draw};
 pub use eye::Eye;
+pub(crate) use job::FLAGS;
 pub use job::{Look, Options, job};
 pub use light::{Floor, Light};
 pub use photons::{Squares, error};

@@ -11,9 +11,9 @@ use super::easel::{Easel, Sheet};
 use super::families::swarm_of;
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Passes, Request, must_hold};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold};
 use crate::scene::Settings;
-use crate::visibility::load_cases;
+use crate::visibility::load_objects;
 
 /// What is drawn, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,9 +58,14 @@ impl Options {
             place: "objects".to_owned(),
             message: message.to_owned(),
         };
-        let case = load_cases(std::slice::from_ref(file))?.pop().ok_or_else(|| broken("there are none"))?;
-        let object = |mesh| Object::new(mesh, case.uncertainty);
-        let objects: Option<Vec<Object>> = case.objects.iter().map(object).collect();
+        let meshes = load_objects(file)?;
+        if meshes.is_empty() {
+            let message =
+                format!("{} holds no objects, so nothing can collide; give another file", file.display());
+            return Err(LoadError::Setting { setting: "file", message });
+        }
+        // What an .mts file says is exact.
+        let objects: Option<Vec<Object>> = meshes.iter().map(|mesh| Object::new(mesh, 0.0)).collect();
         objects.ok_or_else(|| broken("a coordinate is beyond 1e60 or not a number; scale it"))
     }
 }
@@ -72,6 +77,9 @@ struct Collision {
     settings: Settings,
 }
 
+/// Images are squares, looked at through the middles of pixels over the whole of the time.
+pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "resolution")] };
+
 /// Makes the job `ccd`.
 ///
 /// # Errors
@@ -79,10 +87,6 @@ struct Collision {
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: Options = options.read()?;
     options.check()?;
-    if request.overrides.size.is_some() {
-        let message = "the images of `ccd` are as large as its option `resolution` says".to_owned();
-        return Err(LoadError::Setting { setting: "size", message });
-    }
     let Options { resolution, bins, method, .. } = options;
     let settings = Settings { width: 3 * resolution, height: resolution, samples: 1, ..Settings::default() };
     let search = Search { resolution, bins, method, zoom: false };
@@ -177,8 +181,6 @@ mod tests {
     fn options_that_make_no_sense_are_refused() {
         assert!(made(&[("resolution", "0")]).is_err() && made(&[("bins", "257")]).is_err());
         assert!(made(&[("balls", "1")]).is_err() && made(&[("file", "nowhere.mts")]).is_err());
-        let size = Overrides { size: Some((4, 4)), ..Overrides::default() };
-        assert!(job(&OptionSource::default(), &Request { overrides: &size, seed: 1 }).is_err());
     }
 
     #[test]

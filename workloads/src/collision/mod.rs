@@ -39,6 +39,7 @@ mod window;
 pub use bounds::Bounds;
 pub use candidates::candidates;
 pub use detect::{Answer, detect, detect_each};
+pub(crate) use job::FLAGS;
 pub use job::{Options, job};
 pub use object::{Object, components};
 pub use search::{Method, Search, Verdict};

@@ -11,7 +11,7 @@ use super::receiver::{Effect, Receiver};
 use super::stage::{receiver, stage};
 use super::surface::ReceiverShader;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Options of the job.
@@ -203,6 +203,12 @@ impl Job for Glossy {
         Ok(Drawn { image: image.image, counts, triangles, moving, lens: true, facts, warnings })
     }
 }
+
+/// Samples are those of the usual table.
+pub(crate) const FLAGS: Flags = Flags {
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Lens, Flag::Focus, Flag::Clip],
+    instead: &[],
+};
 
 /// The job by its options.
 ///

@@ -15,6 +15,7 @@ mod receiver;
 mod stage;
 mod surface;
 
+pub(crate) use job::FLAGS;
 pub use job::{Glossy, Options, job};
 pub use map::{Lobe, Map};
 pub use receiver::{Effect, Receiver};

@@ -1,10 +1,11 @@
 //! PLY files: vertices with optional normals and texture coordinates, and faces of any number of corners.
 
+use std::io::BufRead;
 use std::path::Path;
 
 use activity::Warning;
 use glam::{Vec2, Vec3};
-use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
 
 use super::reader;
@@ -94,7 +95,10 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     check(&header).map_err(|message| source.broken("header", message))?;
     let mut soup = Soup::default();
     for element in header.elements.values() {
-        let damaged = |error: ply_rs_bw::parser::ParseError| {
+        let damaged = |error: ParseError| {
+            if let Some(error) = not_finite(source, element, &error) {
+                return error;
+            }
             let place = format!("element {}", element.name);
             source.broken(place, format!("{}; the file may be truncated: get it again", in_one_line(&error)))
         };
@@ -116,6 +120,17 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
         }
     }
     Ok(soup)
+}
+
+/// What is wrong with the line where reading stopped, if that is a number that is not finite: the parser has no word for it.
+fn not_finite(source: Source<'_>, element: &ElementDef, error: &ParseError) -> Option<LoadError> {
+    let number = error.line()?;
+    let line = reader::open(source.path).ok()?.lines().nth(number - 1)?.ok()?;
+    let names = element.properties.values().map(|property| &property.name);
+    let mut named = names.zip(line.split_whitespace());
+    let (name, bad) = named.find(|(_, word)| word.parse().is_ok_and(|value: f64| !value.is_finite()))?;
+    let message = format!("the coordinate `{name}` is `{bad}`, which is not finite; mend the file");
+    Some(source.broken(format!("line {number}"), message))
 }
 
 /// The parser's messages spread over several lines.

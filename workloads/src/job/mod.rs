@@ -3,6 +3,7 @@
 //! A [`Job`] draws frames as a scene does, in passes of its own, and hands every packet of work to whoever asked, so that it
 //! can be timed and turned into watts. [`find`] makes one by name from its [`Options`](OptionSource).
 
+mod flags;
 mod options;
 mod passes;
 #[cfg(test)]
@@ -17,6 +18,7 @@ use pipeline::memory::CacheError;
 use crate::error::LoadError;
 use crate::scene::{FrameError, Overrides, Settings};
 
+pub(crate) use flags::{Flag, Flags};
 pub use options::OptionSource;
 pub(crate) use options::must_hold;
 pub use passes::{FrontEnd, Passes, TileWork, Touch};
@@ -101,44 +103,65 @@ pub struct Request<'a> {
 
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
-/// Every job by its name: what it is, and how it is made.
-const JOBS: &[(&str, &str, Maker)] = &[
-    (
-        "caustics",
-        "light refracted by waves: beams drawn as moving triangles, or in the bodies that others put around them",
-        crate::caustics::job,
-    ),
-    (
-        "ccd",
-        "continuous collision detection: moving objects drawn along three axes into boxes of time and depth",
-        crate::collision::job,
-    ),
-    (
-        "glossy",
-        "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
-        crate::glossy::job,
-    ),
-    (
-        "multiview",
-        "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
-        crate::multiview::job,
-    ),
-    (
-        "occlusion",
-        "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
-        crate::occlusion::job,
-    ),
-    ("sampling", "dart throwing over voids that are drawn, until no point fits", crate::points::job::job),
-    (
-        "soft-shadows",
-        "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
-        crate::soft_shadows::job,
-    ),
+/// A job that can be asked for.
+struct Known {
+    name: &'static str,
+    /// What it is.
+    what: &'static str,
+    /// What it makes of flags.
+    flags: Flags,
+    make: Maker,
+}
+
+/// Every job.
+const JOBS: &[Known] = &[
+    Known {
+        name: "caustics",
+        what: "light refracted by waves: beams drawn as moving triangles, or in the bodies that others put around them",
+        flags: crate::caustics::FLAGS,
+        make: crate::caustics::job,
+    },
+    Known {
+        name: "ccd",
+        what: "continuous collision detection: moving objects drawn along three axes into boxes of time and depth",
+        flags: crate::collision::FLAGS,
+        make: crate::collision::job,
+    },
+    Known {
+        name: "glossy",
+        what: "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
+        flags: crate::glossy::FLAGS,
+        make: crate::glossy::job,
+    },
+    Known {
+        name: "multiview",
+        what: "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
+        flags: crate::multiview::FLAGS,
+        make: crate::multiview::job,
+    },
+    Known {
+        name: "occlusion",
+        what: "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
+        flags: crate::occlusion::FLAGS,
+        make: crate::occlusion::job,
+    },
+    Known {
+        name: "sampling",
+        what: "dart throwing over voids that are drawn, until no point fits",
+        flags: crate::points::job::FLAGS,
+        make: crate::points::job::job,
+    },
+    Known {
+        name: "soft-shadows",
+        what: "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
+        flags: crate::soft_shadows::FLAGS,
+        make: crate::soft_shadows::job,
+    },
 ];
 
 /// Names of the jobs, each with a line that says what it is.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
-    JOBS.iter().map(|(name, what, _)| (*name, *what))
+    JOBS.iter().map(|job| (job.name, job.what))
 }
 
 /// What to say of a name that is neither a scene nor a job, where either could have been meant; other errors stay as they are.
@@ -155,11 +178,12 @@ pub fn or_job(error: LoadError) -> LoadError {
 /// The job called `name`, if there is one.
 ///
 /// # Errors
-/// [`LoadError`] when its options or settings make no sense.
+/// [`LoadError`] when its options or settings make no sense, or it has no use for one of them.
 pub fn find(
     name: &str,
     options: &OptionSource,
     request: &Request<'_>,
 ) -> Option<Result<Box<dyn Job>, LoadError>> {
-    JOBS.iter().find(|(known, ..)| *known == name).map(|(.., make)| make(options, request))
+    let job = JOBS.iter().find(|job| job.name == name)?;
+    Some(job.flags.check(name, request.overrides).and_then(|()| (job.make)(options, request)))
 }

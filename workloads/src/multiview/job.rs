@@ -8,7 +8,7 @@ use super::layout::Layout;
 use super::lenticular::Panel;
 use super::rig::{Rig, Target, Views};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::{Overrides, Scene, Settings};
 
 /// How views become the one image that is shown.
@@ -91,14 +91,18 @@ impl MultiView {
     /// # Errors
     /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
     pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
-        let size = overrides.size.or(Some((320, 180)));
-        let scene = crate::load(&options.scene)?.with_overrides(&Overrides { size, ..overrides.clone() })?;
+        // Views agree at a depth whether or not the scene has a lens to focus.
+        let options = Options { focus: options.focus.or(overrides.focus), ..options };
+        let (size, focus) = (overrides.size.or(Some((320, 180))), None);
+        let scene =
+            crate::load(&options.scene)?.with_overrides(&Overrides { size, focus, ..overrides.clone() })?;
         options.panel.check()?;
         options.layout().check()?;
         let settings = scene.settings().clone();
         let across = if options.show == Show::SideBySide { options.views.max(1) } else { 1 };
         let settings = Settings { width: settings.width.saturating_mul(across), ..settings };
         settings.check()?;
+        let settings = Settings { focus: options.focus.or(settings.focus), ..settings };
         let view = Viewport::new(settings.width / across, settings.height);
         let refused = |message: &str| LoadError::Setting { setting: "size", message: message.to_owned() };
         let view = view.ok_or_else(|| refused("views of no size"))?;
@@ -224,6 +228,12 @@ fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
         Warning::new("shading-cache-small", message)
     })
 }
+
+/// The lens that counts is the one that holds all views.
+pub(crate) const FLAGS: Flags = Flags {
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Focus, Flag::Clip],
+    instead: &[(Flag::Lens, "aperture")],
+};
 
 /// The job by its options.
 ///

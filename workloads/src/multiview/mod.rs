@@ -16,6 +16,7 @@ mod rig;
 mod rivals;
 mod samples;
 
+pub(crate) use job::FLAGS;
 pub use job::{MOST_DEG, MOST_RUNS, MultiView, Options, Show, job};
 pub use layout::Layout;
 pub use lenticular::Panel;

@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Emit, Fact, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, must_hold, shifted,
+    Drawn, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
+    must_hold, shifted,
 };
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
@@ -78,6 +79,12 @@ struct Occlusion {
     samples: Arc<dyn SampleSource>,
     yard: Yard,
 }
+
+/// The yard has a lens and a motion of its own.
+pub(crate) const FLAGS: Flags = Flags {
+    uses: &[Flag::Size, Flag::Samples, Flag::Table],
+    instead: &[(Flag::Lens, "lens"), (Flag::Shutter, "motion")],
+};
 
 /// Makes the job `occlusion`.
 ///

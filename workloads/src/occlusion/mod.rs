@@ -17,6 +17,7 @@ mod query;
 mod sampled;
 mod yard;
 
+pub(crate) use job::FLAGS;
 pub use job::{HALF_COVERED, Options, job};
 pub use pyramid::Pyramid;
 pub use query::{Answer, MovingBox, Queries};

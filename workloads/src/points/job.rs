@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::poisson::{Cube, Domain, PoissonSpec, Spacing, poisson_disk_drawn};
 use super::volume::{camera, place};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::Settings;
 
 /// What can be set.
@@ -41,6 +41,9 @@ struct Sampling {
     settings: Settings,
     seed: u64,
 }
+
+/// Samples are new in every round, of no table; there is nothing that moves or is out of focus.
+pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size, Flag::Samples], instead: &[] };
 
 /// The job called `sampling`.
 ///

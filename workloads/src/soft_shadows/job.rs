@@ -1,8 +1,10 @@
 //! Soft shadows as a job: the map, the samples that are seen, and their shading.
 
+use std::collections::HashSet;
+
 use activity::{Counts, Event, Warning};
 use glam::{DVec3, Vec3};
-use pipeline::sampling::{Pattern, SampleSource, SampleSpec};
+use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec};
 use pipeline::{Cull, Draw, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +16,7 @@ use super::shade::{Shadows, World};
 use super::stage::stage;
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Overrides, Scene, Settings};
 
 /// Options of the job.
@@ -29,7 +31,8 @@ pub struct Options {
     pub map_px: u32,
     /// Depth by which a point may lie behind what the map holds and still be lit, scene units.
     pub bias: f64,
-    /// Places `(u, v, t)` of one's own instead of the first points of a scrambled Sobol sequence, at least as many as samples.
+    /// Places `(u, v, t)` of one's own instead of the first points of a scrambled Sobol sequence: the first of them, as many as samples; where
+    /// they are fewer, they come again.
     pub points: Option<Vec<(f32, f32, f32)>>,
     /// Accumulation buffering instead of one pass: the same image at another cost.
     pub accumulate: bool,
@@ -108,14 +111,7 @@ impl SoftShadows {
     /// Where the set or the bias is known to be bad.
     fn warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        let count = self.set.samples().len();
-        if count < Self::FEWEST {
-            let message = format!(
-                "{count} places on the light: penumbras show as {count} steps (bands); --samples {} or more",
-                Self::FEWEST
-            );
-            warnings.push(Warning::new("shadow-banding", message));
-        }
+        warnings.extend(self.banding());
         let texel = self.light.texel_width(DVec3::from_array(self.options.light.target), self.options.map_px);
         let bias = self.options.bias;
         if bias < Self::BIAS_TEXELS[0] * texel || bias > Self::BIAS_TEXELS[1] * texel {
@@ -126,6 +122,23 @@ impl SoftShadows {
             warnings.push(Warning::new("shadow-bias", message));
         }
         warnings
+    }
+
+    /// Samples at one place are one step of a penumbra, however many they are.
+    fn banding(&self) -> Option<Warning> {
+        // Zero has two signs and is one place.
+        let place = |Sample { u, v, t, .. }: &Sample| [u, v, t].map(|of| (of + 0.0).to_bits());
+        let (count, fewest) =
+            (self.set.samples().iter().map(place).collect::<HashSet<_>>().len(), Self::FEWEST);
+        let mend = match &self.options.points {
+            Some(_) => format!("{fewest} or more `points` that differ, and as many --samples"),
+            None => format!("--samples {fewest} or more"),
+        };
+        (count < fewest).then(|| {
+            let message =
+                format!("{count} places on the light: penumbras show as {count} steps (bands); {mend}");
+            Warning::new("shadow-banding", message)
+        })
     }
 
     /// With fewer places than this a penumbra shows as bands.
@@ -175,6 +188,12 @@ pub(crate) fn parts<'a>(
     let drawn = frame.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
 }
+
+/// The lens of the map is the light; the camera is a pinhole, whatever the scene says.
+pub(crate) const FLAGS: Flags = Flags {
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Clip],
+    instead: &[(Flag::Table, "points")],
+};
 
 /// The job by its options.
 ///

@@ -18,6 +18,7 @@ mod sees;
 mod shade;
 mod stage;
 
+pub(crate) use job::FLAGS;
 pub use job::{Options, SoftShadows, job};
 pub use light::{AreaLight, LightSpec};
 pub use look_up::look_up_packets;

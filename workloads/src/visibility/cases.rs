@@ -107,6 +107,24 @@ pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, Load
     CaseFiles::of(files)?.iter().map(CaseFiles::load).collect()
 }
 
+/// Loads the objects of one `.mts` file.
+///
+/// # Errors
+/// [`LoadError::is_usage`] for any other kind of file; else what is broken, and where.
+pub(crate) fn load_objects(file: &Path) -> Result<Vec<MovingMesh>, LoadError> {
+    match kind(file) {
+        Ok(Kind::Mts) => mts::load_mts(file),
+        Ok(_) | Err(LoadError::Kind { .. }) => {
+            let message = format!(
+                "{} is no .mts file, and one of those is taken here; `quintile ccd` takes .ply and .obj files, too, two by two",
+                file.display()
+            );
+            Err(LoadError::Setting { setting: "file", message })
+        }
+        Err(error) => Err(error),
+    }
+}
+
 fn kind(path: &Path) -> Result<Kind, LoadError> {
     match Kind::of(path) {
         Err(LoadError::Kind { file, .. }) => Err(LoadError::Kind { file, known: KNOWN }),

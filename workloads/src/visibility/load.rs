@@ -24,6 +24,10 @@ impl Kind {
     /// What the file at `path` begins as or, where that says nothing, what its name ends in.
     pub fn of(path: &Path) -> Result<Self, LoadError> {
         let head = reader::head::<8>(path)?;
+        // An empty one is of no known kind.
+        if !head.is_empty() && path.metadata().is_ok_and(|data| !data.is_file()) {
+            return Err(no_file(path));
+        }
         let begins = |magic: &[u8]| head.starts_with(magic);
         if begins(m5d::MAGIC) {
             return Ok(Self::M5d);
@@ -86,6 +90,13 @@ pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
         Kind::Surface(format) => pair::still((path, format)),
         _ => Err(LoadError::Kind { file: path.display().to_string(), known: ".ply and .obj (also gzipped)" }),
     }
+}
+
+/// What was read to tell the kind would be missing from the contents.
+fn no_file(path: &Path) -> LoadError {
+    let message =
+        format!("{} is a pipe or a device, and it is read twice: write it to a file first", path.display());
+    LoadError::Setting { setting: "files", message }
 }
 
 fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {

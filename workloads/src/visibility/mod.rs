@@ -18,6 +18,7 @@ mod table;
 mod unshaded;
 
 pub use camera::CameraSpec;
+pub(crate) use cases::load_objects;
 pub use cases::{CaseFiles, CollisionCase, load_cases};
 pub use hits::write_hits;
 pub use load::{load, load_surface};

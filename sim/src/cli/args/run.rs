@@ -17,7 +17,7 @@ use crate::timing::Method;
     quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
     quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
     A workload's options with their defaults are in its chapter of the book; `--set` names them when one is misspelled. It takes no\n\
-    --accuracy, --budget, --verify, --timing sampled or --heat, which need a scene.\n\n\
+    --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuses flags of scenes that would change nothing.\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
     timeline.perfetto-trace (open it at ui.perfetto.dev). summary.json is written last: where it is, all is there."
 )]

@@ -20,10 +20,22 @@ pub struct VolumeArgs {
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
     /// From the axis of the torus to the middle of its tube
-    #[arg(long, value_name = "R", default_value_t = 0.3, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "R",
+        default_value_t = 0.3,
+        allow_negative_numbers = true,
+        conflicts_with = "mesh"
+    )]
     pub ring: f64,
     /// Radius of the tube of the torus
-    #[arg(long, value_name = "R", default_value_t = 0.15, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "R",
+        default_value_t = 0.15,
+        allow_negative_numbers = true,
+        conflicts_with = "mesh"
+    )]
     pub tube: f64,
     /// How many points; 10000 where neither this nor a density is given
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "density", value_parser = clap::value_parser!(u32).range(1..))]
@@ -127,6 +139,16 @@ mod tests {
     use clap::Parser;
 
     use crate::cli::args::{Cli, Command};
+
+    #[test]
+    fn a_mesh_has_no_ring_and_no_tube() {
+        for flag in ["--ring", "--tube"] {
+            let typed = ["quintile", "sample", "volume", "--mesh", "a.ply", flag, "0.2"];
+            let told = Cli::try_parse_from(typed).map(|_| ()).unwrap_err();
+            assert!(told.exit_code() == 2 && told.to_string().contains(flag), "{told}");
+        }
+        assert!(Cli::try_parse_from(["quintile", "sample", "volume", "--mesh", "a.ply"]).is_ok());
+    }
 
     fn refusal(typed: &[&str]) -> String {
         let typed = ["quintile", "sample", "volume"].iter().chain(typed);

@@ -23,9 +23,15 @@ pub enum SolidError {
         "the surface is not closed: {0} edges of triangles have no partner that runs the other way; close its holes, and let all triangles be turned outward"
     )]
     Open(usize),
+    /// There is no surface.
+    #[error("the surface has no triangles; export it with its faces")]
+    NoTriangles,
+    /// There are numbers that cannot be computed with.
+    #[error("the surface has a coordinate that is not finite or beyond 1e60; mend or scale it")]
+    TooFar,
     /// There is nothing inside.
-    #[error("the surface has no triangles, or coordinates that are not finite, or encloses nothing")]
-    Empty,
+    #[error("the surface encloses no volume: it is flat, or its parts cancel out; give one that does")]
+    Flat,
 }
 
 impl Solid {
@@ -34,6 +40,9 @@ impl Solid {
     /// # Errors
     /// [`SolidError`].
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]], tiles: u32) -> Result<Self, SolidError> {
+        if triangles.is_empty() {
+            return Err(SolidError::NoTriangles);
+        }
         let open = open_edges(positions, triangles);
         if open > 0 {
             return Err(SolidError::Open(open));
@@ -45,11 +54,11 @@ impl Solid {
             .map(|corners| corners.map(|corner| corner.to_array()))
             .map(|corners| MovingTriangle::new(corners, corners))
             .collect();
-        let moving = whole.filter(|all| !all.is_empty()).ok_or(SolidError::Empty)?;
+        let moving = whole.ok_or(SolidError::TooFar)?;
         let times = vec![[0.0, 1.0]; moving.len()];
         let hull = Hull { triangles: &moving, times: &times, by_time: false };
         let solid = Self { bounds: Bounds::new(&hull, grid(&triangles, tiles)), triangles };
-        if solid.volume().abs() > 0.0 { Ok(solid) } else { Err(SolidError::Empty) }
+        if solid.volume().abs() > 0.0 { Ok(solid) } else { Err(SolidError::Flat) }
     }
 
     /// What the surface encloses, by the divergence theorem; negative where triangles are turned inward.

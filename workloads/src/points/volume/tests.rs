@@ -93,11 +93,13 @@ fn points_of_a_tetrahedron_are_those_of_its_inequalities() {
 #[test]
 fn an_open_or_empty_surface_is_refused() {
     let (positions, mut triangles) = cube();
-    assert_eq!(Solid::new(&positions, &[], 4).unwrap_err(), SolidError::Empty);
+    assert_eq!(Solid::new(&positions, &[], 4).unwrap_err(), SolidError::NoTriangles);
     triangles[0].swap(0, 1);
     assert_eq!(Solid::new(&positions, &triangles, 4).unwrap_err(), SolidError::Open(6));
     triangles.remove(0);
     assert_eq!(Solid::new(&positions, &triangles, 4).unwrap_err(), SolidError::Open(3));
     let flat = vec![DVec3::ZERO; 8];
-    assert_eq!(Solid::new(&flat, &cube().1, 4).unwrap_err(), SolidError::Empty);
+    assert_eq!(Solid::new(&flat, &cube().1, 4).unwrap_err(), SolidError::Flat);
+    let far: Vec<DVec3> = cube().0.iter().map(|corner| *corner * 1e61).collect();
+    assert_eq!(Solid::new(&far, &cube().1, 4).unwrap_err(), SolidError::TooFar);
 }
