@@ -3,7 +3,6 @@
 use super::assess;
 use super::auto::find_auto;
 use super::flags::Flags;
-use super::flat::flat_mark;
 use super::marks::{MarkError, Marks, Placed, Placement, Window};
 use super::matched::find_matched;
 use super::method::Method;
@@ -82,14 +81,11 @@ pub struct Options {
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
-    let mut found = match options.method {
+    match options.method {
         Method::SumOfSquares | Method::Normalized => find_matched(trace, marks, options.method),
         Method::Tracking => find_tracked(trace, marks),
         Method::Auto => find_auto(trace, marks),
-    }?;
-    let power: Vec<f64> = trace.powers_w().collect();
-    found.warnings.extend(flat_mark(&power, &marks.place(trace)?));
-    Ok(found)
+    }
 }
 
 /// The marked frames alone, nothing searched for: for a recording that is known to hold no others.

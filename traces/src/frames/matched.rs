@@ -2,6 +2,7 @@
 
 use super::correlate::squares;
 use super::find::{Found, FrameStart, marked_starts, spacing};
+use super::flat::flat_mark;
 use super::marks::{MarkError, Marks, Placement};
 use super::method::Method;
 use super::minima::spaced_minima;
@@ -89,7 +90,9 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
     }
     let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
-    Ok(Found { method, ..assess::conclude(trace, marks, &placement, starts, threshold) })
+    let mut found = assess::conclude(trace, marks, &placement, starts, threshold);
+    found.warnings.extend(flat_mark(&power, &placement));
+    Ok(Found { method, ..found })
 }
 
 /// The minima that could be starts, the marks and their surroundings left out.

@@ -65,9 +65,9 @@ pub(super) fn may_be_saved<'a>(
 /// The file that tells what a text does not.
 fn description_path(out: &Path) -> Option<PathBuf> {
     let name = name(out);
-    let text = if name.ends_with(".gz") { out.with_extension("") } else { out.to_owned() };
     let plain = name.trim_end_matches(".gz");
-    (plain.ends_with(".csv") || plain.ends_with(".tsv")).then(|| csv::sidecar_path(&text))
+    let text = plain.ends_with(".csv") || plain.ends_with(".tsv");
+    text.then(|| csv::description_path(out, name.ends_with(".gz")))
 }
 
 /// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].

@@ -12,6 +12,11 @@ pub fn sidecar_path(path: &Path) -> PathBuf {
     path.with_extension("json")
 }
 
+/// Where [`save_as`] puts the description of a file: that of one packed with gzip lies where it would unpacked.
+pub fn description_path(path: &Path, gzip: bool) -> PathBuf {
+    if gzip { sidecar_path(&path.with_extension("")) } else { sidecar_path(path) }
+}
+
 /// What stands between the fields of a text's first line: a tab or a semicolon if it has any, else a comma.
 pub(crate) fn delimiter(text: &[u8]) -> u8 {
     let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();

@@ -1,6 +1,6 @@
 //! Writing.
 
-use super::sidecar_path;
+use super::description_path;
 use crate::decimal;
 use crate::io::source::{Heading, Sink, Source, Stretch};
 use crate::io::{WriteError, atomic, header};
@@ -131,6 +131,5 @@ pub fn save_as(trace: &dyn Source, path: &Path, delimiter: u8, gzip: bool) -> Re
         write_with(trace, &mut packed, delimiter)?;
         packed.finish().map(|_| ()).map_err(encode)
     })?;
-    let beside = if gzip { path.with_extension("") } else { path.to_owned() };
-    atomic::write_trace(&sidecar_path(&beside), |out| write_sidecar(trace, out))
+    atomic::write_trace(&description_path(path, gzip), |out| write_sidecar(trace, out))
 }
