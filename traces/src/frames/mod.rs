@@ -3,6 +3,7 @@
 //! tells starts from the rest, and where it cannot, the result carries a [`Warning`](crate::Warning).
 
 mod alike;
+mod alternate;
 mod assess;
 mod auto;
 mod beat;

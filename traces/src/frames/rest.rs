@@ -5,7 +5,6 @@
 //! the start may be anywhere in what was added. So starts whose rest begins or ends at another distance than it did at the mark, by
 //! more than a start may be off, are in doubt.
 
-use crate::median::median;
 use crate::squares::mean;
 use rayon::prelude::*;
 
@@ -13,13 +12,13 @@ use rayon::prelude::*;
 const REACH: f64 = 0.32;
 /// Shares of the window before and after the start in which the lowest power is looked for.
 const LOWEST: [f64; 2] = [0.2, 0.12];
-/// The rest ends where power is this share of the way from the lowest to the median.
-const ENDS: f64 = 0.35;
+/// The rest ends where power is the first share of the way from the lowest to what it is above for the second share of the stretch.
+const ENDS: [f64; 2] = [0.1, 0.1];
 /// So many frames on either side are averaged, and so many samples.
-const FRAMES: usize = 8;
+pub(super) const FRAMES: usize = 8;
 const SAMPLES: usize = 3;
 /// An end of the rest that has moved by this share of the window is a doubt; where that is less than so many samples, it is noise.
-const MOVED: f64 = 0.08;
+const MOVED: f64 = 0.06;
 const LEAST: f64 = 4.0;
 /// Where so many of the starts near are in doubt, a start is, too.
 const ENOUGH: f64 = 0.125;
@@ -33,7 +32,7 @@ pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize)
     if moved < LEAST || marks.is_empty() {
         return vec![1.0; starts.len()];
     }
-    let rest = |start: usize| rest(&profile(power, near(starts, start), width)?, width);
+    let rest = |start: usize| rest(&profile(power, near(starts, start, FRAMES), width)?, width);
     let rests: Vec<Option<[usize; 2]>> = (0..starts.len()).into_par_iter().map(rest).collect();
     let of_start = |start: usize| {
         let mark = marks.iter().copied().min_by_key(|mark| mark.abs_diff(start))?;
@@ -47,16 +46,16 @@ pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize)
 /// Doubts spread to all starts near which enough others are in doubt: what moved does not move for a frame and back.
 pub(super) fn spread(left: Vec<f64>) -> Vec<f64> {
     let of_start = |start: usize| {
-        let near = near(&left, start);
+        let near = near(&left, start, FRAMES);
         let doubted = near.iter().filter(|left| **left < 1.0).count();
         if doubted as f64 >= ENOUGH * near.len() as f64 { LEFT.min(left[start]) } else { left[start] }
     };
     (0..left.len()).map(of_start).collect()
 }
 
-/// One of some starts and those near it.
-pub(super) fn near<T>(starts: &[T], start: usize) -> &[T] {
-    &starts[start.saturating_sub(FRAMES)..starts.len().min(start + FRAMES + 1)]
+/// One of some starts and so many on either side of it.
+pub(super) fn near<T>(starts: &[T], start: usize, frames: usize) -> &[T] {
+    &starts[start.saturating_sub(frames)..starts.len().min(start + frames + 1)]
 }
 
 /// The power about a start, by shares of the window before and after it; `None` where that is not all in the trace.
@@ -82,7 +81,9 @@ fn rest(profile: &[f64], width: usize) -> Option<[usize; 2]> {
     let middle = (REACH * width as f64) as usize;
     let places = middle.saturating_sub(before)..(middle + after).min(profile.len());
     let lowest_w = profile[places.clone()].iter().copied().fold(f64::INFINITY, f64::min);
-    let ends_w = lowest_w + ENDS * (median(&mut profile.to_vec()) - lowest_w);
+    let high = ((1.0 - ENDS[1]) * profile.len() as f64) as usize;
+    let high_w = *profile.to_vec().select_nth_unstable_by(high, f64::total_cmp).1;
+    let ends_w = lowest_w + ENDS[0] * (high_w - lowest_w);
     let within =
         places.filter(|place| profile[*place] <= ends_w).min_by_key(|place| place.abs_diff(middle))?;
     let works = |watts: &f64| *watts > ends_w;

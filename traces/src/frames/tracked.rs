@@ -1,5 +1,6 @@
 //! Starts by the sequence that fits best.
 
+use super::alternate;
 use super::assess;
 use super::find::{Found, FrameStart, spacing};
 use super::flat::flat_mark;
@@ -18,6 +19,9 @@ use crate::trace::Trace;
 
 /// What is left of the confidence of a start between the ticks of the display that the others wait for.
 const BETWEEN: f64 = 0.4;
+
+/// What is left of the confidence of each start, from the power, their places, which are marked, and the width of the window.
+type Doubts = fn(&[f64], &[f64], &[bool], usize) -> Vec<f64>;
 
 /// By the sequence of starts that fits best.
 pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
@@ -76,8 +80,9 @@ fn phases(
             (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
         }
         None => {
-            let rests = spread(rest::left(power, &places(&positions), fixed, width));
-            (positions, product(starts.iter().map(|start| start.left), rests))
+            let doubts = |left: Doubts| spread(left(power, &places(&positions), fixed, width));
+            let moved = product(doubts(rest::left), doubts(alternate::left));
+            (positions, product(starts.iter().map(|start| start.left), moved))
         }
     };
     let noise_w = libm::sqrt(noise_variance(power));

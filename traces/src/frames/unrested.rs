@@ -3,7 +3,7 @@
 //! A frame begins in little power, after the end of the one before. What was found amidst work, where others near have a rest, may lie
 //! within a frame: where a frame takes two ticks of the display at a slow clock, its middle is on a tick, too.
 
-use super::rest::{LEFT, about, near};
+use super::rest::{FRAMES, LEFT, about, near};
 use crate::median::median;
 use crate::squares::mean;
 
@@ -29,7 +29,7 @@ pub(super) fn left(power: &[f64], starts: &[f64], width: usize, noise_w: f64) ->
     let clear_w = CLEAR * noise_w / libm::sqrt(brief as f64);
     let of_start = |start: usize| {
         let own_w = depths[start]?.lowest_w;
-        let near = near(&depths, start);
+        let near = near(&depths, start, FRAMES);
         let mut lowest: Vec<f64> = near.iter().flatten().map(|depth| depth.lowest_w).collect();
         let quarter = lowest.len() / 4;
         let low_w = *lowest.select_nth_unstable_by(quarter, f64::total_cmp).1;
