@@ -1,6 +1,7 @@
 //! Small tables of text and numbers, from CSV, TSV or Parquet.
 
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use crate::io::PackedFile;
+use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use std::fs::File;
 use std::io::Read;
@@ -130,8 +131,9 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 }
 
 fn from_parquet(path: &Path) -> Result<Content, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let file = SerializedFileReader::new(file).map_err(|error| error.to_string())?;
+    let told = |error: parquet::errors::ParquetError| error.to_string();
+    let file = PackedFile::open(path).map_err(told)?;
+    check_packing(&file)?;
     // Columns of columns count as one, as they do in a row.
     let names = file.metadata().file_metadata().schema().get_fields();
     let names = names.iter().map(|field| field.name().to_owned()).collect();
@@ -148,13 +150,17 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
     Ok((names, rows))
 }
 
-/// What is wrong, and what to do where that is how columns are packed.
-fn told(error: parquet::errors::ParquetError) -> String {
-    let message = error.to_string();
-    if message.contains("Disabled feature") {
-        return "its columns are packed in a way that is not read in tables; write it with snappy, or not packed".to_owned();
-    }
-    message
+/// Refuses columns that cannot be unpacked, with what to do.
+fn check_packing(file: &PackedFile) -> Result<(), String> {
+    let chunks = file.metadata().row_groups().iter().flat_map(|group| group.columns());
+    let mut packed = chunks.filter(|chunk| !PackedFile::unpacks(chunk.compression()));
+    packed.next().map_or(Ok(()), |chunk| {
+        let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
+        let codec = codec.split('(').next().unwrap_or_default();
+        Err(format!(
+            "column {column} is compressed with {codec}, which is not read: write it with Zstandard or Snappy"
+        ))
+    })
 }
 
 #[cfg(test)]

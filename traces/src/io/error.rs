@@ -82,8 +82,8 @@ pub enum ReadError {
         /// The column.
         column: String,
     },
-    /// A column is compressed in a way that needs a C library.
-    #[error("{path}: column {column} is compressed with {codec}, which is not read: write it with Snappy or uncompressed", path = path.display())]
+    /// A column is compressed in a way that is not read.
+    #[error("{path}: column {column} is compressed with {codec}, which is not read: write it with Zstandard or Snappy", path = path.display())]
     Compression {
         /// The file.
         path: PathBuf,

@@ -3,8 +3,11 @@
 mod csv;
 mod jls;
 mod lines;
+mod packed;
 mod parquet;
 mod zstd;
+
+pub(crate) use packed::PackedFile;
 
 use super::columns::{Layout, Rail};
 use super::header::Header;

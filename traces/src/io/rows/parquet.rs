@@ -1,16 +1,16 @@
 //! Rows of Parquet: each column by a reader of its own, all of them at once.
 
 use super::Chunk;
-use super::zstd::ZstdPages;
+use super::PackedFile;
 use crate::io::columns::{Layout, layout};
 use crate::io::header::{self, Header, KEYS};
 use crate::io::timing::Stamps;
 use crate::io::{ReadError, ReadOptions};
-use parquet::basic::{Compression, LogicalType, TimeUnit, Type as Physical};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
+use parquet::basic::{LogicalType, TimeUnit, Type as Physical};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::FileReader;
 use rayon::prelude::*;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ pub(super) struct ParquetRows {
 struct Column {
     path: PathBuf,
     // Of its own, as clones of a file share its position.
-    file: SerializedFileReader<File>,
+    file: PackedFile,
     name: String,
     index: usize,
     /// 1 if values may be missing.
@@ -49,9 +49,9 @@ fn damaged(path: &Path, reason: String) -> ReadError {
     ReadError::Damaged { path: path.to_owned(), format: "Parquet", reason }
 }
 
-fn open(path: &Path) -> Result<SerializedFileReader<File>, ReadError> {
-    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
-    SerializedFileReader::new(file).map_err(|error| damaged(path, error.to_string()))
+fn open(path: &Path) -> Result<PackedFile, ReadError> {
+    File::open(path).map_err(|error| ReadError::io(path, error))?;
+    PackedFile::open(path).map_err(|error| damaged(path, error.to_string()))
 }
 
 impl ParquetRows {
@@ -102,7 +102,7 @@ impl ParquetRows {
     }
 }
 
-fn description(path: &Path, file: &SerializedFileReader<File>) -> Result<Header, ReadError> {
+fn description(path: &Path, file: &PackedFile) -> Result<Header, ReadError> {
     let pairs = file.metadata().file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
     let json = KEYS
         .iter()
@@ -111,19 +111,11 @@ fn description(path: &Path, file: &SerializedFileReader<File>) -> Result<Header,
 }
 
 /// Holds what the file says of the parts that are read against its size, before the decoder trusts it.
-fn check_chunks(
-    path: &Path,
-    file: &SerializedFileReader<File>,
-    size_bytes: u64,
-    layout: &Layout,
-) -> Result<(), ReadError> {
+fn check_chunks(path: &Path, file: &PackedFile, size_bytes: u64, layout: &Layout) -> Result<(), ReadError> {
     let read: Vec<usize> = layout.time.iter().chain(&layout.values).map(|picked| picked.index).collect();
     for group in file.metadata().row_groups() {
         for chunk in read.iter().filter_map(|&index| group.columns().get(index)) {
-            if !matches!(
-                chunk.compression(),
-                Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_)
-            ) {
+            if !PackedFile::unpacks(chunk.compression()) {
                 let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
                 let codec = codec.split('(').next().unwrap_or_default().to_owned();
                 return Err(ReadError::Compression { path: path.to_owned(), column, codec });
@@ -196,19 +188,7 @@ impl Column {
     }
 
     fn reader_of(&self, group: usize) -> Result<ColumnReader, ParquetError> {
-        let chunk = self.file.metadata().row_group(group).column(self.index);
-        if !matches!(chunk.compression(), Compression::ZSTD(_)) {
-            return self.file.get_row_group(group)?.get_column_reader(self.index);
-        }
-        let start = chunk
-            .dictionary_page_offset()
-            .map_or(chunk.data_page_offset(), |at| at.min(chunk.data_page_offset()));
-        let pages = ZstdPages::new(
-            File::open(&self.path)?,
-            start.max(0) as u64,
-            chunk.compressed_size().max(0) as u64,
-        );
-        Ok(get_column_reader(chunk.column_descr_ptr(), Box::new(pages)))
+        self.file.get_row_group(group)?.get_column_reader(self.index)
     }
 
     fn skip(&mut self, mut rows: u64) -> Result<(), ReadError> {
