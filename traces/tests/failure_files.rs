@@ -239,6 +239,40 @@ fn a_compression_that_is_not_read_is_named_with_the_mend() {
 }
 
 #[test]
+fn missing_values_are_filled_by_repair_and_told_with_their_place() {
+    use Values::{Float, Maybe};
+    let times = Maybe(vec![Some(0.0), Some(0.5), Some(1.0), None, Some(2.0), Some(2.5)]);
+    let voltage = Maybe(vec![Some(1.0), None, Some(3.0), Some(1.0), Some(5.0), None]);
+    let (_folder, path) =
+        parquet_file(vec![("time_s", times), ("voltage_V", voltage), ("current_A", Float(vec![1.0; 6]))]);
+    says(&io::read(&path, &ReadOptions::default()).unwrap_err(), &["row 2: voltage_V is missing"]);
+    let options = ReadOptions { repair: true, ..ReadOptions::default() };
+    let loaded = io::read(&path, &options).unwrap();
+    assert_eq!(loaded.trace.voltage_v(), [1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
+    let told: Vec<_> = loaded.repairs.iter().map(|r| (r.code, r.row, r.time_s, r.count)).collect();
+    assert_eq!(
+        told,
+        [
+            ("dropped-rows", 4, 1.0, 1),
+            ("filled-values", 2, 0.5, 1),
+            ("filled-values", 5, 2.5, 1),
+            ("filled-gap", 3, 1.0, 1)
+        ]
+    );
+}
+
+#[test]
+fn surplus_fields_that_repair_drops_are_told_with_their_place() {
+    let rows = "time_s,voltage_V,current_A\n0,1,1\n0.5,1,2,9\n1,1,3\n1.5,1,4,9,9\n";
+    let (_folder, path) = in_folder("surplus.csv", rows.as_bytes());
+    let options = ReadOptions { repair: true, ..ReadOptions::default() };
+    let told = io::read(&path, &options).unwrap().repairs;
+    assert_eq!(io::Recording::open(&path, &options).unwrap().repairs(), told);
+    let [told] = &told[..] else { panic!("{told:?}") };
+    assert_eq!((told.code, told.row, told.time_s, told.count), ("uneven-rows", 2, 0.5, 2));
+}
+
+#[test]
 fn optional_doubles_and_any_letter_case_are_read() {
     let column = |values: [f64; 3]| Values::Maybe(values.map(Some).to_vec());
     let (_folder, path) = parquet_file(vec![

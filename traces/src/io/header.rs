@@ -91,6 +91,11 @@ pub(super) fn from_json(path: &Path, json: &str) -> Result<Header, ReadError> {
 }
 
 impl Header {
+    /// When a row was taken by rate and start, s: of files without times.
+    pub(crate) fn time_s(&self, row: usize) -> f64 {
+        self.start_s.unwrap_or(0.0) + row as f64 / self.rate_hz.unwrap_or(f64::INFINITY)
+    }
+
     /// Holds the stated number of samples against the rows found.
     pub(crate) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
         match self.samples {

@@ -42,8 +42,8 @@ pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
         return Err(ReadError::Empty { path });
     }
     rows.header.check_rows(&path, read as u64)?;
+    let mut repairs: Vec<Repair> = rows.repair().into_iter().collect();
     let mut header = std::mem::take(&mut rows.header);
-    let mut repairs: Vec<Repair> = rows.cut().cloned().into_iter().collect();
     if rows.mends() {
         repairs.extend(mend(&path, &mut columns, &mut header)?);
     }

@@ -52,7 +52,7 @@ impl Recording {
         Ok(Self { path: path.to_owned(), options: options.clone(), piece, heading, repairs: seen.repairs })
     }
 
-    /// What was mended when the file was opened.
+    /// What was mended as the file was looked through.
     pub fn repairs(&self) -> &[Repair] {
         &self.repairs
     }
@@ -89,7 +89,7 @@ impl Seen {
             return Err(ReadError::Empty { path: path.to_owned() });
         }
         rows.header.check_rows(path, count)?;
-        let repairs = rows.cut().cloned().into_iter().collect();
+        let repairs = rows.repair().into_iter().collect();
         Ok(Self { fit, rows: count, metadata: rows.header.metadata, repairs, voltage, current })
     }
 }

@@ -6,7 +6,7 @@ use crate::io::columns::{Layout, Picked, layout};
 use crate::io::csv::{delimiter, sidecar_path};
 use crate::io::header::{self, Header};
 use crate::io::timing::Stamps;
-use crate::io::{ReadError, ReadOptions};
+use crate::io::{ReadError, ReadOptions, Repair};
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 use flate2::read::MultiGzDecoder;
 use std::fs::{self, File};
@@ -24,6 +24,8 @@ pub(super) struct CsvRows {
     row: u64,
     /// Whether the first record is in `record` already: it was looked at for names and had none.
     held: bool,
+    /// Rows with more or fewer fields than there are names: the first, its time if it has one, and how many.
+    uneven: Option<(u64, Option<f64>, u64)>,
 }
 
 fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
@@ -72,11 +74,23 @@ impl CsvRows {
                 .collect()
         };
         let layout = layout(path, &names, options)?;
-        Ok((Self { path: path.to_owned(), reader, record, names, row: 0, held }, layout, header))
+        let path = path.to_owned();
+        Ok((Self { path, reader, record, names, row: 0, held, uneven: None }, layout, header))
     }
 
     pub fn names(&self) -> &[String] {
         &self.names
+    }
+
+    /// What was mended in the rows so far, by a description with rate and start where they have no times.
+    pub fn repair(&self, header: &Header) -> Option<Repair> {
+        let (row, time_s, count) = self.uneven?;
+        let time_s = time_s.unwrap_or_else(|| header.time_s(row as usize - 1));
+        let message = format!(
+            "{count} rows have more or fewer fields than there are columns, the first of them row {row} ({time_s} s); \
+             surplus fields were dropped"
+        );
+        Some(Repair { code: "uneven-rows", row, time_s, count, message })
     }
 
     /// Moves to the next row; whether there was one.
@@ -122,6 +136,10 @@ impl CsvRows {
             }
             if let Some(time) = &layout.time {
                 times.push(self.field::<f64>(time, repair, f64::NAN)? * time.scale);
+            }
+            if self.record.len() != self.names.len() {
+                let time_s = times.last().copied().filter(|time_s| time_s.is_finite());
+                self.uneven.get_or_insert((self.row, time_s, 0)).2 += 1;
             }
             for (column, values) in layout.values.iter().zip(&mut chunk.values) {
                 // Parsed as f32 at once: two roundings, decimal to f64 to f32, can differ from one.

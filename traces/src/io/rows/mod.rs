@@ -155,9 +155,13 @@ impl Rows {
         Ok(())
     }
 
-    /// What was mended when the file was opened.
-    pub(crate) fn cut(&self) -> Option<&Repair> {
-        if let Source::Jls(rows) = &self.source { rows.cut() } else { None }
+    /// What was mended when the file was opened and in the rows read since.
+    pub(crate) fn repair(&self) -> Option<Repair> {
+        match &self.source {
+            Source::Csv(rows) => rows.repair(&self.header),
+            Source::Jls(rows) => rows.cut(&self.header),
+            Source::Parquet(_) => None,
+        }
     }
 
     /// Names of the columns that are read, in order: of the trace's rails.

@@ -1,34 +1,22 @@
-//! Rows of Parquet: each column by a reader of its own, all of them at once.
+//! One column of Parquet.
 
-use super::Chunk;
-use super::PackedFile;
-use crate::io::columns::{Layout, layout};
-use crate::io::header::{self, Header, KEYS};
-use crate::io::timing::Stamps;
-use crate::io::{ReadError, ReadOptions};
+use super::{PackedFile, damaged, open};
+use crate::io::ReadError;
+use crate::io::columns::Picked;
+use crate::io::timing::{NO_TIME_NS, Stamps};
 use parquet::basic::{LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::FileReader;
-use rayon::prelude::*;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Values decoded at once. What a file claims about its length is never allocated on trust.
 const BATCH: usize = 1 << 16;
 
-/// A Parquet file being read.
-pub(super) struct ParquetRows {
-    time: Option<Column>,
-    values: Vec<Column>,
-    names: Vec<String>,
-    rows: u64,
-}
-
 /// One column, over all row groups.
-struct Column {
-    path: PathBuf,
+pub(super) struct Column {
+    pub path: PathBuf,
     // Of its own, as clones of a file share its position.
     file: PackedFile,
     name: String,
@@ -43,102 +31,12 @@ struct Column {
     /// What a whole number counts, ns.
     tick_ns: i64,
     scale: f64,
-}
-
-fn damaged(path: &Path, reason: String) -> ReadError {
-    ReadError::Damaged { path: path.to_owned(), format: "Parquet", reason }
-}
-
-fn open(path: &Path) -> Result<PackedFile, ReadError> {
-    File::open(path).map_err(|error| ReadError::io(path, error))?;
-    PackedFile::open(path).map_err(|error| damaged(path, error.to_string()))
-}
-
-impl ParquetRows {
-    pub fn open(path: &Path, options: &ReadOptions) -> Result<(Self, Layout, Header), ReadError> {
-        let file = open(path)?;
-        let size_bytes = std::fs::metadata(path).map_err(|error| ReadError::io(path, error))?.len();
-        let schema = file.metadata().file_metadata().schema_descr();
-        let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-        let header = description(path, &file)?;
-        let layout = layout(path, &names, options)?;
-        check_chunks(path, &file, size_bytes, &layout)?;
-        let rows = file.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
-        let column = |picked| Column::open(path, picked);
-        let time = layout.time.as_ref().map(column).transpose()?;
-        let values = layout.values.iter().map(column).collect::<Result<_, _>>()?;
-        Ok((Self { time, values, names, rows }, layout, header))
-    }
-
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    pub fn count(&self) -> u64 {
-        self.rows
-    }
-
-    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
-        self.time.iter_mut().chain(&mut self.values).try_for_each(|column| column.skip(rows))
-    }
-
-    pub fn next(&mut self, limit: usize, chunk: &mut Chunk) -> Result<usize, ReadError> {
-        let Self { time, values, .. } = self;
-        let Chunk { stamps, values: lists } = chunk;
-        let (stamped, read) = rayon::join(
-            || time.as_mut().map_or(Ok(None), |column| column.times(limit, stamps).map(Some)),
-            || {
-                let each = values.par_iter_mut().zip(lists);
-                each.map(|(column, list)| column.values(limit, list)).collect::<Vec<_>>()
-            },
-        );
-        let read = read.into_iter().collect::<Result<Vec<usize>, _>>()?;
-        let rows = read.first().copied().unwrap_or(0);
-        if read.iter().chain(&stamped?).any(|&count| count != rows) {
-            let path = values.first().map_or(PathBuf::new(), |column| column.path.clone());
-            return Err(damaged(&path, "its columns differ in length".to_owned()));
-        }
-        Ok(rows)
-    }
-}
-
-fn description(path: &Path, file: &PackedFile) -> Result<Header, ReadError> {
-    let pairs = file.metadata().file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
-    let json = KEYS
-        .iter()
-        .find_map(|key| pairs.iter().find(|pair| pair.key == *key).and_then(|pair| pair.value.as_deref()));
-    json.map_or(Ok(Header::default()), |json| header::from_json(path, json))
-}
-
-/// Holds what the file says of the parts that are read against its size, before the decoder trusts it.
-fn check_chunks(path: &Path, file: &PackedFile, size_bytes: u64, layout: &Layout) -> Result<(), ReadError> {
-    let read: Vec<usize> = layout.time.iter().chain(&layout.values).map(|picked| picked.index).collect();
-    for group in file.metadata().row_groups() {
-        for chunk in read.iter().filter_map(|&index| group.columns().get(index)) {
-            if !PackedFile::unpacks(chunk.compression()) {
-                let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
-                let codec = codec.split('(').next().unwrap_or_default().to_owned();
-                return Err(ReadError::Compression { path: path.to_owned(), column, codec });
-            }
-            let start = chunk
-                .dictionary_page_offset()
-                .map_or(chunk.data_page_offset(), |page| page.min(chunk.data_page_offset()));
-            let range = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok());
-            let end = range.and_then(|(start, length)| start.checked_add(length));
-            if end.is_none_or(|end| end > size_bytes)
-                || chunk.num_values() < 0
-                || group.num_rows() != chunk.num_values()
-            {
-                let reason = format!("column {} is not where the file says", chunk.column_path().string());
-                return Err(damaged(path, reason));
-            }
-        }
-    }
-    Ok(())
+    /// Whether a missing value is to be mended later, and none stands for it until then.
+    repair: bool,
 }
 
 impl Column {
-    fn open(path: &Path, picked: &crate::io::columns::Picked) -> Result<Self, ReadError> {
+    pub fn open(path: &Path, picked: &Picked, repair: bool) -> Result<Self, ReadError> {
         let file = open(path)?;
         let described = file.metadata().file_metadata().schema_descr().column(picked.index);
         if described.max_rep_level() > 0 {
@@ -170,6 +68,7 @@ impl Column {
             levels: Vec::new(),
             tick_ns,
             scale: picked.scale,
+            repair,
         })
     }
 
@@ -191,7 +90,7 @@ impl Column {
         self.file.get_row_group(group)?.get_column_reader(self.index)
     }
 
-    fn skip(&mut self, mut rows: u64) -> Result<(), ReadError> {
+    pub fn skip(&mut self, mut rows: u64) -> Result<(), ReadError> {
         while rows > 0 {
             if self.reader.is_none() {
                 let Some(group) = self.file.metadata().row_groups().get(self.group) else { break };
@@ -219,17 +118,19 @@ impl Column {
     }
 
     /// Appends up to `limit` values; how many there were.
-    fn values(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, ReadError> {
+    pub fn values(&mut self, limit: usize, into: &mut Vec<f32>) -> Result<usize, ReadError> {
         let mut doubles: Vec<f64> = Vec::new();
         let from = into.len();
         while into.len() - from < limit && self.open_group()? {
             let want = (limit - (into.len() - from)).min(BATCH);
-            let (max, levels) = (self.max_definition, &mut self.levels);
+            let mut places = Places { max: self.max_definition, levels: &mut self.levels, fill: self.repair };
             let got = match &mut self.reader {
-                Some(ColumnReader::FloatColumnReader(reader)) => batch(reader, want, max, levels, into),
+                Some(ColumnReader::FloatColumnReader(reader)) => {
+                    batch(reader, want, &mut places, f32::NAN, into)
+                }
                 Some(ColumnReader::DoubleColumnReader(reader)) => {
                     doubles.clear();
-                    let got = batch(reader, want, max, levels, &mut doubles);
+                    let got = batch(reader, want, &mut places, f64::NAN, &mut doubles);
                     into.extend(doubles.iter().map(|&value| value as f32));
                     got
                 }
@@ -240,7 +141,7 @@ impl Column {
         Ok(into.len() - from)
     }
 
-    fn times(&mut self, limit: usize, stamps: &mut Stamps) -> Result<usize, ReadError> {
+    pub fn times(&mut self, limit: usize, stamps: &mut Stamps) -> Result<usize, ReadError> {
         let whole = self.physical() == Physical::INT64;
         if whole && self.tick_ns == 0 {
             return Err(self.wrong_type("DOUBLE or FLOAT, or INT64 by the name time_ns"));
@@ -258,13 +159,18 @@ impl Column {
         while ns.len().max(s.len()) < limit && self.open_group()? {
             let from = ns.len();
             let want = (limit - ns.len().max(s.len())).min(BATCH);
-            let (max, levels, scale) = (self.max_definition, &mut self.levels, self.scale);
+            let scale = self.scale;
+            let mut places = Places { max: self.max_definition, levels: &mut self.levels, fill: self.repair };
             let got = match &mut self.reader {
-                Some(ColumnReader::Int64ColumnReader(reader)) => batch(reader, want, max, levels, &mut ns),
-                Some(ColumnReader::DoubleColumnReader(reader)) => batch(reader, want, max, levels, &mut s),
+                Some(ColumnReader::Int64ColumnReader(reader)) => {
+                    batch(reader, want, &mut places, NO_TIME_NS, &mut ns)
+                }
+                Some(ColumnReader::DoubleColumnReader(reader)) => {
+                    batch(reader, want, &mut places, f64::NAN, &mut s)
+                }
                 Some(ColumnReader::FloatColumnReader(reader)) => {
                     floats.clear();
-                    let got = batch(reader, want, max, levels, &mut floats);
+                    let got = batch(reader, want, &mut places, f32::NAN, &mut floats);
                     s.extend(floats.iter().map(|&value| f64::from(value)));
                     got
                 }
@@ -313,16 +219,45 @@ impl Column {
     }
 }
 
-/// Appends up to `want` values; how many records there were, and how many of them had a value.
+/// Which records have a value.
+struct Places<'a> {
+    /// The level of those that have one.
+    max: i16,
+    levels: &'a mut Vec<i16>,
+    /// Whether the others get a value that stands for none.
+    fill: bool,
+}
+
+/// Appends up to `want` values; how many records there were, and how many of them had a value or got `none`.
 fn batch<D: DataType>(
     reader: &mut ColumnReaderImpl<D>,
     want: usize,
-    max_definition: i16,
-    levels: &mut Vec<i16>,
+    places: &mut Places<'_>,
+    none: D::T,
     into: &mut Vec<D::T>,
 ) -> Result<(usize, usize), ParquetError> {
-    levels.clear();
-    let definitions = (max_definition > 0).then_some(levels);
+    let from = into.len();
+    places.levels.clear();
+    let definitions = (places.max > 0).then_some(&mut *places.levels);
     let (records, values, _) = reader.read_records(want, definitions, None, into)?;
-    Ok((records, values))
+    if values == records || !places.fill {
+        return Ok((records, values));
+    }
+    into.resize(from + records, none.clone());
+    places.spread(&mut into[from..], values, &none);
+    Ok((records, records))
+}
+
+impl Places<'_> {
+    /// Moves the `count` values at the front to their places, and puts `none` into the others.
+    fn spread<T: Clone>(&self, values: &mut [T], mut count: usize, none: &T) {
+        for (place, level) in self.levels.iter().enumerate().rev() {
+            if *level == self.max {
+                count -= 1;
+                values.swap(place, count);
+            } else {
+                values[place] = none.clone();
+            }
+        }
+    }
 }
