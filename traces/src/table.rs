@@ -4,7 +4,7 @@ use crate::io::PackedFile;
 use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -15,6 +15,14 @@ const LARGEST_BYTES: u64 = 1 << 28;
 /// Why a table cannot be used.
 #[derive(Debug, Error)]
 pub enum TableReadError {
+    /// There is no such file.
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    Absent {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
     /// The file.
     #[error("{path}: cannot be read: {reason}", path = path.display())]
     File {
@@ -59,15 +67,27 @@ impl Table {
     /// Reads a table with a header: Parquet by its first bytes, else a text with commas, semicolons or tabs.
     ///
     /// # Errors
-    /// [`TableReadError::File`] if it cannot be read.
+    /// [`TableReadError::Absent`] if it is not there, [`TableReadError::File`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, TableReadError> {
         let refuse = |reason: String| TableReadError::File { path: path.to_owned(), reason };
-        let file = File::open(path).map_err(|error| refuse(error.to_string()))?;
-        if file.metadata().map_err(|error| refuse(error.to_string()))?.len() > LARGEST_BYTES {
+        let file = File::open(path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => {
+                TableReadError::Absent { path: path.to_owned(), reason: error.to_string() }
+            }
+            _ => refuse(error.to_string()),
+        })?;
+        let there = file.metadata().map_err(|error| refuse(error.to_string()))?;
+        if there.is_dir() {
+            return Err(refuse("it is a folder; name a file in it".to_owned()));
+        }
+        if there.len() > LARGEST_BYTES {
             return Err(refuse("a table of settings has to be smaller than 256 MiB".to_owned()));
         }
         let mut bytes = Vec::new();
         (&file).read_to_end(&mut bytes).map_err(|error| refuse(error.to_string()))?;
+        if bytes.iter().all(u8::is_ascii_whitespace) {
+            return Err(refuse("it is empty; give a row for each setting".to_owned()));
+        }
         let (names, rows) = if bytes.starts_with(b"PAR1") {
             let read = catch_unwind(AssertUnwindSafe(|| from_parquet(path)));
             read.unwrap_or_else(|_| Err("it is damaged".to_owned())).map_err(refuse)?

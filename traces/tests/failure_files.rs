@@ -39,7 +39,7 @@ fn csv_errors_name_file_row_and_column() {
         &["bad.csv", "no column current_A", "time_s, voltage_V", "rename or add"],
     );
     says(&csv_error("voltage_V,current_A\n0,1\n"), &["no column time_s"]);
-    says(&csv_error(""), &["bad.csv", "no column voltage_V (found: none)"]);
+    says(&csv_error(""), &["bad.csv", "no samples"]);
     says(&csv_error("voltage_V,Voltage_v,current_A\n"), &["column voltage_V occurs twice"]);
     says(&with(""), &["bad.csv", "no samples"]);
     says(&with("0,1,2\n1,nan,2\n"), &["bad.csv: row 2: voltage_V is \"nan\""]);

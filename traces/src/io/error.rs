@@ -64,6 +64,28 @@ pub enum ReadError {
         /// Rows stated.
         stated: u64,
     },
+    /// The recorder lost the end, and nothing in the rows tells of it.
+    #[error("{path}: the recorder lost {lost} samples after the last row: cut the recording there and take lost_at_end out of its description, or have them filled with --repair", path = path.display())]
+    LostEnd {
+        /// The file.
+        path: PathBuf,
+        /// How many samples.
+        lost: u64,
+    },
+    /// What was asked for does not go with the file.
+    #[error("{path}: {reason}", path = path.display())]
+    Asked {
+        /// The file.
+        path: PathBuf,
+        /// What does not go with it, and what to ask for instead.
+        reason: String,
+    },
+    /// A folder where a file has to be.
+    #[error("{path}: is a folder: name a file in it", path = path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A column is missing.
     #[error("{path}: no column {column} (found: {found}): rename or add it", path = path.display())]
     MissingColumn {
@@ -171,7 +193,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The sample rate cannot be told.
-    #[error("{path}: a single row and no stated rate: the sample rate is unknown; state rate_hz in the description", path = path.display())]
+    #[error("{path}: a single row and no stated rate: the sample rate is unknown; give --rate, or state rate_hz in the description", path = path.display())]
     NoRate {
         /// The file.
         path: PathBuf,

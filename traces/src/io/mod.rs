@@ -24,7 +24,7 @@ pub use options::ReadOptions;
 pub use read::{Loaded, read};
 pub use recording::Recording;
 pub use repair::Repair;
-pub use rows::Rows;
+pub use rows::{Rows, SumOfRails, rail_of_sums};
 #[cfg(test)]
 pub(crate) use source::Cut;
 pub use source::{Heading, Sink, Source, Stretch};

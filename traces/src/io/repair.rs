@@ -45,6 +45,7 @@ pub(super) fn mend(
     {
         space(path, times, columns, header, &mut told)?;
     }
+    lengthen(path, columns, times.as_mut(), header, &mut told)?;
     if !told.is_empty() {
         header.samples = None;
         if let Some(times) = times {
@@ -192,6 +193,37 @@ fn space(
     columns.current_a = interpolated(times, &columns.current_a, &grid, OFF / rate_hz);
     *times = grid;
     header.rate_hz = Some(rate_hz);
+    Ok(())
+}
+
+/// Puts samples like the last one where the recorder lost the end.
+fn lengthen(
+    path: &Path,
+    columns: &mut Columns,
+    times: Option<&mut Vec<f64>>,
+    header: &Header,
+    told: &mut Vec<Repair>,
+) -> Result<(), ReadError> {
+    let rows = columns.voltage_v.len();
+    let Some(lost) = header.lost_at_end.filter(|lost| *lost > 0 && rows > 0) else { return Ok(()) };
+    let longer = usize::try_from(lost).ok().map(|lost| rows.saturating_add(lost));
+    let Some(longer) = longer.filter(|longer| *longer <= LONGER.saturating_mul(rows)) else {
+        let reason = format!("{lost} samples are said to be lost after {rows} rows");
+        return Err(ReadError::Repair { path: path.to_owned(), reason });
+    };
+    let time_s = match times {
+        Some(times) => {
+            let (last_s, rate_hz) = (times[rows - 1], header.rate_hz.unwrap_or_else(|| usual_rate_hz(times)));
+            times.extend((1..=lost).map(|after| last_s + after as f64 / rate_hz));
+            last_s
+        }
+        None => header.time_s(rows - 1),
+    };
+    for values in [&mut columns.voltage_v, &mut columns.current_a] {
+        values.resize(longer, values[rows - 1]);
+    }
+    let message = format!("after the last row ({time_s} s) {lost} samples were missing");
+    told.push(Repair { code: "filled-gap", row: rows as u64, time_s, count: lost, message });
     Ok(())
 }
 

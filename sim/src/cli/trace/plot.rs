@@ -80,6 +80,7 @@ fn curve(args: &PlotArgs) -> Result<(Picture, String), Failure> {
     let pyramid = if args.input.repair {
         Pyramid::of_trace(&args.input.load()?.0)
     } else {
+        args.input.warn_of_sums(&args.input.trace)?;
         Pyramid::of_file(&args.input.trace, &options)?
     };
     let (from_s, to_s) = span(args, pyramid.start_s(), pyramid.end_s())?;

@@ -47,6 +47,7 @@ impl Recording {
             rate_hz: grid.rate_hz,
             samples: seen.rows,
             lost_samples: 0,
+            lost_at_end: 0,
             metadata: seen.metadata,
         };
         Ok(Self { path: path.to_owned(), options: options.clone(), piece, heading, repairs: seen.repairs })
@@ -76,6 +77,7 @@ struct Seen {
 impl Seen {
     fn of(path: &Path, options: &ReadOptions, limit: usize, rate_hz: Option<f64>) -> Result<Self, ReadError> {
         let mut rows = Rows::open(path, options)?;
+        rows.header.check_end(path)?;
         let mut fit = Fit::new(path, rate_hz.or(rows.header.rate_hz), rows.header.start_s);
         let (mut voltage, mut current, mut count) = (None, None, 0);
         let (mut chunk, mut piece) = (Chunk::default(), Piece::default());

@@ -63,8 +63,11 @@ impl CsvRows {
             .from_reader(Box::new(text) as Text);
         let mut record = ByteRecord::new();
         let any = reader.read_byte_record(&mut record).map_err(|error| damaged(path, &error))?;
-        let numbers = any && record.iter().all(|field| number::<f64>(field).is_some());
-        let held = any && !options.header.unwrap_or(!numbers);
+        if !any {
+            return Err(ReadError::Empty { path: path.to_owned() });
+        }
+        let numbers = record.iter().all(|field| number::<f64>(field).is_some());
+        let held = !options.header.unwrap_or(!numbers);
         let names: Vec<String> = if held {
             unnamed(record.len())
         } else {

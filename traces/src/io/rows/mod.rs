@@ -5,9 +5,11 @@ mod jls;
 mod lines;
 mod packed;
 mod parquet;
+mod sums;
 mod zstd;
 
 pub(crate) use packed::PackedFile;
+pub use sums::{SumOfRails, rail_of_sums};
 
 use super::columns::{Layout, Rail};
 use super::header::Header;
@@ -100,6 +102,16 @@ impl Rows {
         options: &ReadOptions,
         time: &str,
     ) -> Result<Self, ReadError> {
+        if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
+            let reason = format!(
+                "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
+                column.name
+            );
+            return Err(ReadError::Asked { path: path.to_owned(), reason });
+        }
+        if !options.repair {
+            header.check_end(path)?;
+        }
         header.rate_hz = options.rate_hz.or(header.rate_hz);
         header.start_s = options.start_s.or(header.start_s);
         if layout.time.is_none() && header.rate_hz.is_none() {
@@ -235,11 +247,7 @@ impl Rows {
     /// Appends a chunk's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
     /// power is known, the voltage is 1 V and the current stands for the power.
     fn channels(&self, chunk: &mut Chunk, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
-        for (values, column) in chunk.values.iter_mut().zip(&self.layout.values) {
-            if column.scale != 1.0 {
-                values.iter_mut().for_each(|value| *value = (f64::from(*value) * column.scale) as f32);
-            }
-        }
+        self.layout.scale(&mut chunk.values);
         match self.layout.rails[..] {
             [Rail::Measured { voltage, current }] => {
                 voltage_v.extend_from_slice(&chunk.values[voltage]);
@@ -255,6 +263,17 @@ impl Rows {
                 let power_w =
                     |row: usize| rails.iter().map(|rail| rail.power_w(&chunk.values, row)).sum::<f64>();
                 current_a.extend((0..rows).map(|row| power_w(row) as f32));
+            }
+        }
+    }
+}
+
+impl Layout {
+    /// Puts values as they stand in the file into V, A or W.
+    fn scale(&self, values: &mut [Vec<f32>]) {
+        for (values, column) in values.iter_mut().zip(&self.values) {
+            if column.scale != 1.0 {
+                values.iter_mut().for_each(|value| *value = (f64::from(*value) * column.scale) as f32);
             }
         }
     }
@@ -283,10 +302,12 @@ impl Source {
 
 fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut start = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(8).read_to_end(&mut start))
-        .map_err(|error| ReadError::io(path, error))?;
-    Ok(start)
+    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+    if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
+        return Err(ReadError::Folder { path: path.to_owned() });
+    }
+    file.take(8).read_to_end(&mut start).map_err(|error| ReadError::io(path, error))?;
+    if start.is_empty() { Err(ReadError::Empty { path: path.to_owned() }) } else { Ok(start) }
 }
 
 /// What is said where the decoder of Parquet panicked: it does on some damaged files.

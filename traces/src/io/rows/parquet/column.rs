@@ -178,7 +178,8 @@ impl Column {
             };
             let rows = self.account(got)?;
             if self.tick_ns > 1 {
-                ns[from..].iter_mut().for_each(|time| *time = time.saturating_mul(self.tick_ns));
+                let times = ns[from..].iter_mut().filter(|time| **time != NO_TIME_NS);
+                times.for_each(|time| *time = time.saturating_mul(self.tick_ns));
             }
             if scale != 1.0 && rows > 0 && !whole {
                 let from = s.len() - rows;
