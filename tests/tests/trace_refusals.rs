@@ -66,6 +66,30 @@ fn what_holds_no_trace_fails_alike_in_every_format_and_command() {
 }
 
 #[test]
+fn plots_show_samples_where_they_are_few_and_a_damaged_pyramid_is_made_anew() {
+    let inputs = Inputs::new();
+    let (trace, svg) = (recording(&inputs), inputs.path("o.svg"));
+    let plot = |more: &[&str]| {
+        let ended = quintile!().call(["trace", "plot", &trace, "--out", &svg].iter().chain(more));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        (ended, std::fs::read(&svg).unwrap_or_default())
+    };
+    let short = plot(&["--from", "0.02", "--to", "0.03"]).0.stdout;
+    assert!(short.contains("0.02 s to 0.03 s in 50 columns"), "{short}");
+    let long = "time_s,power_W\n".to_owned()
+        + &(0..80_000).map(|i| format!("{},{}\n", f64::from(i) / 5000.0, i % 100)).collect::<String>();
+    inputs.put("t.csv", long);
+    let made = plot(&[]).1;
+    let kept = inputs.path("t.csv.pyramid");
+    let mut bytes = std::fs::read(&kept).unwrap_or_default();
+    bytes[3000] ^= 0x40;
+    inputs.put("t.csv.pyramid", bytes);
+    let (told, again) = plot(&[]);
+    assert!(told.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made, "{}", told.stderr);
+    assert_eq!((plot(&[]).0.stderr, plot(&[]).1 == made), (String::new(), true));
+}
+
+#[test]
 fn a_lost_end_is_in_the_file_and_filled_on_request() {
     let inputs = Inputs::new();
     let trace = recording(&inputs);

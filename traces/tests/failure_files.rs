@@ -58,6 +58,27 @@ fn csv_errors_name_file_row_and_column() {
 }
 
 #[test]
+fn what_contradicts_a_file_or_may_mean_another_number_is_refused() {
+    let (_folder, path) = in_folder("a.csv", b"time_s;voltage_V;current_A\n0,0;1,5;2,5\n0,1;1,5;2,5\n");
+    for repair in [false, true] {
+        let options = ReadOptions { repair, ..ReadOptions::default() };
+        says(&io::read(&path, &options).unwrap_err(), &["row 1: time_s is \"0,0\"", "decimal comma"]);
+    }
+    says(&csv_error("time_s,voltage_V,current_A\n0,1,1e308\n"), &["current_A is \"1e308\"", "beyond 3.4e38"]);
+    let (_folder, path) = in_folder("b.csv", b"voltage_V,current_A\n1,2\n1,2\n");
+    let swapped = ReadOptions {
+        voltage: Some("current_A".to_owned()),
+        current: Some("voltage_V".to_owned()),
+        rate_hz: Some(10.0),
+        ..ReadOptions::default()
+    };
+    says(&io::read(&path, &swapped).unwrap_err(), &["column voltage_V holds voltages", "currents"]);
+    std::fs::write(csv::sidecar_path(&path), r#"{"rate_hz": 20}"#).unwrap();
+    let other = ReadOptions { rate_hz: Some(10.0), ..ReadOptions::default() };
+    says(&io::read(&path, &other).unwrap_err(), &["10 Hz was asked for", "says 20 Hz", "--rate"]);
+}
+
+#[test]
 fn a_row_of_units_is_refused_and_not_dropped_by_repair() {
     // Dropped, its "mA" would be read as A.
     let (_folder, path) =

@@ -34,6 +34,20 @@ fn packed_tables_are_read_and_others_named_with_the_mend() {
 }
 
 #[test]
+fn units_of_fields_count_as_those_of_names_do() {
+    let read = |name: &str| read(&foreign(name), &ReadOptions::default());
+    let trace = read("units.parquet").unwrap().trace;
+    assert_eq!((trace.rate_hz(), trace.voltage_v()[0], trace.current_a()[5]), (2000.0, 12.0, 5.0));
+    for (name, says) in [
+        ("units_contradict.parquet", "column time_s has the unit ms"),
+        ("units_other.parquet", "column voltage has the unit mA"),
+    ] {
+        let message = read(name).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
+}
+
+#[test]
 fn a_changed_byte_gives_a_trace_or_an_error_but_no_panic() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign");
     let whole = std::fs::read(folder.join("pyarrow_zstd.parquet")).unwrap();

@@ -166,10 +166,20 @@ impl CsvRows {
         let field = self.record.get(column.index).unwrap_or_default();
         match number(field) {
             Some(value) => Ok(value),
+            None if has_decimal_comma(field) => Err(ReadError::DecimalComma {
+                path: self.path.clone(),
+                row: self.row,
+                column: column.name.clone(),
+                value: String::from_utf8_lossy(field).chars().take(40).collect(),
+            }),
             None if repair => Ok(none),
             None => {
                 let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
-                let value = if shown.is_empty() { "empty".to_owned() } else { format!("{shown:?}") };
+                let value = match number::<f64>(field) {
+                    Some(_) => format!("{shown:?}, which is beyond 3.4e38"),
+                    None if shown.is_empty() => "empty".to_owned(),
+                    None => format!("{shown:?}"),
+                };
                 Err(ReadError::Value {
                     path: self.path.clone(),
                     row: self.row,
@@ -192,7 +202,15 @@ fn unnamed(columns: usize) -> Vec<String> {
 
 /// Whether there is something in a field that is no number, not even one that is not finite.
 fn is_word(field: &[u8]) -> bool {
-    !field.is_empty() && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_err())
+    !field.is_empty()
+        && !has_decimal_comma(field)
+        && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_err())
+}
+
+/// Whether a field would be a number if its only comma were a point.
+fn has_decimal_comma(field: &[u8]) -> bool {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    text.matches(',').count() == 1 && number::<f64>(text.replace(',', ".").as_bytes()).is_some()
 }
 
 fn number<T: std::str::FromStr + Finite>(field: &[u8]) -> Option<T> {

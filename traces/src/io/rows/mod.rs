@@ -5,13 +5,14 @@ mod jls;
 mod lines;
 mod packed;
 mod parquet;
+mod power;
 mod sums;
 mod zstd;
 
 pub(crate) use packed::PackedFile;
 pub use sums::{SumOfRails, rail_of_sums};
 
-use super::columns::{Layout, Rail};
+use super::columns::Layout;
 use super::header::Header;
 use super::timing::Stamps;
 use super::{ReadError, ReadOptions, Repair};
@@ -31,6 +32,9 @@ const FOREIGN: [(&[u8], &str, &str); 3] = [
         "export it to CSV from its own program",
     ),
 ];
+
+/// By what share a rate that is asked for may differ from that of the file: clocks do, and JLS rounds by as much.
+const RATE_OFF: f64 = 1e-3;
 
 /// Some rows.
 #[derive(Debug)]
@@ -102,13 +106,7 @@ impl Rows {
         options: &ReadOptions,
         time: &str,
     ) -> Result<Self, ReadError> {
-        if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
-            let reason = format!(
-                "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
-                column.name
-            );
-            return Err(ReadError::Asked { path: path.to_owned(), reason });
-        }
+        check_asked(path, &layout, &header, options)?;
         if !options.repair {
             header.check_end(path)?;
         }
@@ -243,51 +241,6 @@ impl Rows {
             }
         }
     }
-
-    /// Appends a chunk's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
-    /// power is known, the voltage is 1 V and the current stands for the power.
-    fn channels(&self, chunk: &mut Chunk, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
-        self.layout.scale(&mut chunk.values);
-        match self.layout.rails[..] {
-            [Rail::Measured { voltage, current }] => {
-                voltage_v.extend_from_slice(&chunk.values[voltage]);
-                current_a.extend_from_slice(&chunk.values[current]);
-            }
-            [Rail::Specified { volts, current }] => {
-                voltage_v.resize(voltage_v.len() + chunk.values[current].len(), volts as f32);
-                current_a.extend_from_slice(&chunk.values[current]);
-            }
-            ref rails => {
-                let rows = chunk.values.first().map_or(0, Vec::len);
-                voltage_v.resize(voltage_v.len() + rows, 1.0);
-                let power_w =
-                    |row: usize| rails.iter().map(|rail| rail.power_w(&chunk.values, row)).sum::<f64>();
-                current_a.extend((0..rows).map(|row| power_w(row) as f32));
-            }
-        }
-    }
-}
-
-impl Layout {
-    /// Puts values as they stand in the file into V, A or W.
-    fn scale(&self, values: &mut [Vec<f32>]) {
-        for (values, column) in values.iter_mut().zip(&self.values) {
-            if column.scale != 1.0 {
-                values.iter_mut().for_each(|value| *value = (f64::from(*value) * column.scale) as f32);
-            }
-        }
-    }
-}
-
-impl Rail {
-    fn power_w(&self, values: &[Vec<f32>], row: usize) -> f64 {
-        let value = |column: usize| f64::from(values[column][row]);
-        match *self {
-            Self::Measured { voltage, current } => value(voltage) * value(current),
-            Self::Specified { volts, current } => volts * value(current),
-            Self::Power { power } => value(power),
-        }
-    }
 }
 
 impl Source {
@@ -298,6 +251,32 @@ impl Source {
             Self::Parquet(rows) => rows.names(),
         }
     }
+}
+
+/// Refuses times that are asked for and contradict those of the file.
+fn check_asked(
+    path: &Path,
+    layout: &Layout,
+    header: &Header,
+    options: &ReadOptions,
+) -> Result<(), ReadError> {
+    if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
+        let reason = format!(
+            "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
+            column.name
+        );
+        return Err(ReadError::Asked { path: path.to_owned(), reason });
+    }
+    if let Some((asked_hz, stated_hz)) = options.rate_hz.zip(header.rate_hz)
+        && (asked_hz / stated_hz - 1.0).abs() > RATE_OFF
+    {
+        let reason = format!(
+            "a rate of {asked_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or mend \
+             rate_hz there"
+        );
+        return Err(ReadError::Asked { path: path.to_owned(), reason });
+    }
+    Ok(())
 }
 
 fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {

@@ -1,6 +1,7 @@
 //! Rails that are the sum of others, which would count twice.
 
 use super::{Chunk, Rows};
+use crate::io::columns::Rail;
 use crate::io::{ReadError, ReadOptions};
 use std::fmt::{Display, Formatter, Result as Written};
 use std::path::Path;
@@ -81,7 +82,7 @@ impl Rows {
     fn powers_w(&self, chunk: &mut Chunk) -> Vec<Vec<f64>> {
         self.layout.scale(&mut chunk.values);
         let rows = chunk.values.first().map_or(0, Vec::len);
-        let of = |rail: &super::Rail| (0..rows).map(|row| rail.power_w(&chunk.values, row)).collect();
+        let of = |rail: &Rail| (0..rows).map(|row| rail.power_w(&chunk.values, row)).collect();
         self.layout.rails.iter().map(of).collect()
     }
 }

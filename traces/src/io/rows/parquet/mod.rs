@@ -1,6 +1,7 @@
 //! Rows of Parquet: each column by a reader of its own, all of them at once.
 
 mod column;
+mod units;
 
 use super::Chunk;
 use super::PackedFile;
@@ -10,6 +11,7 @@ use crate::io::{ReadError, ReadOptions};
 use column::Column;
 use parquet::file::reader::FileReader;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +39,8 @@ impl ParquetRows {
         let schema = file.metadata().file_metadata().schema_descr();
         let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
         let header = description(path, &file)?;
-        let layout = layout(path, &names, options)?;
+        let mut layout = layout(path, &names, options)?;
+        layout.with_units(path, &units(&file))?;
         check_chunks(path, &file, size_bytes, &layout)?;
         let rows = file.metadata().row_groups().iter().map(|group| group.num_rows().max(0) as u64).sum();
         let column = |picked| Column::open(path, picked, options.repair);
@@ -76,6 +79,13 @@ impl ParquetRows {
         }
         Ok(rows)
     }
+}
+
+/// The units of fields, by their names.
+fn units(file: &PackedFile) -> BTreeMap<String, String> {
+    let pairs = file.metadata().file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
+    let schema = pairs.iter().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
+    schema.map_or_else(BTreeMap::new, units::units)
 }
 
 fn description(path: &Path, file: &PackedFile) -> Result<Header, ReadError> {
