@@ -49,6 +49,9 @@ pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     }
     let Columns { stamps, voltage_v, current_a } = columns;
     let grid = timing::grid(&path, &stamps, &header)?;
+    if !rows.mends() {
+        header.check_end(&path)?;
+    }
     let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata)
         .map_err(|error| ReadError::trace(&path, error))?;
     Ok(Loaded { trace, repairs })

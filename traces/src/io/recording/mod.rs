@@ -39,7 +39,7 @@ impl Recording {
             grid = Seen::of(path, options, piece, Some(grid.rate_hz))?.fit.conclude()?.grid;
         }
         check_times(seen.rows, grid.rate_hz, grid.start_s).map_err(|error| ReadError::trace(path, error))?;
-        if let Some(error) = seen.voltage.or(seen.current) {
+        if let Some(error) = seen.voltage.or(seen.current).or(seen.end) {
             return Err(error);
         }
         let heading = Heading {
@@ -72,12 +72,13 @@ struct Seen {
     /// The first value of each channel that is not finite.
     voltage: Option<ReadError>,
     current: Option<ReadError>,
+    /// What is wrong with the end of a recording that is whole up to there.
+    end: Option<ReadError>,
 }
 
 impl Seen {
     fn of(path: &Path, options: &ReadOptions, limit: usize, rate_hz: Option<f64>) -> Result<Self, ReadError> {
         let mut rows = Rows::open(path, options)?;
-        rows.header.check_end(path)?;
         let mut fit = Fit::new(path, rate_hz.or(rows.header.rate_hz), rows.header.start_s);
         let (mut voltage, mut current, mut count) = (None, None, 0);
         let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
@@ -91,8 +92,8 @@ impl Seen {
             return Err(ReadError::Empty { path: path.to_owned() });
         }
         rows.header.check_rows(path, count)?;
-        let repairs = rows.repair().into_iter().collect();
-        Ok(Self { fit, rows: count, metadata: rows.header.metadata, repairs, voltage, current })
+        let (repairs, end) = (rows.repair().into_iter().collect(), rows.header.check_end(path).err());
+        Ok(Self { fit, rows: count, metadata: rows.header.metadata, repairs, voltage, current, end })
     }
 }
 

@@ -107,9 +107,6 @@ impl Rows {
         time: &str,
     ) -> Result<Self, ReadError> {
         check_asked(path, &layout, &header, options)?;
-        if !options.repair {
-            header.check_end(path)?;
-        }
         header.rate_hz = options.rate_hz.or(header.rate_hz);
         header.start_s = options.start_s.or(header.start_s);
         if layout.time.is_none() && header.rate_hz.is_none() {
