@@ -423,7 +423,9 @@ fn what_is_no_setting_is_refused_and_deviations_are_drawn() {
     table("zero.csv", "1,10,0\n0,5,0\n");
     table("negative.csv", "1,10,0\n2,5,-1\n");
     table("good.csv", "1,10,1\n2,5,1\n3,20,1\n");
-    refused(folder.path(), &["pareto", "none.csv"], "has no row");
+    let none = quintile(folder.path(), &["pareto", "none.csv"]);
+    let message = String::from_utf8_lossy(&none.stderr).into_owned();
+    assert!(none.status.code() == Some(1) && message.contains("has no row"), "{message}");
     refused(folder.path(), &["pareto", "zero.csv"], "row 2: time_ms is not above 0");
     refused(folder.path(), &["pareto", "negative.csv", "--energy-sd", "sd"], "row 2: a standard deviation");
     let svg = |args: &[&str]| {

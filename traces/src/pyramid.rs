@@ -2,14 +2,13 @@
 //! and so on, made once and kept in a file beside the trace.
 
 mod build;
+mod kept;
+mod samples;
 
 use crate::io::{ReadError, ReadOptions, read};
 use crate::stream::Clock;
 use crate::trace::Trace;
-use std::fs::{self, File};
-use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 /// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample, 2.5 % of
 /// the 8 bytes of voltage and current.
@@ -18,9 +17,9 @@ pub const BLOCK: u64 = 64;
 const FAN: usize = 16;
 /// Blocks a column is made of at least, where the level below has them.
 const PER_COLUMN: u64 = 4;
-const MAGIC: u64 = 0x3130_5259_505f_5451;
-const HEADER_BYTES: u64 = 64;
 const ENTRY_BYTES: u64 = 12;
+/// How near an edge of a sample a time counts as there, in samples.
+const EDGE: f64 = 1e-6;
 
 /// A stretch of time and the powers in it, W.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,7 +54,7 @@ pub struct Pyramid {
 #[derive(Debug)]
 enum Store {
     Memory(Vec<Vec<Entry>>),
-    File(PathBuf),
+    File(kept::Kept),
 }
 
 /// Where the pyramid of a trace is kept.
@@ -72,14 +71,21 @@ impl Pyramid {
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
     pub fn of_file(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let stamp = stamp(path, options);
-        let kept = pyramid_path(path);
-        if let Some(pyramid) = Self::kept(&kept, stamp) {
-            return Ok(pyramid);
+        match kept::kept(&pyramid_path(path), kept::stamp(path, options)) {
+            Some(pyramid) => Ok(pyramid),
+            None => Self::anew(path, options),
         }
+    }
+
+    /// Makes the pyramid of a file and keeps it, whatever is kept there: it may be damaged.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the trace cannot be read.
+    pub fn anew(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let stamp = kept::stamp(path, options);
         let pyramid = Self::build(path, options)?;
         // Without it the next look takes as long as this one; that is all.
-        let _ = pyramid.keep(&kept, stamp);
+        let _ = kept::keep(&pyramid, &pyramid_path(path), stamp);
         Ok(pyramid)
     }
 
@@ -121,10 +127,10 @@ impl Pyramid {
     }
 
     /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64 samples.
-    /// Lowest and highest are those of all samples within (as f32), none missed. Empty where nothing can be read.
-    pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Vec<Column> {
-        let place = |time_s: f64| self.clock.position(time_s).clamp(0.0, self.samples as f64);
-        let (from, to) = (place(from_s) as u64, libm::ceil(place(to_s)) as u64);
+    /// Lowest and highest are those of all samples within (as f32), none missed. `None` where what was kept cannot be read or is
+    /// damaged: it is to be made [anew](Pyramid::anew).
+    pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Vec<Column>> {
+        let (from, to) = self.places(from_s, to_s);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
         let (mut level, mut size) = (0, BLOCK);
         while size * FAN as u64 * PER_COLUMN <= wanted {
@@ -132,86 +138,46 @@ impl Pyramid {
         }
         let per_column = wanted.div_ceil(size).max(1);
         let (first, last) = (from / size, to.div_ceil(size));
-        let entries = self.entries(level, first, last - first).unwrap_or_default();
+        let entries = self.entries(level, first, last.saturating_sub(first))?;
         let column = |(index, entries): (usize, &[Entry])| {
             let begin = (first + index as u64 * per_column) * size;
             let end = (begin + entries.len() as u64 * size).min(self.samples);
-            let all = Entry::of_entries(entries);
-            Column {
-                from_s: self.clock.time_s(begin as f64),
-                to_s: self.clock.time_s(end as f64),
-                low_w: all.low_w,
-                high_w: all.high_w,
-                mean_w: all.mean_w,
-            }
+            self.column(begin, end, Entry::of_entries(entries))
         };
-        entries.chunks(per_column as usize).enumerate().map(column).collect()
+        Some(entries.chunks(per_column as usize).enumerate().map(column).collect())
     }
 
-    fn entries(&self, level: u32, first: u64, count: u64) -> Option<Vec<Entry>> {
+    /// The sample that a time lies in, and the one after that in which another ends.
+    fn places(&self, from_s: f64, to_s: f64) -> (u64, u64) {
+        let place = |time_s: f64| {
+            let (at, whole) = (self.clock.position(time_s), libm::round(self.clock.position(time_s)));
+            // Times of samples are rounded; what is an edge but for that is one.
+            let at = if (at - whole).abs() < EDGE { whole } else { at };
+            at.clamp(0.0, self.samples as f64)
+        };
+        (place(from_s) as u64, libm::ceil(place(to_s)) as u64)
+    }
+
+    fn column(&self, begin: u64, end: u64, all: Entry) -> Column {
+        Column {
+            from_s: self.clock.time_s(begin as f64),
+            to_s: self.clock.time_s(end as f64),
+            low_w: all.low_w,
+            high_w: all.high_w,
+            mean_w: all.mean_w,
+        }
+    }
+
+    fn entries(&self, level: usize, first: u64, count: u64) -> Option<Vec<Entry>> {
         match &self.store {
             Store::Memory(levels) => {
-                let level = levels.get(level as usize)?;
+                let level = levels.get(level)?;
                 let end = ((first + count) as usize).min(level.len());
                 Some(level[(first as usize).min(end)..end].to_vec())
             }
-            Store::File(path) => {
-                let sizes = sizes(self.samples);
-                let before: u64 = sizes.get(..level as usize)?.iter().sum();
-                let count = count.min(sizes.get(level as usize)?.saturating_sub(first));
-                let mut file = File::open(path).ok()?;
-                file.seek(SeekFrom::Start(HEADER_BYTES + ENTRY_BYTES * (before + first))).ok()?;
-                let mut bytes = vec![0; (ENTRY_BYTES * count) as usize];
-                file.read_exact(&mut bytes).ok()?;
-                Some(bytes.chunks_exact(ENTRY_BYTES as usize).map(Entry::from_bytes).collect())
-            }
+            Store::File(kept) => kept.entries(level, first, count),
         }
     }
-
-    fn keep(&self, path: &Path, stamp: u64) -> Result<(), crate::io::WriteError> {
-        let Store::Memory(levels) = &self.store else { return Ok(()) };
-        crate::io::atomic::write_file(path, |out: &mut BufWriter<File>| {
-            let mut header =
-                vec![MAGIC, stamp, self.samples, self.clock.start_s.to_bits(), self.clock.rate_hz.to_bits()];
-            header.resize(HEADER_BYTES as usize / 8, 0);
-            header.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))?;
-            levels.iter().flatten().try_for_each(|entry| out.write_all(&entry.to_bytes()))
-        })
-    }
-
-    fn kept(path: &Path, stamp: u64) -> Option<Self> {
-        let mut bytes = [0; HEADER_BYTES as usize];
-        File::open(path).ok()?.read_exact(&mut bytes).ok()?;
-        let word =
-            |index: usize| bytes[8 * index..8 * index + 8].try_into().map(u64::from_le_bytes).unwrap_or(0);
-        let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
-        if samples >= 1 << 48 {
-            return None;
-        }
-        let whole = HEADER_BYTES + ENTRY_BYTES * sizes(samples).iter().sum::<u64>();
-        let good = word(0) == MAGIC && word(1) == stamp && rate_hz > 0.0 && start_s.is_finite();
-        let long = fs::metadata(path).ok()?.len() == whole;
-        let clock = Clock { start_s, rate_hz, samples: Some(samples) };
-        (good && long).then(|| Self { clock, samples, store: Store::File(path.to_owned()) })
-    }
-}
-
-/// Blocks of each level.
-fn sizes(samples: u64) -> Vec<u64> {
-    let mut sizes = vec![samples.div_ceil(BLOCK)];
-    while sizes[sizes.len() - 1] > FAN as u64 {
-        sizes.push(sizes[sizes.len() - 1].div_ceil(FAN as u64));
-    }
-    sizes
-}
-
-/// Tells a file as it is now, and how it is read, from any other (FNV-1a, Fowler, Noll and Vo).
-fn stamp(path: &Path, options: &ReadOptions) -> u64 {
-    let metadata = fs::metadata(path).ok();
-    let modified = metadata.as_ref().and_then(|m| m.modified().ok()?.duration_since(UNIX_EPOCH).ok());
-    let text = format!("{:?} {modified:?} {options:?}", metadata.map(|m| m.len()));
-    text.bytes()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 impl Entry {
@@ -253,7 +219,7 @@ mod tests {
     use super::*;
     use crate::io::parquet;
     use crate::metadata::Metadata;
-    use crate::trace::Trace;
+    use std::fs;
 
     #[test]
     fn oracle_extremes_are_exact_at_every_zoom_from_memory_and_from_the_file() {
@@ -270,8 +236,8 @@ mod tests {
         let bytes = fs::metadata(pyramid_path(&path)).unwrap().len() as f64;
         assert!(bytes < 0.03 * 8.0 * samples as f64, "{bytes}");
         for (from_s, to_s, columns) in [(1.0, 7.1, 1000), (1.0, 7.1, 3), (2.5, 2.6, 20), (6.99, 7.00002, 7)] {
-            let found = kept.columns(from_s, to_s, columns);
-            assert_eq!(found, made.columns(from_s, to_s, columns));
+            let found = kept.columns(from_s, to_s, columns).unwrap();
+            assert_eq!(Some(&found), made.columns(from_s, to_s, columns).as_ref());
             assert!(
                 found[0].from_s <= from_s && found[found.len() - 1].to_s >= to_s.min(trace.end_s()) - 1e-9
             );

@@ -1,9 +1,10 @@
 //! Small tables of text and numbers, from CSV, TSV or Parquet.
 
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use crate::io::PackedFile;
+use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -14,6 +15,14 @@ const LARGEST_BYTES: u64 = 1 << 28;
 /// Why a table cannot be used.
 #[derive(Debug, Error)]
 pub enum TableReadError {
+    /// There is no such file.
+    #[error("{path}: cannot be read: {reason}", path = path.display())]
+    Absent {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
     /// The file.
     #[error("{path}: cannot be read: {reason}", path = path.display())]
     File {
@@ -58,15 +67,27 @@ impl Table {
     /// Reads a table with a header: Parquet by its first bytes, else a text with commas, semicolons or tabs.
     ///
     /// # Errors
-    /// [`TableReadError::File`] if it cannot be read.
+    /// [`TableReadError::Absent`] if it is not there, [`TableReadError::File`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, TableReadError> {
         let refuse = |reason: String| TableReadError::File { path: path.to_owned(), reason };
-        let file = File::open(path).map_err(|error| refuse(error.to_string()))?;
-        if file.metadata().map_err(|error| refuse(error.to_string()))?.len() > LARGEST_BYTES {
+        let file = File::open(path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => {
+                TableReadError::Absent { path: path.to_owned(), reason: error.to_string() }
+            }
+            _ => refuse(error.to_string()),
+        })?;
+        let there = file.metadata().map_err(|error| refuse(error.to_string()))?;
+        if there.is_dir() {
+            return Err(refuse("it is a folder; name a file in it".to_owned()));
+        }
+        if there.len() > LARGEST_BYTES {
             return Err(refuse("a table of settings has to be smaller than 256 MiB".to_owned()));
         }
         let mut bytes = Vec::new();
         (&file).read_to_end(&mut bytes).map_err(|error| refuse(error.to_string()))?;
+        if bytes.iter().all(u8::is_ascii_whitespace) {
+            return Err(refuse("it is empty; give a row for each setting".to_owned()));
+        }
         let (names, rows) = if bytes.starts_with(b"PAR1") {
             let read = catch_unwind(AssertUnwindSafe(|| from_parquet(path)));
             read.unwrap_or_else(|_| Err("it is damaged".to_owned())).map_err(refuse)?
@@ -130,8 +151,9 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 }
 
 fn from_parquet(path: &Path) -> Result<Content, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let file = SerializedFileReader::new(file).map_err(|error| error.to_string())?;
+    let told = |error: parquet::errors::ParquetError| error.to_string();
+    let file = PackedFile::open(path).map_err(told)?;
+    check_packing(&file)?;
     // Columns of columns count as one, as they do in a row.
     let names = file.metadata().file_metadata().schema().get_fields();
     let names = names.iter().map(|field| field.name().to_owned()).collect();
@@ -148,13 +170,17 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
     Ok((names, rows))
 }
 
-/// What is wrong, and what to do where that is how columns are packed.
-fn told(error: parquet::errors::ParquetError) -> String {
-    let message = error.to_string();
-    if message.contains("Disabled feature") {
-        return "its columns are packed in a way that is not read in tables; write it with snappy, or not packed".to_owned();
-    }
-    message
+/// Refuses columns that cannot be unpacked, with what to do.
+fn check_packing(file: &PackedFile) -> Result<(), String> {
+    let chunks = file.metadata().row_groups().iter().flat_map(|group| group.columns());
+    let mut packed = chunks.filter(|chunk| !PackedFile::unpacks(chunk.compression()));
+    packed.next().map_or(Ok(()), |chunk| {
+        let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
+        let codec = codec.split('(').next().unwrap_or_default();
+        Err(format!(
+            "column {column} is compressed with {codec}, which is not read: write it with Zstandard or Snappy"
+        ))
+    })
 }
 
 #[cfg(test)]

@@ -195,6 +195,11 @@ pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Op
     ))
 }
 
+/// How many of `samples` are lost after the last that is not.
+pub(crate) fn lost_at_end(lost: &[Range<usize>], samples: usize) -> u64 {
+    lost.last().filter(|last| last.end == samples).map_or(0, |last| last.len() as u64)
+}
+
 /// Left edge of a sample to the nearest nanosecond.
 pub(crate) fn time_ns(start_s: f64, rate_hz: f64, index: u64) -> i64 {
     // A float-to-int cast saturates; the constructor keeps times within i64.

@@ -39,7 +39,7 @@ fn csv_errors_name_file_row_and_column() {
         &["bad.csv", "no column current_A", "time_s, voltage_V", "rename or add"],
     );
     says(&csv_error("voltage_V,current_A\n0,1\n"), &["no column time_s"]);
-    says(&csv_error(""), &["bad.csv", "no column voltage_V (found: none)"]);
+    says(&csv_error(""), &["bad.csv", "no samples"]);
     says(&csv_error("voltage_V,Voltage_v,current_A\n"), &["column voltage_V occurs twice"]);
     says(&with(""), &["bad.csv", "no samples"]);
     says(&with("0,1,2\n1,nan,2\n"), &["bad.csv: row 2: voltage_V is \"nan\""]);
@@ -55,6 +55,27 @@ fn csv_errors_name_file_row_and_column() {
     says(&with("0,1,2\n"), &["single row", "rate_hz"]);
     says(&with("0,1,2\n1e-12,1,2\n"), &["bad.csv: sample rate 1000000000000 Hz"]);
     assert!(matches!(with("0,1,2\n1e-12,1,2\n"), ReadError::Trace { .. }));
+}
+
+#[test]
+fn what_contradicts_a_file_or_may_mean_another_number_is_refused() {
+    let (_folder, path) = in_folder("a.csv", b"time_s;voltage_V;current_A\n0,0;1,5;2,5\n0,1;1,5;2,5\n");
+    for repair in [false, true] {
+        let options = ReadOptions { repair, ..ReadOptions::default() };
+        says(&io::read(&path, &options).unwrap_err(), &["row 1: time_s is \"0,0\"", "decimal comma"]);
+    }
+    says(&csv_error("time_s,voltage_V,current_A\n0,1,1e308\n"), &["current_A is \"1e308\"", "beyond 3.4e38"]);
+    let (_folder, path) = in_folder("b.csv", b"voltage_V,current_A\n1,2\n1,2\n");
+    let swapped = ReadOptions {
+        voltage: Some("current_A".to_owned()),
+        current: Some("voltage_V".to_owned()),
+        rate_hz: Some(10.0),
+        ..ReadOptions::default()
+    };
+    says(&io::read(&path, &swapped).unwrap_err(), &["column voltage_V holds voltages", "currents"]);
+    std::fs::write(csv::sidecar_path(&path), r#"{"rate_hz": 20}"#).unwrap();
+    let other = ReadOptions { rate_hz: Some(10.0), ..ReadOptions::default() };
+    says(&io::read(&path, &other).unwrap_err(), &["10 Hz was asked for", "says 20 Hz", "--rate"]);
 }
 
 #[test]
@@ -214,7 +235,7 @@ fn says_both(path: &Path, part: &str) {
 }
 
 #[test]
-fn a_compression_that_needs_c_is_named_with_the_mend() {
+fn a_compression_that_is_not_read_is_named_with_the_mend() {
     // The footer ends with its length (4 bytes) and PAR1; in it each column's codec is the thrift i32 field 4, `15 00`
     // for none, `15 08` for Brotli (4, zigzag). Only the first such pair after the path `voltage_V` is changed.
     let ones = || Values::Float(vec![1.0; 3]);
@@ -232,7 +253,44 @@ fn a_compression_that_needs_c_is_named_with_the_mend() {
     bytes[codec + 1] = 0x08;
     let (_folder, path) = in_folder("brotli.parquet", &bytes);
     let error = parquet::read(&path).unwrap_err();
-    says(&error, &["brotli.parquet: column voltage_V is compressed with BROTLI", "write it with Snappy"]);
+    says(
+        &error,
+        &["brotli.parquet: column voltage_V is compressed with BROTLI", "write it with Zstandard or Snappy"],
+    );
+}
+
+#[test]
+fn missing_values_are_filled_by_repair_and_told_with_their_place() {
+    use Values::{Float, Maybe};
+    let times = Maybe(vec![Some(0.0), Some(0.5), Some(1.0), None, Some(2.0), Some(2.5)]);
+    let voltage = Maybe(vec![Some(1.0), None, Some(3.0), Some(1.0), Some(5.0), None]);
+    let (_folder, path) =
+        parquet_file(vec![("time_s", times), ("voltage_V", voltage), ("current_A", Float(vec![1.0; 6]))]);
+    says(&io::read(&path, &ReadOptions::default()).unwrap_err(), &["row 2: voltage_V is missing"]);
+    let options = ReadOptions { repair: true, ..ReadOptions::default() };
+    let loaded = io::read(&path, &options).unwrap();
+    assert_eq!(loaded.trace.voltage_v(), [1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
+    let told: Vec<_> = loaded.repairs.iter().map(|r| (r.code, r.row, r.time_s, r.count)).collect();
+    assert_eq!(
+        told,
+        [
+            ("dropped-rows", 4, 1.0, 1),
+            ("filled-values", 2, 0.5, 1),
+            ("filled-values", 5, 2.5, 1),
+            ("filled-gap", 3, 1.0, 1)
+        ]
+    );
+}
+
+#[test]
+fn surplus_fields_that_repair_drops_are_told_with_their_place() {
+    let rows = "time_s,voltage_V,current_A\n0,1,1\n0.5,1,2,9\n1,1,3\n1.5,1,4,9,9\n";
+    let (_folder, path) = in_folder("surplus.csv", rows.as_bytes());
+    let options = ReadOptions { repair: true, ..ReadOptions::default() };
+    let told = io::read(&path, &options).unwrap().repairs;
+    assert_eq!(io::Recording::open(&path, &options).unwrap().repairs(), told);
+    let [told] = &told[..] else { panic!("{told:?}") };
+    assert_eq!((told.code, told.row, told.time_s, told.count), ("uneven-rows", 2, 0.5, 2));
 }
 
 #[test]

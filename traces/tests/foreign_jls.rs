@@ -83,6 +83,8 @@ fn lost_samples_are_named_with_their_row_and_filled_on_request() {
     refused(&path, &ReadOptions::default(), &["row 501: ", "NaN, not a finite number"]);
     let mended = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
     assert_eq!((mended.trace.samples(), mended.repairs.is_empty()), (1000, false));
+    let place = mended.trace.time_s(500);
+    assert!(place > 0.0 && mended.repairs.iter().any(|repair| (repair.row, repair.time_s) == (501, place)));
     assert!(mended.trace.current_a().iter().all(|value| value.is_finite()));
 }
 
@@ -187,6 +189,8 @@ fn a_recording_that_was_cut_and_mended_gives_what_all_its_signals_have() {
         let loaded = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
         let told: Vec<_> = loaded.repairs.iter().map(|repair| (repair.code, repair.count)).collect();
         assert_eq!(told, [("cut-signals", current as u64 - voltage as u64)]);
+        let last_s = loaded.trace.time_s(voltage - 1);
+        assert!((loaded.repairs[0].time_s - last_s).abs() < 1e-9, "{:?}", loaded.repairs);
         assert_eq!(bits(loaded.trace.voltage_v()), bits(&whole.voltage_v()[..voltage]));
         assert_eq!(bits(loaded.trace.current_a()), bits(&whole.current_a()[..voltage]));
         let alone =

@@ -1,17 +1,50 @@
-//! Parquet as other programs write it: optional columns, dictionaries, Zstandard (pyarrow, see the file's name).
+//! Parquet as other programs write it: optional columns, dictionaries, every way of packing (pyarrow, see the file's name).
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 use traces::io::{ReadOptions, read};
+use traces::table::Table;
+
+fn foreign(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
+}
 
 #[test]
-fn zstandard_pages_hold_the_same_samples_as_the_text_beside_them() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign");
-    let packed = read(&folder.join("pyarrow_zstd.parquet"), &ReadOptions::default()).unwrap().trace;
-    let text = read(&folder.join("pyarrow_zstd.csv"), &ReadOptions::default()).unwrap().trace;
-    assert_eq!(packed.voltage_v(), text.voltage_v());
-    assert_eq!(packed.current_a(), text.current_a());
-    assert_eq!((packed.rate_hz(), packed.start_s()), (text.rate_hz(), text.start_s()));
+fn packed_pages_hold_the_same_samples_as_the_text_beside_them() {
+    let text = read(&foreign("pyarrow_zstd.csv"), &ReadOptions::default()).unwrap().trace;
+    for packing in ["zstd", "gzip", "lz4"] {
+        let path = foreign(&format!("pyarrow_{packing}.parquet"));
+        let packed = read(&path, &ReadOptions::default()).unwrap().trace;
+        assert_eq!(packed.voltage_v(), text.voltage_v(), "{packing}");
+        assert_eq!(packed.current_a(), text.current_a(), "{packing}");
+        assert_eq!((packed.rate_hz(), packed.start_s()), (text.rate_hz(), text.start_s()), "{packing}");
+    }
+}
+
+#[test]
+fn packed_tables_are_read_and_others_named_with_the_mend() {
+    for packing in ["zstd", "gzip", "lz4"] {
+        let table = Table::read(&foreign(&format!("table_{packing}.parquet"))).unwrap();
+        assert_eq!(table.texts("algorithm").unwrap(), ["VB", "TF", ""], "{packing}");
+        assert_eq!(table.numbers("time_ms").unwrap(), [1.5, 2.0, 3.0], "{packing}");
+    }
+    let message = Table::read(&foreign("table_brotli.parquet")).unwrap_err().to_string();
+    assert!(message.contains("column algorithm is compressed with BROTLI"), "{message}");
+    assert!(message.contains("write it with Zstandard or Snappy"), "{message}");
+}
+
+#[test]
+fn units_of_fields_count_as_those_of_names_do() {
+    let read = |name: &str| read(&foreign(name), &ReadOptions::default());
+    let trace = read("units.parquet").unwrap().trace;
+    assert_eq!((trace.rate_hz(), trace.voltage_v()[0], trace.current_a()[5]), (2000.0, 12.0, 5.0));
+    for (name, says) in [
+        ("units_contradict.parquet", "column time_s has the unit ms"),
+        ("units_other.parquet", "column voltage has the unit mA"),
+    ] {
+        let message = read(name).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
 }
 
 #[test]

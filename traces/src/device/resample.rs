@@ -6,7 +6,7 @@ use crate::curve::CurveError;
 use crate::energy::Sums;
 use crate::io::{Heading, Sink, Source, Stretch, WriteError};
 use crate::sum::PairSum;
-use crate::trace::{check_times, losses, lost_samples};
+use crate::trace::{check_times, losses, lost_at_end, lost_samples};
 use core::ops::Range;
 use rayon::prelude::*;
 
@@ -48,6 +48,7 @@ impl Device {
             rate_hz: self.spec.rate_hz,
             samples: samples as u64,
             lost_samples: lost_samples(&lost) as u64,
+            lost_at_end: lost_at_end(&lost, samples),
             metadata: self.metadata(metadata),
         };
         let (energy_j, clipped_currents, clipped_voltages) = (0.0, 0, 0);

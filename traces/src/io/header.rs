@@ -22,6 +22,9 @@ pub(crate) struct Header {
     pub start_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub samples: Option<u64>,
+    /// How many samples were lost after the last row.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_at_end: Option<u64>,
     pub units: BTreeMap<String, serde_json::Value>,
     #[serde(flatten)]
     pub metadata: Metadata,
@@ -30,7 +33,8 @@ pub(crate) struct Header {
 /// The description of a trace as JSON, on one line if it is to be put into a file's metadata.
 pub(super) fn to_json(trace: &Heading, pretty: bool) -> Result<String, WriteError> {
     let samples = trace.samples - trace.lost_samples;
-    let header = describe(trace.rate_hz, trace.start_s, Some(samples), &trace.metadata)?;
+    let mut header = describe(trace.rate_hz, trace.start_s, Some(samples), &trace.metadata)?;
+    header.lost_at_end = Some(trace.lost_at_end).filter(|lost| *lost > 0);
     let json = if pretty { serde_json::to_string_pretty(&header) } else { serde_json::to_string(&header) };
     json.map_err(|error| WriteError::Encode(error.to_string()))
 }
@@ -56,6 +60,7 @@ pub(super) fn describe(
         rate_hz: Some(rate_hz),
         start_s: Some(start_s),
         samples,
+        lost_at_end: None,
         units: [("time_ns", "ns"), ("time_s", "s"), ("voltage_V", "V"), ("current_A", "A")].map(unit).into(),
         metadata,
     })
@@ -91,6 +96,19 @@ pub(super) fn from_json(path: &Path, json: &str) -> Result<Header, ReadError> {
 }
 
 impl Header {
+    /// When a row was taken by rate and start, s: of files without times.
+    pub(crate) fn time_s(&self, row: usize) -> f64 {
+        self.start_s.unwrap_or(0.0) + row as f64 / self.rate_hz.unwrap_or(f64::INFINITY)
+    }
+
+    /// Refuses what ends before the recording did.
+    pub(crate) fn check_end(&self, path: &Path) -> Result<(), ReadError> {
+        match self.lost_at_end.filter(|lost| *lost > 0) {
+            Some(lost) => Err(ReadError::LostEnd { path: path.to_owned(), lost }),
+            None => Ok(()),
+        }
+    }
+
     /// Holds the stated number of samples against the rows found.
     pub(crate) fn check_rows(&self, path: &Path, found: u64) -> Result<(), ReadError> {
         match self.samples {

@@ -24,7 +24,7 @@ pub use options::ReadOptions;
 pub use read::{Loaded, read};
 pub use recording::Recording;
 pub use repair::Repair;
-pub use rows::Rows;
+pub use rows::{Rows, SumOfRails, rail_of_sums};
 #[cfg(test)]
 pub(crate) use source::Cut;
 pub use source::{Heading, Sink, Source, Stretch};
@@ -32,5 +32,6 @@ pub use source::{Heading, Sink, Source, Stretch};
 /// The names of the columns that files are written with; read without regard to case.
 pub const COLUMNS: [&str; 4] = ["time_ns", "time_s", "voltage_V", "current_A"];
 
-pub(crate) use rows::Chunk;
+pub(crate) use jls::crc32c;
+pub(crate) use rows::{Chunk, PackedFile};
 pub(crate) use timing::{Stamps, all_apart, grid, rounded_rate_hz};

@@ -42,13 +42,16 @@ pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
         return Err(ReadError::Empty { path });
     }
     rows.header.check_rows(&path, read as u64)?;
+    let mut repairs: Vec<Repair> = rows.repair().into_iter().collect();
     let mut header = std::mem::take(&mut rows.header);
-    let mut repairs: Vec<Repair> = rows.cut().cloned().into_iter().collect();
     if rows.mends() {
         repairs.extend(mend(&path, &mut columns, &mut header)?);
     }
     let Columns { stamps, voltage_v, current_a } = columns;
     let grid = timing::grid(&path, &stamps, &header)?;
+    if !rows.mends() {
+        header.check_end(&path)?;
+    }
     let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata)
         .map_err(|error| ReadError::trace(&path, error))?;
     Ok(Loaded { trace, repairs })

@@ -15,11 +15,11 @@ const LONGER: usize = 16;
 /// Something that was mended.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// `cut-signals`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
+    /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
     pub code: &'static str,
     /// The first row (from 1, as rows stand in the file; after sorting, as they stand then).
     pub row: u64,
-    /// When, s; 0 where the file has no times.
+    /// When, s; by rate and start where the file has no times.
     pub time_s: f64,
     /// How many rows or samples.
     pub count: u64,
@@ -37,13 +37,15 @@ pub(super) fn mend(
     let mut told = Vec::new();
     let times = seconds(&columns.stamps);
     let mut times = times.map(|times| order(times, columns, &mut told));
-    fill(path, "voltage_V", &mut columns.voltage_v, times.as_deref(), &mut told)?;
-    fill(path, "current_A", &mut columns.current_a, times.as_deref(), &mut told)?;
+    let time_s = |row: usize| times.as_ref().map_or_else(|| header.time_s(row), |times| times[row]);
+    fill(path, "voltage_V", &mut columns.voltage_v, &time_s, &mut told)?;
+    fill(path, "current_A", &mut columns.current_a, &time_s, &mut told)?;
     if let Some(times) = &mut times
         && times.len() > 1
     {
         space(path, times, columns, header, &mut told)?;
     }
+    lengthen(path, columns, times.as_mut(), header, &mut told)?;
     if !told.is_empty() {
         header.samples = None;
         if let Some(times) = times {
@@ -60,35 +62,42 @@ fn seconds(stamps: &Stamps) -> Option<Vec<f64>> {
 /// Drops rows without a time or with one that was there before, and sorts the rest.
 fn order(times: Vec<f64>, columns: &mut Columns, told: &mut Vec<Repair>) -> Vec<f64> {
     let mut rows: Vec<usize> = (0..times.len()).filter(|&row| times[row].is_finite()).collect();
-    let lost = times.iter().position(|time| !time.is_finite());
     let unsorted = rows.windows(2).position(|pair| times[pair[1]] < times[pair[0]]).map(|at| rows[at + 1]);
     rows.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
-    let before = rows.len();
-    rows.dedup_by(|later, earlier| times[*later] == times[*earlier]);
-    let dropped = times.len() - rows.len();
-    if dropped > 0 {
-        let row = lost.unwrap_or(0) as u64 + 1;
-        let message = format!(
-            "{dropped} rows without a time of their own were dropped ({} repeats)",
-            before - rows.len()
-        );
-        told.push(Repair { code: "dropped-rows", row, time_s: 0.0, count: dropped as u64, message });
-    }
+    let mut repeats = Vec::new();
+    rows.dedup_by(|later, earlier| {
+        let repeated = times[*later] == times[*earlier];
+        repeats.extend(repeated.then_some(*later));
+        repeated
+    });
+    let dropped = dropped(&times, &repeats);
     if let Some(row) = unsorted {
         let message = format!("rows were sorted by time; row {} was the first out of order", row + 1);
-        told.push(Repair {
-            code: "sorted-rows",
-            row: row as u64 + 1,
-            time_s: times[row],
-            count: rows.len() as u64,
-            message,
-        });
+        let count = rows.len() as u64;
+        told.push(Repair { code: "sorted-rows", row: row as u64 + 1, time_s: times[row], count, message });
     }
-    if dropped > 0 || unsorted.is_some() {
+    if dropped.is_some() || unsorted.is_some() {
         columns.voltage_v = rows.iter().map(|&row| columns.voltage_v[row]).collect();
         columns.current_a = rows.iter().map(|&row| columns.current_a[row]).collect();
     }
+    told.splice(0..0, dropped);
     rows.iter().map(|&row| times[row]).collect()
+}
+
+/// Tells of rows without a time and of those that repeat one. The place is the first of them; where it has no time, that of
+/// the last row before which has one, else of the first after.
+fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
+    let count = times.iter().filter(|time| !time.is_finite()).count() + repeats.len();
+    let lost = times.iter().position(|time| !time.is_finite());
+    let row = lost.into_iter().chain(repeats.iter().copied()).min()?;
+    let finite = |time: &&f64| time.is_finite();
+    let near = times[..=row].iter().rfind(finite).or_else(|| times[row..].iter().find(finite));
+    let (time_s, row) = (near.copied().unwrap_or(0.0), row as u64 + 1);
+    let message = format!(
+        "{count} rows without a time of their own were dropped ({} repeats), the first of them row {row} (about {time_s} s)",
+        repeats.len()
+    );
+    Some(Repair { code: "dropped-rows", row, time_s, count: count as u64, message })
 }
 
 /// Puts the straight line between its neighbours in place of every stretch that is not finite.
@@ -96,7 +105,7 @@ fn fill(
     path: &Path,
     name: &str,
     values: &mut [f32],
-    times: Option<&[f64]>,
+    time_s: &dyn Fn(usize) -> f64,
     told: &mut Vec<Repair>,
 ) -> Result<(), ReadError> {
     let mut from = 0;
@@ -114,7 +123,7 @@ fn fill(
             let share = (at + 1) as f32 / (end + 1 - first) as f32;
             *value = before + share * (after - before);
         }
-        let time_s = times.map_or(0.0, |times| times[first]);
+        let time_s = time_s(first);
         let message =
             format!("{name}: {} values from row {} ({time_s} s) on were not finite", end - first, first + 1);
         told.push(Repair {
@@ -184,6 +193,37 @@ fn space(
     columns.current_a = interpolated(times, &columns.current_a, &grid, OFF / rate_hz);
     *times = grid;
     header.rate_hz = Some(rate_hz);
+    Ok(())
+}
+
+/// Puts samples like the last one where the recorder lost the end.
+fn lengthen(
+    path: &Path,
+    columns: &mut Columns,
+    times: Option<&mut Vec<f64>>,
+    header: &Header,
+    told: &mut Vec<Repair>,
+) -> Result<(), ReadError> {
+    let rows = columns.voltage_v.len();
+    let Some(lost) = header.lost_at_end.filter(|lost| *lost > 0 && rows > 0) else { return Ok(()) };
+    let longer = usize::try_from(lost).ok().map(|lost| rows.saturating_add(lost));
+    let Some(longer) = longer.filter(|longer| *longer <= LONGER.saturating_mul(rows)) else {
+        let reason = format!("{lost} samples are said to be lost after {rows} rows");
+        return Err(ReadError::Repair { path: path.to_owned(), reason });
+    };
+    let time_s = match times {
+        Some(times) => {
+            let (last_s, rate_hz) = (times[rows - 1], header.rate_hz.unwrap_or_else(|| usual_rate_hz(times)));
+            times.extend((1..=lost).map(|after| last_s + after as f64 / rate_hz));
+            last_s
+        }
+        None => header.time_s(rows - 1),
+    };
+    for values in [&mut columns.voltage_v, &mut columns.current_a] {
+        values.resize(longer, values[rows - 1]);
+    }
+    let message = format!("after the last row ({time_s} s) {lost} samples were missing");
+    told.push(Repair { code: "filled-gap", row: rows as u64, time_s, count: lost, message });
     Ok(())
 }
 

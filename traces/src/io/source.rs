@@ -6,7 +6,7 @@
 
 use super::WriteError;
 use crate::metadata::Metadata;
-use crate::trace::{Trace, time_ns};
+use crate::trace::{Trace, lost_at_end, time_ns};
 
 /// What is known of a trace before its first sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +19,8 @@ pub struct Heading {
     pub samples: u64,
     /// How many of them the recorder lost.
     pub lost_samples: u64,
+    /// How many of those come after the last sample that was not lost: where files leave lost samples out, no row tells of them.
+    pub lost_at_end: u64,
     /// Where the trace comes from.
     pub metadata: Metadata,
 }
@@ -114,6 +116,7 @@ impl Source for Trace {
             rate_hz: self.rate_hz(),
             samples: self.samples() as u64,
             lost_samples: self.lost_samples() as u64,
+            lost_at_end: lost_at_end(self.lost(), self.samples()),
             metadata: self.metadata.clone(),
         }
     }

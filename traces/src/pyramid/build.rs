@@ -36,6 +36,7 @@ pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, Rea
         }
     }
     rows.header.check_rows(path, samples)?;
+    rows.header.check_end(path)?;
     clock.rate_hz = steps.and_then(|steps| steps.rate_hz(samples)).unwrap_or(clock.rate_hz);
     Ok(Pyramid::of_blocks(clock, samples, base))
 }

@@ -80,6 +80,7 @@ pub(super) fn run(path: &Path, options: &ReadOptions, marks: &Marks) -> Result<S
     let mut rows = Rows::open(path, options)?;
     let gathered = plan.gather(&mut rows)?;
     rows.header.check_rows(path, gathered.samples)?;
+    rows.header.check_end(path)?;
     Ok(conclude(plan, marks, gathered, rows.header.metadata)?)
 }
 

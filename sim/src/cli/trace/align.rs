@@ -4,6 +4,7 @@ use std::io::Write;
 
 use serde_json::json;
 use traces::align::{AlignError, Alignment};
+use traces::io::Heading;
 use traces::io::atomic::write_file;
 
 use super::args::AlignArgs;
@@ -19,12 +20,28 @@ impl From<AlignError> for Failure {
     }
 }
 
+/// Refuses an anchor at a time that the trace does not have.
+fn is_within((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Failure> {
+    let (start_s, end_s) = (trace.start_s, trace.end_s());
+    let rounding_s = 1e-12 * start_s.abs().max(end_s.abs());
+    if (start_s - rounding_s..=end_s + rounding_s).contains(&time_s) {
+        return Ok(());
+    }
+    Err(wrong(format!(
+        "--anchor {stamp_s}={time_s}: {time_s} s is not within the trace, {start_s} s to {end_s} s; write STAMP=TIME"
+    )))
+}
+
 pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {
-        [a, b] => Alignment::by_anchors(a, b)?,
+        [a, b] => {
+            let trace = args.input.source()?.0.heading();
+            [a, b].iter().try_for_each(|anchor| is_within(*anchor, &trace))?;
+            Alignment::by_anchors(a, b)?
+        }
         [] => {
             let found = args.find.frames(&args.input, &args.input.trace)?.found;
             let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();

@@ -19,6 +19,7 @@ use crate::cli::terminal::{complain, print, print_json};
 const LEVELS: u64 = 65_536;
 
 pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
+    passes_differ(&args.pass)?;
     let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
@@ -221,6 +222,16 @@ fn passes(
     let energies: Vec<f64> = energies_j(trace, &spans)?.into_iter().zip(&spans).map(less_idle).collect();
     let spreads = energies.chunks(frames.len()).map(Spread::of);
     Ok(marks.iter().zip(spreads).filter_map(|((name, _), spread)| Some((name.clone(), spread?))).collect())
+}
+
+/// Refuses two passes of one name, whose energies could not be told apart.
+fn passes_differ(passes: &[(String, f64)]) -> Result<(), Failure> {
+    let mut names: Vec<&str> = passes.iter().map(|(name, _)| name.as_str()).collect();
+    names.sort_unstable();
+    match names.windows(2).find(|two| two[0] == two[1]) {
+        Some(two) => Err(wrong(format!("--pass {} is given twice: name each pass differently", two[0]))),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a pass that begins in no frame, and tells of one that begins in some alone.

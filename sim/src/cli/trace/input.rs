@@ -5,7 +5,7 @@ use std::path::Path;
 
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadError, ReadOptions, Recording, Repair, Rows, Source, WriteError, read};
+use traces::io::{ReadError, ReadOptions, Recording, Repair, Rows, Source, WriteError, rail_of_sums, read};
 use traces::stream::{self, StreamError};
 use traces::trace::RATE_LIMITS_HZ;
 use traces::{MarkKind, Metadata, Trace, Warning};
@@ -22,8 +22,10 @@ const LONG_BYTES: u64 = 1 << 30;
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        let asked = matches!(error, ReadError::MissingColumn { .. } | ReadError::Format { .. })
-            || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
+        let asked = matches!(
+            error,
+            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Asked { .. }
+        ) || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
         Self { message: error.to_string(), code: if asked { 2 } else { 1 } }
     }
 }
@@ -96,6 +98,7 @@ impl InputArgs {
     /// Another trace, read in the same way.
     pub(super) fn load_other(&self, path: &Path) -> Result<(Trace, Vec<Repair>), Failure> {
         let loaded = read(path, &self.options()?)?;
+        self.warn_of_sums(path)?;
         tell_repairs(path, &loaded.repairs);
         Ok((loaded.trace, loaded.repairs))
     }
@@ -105,6 +108,7 @@ impl InputArgs {
     pub(super) fn source(&self) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
         match Recording::open(&self.trace, &self.options()?) {
             Ok(recording) => {
+                self.warn_of_sums(&self.trace)?;
                 let repairs = recording.repairs().to_vec();
                 tell_repairs(&self.trace, &repairs);
                 Ok((Box::new(recording), repairs))
@@ -115,6 +119,21 @@ impl InputArgs {
             }
             Err(error) => Err(error.into()),
         }
+    }
+}
+
+impl InputArgs {
+    /// Tells where a rail is added to those that it is the sum of.
+    pub(super) fn warn_of_sums(&self, path: &Path) -> Result<(), Failure> {
+        if !self.rail.is_empty() {
+            return Ok(());
+        }
+        if let Some(sum) = rail_of_sums(path, &self.options()?)? {
+            let others: Vec<String> = sum.others.iter().map(|rail| format!("--rail {rail}")).collect();
+            let alone = if sum.rail.is_empty() { String::new() } else { format!("--rail {}, or ", sum.rail) };
+            complain(&format!("warning rail-counted-twice: {sum}: give {alone}{}", others.join(" ")));
+        }
+        Ok(())
     }
 }
 
@@ -210,6 +229,7 @@ impl FindArgs {
         let end_s = self.end.or_else(|| end_mark(rows.metadata())).unwrap_or(f64::INFINITY);
         let marks = Marks { starts_s, window: self.window_s()?, end_s };
         let streamed = stream::find(path, &options, &marks)?;
+        input.warn_of_sums(path)?;
         let clock = streamed.clock;
         Ok(Frames {
             found: streamed.found,

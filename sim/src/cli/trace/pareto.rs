@@ -6,7 +6,7 @@ use std::io::Write;
 use serde_json::json;
 use traces::io::atomic::write_file;
 use traces::pareto::{Point, Standing, frontier};
-use traces::table::Table as Columns;
+use traces::table::{Table as Columns, TableReadError};
 
 use super::args::{ParetoArgs, ParetoShow};
 use super::input::wrong;
@@ -18,11 +18,18 @@ use crate::cli::terminal::{print, print_json};
 use crate::output::plot::{Lines, Mark, Series};
 use crate::output::table::{Table, si_digits};
 
+impl From<TableReadError> for Failure {
+    fn from(error: TableReadError) -> Self {
+        let code = if matches!(error, TableReadError::File { .. }) { 1 } else { 2 };
+        Self { message: error.to_string(), code }
+    }
+}
+
 type Groups = BTreeMap<String, Vec<Standing>>;
 
 pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.table.as_path()])?;
-    let table = Columns::read(&args.table).map_err(|error| wrong(error.to_string()))?;
+    let table = Columns::read(&args.table)?;
     let groups = groups(args, &table)?;
     if let Some(out) = &args.out {
         if out.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
@@ -40,7 +47,7 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
 
 fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
     let numbers = |column: &str, scale: f64| -> Result<Vec<f64>, Failure> {
-        let values = table.numbers(column).map_err(|error| wrong(error.to_string()))?;
+        let values = table.numbers(column)?;
         Ok(values.into_iter().map(|value| value * scale).collect())
     };
     let unit = |column: &str, of: Quantity| scale(column, of).map_err(wrong);
@@ -49,7 +56,7 @@ fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
         Some(column) => numbers(column, unit(column, quantity)?.or(unit(of, quantity)?).unwrap_or(1.0)),
         None => Ok(vec![0.0; table.rows()]),
     };
-    let texts = |column: &String| table.texts(column).map_err(|error| wrong(error.to_string()));
+    let texts = |column: &String| table.texts(column);
     let (time, energy) = ((args.time.as_str(), Quantity::Time), (args.energy.as_str(), Quantity::Energy));
     let [times, energies] =
         [time, energy].map(|(column, of)| numbers(column, unit(column, of)?.unwrap_or(1.0)));
@@ -79,7 +86,8 @@ fn check(args: &ParetoArgs, times: &[f64], time_sd: &[f64], energy_sd: &[f64]) -
         wrong(format!("{}: row {}: {what}: mend or drop the row", args.table.display(), row + 1))
     };
     if times.is_empty() {
-        return Err(wrong(format!("{}: has no row: give one for each setting", args.table.display())));
+        let message = format!("{}: has no row: give one for each setting", args.table.display());
+        return Err(Failure { message, code: 1 });
     }
     if let Some(row) = times.iter().position(|time_s| *time_s <= 0.0) {
         return Err(refuse(row, &format!("{} is not above 0", args.time)));

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
-use traces::pyramid::{Column, Pyramid};
+use traces::pyramid::{Column, Pyramid, pyramid_path};
 
 use super::args::{PlotArgs, PlotKind};
 use super::input::wrong;
@@ -73,17 +73,30 @@ fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure
     Err(wrong(format!("--from {from_s} --to {to_s}: the trace is from {start_s} s to {end_s} s")))
 }
 
-/// Lowest, highest and mean power of each column, from the pyramid beside the file.
+/// What is shown, and its columns: from the pyramid beside the file, or from the samples where these are few.
+fn columns(args: &PlotArgs) -> Result<((f64, f64), Vec<Column>), Failure> {
+    if args.input.repair {
+        // What is mended is told, so it is mended anew each time.
+        let trace = args.input.load()?.0;
+        let shown = span(args, trace.start_s(), trace.end_s())?;
+        let columns = Pyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
+        return Ok((shown, columns.unwrap_or_default()));
+    }
+    let (path, options) = (args.input.trace.as_path(), args.input.options()?);
+    args.input.warn_of_sums(path)?;
+    let pyramid = Pyramid::of_file(path, &options)?;
+    let shown = span(args, pyramid.start_s(), pyramid.end_s())?;
+    if let Some(columns) = pyramid.columns_of_file((path, &options), shown, COLUMNS)? {
+        return Ok((shown, columns));
+    }
+    complain(&format!("{}: damaged; made anew", pyramid_path(path).display()));
+    let columns = Pyramid::anew(path, &options)?.columns_of_file((path, &options), shown, COLUMNS)?;
+    Ok((shown, columns.unwrap_or_default()))
+}
+
+/// Lowest, highest and mean power of each column.
 fn curve(args: &PlotArgs) -> Result<(Picture, String), Failure> {
-    let options = args.input.options()?;
-    // What is mended is told, so it is mended anew each time.
-    let pyramid = if args.input.repair {
-        Pyramid::of_trace(&args.input.load()?.0)
-    } else {
-        Pyramid::of_file(&args.input.trace, &options)?
-    };
-    let (from_s, to_s) = span(args, pyramid.start_s(), pyramid.end_s())?;
-    let columns = pyramid.columns(from_s, to_s, COLUMNS);
+    let ((from_s, to_s), columns) = columns(args)?;
     let middle = |column: &Column| 0.5 * (column.from_s + column.to_s);
     let band = columns.iter().map(|c| (middle(c), f64::from(c.low_w), f64::from(c.high_w))).collect();
     let width_s = args.low_pass.map_or((to_s - from_s) / 50.0, |ms| ms * 1e-3);

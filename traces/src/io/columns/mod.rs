@@ -66,9 +66,36 @@ fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Pic
     let numbered =
         || column.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).filter(|&n| n < names.len());
     let index = named.or_else(numbered).ok_or_else(|| missing(path, names, column))?;
-    let scale =
-        understood(&names[index]).filter(|named| named.quantity == of).map_or(1.0, |named| named.scale);
+    let told = understood(&names[index]);
+    if let Some(other) = told.as_ref().filter(|named| named.quantity != of && named.sure) {
+        let reason = format!(
+            "column {} holds {} by its name, but was asked for as that of {}: choose another, or rename it",
+            names[index],
+            other.quantity.name(),
+            of.name()
+        );
+        return Err(ReadError::Asked { path: path.to_owned(), reason });
+    }
+    let scale = told.filter(|named| named.quantity == of).map_or(1.0, |named| named.scale);
     Ok(Picked { index, name: names[index].clone(), scale })
+}
+
+/// What to multiply a column by for s, V, A or W, by the unit that a file says beside its name; units that are not known say
+/// nothing.
+///
+/// # Errors
+/// [`ReadError::Unit`] if name and unit contradict each other, or the unit is of something else.
+fn scale_by(path: &Path, picked: &Picked, unit: &str, of: Quantity) -> Result<f64, ReadError> {
+    let Some(told) = understood(&format!("_{unit}")).filter(|told| told.has_unit && told.rail.is_empty())
+    else {
+        return Ok(picked.scale);
+    };
+    let stated = understood(&picked.name).filter(|named| named.quantity == of && named.has_unit);
+    if told.quantity == of && stated.is_none_or(|stated| stated.scale == told.scale) {
+        return Ok(told.scale);
+    }
+    let (path, column, unit) = (path.to_owned(), picked.name.clone(), unit.to_owned());
+    Err(ReadError::Unit { path, column, unit, of: of.name() })
 }
 
 fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
@@ -139,6 +166,17 @@ fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
     Ok(layout)
 }
 
+impl Quantity {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Time => "times",
+            Self::Voltage => "voltages",
+            Self::Current => "currents",
+            Self::Power => "powers",
+        }
+    }
+}
+
 fn native(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Time => "time_s",
@@ -184,6 +222,29 @@ fn chosen(
 }
 
 impl Layout {
+    /// Takes units from where a file has them beside the names of its columns.
+    ///
+    /// # Errors
+    /// [`ReadError::Unit`] where they do not go with the names.
+    pub fn with_units(&mut self, path: &Path, units: &BTreeMap<String, String>) -> Result<(), ReadError> {
+        let put = |picked: &mut Picked, of: Quantity| match units.get(&picked.name) {
+            Some(unit) => scale_by(path, picked, unit, of).map(|scale| picked.scale = scale),
+            None => Ok(()),
+        };
+        self.time.as_mut().map_or(Ok(()), |time| put(time, Quantity::Time))?;
+        for rail in &self.rails {
+            let columns = match *rail {
+                Rail::Measured { voltage, current } => {
+                    vec![(voltage, Quantity::Voltage), (current, Quantity::Current)]
+                }
+                Rail::Specified { current, .. } => vec![(current, Quantity::Current)],
+                Rail::Power { power } => vec![(power, Quantity::Power)],
+            };
+            columns.into_iter().try_for_each(|(index, of)| put(&mut self.values[index], of))?;
+        }
+        Ok(())
+    }
+
     fn add(
         &mut self,
         path: &Path,

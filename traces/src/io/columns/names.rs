@@ -16,6 +16,10 @@ pub(super) struct Named {
     /// What to multiply by for s, V, A or W.
     pub scale: f64,
     pub rail: String,
+    /// Whether a word or a unit of more than one letter says what it is, or a unit in brackets.
+    pub sure: bool,
+    /// Whether it has a unit.
+    pub has_unit: bool,
 }
 
 const UNITS: [(&str, Quantity, f64); 17] = [
@@ -63,6 +67,9 @@ pub(super) fn understood(name: &str) -> Option<Named> {
     let quantity_told = told.or(unit.map(|(_, of, _)| of))?;
     // A single letter is a unit only where nothing but a rail stands beside it or the quantity is told as well.
     let scale = if is_mega(name, unit) { 1e6 } else { unit.map_or(1.0, |(_, _, scale)| scale) };
+    let has_unit = unit.is_some();
+    let sure = tokens.iter().any(|token| token.len() > 1 && quantity(token) == told && told.is_some())
+        || unit.is_some_and(|(token, ..)| token.len() > 1 || lower.ends_with(&format!("({token})")));
     let mut unit = unit.map(|(token, _, _)| token);
     let mut rail: Vec<&str> = Vec::new();
     for token in tokens.iter().rev() {
@@ -73,7 +80,7 @@ pub(super) fn understood(name: &str) -> Option<Named> {
         }
     }
     rail.reverse();
-    Some(Named { quantity: quantity_told, scale, rail: rail.join("_") })
+    Some(Named { quantity: quantity_told, scale, rail: rail.join("_"), sure, has_unit })
 }
 
 /// `power_MW` are megawatts; where all is in capitals, `M` says nothing.

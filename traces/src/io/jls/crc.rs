@@ -34,7 +34,7 @@ const fn tables() -> [[u32; 256]; 8] {
 }
 
 /// CRC-32C of some bytes.
-pub(in crate::io) fn crc32c(bytes: &[u8]) -> u32 {
+pub(crate) fn crc32c(bytes: &[u8]) -> u32 {
     let (words, rest) = bytes.as_chunks::<8>();
     let crc = words.iter().fold(!0, |crc: u32, word| {
         let [a, b, c, d] = crc.to_le_bytes();

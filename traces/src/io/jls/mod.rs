@@ -14,5 +14,5 @@ mod summary;
 mod utc;
 mod write;
 
-pub(in crate::io) use crc::crc32c;
+pub(crate) use crc::crc32c;
 pub use write::{Writer, save, write};

@@ -39,7 +39,7 @@ impl Recording {
             grid = Seen::of(path, options, piece, Some(grid.rate_hz))?.fit.conclude()?.grid;
         }
         check_times(seen.rows, grid.rate_hz, grid.start_s).map_err(|error| ReadError::trace(path, error))?;
-        if let Some(error) = seen.voltage.or(seen.current) {
+        if let Some(error) = seen.voltage.or(seen.current).or(seen.end) {
             return Err(error);
         }
         let heading = Heading {
@@ -47,12 +47,13 @@ impl Recording {
             rate_hz: grid.rate_hz,
             samples: seen.rows,
             lost_samples: 0,
+            lost_at_end: 0,
             metadata: seen.metadata,
         };
         Ok(Self { path: path.to_owned(), options: options.clone(), piece, heading, repairs: seen.repairs })
     }
 
-    /// What was mended when the file was opened.
+    /// What was mended as the file was looked through.
     pub fn repairs(&self) -> &[Repair] {
         &self.repairs
     }
@@ -71,6 +72,8 @@ struct Seen {
     /// The first value of each channel that is not finite.
     voltage: Option<ReadError>,
     current: Option<ReadError>,
+    /// What is wrong with the end of a recording that is whole up to there.
+    end: Option<ReadError>,
 }
 
 impl Seen {
@@ -89,8 +92,8 @@ impl Seen {
             return Err(ReadError::Empty { path: path.to_owned() });
         }
         rows.header.check_rows(path, count)?;
-        let repairs = rows.cut().cloned().into_iter().collect();
-        Ok(Self { fit, rows: count, metadata: rows.header.metadata, repairs, voltage, current })
+        let (repairs, end) = (rows.repair().into_iter().collect(), rows.header.check_end(path).err());
+        Ok(Self { fit, rows: count, metadata: rows.header.metadata, repairs, voltage, current, end })
     }
 }
 

@@ -6,7 +6,7 @@ use crate::io::columns::{Layout, Picked, layout};
 use crate::io::csv::{delimiter, sidecar_path};
 use crate::io::header::{self, Header};
 use crate::io::timing::Stamps;
-use crate::io::{ReadError, ReadOptions};
+use crate::io::{ReadError, ReadOptions, Repair};
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 use flate2::read::MultiGzDecoder;
 use std::fs::{self, File};
@@ -24,6 +24,8 @@ pub(super) struct CsvRows {
     row: u64,
     /// Whether the first record is in `record` already: it was looked at for names and had none.
     held: bool,
+    /// Rows with more or fewer fields than there are names: the first, its time if it has one, and how many.
+    uneven: Option<(u64, Option<f64>, u64)>,
 }
 
 fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
@@ -61,8 +63,11 @@ impl CsvRows {
             .from_reader(Box::new(text) as Text);
         let mut record = ByteRecord::new();
         let any = reader.read_byte_record(&mut record).map_err(|error| damaged(path, &error))?;
-        let numbers = any && record.iter().all(|field| number::<f64>(field).is_some());
-        let held = any && !options.header.unwrap_or(!numbers);
+        if !any {
+            return Err(ReadError::Empty { path: path.to_owned() });
+        }
+        let numbers = record.iter().all(|field| number::<f64>(field).is_some());
+        let held = !options.header.unwrap_or(!numbers);
         let names: Vec<String> = if held {
             unnamed(record.len())
         } else {
@@ -72,11 +77,23 @@ impl CsvRows {
                 .collect()
         };
         let layout = layout(path, &names, options)?;
-        Ok((Self { path: path.to_owned(), reader, record, names, row: 0, held }, layout, header))
+        let path = path.to_owned();
+        Ok((Self { path, reader, record, names, row: 0, held, uneven: None }, layout, header))
     }
 
     pub fn names(&self) -> &[String] {
         &self.names
+    }
+
+    /// What was mended in the rows so far, by a description with rate and start where they have no times.
+    pub fn repair(&self, header: &Header) -> Option<Repair> {
+        let (row, time_s, count) = self.uneven?;
+        let time_s = time_s.unwrap_or_else(|| header.time_s(row as usize - 1));
+        let message = format!(
+            "{count} rows have more or fewer fields than there are columns, the first of them row {row} ({time_s} s); \
+             surplus fields were dropped"
+        );
+        Some(Repair { code: "uneven-rows", row, time_s, count, message })
     }
 
     /// Moves to the next row; whether there was one.
@@ -123,6 +140,10 @@ impl CsvRows {
             if let Some(time) = &layout.time {
                 times.push(self.field::<f64>(time, repair, f64::NAN)? * time.scale);
             }
+            if self.record.len() != self.names.len() {
+                let time_s = times.last().copied().filter(|time_s| time_s.is_finite());
+                self.uneven.get_or_insert((self.row, time_s, 0)).2 += 1;
+            }
             for (column, values) in layout.values.iter().zip(&mut chunk.values) {
                 // Parsed as f32 at once: two roundings, decimal to f64 to f32, can differ from one.
                 values.push(self.field::<f32>(column, repair, f32::NAN)?);
@@ -145,10 +166,20 @@ impl CsvRows {
         let field = self.record.get(column.index).unwrap_or_default();
         match number(field) {
             Some(value) => Ok(value),
+            None if has_decimal_comma(field) => Err(ReadError::DecimalComma {
+                path: self.path.clone(),
+                row: self.row,
+                column: column.name.clone(),
+                value: String::from_utf8_lossy(field).chars().take(40).collect(),
+            }),
             None if repair => Ok(none),
             None => {
                 let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
-                let value = if shown.is_empty() { "empty".to_owned() } else { format!("{shown:?}") };
+                let value = match number::<f64>(field) {
+                    Some(_) => format!("{shown:?}, which is beyond 3.4e38"),
+                    None if shown.is_empty() => "empty".to_owned(),
+                    None => format!("{shown:?}"),
+                };
                 Err(ReadError::Value {
                     path: self.path.clone(),
                     row: self.row,
@@ -171,7 +202,15 @@ fn unnamed(columns: usize) -> Vec<String> {
 
 /// Whether there is something in a field that is no number, not even one that is not finite.
 fn is_word(field: &[u8]) -> bool {
-    !field.is_empty() && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_err())
+    !field.is_empty()
+        && !has_decimal_comma(field)
+        && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_err())
+}
+
+/// Whether a field would be a number if its only comma were a point.
+fn has_decimal_comma(field: &[u8]) -> bool {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    text.matches(',').count() == 1 && number::<f64>(text.replace(',', ".").as_bytes()).is_some()
 }
 
 fn number<T: std::str::FromStr + Finite>(field: &[u8]) -> Option<T> {

@@ -3,10 +3,16 @@
 mod csv;
 mod jls;
 mod lines;
+mod packed;
 mod parquet;
+mod power;
+mod sums;
 mod zstd;
 
-use super::columns::{Layout, Rail};
+pub(crate) use packed::PackedFile;
+pub use sums::{SumOfRails, rail_of_sums};
+
+use super::columns::Layout;
 use super::header::Header;
 use super::timing::Stamps;
 use super::{ReadError, ReadOptions, Repair};
@@ -26,6 +32,9 @@ const FOREIGN: [(&[u8], &str, &str); 3] = [
         "export it to CSV from its own program",
     ),
 ];
+
+/// By what share a rate that is asked for may differ from that of the file: clocks do, and JLS rounds by as much.
+const RATE_OFF: f64 = 1e-3;
 
 /// Some rows.
 #[derive(Debug)]
@@ -97,6 +106,7 @@ impl Rows {
         options: &ReadOptions,
         time: &str,
     ) -> Result<Self, ReadError> {
+        check_asked(path, &layout, &header, options)?;
         header.rate_hz = options.rate_hz.or(header.rate_hz);
         header.start_s = options.start_s.or(header.start_s);
         if layout.time.is_none() && header.rate_hz.is_none() {
@@ -152,9 +162,13 @@ impl Rows {
         Ok(())
     }
 
-    /// What was mended when the file was opened.
-    pub(crate) fn cut(&self) -> Option<&Repair> {
-        if let Source::Jls(rows) = &self.source { rows.cut() } else { None }
+    /// What was mended when the file was opened and in the rows read since.
+    pub(crate) fn repair(&self) -> Option<Repair> {
+        match &self.source {
+            Source::Csv(rows) => rows.repair(&self.header),
+            Source::Jls(rows) => rows.cut(&self.header),
+            Source::Parquet(_) => None,
+        }
     }
 
     /// Names of the columns that are read, in order: of the trace's rails.
@@ -224,44 +238,6 @@ impl Rows {
             }
         }
     }
-
-    /// Appends a chunk's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
-    /// power is known, the voltage is 1 V and the current stands for the power.
-    fn channels(&self, chunk: &mut Chunk, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
-        for (values, column) in chunk.values.iter_mut().zip(&self.layout.values) {
-            if column.scale != 1.0 {
-                values.iter_mut().for_each(|value| *value = (f64::from(*value) * column.scale) as f32);
-            }
-        }
-        match self.layout.rails[..] {
-            [Rail::Measured { voltage, current }] => {
-                voltage_v.extend_from_slice(&chunk.values[voltage]);
-                current_a.extend_from_slice(&chunk.values[current]);
-            }
-            [Rail::Specified { volts, current }] => {
-                voltage_v.resize(voltage_v.len() + chunk.values[current].len(), volts as f32);
-                current_a.extend_from_slice(&chunk.values[current]);
-            }
-            ref rails => {
-                let rows = chunk.values.first().map_or(0, Vec::len);
-                voltage_v.resize(voltage_v.len() + rows, 1.0);
-                let power_w =
-                    |row: usize| rails.iter().map(|rail| rail.power_w(&chunk.values, row)).sum::<f64>();
-                current_a.extend((0..rows).map(|row| power_w(row) as f32));
-            }
-        }
-    }
-}
-
-impl Rail {
-    fn power_w(&self, values: &[Vec<f32>], row: usize) -> f64 {
-        let value = |column: usize| f64::from(values[column][row]);
-        match *self {
-            Self::Measured { voltage, current } => value(voltage) * value(current),
-            Self::Specified { volts, current } => volts * value(current),
-            Self::Power { power } => value(power),
-        }
-    }
 }
 
 impl Source {
@@ -274,12 +250,40 @@ impl Source {
     }
 }
 
+/// Refuses times that are asked for and contradict those of the file.
+fn check_asked(
+    path: &Path,
+    layout: &Layout,
+    header: &Header,
+    options: &ReadOptions,
+) -> Result<(), ReadError> {
+    if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
+        let reason = format!(
+            "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
+            column.name
+        );
+        return Err(ReadError::Asked { path: path.to_owned(), reason });
+    }
+    if let Some((asked_hz, stated_hz)) = options.rate_hz.zip(header.rate_hz)
+        && (asked_hz / stated_hz - 1.0).abs() > RATE_OFF
+    {
+        let reason = format!(
+            "a rate of {asked_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or mend \
+             rate_hz there"
+        );
+        return Err(ReadError::Asked { path: path.to_owned(), reason });
+    }
+    Ok(())
+}
+
 fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut start = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(8).read_to_end(&mut start))
-        .map_err(|error| ReadError::io(path, error))?;
-    Ok(start)
+    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+    if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
+        return Err(ReadError::Folder { path: path.to_owned() });
+    }
+    file.take(8).read_to_end(&mut start).map_err(|error| ReadError::io(path, error))?;
+    if start.is_empty() { Err(ReadError::Empty { path: path.to_owned() }) } else { Ok(start) }
 }
 
 /// What is said where the decoder of Parquet panicked: it does on some damaged files.

@@ -47,9 +47,10 @@ fn damaged(reason: &str) -> ParquetError {
 }
 
 impl ZstdPages {
-    /// Pages in `length` bytes of a file from `start` on.
-    pub fn new(file: File, start: u64, length: u64) -> Self {
-        Self { file, at: start, end: start.saturating_add(length), header: None }
+    /// Pages in `length` bytes of a file from `start` on, as far as the file goes.
+    pub fn new(file: File, start: u64, length: u64) -> Result<Self> {
+        let end = start.saturating_add(length).min(file.metadata()?.len());
+        Ok(Self { file, at: start, end, header: None })
     }
 
     /// The header of the next page, `None` at the end.
@@ -159,6 +160,8 @@ fn encoding(number: i64) -> Result<Encoding> {
         2 => Encoding::PLAIN_DICTIONARY,
         3 => Encoding::RLE,
         5 => Encoding::DELTA_BINARY_PACKED,
+        6 => Encoding::DELTA_LENGTH_BYTE_ARRAY,
+        7 => Encoding::DELTA_BYTE_ARRAY,
         8 => Encoding::RLE_DICTIONARY,
         9 => Encoding::BYTE_STREAM_SPLIT,
         _ => return Err(damaged("its encoding is unknown")),

@@ -11,6 +11,10 @@ use std::path::Path;
 /// A rate is rounded only if that moves the last sample by less than this share of a period.
 const SNAP: f64 = 0.05;
 
+/// Stands for a time that is missing, where missing values are to be mended: a nanosecond 292 years before 1970, and not one of
+/// the first that times come to that wrap around.
+pub(crate) const NO_TIME_NS: i64 = i64::MIN + 999_999_937;
+
 /// Time stamps as a file has them.
 #[derive(Clone, Debug)]
 pub(crate) enum Stamps {
@@ -30,6 +34,7 @@ enum Stamp {
 impl Stamp {
     fn time_s(self) -> f64 {
         match self {
+            Self::Nanoseconds(NO_TIME_NS) => f64::NAN,
             Self::Nanoseconds(time) => time as f64 / 1e9,
             Self::Seconds(time) => time,
         }

@@ -16,7 +16,7 @@ pub struct AlignArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
-    /// Recorded stamps in seconds: a number in each line, or a table with a column start_s, time_s, mark_s or stamp_s
+    /// Recorded stamps: a number in each line, in seconds, or a table with a column start, time, mark or stamp, its unit in its name (time_s, stamp_ms)
     #[arg(value_name = "STAMPS")]
     pub stamps: PathBuf,
     /// A stamp and its time in the trace, twice; without them the best fit to the frames found

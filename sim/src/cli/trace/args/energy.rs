@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::{discard, finite, pass, stretch};
+use super::parse::{discard, finite, not_negative, pass, stretch};
 use super::{FindArgs, InputArgs};
 
 /// What is asked of frames, not of a stretch.
@@ -44,7 +44,7 @@ pub struct EnergyArgs {
     #[arg(long, value_name = "A..B", value_parser = stretch, allow_hyphen_values = true, conflicts_with_all = ["idle_w", "idle_trace"])]
     pub idle: Option<(f64, f64)>,
     /// Idle power to take off
-    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_negative_numbers = true, value_parser = not_negative)]
     pub idle_w: Option<f64>,
     /// A recording without rendering to take off
     #[arg(long, value_name = "TRACE")]

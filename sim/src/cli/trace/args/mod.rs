@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use traces::frames::Method;
 
-use parse::{finite, window};
+use parse::{finite, positive, window};
 
 /// Arguments of `trace`.
 #[derive(Debug, Args)]
@@ -72,12 +72,12 @@ pub struct InputArgs {
     #[arg(long, value_name = "COLUMN")]
     pub power_column: Option<String>,
     /// Voltage by specification instead of a measured one
-    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub voltage: Option<f64>,
     /// Samples per second, where the file does not say
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Time of the first sample, where the file does not say
+    /// Time of the first sample, where the file has no times
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = finite)]
     pub start: Option<f64>,
     /// The first line holds numbers, not names
@@ -94,7 +94,7 @@ pub struct FindArgs {
     /// The start of one frame; may be given several times
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub mark: Vec<f64>,
-    /// A file of starts: a number in each line, or a table with a column start_s
+    /// A file of starts: a number in each line, in seconds, or a table with a column start or time, its unit in its name (start_s, time_ms)
     #[arg(long, value_name = "FILE")]
     pub mark_file: Option<PathBuf>,
     /// Propose a start

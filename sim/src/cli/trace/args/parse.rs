@@ -22,6 +22,10 @@ pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     number(text, "finite number at or above 0", |value| value >= 0.0)
 }
 
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    number(text, "finite number above 0", |value| value > 0.0)
+}
+
 pub(super) fn window(text: &str) -> Result<(f64, f64), String> {
     two(text, ",", "PRE,POST in milliseconds, for example 1,4")
 }

@@ -70,8 +70,12 @@ impl JlsRows {
         self.count
     }
 
-    pub fn cut(&self) -> Option<&Repair> {
-        self.cut.as_ref()
+    /// What was left out, and when, by the description's rate and start.
+    pub fn cut(&self, header: &Header) -> Option<Repair> {
+        let mut cut = self.cut.clone()?;
+        cut.time_s = header.time_s(cut.row as usize - 1);
+        cut.message += &format!("; row {} is at {} s", cut.row, cut.time_s);
+        Some(cut)
     }
 
     pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
@@ -94,6 +98,8 @@ fn cut(path: &Path, tracks: &mut [Track]) -> Result<Option<Repair>, ReadError> {
     let longest = tracks.iter().map(|track| track.rows).max().unwrap_or(0);
     let rate_hz = tracks.first().map_or(0, |track| track.rate_hz);
     let kept = u64::try_from(to - from).unwrap_or(0);
+    // Where they begin together, what is left out comes after the last row.
+    let row = if tracks.iter().all(|track| i128::from(track.first) == from) { kept } else { 1 };
     if kept == longest || kept == 0 || tracks.iter().any(|track| track.rate_hz != rate_hz) {
         return check_alike(path, tracks).map(|()| None);
     }
@@ -103,7 +109,7 @@ fn cut(path: &Path, tracks: &mut [Track]) -> Result<Option<Repair>, ReadError> {
         "signals do not begin and end together: the {kept} samples from number {from} on are read, which all have; the \
          longest signal has {count} more"
     );
-    Ok(Some(Repair { code: "cut-signals", row: 1, time_s: 0.0, count, message }))
+    Ok(Some(Repair { code: "cut-signals", row, time_s: 0.0, count, message }))
 }
 
 /// Rows are made of signals of one rate, from one sample to another.

@@ -1,9 +1,11 @@
 //! What can be wrong with a file.
 
-use crate::device::SampleError;
+mod write;
+
 use crate::trace::TraceError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
+pub use write::WriteError;
 
 /// Why a trace could not be read. Rows are rows of data, counted from 1 (a CSV header is not counted).
 #[derive(Debug, Error)]
@@ -64,6 +66,52 @@ pub enum ReadError {
         /// Rows stated.
         stated: u64,
     },
+    /// The recorder lost the end, and nothing in the rows tells of it.
+    #[error("{path}: the recorder lost {lost} samples after the last row: cut the recording there and take lost_at_end out of its description, or have them filled with --repair", path = path.display())]
+    LostEnd {
+        /// The file.
+        path: PathBuf,
+        /// How many samples.
+        lost: u64,
+    },
+    /// What was asked for does not go with the file.
+    #[error("{path}: {reason}", path = path.display())]
+    Asked {
+        /// The file.
+        path: PathBuf,
+        /// What does not go with it, and what to ask for instead.
+        reason: String,
+    },
+    /// A unit beside a column's name that does not go with it.
+    #[error("{path}: column {column} has the unit {unit} in its metadata, which contradicts that it holds {of}, or the unit in its name: mend one of them", path = path.display())]
+    Unit {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// The unit.
+        unit: String,
+        /// What the column is read as.
+        of: &'static str,
+    },
+    /// A number with a decimal comma, which might as well be two.
+    #[error("{path}: row {row}: {column} is {value:?}: numbers with a decimal comma are not read; export them with a point", path = path.display())]
+    DecimalComma {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: u64,
+        /// The column.
+        column: String,
+        /// What stands there.
+        value: String,
+    },
+    /// A folder where a file has to be.
+    #[error("{path}: is a folder: name a file in it", path = path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A column is missing.
     #[error("{path}: no column {column} (found: {found}): rename or add it", path = path.display())]
     MissingColumn {
@@ -82,8 +130,8 @@ pub enum ReadError {
         /// The column.
         column: String,
     },
-    /// A column is compressed in a way that needs a C library.
-    #[error("{path}: column {column} is compressed with {codec}, which is not read: write it with Snappy or uncompressed", path = path.display())]
+    /// A column is compressed in a way that is not read.
+    #[error("{path}: column {column} is compressed with {codec}, which is not read: write it with Zstandard or Snappy", path = path.display())]
     Compression {
         /// The file.
         path: PathBuf,
@@ -171,7 +219,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The sample rate cannot be told.
-    #[error("{path}: a single row and no stated rate: the sample rate is unknown; state rate_hz in the description", path = path.display())]
+    #[error("{path}: a single row and no stated rate: the sample rate is unknown; give --rate, or state rate_hz in the description", path = path.display())]
     NoRate {
         /// The file.
         path: PathBuf,
@@ -217,64 +265,4 @@ impl ReadError {
             source => Self::Trace { path: path.to_owned(), source },
         }
     }
-}
-
-/// Why a file could not be written.
-#[derive(Debug, Error)]
-pub enum WriteError {
-    /// The file system refused.
-    #[error("{path}: cannot be written: {source}; name a file in a folder that is there and may be written to", path = path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A path that names no file.
-    #[error("{path}: is no file that could be written over; name a file", path = path.display())]
-    NoName {
-        /// The path.
-        path: PathBuf,
-    },
-    /// Encoding or writing failed.
-    #[error("cannot write the trace: {0}")]
-    Encode(String),
-    /// A rate that a JLS file cannot say.
-    #[error(
-        "a JLS file holds whole rates from 1 Hz on and {rate_hz} Hz is none to 1 in 1000: write Parquet or CSV, or sample it anew"
-    )]
-    JlsRate {
-        /// The rate, Hz.
-        rate_hz: f64,
-    },
-    /// A time that a JLS file cannot say.
-    #[error(
-        "a JLS file reaches 8.5e9 s to either side of 2018 and the trace {time_s} s from 1970: write Parquet or CSV"
-    )]
-    JlsTime {
-        /// The time, s from 1970.
-        time_s: f64,
-    },
-    /// A mark is not a finite time.
-    #[error("mark {index} is at {time_s} s: a mark must be at a finite time")]
-    Mark {
-        /// Which mark, from 0.
-        index: usize,
-        /// Its time, s.
-        time_s: f64,
-    },
-    /// What is to be written cannot be sampled from its trace.
-    #[error(transparent)]
-    Sample(#[from] SampleError),
-    /// The samples to be written could not be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// Something else failed while a file was written.
-    #[error("{path}: {source}", path = path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What failed.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
 }

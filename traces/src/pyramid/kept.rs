@@ -1,0 +1,150 @@
+//! The file that a pyramid is kept in: a header, checksums of groups of entries, and the entries, level by level.
+
+use super::{BLOCK, ENTRY_BYTES, Entry, FAN, Pyramid, Store};
+use crate::io::{ReadOptions, WriteError, atomic, crc32c};
+use crate::stream::Clock;
+use std::fs::{self, File};
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+/// Begins every file; the format's version is in it.
+const MAGIC: u64 = 0x3230_5259_505f_5451;
+const HEADER_BYTES: usize = 64;
+/// Where the checksum of the header and of all checksums stands, in words of 8 bytes.
+const SEAL: usize = 7;
+/// Entries of a level that share a checksum: 12 KB, so that a look checks little more than it shows.
+const GROUP: u64 = 1024;
+
+/// A file whose header is whole; its entries are checked as they are read.
+#[derive(Debug)]
+pub(super) struct Kept {
+    path: PathBuf,
+    /// Entries of each level.
+    sizes: Vec<u64>,
+    /// Checksums of the groups of all levels.
+    sums: Vec<u32>,
+}
+
+/// Tells a file as it is now, and how it is read, from any other (FNV-1a, Fowler, Noll and Vo).
+pub(super) fn stamp(path: &Path, options: &ReadOptions) -> u64 {
+    let metadata = fs::metadata(path).ok();
+    let modified = metadata.as_ref().and_then(|m| m.modified().ok()?.duration_since(UNIX_EPOCH).ok());
+    let text = format!("{:?} {modified:?} {options:?}", metadata.map(|m| m.len()));
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Entries of each level.
+fn sizes(samples: u64) -> Vec<u64> {
+    let mut sizes = vec![samples.div_ceil(BLOCK)];
+    while sizes[sizes.len() - 1] > FAN as u64 {
+        sizes.push(sizes[sizes.len() - 1].div_ceil(FAN as u64));
+    }
+    sizes
+}
+
+fn bytes(entries: &[Entry]) -> Vec<u8> {
+    entries.iter().flat_map(|entry| entry.to_bytes()).collect()
+}
+
+/// Writes levels for a trace that is told by its stamp.
+pub(super) fn keep(pyramid: &Pyramid, path: &Path, stamp: u64) -> Result<(), WriteError> {
+    let Store::Memory(levels) = &pyramid.store else { return Ok(()) };
+    let groups = || levels.iter().flat_map(|level| level.chunks(GROUP as usize));
+    let sums: Vec<u8> = groups().flat_map(|group| crc32c(&bytes(group)).to_le_bytes()).collect();
+    let clock = pyramid.clock;
+    let words = [MAGIC, stamp, pyramid.samples, clock.start_s.to_bits(), clock.rate_hz.to_bits(), 0, 0];
+    let mut head: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    head.extend_from_slice(&u64::from(seal(&head, &sums)).to_le_bytes());
+    atomic::write_file(path, |out: &mut BufWriter<File>| {
+        out.write_all(&head)?;
+        out.write_all(&sums)?;
+        groups().try_for_each(|group| out.write_all(&bytes(group)))
+    })
+}
+
+fn seal(head: &[u8], sums: &[u8]) -> u32 {
+    crc32c(&[&head[..8 * SEAL], sums].concat())
+}
+
+/// The pyramid in a file, if it is of the trace with that stamp and whole as far as can be seen without its entries.
+pub(super) fn kept(path: &Path, stamp: u64) -> Option<Pyramid> {
+    let mut file = File::open(path).ok()?;
+    let mut head = [0; HEADER_BYTES];
+    file.read_exact(&mut head).ok()?;
+    let word = |index: usize| head[8 * index..].first_chunk().map_or(0, |word| u64::from_le_bytes(*word));
+    let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
+    if word(0) != MAGIC || word(1) != stamp || samples >= 1 << 48 {
+        return None;
+    }
+    let sizes = sizes(samples);
+    let groups: u64 = sizes.iter().map(|size| size.div_ceil(GROUP)).sum();
+    let whole = HEADER_BYTES as u64 + 4 * groups + ENTRY_BYTES * sizes.iter().sum::<u64>();
+    if fs::metadata(path).ok()?.len() != whole {
+        return None;
+    }
+    let mut sums = vec![0; 4 * groups as usize];
+    file.read_exact(&mut sums).ok()?;
+    if word(SEAL) != u64::from(seal(&head, &sums)) {
+        return None;
+    }
+    let sums = sums.as_chunks().0.iter().map(|sum| u32::from_le_bytes(*sum)).collect();
+    let clock = Clock { start_s, rate_hz, samples: Some(samples) };
+    Some(Pyramid { clock, samples, store: Store::File(Kept { path: path.to_owned(), sizes, sums }) })
+}
+
+impl Kept {
+    /// Entries of a level, as far as there are any; `None` where they cannot be read or are not what was written.
+    pub(super) fn entries(&self, level: usize, first: u64, count: u64) -> Option<Vec<Entry>> {
+        let (size, below) = (*self.sizes.get(level)?, self.sizes.get(..level)?);
+        let end = size.min(first.saturating_add(count));
+        let (from, to) = (first.min(end) / GROUP, end.div_ceil(GROUP));
+        let (before, groups): (u64, u64) =
+            (below.iter().sum(), below.iter().map(|size| size.div_ceil(GROUP)).sum());
+        let mut file = File::open(&self.path).ok()?;
+        let entries_at = HEADER_BYTES as u64 + 4 * self.sums.len() as u64;
+        file.seek(SeekFrom::Start(entries_at + ENTRY_BYTES * (before + from * GROUP))).ok()?;
+        let mut bytes = vec![0; (ENTRY_BYTES * (size.min(to * GROUP) - size.min(from * GROUP))) as usize];
+        file.read_exact(&mut bytes).ok()?;
+        let sums = self.sums.get((groups + from) as usize..(groups + to) as usize)?;
+        let right =
+            bytes.chunks((ENTRY_BYTES * GROUP) as usize).zip(sums).all(|(group, sum)| crc32c(group) == *sum);
+        let within = (ENTRY_BYTES * (first.min(end) - from * GROUP)) as usize
+            ..(ENTRY_BYTES * (end - from * GROUP)) as usize;
+        right.then(|| bytes[within].chunks_exact(ENTRY_BYTES as usize).map(Entry::from_bytes).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pyramid::pyramid_path;
+
+    #[test]
+    fn any_damaged_byte_is_found_where_it_would_be_shown() {
+        let samples = 200_000_usize;
+        let current = (0..samples).map(|i| (i % 1000) as f32).collect();
+        let trace = crate::Trace::new(vec![1.0; samples], current, 1e3, 0.0, Default::default()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        crate::io::parquet::save(&trace, &path).unwrap();
+        let options = ReadOptions::default();
+        let made = Pyramid::of_file(&path, &options).unwrap();
+        let (kept_at, whole) = (pyramid_path(&path), fs::read(pyramid_path(&path)).unwrap());
+        for at in (0..whole.len()).step_by(997).chain([8, 63, 64, whole.len() - 1]) {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 0x10;
+            fs::write(&kept_at, &bytes).unwrap();
+            let damaged = kept(&kept_at, stamp(&path, &options));
+            let looks = [(0.0, 200.0, 1000), (0.0, 200.0, 10), (100.0, 200.0, 3000), (0.0, 99.0, 1500)];
+            let shown = |(from_s, to_s, columns)| {
+                let shown = damaged.as_ref().and_then(|pyramid| pyramid.columns(from_s, to_s, columns));
+                shown.map(|shown| shown == made.columns(from_s, to_s, columns).unwrap())
+            };
+            let shown = looks.map(shown);
+            assert!(!shown.contains(&Some(false)), "byte {at}");
+            assert!(at >= 64 || shown == [None; 4], "byte {at}: {shown:?}");
+        }
+    }
+}
