@@ -15,20 +15,28 @@ fn is_flat(window: &[f64], sigma: f64) -> bool {
     moments(window).deviation <= most
 }
 
-/// The warning, where a marked window is flat.
-pub(super) fn flat_mark(power: &[f64], placement: &Placement) -> Option<Warning> {
-    let sigma = libm::sqrt(noise_variance(power));
-    let window = |first: usize| power.get(first..first + placement.samples);
-    let flat = |first: usize| window(first).is_some_and(|window| is_flat(window, sigma));
-    let mark = placement.marks.iter().find(|mark| flat(mark.first))?;
+/// The warning, where one of some marked windows, each with where its mark is (s), is flat in noise of deviation `sigma`.
+pub(crate) fn flat_mark<'a>(
+    windows: impl IntoIterator<Item = (f64, &'a [f64])>,
+    sigma: f64,
+) -> Option<Warning> {
+    let (mark_s, _) = windows.into_iter().find(|(_, window)| is_flat(window, sigma))?;
     Some(Warning::new(
         "flat-mark",
         format!(
-            "around the mark at {} s power varies by no more than noise, so that any rest resembles it: what is found may be no \
-             frames; mark where one begins",
-            mark.mark_s
+            "around the mark at {mark_s} s power varies by no more than noise, so that any rest resembles it: what is found may be no \
+             frames; mark where one begins"
         ),
     ))
+}
+
+/// [`flat_mark`] of a trace that is all at hand.
+pub(super) fn flat_mark_of(power: &[f64], placement: &Placement) -> Option<Warning> {
+    let windows = placement
+        .marks
+        .iter()
+        .filter_map(|mark| Some((mark.mark_s, power.get(mark.first..mark.first + placement.samples)?)));
+    flat_mark(windows, libm::sqrt(noise_variance(power)))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::correlate::squares;
 use super::find::{Found, FrameStart, marked_starts, spacing};
-use super::flat::flat_mark;
+use super::flat::flat_mark_of;
 use super::marks::{MarkError, Marks, Placement};
 use super::method::Method;
 use super::minima::spaced_minima;
@@ -91,7 +91,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
     let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
     let mut found = assess::conclude(trace, marks, &placement, starts, threshold);
-    found.warnings.extend(flat_mark(&power, &placement));
+    found.warnings.extend(flat_mark_of(&power, &placement));
     Ok(Found { method, ..found })
 }
 

@@ -43,6 +43,7 @@ pub use threshold::{Population, Rule, Threshold};
 
 // For the analysis of files in pieces.
 pub(crate) use assess::{conclude_at, confidence};
+pub(crate) use flat::flat_mark;
 pub(crate) use marks::{Placed, Placement};
 pub(crate) use matched::{misalignment_w2, start_after_idle};
 pub(crate) use refine::vertex;

@@ -3,7 +3,7 @@
 use super::alternate;
 use super::assess;
 use super::find::{Found, FrameStart, spacing};
-use super::flat::flat_mark;
+use super::flat::flat_mark_of;
 use super::lock::{Ticks, ticks};
 use super::marks::{MarkError, Marks, Placed};
 use super::matched::noise_variance;
@@ -52,7 +52,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let places: Vec<f64> = found.starts.iter().map(|start| trace.position(start.time_s)).collect();
     let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());
     found.warnings.extend(uncovered(&power[..end], &places));
-    found.warnings.extend(flat_mark(&power, &placement));
+    found.warnings.extend(flat_mark_of(&power, &placement));
     found.method = Method::Tracking;
     Ok(found)
 }

@@ -4,8 +4,8 @@ use super::pass::{Candidate, Gathered, Plan};
 use super::{Clock, Streamed};
 use crate::energy::FrameEnergy;
 use crate::frames::{
-    FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, misalignment_w2, regularity,
-    start_after_idle,
+    FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, flat_mark, misalignment_w2,
+    regularity, start_after_idle,
 };
 use crate::median::median;
 use crate::metadata::Metadata;
@@ -26,7 +26,8 @@ pub(super) fn conclude(
     let clock = Clock { samples: Some(gathered.samples), ..plan.clock };
     let trace_end_s = clock.time_s(gathered.samples as f64);
     let marks = Marks { end_s: marks.end_s.min(trace_end_s), ..marks.clone() };
-    let threshold = plan.threshold(&mut gathered);
+    let sigma_w = median(&mut gathered.steps_w) / (0.674_489_75 * SQRT_2);
+    let threshold = plan.threshold(&mut gathered, sigma_w);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };
     let confidence = confidence(&threshold);
@@ -43,7 +44,8 @@ pub(super) fn conclude(
     let end_w = gathered.sums_w.last().copied().flatten().unwrap_or(gathered.total_w);
     let sums: Vec<PairSum> = starts.iter().map(|(_, sum)| *sum).chain([end_w]).collect();
     let starts: Vec<FrameStart> = starts.into_iter().map(|(start, _)| start).collect();
-    let found = conclude_at(clock.rate_hz, &marks, &plan.placement, starts, threshold);
+    let mut found = conclude_at(clock.rate_hz, &marks, &plan.placement, starts, threshold);
+    found.warnings.extend(flat_mark(plan.windows(), sigma_w));
     let energy = |(span, sums): (&crate::frames::FrameSpan, &[PairSum])| FrameEnergy {
         start_s: span.start_s,
         end_s: span.end_s,
@@ -101,11 +103,11 @@ impl Starter<'_> {
 }
 
 impl Plan {
-    fn threshold(&self, gathered: &mut Gathered) -> crate::frames::Threshold {
+    /// By what was gathered, in which noise has a deviation of `sigma_w`.
+    fn threshold(&self, gathered: &mut Gathered, sigma_w: f64) -> crate::frames::Threshold {
         let candidates = &gathered.candidates;
         let distances: Vec<f64> = candidates.par_iter().map(|candidate| candidate.distance_w2).collect();
-        let sigma = median(&mut gathered.steps_w) / (0.674_489_75 * SQRT_2);
-        let noise_w2 = 2.0 * self.placement.samples as f64 * sigma * sigma;
+        let noise_w2 = 2.0 * self.placement.samples as f64 * sigma_w * sigma_w;
         let background_w2 = median(&mut gathered.distances_w2);
         let span = match (candidates.first(), candidates.last()) {
             (Some(first), Some(last)) => (last.offset - first.offset) as usize,
@@ -119,6 +121,12 @@ impl Plan {
             }
             regularity(&offsets, span)
         })
+    }
+
+    /// Where each mark is, s, and the powers about it.
+    fn windows(&self) -> impl Iterator<Item = (f64, &[f64])> {
+        let marks = self.placement.marks.iter().map(|mark| mark.mark_s);
+        marks.zip(self.templates.iter().map(Vec::as_slice))
     }
 
     fn misalignment_w2(&self) -> f64 {

@@ -2,7 +2,7 @@ use super::find;
 use crate::CurveBuilder;
 use crate::device::{Device, DeviceSpec};
 use crate::energy::PowerIntegral;
-use crate::frames::{Marks, Method, Options, default_window, find_with};
+use crate::frames::{Marks, Method, Options, Window, default_window, find_with};
 use crate::io::{ReadOptions, parquet};
 use crate::trace::Trace;
 
@@ -64,4 +64,26 @@ fn the_same_for_one_thread_and_for_several() {
         pool.install(|| find(&path, &ReadOptions::default(), &marks).unwrap())
     };
     assert!(on(1) == on(3));
+}
+
+#[test]
+fn a_mark_in_the_rest_between_frames_is_told_as_in_memory() {
+    let trace = trace(300);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    parquet::save(&trace, &path).unwrap();
+    let told = |mark_s: f64, window: Window| {
+        let marks = Marks::one(mark_s, window, trace.end_s());
+        let options = Options { method: Method::SumOfSquares };
+        let [ours, theirs] = [
+            find(&path, &ReadOptions::default(), &marks).unwrap().found,
+            find_with(&trace, &marks, &options).unwrap(),
+        ]
+        .map(|found| found.warnings.into_iter().find(|warning| warning.code == "flat-mark"));
+        assert_eq!(ours, theirs);
+        ours.is_some()
+    };
+    // Before the first frame there is idle power alone.
+    assert!(told(0.02, Window { pre_s: 5e-3, post_s: 20e-3 }));
+    assert!(!told(0.05, default_window(0.01, trace.rate_hz())));
 }
