@@ -16,6 +16,10 @@ const ON_TICKS: [f64; 2] = [0.8, 0.1];
 const SPREAD: [f64; 2] = [0.02, 0.06];
 /// Fewest gaps that tell.
 const LEAST: usize = 16;
+/// In noise no gap is whole. Starts that are scattered about ticks lie about as far from them as gaps are from whole periods, however many
+/// there are; starts that walk away a quarter as far as that for each root of their number. Scattered are those below this share for each
+/// root, and at most so many times as far.
+const SCATTERED: [f64; 2] = [0.1, 1.5];
 /// Rounds of reweighting.
 const ROUNDS: usize = 60;
 
@@ -31,20 +35,7 @@ pub(super) struct Ticks {
 /// Holds the starts at `positions` (samples, in order) against the ticks of the display, if they wait for it; `fixed` is the number of
 /// one that is right.
 pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Ticks> {
-    let gaps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
-    if gaps.len() < LEAST {
-        return None;
-    }
-    let period = median(&mut gaps.clone());
-    let periods = whole_periods(&gaps, period);
-    let whole = |(gap, count): (&f64, &f64)| *count > 0.0 && (gap - count * period).abs() < WHOLE * period;
-    let many = gaps.iter().zip(&periods).filter(|pair| whole(*pair)).count();
-    if (many as f64) < MOSTLY * gaps.len() as f64 {
-        return None;
-    }
-    let period = slope(positions, &periods);
-    let tick = |position: f64| libm::round((position - positions[fixed]) / period);
-    let off: Vec<f64> = positions.iter().map(|x| x - positions[fixed] - tick(*x) * period).collect();
+    let (off, period) = beat(positions, fixed)?;
     let share =
         |far: &dyn Fn(f64) -> bool| off.iter().filter(|off| far(**off)).count() as f64 / off.len() as f64;
     let near = |off: f64| off.abs() < ON_TICKS[1] * period;
@@ -54,6 +45,33 @@ pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Tic
         positions: positions.iter().zip(&off).map(put).collect(),
         between: off.iter().map(|off| !near(*off)).collect(),
     })
+}
+
+/// How far each start lies from the nearest tick of the period that goes through the `fixed` one, and that period, samples; `None` where
+/// gaps are no whole numbers of it.
+fn beat(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
+    let gaps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
+    if gaps.len() < LEAST {
+        return None;
+    }
+    let usual = median(&mut gaps.clone());
+    let periods = whole_periods(&gaps, usual);
+    let beside: Vec<f64> =
+        gaps.iter().zip(&periods).map(|(gap, count)| (gap - count * usual).abs()).collect();
+    let whole = |(beside, count): &(&f64, &f64)| **count > 0.0 && **beside < WHOLE * usual;
+    let mostly = beside.iter().zip(&periods).filter(whole).count() as f64 >= MOSTLY * gaps.len() as f64;
+    let period = slope(positions, &periods);
+    let tick = |position: f64| libm::round((position - positions[fixed]) / period);
+    let off: Vec<f64> = positions.iter().map(|x| x - positions[fixed] - tick(*x) * period).collect();
+    (mostly || scattered(&off, beside)).then_some((off, period))
+}
+
+/// Whether starts that lie so far `off` the ticks are scattered about them; gaps lie so far `beside` whole periods.
+fn scattered(off: &[f64], mut beside: Vec<f64>) -> bool {
+    let middle = median(&mut off.to_vec());
+    let mut far: Vec<f64> = off.iter().map(|off| (off - middle).abs()).collect();
+    let most = (SCATTERED[0] * libm::sqrt(beside.len() as f64)).min(SCATTERED[1]);
+    median(&mut far) < most * median(&mut beside)
 }
 
 /// How many periods each gap is, as whole numbers: what a start between two ticks leaves over is counted with the next gap.
@@ -100,6 +118,7 @@ fn slope(positions: &[f64], periods: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// 200 starts on ticks of 400.25 samples, every seventh tick skipped, moved by `off`.
     fn starts(off: impl Fn(usize) -> f64) -> Vec<f64> {
@@ -152,5 +171,16 @@ mod tests {
         assert_eq!(found.positions[90], starts(late)[90]);
         assert_eq!(found.between.iter().filter(|between| **between).count(), 1);
         assert!(found.between[90]);
+    }
+
+    #[test]
+    fn starts_that_noise_scatters_about_ticks_are_put_on_them_and_those_that_walk_are_not() {
+        let random = Random::new(11, 0);
+        let noise = |i: usize| if i == 60 { 0.0 } else { 9.0 * random.normals(i as u64).0 };
+        let found = ticks(&starts(noise), 60, 250).unwrap().positions;
+        let worst = found.iter().zip(starts(|_| 0.0)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 6.0, "{worst}");
+        let walk = |i: usize| (0..i).map(|step| 2.0 * random.normals(step as u64).0).sum::<f64>();
+        assert_eq!(ticks(&starts(walk), 60, 250), None);
     }
 }

@@ -12,35 +12,57 @@ use rayon::prelude::*;
 const REACH: f64 = 0.32;
 /// Shares of the window before and after the start in which the lowest power is looked for.
 const LOWEST: [f64; 2] = [0.2, 0.12];
-/// The rest ends where power is the first share of the way from the lowest to what it is above for the second share of the stretch.
-const ENDS: [f64; 2] = [0.1, 0.1];
+
+/// How a rest is bounded.
+struct Bound {
+    /// It ends where power is this share of the way from the lowest
+    rises: f64,
+    /// to what it is above for this share of the stretch.
+    above: f64,
+    /// An end that has moved by this share of the window is a doubt.
+    moved: f64,
+}
+
+/// Low down where work draws much more than a rest, and, where the quiet end of the frame before hides that, half way up.
+const BOUNDS: [Bound; 2] =
+    [Bound { rises: 0.1, above: 0.1, moved: 0.06 }, Bound { rises: 0.35, above: 0.5, moved: 0.08 }];
 /// So many frames on either side are averaged, and so many samples.
 pub(super) const FRAMES: usize = 8;
 const SAMPLES: usize = 3;
-/// An end of the rest that has moved by this share of the window is a doubt; where that is less than so many samples, it is noise.
-const MOVED: f64 = 0.06;
+/// Where that is less than so many samples, it is noise.
 const LEAST: f64 = 4.0;
 /// Where so many of the starts near are in doubt, a start is, too.
 const ENOUGH: f64 = 0.125;
 /// What is left of the confidence then.
 pub(super) const LEFT: f64 = 0.4;
 
+/// The samples of a profile at which a rest begins and ends, by each of the [`BOUNDS`].
+type Rests = [Option<[usize; 2]>; BOUNDS.len()];
+
 /// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
 pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
-    let moved = MOVED * width as f64;
     let marks: Vec<usize> = (0..starts.len()).filter(|&start| marked[start]).collect();
-    if moved < LEAST || marks.is_empty() {
-        return vec![1.0; starts.len()];
-    }
-    let rest = |start: usize| rest(&profile(power, near(starts, start, FRAMES), width)?, width);
-    let rests: Vec<Option<[usize; 2]>> = (0..starts.len()).into_par_iter().map(rest).collect();
+    let rests = |start: usize| {
+        let profile = profile(power, near(starts, start, FRAMES), width);
+        BOUNDS.each_ref().map(|bound| rest(profile.as_ref()?, bound, width))
+    };
+    let rests: Vec<Rests> = (0..starts.len()).into_par_iter().map(rests).collect();
     let of_start = |start: usize| {
         let mark = marks.iter().copied().min_by_key(|mark| mark.abs_diff(start))?;
-        let (here, there) = (rests[start]?, rests[mark]?);
-        let changed = here.iter().zip(there).any(|(a, b)| a.abs_diff(b) as f64 > moved);
-        Some(if changed { LEFT } else { 1.0 })
+        let mut ends = BOUNDS.iter().zip(rests[start].iter().zip(rests[mark]));
+        Some(if ends.any(|(bound, (here, there))| bound.moved(*here, there, width)) { LEFT } else { 1.0 })
     };
     (0..starts.len()).map(|start| of_start(start).unwrap_or(1.0)).collect()
+}
+
+impl Bound {
+    /// Whether a rest is bounded elsewhere than another, in samples of a window of that width.
+    fn moved(&self, here: Option<[usize; 2]>, there: Option<[usize; 2]>, width: usize) -> bool {
+        let least = self.moved * width as f64;
+        let far = |(a, b): (usize, usize)| a.abs_diff(b) as f64 > least;
+        let ends = here.zip(there).map(|(here, there)| here.into_iter().zip(there));
+        least >= LEAST && ends.is_some_and(|mut ends| ends.any(far))
+    }
 }
 
 /// Doubts spread to all starts near which enough others are in doubt: what moved does not move for a frame and back.
@@ -76,14 +98,14 @@ fn profile(power: &[f64], starts: &[f64], width: usize) -> Option<Vec<f64>> {
 }
 
 /// The samples of a profile at which the rest in its middle, or next to that, begins and ends.
-fn rest(profile: &[f64], width: usize) -> Option<[usize; 2]> {
+fn rest(profile: &[f64], bound: &Bound, width: usize) -> Option<[usize; 2]> {
     let [before, after] = LOWEST.map(|share| (share * width as f64) as usize);
     let middle = (REACH * width as f64) as usize;
     let places = middle.saturating_sub(before)..(middle + after).min(profile.len());
     let lowest_w = profile[places.clone()].iter().copied().fold(f64::INFINITY, f64::min);
-    let high = ((1.0 - ENDS[1]) * profile.len() as f64) as usize;
+    let high = ((1.0 - bound.above) * profile.len() as f64) as usize;
     let high_w = *profile.to_vec().select_nth_unstable_by(high, f64::total_cmp).1;
-    let ends_w = lowest_w + ENDS[0] * (high_w - lowest_w);
+    let ends_w = lowest_w + bound.rises * (high_w - lowest_w);
     let within =
         places.filter(|place| profile[*place] <= ends_w).min_by_key(|place| place.abs_diff(middle))?;
     let works = |watts: &f64| *watts > ends_w;
