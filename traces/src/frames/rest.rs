@@ -42,6 +42,9 @@ type Rests = [Option<[usize; 2]>; BOUNDS.len()];
 /// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
 pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
     let marks: Vec<usize> = (0..starts.len()).filter(|&start| marked[start]).collect();
+    if BOUNDS.iter().all(|bound| bound.least(width).is_none()) {
+        return vec![1.0; starts.len()];
+    }
     let rests = |start: usize| {
         let profile = profile(power, near(starts, start, FRAMES), width);
         BOUNDS.each_ref().map(|bound| rest(profile.as_ref()?, bound, width))
@@ -56,12 +59,15 @@ pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize)
 }
 
 impl Bound {
+    /// The samples by which an end must have moved in a window of that width; `None` where so few are noise.
+    fn least(&self, width: usize) -> Option<f64> {
+        Some(self.moved * width as f64).filter(|moved| *moved >= LEAST)
+    }
+
     /// Whether a rest is bounded elsewhere than another, in samples of a window of that width.
     fn moved(&self, here: Option<[usize; 2]>, there: Option<[usize; 2]>, width: usize) -> bool {
-        let least = self.moved * width as f64;
-        let far = |(a, b): (usize, usize)| a.abs_diff(b) as f64 > least;
-        let ends = here.zip(there).map(|(here, there)| here.into_iter().zip(there));
-        least >= LEAST && ends.is_some_and(|mut ends| ends.any(far))
+        let (Some(least), Some(here), Some(there)) = (self.least(width), here, there) else { return false };
+        here.into_iter().zip(there).any(|(a, b)| a.abs_diff(b) as f64 > least)
     }
 }
 
@@ -193,7 +199,9 @@ mod tests {
         let (power, starts) = frames(60, |frame| 15 + frame);
         assert_eq!(left(&power, &starts, &[false; 60], WIDTH), [1.0; 60]);
         let marked: Vec<bool> = (0..60).map(|frame| frame == 1).collect();
-        assert_eq!(left(&power, &starts, &marked, 40), [1.0; 60]);
+        for width in [0, 1, 3, 5, 40] {
+            assert_eq!(left(&power, &starts, &marked, width), [1.0; 60]);
+        }
         assert_eq!(left(&[1.0; 9], &[3.0], &[true], WIDTH), [1.0]);
         assert!(left(&[], &[], &[], WIDTH).is_empty());
     }
