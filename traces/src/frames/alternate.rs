@@ -1,12 +1,14 @@
-//! Doubt where every other start is alike.
+//! Doubt where every other start is alike, and starts that cut a frame in two.
 //!
 //! Content changes slowly: a frame is as unlike the next as it is unlike the one after that, or less. Where a start is far more like the
 //! one after the next, each frame may have been cut in two, as happens where a slow clock makes them as long as two were at the mark.
-//! Frames that take turns by themselves (a shadow map drawn every other time) do so at the mark, too.
+//! Frames that take turns by themselves (a shadow map drawn every other time) do so at the mark, too. A frame begins in its rest: of starts
+//! that take turns, those that go down clearly less are cuts.
 
 use super::rest::{LEFT, about, near};
 use crate::median::median;
-use crate::squares::mean;
+use crate::squares::{about_mean, mean};
+use core::ops::Range;
 use rayon::prelude::*;
 
 /// The shares of the window before and after a start that are compared.
@@ -16,9 +18,42 @@ const FRAMES: usize = 4;
 const LEAST: usize = 4;
 /// Neighbours differ so many times as much as every other start does, and as they do at the mark.
 const MORE: f64 = 3.0;
+/// Shares of the window before and after a start in which it has its rest, and that of a rest.
+const OWN: [f64; 2] = [0.1, 0.06];
+const BRIEF: f64 = 0.06;
+/// Cuts go down by less than this share of what starts do, and that is so many standard errors.
+const LESS: f64 = 0.85;
+const CLEAR: f64 = 4.0;
+/// Fewest starts of either kind.
+const FEW: usize = 4;
+/// So many starts of either kind may lie beyond either end of what is seen to take turns.
+const BEYOND: usize = 2;
+
+/// What is said of each start.
+pub(super) struct Turns {
+    /// What is left of its confidence.
+    pub left: Vec<f64>,
+    /// Whether it cuts a frame in two.
+    pub cut: Vec<bool>,
+}
+
+impl Turns {
+    /// From the places of all starts (samples, in order), which of them are marked, and the width of the window.
+    pub fn new(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Self {
+        let left = left(power, starts, marked, width);
+        let rests = Rests::new(power, starts, width);
+        let mut cut = vec![false; starts.len()];
+        for stretch in stretches(&left) {
+            for start in rests.cuts(stretch).into_iter().filter(|start| !marked[*start]) {
+                cut[start] = true;
+            }
+        }
+        Self { left, cut }
+    }
+}
 
 /// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
-pub(super) fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
+fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
     let [next, after_next] = [1, 2].map(|apart| differences(power, starts, width, apart));
     let turns: Vec<f64> = (0..starts.len()).map(|start| turns(&next, &after_next, start)).collect();
     let marks: Vec<usize> = (0..starts.len()).filter(|&start| marked[start]).collect();
@@ -51,6 +86,72 @@ fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec
     (0..starts.len()).into_par_iter().map(of_start).collect()
 }
 
+/// The stretches of starts in doubt.
+fn stretches(left: &[f64]) -> Vec<Range<usize>> {
+    let ends = |place: usize| place == 0 || (left[place] < 1.0) != (left[place - 1] < 1.0);
+    let mut bounds: Vec<usize> = (0..left.len()).filter(|place| ends(*place)).collect();
+    bounds.push(left.len());
+    bounds
+        .windows(2)
+        .map(|two| two[0]..two[1])
+        .filter(|stretch| left.get(stretch.start) < Some(&1.0))
+        .collect()
+}
+
+/// How far power goes down at each start.
+struct Rests {
+    /// Least mean of a brief stretch, W.
+    lowest_w: Vec<Option<f64>>,
+    /// Median of the power around, W.
+    usual_w: Vec<Option<f64>>,
+}
+
+impl Rests {
+    fn new(power: &[f64], starts: &[f64], width: usize) -> Self {
+        let brief = ((BRIEF * width as f64) as usize).max(1);
+        let lowest = |start: &f64| {
+            let means = about(power, *start, OWN, width)?.windows(brief).map(mean);
+            means.min_by(f64::total_cmp)
+        };
+        let usual = |start: &f64| Some(median(&mut about(power, *start, COMPARED, width)?.to_vec()));
+        Self {
+            lowest_w: starts.par_iter().map(lowest).collect(),
+            usual_w: starts.par_iter().map(usual).collect(),
+        }
+    }
+
+    /// Every other start of a stretch, and beyond as long as starts go down as little, if those clearly go down less than the others.
+    fn cuts(&self, stretch: Range<usize>) -> Vec<usize> {
+        let every_other = |from: usize| (stretch.start + from..stretch.end).step_by(2);
+        let lowest = [0, 1].map(|from| every_other(from).filter_map(|start| self.lowest_w[start]).collect());
+        let [a, b]: [Vec<f64>; 2] = lowest;
+        if a.len().min(b.len()) < FEW {
+            return Vec::new();
+        }
+        let usual_w =
+            median(&mut self.usual_w[stretch.clone()].iter().flatten().copied().collect::<Vec<_>>());
+        let ([a_w, a_error], [b_w, b_error]) = (mean_and_error(&a), mean_and_error(&b));
+        let (from, low_w, high_w) = if a_w > b_w { (0, b_w, a_w) } else { (1, a_w, b_w) };
+        let clear = high_w - low_w > CLEAR * libm::hypot(a_error, b_error);
+        if !clear || usual_w - high_w > LESS * (usual_w - low_w) {
+            return Vec::new();
+        }
+        let cut = |start: &usize| self.lowest_w[*start].is_some_and(|watts| watts > 0.5 * (low_w + high_w));
+        let first = stretch.start + from;
+        let before = (0..first).rev().skip(1).step_by(2).take(BEYOND).take_while(cut);
+        let last = every_other(from).last().unwrap_or(first);
+        let after = (last + 2..self.lowest_w.len()).step_by(2).take(BEYOND).take_while(cut);
+        before.chain(every_other(from)).chain(after).collect()
+    }
+}
+
+/// The mean of some values and its standard error.
+fn mean_and_error(values: &[f64]) -> [f64; 2] {
+    let (mean, squares) = about_mean(values);
+    let count = values.len() as f64;
+    [mean, libm::sqrt(squares / (count - 1.0) / count)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,6 +179,38 @@ mod tests {
         let marked: Vec<bool> = (0..starts.len()).map(|start| start == marked).collect();
         let left = left(&power, &starts, &marked, WIDTH);
         (0..starts.len()).filter(|&start| left[start] < 1.0).collect()
+    }
+
+    /// Of 60 frames with a rest before 300 samples of draws and a dip of `dip` samples in the midst of those: all starts, with those in
+    /// the dip from the 30th frame on, and what is said of them.
+    fn with_dips(dip_w: f64) -> (Vec<f64>, Turns) {
+        let random = Random::new(9, 0);
+        let (mut power, mut starts) = (vec![1.2; 300], Vec::new());
+        for frame in 0..60 {
+            power.extend([0.2; 16]);
+            starts.push(power.len() as f64 - 3.0);
+            power.extend((0..150).map(|sample| 1.0 + f64::from(sample / 2 * 37 % 11) / 22.0));
+            power.extend([dip_w; 16]);
+            if frame >= 30 {
+                starts.push(power.len() as f64 - 3.0);
+            }
+            power.extend((0..150).map(|sample| 1.3 + f64::from(sample / 2 * 31 % 13) / 22.0));
+        }
+        power.iter_mut().enumerate().for_each(|(i, w)| *w += random.between(i as u64, [-0.05, 0.05]));
+        let marked: Vec<bool> = (0..starts.len()).map(|start| start == 10).collect();
+        let turns = Turns::new(&power, &starts, &marked, WIDTH);
+        (starts, turns)
+    }
+
+    #[test]
+    fn starts_that_go_down_less_than_those_they_take_turns_with_are_cuts() {
+        let (starts, turns) = with_dips(0.5);
+        let cut: Vec<usize> = (0..starts.len()).filter(|start| turns.cut[*start]).collect();
+        assert!(cut.iter().all(|start| *start > 30 && start % 2 == 1), "{cut:?}");
+        assert!(cut.len() > 27, "{cut:?}");
+        // Where both go down as far, either may be a start: that is a doubt and no more.
+        let (starts, turns) = with_dips(0.2);
+        assert!((40..starts.len() - 4).all(|start| turns.left[start] < 1.0 && !turns.cut[start]));
     }
 
     #[test]

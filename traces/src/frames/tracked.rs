@@ -1,11 +1,11 @@
 //! Starts by the sequence that fits best.
 
-use super::alternate;
+use super::alternate::Turns;
 use super::assess;
 use super::find::{Found, FrameStart, spacing};
 use super::flat::flat_mark_of;
 use super::lock::{Ticks, ticks};
-use super::marks::{MarkError, Marks, Placed};
+use super::marks::{MarkError, Marks, Placed, Placement};
 use super::matched::noise_variance;
 use super::method::Method;
 use super::register::register;
@@ -20,22 +20,19 @@ use crate::trace::Trace;
 /// What is left of the confidence of a start between the ticks of the display that the others wait for.
 const BETWEEN: f64 = 0.4;
 
-/// What is left of the confidence of each start, from the power, their places, which are marked, and the width of the window.
-type Doubts = fn(&[f64], &[f64], &[bool], usize) -> Vec<f64>;
-
 /// By the sequence of starts that fits best.
 pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
-    let tracked = track(&power, &placement);
-    let offsets: Vec<usize> = tracked.starts.iter().map(|start| start.offset).collect();
+    let tracked = whole(&power, track(&power, &placement).starts, &placement);
+    let offsets: Vec<usize> = tracked.iter().map(|start| start.offset).collect();
     let marked: Vec<Option<&Placed>> =
         offsets.iter().map(|offset| placement.marks.iter().find(|mark| mark.first == *offset)).collect();
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
     let positions = settle(&power, positions, &fixed, anchor, placement.samples);
-    let (positions, kept) = phases(&power, positions, &tracked.starts, &fixed, anchor, placement.samples);
+    let (positions, kept) = phases(&power, positions, &tracked, &fixed, anchor, placement.samples);
     let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
         time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
         distance_w2: start.distance_w2,
@@ -43,7 +40,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
         marked: marked.is_some(),
     };
     let mut starts: Vec<FrameStart> =
-        tracked.starts.iter().zip(positions).zip(kept).zip(&marked).map(start).collect();
+        tracked.iter().zip(positions).zip(kept).zip(&marked).map(start).collect();
     starts.dedup_by(|later, earlier| later.time_s <= earlier.time_s && !later.marked);
     let end_tolerance_s = 0.5 * spacing(placement.samples) as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
@@ -55,6 +52,19 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     found.warnings.extend(flat_mark_of(&power, &placement));
     found.method = Method::Tracking;
     Ok(found)
+}
+
+/// The starts without those that cut a frame in two; what is left of the confidence of those that take turns is less.
+fn whole(power: &[f64], starts: Vec<Start>, placement: &Placement) -> Vec<Start> {
+    let is_marked = |start: &Start| placement.marks.iter().any(|mark| mark.first == start.offset);
+    let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
+    let places: Vec<f64> = starts.iter().map(|start| start.offset as f64 + anchor).collect();
+    let marked: Vec<bool> = starts.iter().map(is_marked).collect();
+    let turns = Turns::new(power, &places, &marked, placement.samples);
+    let left = rest::spread(turns.left).into_iter().zip(marked);
+    let left = left.map(|(left, marked)| if marked { 1.0 } else { left });
+    let uncut = starts.into_iter().zip(left).zip(turns.cut).filter(|(_, cut)| !cut);
+    uncut.map(|((start, left), _)| Start { left: left * start.left, ..start }).collect()
 }
 
 /// Positions on the ticks of the display, where there are any, and what is left of the confidence of each start.
@@ -80,9 +90,8 @@ fn phases(
             (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
         }
         None => {
-            let doubts = |left: Doubts| spread(left(power, &places(&positions), fixed, width));
-            let moved = product(doubts(rest::left), doubts(alternate::left));
-            (positions, product(starts.iter().map(|start| start.left), moved))
+            let rests = spread(rest::left(power, &places(&positions), fixed, width));
+            (positions, product(starts.iter().map(|start| start.left), rests))
         }
     };
     let noise_w = libm::sqrt(noise_variance(power));

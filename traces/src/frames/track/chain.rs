@@ -58,6 +58,14 @@ struct Solution {
     last: usize,
 }
 
+/// The longest period by which marks that are neighbours, in order, are in reach of each other.
+pub(super) fn longest(marks: &[usize]) -> usize {
+    let mut marks = marks.to_vec();
+    marks.sort_unstable();
+    let gaps = marks.windows(2).map(|two| two[1] - two[0]);
+    gaps.filter(|gap| *gap > 0).min().map_or(usize::MAX, |gap| (gap as f64 / REACH[0]) as usize)
+}
+
 impl<'a> Graph<'a> {
     pub fn new(bank: &Bank, candidates: &'a [Candidate], period: usize) -> Self {
         let [least, most] = REACH.map(|share| (share * period as f64) as usize);
@@ -225,6 +233,13 @@ mod tests {
         assert_eq!(2.0 * beat(50.0, 50.0, 100.0), EVEN);
         assert_eq!(beat(200.0, 200.0, 100.0), EVEN);
         assert_eq!(beat(100.0, 150.0, 100.0), JUMP);
+    }
+
+    #[test]
+    fn neighbouring_marks_are_in_reach_of_each_other() {
+        assert_eq!((longest(&[]), longest(&[7]), longest(&[7, 7])), (usize::MAX, usize::MAX, usize::MAX));
+        let period = longest(&[900, 100, 1400]);
+        assert!((REACH[0] * period as f64) as usize <= 500 && period > 1100, "{period}");
     }
 
     #[test]

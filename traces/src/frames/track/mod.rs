@@ -86,6 +86,8 @@ struct Tracker {
     marks: Vec<usize>,
     spacing: usize,
     period: usize,
+    /// No longer, or neighbouring marks would be too near to each other for a sequence to have both.
+    longest: usize,
     reach: usize,
     candidates: Vec<Candidate>,
     evidence: Evidence,
@@ -98,11 +100,14 @@ impl Tracker {
     fn new(power: &[f64], width: usize, anchor: usize, marks: &[usize]) -> Self {
         let bank = Bank::new(power, width, anchor, marks);
         let (period, starts) = guess::first(&bank, (width / 2).max(1), marks);
+        let longest = chain::longest(marks);
+        let period = period.min(longest);
         let mut tracker = Self {
             bank,
             marks: marks.to_vec(),
             spacing: (width / 8).max(2),
             period,
+            longest,
             reach: FIRST_PERIODS * period,
             candidates: Vec::new(),
             evidence: Evidence::default(),
@@ -138,7 +143,7 @@ impl Tracker {
         self.prune();
         self.chain = Graph::new(&self.bank, &self.candidates, self.period).best();
         let starts = self.starts();
-        self.period = guess::median_gap(&starts).unwrap_or(self.period);
+        self.period = guess::median_gap(&starts).unwrap_or(self.period).min(self.longest);
         let all: Vec<usize> = self.candidates.iter().map(|candidate| candidate.offset).collect();
         let covered = |offsets: &[usize]| chain::covered(offsets, self.period) as f64;
         self.levels_changed |= covered(&starts) < COVERED * covered(&all);
