@@ -139,7 +139,7 @@ impl Rests {
         let cut = |start: &usize| self.lowest_w[*start].is_some_and(|watts| watts > 0.5 * (low_w + high_w));
         let first = stretch.start + from;
         let before = (0..first).rev().skip(1).step_by(2).take(BEYOND).take_while(cut);
-        let last = every_other(from).last().unwrap_or(first);
+        let last = every_other(from).next_back().unwrap_or(first);
         let after = (last + 2..self.lowest_w.len()).step_by(2).take(BEYOND).take_while(cut);
         before.chain(every_other(from)).chain(after).collect()
     }
