@@ -10,6 +10,7 @@ mod sums;
 mod zstd;
 
 pub(crate) use packed::PackedFile;
+pub(crate) use parquet::units as field_units;
 pub use sums::{SumOfRails, rail_of_sums};
 
 use super::columns::Layout;
