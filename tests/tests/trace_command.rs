@@ -190,7 +190,7 @@ fn wrong_input_is_one_line_and_the_right_code() {
         (&["frames", "t.csv", "--rail", "gpu", "--mark", "1"], 2, "rail gpu"),
         (&["frames", "cut.parquet", "--mark", "1"], 1, "cut.parquet"),
         (&["convert", "t.csv", "t.xyz"], 2, "ending"),
-        (&["plot", "t.csv", "--from", "5", "--out", "a.svg"], 2, "--from 5"),
+        (&["plot", "t.csv", "--from", "5", "--out", "a.svg"], 2, "--from and --to: 5 s"),
         (&["pareto", "t.csv"], 2, "time_ms"),
         (&["convert", "t.csv", "t.parquet", "--rail", "main", "--rail", "Main"], 2, "Main is given twice"),
         (

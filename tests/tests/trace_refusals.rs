@@ -16,6 +16,8 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
     let inputs = Inputs::new();
     let trace = recording(&inputs);
     let (stamps, out) = (inputs.put("stamps.txt", "1\n2\n3\n4\n"), inputs.path("o.csv"));
+    let (svg, bad) = (inputs.path("o.svg"), inputs.put("bad.txt", "0.02s\n0.04s\n"));
+    let sample = ["sample", &trace, "--device-rate", "1000", "--out", &out];
     let marked = ["energy", &trace, "--mark", "0.02"];
     for (args, says) in [
         (vec!["convert", &trace, &out, "--voltage", "0"], vec!["--voltage", "above 0"]),
@@ -30,6 +32,12 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
             vec!["convert", &trace, &out, "--start", "5"],
             vec!["t.csv", "column time_s has the times", "--start"],
         ),
+        (vec!["convert", &trace, &out, "--rate", "9000"], vec!["column time_s it is 5000 Hz", "--rate"]),
+        (vec!["convert", &trace, &out, "--rate", "9000", "--repair"], vec!["column time_s it is 5000 Hz"]),
+        ([&sample[..], &["--specified-voltage", "0"]].concat(), vec!["specified_voltage_v", "above 0"]),
+        ([&sample[..], &["--current-gain=-1"]].concat(), vec!["current_gain", "above 0"]),
+        (vec!["plot", &trace, "--from", "0.05", "--to", "1", "--out", &svg], vec!["not within the trace"]),
+        (vec!["frames", &trace, "--mark-file", &bad], vec!["line 1: `0.02s` holds no time"]),
     ] {
         let ended = quintile!().call(["trace"].iter().chain(&args));
         assert_eq!(ended.code, Some(2), "{args:?}: {}", ended.stderr);
@@ -87,6 +95,18 @@ fn plots_show_samples_where_they_are_few_and_a_damaged_pyramid_is_made_anew() {
     let (told, again) = plot(&[]);
     assert!(told.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made, "{}", told.stderr);
     assert_eq!((plot(&[]).0.stderr, plot(&[]).1 == made), (String::new(), true));
+    let whole = std::fs::read(&kept).unwrap_or_default();
+    let mut head = whole.clone();
+    head[20] ^= 1;
+    for damaged in [head, whole[..40].to_vec(), whole[..whole.len() - 1].to_vec()] {
+        inputs.put("t.csv.pyramid", damaged);
+        let (told, again) = plot(&[]);
+        assert!(
+            told.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made,
+            "{}",
+            told.stderr
+        );
+    }
 }
 
 #[test]
@@ -122,4 +142,21 @@ fn a_rail_that_is_the_sum_of_others_is_told_unless_rails_are_chosen() {
     let chosen =
         quintile!().call(["trace", "convert", &trace, &out, "--rail", "cpu", "--rail", "gpu"]).stderr;
     assert!(!chosen.contains("warning"), "{chosen}");
+}
+
+#[test]
+fn anchors_of_another_clock_or_beyond_the_stamps_are_told() {
+    let inputs = Inputs::new();
+    let (trace, stamps) = (recording(&inputs), inputs.put("stamps.txt", "1.01\n1.02\n1.03\n1.04\n"));
+    let told = |first: &str, second: &str| {
+        let args = ["trace", "align", &trace, &stamps, "--anchor", first, "--anchor", second];
+        let ended = quintile!().call(args);
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended.stderr
+    };
+    assert_eq!(told("1.01=0.02", "1.04=0.05"), "");
+    assert!(told("1.01=0.02", "1.04=0.06").contains("warning anchors-off: by the anchors, a second"));
+    assert!(
+        told("1.01=0.02", "1.09=0.1").contains("warning anchors-off: stamp 1.09 s of an anchor is beyond")
+    );
 }

@@ -8,6 +8,7 @@ mod samples;
 use crate::io::{ReadError, ReadOptions, read};
 use crate::stream::Clock;
 use crate::trace::Trace;
+use kept::Found;
 use std::path::{Path, PathBuf};
 
 /// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample, 2.5 % of
@@ -49,6 +50,8 @@ pub struct Pyramid {
     clock: Clock,
     samples: u64,
     store: Store,
+    /// Whether what was kept was damaged, so that this was made in its place.
+    was_damaged: bool,
 }
 
 #[derive(Debug)]
@@ -72,9 +75,15 @@ impl Pyramid {
     /// [`ReadError`] if the trace cannot be read.
     pub fn of_file(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         match kept::kept(&pyramid_path(path), kept::stamp(path, options)) {
-            Some(pyramid) => Ok(pyramid),
-            None => Self::anew(path, options),
+            Found::Whole(pyramid) => Ok(pyramid),
+            Found::Other => Self::anew(path, options),
+            Found::Damaged => Ok(Self { was_damaged: true, ..Self::anew(path, options)? }),
         }
+    }
+
+    /// Whether the pyramid that was kept was damaged, as far as was seen when it was opened, so that this was made in its place.
+    pub fn was_damaged(&self) -> bool {
+        self.was_damaged
     }
 
     /// Makes the pyramid of a file and keeps it, whatever is kept there: it may be damaged.
@@ -113,7 +122,7 @@ impl Pyramid {
         while levels[levels.len() - 1].len() > FAN {
             levels.push(levels[levels.len() - 1].chunks(FAN).map(Entry::of_entries).collect());
         }
-        Self { clock, samples, store: Store::Memory(levels) }
+        Self { clock, samples, store: Store::Memory(levels), was_damaged: false }
     }
 
     /// Left edge of the first sample, s.

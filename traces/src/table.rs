@@ -1,8 +1,9 @@
 //! Small tables of text and numbers, from CSV, TSV or Parquet.
 
-use crate::io::PackedFile;
+use crate::io::{PackedFile, field_units};
 use parquet::file::reader::FileReader;
 use parquet::record::Field;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -61,6 +62,8 @@ pub struct Table {
     path: PathBuf,
     names: Vec<String>,
     rows: Vec<Vec<String>>,
+    /// Units that stand beside names, in the metadata of fields.
+    units: BTreeMap<String, String>,
 }
 
 impl Table {
@@ -88,18 +91,24 @@ impl Table {
         if bytes.iter().all(u8::is_ascii_whitespace) {
             return Err(refuse("it is empty; give a row for each setting".to_owned()));
         }
-        let (names, rows) = if bytes.starts_with(b"PAR1") {
+        let (names, rows, units) = if bytes.starts_with(b"PAR1") {
             let read = catch_unwind(AssertUnwindSafe(|| from_parquet(path)));
             read.unwrap_or_else(|_| Err("it is damaged".to_owned())).map_err(refuse)?
         } else {
             from_text(&bytes).map_err(refuse)?
         };
-        Ok(Self { path: path.to_owned(), names, rows })
+        Ok(Self { path: path.to_owned(), names, rows, units })
     }
 
     /// How many rows there are.
     pub fn rows(&self) -> usize {
         self.rows.len()
+    }
+
+    /// The unit that a file has beside a column's name (letter case does not count).
+    pub fn unit(&self, column: &str) -> Option<&str> {
+        let found = self.units.iter().find(|(name, _)| name.eq_ignore_ascii_case(column));
+        found.map(|(_, unit)| unit.as_str())
     }
 
     /// A column as text.
@@ -135,7 +144,7 @@ impl Table {
     }
 }
 
-type Content = (Vec<String>, Vec<Vec<String>>);
+type Content = (Vec<String>, Vec<Vec<String>>, BTreeMap<String, String>);
 
 fn from_text(bytes: &[u8]) -> Result<Content, String> {
     let mut reader = csv::ReaderBuilder::new()
@@ -147,7 +156,7 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
         |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
     let names = text(reader.byte_headers().map_err(|error| error.to_string())?);
     let rows = reader.byte_records().map(|record| record.map(|record| text(&record)));
-    Ok((names, rows.collect::<Result<_, _>>().map_err(|error| error.to_string())?))
+    Ok((names, rows.collect::<Result<_, _>>().map_err(|error| error.to_string())?, BTreeMap::new()))
 }
 
 fn from_parquet(path: &Path) -> Result<Content, String> {
@@ -167,7 +176,7 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
         };
         rows.push(row.get_column_iter().map(|(_, field)| text(field)).collect());
     }
-    Ok((names, rows))
+    Ok((names, rows, field_units(&file)))
 }
 
 /// Refuses columns that cannot be unpacked, with what to do.

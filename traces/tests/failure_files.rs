@@ -76,6 +76,41 @@ fn what_contradicts_a_file_or_may_mean_another_number_is_refused() {
     std::fs::write(csv::sidecar_path(&path), r#"{"rate_hz": 20}"#).unwrap();
     let other = ReadOptions { rate_hz: Some(10.0), ..ReadOptions::default() };
     says(&io::read(&path, &other).unwrap_err(), &["10 Hz was asked for", "says 20 Hz", "--rate"]);
+    std::fs::write(csv::sidecar_path(&path), r#"{"rate_hz": 20, "start_s": 3}"#).unwrap();
+    let late = |start_s| ReadOptions { start_s: Some(start_s), ..ReadOptions::default() };
+    says(&io::read(&path, &late(4.0)).unwrap_err(), &["start at 4 s was asked for", "says 3 s", "--start"]);
+    assert!(io::read(&path, &late(3.0)).is_ok());
+}
+
+#[test]
+fn a_rate_that_contradicts_the_times_is_refused_also_where_they_are_to_be_mended() {
+    let rows: String = (0..500).map(|i| format!("{},1,2\n", f64::from(i) / 1000.0)).collect();
+    let (_folder, path) = in_folder("a.csv", format!("time_s,voltage_V,current_A\n{rows}").as_bytes());
+    for repair in [false, true] {
+        let of = |rate_hz| ReadOptions { repair, rate_hz: Some(rate_hz), ..ReadOptions::default() };
+        for rate_hz in [2000.0, 500.0, 1002.0] {
+            let error = io::read(&path, &of(rate_hz)).unwrap_err();
+            says(&error, &[&format!("a rate of {rate_hz} Hz was asked for"), "column time_s it is 1000 Hz"]);
+            assert!(matches!(error, ReadError::Asked { .. }));
+        }
+        assert_eq!(io::read(&path, &of(1000.0)).unwrap().trace.samples(), 500);
+    }
+}
+
+#[test]
+fn rows_with_halves_of_numbers_are_not_cut_to_length() {
+    let (repair, many) = (ReadOptions { repair: true, ..ReadOptions::default() }, 1500);
+    for rows in [3, many] {
+        let text: String = (0..rows).map(|i| format!("0,{i:04},1,5,2,5\n")).collect();
+        let (_folder, path) = in_folder("a.csv", format!("time_s,voltage_V,current_A\n{text}").as_bytes());
+        says(
+            &io::read(&path, &repair).unwrap_err(),
+            &[&format!("first {} rows", rows.min(1000)), "decimal comma"],
+        );
+    }
+    // A comma after the last value is no half of a number.
+    let (_folder, path) = in_folder("b.csv", b"time_s,voltage_V,current_A\n0,1,2,\n0.5,1,2,\n1,1,2,\n");
+    assert_eq!(io::read(&path, &repair).unwrap().trace.samples(), 3);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Parquet as other programs write it: optional columns, dictionaries, every way of packing (pyarrow, see the file's name).
 #![allow(clippy::unwrap_used)]
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
 use traces::io::{ReadOptions, read};
 use traces::table::Table;
@@ -45,6 +47,40 @@ fn units_of_fields_count_as_those_of_names_do() {
         let message = read(name).unwrap_err().to_string();
         assert!(message.contains(says), "{message}");
     }
+}
+
+/// `units.parquet` with something in the schema of its fields put in place of something else, of the same length.
+fn changed(from: &str, to: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    let mut bytes = std::fs::read(foreign("units.parquet")).unwrap();
+    let find = |bytes: &[u8], what: &[u8]| bytes.windows(what.len()).position(|part| part == what);
+    let is_text = |byte: &u8| byte.is_ascii_alphanumeric() || b"+/=".contains(byte);
+    let key = find(&bytes, b"ARROW:schema").unwrap() + 12;
+    let begin = key + bytes[key..].windows(9).position(|part| part.iter().all(is_text)).unwrap();
+    let end = begin + bytes[begin..].iter().position(|byte| !is_text(byte)).unwrap();
+    let mut schema = STANDARD.decode(&bytes[begin..end]).unwrap();
+    while let Some(at) = find(&schema, from.as_bytes()) {
+        schema[at..at + to.len()].copy_from_slice(to.as_bytes());
+    }
+    bytes[begin..end].copy_from_slice(STANDARD.encode(schema).as_bytes());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    std::fs::write(&path, bytes).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn keys_of_units_are_read_in_any_case_and_units_that_are_not_known_refused() {
+    let whole = read(&foreign("units.parquet"), &ReadOptions::default()).unwrap().trace;
+    let (_folder, path) = changed("unit", "UNIT");
+    let trace = read(&path, &ReadOptions::default()).unwrap().trace;
+    assert_eq!((trace.voltage_v(), trace.rate_hz()), (whole.voltage_v(), whole.rate_hz()));
+    assert_eq!(Table::read(&path).unwrap().unit("Voltage"), Some("mV"));
+    let (_folder, path) = changed("mV", "zV");
+    let message = read(&path, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(
+        message.contains("column voltage has the unit zV in its metadata, which is not known"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -97,34 +97,30 @@ impl DeviceSpec {
         let not_negative = "a finite number at or above 0";
         let ordered = "two finite numbers, the lower one first";
         let spans = |range: [f64; 2]| range[0].is_finite() && range[1].is_finite() && range[0] < range[1];
+        let above = |value: f64| value.is_finite() && value > 0.0;
         let quiet = |noise: f64| noise.is_finite() && noise >= 0.0;
         let rate_good = (RATE_LIMITS_HZ[0]..=RATE_LIMITS_HZ[1]).contains(&self.rate_hz);
         let low_pass_s = self.low_pass_s.unwrap_or(1.0);
         let checks = [
             ("rate_hz", self.rate_hz, rate_good, "between 1e-6 and 1e8 Hz"),
-            ("rail_v", self.rail_v, self.rail_v.is_finite() && self.rail_v > 0.0, "a finite number above 0"),
+            ("rail_v", self.rail_v, above(self.rail_v), "a finite number above 0"),
             ("rail_ohm", self.rail_ohm, quiet(self.rail_ohm), not_negative),
             ("current_range_a", self.current_range_a[0], spans(self.current_range_a), ordered),
             ("voltage_range_v", self.voltage_range_v[0], spans(self.voltage_range_v), ordered),
             ("bits", f64::from(self.bits), (1..=24).contains(&self.bits), "between 1 and 24"),
             ("current_noise_a", self.current_noise_a, quiet(self.current_noise_a), not_negative),
             ("voltage_noise_v", self.voltage_noise_v, quiet(self.voltage_noise_v), not_negative),
-            ("current_gain", self.current_gain, self.current_gain.is_finite(), "a finite number"),
+            ("current_gain", self.current_gain, above(self.current_gain), "a finite number above 0"),
             ("current_offset_a", self.current_offset_a, self.current_offset_a.is_finite(), "a finite number"),
-            ("voltage_gain", self.voltage_gain, self.voltage_gain.is_finite(), "a finite number"),
+            ("voltage_gain", self.voltage_gain, above(self.voltage_gain), "a finite number above 0"),
             ("voltage_offset_v", self.voltage_offset_v, self.voltage_offset_v.is_finite(), "a finite number"),
             (
                 "specified_voltage_v",
                 self.specified_voltage_v.unwrap_or(1.0),
-                self.specified_voltage_v.is_none_or(f64::is_finite),
-                "a finite number, or absent",
-            ),
-            (
-                "low_pass_s",
-                low_pass_s,
-                low_pass_s.is_finite() && low_pass_s > 0.0,
+                self.specified_voltage_v.is_none_or(above),
                 "a finite number above 0, or absent",
             ),
+            ("low_pass_s", low_pass_s, above(low_pass_s), "a finite number above 0, or absent"),
             ("packet_samples", f64::from(self.packet_samples), self.packet_samples > 0, "at least 1"),
             ("packet_loss", self.packet_loss, (0.0..1.0).contains(&self.packet_loss), "from 0 to below 1"),
         ];
@@ -146,8 +142,11 @@ mod tests {
     #[test]
     fn the_default_is_valid_and_every_bad_field_is_named() {
         assert_eq!(DeviceSpec::default().check(), Ok(()));
-        let spoils: [(&str, Spoil); 13] = [
+        let spoils: [(&str, Spoil); 16] = [
             ("current_gain", |s| s.current_gain = f64::NAN),
+            ("current_gain", |s| s.current_gain = -1.0),
+            ("voltage_gain", |s| s.voltage_gain = 0.0),
+            ("specified_voltage_v", |s| s.specified_voltage_v = Some(0.0)),
             ("specified_voltage_v", |s| s.specified_voltage_v = Some(f64::INFINITY)),
             ("rate_hz", |s| s.rate_hz = -1.0),
             ("rail_v", |s| s.rail_v = 0.0),

@@ -33,5 +33,5 @@ pub use source::{Heading, Sink, Source, Stretch};
 pub const COLUMNS: [&str; 4] = ["time_ns", "time_s", "voltage_V", "current_A"];
 
 pub(crate) use jls::crc32c;
-pub(crate) use rows::{Chunk, PackedFile};
+pub(crate) use rows::{Chunk, PackedFile, field_units};
 pub(crate) use timing::{Stamps, all_apart, grid, rounded_rate_hz};

@@ -10,6 +10,8 @@ use std::time::UNIX_EPOCH;
 
 /// Begins every file; the format's version is in it.
 const MAGIC: u64 = 0x3230_5259_505f_5451;
+/// That of the version before, which had no checksums.
+const BEFORE: u64 = 0x3130_5259_505f_5451;
 const HEADER_BYTES: usize = 64;
 /// Where the checksum of the header and of all checksums stands, in words of 8 bytes.
 const SEAL: usize = 7;
@@ -68,30 +70,55 @@ fn seal(head: &[u8], sums: &[u8]) -> u32 {
     crc32c(&[&head[..8 * SEAL], sums].concat())
 }
 
-/// The pyramid in a file, if it is of the trace with that stamp and whole as far as can be seen without its entries.
-pub(super) fn kept(path: &Path, stamp: u64) -> Option<Pyramid> {
-    let mut file = File::open(path).ok()?;
+/// What is kept beside a trace.
+pub(super) enum Found {
+    /// The pyramid of the trace, whole as far as can be seen without its entries.
+    Whole(Pyramid),
+    /// Nothing, or the pyramid of another trace or version.
+    Other,
+    /// A pyramid that was cut off or changed.
+    Damaged,
+}
+
+/// Looks for the pyramid of the trace with that stamp.
+pub(super) fn kept(path: &Path, stamp: u64) -> Found {
+    let Ok(mut file) = File::open(path) else { return Found::Other };
     let mut head = [0; HEADER_BYTES];
-    file.read_exact(&mut head).ok()?;
+    if file.read_exact(&mut head).is_err() {
+        return Found::Damaged;
+    }
     let word = |index: usize| head[8 * index..].first_chunk().map_or(0, |word| u64::from_le_bytes(*word));
+    if word(0) == BEFORE {
+        return Found::Other;
+    }
     let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
-    if word(0) != MAGIC || word(1) != stamp || samples >= 1 << 48 {
+    let Some((sizes, sums)) = checksums(&mut file, samples) else { return Found::Damaged };
+    if word(0) != MAGIC || word(SEAL) != u64::from(seal(&head, &sums)) {
+        return Found::Damaged;
+    }
+    if word(1) != stamp {
+        return Found::Other;
+    }
+    let sums = sums.as_chunks().0.iter().map(|sum| u32::from_le_bytes(*sum)).collect();
+    let clock = Clock { start_s, rate_hz, samples: Some(samples) };
+    let store = Store::File(Kept { path: path.to_owned(), sizes, sums });
+    Found::Whole(Pyramid { clock, samples, store, was_damaged: false })
+}
+
+/// Entries of each level and the bytes of the checksums, which come next; `None` if the file is not as long as it has to be.
+fn checksums(file: &mut File, samples: u64) -> Option<(Vec<u64>, Vec<u8>)> {
+    if samples >= 1 << 48 {
         return None;
     }
     let sizes = sizes(samples);
     let groups: u64 = sizes.iter().map(|size| size.div_ceil(GROUP)).sum();
     let whole = HEADER_BYTES as u64 + 4 * groups + ENTRY_BYTES * sizes.iter().sum::<u64>();
-    if fs::metadata(path).ok()?.len() != whole {
+    if file.metadata().ok()?.len() != whole {
         return None;
     }
     let mut sums = vec![0; 4 * groups as usize];
     file.read_exact(&mut sums).ok()?;
-    if word(SEAL) != u64::from(seal(&head, &sums)) {
-        return None;
-    }
-    let sums = sums.as_chunks().0.iter().map(|sum| u32::from_le_bytes(*sum)).collect();
-    let clock = Clock { start_s, rate_hz, samples: Some(samples) };
-    Some(Pyramid { clock, samples, store: Store::File(Kept { path: path.to_owned(), sizes, sums }) })
+    Some((sizes, sums))
 }
 
 impl Kept {
@@ -136,7 +163,9 @@ mod tests {
             let mut bytes = whole.clone();
             bytes[at] ^= 0x10;
             fs::write(&kept_at, &bytes).unwrap();
-            let damaged = kept(&kept_at, stamp(&path, &options));
+            let found = kept(&kept_at, stamp(&path, &options));
+            assert!(at >= 64 || matches!(found, Found::Damaged), "byte {at}");
+            let damaged = if let Found::Whole(pyramid) = found { Some(pyramid) } else { None };
             let looks = [(0.0, 200.0, 1000), (0.0, 200.0, 10), (100.0, 200.0, 3000), (0.0, 99.0, 1500)];
             let shown = |(from_s, to_s, columns)| {
                 let shown = damaged.as_ref().and_then(|pyramid| pyramid.columns(from_s, to_s, columns));
@@ -145,6 +174,11 @@ mod tests {
             let shown = looks.map(shown);
             assert!(!shown.contains(&Some(false)), "byte {at}");
             assert!(at >= 64 || shown == [None; 4], "byte {at}: {shown:?}");
+        }
+        for length in [0, 63, 64, whole.len() - 1] {
+            fs::write(&kept_at, &whole[..length]).unwrap();
+            let again = Pyramid::of_file(&path, &options).unwrap();
+            assert!(again.was_damaged() && !Pyramid::of_file(&path, &options).unwrap().was_damaged());
         }
     }
 }

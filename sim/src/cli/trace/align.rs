@@ -32,6 +32,24 @@ fn is_within((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Failu
     )))
 }
 
+/// By what share the clock of stamps may run off that of the trace; clocks of computers are off by far less.
+const SLOPE_OFF: f64 = 0.02;
+
+/// Tells of anchors that are likely wrong: stamps in another unit, or of another recording.
+fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f64]) {
+    let told = |what: String| complain(&format!("warning anchors-off: {what}; look at --anchor STAMP=TIME"));
+    if (alignment.scale - 1.0).abs() > SLOPE_OFF {
+        told(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
+    }
+    let (first, last) = (sorted[0], sorted[sorted.len() - 1]);
+    let rounding = 1e-12 * first.abs().max(last.abs());
+    for (stamp, _) in anchors {
+        if !(first - rounding..=last + rounding).contains(&stamp) {
+            told(format!("stamp {stamp} s of an anchor is beyond those of the file, {first} s to {last} s"));
+        }
+    }
+}
+
 pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = times(&args.stamps)?;
@@ -40,7 +58,9 @@ pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
         [a, b] => {
             let trace = args.input.source()?.0.heading();
             [a, b].iter().try_for_each(|anchor| is_within(*anchor, &trace))?;
-            Alignment::by_anchors(a, b)?
+            let alignment = Alignment::by_anchors(a, b)?;
+            warn_of_anchors([a, b], &alignment, &stamps);
+            alignment
         }
         [] => {
             let found = args.find.frames(&args.input, &args.input.trace)?.found;

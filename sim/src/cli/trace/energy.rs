@@ -80,7 +80,15 @@ fn stretch(
 }
 
 fn check(trace: &Heading, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
-    let (start_s, end_s) = (trace.start_s, trace.end_s());
+    check_within((trace.start_s, trace.end_s()), (from_s, to_s), what)
+}
+
+/// Refuses a stretch that is not within a trace.
+pub(super) fn check_within(
+    (start_s, end_s): (f64, f64),
+    (from_s, to_s): (f64, f64),
+    what: &str,
+) -> Result<(), Failure> {
     let rounding_s = 1e-12 * start_s.abs().max(end_s.abs());
     if from_s >= start_s - rounding_s && to_s <= end_s + rounding_s && from_s < to_s {
         return Ok(());

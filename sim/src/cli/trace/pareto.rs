@@ -11,7 +11,7 @@ use traces::table::{Table as Columns, TableReadError};
 use super::args::{ParetoArgs, ParetoShow};
 use super::input::wrong;
 use super::plot::{Ending, write};
-use super::units::{Quantity, scale};
+use super::units::{Quantity, scale_with};
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::{print, print_json};
@@ -50,7 +50,7 @@ fn groups(args: &ParetoArgs, table: &Columns) -> Result<Groups, Failure> {
         let values = table.numbers(column)?;
         Ok(values.into_iter().map(|value| value * scale).collect())
     };
-    let unit = |column: &str, of: Quantity| scale(column, of).map_err(wrong);
+    let unit = |column: &str, of: Quantity| scale_with(column, table.unit(column), of).map_err(wrong);
     // A deviation whose name tells no unit has that of what it belongs to.
     let deviations = |column: &Option<String>, (of, quantity): (&str, Quantity)| match column {
         Some(column) => numbers(column, unit(column, quantity)?.or(unit(of, quantity)?).unwrap_or(1.0)),

@@ -8,6 +8,7 @@ use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
 use traces::pyramid::{Column, Pyramid, pyramid_path};
 
 use super::args::{PlotArgs, PlotKind};
+use super::energy::check_within;
 use super::input::wrong;
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
@@ -67,10 +68,8 @@ pub(super) fn write(picture: &Picture, path: &Path, ending: Ending) -> Result<()
 
 fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure> {
     let (from_s, to_s) = (args.from.unwrap_or(start_s), args.to.unwrap_or(end_s));
-    if from_s < to_s && from_s < end_s && to_s > start_s {
-        return Ok((from_s.max(start_s), to_s.min(end_s)));
-    }
-    Err(wrong(format!("--from {from_s} --to {to_s}: the trace is from {start_s} s to {end_s} s")))
+    check_within((start_s, end_s), (from_s, to_s), "--from and --to")?;
+    Ok((from_s.max(start_s), to_s.min(end_s)))
 }
 
 /// What is shown, and its columns: from the pyramid beside the file, or from the samples where these are few.
@@ -85,11 +84,15 @@ fn columns(args: &PlotArgs) -> Result<((f64, f64), Vec<Column>), Failure> {
     let (path, options) = (args.input.trace.as_path(), args.input.options()?);
     args.input.warn_of_sums(path)?;
     let pyramid = Pyramid::of_file(path, &options)?;
+    let told = || complain(&format!("{}: damaged; made anew", pyramid_path(path).display()));
+    if pyramid.was_damaged() {
+        told();
+    }
     let shown = span(args, pyramid.start_s(), pyramid.end_s())?;
     if let Some(columns) = pyramid.columns_of_file((path, &options), shown, COLUMNS)? {
         return Ok((shown, columns));
     }
-    complain(&format!("{}: damaged; made anew", pyramid_path(path).display()));
+    told();
     let columns = Pyramid::anew(path, &options)?.columns_of_file((path, &options), shown, COLUMNS)?;
     Ok((shown, columns.unwrap_or_default()))
 }

@@ -28,7 +28,7 @@ pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     for (nth, (index, line)) in lines.filter(|(_, line)| !line.trim().is_empty()).enumerate() {
         let fields: Vec<&str> = line.split([',', '\t', ';']).map(str::trim).collect();
-        if nth == 0 && fields.iter().all(|field| field.parse::<f64>().is_err()) {
+        if nth == 0 && is_header(&fields) {
             column = Column::named(path, &fields)?;
             continue;
         }
@@ -41,6 +41,12 @@ pub(super) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
     let none =
         || Failure { message: format!("{}: holds no time: give one in each line", path.display()), code: 1 };
     if times.is_empty() { Err(none()) } else { Ok(times) }
+}
+
+/// Whether there is no number among the fields of a first line, nor in the first what seems meant for one: `1.5s`.
+fn is_header(fields: &[&str]) -> bool {
+    let begins = fields[0].trim_start_matches(['+', '-', '.']).starts_with(|c: char| c.is_ascii_digit());
+    !begins && fields.iter().all(|field| field.parse::<f64>().is_err())
 }
 
 /// What is not there was asked for wrongly; what cannot be read failed.
@@ -128,6 +134,10 @@ mod tests {
             ("start_s;label\n1,5;a\n", "line 2: `1,5;a` has 3 fields, the first line 2"),
             ("frame,energy\n1,2\n", "(frame, energy) is called start, time"),
             ("start_mJ\n1\n", "holds no times"),
+            ("1.5s\n2.5\n", "line 1: `1.5s` holds no time"),
+            ("1.5.0\n2.5\n", "line 1: `1.5.0` holds no time"),
+            ("-.5s\n2.5\n", "line 1: `-.5s` holds no time"),
+            ("1.5s,a\n2.5,b\n", "line 1: `1.5s,a` has 2 fields"),
             ("time_s\nx\n", "line 2: `x` holds no time"),
         ] {
             let message = read(text).unwrap_err();

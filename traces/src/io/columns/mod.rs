@@ -3,8 +3,8 @@
 mod names;
 
 use super::{ReadError, ReadOptions};
-pub(super) use names::Quantity;
-use names::understood;
+pub(super) use names::{MICRO, Quantity};
+use names::{understood, unit};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -80,21 +80,23 @@ fn pick(path: &Path, names: &[String], column: &str, of: Quantity) -> Result<Pic
     Ok(Picked { index, name: names[index].clone(), scale })
 }
 
-/// What to multiply a column by for s, V, A or W, by the unit that a file says beside its name; units that are not known say
-/// nothing.
+/// What to multiply a column by for s, V, A or W, by the unit that a file says beside its name; none if that is empty.
 ///
 /// # Errors
-/// [`ReadError::Unit`] if name and unit contradict each other, or the unit is of something else.
-fn scale_by(path: &Path, picked: &Picked, unit: &str, of: Quantity) -> Result<f64, ReadError> {
-    let Some(told) = understood(&format!("_{unit}")).filter(|told| told.has_unit && told.rail.is_empty())
-    else {
+/// [`ReadError::Unit`] if name and unit contradict each other, or the unit is of something else; [`ReadError::UnitUnknown`].
+fn scale_by(path: &Path, picked: &Picked, text: &str, of: Quantity) -> Result<f64, ReadError> {
+    if text.is_empty() {
         return Ok(picked.scale);
+    }
+    let Some(told) = unit(text) else {
+        let (path, column, unit) = (path.to_owned(), picked.name.clone(), text.to_owned());
+        return Err(ReadError::UnitUnknown { path, column, unit });
     };
     let stated = understood(&picked.name).filter(|named| named.quantity == of && named.has_unit);
     if told.quantity == of && stated.is_none_or(|stated| stated.scale == told.scale) {
         return Ok(told.scale);
     }
-    let (path, column, unit) = (path.to_owned(), picked.name.clone(), unit.to_owned());
+    let (path, column, unit) = (path.to_owned(), picked.name.clone(), text.to_owned());
     Err(ReadError::Unit { path, column, unit, of: of.name() })
 }
 
@@ -225,7 +227,7 @@ impl Layout {
     /// Takes units from where a file has them beside the names of its columns.
     ///
     /// # Errors
-    /// [`ReadError::Unit`] where they do not go with the names.
+    /// [`ReadError::Unit`] where they do not go with the names, [`ReadError::UnitUnknown`] where they are not known.
     pub fn with_units(&mut self, path: &Path, units: &BTreeMap<String, String>) -> Result<(), ReadError> {
         let put = |picked: &mut Picked, of: Quantity| match units.get(&picked.name) {
             Some(unit) => scale_by(path, picked, unit, of).map(|scale| picked.scale = scale),

@@ -42,6 +42,32 @@ const UNITS: [(&str, Quantity, f64); 17] = [
     ("uw", Quantity::Power, 1e-6),
 ];
 
+/// Units written out, as they stand in metadata.
+const WORDS: [(&str, &str); 12] = [
+    ("sec", "s"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("msec", "ms"),
+    ("usec", "us"),
+    ("volt", "v"),
+    ("volts", "v"),
+    ("amp", "a"),
+    ("amps", "a"),
+    ("ampere", "a"),
+    ("watt", "w"),
+    ("watts", "w"),
+];
+
+/// The signs for micro, U+00B5 and the Greek letter U+03BC, that names and units may have in place of `u`.
+pub(in crate::io) const MICRO: [char; 2] = ['\u{b5}', '\u{3bc}'];
+
+/// A unit that stands beside a name; `None` if it is not known.
+pub(super) fn unit(text: &str) -> Option<Named> {
+    let lower = text.to_ascii_lowercase();
+    let symbol = WORDS.iter().find(|(word, _)| *word == lower).map_or(text, |(_, symbol)| symbol);
+    understood(&format!("_{symbol}")).filter(|told| told.has_unit && told.rail.is_empty())
+}
+
 fn quantity(token: &str) -> Option<Quantity> {
     match token {
         "time" | "timestamp" | "t" => Some(Quantity::Time),
@@ -55,7 +81,7 @@ fn quantity(token: &str) -> Option<Quantity> {
 /// `gpu_voltage_V`, `Main(mA)`, `Time (s)`, `voltage_V`: quantity, unit and what is left, the rail. `None` for names of
 /// other things.
 pub(super) fn understood(name: &str) -> Option<Named> {
-    let lower = name.trim_start_matches('\u{feff}').to_ascii_lowercase().replace('\u{b5}', "u");
+    let lower = name.trim_start_matches('\u{feff}').to_ascii_lowercase().replace(MICRO, "u");
     let tokens: Vec<&str> =
         lower.split(|c: char| !c.is_alphanumeric()).filter(|token| !token.is_empty()).collect();
     let told = tokens.iter().find_map(|token| quantity(token));
@@ -119,5 +145,20 @@ mod tests {
         assert_eq!(read("power_MW"), is(Quantity::Power, 1e6, ""));
         assert_eq!(read("power_mW"), is(Quantity::Power, 1e-3, ""));
         assert_eq!(read("POWER_MW"), is(Quantity::Power, 1e-3, ""));
+        for name in ["current_\u{b5}A", "current (\u{3bc}A)"] {
+            assert_eq!(read(name), is(Quantity::Current, 1e-6, ""), "{name}");
+        }
+    }
+
+    #[test]
+    fn units_alone_are_symbols_or_words_and_others_are_not_known() {
+        let read = |text| unit(text).map(|unit| (unit.quantity, unit.scale));
+        assert_eq!(read("\u{3bc}A"), Some((Quantity::Current, 1e-6)));
+        assert_eq!(read("[mA]"), Some((Quantity::Current, 1e-3)));
+        assert_eq!(read("Volts"), Some((Quantity::Voltage, 1.0)));
+        assert_eq!(read("msec"), Some((Quantity::Time, 1e-3)));
+        for text in ["milliamps", "mAmp", "ticks", "min", "furlong", "power", "t"] {
+            assert_eq!(read(text), None, "{text}");
+        }
     }
 }

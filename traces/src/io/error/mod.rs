@@ -94,6 +94,24 @@ pub enum ReadError {
         /// What the column is read as.
         of: &'static str,
     },
+    /// A unit beside a column's name that is not known.
+    #[error("{path}: column {column} has the unit {unit} in its metadata, which is not known: write s, V, A or W there, or m, u, k with them", path = path.display())]
+    UnitUnknown {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// The unit.
+        unit: String,
+    },
+    /// More fields than columns in most rows.
+    #[error("{path}: more than half of the first {rows} rows have more fields than there are columns: most likely numbers with a decimal comma, which are not read; export them with a point", path = path.display())]
+    Surplus {
+        /// The file.
+        path: PathBuf,
+        /// How many rows were looked at.
+        rows: u64,
+    },
     /// A number with a decimal comma, which might as well be two.
     #[error("{path}: row {row}: {column} is {value:?}: numbers with a decimal comma are not read; export them with a point", path = path.display())]
     DecimalComma {

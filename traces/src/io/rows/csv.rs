@@ -13,6 +13,9 @@ use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+/// Rows by which it is judged whether fields are halves of numbers.
+const JUDGED: u64 = 1000;
+
 type Text = Box<dyn Read + Send>;
 
 /// A text being read.
@@ -26,6 +29,8 @@ pub(super) struct CsvRows {
     held: bool,
     /// Rows with more or fewer fields than there are names: the first, its time if it has one, and how many.
     uneven: Option<(u64, Option<f64>, u64)>,
+    /// How many of the first rows have something in a field for which there is no name.
+    surplus: u64,
 }
 
 fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
@@ -78,7 +83,7 @@ impl CsvRows {
         };
         let layout = layout(path, &names, options)?;
         let path = path.to_owned();
-        Ok((Self { path, reader, record, names, row: 0, held, uneven: None }, layout, header))
+        Ok((Self { path, reader, record, names, row: 0, held, uneven: None, surplus: 0 }, layout, header))
     }
 
     pub fn names(&self) -> &[String] {
@@ -101,10 +106,23 @@ impl CsvRows {
         if !std::mem::take(&mut self.held)
             && !self.reader.read_byte_record(&mut self.record).map_err(|error| damaged(&self.path, &error))?
         {
+            self.judge(self.row < JUDGED)?;
             return Ok(false);
         }
         self.row += 1;
+        let beyond =
+            |record: &ByteRecord| record.iter().skip(self.names.len()).any(|field| !field.is_empty());
+        self.surplus += u64::from(self.row <= JUDGED && beyond(&self.record));
+        self.judge(self.row == JUDGED)?;
         Ok(true)
+    }
+
+    /// Refuses what most likely are numbers with decimal commas: dropping what is beyond the columns would leave wrong ones.
+    fn judge(&self, now: bool) -> Result<(), ReadError> {
+        if now && 2 * self.surplus > self.row {
+            return Err(ReadError::Surplus { path: self.path.clone(), rows: self.row });
+        }
+        Ok(())
     }
 
     pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {

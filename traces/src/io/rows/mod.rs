@@ -1,5 +1,6 @@
 //! Rows of a file in pieces, so that no file has to fit into memory.
 
+mod asked;
 mod csv;
 mod jls;
 mod lines;
@@ -10,6 +11,7 @@ mod sums;
 mod zstd;
 
 pub(crate) use packed::PackedFile;
+pub(crate) use parquet::units as field_units;
 pub use sums::{SumOfRails, rail_of_sums};
 
 use super::columns::Layout;
@@ -32,9 +34,6 @@ const FOREIGN: [(&[u8], &str, &str); 3] = [
         "export it to CSV from its own program",
     ),
 ];
-
-/// By what share a rate that is asked for may differ from that of the file: clocks do, and JLS rounds by as much.
-const RATE_OFF: f64 = 1e-3;
 
 /// Some rows.
 #[derive(Debug)]
@@ -72,6 +71,12 @@ impl Rows {
     /// # Errors
     /// [`ReadError`] if there is no such file, it is of no known format, or columns are missing.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let rows = Self::of_kind(path, options)?;
+        asked::check_times(&rows, options)?;
+        Ok(rows)
+    }
+
+    fn of_kind(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         match first_bytes(path)? {
             start if start.starts_with(b"PAR1") => Self::parquet(path, options),
             start if start.starts_with(b"jlsfmt\r\n") => Self::jls(path, options),
@@ -106,7 +111,7 @@ impl Rows {
         options: &ReadOptions,
         time: &str,
     ) -> Result<Self, ReadError> {
-        check_asked(path, &layout, &header, options)?;
+        asked::check(path, &layout, &header, options)?;
         header.rate_hz = options.rate_hz.or(header.rate_hz);
         header.start_s = options.start_s.or(header.start_s);
         if layout.time.is_none() && header.rate_hz.is_none() {
@@ -248,32 +253,6 @@ impl Source {
             Self::Parquet(rows) => rows.names(),
         }
     }
-}
-
-/// Refuses times that are asked for and contradict those of the file.
-fn check_asked(
-    path: &Path,
-    layout: &Layout,
-    header: &Header,
-    options: &ReadOptions,
-) -> Result<(), ReadError> {
-    if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
-        let reason = format!(
-            "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
-            column.name
-        );
-        return Err(ReadError::Asked { path: path.to_owned(), reason });
-    }
-    if let Some((asked_hz, stated_hz)) = options.rate_hz.zip(header.rate_hz)
-        && (asked_hz / stated_hz - 1.0).abs() > RATE_OFF
-    {
-        let reason = format!(
-            "a rate of {asked_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or mend \
-             rate_hz there"
-        );
-        return Err(ReadError::Asked { path: path.to_owned(), reason });
-    }
-    Ok(())
 }
 
 fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {

@@ -14,7 +14,7 @@ const LEAST: usize = 8;
 const OFF: f64 = 2e-3;
 /// Two rails that are the same count as one and its sum if they vary by more than this share of their highest power.
 const VARIES: f64 = 0.01;
-/// Words in names of sums.
+/// Names of sums. As a part of a name they tell nothing: `gpu_total` may stand beside `cpu_total`.
 const WORDS: [&str; 5] = ["total", "sum", "all", "overall", "combined"];
 
 /// A rail among several that seems to be the sum of the others.
@@ -50,7 +50,7 @@ pub fn rail_of_sums(path: &Path, options: &ReadOptions) -> Result<Option<SumOfRa
     let powers_w = rows.powers_w(&mut chunk);
     let names = rows.rails();
     let by_values = (0..names.len()).rev().find(|&rail| is_sum(rail, &powers_w));
-    let by_name = || names.iter().position(|name| name.split('_').any(|word| WORDS.contains(&word)));
+    let by_name = || names.iter().position(|name| WORDS.contains(&name.as_str()));
     let found = by_values.or_else(by_name);
     Ok(found.map(|rail| SumOfRails {
         rail: names[rail].clone(),
@@ -114,6 +114,8 @@ mod tests {
             looked_at("a_power_W,b_power_W", |i| format!("{0},{0}", cpu(i))),
             Some(("b".to_owned(), true))
         );
+        let parts = "gpu_total_power_W,cpu_total_power_W";
+        assert_eq!(looked_at(parts, |i| format!("{},{}", cpu(i), gpu(i))), None);
         assert_eq!(looked_at("a_power_W,b_power_W", |_| "2,2".to_owned()), None);
     }
 }

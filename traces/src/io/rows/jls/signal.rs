@@ -2,6 +2,7 @@
 
 use super::chunk::{ChunkFile, Head, field};
 use crate::io::ReadError;
+use crate::io::columns::MICRO;
 use crate::io::jls::format::{FIXED_RATE, HEAD, LEVELS, SIGNAL, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS};
 use std::collections::BTreeMap;
 
@@ -11,16 +12,14 @@ const FIXED_HEAD: u8 = FIXED_RATE + HEAD;
 pub(super) const SIGNAL_MASK: u16 = 0x0fff;
 const MOST: u16 = 256;
 /// Names of units and what they are in A, V or W.
-const UNITS: [(&str, f64); 12] = [
+const UNITS: [(&str, f64); 10] = [
     ("a", 1.0),
     ("ma", 1e-3),
     ("ua", 1e-6),
-    ("\u{b5}a", 1e-6),
     ("na", 1e-9),
     ("v", 1.0),
     ("mv", 1e-3),
     ("uv", 1e-6),
-    ("\u{b5}v", 1e-6),
     ("w", 1.0),
     ("mw", 1e-3),
     ("uw", 1e-6),
@@ -42,7 +41,7 @@ pub(super) struct Signal {
 impl Signal {
     /// What its unit is in A, V or W; `None` for other units.
     pub fn scale(&self) -> Option<f64> {
-        let unit = self.unit.to_lowercase();
+        let unit = self.unit.to_lowercase().replace(MICRO, "u");
         UNITS.iter().find(|(name, _)| *name == unit).map(|(_, scale)| *scale)
     }
 

@@ -82,7 +82,7 @@ impl ParquetRows {
 }
 
 /// The units of fields, by their names.
-fn units(file: &PackedFile) -> BTreeMap<String, String> {
+pub(crate) fn units(file: &PackedFile) -> BTreeMap<String, String> {
     let pairs = file.metadata().file_metadata().key_value_metadata().map_or(&[][..], Vec::as_slice);
     let schema = pairs.iter().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
     schema.map_or_else(BTreeMap::new, units::units)

@@ -5,7 +5,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::collections::BTreeMap;
 
-/// Keys of units.
+/// Keys of units; letter case does not count.
 const KEYS: [&str; 2] = ["unit", "units"];
 /// Fields of the tables `Message`, `Schema`, `Field` and `KeyValue`.
 const HEADER: usize = 2;
@@ -14,6 +14,10 @@ const METADATA: usize = 6;
 const NAME: usize = 0;
 const KEY: usize = 0;
 const VALUE: usize = 1;
+
+fn is_key(text: &str) -> bool {
+    KEYS.iter().any(|key| key.eq_ignore_ascii_case(text))
+}
 
 /// The unit of each field that has one, by its name. What cannot be read has none.
 pub(super) fn units(schema: &str) -> BTreeMap<String, String> {
@@ -30,7 +34,7 @@ fn read(bytes: &[u8]) -> Option<BTreeMap<String, String>> {
     for field in flat.tables(schema, FIELDS)? {
         let Some(name) = flat.text(field, NAME) else { continue };
         let pairs = flat.tables(field, METADATA).unwrap_or_default();
-        let unit = |pair: &&usize| flat.text(**pair, KEY).is_some_and(|key| KEYS.contains(&key));
+        let unit = |pair: &&usize| flat.text(**pair, KEY).is_some_and(is_key);
         if let Some(unit) = pairs.iter().find(unit).and_then(|pair| flat.text(*pair, VALUE)) {
             units.insert(name.to_owned(), unit.trim().to_owned());
         }
