@@ -161,7 +161,8 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 
 fn from_parquet(path: &Path) -> Result<Content, String> {
     let told = |error: parquet::errors::ParquetError| error.to_string();
-    let file = PackedFile::open(path).map_err(told)?;
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let file = PackedFile::new(path, file).map_err(told)?;
     check_packing(&file)?;
     // Columns of columns count as one, as they do in a row.
     let names = file.metadata().file_metadata().schema().get_fields();

@@ -6,6 +6,7 @@
 //! that take turns, those that go down clearly less are cuts.
 
 use super::rest::{LEFT, about, near};
+use super::unrested::lowest_w;
 use crate::median::median;
 use crate::squares::{about_mean, mean};
 use core::ops::Range;
@@ -18,8 +19,7 @@ const FRAMES: usize = 4;
 const LEAST: usize = 4;
 /// Neighbours differ so many times as much as every other start does, and as they do at the mark.
 const MORE: f64 = 3.0;
-/// Shares of the window before and after a start in which it has its rest, and that of a rest.
-const OWN: [f64; 2] = [0.1, 0.06];
+/// The share of the window that is a rest.
 const BRIEF: f64 = 0.06;
 /// Cuts go down by less than this share of what starts do, and that is so many standard errors.
 const LESS: f64 = 0.85;
@@ -41,7 +41,7 @@ impl Turns {
     /// From the places of all starts (samples, in order), which of them are marked, and the width of the window.
     pub fn new(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Self {
         let left = left(power, starts, marked, width);
-        let rests = Rests::new(power, starts, width);
+        let rests = Rests { power, starts, width };
         let mut cut = vec![false; starts.len()];
         for stretch in stretches(&left) {
             for start in rests.cuts(stretch).into_iter().filter(|start| !marked[*start]) {
@@ -98,49 +98,46 @@ fn stretches(left: &[f64]) -> Vec<Range<usize>> {
         .collect()
 }
 
-/// How far power goes down at each start.
-struct Rests {
-    /// Least mean of a brief stretch, W.
-    lowest_w: Vec<Option<f64>>,
-    /// Median of the power around, W.
-    usual_w: Vec<Option<f64>>,
+/// How far power goes down at starts.
+struct Rests<'a> {
+    power: &'a [f64],
+    starts: &'a [f64],
+    width: usize,
 }
 
-impl Rests {
-    fn new(power: &[f64], starts: &[f64], width: usize) -> Self {
-        let brief = ((BRIEF * width as f64) as usize).max(1);
-        let lowest = |start: &f64| {
-            let means = about(power, *start, OWN, width)?.windows(brief).map(mean);
-            means.min_by(f64::total_cmp)
-        };
-        let usual = |start: &f64| Some(median(&mut about(power, *start, COMPARED, width)?.to_vec()));
-        Self {
-            lowest_w: starts.par_iter().map(lowest).collect(),
-            usual_w: starts.par_iter().map(usual).collect(),
-        }
+impl Rests<'_> {
+    /// Least mean of a brief stretch at a start, W.
+    fn lowest_w(&self, start: usize) -> Option<f64> {
+        let brief = ((BRIEF * self.width as f64) as usize).max(1);
+        lowest_w(self.power, self.starts[start], self.width, brief)
+    }
+
+    /// Median of the power around a start, W.
+    fn usual_w(&self, start: usize) -> Option<f64> {
+        Some(median(&mut about(self.power, self.starts[start], COMPARED, self.width)?.to_vec()))
     }
 
     /// Every other start of a stretch, and beyond as long as starts go down as little, if those clearly go down less than the others.
     fn cuts(&self, stretch: Range<usize>) -> Vec<usize> {
         let every_other = |from: usize| (stretch.start + from..stretch.end).step_by(2);
-        let lowest = [0, 1].map(|from| every_other(from).filter_map(|start| self.lowest_w[start]).collect());
+        let lowest = [0, 1].map(|from| every_other(from).filter_map(|start| self.lowest_w(start)).collect());
         let [a, b]: [Vec<f64>; 2] = lowest;
         if a.len().min(b.len()) < FEW {
             return Vec::new();
         }
         let usual_w =
-            median(&mut self.usual_w[stretch.clone()].iter().flatten().copied().collect::<Vec<_>>());
+            median(&mut stretch.clone().filter_map(|start| self.usual_w(start)).collect::<Vec<_>>());
         let ([a_w, a_error], [b_w, b_error]) = (mean_and_error(&a), mean_and_error(&b));
         let (from, low_w, high_w) = if a_w > b_w { (0, b_w, a_w) } else { (1, a_w, b_w) };
         let clear = high_w - low_w > CLEAR * libm::hypot(a_error, b_error);
         if !clear || usual_w - high_w > LESS * (usual_w - low_w) {
             return Vec::new();
         }
-        let cut = |start: &usize| self.lowest_w[*start].is_some_and(|watts| watts > 0.5 * (low_w + high_w));
+        let cut = |start: &usize| self.lowest_w(*start).is_some_and(|watts| watts > 0.5 * (low_w + high_w));
         let first = stretch.start + from;
         let before = (0..first).rev().skip(1).step_by(2).take(BEYOND).take_while(cut);
         let last = every_other(from).next_back().unwrap_or(first);
-        let after = (last + 2..self.lowest_w.len()).step_by(2).take(BEYOND).take_while(cut);
+        let after = (last + 2..self.starts.len()).step_by(2).take(BEYOND).take_while(cut);
         before.chain(every_other(from)).chain(after).collect()
     }
 }

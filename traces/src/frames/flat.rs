@@ -1,7 +1,6 @@
 //! A mark where there is nothing to see: whatever is as flat resembles it.
 
 use super::marks::Placement;
-use super::matched::noise_variance;
 use super::split::moments;
 use crate::warning::Warning;
 
@@ -31,17 +30,18 @@ pub(crate) fn flat_mark<'a>(
 }
 
 /// [`flat_mark`] of a trace that is all at hand.
-pub(super) fn flat_mark_of(power: &[f64], placement: &Placement) -> Option<Warning> {
+pub(super) fn flat_mark_of(power: &[f64], placement: &Placement, sigma: f64) -> Option<Warning> {
     let windows = placement
         .marks
         .iter()
         .filter_map(|mark| Some((mark.mark_s, power.get(mark.first..mark.first + placement.samples)?)));
-    flat_mark(windows, libm::sqrt(noise_variance(power)))
+    flat_mark(windows, sigma)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::matched::noise_variance;
     use crate::random::Random;
 
     #[test]

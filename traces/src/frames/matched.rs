@@ -69,7 +69,8 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
     let spacing = spacing(placement.samples);
     let candidates = candidates(&profile, &placement, spacing);
     let distances: Vec<f64> = candidates.iter().map(|candidate| candidate.distance_w2).collect();
-    let noise_w2 = 2.0 * placement.samples as f64 * noise_variance(&power);
+    let noise = noise_variance(&power);
+    let noise_w2 = 2.0 * placement.samples as f64 * noise;
     let background_w2 = median_of(profile.iter().copied(), profile.len());
     let threshold =
         choose(&distances, background_w2, noise_w2, misalignment_w2(&power, &placement), |value_w2| {
@@ -91,7 +92,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
     let end_tolerance_s = 0.5 * spacing as f64 * trace.period_s();
     starts.retain(|start| start.marked || start.time_s < marks.end_s - end_tolerance_s);
     let mut found = assess::conclude(trace, marks, &placement, starts, threshold);
-    found.warnings.extend(flat_mark_of(&power, &placement));
+    found.warnings.extend(flat_mark_of(&power, &placement, libm::sqrt(noise)));
     Ok(Found { method, ..found })
 }
 
@@ -152,8 +153,13 @@ pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
 /// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a median.
 pub(super) fn noise_variance(power: &[f64]) -> f64 {
     let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let sigma = median_of(steps, power.len().saturating_sub(1)) / (0.674_489_75 * core::f64::consts::SQRT_2);
+    let sigma = noise_deviation(median_of(steps, power.len().saturating_sub(1)));
     sigma * sigma
+}
+
+/// The deviation of white Gaussian noise whose steps from sample to sample have this median.
+pub(crate) fn noise_deviation(median_step: f64) -> f64 {
+    median_step / (0.674_489_75 * core::f64::consts::SQRT_2)
 }
 
 /// The (upper) median of at most [`MEDIAN_OF`] of `count` values, evenly picked; 0 for none.

@@ -45,7 +45,7 @@ pub use threshold::{Population, Rule, Threshold};
 pub(crate) use assess::{conclude_at, confidence};
 pub(crate) use flat::flat_mark;
 pub(crate) use marks::{Placed, Placement};
-pub(crate) use matched::{misalignment_w2, start_after_idle};
+pub(crate) use matched::{misalignment_w2, noise_deviation, start_after_idle};
 pub(crate) use refine::vertex;
 pub(crate) use regularity::regularity;
 pub(crate) use threshold::choose;

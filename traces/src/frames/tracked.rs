@@ -32,7 +32,8 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
     let positions = settle(&power, positions, &fixed, anchor, placement.samples);
-    let (positions, kept) = phases(&power, positions, &tracked, &fixed, anchor, placement.samples);
+    let noise_w = libm::sqrt(noise_variance(&power));
+    let (positions, kept) = phases(&power, noise_w, positions, &tracked, &fixed, anchor, placement.samples);
     let start = |(((start, position), kept), marked): (((&Start, f64), f64), &Option<&Placed>)| FrameStart {
         time_s: marked.map_or(trace.start_s() + (position + anchor) * trace.period_s(), |mark| mark.mark_s),
         distance_w2: start.distance_w2,
@@ -49,7 +50,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     let places: Vec<f64> = found.starts.iter().map(|start| trace.position(start.time_s)).collect();
     let end = (trace.position(marks.end_s).max(0.0) as usize).min(power.len());
     found.warnings.extend(uncovered(&power[..end], &places));
-    found.warnings.extend(flat_mark_of(&power, &placement));
+    found.warnings.extend(flat_mark_of(&power, &placement, noise_w));
     found.method = Method::Tracking;
     Ok(found)
 }
@@ -61,15 +62,14 @@ fn whole(power: &[f64], starts: Vec<Start>, placement: &Placement) -> Vec<Start>
     let places: Vec<f64> = starts.iter().map(|start| start.offset as f64 + anchor).collect();
     let marked: Vec<bool> = starts.iter().map(is_marked).collect();
     let turns = Turns::new(power, &places, &marked, placement.samples);
-    let left = rest::spread(turns.left).into_iter().zip(marked);
-    let left = left.map(|(left, marked)| if marked { 1.0 } else { left });
-    let uncut = starts.into_iter().zip(left).zip(turns.cut).filter(|(_, cut)| !cut);
+    let uncut = starts.into_iter().zip(spread(turns.left, &marked)).zip(turns.cut).filter(|(_, cut)| !cut);
     uncut.map(|((start, left), _)| Start { left: left * start.left, ..start }).collect()
 }
 
 /// Positions on the ticks of the display, where there are any, and what is left of the confidence of each start.
 fn phases(
     power: &[f64],
+    noise_w: f64,
     positions: Vec<f64>,
     starts: &[Start],
     fixed: &[bool],
@@ -78,11 +78,6 @@ fn phases(
 ) -> (Vec<f64>, Vec<f64>) {
     let places =
         |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
-    // Marks are where they were put.
-    let spread = |left: Vec<f64>| -> Vec<f64> {
-        let spread = rest::spread(left).into_iter().zip(fixed);
-        spread.map(|(left, fixed)| if *fixed { 1.0 } else { left }).collect()
-    };
     let first_mark = fixed.iter().position(|fixed| *fixed);
     let (positions, in_phase) = match first_mark.and_then(|mark| ticks(&positions, mark, width)) {
         // What begins on a tick is in the phase of the mark, whatever happened on the way.
@@ -90,13 +85,18 @@ fn phases(
             (positions, between.iter().map(|between| if *between { BETWEEN } else { 1.0 }).collect())
         }
         None => {
-            let rests = spread(rest::left(power, &places(&positions), fixed, width));
+            let rests = spread(rest::left(power, &places(&positions), fixed, width), fixed);
             (positions, product(starts.iter().map(|start| start.left), rests))
         }
     };
-    let noise_w = libm::sqrt(noise_variance(power));
-    let rested = spread(unrested::left(power, &places(&positions), width, noise_w));
+    let rested = spread(unrested::left(power, &places(&positions), width, noise_w), fixed);
     (positions, product(in_phase, rested))
+}
+
+/// Doubts spread to the starts near, but not to marks, which are where they were put.
+fn spread(left: Vec<f64>, marked: &[bool]) -> Vec<f64> {
+    let spread = rest::spread(left).into_iter().zip(marked);
+    spread.map(|(left, marked)| if *marked { 1.0 } else { left }).collect()
 }
 
 fn product(a: impl IntoIterator<Item = f64>, b: Vec<f64>) -> Vec<f64> {

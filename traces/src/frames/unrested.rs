@@ -51,10 +51,14 @@ struct Depth {
 
 impl Depth {
     fn of(power: &[f64], start: f64, width: usize, brief: usize) -> Option<Self> {
-        let means = about(power, start, OWN, width)?.windows(brief).map(mean);
         let usual_w = median(&mut about(power, start, USUAL, width)?.to_vec());
-        Some(Self { lowest_w: means.fold(f64::INFINITY, f64::min), usual_w })
+        Some(Self { lowest_w: lowest_w(power, start, width, brief)?, usual_w })
     }
+}
+
+/// The least mean of a stretch of `brief` samples at a start, W.
+pub(super) fn lowest_w(power: &[f64], start: f64, width: usize, brief: usize) -> Option<f64> {
+    about(power, start, OWN, width)?.windows(brief).map(mean).min_by(f64::total_cmp)
 }
 
 #[cfg(test)]

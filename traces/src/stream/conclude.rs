@@ -5,13 +5,12 @@ use super::{Clock, Streamed};
 use crate::energy::FrameEnergy;
 use crate::frames::{
     FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, flat_mark, misalignment_w2,
-    regularity, start_after_idle,
+    noise_deviation, regularity, start_after_idle,
 };
 use crate::median::median;
 use crate::metadata::Metadata;
 use crate::sum::PairSum;
 use crate::trace::Trace;
-use core::f64::consts::SQRT_2;
 use rayon::prelude::*;
 
 /// A start and the sum of powers (W) before it.
@@ -26,7 +25,7 @@ pub(super) fn conclude(
     let clock = Clock { samples: Some(gathered.samples), ..plan.clock };
     let trace_end_s = clock.time_s(gathered.samples as f64);
     let marks = Marks { end_s: marks.end_s.min(trace_end_s), ..marks.clone() };
-    let sigma_w = median(&mut gathered.steps_w) / (0.674_489_75 * SQRT_2);
+    let sigma_w = noise_deviation(median(&mut gathered.steps_w));
     let threshold = plan.threshold(&mut gathered, sigma_w);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };

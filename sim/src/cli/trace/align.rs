@@ -8,6 +8,7 @@ use traces::io::Heading;
 use traces::io::atomic::write_file;
 
 use super::args::AlignArgs;
+use super::energy::is_within;
 use super::input::wrong;
 use super::times::times;
 use crate::cli::Failure;
@@ -21,10 +22,9 @@ impl From<AlignError> for Failure {
 }
 
 /// Refuses an anchor at a time that the trace does not have.
-fn is_within((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Failure> {
+fn check_anchor((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Failure> {
     let (start_s, end_s) = (trace.start_s, trace.end_s());
-    let rounding_s = 1e-12 * start_s.abs().max(end_s.abs());
-    if (start_s - rounding_s..=end_s + rounding_s).contains(&time_s) {
+    if is_within([start_s, end_s], time_s) {
         return Ok(());
     }
     Err(wrong(format!(
@@ -42,9 +42,8 @@ fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f6
         told(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
     }
     let (first, last) = (sorted[0], sorted[sorted.len() - 1]);
-    let rounding = 1e-12 * first.abs().max(last.abs());
     for (stamp, _) in anchors {
-        if !(first - rounding..=last + rounding).contains(&stamp) {
+        if !is_within([first, last], stamp) {
             told(format!("stamp {stamp} s of an anchor is beyond those of the file, {first} s to {last} s"));
         }
     }
@@ -57,7 +56,7 @@ pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
     let alignment = match args.anchor[..] {
         [a, b] => {
             let trace = args.input.source()?.0.heading();
-            [a, b].iter().try_for_each(|anchor| is_within(*anchor, &trace))?;
+            [a, b].iter().try_for_each(|anchor| check_anchor(*anchor, &trace))?;
             let alignment = Alignment::by_anchors(a, b)?;
             warn_of_anchors([a, b], &alignment, &stamps);
             alignment

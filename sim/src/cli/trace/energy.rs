@@ -83,14 +83,20 @@ fn check(trace: &Heading, from_s: f64, to_s: f64, what: &str) -> Result<(), Fail
     check_within((trace.start_s, trace.end_s()), (from_s, to_s), what)
 }
 
+/// Whether a number is between two others, to rounding.
+pub(super) fn is_within([low, high]: [f64; 2], number: f64) -> bool {
+    let rounding = 1e-12 * low.abs().max(high.abs());
+    (low - rounding..=high + rounding).contains(&number)
+}
+
 /// Refuses a stretch that is not within a trace.
 pub(super) fn check_within(
     (start_s, end_s): (f64, f64),
     (from_s, to_s): (f64, f64),
     what: &str,
 ) -> Result<(), Failure> {
-    let rounding_s = 1e-12 * start_s.abs().max(end_s.abs());
-    if from_s >= start_s - rounding_s && to_s <= end_s + rounding_s && from_s < to_s {
+    let extent = [start_s, end_s];
+    if is_within(extent, from_s) && is_within(extent, to_s) && from_s < to_s {
         return Ok(());
     }
     Err(wrong(format!("{what}: {from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s")))

@@ -5,7 +5,7 @@ use parquet::basic::Compression;
 use parquet::bloom_filter::Sbbf;
 use parquet::column::page::PageReader;
 use parquet::errors::Result;
-use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
 use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::record::reader::RowIter;
 use parquet::schema::types::Type;
@@ -19,9 +19,9 @@ pub(crate) struct PackedFile {
 }
 
 impl PackedFile {
-    /// Reads the footer.
-    pub fn open(path: &Path) -> Result<Self> {
-        Ok(Self { path: path.to_owned(), file: SerializedFileReader::new(File::open(path)?)? })
+    /// Reads the footer of an open file; `path` is where it lies.
+    pub fn new(path: &Path, file: File) -> Result<Self> {
+        Ok(Self { path: path.to_owned(), file: SerializedFileReader::new(file)? })
     }
 
     /// Whether columns packed so can be read.
@@ -48,6 +48,12 @@ impl FileReader for PackedFile {
     }
 }
 
+/// Where the pages of a column begin, by what the file says.
+pub(super) fn first_page(chunk: &ColumnChunkMetaData) -> i64 {
+    let data = chunk.data_page_offset();
+    chunk.dictionary_page_offset().map_or(data, |dictionary| dictionary.min(data))
+}
+
 /// The rows that were written together.
 struct PackedGroup<'a> {
     path: &'a Path,
@@ -68,10 +74,7 @@ impl RowGroupReader for PackedGroup<'_> {
         if !matches!(chunk.compression(), Compression::ZSTD(_)) {
             return self.group.get_column_page_reader(column);
         }
-        let start = chunk
-            .dictionary_page_offset()
-            .map_or(chunk.data_page_offset(), |at| at.min(chunk.data_page_offset()));
-        let [start, length] = [start, chunk.compressed_size()].map(|bytes| bytes.max(0) as u64);
+        let [start, length] = [first_page(chunk), chunk.compressed_size()].map(|bytes| bytes.max(0) as u64);
         Ok(Box::new(ZstdPages::new(File::open(self.path)?, start, length)?))
     }
 

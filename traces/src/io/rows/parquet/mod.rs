@@ -4,7 +4,7 @@ mod column;
 mod units;
 
 use super::Chunk;
-use super::PackedFile;
+use super::packed::{PackedFile, first_page};
 use crate::io::columns::{Layout, layout};
 use crate::io::header::{self, Header, KEYS};
 use crate::io::{ReadError, ReadOptions};
@@ -28,8 +28,8 @@ fn damaged(path: &Path, reason: String) -> ReadError {
 }
 
 fn open(path: &Path) -> Result<PackedFile, ReadError> {
-    File::open(path).map_err(|error| ReadError::io(path, error))?;
-    PackedFile::open(path).map_err(|error| damaged(path, error.to_string()))
+    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+    PackedFile::new(path, file).map_err(|error| damaged(path, error.to_string()))
 }
 
 impl ParquetRows {
@@ -106,10 +106,8 @@ fn check_chunks(path: &Path, file: &PackedFile, size_bytes: u64, layout: &Layout
                 let codec = codec.split('(').next().unwrap_or_default().to_owned();
                 return Err(ReadError::Compression { path: path.to_owned(), column, codec });
             }
-            let start = chunk
-                .dictionary_page_offset()
-                .map_or(chunk.data_page_offset(), |page| page.min(chunk.data_page_offset()));
-            let range = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok());
+            let range =
+                u64::try_from(first_page(chunk)).ok().zip(u64::try_from(chunk.compressed_size()).ok());
             let end = range.and_then(|(start, length)| start.checked_add(length));
             if end.is_none_or(|end| end > size_bytes)
                 || chunk.num_values() < 0
