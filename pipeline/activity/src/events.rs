@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 /// Declares the units and, under each, its events: `Name "column" "what one of it is"`.
 macro_rules! activity {
     ($($unit:ident $unit_name:literal $unit_doc:literal {
@@ -29,7 +31,8 @@ macro_rules! activity {
 
         /// Something a unit does that can be counted. The energy of one and the rate at which the unit
         /// can do it are other people's business.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(into = "&'static str", try_from = "String")]
         #[repr(u8)]
         pub enum Event { $($(#[doc = $event_doc] $event),*),* }
 
@@ -172,6 +175,20 @@ impl Event {
     /// The event called `name` in files.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|event| event.name() == name)
+    }
+}
+
+impl From<Event> for &'static str {
+    fn from(event: Event) -> Self {
+        event.name()
+    }
+}
+
+impl TryFrom<String> for Event {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Self::from_name(&name).ok_or_else(|| format!("no counter is called `{name}`"))
     }
 }
 

@@ -7,18 +7,23 @@
 //! - [`LineAccess`]: a line of memory a packet asks the L2 for, in order.
 //! - [`Timeline`]: counts over time, made by a timing model, read by a power model.
 //! - [`Warning`]: a coded remark that a run has entered a regime its methods are bad at.
+//! - [`inputs`]: opening files so that it is known which were.
+//! - [`Bounded`]: a whole number that cannot be built out of range.
 //! - [`spec`]: reading RON files with the place of every mistake and a suggestion.
 //!
 //! This crate knows no triangle, no clock rate and no joule, and depends on nothing else of the house.
 
+mod bounded;
 mod counts;
 mod events;
+pub mod inputs;
 mod lines;
 mod packet;
 pub mod spec;
 mod timeline;
 mod warning;
 
+pub use bounded::{Bounded, OutOfBounds};
 pub use counts::Counts;
 pub use events::{Event, Unit};
 pub use lines::{LineAccess, LineKind};

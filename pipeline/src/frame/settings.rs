@@ -123,7 +123,7 @@ pub enum SpecError {
         allowed: &'static str,
     },
     /// A threshold is not a number of pixels.
-    #[error("`{field}` is {value}; it has to be 0 or a finite number above")]
+    #[error("`{field}` is {value}; it has to be 0 to 16384")]
     Threshold {
         /// The field.
         field: &'static str,
@@ -138,6 +138,18 @@ pub enum SpecError {
         /// Why.
         source: CacheError,
     },
+}
+
+/// The largest threshold: the side of the largest image.
+const MAX_THRESHOLD_PX: f32 = 16_384.0;
+
+impl SpecError {
+    /// The field that is wrong, such as `memory.l2`.
+    pub fn field(&self) -> &'static str {
+        match self {
+            Self::Size { field, .. } | Self::Threshold { field, .. } | Self::Cache { field, .. } => field,
+        }
+    }
 }
 
 impl PipelineSpec {
@@ -161,7 +173,7 @@ impl PipelineSpec {
         let most = Timeline::MOST_SPLITS;
         size("features.facing_splits", facing_splits, facing_splits <= most, "it has to be 0 to 3")?;
         for (field, value) in [("features.still_px", still_px), ("features.in_focus_px", in_focus_px)] {
-            if !(value >= 0.0 && value.is_finite()) {
+            if !(0.0..=MAX_THRESHOLD_PX).contains(&value) {
                 return Err(SpecError::Threshold { field, value: value.to_string() });
             }
         }

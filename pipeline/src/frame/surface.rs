@@ -129,6 +129,15 @@ impl<'a> Surface<'a> {
         if uvs.is_empty() { Vec2::ZERO } else { (0..3).map(|k| uvs[self.vertices[k]] * weights[k]).sum() }
     }
 
+    /// Cells that a border crosses extrapolate, so the colour is cut to what a colour can be.
+    fn color(&self, weights: [f32; 3]) -> Vec3 {
+        let colors = self.pass.draws[self.draw].geometry.colors();
+        if colors.is_empty() {
+            return Vec3::ONE;
+        }
+        (0..3).map(|k| colors[self.vertices[k]] * weights[k]).sum::<Vec3>().clamp(Vec3::ZERO, Vec3::ONE)
+    }
+
     fn point(&self, weights: [f32; 3], corners: [Vec3; 3]) -> ShadingPoint {
         let geometry = &self.pass.draws[self.draw].geometry;
         let position: Vec3 = (0..3).map(|k| corners[k] * weights[k]).sum();
@@ -142,6 +151,6 @@ impl<'a> Surface<'a> {
         let eye = self.pass.eye;
         let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
-        ShadingPoint { position, normal, to_camera, uv: self.uv(weights) }
+        ShadingPoint { position, normal, to_camera, uv: self.uv(weights), color: self.color(weights) }
     }
 }

@@ -1,6 +1,7 @@
 //! A thin-lens or orthographic camera that may move while the shutter is open.
 
 use glam::{Affine3A, Vec2};
+use serde::Serialize;
 
 use super::Clip;
 
@@ -8,7 +9,7 @@ use super::Clip;
 ///
 /// The pose is given at both ends of the shutter; in between every vertex moves on a straight line, so a
 /// camera that turns is a chord of its true path.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Camera {
     open: Affine3A,
     close: Affine3A,
@@ -22,7 +23,7 @@ pub struct Camera {
 
 /// A thin lens. In an orthographic view, where there is none, what it does to the image far away: a point at depth `w` is moved by
 /// `radius (w / focus - 1)` scene units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Lens {
     radius: f32,
     focus: f32,

@@ -1,9 +1,11 @@
 //! Clip planes across lens and shutter.
 
+use serde::Serialize;
+
 /// The part of lens and shutter in which something is drawn: from the first value up to the second on each axis. Samples on the
 /// first are in, samples on the second are not, so that parts side by side share no sample. (In conservative mode both count.)
 /// An infinite value is no bound: it takes that, not 1, to keep samples on the very rim of the lens.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Clip {
     u: [f32; 2],
     v: [f32; 2],

@@ -24,6 +24,7 @@ pub struct Geometry<'a> {
     close: &'a [Vec3],
     normals: &'a [Vec3],
     uvs: &'a [Vec2],
+    colors: &'a [Vec3],
     triangles: &'a [[u32; 3]],
     clip: Clip,
 }
@@ -78,7 +79,7 @@ impl<'a> Geometry<'a> {
                 return Err(DrawError::Index { triangle, vertex, vertices: open.len() });
             }
         }
-        Ok(Self { open, close, normals: &[], uvs: &[], triangles, clip: Clip::NONE })
+        Ok(Self { open, close, normals: &[], uvs: &[], colors: &[], triangles, clip: Clip::NONE })
     }
 
     /// The same with one normal for each vertex (at mid-shutter, world space; need not be unit length).
@@ -99,6 +100,16 @@ impl<'a> Geometry<'a> {
         same_length("the texture coordinates", uvs.len(), self.open.len())?;
         finite("texture coordinate", uvs.iter().map(|uv| uv.is_finite()))?;
         Ok(Self { uvs, ..self })
+    }
+
+    /// The same with one colour for each vertex: linear RGB, by which its shader may multiply.
+    ///
+    /// # Errors
+    /// When the length differs or a colour is not finite.
+    pub fn with_colors(self, colors: &'a [Vec3]) -> Result<Self, DrawError> {
+        same_length("the colours", colors.len(), self.open.len())?;
+        finite("colour", colors.iter().map(|color| color.is_finite()))?;
+        Ok(Self { colors, ..self })
     }
 
     /// The same with clip planes across lens and shutter: it is drawn there only.
@@ -137,6 +148,11 @@ impl<'a> Geometry<'a> {
         self.uvs
     }
 
+    /// Colours in linear RGB, or nothing.
+    pub fn colors(&self) -> &'a [Vec3] {
+        self.colors
+    }
+
     /// Vertex indices of each triangle, all in range.
     pub fn triangles(&self) -> &'a [[u32; 3]] {
         self.triangles
@@ -144,8 +160,11 @@ impl<'a> Geometry<'a> {
 
     /// Bytes of one vertex as fetched: positions at both ends where they differ, and the attributes.
     pub fn vertex_bytes(&self) -> u32 {
-        let vec3 = |present: bool| if present { 12 } else { 0 };
-        12 + vec3(!self.is_still()) + vec3(!self.normals.is_empty()) + if self.uvs.is_empty() { 0 } else { 8 }
+        let bytes = |size: u32, present: bool| if present { size } else { 0 };
+        12 + bytes(12, !self.is_still())
+            + bytes(12, !self.normals.is_empty())
+            + bytes(8, !self.uvs.is_empty())
+            + bytes(12, !self.colors.is_empty())
     }
 }
 
@@ -193,5 +212,6 @@ mod tests {
         let end = CORNERS;
         let moving = Geometry::new(&CORNERS, &end, &[[0, 1, 2]]).unwrap();
         assert_eq!((still.vertex_bytes(), moving.vertex_bytes()), (12, 24));
+        assert_eq!(still.with_colors(&CORNERS).unwrap().vertex_bytes(), 24);
     }
 }

@@ -24,6 +24,8 @@ pub struct ShadingPoint {
     pub to_camera: Vec3,
     /// Texture coordinate; zero where the draw has none.
     pub uv: Vec2,
+    /// Vertex colour in linear RGB, each channel 0 to 1; white where the draw has none.
+    pub color: Vec3,
 }
 
 /// Colours a point of a surface. The result has to depend on the arguments alone: workers shade in any

@@ -86,6 +86,11 @@ impl Texture {
         self.levels.iter().map(|level| u64::from(level.blocks()) * 64).sum()
     }
 
+    /// The lowest alpha of any texel.
+    pub fn least_alpha(&self) -> u8 {
+        self.levels[0].texels.iter().map(|texel| texel[3]).min().unwrap_or(u8::MAX)
+    }
+
     pub(super) fn levels(&self) -> &[Level] {
         &self.levels
     }
