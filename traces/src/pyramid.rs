@@ -81,6 +81,19 @@ impl Pyramid {
         }
     }
 
+    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say; else made anew and not
+    /// kept.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the trace cannot be read.
+    pub fn look(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        match kept::kept(&pyramid_path(path), kept::stamp(path, options)) {
+            Found::Whole(pyramid) => Ok(pyramid),
+            Found::Other => Self::build(path, options),
+            Found::Damaged => Ok(Self { was_damaged: true, ..Self::build(path, options)? }),
+        }
+    }
+
     /// Whether the pyramid that was kept was damaged, as far as was seen when it was opened, so that this was made in its place.
     pub fn was_damaged(&self) -> bool {
         self.was_damaged

@@ -94,7 +94,9 @@ fn written(trace: &dyn Source) -> Vec<Vec<u8>> {
     parquet::save(trace, &path("parquet")).unwrap();
     csv::save_as(trace, &path("tsv"), b'\t', false).unwrap();
     csv::save_as(trace, &path("csv.gz"), b',', true).unwrap();
-    ["parquet", "tsv", "csv.gz", "json"].map(|end| std::fs::read(path(end)).unwrap()).into()
+    ["parquet", "tsv", "tsv.json", "csv.gz", "csv.gz.json"]
+        .map(|end| std::fs::read(path(end)).unwrap())
+        .into()
 }
 
 proptest! {

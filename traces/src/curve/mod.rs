@@ -29,8 +29,8 @@ pub enum CurveError {
         /// The edge, s.
         time_s: f64,
     },
-    /// A segment's power is not a finite number of watts at or above zero.
-    #[error("segment {index}: power {power_w} W is not finite and at least 0")]
+    /// A segment's power is no finite number of watts or, where it is simulated, below zero.
+    #[error("segment {index}: power {power_w} W is not finite, or below 0 in a simulation")]
     Power {
         /// Position of the segment, from 0.
         index: usize,
@@ -71,6 +71,18 @@ impl Curve {
     /// # Errors
     /// [`CurveError`] names the edge or segment that is wrong.
     pub fn new(edges_s: Vec<f64>, watts: Vec<f64>) -> Result<Self, CurveError> {
+        Self::from_least(edges_s, watts, 0.0)
+    }
+
+    /// The same from a recording, whose noise may take its powers below 0.
+    ///
+    /// # Errors
+    /// As [`Curve::new`].
+    pub fn recorded(edges_s: Vec<f64>, watts: Vec<f64>) -> Result<Self, CurveError> {
+        Self::from_least(edges_s, watts, f64::NEG_INFINITY)
+    }
+
+    fn from_least(edges_s: Vec<f64>, watts: Vec<f64>, least_w: f64) -> Result<Self, CurveError> {
         if watts.is_empty() {
             return Err(CurveError::Empty);
         }
@@ -78,9 +90,8 @@ impl Curve {
             return Err(CurveError::Lengths { edges: edges_s.len(), segments: watts.len() });
         }
         check_edges(&edges_s)?;
-        if let Some((index, &power_w)) =
-            watts.iter().enumerate().find(|(_, w)| !(w.is_finite() && **w >= 0.0))
-        {
+        let is_power = |watts: f64| watts.is_finite() && watts >= least_w;
+        if let Some((index, &power_w)) = watts.iter().enumerate().find(|(_, watts)| !is_power(**watts)) {
             return Err(CurveError::Power { index, power_w });
         }
         let prefix_j = prefix_energy(&edges_s, &watts);

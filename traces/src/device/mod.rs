@@ -1,6 +1,7 @@
 //! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
 
 mod bound;
+mod fit;
 mod gaps;
 mod packets;
 mod quantizer;
@@ -9,9 +10,10 @@ mod resample;
 mod sample;
 mod spec;
 
+pub use fit::Peaks;
 pub use resample::Resampled;
 pub use sample::{SampleError, Sampled};
-pub use spec::{DeviceError, DeviceSpec, RATES_HZ};
+pub use spec::{DeviceError, DeviceSpec, MAX_PACKET_SAMPLES, RATES_HZ};
 
 use quantizer::Quantizer;
 use rail::Rail;

@@ -161,7 +161,7 @@ impl<'a> Pass<'a> {
         if !(end_s.is_finite() && end_s > begin_s) {
             self.edge.get_or_insert(CurveError::Edge { index: index + 1, time_s: end_s });
         }
-        if !(power_w.is_finite() && power_w >= 0.0) {
+        if !power_w.is_finite() {
             self.power.get_or_insert(CurveError::Power { index, power_w });
         }
     }

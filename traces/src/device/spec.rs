@@ -21,6 +21,8 @@ pub struct DeviceError {
 
 /// Rates of the devices that are modelled, Hz.
 pub const RATES_HZ: RangeInclusive<f64> = 1.0..=1e7;
+/// The most samples of a packet.
+pub const MAX_PACKET_SAMPLES: u32 = 1 << 24;
 
 /// A recorder and the rail it is put into. Take the default and change what differs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -121,7 +123,12 @@ impl DeviceSpec {
                 "a finite number above 0, or absent",
             ),
             ("low_pass_s", low_pass_s, above(low_pass_s), "a finite number above 0, or absent"),
-            ("packet_samples", f64::from(self.packet_samples), self.packet_samples > 0, "at least 1"),
+            (
+                "packet_samples",
+                f64::from(self.packet_samples),
+                (1..=MAX_PACKET_SAMPLES).contains(&self.packet_samples),
+                "from 1 to 16777216",
+            ),
             ("packet_loss", self.packet_loss, (0.0..1.0).contains(&self.packet_loss), "from 0 to below 1"),
         ];
         match checks.into_iter().find(|(_, _, good, _)| !good) {

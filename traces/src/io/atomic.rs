@@ -1,10 +1,11 @@
 //! Files that are whole or not there.
 
 use super::WriteError;
+use super::unfinished::{self, Unfinished};
 use std::error::Error;
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on any
@@ -21,13 +22,16 @@ where
     E: Into<Box<dyn Error + Send + Sync>>,
 {
     let path = &destination(path)?;
-    let temporary = temporary_name(path)?;
-    let written = write_whole(path, &temporary, fill);
-    if written.is_err() {
-        // The first error is the one to tell; a leftover that cannot be removed changes nothing about it.
-        let _ = fs::remove_file(&temporary);
-    }
-    written
+    let io = |source| WriteError::Io { path: path.to_owned(), source };
+    let (unfinished, file) = temporary(&temporary_name(path)?).map_err(io)?;
+    let mut writer = BufWriter::new(file);
+    fill(&mut writer).map_err(|error| WriteError::Content { path: path.to_owned(), source: error.into() })?;
+    writer.flush().map_err(io)?;
+    writer.get_ref().sync_all().map_err(io)?;
+    drop(writer);
+    fs::rename(temporary_name(path)?, path).map_err(io)?;
+    unfinished.finish();
+    Ok(())
 }
 
 /// Finds out whether a file could be written at `path` by making the temporary one and removing it: before long work, not after it.
@@ -36,26 +40,19 @@ where
 /// As [`write_file`].
 pub fn try_place(path: &Path) -> Result<(), WriteError> {
     let path = &destination(path)?;
-    let temporary = temporary_name(path)?;
-    let made = File::create(&temporary).and_then(|_| fs::remove_file(&temporary));
-    made.map_err(|source| WriteError::Io { path: path.to_owned(), source })
+    let made = temporary(&temporary_name(path)?);
+    made.map(drop).map_err(|source| WriteError::Io { path: path.to_owned(), source })
 }
 
-fn write_whole<E>(
-    path: &Path,
-    temporary: &Path,
-    fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
-) -> Result<(), WriteError>
-where
-    E: Into<Box<dyn Error + Send + Sync>>,
-{
-    let io = |source| WriteError::Io { path: path.to_owned(), source };
-    let mut writer = BufWriter::new(File::create(temporary).map_err(io)?);
-    fill(&mut writer).map_err(|error| WriteError::Content { path: path.to_owned(), source: error.into() })?;
-    writer.flush().map_err(io)?;
-    writer.get_ref().sync_all().map_err(io)?;
-    drop(writer);
-    fs::rename(temporary, path).map_err(io)
+/// A new file that is removed unless it is finished.
+fn temporary(path: &Path) -> io::Result<(Unfinished, File)> {
+    let unfinished = Unfinished::new({
+        let path = path.to_owned();
+        // The first error is the one to report; a leftover that cannot be removed changes nothing about it.
+        move || drop(fs::remove_file(path))
+    });
+    let file = unfinished::uninterrupted(|| File::create(path))?;
+    Ok((unfinished, file))
 }
 
 /// As [`write_file`], for samples: what is wrong with where they come from is told as it is, by the name of that file alone.
@@ -109,7 +106,7 @@ mod tests {
         write_file(&path, |w| w.write_all(b"old")).unwrap();
         let error = write_file(&path, |w| {
             w.write_all(b"half of the ne")?;
-            Err(std::io::Error::other("no more ink"))
+            Err(io::Error::other("no more ink"))
         })
         .unwrap_err();
         assert!(error.to_string().contains("a.txt: no more ink"), "{error}");
@@ -137,11 +134,13 @@ mod tests {
     #[test]
     fn failures_name_the_path() {
         let folder = tempfile::tempdir().unwrap();
-        let none = |_: &mut BufWriter<File>| Ok::<(), std::io::Error>(());
+        let none = |_: &mut BufWriter<File>| Ok::<(), io::Error>(());
         let missing = folder.path().join("no/such/a.txt");
         assert!(
             write_file(&missing, none).unwrap_err().to_string().contains("no/such/a.txt: cannot be written")
         );
+        // Where a folder takes no files.
+        assert!(write_file(Path::new("/proc/self/a.txt"), none).is_err());
         assert!(write_file(Path::new("/"), none).unwrap_err().to_string().contains("/: is no file"));
     }
 }

@@ -18,6 +18,7 @@ mod repair;
 mod rows;
 mod source;
 mod timing;
+pub mod unfinished;
 
 pub use error::{ReadError, WriteError};
 pub use options::ReadOptions;

@@ -131,5 +131,5 @@ pub fn save_as(trace: &dyn Source, path: &Path, delimiter: u8, gzip: bool) -> Re
         write_with(trace, &mut packed, delimiter)?;
         packed.finish().map(|_| ()).map_err(encode)
     })?;
-    atomic::write_trace(&description_path(path, gzip), |out| write_sidecar(trace, out))
+    atomic::write_trace(&description_path(path), |out| write_sidecar(trace, out))
 }

@@ -64,7 +64,7 @@ fn outcome(trace: &dyn Source, folder: &Path) -> Vec<Vec<u8>> {
     parquet::save(trace, &name("parquet")).unwrap();
     csv::save(trace, &name("csv")).unwrap();
     csv::save_as(trace, &name("tsv.gz"), b'\t', true).unwrap();
-    ["parquet", "csv", "json", "tsv.gz"].map(|end| fs::read(name(end)).unwrap()).into()
+    ["parquet", "csv", "csv.json", "tsv.gz", "tsv.gz.json"].map(|end| fs::read(name(end)).unwrap()).into()
 }
 
 fn both(path: &Path, options: &ReadOptions, piece: usize) -> Result<(), TestCaseError> {

@@ -3,7 +3,7 @@
 use super::Chunk;
 use super::lines::LineLimit;
 use crate::io::columns::{Layout, Picked, layout};
-use crate::io::csv::{delimiter, sidecar_path};
+use crate::io::csv::{delimiter, description_paths};
 use crate::io::header::{self, Header};
 use crate::io::timing::Stamps;
 use crate::io::{ReadError, ReadOptions, Repair};
@@ -39,9 +39,7 @@ fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
 
 /// The description beside a text, where there is one.
 fn description(path: &Path) -> Result<Header, ReadError> {
-    let inner = path.with_extension("");
-    let beside = [Some(sidecar_path(path)), inner.extension().is_some().then(|| sidecar_path(&inner))];
-    for sidecar in beside.into_iter().flatten() {
+    for sidecar in description_paths(path) {
         match fs::read_to_string(&sidecar) {
             Ok(json) => return header::from_json(&sidecar, &json),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}

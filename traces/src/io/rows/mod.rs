@@ -25,7 +25,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of formats that are not read, and what to do about them.
-const FOREIGN: [(&[u8], &str, &str); 3] = [
+const FOREIGN: [(&[u8], &str, &str); 6] = [
     (b"\xd3tagfmt", "a JLS recording of version 1", "export it to CSV from the program that made it"),
     (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
     (
@@ -33,7 +33,16 @@ const FOREIGN: [(&[u8], &str, &str); 3] = [
         "an archive (sigrok .sr, .ppk2 or a spreadsheet)",
         "export it to CSV from its own program",
     ),
+    (b"\x89PNG", "a PNG image", TRACE_FORMATS),
+    (b"\xff\xd8\xff", "a JPEG image", TRACE_FORMATS),
+    (b"%PDF", "a PDF document", TRACE_FORMATS),
 ];
+const TRACE_FORMATS: &str = "give a trace in Parquet, JLS, CSV or TSV";
+
+/// Whether these bytes are none of a text: control characters other than white space. Those of UTF-16 are not either.
+fn is_binary(start: &[u8]) -> bool {
+    start.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace())
+}
 
 /// Some rows.
 #[derive(Debug)]
@@ -82,6 +91,10 @@ impl Rows {
             start if start.starts_with(b"jlsfmt\r\n") => Self::jls(path, options),
             start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
                 Some((_, found, mend)) => Err(ReadError::Format { path: path.to_owned(), found, mend }),
+                None if is_binary(&start) && !start.starts_with(&[0x1f, 0x8b]) => {
+                    let found = "a binary file of a kind that is not read";
+                    Err(ReadError::Format { path: path.to_owned(), found, mend: TRACE_FORMATS })
+                }
                 None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),
             },
         }
