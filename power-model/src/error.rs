@@ -127,6 +127,18 @@ pub enum ModelError {
         /// The highest voltage the table scales to.
         high_v: f64,
     },
+    /// Leakage at the voltage and temperature of the platform is more than any supply delivers.
+    #[error(
+        "platform `{platform}` leaks {leakage_w:.3e} W at its voltage and temperature, more than {most_w} W: check          leakage.doubling_c, leakage.voltage_exponent and v0_v"
+    )]
+    Leakage {
+        /// The platform.
+        platform: String,
+        /// The leakage, W.
+        leakage_w: f64,
+        /// The most there can be, W.
+        most_w: f64,
+    },
 }
 
 /// Why a timeline cannot be turned into watts.

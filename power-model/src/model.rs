@@ -6,6 +6,7 @@ use crate::error::{ModelError, TimelineError};
 use crate::frame::{FramePower, S_PER_PS, bin_lengths_ps};
 use crate::parts::{Energy, Part};
 use crate::platform::Platform;
+use crate::quantity::Watts;
 use crate::row::{EnergyRow, Supply};
 use crate::table::{Bound, EnergyTable};
 
@@ -115,6 +116,10 @@ fn check_match(table: &EnergyTable, platform: &Platform) -> Result<(), ModelErro
     if !(low_v..=high_v).contains(&v_v) {
         let (platform, table) = (platform.name.clone(), table.name().to_owned());
         return Err(ModelError::Voltage { platform, v_v, table, low_v, high_v });
+    }
+    let (leakage_w, most_w) = (platform.leakage_w(), Watts::MOST);
+    if !(0.0..=most_w).contains(&leakage_w) {
+        return Err(ModelError::Leakage { platform: platform.name.clone(), leakage_w, most_w });
     }
     Ok(())
 }

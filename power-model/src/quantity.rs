@@ -24,6 +24,9 @@ macro_rules! quantities {
         pub struct $name(f64);
 
         impl $name {
+            /// The largest there is.
+            pub const MOST: f64 = $high;
+
             /// Checks `value` against the range of this quantity.
             ///
             /// # Errors
@@ -58,6 +61,9 @@ macro_rules! quantities {
     )*};
 }
 
+/// A process node, nm: from beyond the smallest to the first integrated circuits.
+pub type Nanometres = activity::Bounded<1, 20_000>;
+
 /// A number with a unit, for lists of where numbers come from.
 pub trait Quantity {
     /// The unit's symbol.
@@ -73,6 +79,8 @@ quantities! {
     Volts "V" 0.1 to 48.0
     /// A length of time, at most an hour.
     Seconds "s" 0.0 to 3600.0
+    /// Idle time recorded before or after a run, at most a minute: more shows nothing new and fills the disk.
+    RecordedIdle "s" 0.0 to 60.0
     /// A rate of frames, 0.1 Hz to 100 kHz.
     Hertz "Hz" 0.1 to 1e5
     /// A junction temperature.

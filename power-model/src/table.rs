@@ -3,17 +3,18 @@
 use std::path::Path;
 
 use activity::{Event, spec};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::TableError;
-use crate::quantity::{Source, Volts};
+use crate::quantity::{Nanometres, Source, Volts};
 use crate::row::{EnergyRow, EventName};
 
 /// The tables that come with the crate, by name.
 const BUILTIN: [(&str, &str); 1] = [("28nm", include_str!("../tables/28nm.ron"))];
 
 /// Which end of each row's interval to use.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Bound {
     /// The smallest energies the sources allow.
     Low,
@@ -51,7 +52,7 @@ pub struct EnergyTable {
 struct Written {
     name: String,
     doc: String,
-    node_nm: u32,
+    node_nm: Nanometres,
     v0_v: Volts,
     v_min_v: Volts,
     v_max_v: Volts,
@@ -108,6 +109,7 @@ impl EnergyTable {
         let costs = rows.into_iter().map(|row| (row.event(), Entry::Costs(row)));
         let free = free.into_iter().map(|row| (row.event.0, Entry::Free(row.reason)));
         let entries = complete(costs.chain(free), file)?;
+        let node_nm = node_nm.get();
         Ok(Self { name, doc, node_nm, v0_v, valid_v: [v_min_v, v_max_v], entries })
     }
 

@@ -50,8 +50,9 @@ impl Divisor {
 impl Map {
     /// The map of these chips.
     pub fn new(spec: &DramSpec) -> Self {
-        let [chunk, row] = [spec.interleave_bytes, spec.row_bytes].map(|bytes| (bytes / LINE_BYTES).max(1));
-        Self::with(chunk, row, spec.channels, spec.banks)
+        let [chunk, row] =
+            [spec.interleave_bytes, spec.row_bytes].map(|bytes| (bytes.get() / LINE_BYTES).max(1));
+        Self::with(chunk, row, spec.channels.get(), spec.banks.get())
     }
 
     fn with(lines_per_chunk: u32, lines_per_row: u32, channels: u32, banks: u32) -> Self {

@@ -28,10 +28,13 @@ pub mod streams;
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
 pub use job::{CLIENTS, Job, Jobs, Place};
-pub use packet::PacketClock;
+pub use packet::{MAX_CYCLES, PacketClock};
 pub use rates::Rates;
 pub use recorder::Recorder;
-pub use spec::{ClientSpec, Clock, Common, DramSpec, L2Spec, MachineSpec, ShaderSpec, UnitSpec};
+pub use spec::{
+    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, L2Spec, MachineSpec, RowBytes, ShaderSpec,
+    UnitSpec, WaitCycles, Width,
+};
 pub use stalls::{Reason, Stalls, UnitTime};
 
 /// Bytes of a line of memory.

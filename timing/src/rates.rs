@@ -6,7 +6,12 @@ use std::fmt;
 use activity::{Event, spec::suggestion};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
 
-/// Events per cycle of one unit, each finite and above zero. Events without a rate take no time of their own.
+/// The fewest events of a cycle: one in 10,000 cycles.
+const SLOWEST: f64 = 1e-4;
+/// The most events of a cycle: as good as no limit.
+const FASTEST: f64 = 1e9;
+
+/// Events per cycle of one unit, each 1e-4 to 1e9. Events without a rate take no time of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rates(BTreeMap<Event, f64>);
 
@@ -40,8 +45,10 @@ impl<'de> Visitor<'de> for RatesVisitor {
                 de::Error::custom(format!("unknown event `{name}`, {}", suggestion(&name, &known)))
             })?;
             let rate = map.next_value::<f64>()?;
-            if !(rate.is_finite() && rate > 0.0) {
-                let message = format!("`{name}` has the rate {rate}; it has to be finite and above zero");
+            if !(SLOWEST..=FASTEST).contains(&rate) {
+                let message = format!(
+                    "`{name}`: {rate:?} is out of range; a rate has to be {SLOWEST:e} to {FASTEST:e} events per cycle"
+                );
                 return Err(de::Error::custom(message));
             }
             if rates.insert(event, rate).is_some() {

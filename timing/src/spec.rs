@@ -1,9 +1,23 @@
 //! The machine as its file describes it. `docs/gpu.md` documents every field.
 
-use activity::Unit;
+use activity::{Bounded, Unit};
 use serde::Deserialize;
 
 use crate::Rates;
+
+/// Cycles that something takes at least 1 of: 65,536 are 65 us at 1 GHz, a hundred times what memory takes.
+pub type Cycles = Bounded<1, 65_536>;
+/// Cycles that something may take none of.
+pub type WaitCycles = Bounded<0, 65_536>;
+/// Packets, warps, requests or lines that may wait or be under way: more than the largest machines have, and so deep that a
+/// queue never fills.
+pub type Entries = Bounded<1, 65_536>;
+/// Things of which a unit does some in each cycle, and hardware that is there that often.
+pub type Width = Bounded<1, 4096>;
+/// Channels of memory, or banks of a channel.
+pub type Chips = Bounded<1, 1024>;
+/// Bytes of a row or of an interleaving step, from a line to 1 MiB.
+pub type RowBytes = Bounded<{ crate::LINE_BYTES }, 1_048_576>;
 
 /// A clock domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -22,10 +36,10 @@ pub struct UnitSpec {
     /// The clock its cycles are counted in.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the moment a packet leaves until the next unit sees it, at least 1.
-    pub latency_cycles: u32,
+    /// Cycles from the moment a packet leaves until the next unit sees it.
+    pub latency_cycles: Cycles,
     /// Packets that may be in front of it or on their way to it, at least 1.
-    pub queue: u32,
+    pub queue: Entries,
     /// Events per cycle. The parts of a unit work side by side: the slowest sets the pace.
     pub rates: Rates,
 }
@@ -37,26 +51,21 @@ pub struct ClientSpec {
     /// The clock its cycles are counted in.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the moment a packet leaves until the next unit sees it, at least 1.
-    pub latency_cycles: u32,
+    /// Cycles from the moment a packet leaves until the next unit sees it.
+    pub latency_cycles: Cycles,
     /// Packets that may be in front of it or on their way to it, at least 1; warps at the texture units.
-    pub queue: u32,
+    pub queue: Entries,
     /// Packets (warps) that may wait behind it for their lines, at least 1.
-    pub in_flight: u32,
+    pub in_flight: Entries,
     /// Lines it can ask the L2 for in a cycle.
     #[serde(default = "one")]
-    pub lines_per_cycle: u32,
+    pub lines_per_cycle: Width,
     /// Events per cycle.
     pub rates: Rates,
 }
 
-/// The most of anything: more is a slip of the pen, and would take for ever.
-const MOST: u32 = 1 << 20;
-/// The fewest events of a cycle.
-const SLOWEST: f64 = 1e-6;
-
-fn one() -> u32 {
-    1
+fn one() -> Width {
+    Width::MIN
 }
 
 /// The shader cores.
@@ -67,21 +76,21 @@ pub struct ShaderSpec {
     #[serde(default)]
     pub clock: Clock,
     /// Cycles from the end of a packet's last warp until the next unit sees it, at least 1.
-    pub latency_cycles: u32,
+    pub latency_cycles: Cycles,
     /// Packets of vertices, and as many of pixels, that may wait in front.
-    pub queue: u32,
+    pub queue: Entries,
     /// Packets of vertices, and as many of pixels, whose warps may be on the cores.
-    pub in_flight: u32,
+    pub in_flight: Entries,
     /// Cores.
-    pub cores: u32,
+    pub cores: Width,
     /// Lanes of a core: operations per cycle.
-    pub lanes: u32,
+    pub lanes: Width,
     /// Threads that go through a shader together, at most.
-    pub warp_lanes: u32,
+    pub warp_lanes: Width,
     /// Warps a core can hold.
-    pub warps: u32,
+    pub warps: Width,
     /// Cycles from an operation of a warp to its next.
-    pub alu_latency_cycles: u32,
+    pub alu_latency_cycles: Cycles,
 }
 
 /// The cache shared by all.
@@ -92,11 +101,11 @@ pub struct L2Spec {
     #[serde(default)]
     pub clock: Clock,
     /// Cycles from the moment a request is taken, or its line has come from memory, until the client has it; at least 1.
-    pub latency_cycles: u32,
+    pub latency_cycles: Cycles,
     /// Requests that may wait in front of it, of each client.
-    pub queue: u32,
+    pub queue: Entries,
     /// Lines it takes in a cycle.
-    pub lines_per_cycle: u32,
+    pub lines_per_cycle: Width,
 }
 
 /// Memory chips.
@@ -107,25 +116,25 @@ pub struct DramSpec {
     #[serde(default)]
     pub clock: Clock,
     /// Cycles a request spends in the controller and on the way, beside what the chips take; at least 1.
-    pub latency_cycles: u32,
+    pub latency_cycles: Cycles,
     /// Lines that may wait at a channel, at least 2.
-    pub queue: u32,
-    /// Channels, a power of two not asked for.
-    pub channels: u32,
+    pub queue: Bounded<2, 65_536>,
+    /// Channels; any number, not only powers of two.
+    pub channels: Chips,
     /// Banks of a channel.
-    pub banks: u32,
+    pub banks: Chips,
     /// Bytes of a row in a channel.
-    pub row_bytes: u32,
+    pub row_bytes: RowBytes,
     /// Bytes after which addresses go on in the next channel.
-    pub interleave_bytes: u32,
+    pub interleave_bytes: RowBytes,
     /// Cycles for which a line occupies the data bus of its channel.
-    pub burst_cycles: u32,
+    pub burst_cycles: Cycles,
     /// Cycles from a column command to the first data (CL).
-    pub cas_cycles: u32,
+    pub cas_cycles: WaitCycles,
     /// Cycles from opening a row to the first column command (tRCD).
-    pub activate_cycles: u32,
+    pub activate_cycles: WaitCycles,
     /// Cycles to close a row (tRP).
-    pub precharge_cycles: u32,
+    pub precharge_cycles: WaitCycles,
 }
 
 /// Every unit of the block diagram.
@@ -167,23 +176,30 @@ pub struct Common<'a> {
 impl UnitSpec {
     fn common(&self) -> Common<'_> {
         let Self { clock, latency_cycles, queue, ref rates } = *self;
+        let (latency_cycles, queue) = (latency_cycles.get(), queue.get());
         Common { clock, latency_cycles, queue, in_flight: 0, lines_per_cycle: 0, rates: Some(rates) }
     }
 }
 
 impl ClientSpec {
     fn common(&self) -> Common<'_> {
-        let Self { clock, latency_cycles, queue, in_flight, lines_per_cycle, ref rates } = *self;
-        Common { clock, latency_cycles, queue, in_flight, lines_per_cycle, rates: Some(rates) }
+        Common {
+            clock: self.clock,
+            latency_cycles: self.latency_cycles.get(),
+            queue: self.queue.get(),
+            in_flight: self.in_flight.get(),
+            lines_per_cycle: self.lines_per_cycle.get(),
+            rates: Some(&self.rates),
+        }
     }
 }
 
 impl MachineSpec {
     /// What `unit` has in common with the others.
     pub fn common(&self, unit: Unit) -> Common<'_> {
-        let bare = |clock, latency_cycles, queue, in_flight| Common {
+        let bare = |clock, latency_cycles: Cycles, queue, in_flight| Common {
             clock,
-            latency_cycles,
+            latency_cycles: latency_cycles.get(),
             queue,
             in_flight,
             lines_per_cycle: 0,
@@ -193,7 +209,7 @@ impl MachineSpec {
             Unit::Command => self.command.common(),
             Unit::Shader => {
                 let s = &self.shader;
-                bare(s.clock, s.latency_cycles, s.queue, s.in_flight)
+                bare(s.clock, s.latency_cycles, s.queue.get(), s.in_flight.get())
             }
             Unit::Setup => self.setup.common(),
             Unit::Traversal => self.traversal.common(),
@@ -203,82 +219,24 @@ impl MachineSpec {
             Unit::ShadingCache => self.shading_cache.common(),
             Unit::Texture => self.texture.common(),
             Unit::Colour => self.colour.common(),
-            Unit::L2 => bare(self.l2.clock, self.l2.latency_cycles, self.l2.queue, 0),
-            Unit::Dram => bare(self.dram.clock, self.dram.latency_cycles, self.dram.queue, 0),
+            Unit::L2 => bare(self.l2.clock, self.l2.latency_cycles, self.l2.queue.get(), 0),
+            Unit::Dram => bare(self.dram.clock, self.dram.latency_cycles, self.dram.queue.get(), 0),
         }
     }
 
-    /// The first value that cannot be, and what would do.
+    /// Checks what the types of single fields do not: that every rate is that of the unit it is written for.
     ///
     /// # Errors
-    /// That, in words that name the field below `units`.
-    pub fn validate(&self) -> Result<(), String> {
+    /// The first that is not: its field, such as `depth.rates`, and what is wrong with it.
+    pub fn validate(&self) -> Result<(), (String, String)> {
         for unit in Unit::ALL {
-            let common = self.common(unit);
-            let name = unit.name();
-            if common.queue == 0 {
-                return Err(format!("`units.{name}.queue` is 0; a queue holds at least 1 packet"));
-            }
-            if common.latency_cycles == 0 {
-                return Err(format!(
-                    "`units.{name}.latency_cycles` is 0; nothing is seen before the next cycle, so it is at least 1"
-                ));
-            }
-            if common.latency_cycles > MOST {
-                return Err(format!(
-                    "`units.{name}.latency_cycles` is {}; it has to be 1 to {MOST}",
-                    common.latency_cycles
-                ));
-            }
-            let slow = common.rates.and_then(|rates| rates.iter().find(|(_, rate)| *rate < SLOWEST));
-            if let Some((event, rate)) = slow {
-                let event = event.name();
-                return Err(format!(
-                    "`units.{name}.rates` has {rate:e} `{event}` a cycle; it has to be at least {SLOWEST:e}"
-                ));
-            }
-            let foreign = common.rates.and_then(|rates| rates.iter().find(|(event, _)| event.unit() != unit));
-            if let Some((event, _)) = foreign {
-                let (event, owner) = (event.name(), event.unit().name());
-                return Err(format!("`units.{name}.rates` has `{event}`; it belongs in `units.{owner}`"));
+            let foreign = |rates: &Rates| rates.iter().find(|(event, _)| event.unit() != unit);
+            if let Some((event, _)) = self.common(unit).rates.and_then(foreign) {
+                let (unit, event, owner) = (unit.name(), event.name(), event.unit().name());
+                let message = format!("`units.{unit}.rates` has `{event}`; it belongs in `units.{owner}`");
+                return Err((format!("{unit}.rates"), message));
             }
         }
-        self.validate_sizes()
-    }
-
-    fn validate_sizes(&self) -> Result<(), String> {
-        let (shader, dram) = (&self.shader, &self.dram);
-        let sizes = [
-            ("command.in_flight", self.command.in_flight, 1),
-            ("depth.in_flight", self.depth.in_flight, 1),
-            ("texture.in_flight", self.texture.in_flight, 1),
-            ("colour.in_flight", self.colour.in_flight, 1),
-            ("command.lines_per_cycle", self.command.lines_per_cycle, 1),
-            ("depth.lines_per_cycle", self.depth.lines_per_cycle, 1),
-            ("texture.lines_per_cycle", self.texture.lines_per_cycle, 1),
-            ("colour.lines_per_cycle", self.colour.lines_per_cycle, 1),
-            ("shader.in_flight", shader.in_flight, 1),
-            ("shader.cores", shader.cores, 1),
-            ("shader.lanes", shader.lanes, 1),
-            ("shader.warp_lanes", shader.warp_lanes, 1),
-            ("shader.warps", shader.warps, 1),
-            ("shader.alu_latency_cycles", shader.alu_latency_cycles, 1),
-            ("l2.lines_per_cycle", self.l2.lines_per_cycle, 1),
-            ("dram.queue", dram.queue, 2),
-            ("dram.channels", dram.channels, 1),
-            ("dram.banks", dram.banks, 1),
-            ("dram.burst_cycles", dram.burst_cycles, 1),
-            ("dram.cas_cycles", dram.cas_cycles, 0),
-            ("dram.activate_cycles", dram.activate_cycles, 0),
-            ("dram.precharge_cycles", dram.precharge_cycles, 0),
-            ("dram.row_bytes", dram.row_bytes, crate::LINE_BYTES),
-            ("dram.interleave_bytes", dram.interleave_bytes, crate::LINE_BYTES),
-        ];
-        match sizes.iter().find(|(_, value, least)| !(*least..=MOST).contains(value)) {
-            Some((field, value, least)) => {
-                Err(format!("`units.{field}` is {value}; it has to be {least} to {MOST}"))
-            }
-            None => Ok(()),
-        }
+        Ok(())
     }
 }

@@ -1,9 +1,9 @@
 //! Streams made to break levels of timing, and microbenchmarks of one rate each. They are made of packets, not of triangles, so
 //! that each breaks one thing.
 
-use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 
-use crate::spec::MachineSpec;
+use crate::spec::{Entries, MachineSpec};
 
 /// Packets with their lines.
 pub type Packets = Vec<(Packet, Vec<LineAccess>)>;
@@ -165,12 +165,13 @@ fn shallow(units: &mut MachineSpec) {
         &mut units.sample_test,
         &mut units.shading_cache,
     ] {
-        unit.queue = 1;
+        unit.queue = Entries::MIN;
     }
     for unit in [&mut units.command, &mut units.depth, &mut units.texture, &mut units.colour] {
-        (unit.queue, unit.in_flight) = (1, 1);
+        (unit.queue, unit.in_flight) = (Entries::MIN, Entries::MIN);
     }
-    (units.shader.queue, units.shader.in_flight, units.l2.queue, units.dram.queue) = (1, 1, 1, 2);
+    (units.shader.queue, units.shader.in_flight, units.l2.queue) = (Entries::MIN, Entries::MIN, Entries::MIN);
+    units.dram.queue = Bounded::MIN;
 }
 
 /// One rate of a machine: a stream that asks for nothing else.

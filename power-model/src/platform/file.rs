@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{Leakage, Platform, Rail, ScaledFrom, UnitPower};
 use crate::PlatformError;
-use crate::quantity::{Seconds, Source, Sourced, Volts, Watts};
+use crate::quantity::{Nanometres, RecordedIdle, Seconds, Source, Sourced, Volts, Watts};
 use crate::row::EnergyRow;
 use crate::system::System;
 
@@ -15,7 +15,7 @@ use crate::system::System;
 pub(super) struct Written {
     name: String,
     doc: Source,
-    node_nm: u32,
+    node_nm: Nanometres,
     #[serde(default)]
     energy_from: Option<ScaledFrom>,
     rail: Rail,
@@ -26,8 +26,8 @@ pub(super) struct Written {
     units: Vec<UnitRow>,
     idle_w: Sourced<Watts>,
     submit_gap_s: Sourced<Seconds>,
-    lead_in_s: Sourced<Seconds>,
-    tail_s: Sourced<Seconds>,
+    lead_in_s: Sourced<RecordedIdle>,
+    tail_s: Sourced<RecordedIdle>,
     #[serde(default)]
     system: System,
     #[serde(default)]
@@ -63,7 +63,7 @@ impl Written {
         Ok(Platform {
             name: self.name,
             doc: self.doc.text().to_owned(),
-            node_nm: self.node_nm,
+            node_nm: self.node_nm.get(),
             energy_from: self.energy_from,
             rail: self.rail,
             v0_v: self.v0_v,

@@ -9,7 +9,9 @@ use serde::Deserialize;
 
 use self::file::Written;
 use crate::PlatformError;
-use crate::quantity::{Basis, Celsius, Exponent, Quantity, Ratio, Seconds, Sourced, Volts, Watts};
+use crate::quantity::{
+    Basis, Celsius, Exponent, Nanometres, Quantity, Ratio, RecordedIdle, Seconds, Sourced, Volts, Watts,
+};
 use crate::row::EnergyRow;
 use crate::system::System;
 
@@ -34,8 +36,8 @@ pub struct Rail {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScaledFrom {
-    /// The node of the table, in nanometres.
-    pub node_nm: u32,
+    /// The node of the table.
+    pub node_nm: Nanometres,
     /// Energy of an event in the core on this platform's node over that on the table's, at one voltage. Memory has nodes of
     /// its own and is not scaled.
     pub core_scale: Sourced<Ratio>,
@@ -99,9 +101,9 @@ pub struct Platform {
     /// Free-running, the gap between the end of a frame and the start of the next, while the driver submits.
     pub submit_gap_s: Sourced<Seconds>,
     /// Idle time recorded before the first frame.
-    pub lead_in_s: Sourced<Seconds>,
+    pub lead_in_s: Sourced<RecordedIdle>,
     /// Idle time recorded after the last frame.
-    pub tail_s: Sourced<Seconds>,
+    pub tail_s: Sourced<RecordedIdle>,
     /// What surrounds the GPU and shows in a recording: launch, blocking calls, the operating system.
     pub system: System,
     /// Rows that replace the energy table's, for devices the table cannot know.
@@ -182,7 +184,7 @@ impl Platform {
     /// The node of the table it uses, and what the table's energies of core events are multiplied with.
     pub fn table_node(&self) -> (u32, f64) {
         let from = self.energy_from.as_ref();
-        from.map_or((self.node_nm, 1.0), |from| (from.node_nm, from.core_scale.value()))
+        from.map_or((self.node_nm, 1.0), |from| (from.node_nm.get(), from.core_scale.value()))
     }
 
     /// V/V0: the core voltage it runs at over the one its watts are stated at.

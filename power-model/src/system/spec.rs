@@ -98,6 +98,13 @@ impl Disturbance {
         self.0.extra_w.value()
     }
 
+    /// The same with another power on top.
+    #[must_use]
+    pub fn drawing(mut self, extra_w: Sourced<Watts>) -> Self {
+        self.0.extra_w = extra_w;
+        self
+    }
+
     /// By which part of it each one may draw more or less: 0 where all are alike.
     pub fn variation(&self) -> f64 {
         self.0.variation.value()

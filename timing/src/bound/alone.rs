@@ -26,13 +26,17 @@ impl Alone {
         let period = common.map(|common| clocks.period(common.clock));
         let (shader, dram) = (&machine.shader, &machine.dram);
         // A warp wider than a core takes more than one cycle of its lanes.
-        let cycles = shader.alu_latency_cycles + shader.warp_lanes.div_ceil(shader.lanes) - 1;
-        let row = dram.latency_cycles + dram.activate_cycles + dram.cas_cycles + dram.burst_cycles;
+        let cycles =
+            shader.alu_latency_cycles.get() + shader.warp_lanes.get().div_ceil(shader.lanes.get()) - 1;
+        let row = dram.latency_cycles.get()
+            + dram.activate_cycles.get()
+            + dram.cas_cycles.get()
+            + dram.burst_cycles.get();
         Self {
             period,
             latency: std::array::from_fn(|at| period[at] * Time::from(common[at].latency_cycles)),
             operation: clocks.period(shader.clock) * Time::from(cycles),
-            warp_lanes: shader.warp_lanes,
+            warp_lanes: shader.warp_lanes.get(),
             holds: [f64::from(shader.in_flight), f64::from(shader.cores) * f64::from(shader.warps)],
             line: [
                 clocks.period(machine.l2.clock) * Time::from(machine.l2.latency_cycles),

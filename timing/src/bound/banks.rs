@@ -23,9 +23,9 @@ pub(super) struct Banks {
 impl Banks {
     pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
         let spec = &machine.dram;
-        let banks = spec.banks as usize;
-        let all = spec.channels as usize * banks;
-        let row = spec.precharge_cycles + spec.activate_cycles;
+        let banks = spec.banks.get() as usize;
+        let all = spec.channels.get() as usize * banks;
+        let row = spec.precharge_cycles.get() + spec.activate_cycles.get();
         Self {
             map: Map::new(spec),
             banks,

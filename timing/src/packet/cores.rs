@@ -73,23 +73,23 @@ impl Cores {
         let (spec, texture) = (&machine.shader, &machine.texture);
         let period = clocks.period(spec.clock);
         let texture_period = clocks.period(texture.clock);
-        let slots = Ring::new(spec.cores * spec.warps);
-        let way = Way { sent: 0, left: 0, flights: Ring::new(spec.in_flight), slots };
+        let slots = Ring::new(spec.cores.get() * spec.warps.get());
+        let way = Way { sent: 0, left: 0, flights: Ring::new(spec.in_flight.get()), slots };
         Self {
             ways: [way.clone(), way],
             sends: Calendar::new(Time::from(STRETCH) * period, 1),
-            lanes: Calendar::new(Time::from(STRETCH) * period, spec.cores * spec.lanes),
+            lanes: Calendar::new(Time::from(STRETCH) * period, spec.cores.get() * spec.lanes.get()),
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
-            lanes_of_core: spec.lanes,
-            warp_lanes: spec.warp_lanes,
+            lanes_of_core: spec.lanes.get(),
+            warp_lanes: spec.warp_lanes.get(),
             texture_period,
             texture_latency: texture_period * Time::from(texture.latency_cycles),
             texture_free: 0,
             texture_gone: 0,
             texture_asks: 0,
-            texture_queue: Ring::new(texture.queue),
-            texture_behind: Ring::new(texture.in_flight),
+            texture_queue: Ring::new(texture.queue.get()),
+            texture_behind: Ring::new(texture.in_flight.get()),
         }
     }
 

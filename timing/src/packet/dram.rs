@@ -73,18 +73,18 @@ impl Dram {
     pub fn new(spec: &DramSpec, clocks: &Clocks) -> Self {
         let period = clocks.period(spec.clock);
         let cycles = |count: u32| period * Time::from(count);
-        let burst = cycles(spec.burst_cycles);
+        let burst = cycles(spec.burst_cycles.get());
         let [bus, time] = [STRETCH, BANK_STRETCH].map(|lines| Calendar::new(burst * Time::from(lines), 1));
         let bank = Bank { time, rows: [Open::NONE; ROWS] };
-        let channel = Channel { bus, banks: vec![bank; spec.banks as usize], lines: 0 };
+        let channel = Channel { bus, banks: vec![bank; spec.banks.get() as usize], lines: 0 };
         Self {
             map: Map::new(spec),
-            channels: vec![channel; spec.channels as usize],
+            channels: vec![channel; spec.channels.get() as usize],
             burst,
-            cas: cycles(spec.cas_cycles),
-            activate: cycles(spec.activate_cycles),
-            precharge: cycles(spec.precharge_cycles),
-            latency: cycles(spec.latency_cycles),
+            cas: cycles(spec.cas_cycles.get()),
+            activate: cycles(spec.activate_cycles.get()),
+            precharge: cycles(spec.precharge_cycles.get()),
+            latency: cycles(spec.latency_cycles.get()),
             backlog: burst * Time::from(spec.queue),
             queue: spec.queue.into(),
             end: 0,

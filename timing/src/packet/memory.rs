@@ -91,13 +91,13 @@ impl Memory {
         let period = clocks.period(spec.clock);
         Self {
             dram: Dram::new(&machine.dram, clocks),
-            l2: Calendar::new(Time::from(STRETCH) * period, spec.lines_per_cycle),
-            ports: std::array::from_fn(|_| Ring::new(spec.queue)),
+            l2: Calendar::new(Time::from(STRETCH) * period, spec.lines_per_cycle.get()),
+            ports: std::array::from_fn(|_| Ring::new(spec.queue.get())),
             lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
             order: [0; CLIENTS.len()],
             period,
             latency: period * Time::from(spec.latency_cycles),
-            queue: spec.queue,
+            queue: spec.queue.get(),
             end: 0,
         }
     }

@@ -81,7 +81,14 @@ pub struct PacketClock {
     /// Packets so far.
     packets: u64,
     end: Time,
+    /// The latest moment that is timed.
+    most: Time,
+    is_too_long: bool,
 }
+
+/// Core cycles of a frame beyond which it is not timed: half a second to some seconds of hardware. Shared resources are
+/// kept as calendars of about three bytes a cycle.
+pub const MAX_CYCLES: u64 = 1 << 30;
 
 /// When batches were set up and traversed, as far as is known.
 #[derive(Clone, Debug, Default)]
@@ -127,7 +134,15 @@ impl PacketClock {
             lines: Vec::new(),
             packets: 0,
             end: 0,
+            most: MAX_CYCLES * clocks.period(Clock::Core),
+            is_too_long: false,
         }
+    }
+
+    /// Whether the frame takes more than [`MAX_CYCLES`]. What comes later is not timed, and [`PacketClock::finish`] gives the
+    /// time of the part before.
+    pub fn is_too_long(&self) -> bool {
+        self.is_too_long
     }
 
     /// Runs a stream that is written already.
@@ -179,6 +194,10 @@ impl PacketClock {
     fn walk(&mut self, job: &Job, counts: &PacketCounts, lines: &[LineAccess]) {
         let first = if job.front { Place::Command } else { Place::Traversal };
         let mut arrive = self.gates.opens(job);
+        self.is_too_long |= self.end > self.most || arrive > self.most;
+        if self.is_too_long {
+            return;
+        }
         let mut memory = Span::NONE;
         for &place in &Place::ALL[first as usize..=job.last as usize] {
             if self.mixed {

@@ -56,21 +56,21 @@ impl Dram {
         let cycles = |count: u32| period * Time::from(count);
         let channel = Channel {
             entries: Vec::new(),
-            banks: vec![Bank::default(); spec.banks as usize],
+            banks: vec![Bank::default(); spec.banks.get() as usize],
             bus_free_at: 0,
             taken: 0,
             taken_at: Time::MAX,
         };
         Self {
-            channels: vec![channel; spec.channels as usize],
+            channels: vec![channel; spec.channels.get() as usize],
             map: Map::new(spec),
-            queue: spec.queue as usize,
+            queue: spec.queue.get() as usize,
             period,
-            burst: cycles(spec.burst_cycles),
-            cas: cycles(spec.cas_cycles),
-            activate: cycles(spec.activate_cycles),
-            precharge: cycles(spec.precharge_cycles),
-            latency: cycles(spec.latency_cycles),
+            burst: cycles(spec.burst_cycles.get()),
+            cas: cycles(spec.cas_cycles.get()),
+            activate: cycles(spec.activate_cycles.get()),
+            precharge: cycles(spec.precharge_cycles.get()),
+            latency: cycles(spec.latency_cycles.get()),
         }
     }
 

@@ -52,9 +52,9 @@ impl<'a> Machine<'a> {
             })
         };
         let mut servers = [1; Unit::COUNT];
-        servers[Unit::Shader as usize] = machine.shader.cores * machine.shader.lanes;
-        servers[Unit::L2 as usize] = machine.l2.lines_per_cycle;
-        servers[Unit::Dram as usize] = machine.dram.channels;
+        servers[Unit::Shader as usize] = machine.shader.cores.get() * machine.shader.lanes.get();
+        servers[Unit::L2 as usize] = machine.l2.lines_per_cycle.get();
+        servers[Unit::Dram as usize] = machine.dram.channels.get();
         let world = World {
             clocks,
             makes,
@@ -72,10 +72,10 @@ impl<'a> Machine<'a> {
             shader: Shader::new(machine, &clocks),
             texture: Stage::new(
                 clocks.period(machine.texture.clock),
-                machine.texture.in_flight,
-                machine.texture.lines_per_cycle,
+                machine.texture.in_flight.get(),
+                machine.texture.lines_per_cycle.get(),
             ),
-            textures: Queue::new(machine.texture.queue),
+            textures: Queue::new(machine.texture.queue.get()),
             texture_latency: clocks.period(machine.texture.clock)
                 * Time::from(machine.texture.latency_cycles),
             l2: L2::new(machine, &clocks),

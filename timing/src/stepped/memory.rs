@@ -94,8 +94,8 @@ impl L2 {
         let spec = &machine.l2;
         let period = clocks.period(spec.clock);
         Self {
-            ports: std::array::from_fn(|_| Queue::new(spec.queue)),
-            lines_per_cycle: spec.lines_per_cycle,
+            ports: std::array::from_fn(|_| Queue::new(spec.queue.get())),
+            lines_per_cycle: spec.lines_per_cycle.get(),
             period,
             latency: period * Time::from(spec.latency_cycles),
             turn: 0,

@@ -61,7 +61,7 @@ impl Shader {
         let spec = &machine.shader;
         let period = clocks.period(spec.clock);
         let core = Core {
-            slots: spec.warps,
+            slots: spec.warps.get(),
             lane: 0,
             ready: VecDeque::new(),
             fresh: VecDeque::new(),
@@ -69,14 +69,14 @@ impl Shader {
             cooling: VecDeque::new(),
         };
         Self {
-            cores: vec![core; spec.cores as usize],
+            cores: vec![core; spec.cores.get() as usize],
             ways: Default::default(),
             warps: Vec::new(),
             free: Vec::new(),
             turn: 0,
             lanes: u64::from(spec.lanes),
-            warp_lanes: spec.warp_lanes,
-            in_flight: spec.in_flight as usize,
+            warp_lanes: spec.warp_lanes.get(),
+            in_flight: spec.in_flight.get() as usize,
             period,
             alu: period * Time::from(spec.alu_latency_cycles),
             fetching: 0,

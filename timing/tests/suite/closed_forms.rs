@@ -3,7 +3,9 @@
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use proptest::prelude::*;
 
-use crate::common::{Packets, bound_level, clocks, packet, packet_level, plain, read, stepped, tile, tiles};
+use crate::common::{
+    Packets, bound_level, clocks, packet, packet_level, plain, read, size, stepped, tile, tiles,
+};
 
 fn cycles(packets: &Packets) -> u64 {
     stepped(&plain(), packets).cycles
@@ -14,7 +16,7 @@ fn one_unit_takes_the_sum_and_its_latency() {
     let packets = tiles([3, 5, 7].map(|n| vec![(Event::TilesVisited, n)]));
     assert_eq!(cycles(&packets), 3 + 5 + 7 + 1);
     let mut machine = plain();
-    machine.traversal.latency_cycles = 9;
+    machine.traversal.latency_cycles = size(9);
     assert_eq!(stepped(&machine, &packets).cycles, 3 + 5 + 7 + 9);
 }
 
@@ -52,7 +54,7 @@ fn a_full_queue_blocks_by_hand() {
     assert_eq!(stepped(&machine, &pair(&works)).cycles, 1 + 20 * 10 + 1 + 1 + 1);
     // Room for one: the first starts in z-cull at 2 and leaves at 102. The second is in the queue since 11, the third done at
     // 21 and held: the second starts at 102, that is known at 103, when the third leaves; 18 more follow ten cycles apart.
-    machine.z_cull.queue = 1;
+    machine.z_cull.queue = size(1);
     assert_eq!(stepped(&machine, &pair(&works)).cycles, 103 + 18 * 10 + 1 + 1 + 1);
 }
 
@@ -61,7 +63,7 @@ proptest! {
     #[test]
     fn two_units_with_a_queue_of_k(works in prop::collection::vec((0u32..20, 0u32..20), 1..60), queue in 1u32..9) {
         let mut machine = plain();
-        machine.z_cull.queue = queue;
+        machine.z_cull.queue = size(queue);
         // A tile that asks nothing of z-cull ends at traversal: give each one event there.
         let works: Vec<_> = works.into_iter().map(|(a, b)| (a, b + 1)).collect();
         prop_assert_eq!(stepped(&machine, &pair(&works)).cycles, tandem(&works, queue as usize));
@@ -78,18 +80,18 @@ fn a_lone_warp_takes_its_latency_for_every_operation() {
     // Five units before the cores with a cycle each and no work; a cycle to reach the core; a cycle to leave.
     let before = 5 + 1;
     let mut machine = plain();
-    machine.shader.alu_latency_cycles = 6;
+    machine.shader.alu_latency_cycles = size(6);
     let one = vec![(pixels(4, 10), Vec::new())];
     assert_eq!(stepped(&machine, &one).cycles, before + 10 * 6 + 1);
     // With lanes for one thread in a cycle an operation of four threads is issued over four cycles.
-    machine.shader.lanes = 1;
+    machine.shader.lanes = size(1);
     assert_eq!(stepped(&machine, &one).cycles, before + 10 * (6 + 3) + 1);
 }
 
 #[test]
 fn resident_warps_hide_latency_until_the_lanes_are_full() {
     let mut machine = plain();
-    machine.shader.alu_latency_cycles = 6;
+    machine.shader.alu_latency_cycles = size(6);
     let run = |machine: &_, warps: u32| stepped(machine, &vec![(pixels(4 * warps, 10), Vec::new())]).cycles;
     // Warps are sent one a cycle: w of them, up to six, take turns within the latency of one.
     for warps in 1..=6 {
@@ -98,7 +100,7 @@ fn resident_warps_hide_latency_until_the_lanes_are_full() {
     // Eight fill the lanes: eighty operations, one a cycle, and the last one's latency.
     assert_eq!(run(&machine, 8), 6 + 80 - 1 + 6 + 1);
     // Two cores, half as many each; every other warp is for the other core.
-    machine.shader.cores = 2;
+    machine.shader.cores = size(2);
     assert_eq!(run(&machine, 8), 6 + 7 + 10 * 6 + 1);
 }
 
@@ -123,8 +125,8 @@ fn a_shared_resource_serves_n_clients_in_turn() {
 fn a_client_asks_for_so_many_lines_a_cycle() {
     let mut machine = plain();
     for (lines, m) in (1..6).flat_map(|lines| [1, 2, 7, 40].map(|m| (lines, m))) {
-        machine.command.lines_per_cycle = lines;
-        machine.l2.lines_per_cycle = lines;
+        machine.command.lines_per_cycle = size(lines);
+        machine.l2.lines_per_cycle = size(lines);
         let asks: Vec<_> = (0..m).map(|n| read(Unit::Command, n, LineKind::Hit)).collect();
         let alone = vec![(packet(PacketKind::Vertices, &[(Event::Indices, 1)]), asks)];
         // The first is seen at 1, the last taken in its cycle; its line is there a cycle later and the packet done after one more.
@@ -132,7 +134,7 @@ fn a_client_asks_for_so_many_lines_a_cycle() {
         assert_eq!(stepped(&machine, &alone).cycles, cycles, "{m} lines, {lines} a cycle");
         assert_eq!(packet_level(&machine, clocks(), &alone).cycles, cycles, "{m} lines, {lines} a cycle");
         // The L2 as the bottleneck.
-        machine.l2.lines_per_cycle = 1;
+        machine.l2.lines_per_cycle = size(1);
         assert_eq!(stepped(&machine, &alone).cycles, u64::from(m) + 2);
         assert_eq!(packet_level(&machine, clocks(), &alone).cycles, u64::from(m) + 2);
     }
@@ -141,14 +143,14 @@ fn a_client_asks_for_so_many_lines_a_cycle() {
 #[test]
 fn the_roofline_knows_programs_that_nobody_hides() {
     let mut machine = plain();
-    machine.shader.alu_latency_cycles = 6;
+    machine.shader.alu_latency_cycles = size(6);
     // A warp of ten operations alone, and sixteen of them where the cores hold one packet at a time.
     let of = |n: usize| vec![(pixels(4, 10), Vec::new()); n];
     let bound = |machine: &_, packets: &_| bound_level(machine, clocks(), packets).cycles;
     assert!((60..=stepped(&machine, &of(1)).cycles).contains(&bound(&machine, &of(1))));
-    machine.shader.in_flight = 1;
+    machine.shader.in_flight = size(1);
     assert!((16 * 60..=stepped(&machine, &of(16)).cycles).contains(&bound(&machine, &of(16))));
-    machine.shader.in_flight = 64;
+    machine.shader.in_flight = size(64);
     assert!(bound(&machine, &of(16)) < 200);
 }
 

@@ -1,6 +1,6 @@
 //! Machines and streams for tests.
 
-use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
+use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::stepped::{self, Manner, Stream};
 use timing::{
     ClientSpec, Clock, Clocks, DramSpec, Jobs, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec, Timed,
@@ -13,13 +13,25 @@ pub fn rates(text: &str) -> Rates {
     activity::spec::parse(text, "test").unwrap()
 }
 
+/// A size of a machine.
+pub fn size<const LEAST: u32, const MOST: u32>(value: u32) -> Bounded<LEAST, MOST> {
+    Bounded::new(value).unwrap()
+}
+
 fn unit(text: &str) -> UnitSpec {
-    UnitSpec { clock: Clock::Core, latency_cycles: 1, queue: 64, rates: rates(text) }
+    UnitSpec { clock: Clock::Core, latency_cycles: size(1), queue: size(64), rates: rates(text) }
 }
 
 fn client(text: &str) -> ClientSpec {
     let rates = rates(text);
-    ClientSpec { clock: Clock::Core, latency_cycles: 1, queue: 64, in_flight: 64, lines_per_cycle: 1, rates }
+    ClientSpec {
+        clock: Clock::Core,
+        latency_cycles: size(1),
+        queue: size(64),
+        in_flight: size(64),
+        lines_per_cycle: size(1),
+        rates,
+    }
 }
 
 /// Every rate is 1 in a cycle, every latency 1, every queue deep.
@@ -28,14 +40,14 @@ pub fn plain() -> MachineSpec {
         command: client("{\"indices\": 1}"),
         shader: ShaderSpec {
             clock: Clock::Core,
-            latency_cycles: 1,
-            queue: 64,
-            in_flight: 64,
-            cores: 1,
-            lanes: 4,
-            warp_lanes: 4,
-            warps: 8,
-            alu_latency_cycles: 1,
+            latency_cycles: size(1),
+            queue: size(64),
+            in_flight: size(64),
+            cores: size(1),
+            lanes: size(4),
+            warp_lanes: size(4),
+            warps: size(8),
+            alu_latency_cycles: size(1),
         },
         setup: unit("{\"triangles_in\": 1}"),
         traversal: unit("{\"tiles_visited\": 1}"),
@@ -45,19 +57,19 @@ pub fn plain() -> MachineSpec {
         shading_cache: unit("{\"shading_lookups\": 1}"),
         texture: client("{\"texture_fetches\": 1}"),
         colour: client("{\"colour_writes\": 1}"),
-        l2: L2Spec { clock: Clock::Core, latency_cycles: 1, queue: 64, lines_per_cycle: 1 },
+        l2: L2Spec { clock: Clock::Core, latency_cycles: size(1), queue: size(64), lines_per_cycle: size(1) },
         dram: DramSpec {
             clock: Clock::Memory,
-            latency_cycles: 1,
-            queue: 64,
-            channels: 1,
-            banks: 2,
-            row_bytes: 512,
-            interleave_bytes: 64,
-            burst_cycles: 2,
-            cas_cycles: 3,
-            activate_cycles: 4,
-            precharge_cycles: 5,
+            latency_cycles: size(1),
+            queue: size(64),
+            channels: size(1),
+            banks: size(2),
+            row_bytes: size(512),
+            interleave_bytes: size(64),
+            burst_cycles: size(2),
+            cas_cycles: size(3),
+            activate_cycles: size(4),
+            precharge_cycles: size(5),
         },
     }
 }

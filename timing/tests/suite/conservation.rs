@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use timing::stepped::Manner;
 use timing::{Clocks, MachineSpec};
 
-use crate::common::{BATCH, Packets, plain, stepped_as};
+use crate::common::{BATCH, Packets, plain, size, stepped_as};
 
 fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
     let kind = prop_oneof![
@@ -102,15 +102,16 @@ pub fn machine() -> impl Strategy<Value = MachineSpec> {
         let mut m = plain();
         for unit in [&mut m.setup, &mut m.traversal, &mut m.z_cull, &mut m.sample_test, &mut m.shading_cache]
         {
-            (unit.queue, unit.latency_cycles) = (queue, latency);
+            (unit.queue, unit.latency_cycles) = (size(queue), size(latency));
         }
         for unit in [&mut m.command, &mut m.depth, &mut m.texture, &mut m.colour] {
-            (unit.queue, unit.latency_cycles, unit.in_flight) = (queue, latency, in_flight);
+            (unit.queue, unit.latency_cycles, unit.in_flight) = (size(queue), size(latency), size(in_flight));
         }
-        (m.shader.queue, m.shader.in_flight, m.l2.queue) = (queue, in_flight, port);
-        (m.shader.cores, m.shader.lanes, m.shader.warp_lanes, m.shader.warps, m.shader.alu_latency_cycles) =
-            s;
-        (m.dram.queue, m.dram.channels, m.dram.banks, m.dram.burst_cycles, m.l2.lines_per_cycle) = d;
+        (m.shader.queue, m.shader.in_flight, m.l2.queue) = (size(queue), size(in_flight), size(port));
+        (m.shader.cores, m.shader.lanes, m.shader.warp_lanes) = (size(s.0), size(s.1), size(s.2));
+        (m.shader.warps, m.shader.alu_latency_cycles) = (size(s.3), size(s.4));
+        (m.dram.queue, m.dram.channels, m.dram.banks) = (size(d.0), size(d.1), size(d.2));
+        (m.dram.burst_cycles, m.l2.lines_per_cycle) = (size(d.3), size(d.4));
         m
     })
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use timing::stepped::Manner;
 
 use crate::common::{
-    Packets, bound_level, clocks, packet_level, plain, read, stepped, stepped_as, tile, tiles,
+    Packets, bound_level, clocks, packet_level, plain, read, size, stepped, stepped_as, tile, tiles,
 };
 use crate::conservation::{machine, packets};
 
@@ -20,9 +20,9 @@ proptest! {
         latencies in prop::array::uniform3(1u32..9),
     ) {
         let mut machine = plain();
-        (machine.z_cull.queue, machine.sample_test.queue) = queues.into();
+        (machine.z_cull.queue, machine.sample_test.queue) = (size(queues[0]), size(queues[1]));
         let units = [&mut machine.traversal, &mut machine.z_cull, &mut machine.sample_test];
-        units.into_iter().zip(latencies).for_each(|(unit, latency)| unit.latency_cycles = latency);
+        units.into_iter().zip(latencies).for_each(|(unit, latency)| unit.latency_cycles = size(latency));
         let packets = tiles(works.into_iter().map(|[a, b, c]| {
             vec![(Event::TilesVisited, a), (Event::ZCullTests, b), (Event::SamplesTested, c)]
         }));
@@ -52,7 +52,7 @@ fn error(machine: &timing::MachineSpec, packets: &Packets) -> f64 {
 #[test]
 fn what_is_shared_is_close_where_it_is_the_bottleneck() {
     let mut machine = plain();
-    machine.shader.alu_latency_cycles = 4;
+    machine.shader.alu_latency_cycles = size(4);
     let shaded =
         |n: u32| (tile(&[(Event::PixelInvocations, 4 * n), (Event::ShaderOps, 4 * n * 10)]), Vec::new());
     let cores: Packets = (0..200).map(|k| shaded(1 + k % 7)).collect();

@@ -3,7 +3,7 @@
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::MachineSpec;
 
-use crate::common::{BATCH, Packets, clocks, packet_level, plain, read, stepped, tile};
+use crate::common::{BATCH, Packets, clocks, packet_level, plain, read, size, stepped, tile};
 
 type Level = fn(&MachineSpec, &Packets) -> u64;
 
@@ -56,7 +56,7 @@ fn the_front_end_waits_for_the_tiles_of_the_batch_before_the_last() {
 #[test]
 fn a_packet_waits_for_its_lines() {
     let mut machine = plain();
-    machine.dram.latency_cycles = 500;
+    machine.dram.latency_cycles = size(500);
     let packet = |line| {
         (
             tile(&[(Event::DepthReads, 1), (Event::ColourWrites, 1)]),
@@ -72,7 +72,7 @@ fn a_packet_waits_for_its_lines() {
         assert!(last < first + 64 * 4, "{name}: {last}");
         // Where only one may wait, each waits by itself.
         let mut narrow = machine.clone();
-        narrow.depth.in_flight = 1;
+        narrow.depth.in_flight = size(1);
         let in_turn = cycles(&narrow, &many);
         assert!(in_turn > 31 * 500, "{name}: {in_turn}");
         [first, last, in_turn]
@@ -85,7 +85,7 @@ fn a_packet_waits_for_its_lines() {
 #[test]
 fn warps_wait_for_their_texels() {
     let mut machine = plain();
-    machine.dram.latency_cycles = 500;
+    machine.dram.latency_cycles = size(500);
     let counts = [(Event::PixelInvocations, 4), (Event::ShaderOps, 4), (Event::TextureFetches, 4)];
     let packets = vec![(tile(&counts), vec![read(Unit::Texture, 0, LineKind::Fetch)])];
     for (name, cycles) in LEVELS {
