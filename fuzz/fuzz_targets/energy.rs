@@ -1,8 +1,11 @@
-//! Energy tables in RON.
+//! Energy tables in RON, and one frame with those that are accepted.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use sim::run::MachineTexts;
+use sim::timing::Level;
 
 fuzz_target!(|text: &str| {
-    let _ = power_model::EnergyTable::parse(text, "a.ron");
+    let machine = MachineTexts { table: Some(text), ..MachineTexts::default() };
+    let _ = machine.one_frame(Level::Packet);
 });

@@ -6,6 +6,6 @@ use quintile_fuzz::on_disk;
 
 fuzz_target!(|data: &[u8]| {
     on_disk("a.obj", data, |path| {
-        let _ = workloads::visibility::load(&[path], None);
+        let _ = workloads::load(&path.display().to_string());
     });
 });

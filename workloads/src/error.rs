@@ -27,6 +27,14 @@ pub enum LoadError {
         /// What there could be instead.
         known: &'static str,
     },
+    /// A path that cannot be a scene: a folder, a file of another format, or one whose ending says nothing.
+    #[error("{file}: {message}")]
+    Format {
+        /// The path.
+        file: String,
+        /// What it is, and what to do.
+        message: String,
+    },
     /// A setting, from a command line or a scene file, that makes no sense.
     #[error("{setting}: {message}")]
     Setting {
@@ -73,7 +81,7 @@ fn mend(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "check the path",
         io::ErrorKind::IsADirectory => {
-            "it is a folder: give the path of a .ron, .gltf, .glb, .ply or .obj file in it"
+            "it is a folder: give the path of a .ron, .gltf, .glb, .obj, .ply, .off or .stl file in it"
         }
         io::ErrorKind::PermissionDenied => "give yourself the right to read it",
         _ => "check the path and what it leads to",
@@ -86,9 +94,11 @@ impl LoadError {
     /// code 1. A RON file that cannot be read counts as unreadable.
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Unknown { .. } | Self::Kind { .. } | Self::Setting { .. } | Self::Description { .. } => {
-                true
-            }
+            Self::Unknown { .. }
+            | Self::Kind { .. }
+            | Self::Format { .. }
+            | Self::Setting { .. }
+            | Self::Description { .. } => true,
             Self::Spec(error) => matches!(error, SpecError::Parse { .. }),
             Self::Read { .. } | Self::Broken { .. } => false,
         }
@@ -122,6 +132,6 @@ impl Source<'_> {
     }
 
     pub fn read(self) -> Result<Vec<u8>, LoadError> {
-        std::fs::read(self.path).map_err(|error| self.unreadable(error))
+        activity::inputs::read(self.path).map_err(|error| self.unreadable(error))
     }
 }

@@ -9,20 +9,30 @@ use crate::error::LoadError;
 use crate::import;
 use crate::scene::Scene;
 
-/// The scene called `name_or_path`: a built-in one, or a `.ron`, `.gltf`, `.glb`, `.ply` or `.obj` file (the
-/// last two also gzipped, `.ply.gz`). A bare geometry file gets a fitted camera and default settings.
+/// The scene called `name_or_path`: a built-in one, or a `.ron`, `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file (the
+/// last four also gzipped, `.ply.gz`). A bare geometry file gets a fitted camera and default settings.
 ///
 /// # Errors
 /// [`LoadError`]; [`LoadError::is_usage`] tells the caller's mistakes from broken files.
-pub fn load(name_or_path: &str) -> Result<Scene, LoadError> {
-    if let Some(scene) = builtin(name_or_path) {
+pub fn load(name_or_path: impl AsRef<Path>) -> Result<Scene, LoadError> {
+    let path = name_or_path.as_ref();
+    if let Some(scene) = path.to_str().and_then(builtin) {
         return scene;
     }
-    match import::Format::of(Path::new(name_or_path)) {
-        Some(format) => Scene::new(import::import(Path::new(name_or_path), format)?)
-            .map_err(|error| error.in_file(name_or_path)),
-        None => Err(unknown(name_or_path, &[])),
+    match import::Format::of(path) {
+        Some(format) => Scene::new(import::import(path, format)?)
+            .map_err(|error| error.in_file(&path.display().to_string())),
+        None => Err(unreadable(path).unwrap_or_else(|| unknown(&path.to_string_lossy(), &[]))),
     }
+}
+
+/// The error for a path that is meant as one, but cannot be read as a scene.
+fn unreadable(path: &Path) -> Option<LoadError> {
+    let message = import::foreign(path).or_else(|| {
+        let message = if path.is_dir() { "it is a folder" } else { "its ending is not one of a scene file" };
+        path.exists().then(|| format!("{message}; give a {} file", import::ENDINGS))
+    })?;
+    Some(LoadError::Format { file: path.display().to_string(), message })
 }
 
 /// The error for a name that is no scene, and none of `workloads` where these could have been meant.
@@ -32,7 +42,7 @@ pub(crate) fn unknown(name: &str, workloads: &[&str]) -> LoadError {
     if !workloads.is_empty() {
         known += &format!("workloads: {}; ", workloads.join(", "));
     }
-    known += "or a path to a .ron, .gltf, .glb, .ply or .obj file";
+    known += &format!("or a path to a {} file", import::ENDINGS);
     names.extend(workloads);
     let near = suggestion(name, &names);
     if near.starts_with("did you mean") {
@@ -55,6 +65,25 @@ mod tests {
             "{text}"
         );
         assert!(load("nothing-like-it").unwrap_err().to_string().contains("built in: default, tiny"));
+    }
+
+    #[test]
+    fn files_that_are_no_scenes_say_why() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        std::fs::write(path("a.txt"), "text").unwrap();
+        std::fs::write(path("bare"), "text").unwrap();
+        let cases = [
+            (path("."), "it is a folder; give a .ron, .gltf"),
+            (path("a.txt"), "its ending is not one of a scene file; give a .ron, .gltf"),
+            (path("bare"), "its ending is not one"),
+            (path("a.usdz"), "it is a USD file, which is not read; convert it to glTF"),
+        ];
+        for (name, expected) in cases {
+            let error = load(&name).unwrap_err();
+            assert!(error.is_usage() && error.to_string().contains(expected), "{error}");
+        }
+        assert!(load(path("nothing")).unwrap_err().to_string().starts_with("no scene called"));
     }
 
     #[test]

@@ -1,21 +1,29 @@
 //! Importers: one folder or file for each format, all of them giving [`Parts`].
 
-mod faces;
+mod foreign;
 mod gltf;
+mod ignored;
 mod image;
 mod obj;
+mod off;
 mod ply;
 pub(crate) mod reader;
 pub(crate) mod ron;
 mod soup;
-mod statements;
+mod stl;
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use crate::error::LoadError;
-use crate::scene::{Local, Mesh, Node, Parts, Trs};
-pub(crate) use faces::faces;
-use soup::Soup;
+use crate::scene::{Local, Node, Parts, Trs, far};
+pub(crate) use foreign::foreign;
+pub(crate) use obj::{Face, statements};
+use soup::{Looks, Soup};
+
+/// The endings of scene files, for messages.
+pub(crate) const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
 
 /// File formats, told by the end of the name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,21 +31,30 @@ pub(crate) enum Format {
     Gltf,
     Ply,
     Obj,
+    Off,
+    Stl,
     Ron,
 }
 
 impl Format {
-    /// The format of `path`, whatever the case of its ending; `.gz` after `.ply` and `.obj` is fine.
+    /// The format of `path`, whatever the case of its ending; `.gz` after the formats that hold one surface is fine.
     pub fn of(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let bare = name.strip_suffix(".gz").unwrap_or(&name);
         match bare.rsplit_once('.')?.1 {
             "gltf" | "glb" if bare == name => Some(Self::Gltf),
             "ron" if bare == name => Some(Self::Ron),
             "ply" => Some(Self::Ply),
             "obj" => Some(Self::Obj),
+            "off" => Some(Self::Off),
+            "stl" => Some(Self::Stl),
             _ => None,
         }
+    }
+
+    /// Whether files of this format hold one surface and nothing else.
+    pub fn is_surface(self) -> bool {
+        matches!(self, Self::Ply | Self::Obj | Self::Off | Self::Stl)
     }
 }
 
@@ -51,8 +68,8 @@ const MOST_FRAMES: u32 = 36;
 pub(crate) fn import(path: &Path, format: Format) -> Result<Parts, LoadError> {
     let mut parts = match format {
         Format::Ron => return ron::import(path),
-        Format::Gltf => gltf::import(path, None)?,
-        Format::Ply | Format::Obj => solid(path, soup(path, format)?)?,
+        Format::Gltf => gltf::import(path, None, gltf::Looks::Own)?,
+        Format::Ply | Format::Obj | Format::Off | Format::Stl => solid(path, soup(path, format)?)?,
     };
     let frames = libm::ceil(parts.graph.last_key_s() * parts.settings.frame_rate_hz);
     parts.settings.frames =
@@ -60,23 +77,51 @@ pub(crate) fn import(path: &Path, format: Format) -> Result<Parts, LoadError> {
     Ok(parts)
 }
 
-/// The triangles of a PLY or OBJ file.
+/// The surface in a file of a format that holds one.
 fn soup(path: &Path, format: Format) -> Result<Soup, LoadError> {
-    if format == Format::Ply { ply::read(path) } else { obj::read(path) }
+    match format {
+        Format::Obj => obj::read(path),
+        Format::Off => off::read(path),
+        Format::Stl => stl::read(path),
+        _ => ply::read(path),
+    }
 }
 
-/// The positions and triangles of a PLY or OBJ file.
-pub(crate) fn surface(path: &Path, format: Format) -> Result<Mesh, LoadError> {
-    let soup = soup(path, format)?;
-    Soup { positions: soup.positions, triangles: soup.triangles, ..Soup::default() }.into_mesh(path, 0)
+/// The same without what it looks like, for surfaces that get a material from elsewhere.
+fn bare(path: &Path, format: Format) -> Result<Soup, LoadError> {
+    let mut soup = if format == Format::Obj { obj::surface(path)? } else { soup(path, format)? };
+    soup.colors.clear();
+    soup.looks = Looks::default();
+    soup.warnings.retain(|warning| warning.code == far::ROUNDED);
+    Ok(soup)
 }
 
-fn solid(path: &Path, soup: Soup) -> Result<Parts, LoadError> {
+/// Positions and triangles.
+pub(crate) struct Surface {
+    /// As precise as the file gives them, all finite.
+    pub positions: Vec<DVec3>,
+    /// Vertex indices, all in range.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The positions and triangles of a file of a format that holds a surface.
+pub(crate) fn surface(path: &Path, format: Format) -> Result<Surface, LoadError> {
+    let soup = bare(path, format)?;
+    let (positions, triangles) = (soup.positions.clone(), soup.triangles.clone());
+    // The mesh checks what it is made from.
+    soup.into_mesh(path, DVec3::ZERO)?;
+    Ok(Surface { positions, triangles })
+}
+
+fn solid(path: &Path, mut soup: Soup) -> Result<Parts, LoadError> {
     let mut parts = Parts::new(path.display().to_string());
-    let node = parts.graph.push_node(Node::new("root", None, Local::Trs(Trs::default())));
-    let material = parts.graph.push_material(soup::grey());
-    parts.warnings = soup.warnings.clone();
-    let mesh = soup.into_mesh(path, material)?;
-    parts.graph.hang(mesh, node);
+    let origin = soup.origin();
+    let place = Trs { translation: origin, ..Trs::default() };
+    let node = parts.graph.push_node(Node::new("root", None, Local::Trs(place)));
+    parts.warnings = std::mem::take(&mut soup.warnings);
+    let looks = std::mem::take(&mut soup.looks);
+    let (meshes, materials) = looks.split(soup.into_mesh(path, origin)?, 0);
+    parts.graph.materials = materials;
+    meshes.into_iter().for_each(|mesh| parts.graph.hang(mesh, node));
     Ok(parts)
 }

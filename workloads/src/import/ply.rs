@@ -1,15 +1,17 @@
-//! PLY files: vertices with optional normals and texture coordinates, and faces of any number of corners.
+//! PLY files: vertices with optional normals, colours and texture coordinates, and faces of any number of corners.
 
 use std::io::BufRead;
 use std::path::Path;
 
 use activity::Warning;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{
+    ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+};
 
-use super::reader;
-use super::soup::Soup;
+use super::soup::{Soup, linear};
+use super::{ignored, reader};
 use crate::error::{LoadError, Source};
 
 /// What to do about a header that cannot be used.
@@ -20,9 +22,11 @@ const MOST: usize = 100_000_000;
 
 #[derive(Default)]
 struct Vertex {
-    position: Vec3,
+    position: DVec3,
     normal: Vec3,
     uv: Vec2,
+    /// As shown on a screen, 0 to 1.
+    color: [f32; 3],
 }
 
 #[derive(Default)]
@@ -39,10 +43,20 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let axis = match name {
+            "x" => Some(&mut self.position.x),
+            "y" => Some(&mut self.position.y),
+            "z" => Some(&mut self.position.z),
+            _ => None,
+        };
+        if let (Some(axis), Some(value)) = (axis, number(&property)) {
+            *axis = value;
+            return PropertyAccessResult::Set;
+        }
         let slot = match name {
-            "x" => &mut self.position.x,
-            "y" => &mut self.position.y,
-            "z" => &mut self.position.z,
+            "red" => &mut self.color[0],
+            "green" => &mut self.color[1],
+            "blue" => &mut self.color[2],
             "nx" => &mut self.normal.x,
             "ny" => &mut self.normal.y,
             "nz" => &mut self.normal.z,
@@ -50,13 +64,38 @@ impl PropertyAccess for Vertex {
             "t" | "v" | "texture_v" => &mut self.uv.y,
             _ => return PropertyAccessResult::Ignored,
         };
-        match property.to_f32_lossy() {
+        let most = if matches!(name, "red" | "green" | "blue") { brightest(&property) } else { 1.0 };
+        match number(&property) {
             Some(value) => {
-                *slot = value;
+                *slot = (value / most) as f32;
                 PropertyAccessResult::Set
             }
             None => PropertyAccessResult::UnsupportedType,
         }
+    }
+}
+
+/// A property that is one number.
+fn number(property: &Property) -> Option<f64> {
+    Some(match property {
+        Property::Char(value) => f64::from(*value),
+        Property::UChar(value) => f64::from(*value),
+        Property::Short(value) => f64::from(*value),
+        Property::UShort(value) => f64::from(*value),
+        Property::Int(value) => f64::from(*value),
+        Property::UInt(value) => f64::from(*value),
+        Property::Float(value) => f64::from(*value),
+        Property::Double(value) => *value,
+        _ => return None,
+    })
+}
+
+/// The value of a channel of a colour at full brightness.
+fn brightest(property: &Property) -> f64 {
+    match property {
+        Property::Float(_) | Property::Double(_) => 1.0,
+        Property::Short(_) | Property::UShort(_) => 65_535.0,
+        _ => 255.0,
     }
 }
 
@@ -93,7 +132,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
         source.broken("header", format!("not a PLY file: {}; {MEND}", in_one_line(&error)))
     })?;
     check(&header).map_err(|message| source.broken("header", message))?;
-    let mut soup = Soup::default();
+    let mut soup = Soup { warnings: left_out(&header, path), ..Soup::default() };
     for element in header.elements.values() {
         let damaged = |error: ParseError| {
             if let Some(error) = not_finite(source, element, &error) {
@@ -106,6 +145,9 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
             "vertex" => {
                 let read = Parser::<Vertex>::new().read_payload_for_element(&mut input, element, &header);
                 take_vertices(&mut soup, element, read.map_err(damaged)?);
+                if stored_single(element) {
+                    soup.warn_if_rounded(path);
+                }
             }
             "face" => {
                 let read = Parser::<Face>::new().read_payload_for_element(&mut input, element, &header);
@@ -148,10 +190,32 @@ fn take_vertices(soup: &mut Soup, element: &ElementDef, vertices: Vec<Vertex>) {
         // PLY and OBJ count v upwards from the last row.
         soup.uvs = vertices.iter().map(|vertex| Vec2::new(vertex.uv.x, 1.0 - vertex.uv.y)).collect();
     }
-    if has(&["red"]) {
-        let message = "vertex colours are not used; the material's colour is";
-        soup.warnings.push(Warning::new("vertex-colors-ignored", message));
+    if has(&["red"]) && has(&["green"]) && has(&["blue"]) {
+        soup.colors = vertices.iter().map(|vertex| linear(vertex.color)).collect();
     }
+}
+
+/// Whether positions are stored as f32.
+fn stored_single(vertex: &ElementDef) -> bool {
+    let is_single = |name: &str| {
+        let kind = vertex.properties.get(name).map(|property| &property.data_type);
+        matches!(kind, Some(PropertyType::Scalar(ScalarType::Float)))
+    };
+    ["x", "y", "z"].into_iter().any(is_single)
+}
+
+/// What the header says of the look and is not drawn.
+fn left_out(header: &Header, path: &Path) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if header.elements.get("face").is_some_and(|face| face.properties.contains_key("red")) {
+        warnings.push(ignored::face_colors(path));
+    }
+    for texture in header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile ")) {
+        let (what, detail) =
+            ("ignored: textures that PLY files name are not read", texture.trim().to_owned());
+        warnings.push(Warning::about("texture-ignored", "texture", what, detail));
+    }
+    warnings
 }
 
 fn check(header: &Header) -> Result<(), String> {

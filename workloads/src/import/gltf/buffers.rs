@@ -7,6 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use gltf::json::Root;
 
 use crate::error::{LoadError, Source};
+use crate::import::reader;
 
 /// The bytes of every buffer, as many as it claims to have.
 pub(super) fn load(source: Source, root: &Root, binary: Option<&[u8]>) -> Result<Vec<Vec<u8>>, LoadError> {
@@ -43,7 +44,7 @@ pub(super) fn fetch(source: Source, uri: &str) -> Result<Vec<u8>, String> {
         return STANDARD.decode(payload.trim()).map_err(|error| format!("bad base64: {error}"));
     }
     let path = beside(source, uri)?;
-    std::fs::read(&path).map_err(|error| {
+    reader::named(&path).map_err(|error| {
         format!(
             "cannot read {}: {error}; put the file there, or export with everything embedded",
             path.display()

@@ -5,42 +5,33 @@ use std::sync::Arc;
 
 use activity::Warning;
 use glam::Vec3;
-use gltf::json::material::AlphaMode;
-use gltf::json::texture::WrappingMode;
+use gltf::json::texture::{MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use pipeline::{Texture, Wrap};
 
 use super::buffers;
 use super::document::Document;
-use crate::import::image;
+use super::left_out::Used;
+use crate::import::{ignored, image};
 use crate::material::Material;
 
-/// All materials and, last, the default one for primitives without any (glTF 2.0, 3.9.6).
-pub(super) fn materials(document: &Document, warnings: &mut Vec<Warning>) -> Vec<Material> {
+/// All materials and, last, the default one for primitives without any (glTF 2.0, 3.9.6). Textures of those that are not in use
+/// are not read.
+pub(super) fn materials(document: &Document, used: &Used, warnings: &mut Vec<Warning>) -> Vec<Material> {
     let mut images = Images { document, made: BTreeMap::new() };
     let mut materials = Vec::new();
     for (index, material) in document.root.materials.iter().enumerate() {
         let name = material.name.clone().unwrap_or_else(|| format!("material {index}"));
         let surface = &material.pbr_metallic_roughness;
         let [r, g, b, _] = surface.base_color_factor.0.map(|part| part.clamp(0.0, 1.0));
-        let texture = surface.base_color_texture.as_ref();
+        let texture = surface.base_color_texture.as_ref().filter(|_| used.materials[index]);
         let texture = texture.and_then(|info| images.texture(info.index.value(), &name, warnings));
-        warn_of_alpha(&material.alpha_mode, &name, warnings);
         let unlit = material.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some());
         let base_color = Vec3::new(r, g, b);
         materials.push(Material { name, base_color, texture, double_sided: material.double_sided, unlit });
     }
     materials.push(Material::colored("default", Vec3::ONE));
     materials
-}
-
-fn warn_of_alpha(mode: &Checked<AlphaMode>, name: &str, warnings: &mut Vec<Warning>) {
-    let what = match mode {
-        Checked::Valid(AlphaMode::Mask) => "is cut out by its alpha (MASK)",
-        Checked::Valid(AlphaMode::Blend) => "is blended by its alpha (BLEND)",
-        _ => return,
-    };
-    warnings.push(Warning::new("alpha-ignored", format!("material `{name}` {what}; it is drawn opaque")));
 }
 
 struct Images<'d, 'a> {
@@ -53,18 +44,27 @@ impl Images<'_, '_> {
     fn texture(&mut self, index: usize, material: &str, warnings: &mut Vec<Warning>) -> Option<Arc<Texture>> {
         let texture = self.document.root.textures.get(index)?;
         let (image, wrap) = (texture.source.value(), self.wrap(index));
+        if self.is_blocky(index) {
+            let what = "without filter drawn with one: magnified texels have soft edges";
+            warnings.push(ignored::about_material("texture-filter-ignored", "texture", what, material));
+        }
         let document = self.document;
         let key = (image, wrap.map(|wrap| wrap as u8));
         let made = self.made.entry(key).or_insert_with(|| load(document, image, wrap).map(Arc::new));
         match made {
             Ok(texture) => Some(Arc::clone(texture)),
             Err(why) => {
-                let message =
-                    format!("material `{material}`: image {why}; its base colour is used without a texture");
-                warnings.push(Warning::new("missing-image", message));
+                warnings.push(ignored::texture(material, &format!("image {why}")));
                 None
             }
         }
+    }
+
+    /// Whether texels should show as squares.
+    fn is_blocky(&self, texture: usize) -> bool {
+        let root = &self.document.root;
+        let sampler = root.textures[texture].sampler.and_then(|sampler| root.samplers.get(sampler.value()));
+        sampler.is_some_and(|sampler| sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)))
     }
 
     fn wrap(&self, texture: usize) -> [Wrap; 2] {

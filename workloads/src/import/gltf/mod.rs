@@ -7,6 +7,7 @@ mod accessor;
 mod buffers;
 mod clips;
 mod document;
+mod left_out;
 mod materials;
 mod nodes;
 mod primitive;
@@ -17,23 +18,34 @@ use std::path::Path;
 use activity::Warning;
 
 use crate::error::{LoadError, Source};
+use crate::scene::far::Bounds;
 use crate::scene::{Instance, Mesh, Parts, clip};
 use document::Document;
+use left_out::Used;
+
+/// Whose materials are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Looks {
+    /// The file's.
+    Own,
+    /// Others: those of the file are not read, and nothing is said of them.
+    Replaced,
+}
 
 /// Reads the file at `path` and plays the clip called `clip`, or the first.
-pub(super) fn import(path: &Path, clip: Option<&str>) -> Result<Parts, LoadError> {
+pub(super) fn import(path: &Path, clip: Option<&str>, looks: Looks) -> Result<Parts, LoadError> {
     let source = Source { path };
     let document = Document::read(source)?;
-    let mut warnings = Vec::new();
     let tree = nodes::tree(&document)?;
+    let used = Used::new(&document, &tree, looks);
     let mut parts = Parts::new(path.display().to_string());
     parts.clips = clips::clips(&document, &tree)?;
     parts.graph.skins = clips::skins(&document, &tree)?;
-    parts.graph.materials = materials::materials(&document, &mut warnings);
-    let (meshes, of_mesh) = meshes(&document, &mut parts.graph.materials, &mut warnings)?;
-    parts.graph.meshes = meshes;
+    parts.graph.materials = materials::materials(&document, &used, &mut parts.warnings);
+    let of_mesh = meshes(&document, &used, &mut parts)?;
     parts.graph.instances = instances(&document, &tree, &of_mesh, &parts.graph)?;
-    (parts.camera, parts.light) = view::view(&document, &tree, &mut warnings);
+    (parts.cameras, parts.light) = view::view(&document, &tree, &mut parts.warnings);
+    parts.camera = parts.cameras.first().map(|own| own.camera.clone()).unwrap_or_default();
     parts.graph.nodes = tree.nodes;
     if !parts.clips.is_empty() {
         let chosen = clip.map_or(Ok(0), |wanted| clip::find(&parts.clips, wanted))?;
@@ -41,27 +53,44 @@ pub(super) fn import(path: &Path, clip: Option<&str>) -> Result<Parts, LoadError
     } else if let Some(wanted) = clip {
         clip::find(&parts.clips, wanted)?;
     }
-    warnings.dedup();
-    parts.warnings = warnings;
     Ok(parts)
 }
 
-/// All primitives as meshes, and for each glTF mesh the range of its own.
+/// Reads all primitives as meshes; gives for each glTF mesh the range of its own.
 fn meshes(
     document: &Document,
-    materials: &mut Vec<crate::Material>,
-    warnings: &mut Vec<Warning>,
-) -> Result<(Vec<Mesh>, Vec<std::ops::Range<usize>>), LoadError> {
-    let mut all = Vec::new();
+    used: &Used,
+    parts: &mut Parts,
+) -> Result<Vec<std::ops::Range<usize>>, LoadError> {
+    let (graph, mut warnings) = (&mut parts.graph, Vec::new());
+    let mut alpha = vec![1.0_f32; graph.materials.len()];
     let mut ranges = Vec::new();
     for mesh in 0..document.root.meshes.len() {
-        let first = all.len();
+        let first = graph.meshes.len();
         for index in 0..document.root.meshes[mesh].primitives.len() {
-            all.extend(primitive::read(document, [mesh, index], materials, warnings)?);
+            let read = primitive::read(document, [mesh, index], &mut graph.materials, &mut warnings)?;
+            if let Some(primitive::Read { mesh: made, least_alpha }) = read {
+                warnings.extend(rounded(&made));
+                if let Some(alpha) = alpha.get_mut(made.material) {
+                    *alpha = alpha.min(least_alpha);
+                }
+                graph.meshes.push(made);
+            }
         }
-        ranges.push(first..all.len());
+        // What no node of the scene shows changes no picture.
+        if used.meshes[mesh] {
+            parts.warnings.append(&mut warnings);
+        }
+        warnings.clear();
+        ranges.push(first..graph.meshes.len());
     }
-    Ok((all, ranges))
+    parts.warnings.extend(left_out::left_out(document, used, &graph.materials, &alpha));
+    Ok(ranges)
+}
+
+/// The warning that f32 is too coarse for where a mesh is in its own space.
+fn rounded(mesh: &Mesh) -> Option<Warning> {
+    Bounds::of(mesh.positions.iter().map(|point| point.as_dvec3())).rounded(&mesh.name)
 }
 
 fn instances(

@@ -19,13 +19,20 @@ struct Reading<'d, 'a> {
     place: String,
 }
 
+/// A primitive as a mesh.
+pub(super) struct Read {
+    pub mesh: Mesh,
+    /// The lowest alpha of its vertex colours; 1 where it has none.
+    pub least_alpha: f32,
+}
+
 /// Reads a primitive; nothing for points and lines.
 pub(super) fn read(
     document: &Document,
     [mesh, index]: [usize; 2],
     materials: &mut Vec<Material>,
     warnings: &mut Vec<Warning>,
-) -> Result<Option<Mesh>, LoadError> {
+) -> Result<Option<Read>, LoadError> {
     let described = &document.root.meshes[mesh];
     let primitive = &described.primitives[index];
     let place = format!("meshes[{mesh}].primitives[{index}]");
@@ -34,8 +41,7 @@ pub(super) fn read(
         return Ok(None);
     }
     let Some(positions) = reading.attribute(Semantic::Positions, &[Type::Vec3])? else {
-        let message = format!("{} has no positions and is not drawn", reading.place);
-        warnings.push(Warning::new("primitive-dropped", message));
+        warnings.push(dropped(format!("{} has no positions", reading.place)));
         return Ok(None);
     };
     let positions: Vec<Vec3> = positions.vectors().map(Vec3::from_array).collect();
@@ -46,11 +52,16 @@ pub(super) fn read(
     let made = Mesh::new(name, positions, triangles, material);
     let mut made = made.map_err(|what| reading.broken(&what))?;
     made.normals = reading.normals(count)?;
+    let least_alpha = reading.colors(&mut made)?;
     reading.texture_coordinates(&mut made, materials, warnings)?;
     made.targets = reading.targets(count)?;
     made.weights = described.weights.iter().flatten().map(|weight| f64::from(*weight)).collect();
     made.influences = reading.influences(count)?;
-    Ok(Some(made))
+    Ok(Some(Read { mesh: made, least_alpha }))
+}
+
+fn dropped(detail: String) -> Warning {
+    Warning::about("primitive-dropped", "primitive", "not drawn: only triangles are", detail)
 }
 
 impl Reading<'_, '_> {
@@ -68,13 +79,7 @@ impl Reading<'_, '_> {
     fn dropped(&self, warnings: &mut Vec<Warning>) -> bool {
         let surface = matches!(self.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan);
         if !surface {
-            let message = format!("{} is made of points or lines and is not drawn", self.place);
-            warnings.push(Warning::new("primitive-dropped", message));
-        }
-        let colors = self.primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(0)));
-        if surface && colors {
-            let message = format!("{}: vertex colours are not used; the material's colour is", self.place);
-            warnings.push(Warning::new("vertex-colors-ignored", message));
+            warnings.push(dropped(format!("{} is made of points or lines", self.place)));
         }
         !surface
     }
@@ -130,6 +135,22 @@ impl Reading<'_, '_> {
         Ok(Normals::Given(normals.into_iter().map(Vec3::from_array).collect()))
     }
 
+    /// Gives `mesh` its vertex colours, unless all are white; says how low their alpha goes.
+    fn colors(&self, mesh: &mut Mesh) -> Result<f32, LoadError> {
+        let Some(values) = self.attribute(Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? else {
+            return Ok(1.0);
+        };
+        let count = mesh.positions.len();
+        let colors: Vec<[f32; 4]> = self.vectors(&values, count, "colour")?;
+        let rgb = colors.iter().map(|[r, g, b, _]| Vec3::new(*r, *g, *b).clamp(Vec3::ZERO, Vec3::ONE));
+        let rgb: Vec<Vec3> = rgb.collect();
+        if rgb.iter().any(|color| *color != Vec3::ONE) {
+            mesh.colors = rgb.into();
+        }
+        let alpha = colors.iter().map(|[.., alpha]| alpha.clamp(0.0, 1.0));
+        Ok(if values.width == 4 { alpha.fold(1.0, f32::min) } else { 1.0 })
+    }
+
     fn texture_coordinates(
         &self,
         mesh: &mut Mesh,
@@ -144,9 +165,9 @@ impl Reading<'_, '_> {
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
         let Some(values) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
-            let message =
-                format!("{} has no texture coordinates {set}: its base colour is used alone", self.place);
-            warnings.push(Warning::new("missing-texcoord", message));
+            let what = "without the coordinates that its texture needs: the base colour is used alone";
+            let detail = format!("{}: no texture coordinates {set}", self.place);
+            warnings.push(Warning::about("missing-texcoord", "primitive", what, detail));
             materials.push(Material { texture: None, ..materials[mesh.material].clone() });
             mesh.material = materials.len() - 1;
             return Ok(());

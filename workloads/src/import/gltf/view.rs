@@ -8,29 +8,35 @@ use gltf::json::validation::Checked;
 
 use super::document::Document;
 use super::nodes::Tree;
-use crate::scene::{Instant, Light, Rig, SceneCamera, View, world_poses};
+use crate::scene::{Instant, Light, OwnCamera, Rig, SceneCamera, View, world_poses};
 
-/// The first usable camera and the first directional light of the default scene, or what stands in.
-pub(super) fn view(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> (SceneCamera, Light) {
-    (camera(document, tree, warnings), light(document, tree, warnings))
+/// The usable cameras of the default scene, of which the first sees it, and the first directional light or what stands in.
+pub(super) fn view(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> (Vec<OwnCamera>, Light) {
+    (cameras(document, tree, warnings), light(document, tree, warnings))
 }
 
-fn camera(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> SceneCamera {
-    let root = &document.root;
+fn at_node(index: usize, node: &gltf::json::Node) -> String {
+    node.name.as_ref().map_or_else(|| format!("node {index}"), |name| format!("node {index} `{name}`"))
+}
+
+fn cameras(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Vec<OwnCamera> {
+    let (root, mut cameras) = (&document.root, Vec::new());
     for (index, node) in root.nodes.iter().enumerate() {
         let Some(camera) = node.camera.and_then(|camera| root.cameras.get(camera.value())) else { continue };
         if !tree.in_scene[index] {
             continue;
         }
         if let Some((view, near)) = seen(camera) {
-            return SceneCamera { rig: Rig::Node(tree.place[index]), view, near };
+            let name = camera.name.clone().or_else(|| node.name.clone());
+            let name = name.unwrap_or_else(|| format!("camera {}", cameras.len()));
+            let camera = SceneCamera { rig: Rig::Node(tree.place[index]), view: Some(view), near };
+            cameras.push(OwnCamera { name, camera });
+            continue;
         }
-        let message = format!(
-            "the camera at node {index} has no usable field of view, height or near plane: another one is used"
-        );
-        warnings.push(Warning::new("camera-ignored", message));
+        let what = "without a usable field of view, height or near plane ignored: it cannot be used";
+        warnings.push(Warning::about("camera-ignored", "camera", what, at_node(index, node)));
     }
-    SceneCamera::default()
+    cameras
 }
 
 /// How much the camera sees and its near depth. The image has its own width, so the file's aspect ratio or `xmag` does not count
@@ -68,9 +74,14 @@ fn light(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Light
         let directional = matches!(light.type_, Checked::Valid(LightType::Directional));
         if directional && found.is_none() && toward.length() > 0.0 && toward.is_finite() {
             found = Some((toward, light.color));
-        } else {
-            let message = format!("the light at node {index} is not used: one directional light is");
-            warnings.push(Warning::new("light-ignored", message));
+        } else if light.intensity > 0.0 && light.color.iter().any(|channel| *channel > 0.0) {
+            let what = "ignored: only one directional light is used";
+            let kind = match light.type_ {
+                Checked::Valid(LightType::Point) => "point light",
+                Checked::Valid(LightType::Spot) => "spot light",
+                _ => "further directional light",
+            };
+            warnings.push(Warning::about("light-ignored", kind, what, at_node(index, node)));
         }
     }
     found.map_or_else(Light::default, |(toward, color)| lamp(toward, color))

@@ -1,6 +1,5 @@
 //! RON scene files: what is in them ([`spec`]), and scenes made from that.
 
-pub(crate) mod bounded;
 mod object;
 mod spec;
 
@@ -10,8 +9,8 @@ use activity::Warning;
 use glam::{DVec3, Vec3};
 
 use crate::error::{LoadError, Source};
-use crate::scene::{Light, LookAt, Parts, Place, Rig, SceneCamera, Settings, Track, View};
-use spec::{CameraSpec, LightSpec, SceneSpec, SettingsSpec};
+use crate::scene::{CameraSpec, Light, Parts, Rig, SceneCamera, Settings};
+use spec::{LightSpec, SceneSpec, SettingsSpec};
 
 /// Reads the scene at `path`.
 pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
@@ -54,6 +53,9 @@ fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
     let context = Context { path };
     let mut parts = Parts::new(spec.name.unwrap_or_else(|| path.display().to_string()));
     parts.settings = settings(context, &spec.settings);
+    if let Some(camera) = &spec.camera {
+        take_lens(context, camera, &spec.settings, &mut parts.settings)?;
+    }
     // The settings are checked with the scene, but an object's default timing needs a rate that makes sense.
     parts.settings.check().map_err(|error| context.wrong("settings", error.to_string()))?;
     if let Some(background) = spec.background {
@@ -71,7 +73,7 @@ fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
     if let Some(camera) = &spec.camera {
         parts.camera = looking(context, camera, &parts.settings)?;
     }
-    if parts.camera.rig == Rig::Fitted && parts.settings.focus.is_some() {
+    if matches!(parts.camera.rig, Rig::Fitted(_)) && parts.settings.focus.is_some() {
         let message = "`focus` is a depth from a camera that is placed by itself: give the scene a `camera` to be sure of it";
         parts.warnings.push(Warning::new("focus-of-fitted-camera", message));
     }
@@ -137,42 +139,41 @@ fn lamp(context: Context, spec: &LightSpec) -> Result<Light, LoadError> {
     })
 }
 
-fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<SceneCamera, LoadError> {
-    let position = vector(context, "camera.position", spec.position)?;
-    let target = vector(context, "camera.target", spec.target)?;
-    if position == target {
-        return Err(context.wrong("camera", "position and target coincide: move one of them"));
+/// The lens may stand beside the camera or in the settings, not in both.
+fn take_lens(
+    context: Context,
+    camera: &CameraSpec,
+    given: &SettingsSpec,
+    settings: &mut Settings,
+) -> Result<(), LoadError> {
+    let image = [
+        ("width", camera.width.is_some()),
+        ("height", camera.height.is_some()),
+        ("samples", camera.samples.is_some()),
+    ];
+    if let Some((field, _)) = image.into_iter().find(|(_, given)| *given) {
+        return Err(context
+            .wrong(format!("camera.{field}"), format!("it belongs in `settings`: put `{field}` there")));
     }
-    let up = vector(context, "camera.up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?;
-    let end_s = f64::from(settings.frames.end) / settings.frame_rate_hz;
-    let path =
-        |place: &str, rest: DVec3, end: Option<[f64; 3]>, key: fn(&spec::CameraKey) -> Option<[f64; 3]>| {
-            let track = match (end, spec.keyframes.is_empty()) {
-                (Some(_), false) => return Err(context.wrong(place, "give an end or `keyframes`, not both")),
-                (Some(end), true) => Some((vec![0.0, end_s], vec![rest, vector(context, place, end)?])),
-                (None, true) => None,
-                (None, false) => Some((
-                    spec.keyframes.iter().map(|key| key.time_s).collect(),
-                    spec.keyframes.iter().map(|one| key(one).map_or(rest, DVec3::from_array)).collect(),
-                )),
-            };
-            let track = track.map(|(times, points): (Vec<f64>, Vec<DVec3>)| {
-                let numbers = points.iter().flat_map(|point| point.to_array()).collect();
-                Track::new(times, numbers, 3, spec.interpolation.into())
-                    .map_err(|what| context.wrong(place, what))
-            });
-            Ok(Place { rest, track: track.transpose()? })
-        };
-    Ok(SceneCamera {
-        rig: Rig::LookAt(Box::new(LookAt {
-            position: path("camera.end_position", position, spec.end_position, |key| key.position)?,
-            target: path("camera.end_target", target, spec.end_target, |key| key.target)?,
-            up,
-        })),
-        view: View::given(spec.fov_deg, spec.view_height)
-            .map_err(|message| context.wrong("camera", message))?,
-        near: spec.near,
-    })
+    let twice = [
+        ("lens_radius", camera.lens_radius.is_some() && given.lens_radius.is_some()),
+        ("focus", camera.focus.is_some() && given.focus.is_some()),
+    ];
+    if let Some((field, _)) = twice.into_iter().find(|(_, twice)| *twice) {
+        return Err(context.wrong(format!("camera.{field}"), "`settings` has one, too: remove one of them"));
+    }
+    settings.lens_radius = camera.lens_radius.unwrap_or(settings.lens_radius);
+    // A camera that says it is a pinhole may say where a lens would be sharp.
+    let focus = camera.focus.filter(|_| camera.lens_radius != Some(0.0));
+    settings.focus = focus.or(settings.focus);
+    Ok(())
+}
+
+fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<SceneCamera, LoadError> {
+    let place = |field: &str| if field == "camera" { field.to_owned() } else { format!("camera.{field}") };
+    spec.check()
+        .and_then(|()| spec.scene_camera(settings))
+        .map_err(|(field, message)| context.wrong(place(field), message))
 }
 
 /// Errors in a file that a scene names point at that file.

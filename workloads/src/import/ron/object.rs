@@ -1,6 +1,5 @@
 //! Objects of a RON scene.
 
-use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,9 +11,9 @@ use super::spec::{MaterialSpec, ObjectSpec, ShapeSpec, TextureSpec};
 use super::{Context, broken, color, vector};
 use crate::builtin::checker;
 use crate::error::LoadError;
-use crate::import::{Format, gltf, image, soup};
+use crate::import::{Format, bare, foreign, gltf, ignored, image, soup};
 use crate::material::Material;
-use crate::scene::{Local, Mesh, Node, Parts, Spin, Target, Track, Trs, rotation};
+use crate::scene::{Interpolation, Local, Mesh, Node, Parts, Spin, Target, Track, Trs, rotation};
 use crate::shapes;
 
 /// Adds `object`, number `index` of the file, to `parts`.
@@ -35,7 +34,7 @@ pub(super) fn add(
                 return Err(context.wrong(place, "`end` and `clip` go with a `file`, not with a `shape`"));
             }
             let material = material(context, parts, &place, object.material.as_ref())?;
-            let mesh = solid(shape, material).map_err(|what| context.wrong(&place, what))?;
+            let mesh = solid(shape, material);
             parts
                 .graph
                 .hang(Mesh { name: object.name.clone().unwrap_or_else(|| mesh.name.clone()), ..mesh }, node);
@@ -55,33 +54,59 @@ fn add_file(
     let path = context.beside(file);
     match Format::of(&path) {
         Some(Format::Gltf) if object.end.is_some() => {
-            Err(context
-                .wrong(place, "`end` goes with PLY and OBJ files; glTF files bring their own animation"))
+            let message = format!("`end` goes with {SURFACES} files; glTF files bring their own animation");
+            Err(context.wrong(place, message))
         }
         Some(Format::Gltf) => add_gltf(context, parts, place, object, (&path, node)),
         Some(_) if object.clip.is_some() => Err(context.wrong(place, "`clip` goes with glTF files")),
-        Some(format @ (Format::Ply | Format::Obj)) => {
-            let material = material(context, parts, place, object.material.as_ref())?;
-            let mut start = soup(&path, format)?;
-            parts.warnings.append(&mut start.warnings);
-            let mut mesh = start.into_mesh(&path, material)?;
-            if let Some(end) = &object.end {
-                let end = context.beside(end);
-                let arrival_s = object.end_s.unwrap_or(1.0 / parts.settings.frame_rate_hz);
-                mesh.targets = vec![to_end(&mesh, &end)?];
-                let track =
-                    Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, crate::scene::Interpolation::Linear);
-                parts.graph.nodes[node].channels.weights =
-                    Some(track.map_err(|what| context.wrong(place, what))?);
-            }
-            parts.graph.hang(mesh, node);
-            Ok(())
+        Some(format) if format.is_surface() => {
+            add_surface(context, parts, place, object, ((&path, format), node))
         }
-        Some(Format::Ron) | None => {
-            let message = format!("`{file}` is not a .gltf, .glb, .ply, .obj, .ply.gz or .obj.gz file");
-            Err(context.wrong(place, message))
+        _ => {
+            let known = foreign(&path).unwrap_or_else(|| format!("it is no .gltf, .glb or {SURFACES} file"));
+            Err(context.wrong(place, format!("`{file}`: {known}")))
         }
     }
+}
+
+/// Formats that hold one surface, for messages.
+const SURFACES: &str = ".obj, .ply, .off or .stl";
+
+fn add_surface(
+    context: Context,
+    parts: &mut Parts,
+    place: &str,
+    object: &ObjectSpec,
+    ((path, format), node): ((&Path, Format), usize),
+) -> Result<(), LoadError> {
+    let mut start = if object.material.is_some() { bare(path, format)? } else { soup(path, format)? };
+    parts.warnings.append(&mut start.warnings);
+    let looks = std::mem::take(&mut start.looks);
+    let origin = start.origin();
+    let mut whole = start.into_mesh(path, origin)?;
+    // The file's own origin may be far from the surface, and is what the object's transform is about.
+    let middle = Trs { translation: origin, ..Trs::default() };
+    let hook = match origin == DVec3::ZERO {
+        true => node,
+        false => parts.graph.push_node(Node::new("middle", Some(node), Local::Trs(middle))),
+    };
+    if let Some(end) = &object.end {
+        let arrival_s = object.end_s.unwrap_or(1.0 / parts.settings.frame_rate_hz);
+        whole.targets = vec![to_end(&whole, &context.beside(end), origin)?];
+        let track = Track::new(vec![0.0, arrival_s], vec![0.0, 1.0], 1, Interpolation::Linear);
+        parts.graph.nodes[hook].channels.weights = Some(track.map_err(|what| context.wrong(place, what))?);
+    }
+    let first = parts.graph.materials.len();
+    let (meshes, materials) = match &object.material {
+        None => looks.split(whole, first),
+        Some(own) => {
+            let material = make_material(context, &mut parts.warnings, place, own)?;
+            (vec![Mesh { material: first, ..whole }], vec![material])
+        }
+    };
+    parts.graph.materials.extend(materials);
+    meshes.into_iter().for_each(|mesh| parts.graph.hang(mesh, hook));
+    Ok(())
 }
 
 fn add_gltf(
@@ -91,7 +116,8 @@ fn add_gltf(
     object: &ObjectSpec,
     (path, node): (&Path, usize),
 ) -> Result<(), LoadError> {
-    let asset = gltf::import(path, object.clip.as_deref());
+    let looks = if object.material.is_some() { gltf::Looks::Replaced } else { gltf::Looks::Own };
+    let asset = gltf::import(path, object.clip.as_deref(), looks);
     let mut asset = asset.map_err(|error| match error {
         LoadError::Setting { message, .. } => context.wrong(format!("{place}.clip"), message),
         error => error,
@@ -99,18 +125,20 @@ fn add_gltf(
     if let Some(own) = &object.material {
         let material = make_material(context, &mut parts.warnings, place, own)?;
         asset.graph.materials = vec![material];
-        asset.graph.meshes.iter_mut().for_each(|mesh| mesh.material = 0);
+        for mesh in &mut asset.graph.meshes {
+            (mesh.material, mesh.colors) = (0, [].into());
+        }
     }
     parts.warnings.append(&mut asset.warnings);
     parts.graph.adopt(asset.graph, node);
     Ok(())
 }
 
-/// What takes `mesh` to the vertices in the file at `end`, as a morph target.
-fn to_end(mesh: &Mesh, end: &Path) -> Result<Target, LoadError> {
-    let format = Format::of(end).filter(|format| matches!(format, Format::Ply | Format::Obj));
-    let format = format.ok_or_else(|| broken(end, "end", "it has to be a PLY or OBJ file".to_owned()))?;
-    let other = soup(end, format)?.into_mesh(end, 0)?;
+/// What takes `mesh`, positions relative to `origin`, to the vertices in the file at `end`, as a morph target.
+fn to_end(mesh: &Mesh, end: &Path, origin: DVec3) -> Result<Target, LoadError> {
+    let format = Format::of(end).filter(|format| format.is_surface());
+    let format = format.ok_or_else(|| broken(end, "end", format!("it has to be a {SURFACES} file")))?;
+    let other = bare(end, format)?.into_mesh(end, origin)?;
     let same = other.positions.len() == mesh.positions.len() && other.triangles == mesh.triangles;
     if !same {
         let message = format!(
@@ -127,54 +155,15 @@ fn to_end(mesh: &Mesh, end: &Path) -> Result<Target, LoadError> {
     Ok(Target { positions, normals: Vec::new() })
 }
 
-fn solid(shape: &ShapeSpec, material: usize) -> Result<Mesh, String> {
-    let positive = |what: &str, values: &[f64]| {
-        let usable = values.iter().all(|value| value.is_finite() && *value > 0.0);
-        if usable {
-            Ok(())
-        } else {
-            Err(format!("{what}: every length has to be a finite number above zero"))
-        }
-    };
-    let within = |what: &str, value: u32, range: RangeInclusive<u32>| {
-        let (low, high) = (range.start(), range.end());
-        if range.contains(&value) {
-            Ok(())
-        } else {
-            Err(format!("{what} is {value}; it has to be {low} to {high}"))
-        }
-    };
-    Ok(match *shape {
-        ShapeSpec::Sphere { radius, segments } => {
-            within("Sphere: segments", segments, 3..=4096)?;
-            positive("Sphere", &[radius])?;
-            shapes::sphere(radius, segments, material)
-        }
-        ShapeSpec::Box { size } => {
-            positive("Box", &size)?;
-            shapes::cuboid(DVec3::from_array(size).as_vec3(), material)
-        }
-        ShapeSpec::Plane { size, cells, tiles } => {
-            within("Plane: cells", cells, 1..=2048)?;
-            positive("Plane", &[size, tiles])?;
-            shapes::plane(size, cells, tiles, material)
-        }
-        ShapeSpec::Torus { ring, tube, segments } => {
-            within("Torus: segments", segments, 3..=4096)?;
-            positive("Torus", &[ring, tube])?;
-            shapes::torus(ring, tube, segments, material)
-        }
-        ShapeSpec::Gear { teeth, radius, thickness } => {
-            within("Gear: teeth", teeth, 3..=1024)?;
-            positive("Gear", &[radius, thickness])?;
-            shapes::gear(teeth, radius, thickness, material)
-        }
-        ShapeSpec::Propeller { blades, radius } => {
-            within("Propeller: blades", blades, 1..=64)?;
-            positive("Propeller", &[radius])?;
-            shapes::propeller(blades, radius, material)
-        }
-    })
+fn solid(shape: &ShapeSpec, material: usize) -> Mesh {
+    match *shape {
+        ShapeSpec::Sphere { radius, segments } => shapes::sphere(radius, segments, material),
+        ShapeSpec::Box { size } => shapes::cuboid(DVec3::from_array(size).as_vec3(), material),
+        ShapeSpec::Plane { size, cells, tiles } => shapes::plane(size, cells, tiles, material),
+        ShapeSpec::Torus { ring, tube, segments } => shapes::torus(ring, tube, segments, material),
+        ShapeSpec::Gear { teeth, radius, thickness } => shapes::gear(teeth, radius, thickness, material),
+        ShapeSpec::Propeller { blades, radius } => shapes::propeller(blades, radius, material),
+    }
 }
 
 fn material(
@@ -207,8 +196,7 @@ fn make_material(
         Some(TextureSpec::Image { file }) => match image::load(&context.beside(file), [Wrap::Repeat; 2]) {
             Ok(texture) => Some(Arc::new(texture)),
             Err(why) => {
-                let message = format!("{place}: image `{file}`: {why}; its colour is used without a texture");
-                warnings.push(Warning::new("missing-image", message));
+                warnings.push(ignored::texture(place, &format!("`{file}`: {why}")));
                 None
             }
         },

@@ -5,8 +5,8 @@
 
 use serde::Deserialize;
 
-use super::bounded;
-use crate::scene::Interpolation;
+use crate::bounded;
+use crate::scene::{CameraSpec, InterpolationSpec};
 
 /// A scene file.
 #[derive(Debug, Deserialize)]
@@ -17,11 +17,12 @@ pub(super) struct SceneSpec {
     /// Size of the image, sampling, time and lens.
     #[serde(default)]
     pub settings: SettingsSpec,
-    /// The camera; without one it is fitted to the scene over all frames.
+    /// The camera; without one it is placed by itself.
     pub camera: Option<CameraSpec>,
     /// The light; by default a lamp over the camera's shoulder under a pale sky.
     pub light: Option<LightSpec>,
     /// Radiance where nothing is hit.
+    #[serde(default, deserialize_with = "bounded::color")]
     pub background: Option<[f32; 3]>,
     /// What there is to see, at least one.
     pub objects: Vec<ObjectSpec>,
@@ -41,7 +42,7 @@ pub(super) struct SettingsSpec {
     #[serde(deserialize_with = "bounded::samples")]
     pub samples: Option<u32>,
     /// Frames in a second, 60 by default.
-    #[serde(deserialize_with = "bounded::positive")]
+    #[serde(deserialize_with = "bounded::frame_rate")]
     pub frame_rate_hz: Option<f64>,
     /// Fraction of the frame period for which the shutter is open, 0 to 1, 0.5 by default.
     #[serde(deserialize_with = "bounded::fraction")]
@@ -59,57 +60,21 @@ pub(super) struct SettingsSpec {
     pub table: Option<String>,
 }
 
-/// A camera that looks from one point at another.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CameraSpec {
-    /// Where it is.
-    pub position: [f64; 3],
-    /// What it looks at.
-    pub target: [f64; 3],
-    /// Which way is up, +y by default.
-    pub up: Option<[f64; 3]>,
-    /// Vertical field of view, 40 degrees by default.
-    #[serde(default, deserialize_with = "bounded::field_of_view")]
-    pub fov_deg: Option<f64>,
-    /// Height of what is seen, at any depth: an orthographic view, instead of a field of view.
-    #[serde(default, deserialize_with = "bounded::height")]
-    pub view_height: Option<f64>,
-    /// Depth below which nothing is seen; a thousandth of the target's by default.
-    #[serde(default, deserialize_with = "bounded::positive")]
-    pub near: Option<f64>,
-    /// Where it is at the end of the last frame; it goes there on a straight line from time zero.
-    pub end_position: Option<[f64; 3]>,
-    /// What it looks at by then.
-    pub end_target: Option<[f64; 3]>,
-    /// Instead of an end, where it is when.
-    #[serde(default)]
-    pub keyframes: Vec<CameraKey>,
-    /// How it goes from one key to the next.
-    #[serde(default)]
-    pub interpolation: InterpolationSpec,
-}
-
-/// Where a camera is at one time; what is left out is the camera's own.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CameraKey {
-    pub time_s: f64,
-    pub position: Option<[f64; 3]>,
-    pub target: Option<[f64; 3]>,
-}
-
 /// One lamp at infinity, and a sky over a ground.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LightSpec {
     /// From the scene to the lamp, of any length; over the camera's right shoulder by default.
+    #[serde(default, deserialize_with = "bounded::vector")]
     pub toward: Option<[f64; 3]>,
     /// Radiance that a white surface facing the lamp sends back.
+    #[serde(default, deserialize_with = "bounded::color")]
     pub color: Option<[f32; 3]>,
     /// Radiance of a white surface looking up, from the sky alone.
+    #[serde(default, deserialize_with = "bounded::color")]
     pub sky: Option<[f32; 3]>,
     /// The same of one looking down.
+    #[serde(default, deserialize_with = "bounded::color")]
     pub ground: Option<[f32; 3]>,
 }
 
@@ -119,29 +84,30 @@ pub(super) struct LightSpec {
 pub(super) struct ObjectSpec {
     /// Name in messages.
     pub name: Option<String>,
-    /// A `.gltf`, `.glb`, `.ply`, `.obj`, `.ply.gz` or `.obj.gz` file, relative to the scene file.
+    /// A `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file, the last four also gzipped, relative to the scene file.
     pub file: Option<String>,
     /// Or a shape.
     pub shape: Option<ShapeSpec>,
-    /// A second PLY or OBJ file of equal topology: vertices go there on straight lines.
+    /// A second file of equal topology that holds a surface: vertices go there on straight lines.
     pub end: Option<String>,
     /// When they arrive; by default after one frame period. They stay there.
-    #[serde(default, deserialize_with = "bounded::positive")]
+    #[serde(default, deserialize_with = "bounded::moment")]
     pub end_s: Option<f64>,
     /// Which animation clip of a glTF file plays, by name or number; the first by default.
     pub clip: Option<String>,
     /// How it looks; glTF files bring their own materials, which this one replaces.
     pub material: Option<MaterialSpec>,
     /// Where it is.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "bounded::coordinates")]
     pub position: [f64; 3],
     /// How it is turned: about x, then y, then z, right-handed.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "bounded::angles")]
     pub rotation_deg: [f64; 3],
     /// How large it is, as a factor along each axis; a negative one mirrors.
+    #[serde(default, deserialize_with = "bounded::vector")]
     pub scale: Option<[f64; 3]>,
     /// Steady motion, in units per second.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "bounded::coordinates")]
     pub velocity: [f64; 3],
     /// Steady turning about an axis of its own.
     pub spin: Option<SpinSpec>,
@@ -160,9 +126,13 @@ pub(super) struct ObjectSpec {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObjectKey {
+    #[serde(deserialize_with = "bounded::time")]
     pub time_s: f64,
+    #[serde(default, deserialize_with = "bounded::vector")]
     pub position: Option<[f64; 3]>,
+    #[serde(default, deserialize_with = "bounded::optional_angles")]
     pub rotation_deg: Option<[f64; 3]>,
+    #[serde(default, deserialize_with = "bounded::vector")]
     pub scale: Option<[f64; 3]>,
 }
 
@@ -171,28 +141,11 @@ pub(super) struct ObjectKey {
 #[serde(deny_unknown_fields)]
 pub(super) struct SpinSpec {
     /// The axis, of any length, in the object's own space.
+    #[serde(deserialize_with = "bounded::coordinates")]
     pub axis: [f64; 3],
     /// Turns in a second, right-handed.
+    #[serde(deserialize_with = "bounded::turns")]
     pub rate_hz: f64,
-}
-
-/// Between keys.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-pub(super) enum InterpolationSpec {
-    /// Straight lines and even turns.
-    #[default]
-    Linear,
-    /// Jumps.
-    Step,
-}
-
-impl From<InterpolationSpec> for Interpolation {
-    fn from(spec: InterpolationSpec) -> Self {
-        match spec {
-            InterpolationSpec::Linear => Self::Linear,
-            InterpolationSpec::Step => Self::Step,
-        }
-    }
 }
 
 /// Shapes centred at the object's origin.
@@ -201,31 +154,50 @@ impl From<InterpolationSpec> for Interpolation {
 pub(super) enum ShapeSpec {
     /// A sphere with that many segments around.
     Sphere {
+        #[serde(deserialize_with = "bounded::length")]
         radius: f64,
-        #[serde(default = "segments")]
+        #[serde(default = "segments", deserialize_with = "bounded::segments")]
         segments: u32,
     },
     /// A box with those edges.
-    Box { size: [f64; 3] },
+    Box {
+        #[serde(deserialize_with = "bounded::lengths")]
+        size: [f64; 3],
+    },
     /// A square looking up, in cells x cells quads, its texture repeated that many times along an edge.
     Plane {
+        #[serde(deserialize_with = "bounded::length")]
         size: f64,
-        #[serde(default = "one")]
+        #[serde(default = "one", deserialize_with = "bounded::cells")]
         cells: u32,
-        #[serde(default = "unit")]
+        #[serde(default = "unit", deserialize_with = "bounded::repeats")]
         tiles: f64,
     },
     /// A torus about y.
     Torus {
+        #[serde(deserialize_with = "bounded::length")]
         ring: f64,
+        #[serde(deserialize_with = "bounded::length")]
         tube: f64,
-        #[serde(default = "segments")]
+        #[serde(default = "segments", deserialize_with = "bounded::segments")]
         segments: u32,
     },
     /// A gear about z.
-    Gear { teeth: u32, radius: f64, thickness: f64 },
+    Gear {
+        #[serde(deserialize_with = "bounded::teeth")]
+        teeth: u32,
+        #[serde(deserialize_with = "bounded::length")]
+        radius: f64,
+        #[serde(deserialize_with = "bounded::length")]
+        thickness: f64,
+    },
     /// A propeller about z.
-    Propeller { blades: u32, radius: f64 },
+    Propeller {
+        #[serde(deserialize_with = "bounded::blades")]
+        blades: u32,
+        #[serde(deserialize_with = "bounded::length")]
+        radius: f64,
+    },
 }
 
 fn segments() -> u32 {
@@ -245,6 +217,7 @@ fn unit() -> f64 {
 #[serde(deny_unknown_fields)]
 pub(super) struct MaterialSpec {
     /// Reflectance; multiplies the texture. White with a texture, else grey by default.
+    #[serde(default, deserialize_with = "bounded::color")]
     pub color: Option<[f32; 3]>,
     /// Colour texture; the object needs texture coordinates.
     pub texture: Option<TextureSpec>,
@@ -266,8 +239,9 @@ fn yes() -> bool {
 pub(super) enum TextureSpec {
     /// Two by two fields of two colours, with that many texels along an edge.
     Checker {
+        #[serde(deserialize_with = "bounded::colors")]
         colors: [[f32; 3]; 2],
-        #[serde(default = "texels")]
+        #[serde(default = "texels", deserialize_with = "bounded::texels")]
         texels: u32,
     },
     /// A PNG or JPEG file, relative to the scene file.

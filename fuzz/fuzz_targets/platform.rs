@@ -1,0 +1,11 @@
+//! Platform files in RON, and one frame on those that are accepted.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use sim::run::MachineTexts;
+use sim::timing::Level;
+
+fuzz_target!(|text: &str| {
+    let machine = MachineTexts { platform: Some(text), ..MachineTexts::default() };
+    let _ = machine.one_frame(Level::Packet);
+});

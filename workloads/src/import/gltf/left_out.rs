@@ -1,0 +1,115 @@
+//! What the file asks for and is not drawn.
+
+use activity::Warning;
+use gltf::json::material::{AlphaMode, Material as Described};
+use gltf::json::validation::Checked;
+
+use super::Looks;
+use super::document::Document;
+use super::nodes::Tree;
+use crate::import::ignored::{self, about_material};
+use crate::material::Material;
+
+/// Meshes and materials that nodes of the scene show: what is wrong with others changes no picture.
+pub(super) struct Used {
+    pub meshes: Vec<bool>,
+    pub materials: Vec<bool>,
+}
+
+impl Used {
+    pub fn new(document: &Document, tree: &Tree, looks: Looks) -> Self {
+        let root = &document.root;
+        let mut used =
+            Self { meshes: vec![false; root.meshes.len()], materials: vec![false; root.materials.len()] };
+        for (index, node) in root.nodes.iter().enumerate() {
+            let Some(mesh) = node.mesh.filter(|_| tree.in_scene[index]) else { continue };
+            used.meshes[mesh.value()] = true;
+            if looks == Looks::Own {
+                let primitives = root.meshes[mesh.value()].primitives.iter();
+                let named = primitives.filter_map(|primitive| primitive.material);
+                named.for_each(|material| used.materials[material.value()] = true);
+            }
+        }
+        used
+    }
+}
+
+/// Warnings about the materials in use, whose lowest vertex alpha is in `alpha`, and about extensions.
+pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alpha: &[f32]) -> Vec<Warning> {
+    let root = &document.root;
+    let mut warnings = Vec::new();
+    for (index, described) in root.materials.iter().enumerate().filter(|(index, _)| used.materials[*index]) {
+        let name = &made[index].name;
+        warnings.extend(transparent(described, &made[index], alpha[index]));
+        // Unlit materials have none of these (KHR_materials_unlit).
+        if !made[index].unlit {
+            warnings.extend(maps(described, name));
+        }
+    }
+    let what = "ignored: what it describes looks or moves in another way";
+    let changing = root.extensions_used.iter().filter(|name| changes_the_picture(name));
+    warnings.extend(changing.map(|name| Warning::about("extension-ignored", "extension", what, name)));
+    warnings
+}
+
+/// Whether alpha would change anything: opaque texels of blended materials are drawn as they should be.
+fn transparent(described: &Described, made: &Material, vertex_alpha: f32) -> Option<Warning> {
+    let texture = made.texture.as_ref().map_or(1.0, |texture| f32::from(texture.least_alpha()) / 255.0);
+    let least = described.pbr_metallic_roughness.base_color_factor.0[3] * texture * vertex_alpha;
+    match described.alpha_mode {
+        Checked::Valid(AlphaMode::Mask) => {
+            let cutoff = described.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0);
+            (least < cutoff).then(|| ignored::cut_out(&made.name))
+        }
+        Checked::Valid(AlphaMode::Blend) => (least < 1.0).then(|| ignored::blended(&made.name)),
+        _ => None,
+    }
+}
+
+fn maps(described: &Described, name: &str) -> Vec<Warning> {
+    let surface = &described.pbr_metallic_roughness;
+    let normal = described.normal_texture.as_ref().is_some_and(|map| map.scale != 0.0);
+    let occlusion = described.occlusion_texture.as_ref().is_some_and(|map| map.strength.0 > 0.0);
+    let emissive = described.emissive_factor.0.iter().any(|channel| *channel > 0.0);
+    let metallic = surface.metallic_factor.0 > 0.0 && surface.metallic_roughness_texture.is_none();
+    let rough = surface.metallic_roughness_texture.is_some();
+    let matt = "drawn as matt ones with a faint highlight";
+    let gloss = "ignored: every surface has the same faint highlight";
+    let shaded = "ignored: nothing darkens the corners";
+    let found = [
+        normal.then(|| ignored::normal_map(name)),
+        emissive.then(|| ignored::emissive(name)),
+        occlusion.then(|| about_material("occlusion-map-ignored", "occlusion map", shaded, name)),
+        metallic.then(|| about_material("metallic-ignored", "metallic material", matt, name)),
+        rough.then(|| about_material("metallic-ignored", "metallic-roughness map", gloss, name)),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// Whether an extension that is not read changes the picture. Those of compression and of image formats bring what is due without
+/// them, or the file requires them and is refused; variants of materials change nothing until one is chosen.
+fn changes_the_picture(name: &str) -> bool {
+    let known = ["KHR_materials_unlit", "KHR_lights_punctual", "KHR_materials_variants"];
+    let others = ["EXT_mesh_gpu_instancing", "KHR_animation_pointer", "KHR_node_visibility"];
+    let kind = ["_materials_", "_lights_"].iter().any(|kind| name.contains(kind));
+    !known.contains(&name) && (kind || others.contains(&name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extensions_count_where_they_change_the_picture() {
+        let of = ["KHR_materials_clearcoat", "EXT_lights_image_based", "KHR_animation_pointer"];
+        assert!(of.into_iter().all(changes_the_picture));
+        let harmless = [
+            "KHR_materials_unlit",
+            "KHR_texture_transform",
+            "KHR_mesh_quantization",
+            "EXT_texture_webp",
+            "KHR_xmp",
+        ];
+        assert!(!harmless.into_iter().any(changes_the_picture));
+    }
+}

@@ -1,0 +1,54 @@
+//! Warnings about what a file asks for and is not drawn; one kind each, whatever the format.
+
+use std::path::Path;
+
+use activity::Warning;
+
+/// A material with a normal or bump map.
+pub(super) fn normal_map(material: &str) -> Warning {
+    about_material(
+        "normal-map-ignored",
+        "normal map",
+        "ignored: surfaces keep the normals of their vertices",
+        material,
+    )
+}
+
+/// A material that sheds light.
+pub(super) fn emissive(material: &str) -> Warning {
+    about_material("emissive-ignored", "emissive material", "drawn without the light that it sheds", material)
+}
+
+/// A material that is cut out by its alpha.
+pub(super) fn cut_out(material: &str) -> Warning {
+    let what = "drawn whole, with what should be cut away";
+    about_material("alpha-ignored", "cut-out material", what, material)
+}
+
+/// A material that is blended with what is behind it.
+pub(super) fn blended(material: &str) -> Warning {
+    let what = "drawn opaque: what is behind is hidden";
+    about_material("alpha-ignored", "see-through material", what, material)
+}
+
+/// A texture that cannot be read, in words `why`.
+pub(super) fn texture(material: &str, why: &str) -> Warning {
+    let detail = format!("material `{material}`: {why}");
+    Warning::about("missing-image", "texture", "not read: the material's colour is used alone", detail)
+}
+
+/// A file whose faces have colours of their own.
+pub(super) fn face_colors(path: &Path) -> Warning {
+    let what = "with colours for faces, which are drawn without them";
+    Warning::about("face-colors-ignored", "file", what, path.display().to_string())
+}
+
+/// A warning about a material.
+pub(super) fn about_material(
+    code: &'static str,
+    thing: &'static str,
+    what: &'static str,
+    material: &str,
+) -> Warning {
+    Warning::about(code, thing, what, format!("material `{material}`"))
+}
