@@ -5,7 +5,9 @@ use glam::Vec3;
 use pipeline::PipelineSpec;
 
 use super::compare::Watch;
+use super::object::Object;
 use super::pass::{Fragment, Part, Pass};
+use super::picture::Picture;
 use super::{Method, Search};
 use crate::job::{FrontEnd, Passes, TileWork, Touch};
 
@@ -36,11 +38,11 @@ fn targets(method: Method) -> [Target; 2] {
     [first, if method == Method::BoxBox { second } else { Target { write: false, ..first } }]
 }
 
-/// Draws what is told of passes: as packets, and as a picture with an image for each axis side by side.
+/// Draws what is told of passes: as packets, and as a picture.
 pub(super) struct Easel<'a> {
     passes: Passes<'a>,
     spec: &'a PipelineSpec,
-    image: Vec<Vec3>,
+    picture: Picture,
     side: usize,
     bins: u32,
     targets: [Target; 2],
@@ -69,19 +71,20 @@ pub(super) struct Sheet {
 }
 
 impl<'a> Easel<'a> {
-    /// For passes as `search` asks for them on the hardware `spec`.
-    pub fn new(search: &Search, spec: &'a PipelineSpec, passes: Passes<'a>) -> Self {
+    /// For passes over `objects` as `search` asks for them on the hardware `spec`.
+    pub fn new(search: &Search, objects: &[Object], spec: &'a PipelineSpec, passes: Passes<'a>) -> Self {
         let side = search.resolution as usize;
-        let (image, targets) = (vec![Vec3::ZERO; 3 * side * side], targets(search.method));
-        Self { passes, spec, image, side, bins: search.bins, targets, fragments: 0, drawn: None }
+        let (picture, targets) = (Picture::new(objects, side), targets(search.method));
+        Self { passes, spec, picture, side, bins: search.bins, targets, fragments: 0, drawn: None }
     }
 
     /// Writes the image.
     pub fn finish(mut self) -> Sheet {
         self.flush();
-        self.passes.resolve(IMAGE, self.image.len() as u64, self.spec.tile_px.pow(2));
+        let image = self.picture.image();
+        self.passes.resolve(IMAGE, image.len() as u64, self.spec.tile_px.pow(2));
         let (counts, triangles) = self.passes.finish();
-        Sheet { image: self.image, counts, triangles, fragments: self.fragments }
+        Sheet { image, counts, triangles, fragments: self.fragments }
     }
 
     /// The hardware's tile of a pixel, and the pixel's place in it.
@@ -107,11 +110,6 @@ impl<'a> Easel<'a> {
         let touch = Touch { address, bytes, write: target.write, fresh: false };
         let work = TileWork { tile: pending.tile, triangle: pending.item, counts };
         self.passes.tile(&work, &[touch], &[]);
-    }
-
-    fn pixel(&mut self, pass: &Pass, [x, y]: [u32; 2]) -> &mut Vec3 {
-        let across = pass.axis * self.side + x as usize;
-        &mut self.image[y as usize * 3 * self.side + across]
     }
 }
 
@@ -142,14 +140,10 @@ impl Watch for Easel<'_> {
         });
         pending.fragments += 1;
         pending.pixels |= 1 << place;
-        let shade = [Vec3::new(0.01, 0.03, 0.08), Vec3::new(0.02, 0.06, 0.02)][which] / self.bins as f32;
-        *self.pixel(pass, fragment.tile) += shade;
+        self.picture.fragment(pass, fragment.tile);
     }
 
     fn left(&mut self, pass: &Pass, tile: [u32; 2]) {
-        let red = Vec3::new(0.6, 0.05, 0.02);
-        let bins = self.bins as f32;
-        let pixel = self.pixel(pass, tile);
-        *pixel = (*pixel + red / bins).min(Vec3::ONE);
+        self.picture.left(pass, tile);
     }
 }

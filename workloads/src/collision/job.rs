@@ -11,7 +11,9 @@ use super::easel::{Easel, Sheet};
 use super::families::swarm_of;
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold};
+use crate::job::{
+    Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold,
+};
 use crate::scene::Settings;
 use crate::visibility::load_objects;
 
@@ -99,17 +101,25 @@ const MOST_KEPT: f64 = 0.9;
 /// Fewer candidates than this say little.
 const FEWEST: usize = 4;
 
-impl Job for Collision {
+impl Draws for Collision {
+    /// Every frame searches the same motion.
+    type Input = ();
+
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    fn is_animated(&self) -> bool {
-        false
+    fn shows(&self) -> &'static str {
+        "the way of all objects, seen along x, y and z; blue: fragments of the passes, red: where a pair may collide; shades are \
+         logarithmic"
     }
 
-    fn frame(&self, _: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let mut easel = Easel::new(&self.search, spec, Passes::new(&spec.memory, emit)?);
+    fn input(&self, _: u32) -> Result<(), JobError> {
+        Ok(())
+    }
+
+    fn draw(&self, (): &(), spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let mut easel = Easel::new(&self.search, &self.objects, spec, Passes::new(&spec.memory, emit)?);
         let pairs = candidates(&self.objects);
         let mut scratch = Scratch::default();
         let mut kept = 0_u32;

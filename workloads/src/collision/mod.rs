@@ -14,6 +14,7 @@
 //! - [`candidates`]: the pairs whose swept boxes touch.
 //! - [`Method`], [`Search`]: how closely a pair is looked at; [`Verdict`]: what is found.
 //! - [`detect`]: all pairs of a case.
+//! - [`PlainPasses`]: the passes of the paper alone, without any narrowing on the CPU.
 //! - [`families`]: cases whose truth is known.
 //! - [`job`]: the passes as a workload of the modelled hardware.
 
@@ -33,6 +34,8 @@ mod job;
 mod object;
 mod pair;
 mod pass;
+mod picture;
+mod plain;
 mod search;
 mod window;
 
@@ -42,4 +45,5 @@ pub use detect::{Answer, detect, detect_each};
 pub(crate) use job::FLAGS;
 pub use job::{Options, job};
 pub use object::{Object, components};
+pub use plain::{Drawn, PlainPasses};
 pub use search::{Method, Search, Verdict};

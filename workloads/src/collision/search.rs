@@ -69,13 +69,18 @@ impl Verdict {
     pub fn may_collide(&self) -> bool {
         *self != Self::Apart
     }
+
+    /// Whether two triangles were seen to cross or to share a corner.
+    pub fn is_seen(&self) -> bool {
+        matches!(self, Self::Maybe { seen: true, .. })
+    }
 }
 
 /// Below this, products of three coordinates would vanish: a pair is then looked at as much larger as brings it near one.
-const TINY: f64 = 1e-60;
+pub(super) const TINY: f64 = 1e-60;
 
 /// The power of two that brings a small number near one, at most 2^1000: times it, all numbers are exact.
-fn enlarging(small: f64) -> f64 {
+pub(super) fn enlarging(small: f64) -> f64 {
     const BIAS: u64 = 1023;
     let exponent = BIAS.saturating_sub(small.to_bits() >> 52).min(1000);
     f64::from_bits((BIAS + exponent) << 52)
