@@ -1,6 +1,6 @@
 //! Scenes: what the pipeline is given to draw.
 //!
-//! - [`load`] finds a scene by name or path: built in, RON, glTF 2.0, PLY or OBJ.
+//! - [`load`] finds a scene by name or path: built in, RON, glTF 2.0, OBJ, PLY, OFF or STL.
 //! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]), and
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
@@ -29,10 +29,12 @@
 //! deterministic: the same file gives the same bits on every machine.
 
 pub mod accumulation;
+mod bounded;
 pub mod builtin;
 pub mod caustics;
 pub mod collision;
 mod error;
+mod fingerprint;
 pub mod glossy;
 mod import;
 pub mod job;
@@ -50,6 +52,7 @@ pub mod visibility;
 
 pub use builtin::builtin_names;
 pub use error::LoadError;
+pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
 pub use load::load;
 pub use material::Material;

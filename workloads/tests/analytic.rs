@@ -205,7 +205,7 @@ fn an_orthographic_camera_sees_twice_its_ymag_at_any_depth() {
 fn a_ron_camera_with_a_height_is_orthographic() {
     let text = "(settings: (lens_radius: 0.1), camera: (position: (0, 0, 7), target: (0, 0, 1), view_height: 3), \
                 objects: [(shape: Sphere(radius: 1))])";
-    let camera = workloads::load(&Files::new().put("s.ron", text)).unwrap().frame(0).unwrap().camera;
+    let camera = workloads::load(Files::new().put("s.ron", text)).unwrap().frame(0).unwrap().camera;
     assert!(camera.is_orthographic());
     assert_eq!((camera.half_height(), camera.lens().unwrap().focus()), (1.5, 6.0));
 }
@@ -232,10 +232,10 @@ fn two_files_are_the_two_ends_of_a_motion() {
 fn ron_objects_turn_about_x_then_y_then_z_and_spin_about_their_own_axis() {
     let text = "(settings: (frame_rate_hz: 4, shutter: 0.5), objects: [(shape: Box(size: (2, 2, 2)), position: (1, 2, 3), \
                 rotation_deg: (90, 0, 90), velocity: (4, 0, 0), spin: (axis: (0, 0, 2), rate_hz: 1))])";
-    let scene = workloads::load(&Files::new().put("s.ron", text)).unwrap();
+    let scene = workloads::load(Files::new().put("s.ron", text)).unwrap();
     let frame = scene.frame(1).unwrap();
     let still =
-        workloads::load(&Files::new().put("s.ron", "(objects: [(shape: Box(size: (2, 2, 2)))])")).unwrap();
+        workloads::load(Files::new().put("s.ron", "(objects: [(shape: Box(size: (2, 2, 2)))])")).unwrap();
     let rest = still.frame(0).unwrap();
     let rotation = Quat::from_rotation_z(90f32.to_radians()) * Quat::from_rotation_x(90f32.to_radians());
     for (time, found) in [(0.25f32, &frame.meshes[0].open), (0.375, &frame.meshes[0].close)] {
@@ -249,7 +249,7 @@ fn ron_objects_turn_about_x_then_y_then_z_and_spin_about_their_own_axis() {
 #[test]
 fn a_lens_focuses_on_the_target_unless_told() {
     let text = "(settings: (lens_radius: 0.1), camera: (position: (0, 0, 7), target: (0, 0, 1)), objects: [(shape: Sphere(radius: 1))])";
-    let scene = workloads::load(&Files::new().put("s.ron", text)).unwrap();
+    let scene = workloads::load(Files::new().put("s.ron", text)).unwrap();
     assert_eq!(scene.frame(0).unwrap().camera.lens().unwrap().focus(), 6.0);
     let told = scene.with_overrides(&Overrides { focus: Some(4.5), ..Overrides::default() }).unwrap();
     assert_eq!(told.frame(0).unwrap().camera.lens().unwrap().focus(), 4.5);

@@ -153,10 +153,14 @@ fn files_that_are_something_else_are_refused() {
         ("a.ply", "solid"),
         ("a.ply", "ply\nformat ascii 1.0\nend_header\n"),
         ("a.obj", "f 1 2 3\n"),
+        ("a.off", "solid"),
+        ("a.off", "OFF\n4000000000 1 0\n"),
+        ("a.stl", "ply"),
+        ("a.stl", "solid a\nfacet\n"),
         ("a.obj", ""),
         ("a.obj.gz", "v 0 0 0"),
     ] {
-        let text = failure(load(&files.put(name, bytes)).unwrap_err());
+        let text = failure(load(files.put(name, bytes)).unwrap_err());
         expect(&text, &[name]);
     }
     let text = broken(|file| {
@@ -174,7 +178,7 @@ fn a_missing_buffer_is_a_failure_and_a_missing_image_a_warning() {
     let files = Files::new();
     let mut file = Builder::triangle();
     file.json["buffers"][0]["uri"] = json!("gone.bin");
-    let text = failure(load(&files.put("a.gltf", file.json.to_string())).unwrap_err());
+    let text = failure(load(files.put("a.gltf", file.json.to_string())).unwrap_err());
     expect(&text, &["a.gltf: buffers[0]: cannot read", "gone.bin", "put the file there"]);
 
     let png = |width: u32| {
@@ -193,16 +197,16 @@ fn a_missing_buffer_is_a_failure_and_a_missing_image_a_warning() {
         let uvs = file.floats(&[0.0; 6], "VEC2");
         file.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uvs);
         file.json["meshes"][0]["primitives"][0]["material"] = json!(0);
-        file.json["materials"] = json!([{"name": "skin", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.25, 1, 1]}}]);
+        file.json["materials"] = json!([{"name": "skin", "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.25, 1, 1]}}]);
         file.json["textures"] = json!([{"source": 0}]);
         file.json["images"] = json!([{"uri": name}]);
         if let Some(bytes) = bytes {
             files.put(name, bytes);
         }
-        let scene = load(&files.put("b.glb", file.bytes())).unwrap();
+        let scene = load(files.put("b.glb", file.bytes())).unwrap();
         let warning = &scene.warnings()[0];
         assert_eq!(warning.code, "missing-image");
-        expect(&warning.message, &["material `skin`", name]);
+        expect(&warning.to_string(), &["1 texture not read", "material `skin`", name]);
         assert_eq!(scene.materials()[0].base_color, glam::Vec3::new(0.5, 0.25, 1.0));
     }
 }
@@ -212,11 +216,22 @@ fn points_are_dropped_with_a_warning_and_alpha_is_drawn_opaque_with_one() {
     let mut file = Builder::triangle();
     let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
     file.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(points);
-    file.json["materials"] = json!([{"alphaMode": "MASK"}, {"alphaMode": "BLEND"}]);
+    let half = json!({"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 0});
+    file.json["materials"] = json!([
+        {"alphaMode": "MASK", "alphaCutoff": 0.75, "pbrMetallicRoughness": half},
+        {"alphaMode": "BLEND", "pbrMetallicRoughness": half},
+        {"alphaMode": "MASK", "pbrMetallicRoughness": half},
+        {"alphaMode": "BLEND", "pbrMetallicRoughness": {"metallicFactor": 0}},
+    ]);
+    for material in 0..4 {
+        let primitive = json!({"attributes": {"POSITION": 0}, "material": material});
+        file.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(primitive);
+    }
     let scene = load_glb(&file.bytes()).unwrap();
-    let codes: Vec<_> = scene.warnings().iter().map(|warning| warning.code).collect();
-    assert_eq!(codes, ["alpha-ignored", "alpha-ignored", "primitive-dropped"]);
-    assert_eq!(scene.triangle_count(), 1);
+    let warnings: Vec<_> = scene.warnings().iter().map(|warning| (warning.code, warning.count)).collect();
+    // A mask at half does not cut away what is half there, and a blended material that is opaque is drawn as it should be.
+    assert_eq!(warnings, [("alpha-ignored", 1), ("alpha-ignored", 1), ("primitive-dropped", 1)]);
+    assert_eq!(scene.triangle_count(), 5);
     let text = broken(|file| file.json["meshes"][0]["primitives"][0]["mode"] = json!(1));
     expect(&text, &["it has no triangles"]);
 }
@@ -226,31 +241,35 @@ fn mistakes_in_ron_have_a_place_and_a_mend() {
     let files = Files::new();
     let sphere = "objects: [(shape: Sphere(radius: 1))]";
     let bad = [
-        (format!("(\n settings: (frame_rate_hz: -60),\n {sphere})"), "s.ron:2:", "-60.0 is not a finite number above zero"),
+        (format!("(\n settings: (frame_rate_hz: -60),\n {sphere})"), "s.ron:2:", "`frame_rate_hz`: -60.0 is not a rate from 0.1 to 100000 frames per second"),
         (format!("(\n\n settings: (widht: 3), {sphere})"), "s.ron:3:", "unknown field `widht`, did you mean `width`?"),
         (format!("(settings: (width: 0), {sphere})"), "s.ron:1:", "0 is not a number of pixels"),
         (format!("(settings: (frames: (3, 3)), {sphere})"), "s.ron:1:", "a range of frames"),
         (format!("(settings: (shutter: 1.5), {sphere})"), "s.ron:1:", "a fraction of the frame period"),
         (format!("(settings: (focus: 2), {sphere})"), "s.ron: settings", "there is no lens to focus"),
         ("(objects: [(shape: Spere(radius: 1))])".to_owned(), "s.ron:1:", "did you mean `Sphere`?"),
-        ("(objects: [(shape: Sphere(radius: -1))])".to_owned(), "s.ron: objects[0]", "above zero"),
+        ("(objects: [(shape: Sphere(radius: -1))])".to_owned(), "s.ron:1:", "`radius`: -1.0 is not a length above 0 and up to 1e15"),
+        ("(objects: [\n (shape: Torus(ring: 1, tube: 1, segments: 100000))])".to_owned(), "s.ron:2:", "`segments`: 100000 is not a number of segments from 3 to 2048"),
+        ("(objects: [(shape: Sphere(radius: 1), position: (0, nan, 0))])".to_owned(), "s.ron:1:", "`position`: `nan` is not a number"),
+        ("(objects: [(shape: Sphere(radius: 1), position: (0, 1e300, 0))])".to_owned(), "s.ron:1:", "`position`: [0.0, 1e300, 0.0] is not three numbers from -1e15 to 1e15"),
         ("(objects: [])".to_owned(), "s.ron: objects", "add a `file` or a `shape`"),
         ("(objects: [(name: \"x\")])".to_owned(), "s.ron: object `x`", "either a `file` or a `shape`"),
-        ("(objects: [(file: \"x.stl\")])".to_owned(), "s.ron: objects[0]", "not a .gltf"),
+        ("(objects: [(file: \"x.txt\")])".to_owned(), "s.ron: objects[0]", "it is no .gltf, .glb or .obj"),
+        ("(objects: [(file: \"x.fbx\")])".to_owned(), "s.ron: objects[0]", "an FBX file, which is not read; convert it"),
         (format!("(camera: (position: (1, 1, 1), target: (1, 1, 1)), {sphere})"), "s.ron: camera", "coincide"),
         (format!("(camera: (position: (0, 0, 1), target: (0, 0, 0), view_height: 0), {sphere})"), "s.ron:1:", "a height above zero"),
         (format!("(camera: (position: (0, 0, 1), target: (0, 0, 0), view_height: -3), {sphere})"), "s.ron:1:", "a height above zero"),
-        (format!("(camera: (position: (0, 0, 1), target: (0, 0, 0), view_height: 3, fov_deg: 40), {sphere})"), "s.ron: camera", "leave one out"),
+        (format!("(camera: (position: (0, 0, 1), target: (0, 0, 0), view_height: 3, fov_deg: 40), {sphere})"), "s.ron: camera", "remove one of them"),
         (format!("(light: (toward: (0, 0, 0)), {sphere})"), "s.ron: light.toward", "no length"),
         ("(objects: [(shape: Sphere(radius: 1), spin: (axis: (0, 0, 0), rate_hz: 1))])".to_owned(), "spin", "needs a length"),
         ("(objects: [(shape: Sphere(radius: 1), keyframes: [(time_s: 1, position: (0, 0, 0)), (time_s: 0)])])".to_owned(), "keyframes", "lies before"),
     ];
     for (text, place, message) in bad {
-        let error = load(&files.put("s.ron", &text)).unwrap_err();
+        let error = load(files.put("s.ron", &text)).unwrap_err();
         assert!(error.is_usage(), "{error}");
         expect(&error.to_string(), &[place, message]);
     }
-    let text = failure(load(&files.put("s.ron", "(objects: [(file: \"gone.ply\")])")).unwrap_err());
+    let text = failure(load(files.put("s.ron", "(objects: [(file: \"gone.ply\")])")).unwrap_err());
     expect(&text, &["gone.ply: cannot read it"]);
 }
 
@@ -260,7 +279,7 @@ fn two_ends_of_different_topology_are_refused() {
     files.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     files.put("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n");
     let text =
-        failure(load(&files.put("s.ron", "(objects: [(file: \"a.obj\", end: \"b.obj\")])")).unwrap_err());
+        failure(load(files.put("s.ron", "(objects: [(file: \"a.obj\", end: \"b.obj\")])")).unwrap_err());
     expect(&text, &["b.obj: end: its 4 vertices and 2 triangles", "equal topology"]);
 }
 
@@ -277,23 +296,23 @@ fn truncated_and_absurd_ply_files_are_failures() {
     {
         let mut bytes = header(vertices).into_bytes();
         bytes.extend([0; 20]);
-        let text = failure(load(&files.put("a.ply", bytes)).unwrap_err());
+        let text = failure(load(files.put("a.ply", bytes)).unwrap_err());
         expect(&text, &["a.ply: ", word]);
     }
     let index = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 7\n";
-    let text = failure(load(&files.put("a.ply", index)).unwrap_err());
+    let text = failure(load(files.put("a.ply", index)).unwrap_err());
     expect(&text, &["a.ply: geometry: triangle 0 uses vertex 7, but there are only 1"]);
     for (word, says) in [
         ("x", "a.ply: element vertex: Line 10"),
         ("nan", "a.ply: line 10: the coordinate `y` is `nan`, which is not finite"),
     ] {
         let bad = index.replace("0 0 0\n3", &format!("0 {word} 0\n3"));
-        let text = failure(load(&files.put("a.ply", bad)).unwrap_err());
+        let text = failure(load(files.put("a.ply", bad)).unwrap_err());
         expect(&text, &[says]);
         assert!(!text.contains('\n'));
     }
     let mut nan = header("1").into_bytes();
     nan.extend([0.0, f32::NAN, 0.0].map(f32::to_le_bytes).concat());
     nan.extend([[3, 0, 0, 0], [0; 4], [0; 4], [0; 4]].concat());
-    expect(&failure(load(&files.put("a.ply", nan)).unwrap_err()), &["vertex 0 has a coordinate that is NaN"]);
+    expect(&failure(load(files.put("a.ply", nan)).unwrap_err()), &["vertex 0 has a coordinate that is NaN"]);
 }

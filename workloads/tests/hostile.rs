@@ -55,6 +55,17 @@ fn a_header_alone_takes_no_memory() {
     let list =
         header("binary_little_endian").replace("vertex 99999999", "vertex 0") + "\u{7f}\u{7f}\u{7f}\u{7f}";
     failure(load(&[files.put("a.ply", list)], None).unwrap_err());
+    let mut stl = vec![b' '; 80];
+    stl.extend(MOST.to_le_bytes());
+    failure(load(&[files.put("a.stl", stl)], None).unwrap_err());
+    for text in ["OFF\n100000000 100000000 0\n", "OFF\n4294967295 1 0\n", "OFF\n1 1 0\n0 0 0\n4294967295 0\n"]
+    {
+        failure(load(&[files.put("a.off", text)], None).unwrap_err());
+    }
+    failure(
+        load(&[files.put("a.obj", "v 0 0 0\nf 4294967295 1 1\nf -9223372036854775808 1 1\n")], None)
+            .unwrap_err(),
+    );
     let taken = peak_bytes() - before;
     // What any of these headers announces is gigabytes; what a thread's heap may set aside is not.
     assert!(taken < 256 << 20, "{taken} bytes");

@@ -18,7 +18,7 @@ type Optics = (f32, Option<f32>);
 /// A sphere of radius 1 around the origin, without a camera of its own.
 fn sphere((radius, focus): Optics) -> Scene {
     let files = Files::new();
-    let scene = load(&files.put("s.ron", "(objects: [(shape: Sphere(radius: 1))])")).unwrap();
+    let scene = load(files.put("s.ron", "(objects: [(shape: Sphere(radius: 1))])")).unwrap();
     let overrides = Overrides { size: Some(SIZE), lens_radius: Some(radius), focus, ..Overrides::default() };
     scene.with_overrides(&overrides).unwrap()
 }

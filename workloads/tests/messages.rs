@@ -11,7 +11,7 @@ use workloads::{LoadError, Overrides, load};
 fn files_that_cannot_be_read_say_what_to_do() {
     let files = Files::new();
     let at = files.put("here", "");
-    for kind in ["ron", "gltf", "glb", "ply", "ply.gz", "obj", "obj.gz"] {
+    for kind in ["ron", "gltf", "glb", "ply", "ply.gz", "obj", "obj.gz", "off", "off.gz", "stl", "stl.gz"] {
         let path = format!("{at}-gone.{kind}");
         let text = failure(load(&path).unwrap_err());
         expect(&text, &[&path, "cannot read it: No such file", "; check the path"]);
@@ -20,11 +20,14 @@ fn files_that_cannot_be_read_say_what_to_do() {
         let text = failure(load(&folder).unwrap_err());
         expect(
             &text,
-            &[&folder, "is a folder: give the path of a .ron, .gltf, .glb, .ply or .obj file in it"],
+            &[
+                &folder,
+                "is a folder: give the path of a .ron, .gltf, .glb, .obj, .ply, .off or .stl file in it",
+            ],
         );
         expect(&text.to_lowercase(), &["directory"]);
     }
-    let text = failure(load(&files.put("a.ron", b"(\xff)")).unwrap_err());
+    let text = failure(load(files.put("a.ron", b"(\xff)")).unwrap_err());
     expect(&text, &["a.ron", "UTF-8", "check "]);
 }
 
@@ -40,12 +43,12 @@ fn a_ply_header_that_cannot_be_used_says_what_to_do() {
         (format!("{whole}element face 0\nproperty float area\n"), "no property `vertex_indices`"),
     ] {
         let text = format!("ply\nformat ascii 1.0\n{header}end_header\n");
-        let text = failure(load(&files.put("a.ply", text)).unwrap_err());
+        let text = failure(load(files.put("a.ply", text)).unwrap_err());
         expect(&text, &["a.ply: header: ", wrong, "; export it again as a PLY file"]);
     }
     for bytes in [&b""[..], b"solid", b"\x89PNG\r\n\x1a\n\0\0\xff\xfe"] {
         for name in ["a.ply", "a.ply.gz"] {
-            let text = failure(load(&files.put(name, bytes)).unwrap_err());
+            let text = failure(load(files.put(name, bytes)).unwrap_err());
             expect(&text, &[name, ": header: not a PLY file: ", "; export it again as a PLY file"]);
             assert!(!text.contains('\n'), "{text}");
         }
@@ -72,17 +75,19 @@ fn a_clip_of_a_scene_without_any_is_to_be_left_out() {
 }
 
 #[test]
-fn materials_named_in_an_obj_file_are_a_warning() {
+fn materials_that_no_file_describes_are_a_warning_unless_the_scene_has_its_own() {
     let files = Files::new();
     let faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\ng usemtl\n# mtllib a.mtl\n";
-    for (statement, warned) in [("mtllib a.mtl\n", true), ("usemtl red\n", true), ("", false)] {
+    for (statement, warned) in [("mtllib a.mtl\nusemtl red\n", true), ("usemtl red\n", true), ("", false)] {
         let path = files.put("a.obj", format!("{faces}{statement}f 1 2 3\n"));
         let object = files.put("s.ron", "(objects: [(file: \"a.obj\")])");
         for scene in [&path, &object].map(|path| load(path).unwrap()) {
             let codes: Vec<_> = scene.warnings().iter().map(|warning| warning.code).collect();
-            assert_eq!(codes == ["obj-materials-ignored"], warned, "{statement:?}: {codes:?}");
+            assert_eq!(codes == ["missing-material"], warned, "{statement:?}: {codes:?}");
             assert!(warned || codes.is_empty(), "{codes:?}");
         }
+        let own = files.put("own.ron", "(objects: [(file: \"a.obj\", material: (color: (1, 0, 0)))])");
+        assert_eq!(load(&own).unwrap().warnings(), []);
     }
 }
 

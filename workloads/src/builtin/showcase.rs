@@ -36,7 +36,7 @@ pub(super) fn scene() -> Result<Scene, LoadError> {
     background(&mut parts.graph, &palette);
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.6, 2.3, 8.2), DVec3::new(0.0, 1.15, 0.0)),
-        view: View::Perspective { tan_half_height: tan_half(38.0) },
+        view: Some(View::Perspective { tan_half_height: tan_half(38.0) }),
         near: None,
     };
     parts.background = Vec3::new(0.50, 0.62, 0.76);

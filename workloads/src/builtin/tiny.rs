@@ -15,7 +15,7 @@ pub(super) fn scene() -> Result<Scene, LoadError> {
     fill(&mut parts.graph);
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.0, 1.6, 4.0), DVec3::new(0.0, 0.6, 0.0)),
-        view: View::Perspective { tan_half_height: tan_half(45.0) },
+        view: Some(View::Perspective { tan_half_height: tan_half(45.0) }),
         near: None,
     };
     parts.settings = Settings {

@@ -14,8 +14,17 @@ pub struct Found {
     pub lit: u64,
     /// Of these, those that the method leaves out: there must be none.
     pub missed: u64,
-    /// Hits, of which a pair may have three.
-    pub hits: u64,
+    /// Pairs by how many times the beam hits the point: once, twice, three times. A beam that folds passes a point more than once.
+    pub by_hits: [u64; 3],
+}
+
+impl Found {
+    /// What was found in both.
+    #[must_use]
+    pub fn and(self, other: &Self) -> Self {
+        let by_hits = [0, 1, 2].map(|n| self.by_hits[n] + other.by_hits[n]);
+        Self { lit: self.lit + other.lit, missed: self.missed + other.missed, by_hits }
+    }
 }
 
 /// Tests every beam at the point of the floor that every pixel sees, and looks which of them a method leaves out.
@@ -37,19 +46,17 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
             let Some(point) = floor.point(eye, eye.middle([x, y])) else { continue };
             for (number, seen) in (0..).zip(&seen) {
                 let near = seen.as_ref().filter(|(room, _)| room.holds(point));
-                let hits = near.map_or(0, |(_, seen)| seen.image.inside(point).count() as u64);
+                let hits = near.map_or(0, |(_, seen)| seen.image.inside(point).count());
                 if hits > 0 {
                     found.lit += 1;
-                    found.hits += hits;
+                    found.by_hits[hits.min(3) - 1] += 1;
                     found.missed += u64::from(!covered(number, [x, y]));
                 }
             }
         }
         found
     };
-    let add =
-        |a: Found, b: Found| Found { lit: a.lit + b.lit, missed: a.missed + b.missed, hits: a.hits + b.hits };
-    (0..height).into_par_iter().map(row).reduce(Found::default, add)
+    (0..height).into_par_iter().map(row).reduce(Found::default, |a, b| a.and(&b))
 }
 
 /// The box about the corners of a beam, with room for more than rounding: what is not in it cannot be in the beam.

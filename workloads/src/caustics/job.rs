@@ -11,7 +11,8 @@ use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork, Touch,
+    Drawn, Draws, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
+    Touch,
 };
 use crate::scene::Settings;
 
@@ -126,13 +127,20 @@ const LIGHT_BYTES: u64 = 4;
 /// Pixels of a tile.
 const TILE_PIXELS: u64 = 64;
 
-impl Job for Caustics {
+impl Draws for Caustics {
+    /// The time of the waves, in seconds.
+    type Input = f64;
+
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let beams = self.ocean.beams(f64::from(number) / self.settings.frame_rate_hz);
+    fn input(&self, number: u32) -> Result<f64, JobError> {
+        Ok(f64::from(number) / self.settings.frame_rate_hz)
+    }
+
+    fn draw(&self, time_s: &f64, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let beams = self.ocean.beams(*time_s);
         let eye = self.eye().ok_or_else(|| JobError::Setting("the view has no extent".to_owned()))?;
         let method = self.options.method;
         let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);

@@ -11,7 +11,7 @@ use super::receiver::{Effect, Receiver};
 use super::stage::{receiver, stage};
 use super::surface::ReceiverShader;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Options of the job.
@@ -115,7 +115,7 @@ impl Glossy {
         };
         let scene = scene.with_overrides(overrides)?;
         options.check()?;
-        let receiver = Receiver::lying(DVec3::from_array(options.centre), options.half);
+        let receiver = Receiver::lying(DVec3::from_array(options.centre) - scene.origin(), options.half);
         let job = Self { scene, receiver, options, seed };
         let first = job.scene.settings().frames.start;
         let frame = job.scene.frame(first);
@@ -164,7 +164,7 @@ impl Glossy {
         Ok(render_with_heat(camera, &draws, &settings, &[], emit)?.0)
     }
 
-    fn warnings(&self) -> Vec<Warning> {
+    fn regime_warnings(&self) -> Vec<Warning> {
         let (radius, least) = (self.options.roughness, self.receiver.half[0].min(self.receiver.half[1]));
         let message = format!(
             "the lens is {radius} in radius and the receiver {least} in half its shorter side: texels at its rim gather from quite other \
@@ -174,18 +174,23 @@ impl Glossy {
     }
 }
 
-impl Job for Glossy {
+impl Draws for Glossy {
+    type Input = Frame;
+
     fn settings(&self) -> &Settings {
         self.scene.settings()
     }
 
-    fn is_animated(&self) -> bool {
-        self.scene.is_animated()
+    fn warnings(&self) -> &[Warning] {
+        self.scene.warnings()
     }
 
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let frame = self.scene.frame(number)?;
-        let map = self.map(&frame).map_err(refused)?;
+    fn input(&self, number: u32) -> Result<Frame, JobError> {
+        Ok(self.scene.frame(number)?)
+    }
+
+    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let map = self.map(frame).map_err(refused)?;
         let draws: Vec<_> =
             frame.draws(&self.scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
         let samples = self.table(self.options.map_samples)?;
@@ -197,16 +202,15 @@ impl Job for Glossy {
         ];
         let image = self.show((&map, &texels), (&frame.camera, draws), spec, &mut shifted(1, emit))?;
         counts += &image.counts;
-        let first = number == self.scene.settings().frames.start;
-        let warnings = if first { self.warnings() } else { Vec::new() };
-        let (triangles, moving) = (2 * frame.triangle_count() + 2, self.is_animated());
+        let (triangles, moving) = (2 * frame.triangle_count() + 2, frame.is_moving());
+        let warnings = self.regime_warnings();
         Ok(Drawn { image: image.image, counts, triangles, moving, lens: true, facts, warnings })
     }
 }
 
 /// Samples are those of the usual table.
 pub(crate) const FLAGS: Flags = Flags {
-    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Lens, Flag::Focus, Flag::Clip],
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Lens, Flag::Focus, Flag::Clip, Flag::Camera],
     instead: &[],
 };
 

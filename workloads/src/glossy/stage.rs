@@ -18,7 +18,7 @@ pub fn stage(below: bool) -> Result<Scene, LoadError> {
     fill(&mut parts.graph, if below { -1.0 } else { 1.0 });
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(0.4, 2.2, 4.6), DVec3::new(0.0, 0.0, 0.1)),
-        view: View::Perspective { tan_half_height: tan_half(42.0) },
+        view: Some(View::Perspective { tan_half_height: tan_half(42.0) }),
         near: None,
     };
     parts.background = Vec3::new(0.45, 0.55, 0.70);

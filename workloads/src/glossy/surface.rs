@@ -63,7 +63,13 @@ mod tests {
         let surface = ReceiverShader::new(&[Vec3::ONE], one, Vec3::splat(0.2), 0.04).unwrap();
         let seen = |cosine: f32| {
             let to_camera = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
-            let at = ShadingPoint { position: Vec3::ZERO, normal: Vec3::Y, to_camera, uv: Vec2::ZERO };
+            let at = ShadingPoint {
+                position: Vec3::ZERO,
+                normal: Vec3::Y,
+                to_camera,
+                uv: Vec2::ZERO,
+                color: Vec3::ONE,
+            };
             surface.shade(&at, Vec4::ONE).x
         };
         for (cosine, share) in [(1.0, 0.04), (0.5, 0.04 + 0.96 / 32.0), (0.0, 1.0)] {

@@ -13,6 +13,7 @@ pub(crate) enum Flag {
     Focus,
     Table,
     Clip,
+    Camera,
 }
 
 /// What a job makes of them.
@@ -46,6 +47,7 @@ impl Flag {
             Self::Focus => "--focus",
             Self::Table => "--table",
             Self::Clip => "--clip",
+            Self::Camera => "--camera",
         }
     }
 }
@@ -53,8 +55,18 @@ impl Flag {
 /// The flags that were given.
 fn given(overrides: &Overrides) -> impl Iterator<Item = Flag> {
     // Taken apart whole, so that none that is added later is forgotten.
-    let Overrides { size, samples, frame_rate_hz: _, shutter, frames: _, lens_radius, focus, table, clip } =
-        overrides;
+    let Overrides {
+        size,
+        samples,
+        frame_rate_hz: _,
+        shutter,
+        frames: _,
+        lens_radius,
+        focus,
+        table,
+        clip,
+        camera,
+    } = overrides;
     let all = [
         (Flag::Size, size.is_some()),
         (Flag::Samples, samples.is_some()),
@@ -63,6 +75,7 @@ fn given(overrides: &Overrides) -> impl Iterator<Item = Flag> {
         (Flag::Focus, focus.is_some()),
         (Flag::Table, table.is_some()),
         (Flag::Clip, clip.is_some()),
+        (Flag::Camera, camera.is_some()),
     ];
     all.into_iter().filter(|(_, given)| *given).map(|(flag, _)| flag)
 }

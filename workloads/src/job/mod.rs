@@ -14,8 +14,10 @@ use activity::{Counts, LineAccess, Packet, Warning};
 use glam::Vec3;
 use pipeline::PipelineSpec;
 use pipeline::memory::CacheError;
+use serde::Serialize;
 
 use crate::error::LoadError;
+use crate::fingerprint::{Fingerprint, FingerprintError};
 use crate::scene::{FrameError, Overrides, Settings};
 
 pub(crate) use flags::{Flag, Flags};
@@ -62,21 +64,84 @@ pub struct Drawn {
     pub warnings: Vec<Warning>,
 }
 
-/// Work for the rasterizer that is more than one rendering of a scene.
+/// How a job draws: it prepares the input of a frame, and draws from that alone.
+///
+/// [`draw`](Self::draw) does not know the number of the frame, so whatever differs between frames is in the input, and frames
+/// with equal inputs can be drawn once. Derive `Serialize` for the input: a field that is added later is compared, too.
+pub trait Draws: Sync + Send {
+    /// Everything that changes from frame to frame.
+    type Input: Serialize;
+
+    /// Size of the image, frames and frame rate.
+    fn settings(&self) -> &Settings;
+
+    /// Warnings about what it was made from, such as a scene file.
+    fn warnings(&self) -> &[Warning] {
+        &[]
+    }
+
+    /// What its images show, for captions; empty where that is plain.
+    fn shows(&self) -> &'static str {
+        ""
+    }
+
+    /// The input of frame `number`.
+    ///
+    /// # Errors
+    /// When the frame cannot be made.
+    fn input(&self, number: u32) -> Result<Self::Input, JobError>;
+
+    /// Draws a frame on the hardware `spec`. Warnings may come again in every frame.
+    ///
+    /// # Errors
+    /// When the hardware cannot be built or the frame cannot be drawn.
+    fn draw(&self, input: &Self::Input, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+}
+
+/// Work for the rasterizer that is more than one rendering of a scene: every type that [`Draws`].
 pub trait Job: Sync + Send {
     /// Size of the image, frames and frame rate.
     fn settings(&self) -> &Settings;
 
-    /// Whether frames differ; frames of a job that is still are drawn once.
-    fn is_animated(&self) -> bool {
-        true
-    }
+    /// The fingerprint of the input of frame `number`. Frames with the same fingerprint are drawn alike.
+    ///
+    /// # Errors
+    /// When the frame cannot be made.
+    fn fingerprint(&self, number: u32) -> Result<Fingerprint, JobError>;
+
+    /// Warnings about what it was made from, such as a scene file.
+    fn warnings(&self) -> &[Warning];
+
+    /// What its images show, for captions; empty where that is plain.
+    fn shows(&self) -> &'static str;
 
     /// Draws frame `number` on the hardware `spec`.
     ///
     /// # Errors
     /// When the hardware cannot be built or the frame cannot be made.
     fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+}
+
+impl<D: Draws> Job for D {
+    fn settings(&self) -> &Settings {
+        Draws::settings(self)
+    }
+
+    fn warnings(&self) -> &[Warning] {
+        Draws::warnings(self)
+    }
+
+    fn shows(&self) -> &'static str {
+        Draws::shows(self)
+    }
+
+    fn fingerprint(&self, number: u32) -> Result<Fingerprint, JobError> {
+        Ok(Fingerprint::of(&self.input(number)?)?)
+    }
+
+    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        self.draw(&self.input(number)?, spec, emit)
+    }
 }
 
 /// Why a frame of a job could not be drawn.
@@ -87,6 +152,8 @@ pub enum JobError {
     Cache(#[from] CacheError),
     #[error(transparent)]
     Frame(#[from] FrameError),
+    #[error(transparent)]
+    Fingerprint(#[from] FingerprintError),
     /// Two settings that cannot be together, or one that cannot be.
     #[error("{0}")]
     Setting(String),

@@ -3,15 +3,16 @@
 use std::path::PathBuf;
 
 use activity::spec;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Number, Value};
 
 use super::words::{clipped, plain};
 use crate::error::LoadError;
 
 /// Where the options of a job come from; what is not named has its default.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct OptionSource {
     /// A file in RON.
     pub file: Option<PathBuf>,
@@ -115,7 +116,6 @@ fn parsed(value: &str) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde::Deserialize;
 
     #[derive(Debug, PartialEq, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]

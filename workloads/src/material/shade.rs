@@ -10,13 +10,15 @@ use crate::scene::Light;
 
 /// Colours a material under a scene's light.
 ///
-/// `texel * base * (lamp * max(0, n.l) + mix(ground, sky, n.y)) + highlight * lamp * max(0, n.h)^32`, with the
-/// half vector `h` of Blinn (Models of light reflection, SIGGRAPH 1977).
+/// `texel * base * vertex colour * (lamp * max(0, n.l) + mix(ground, sky, n.y)) + highlight * lamp * max(0, n.h)^32`, with the
+/// half vector `h` of Blinn (Models of light reflection, SIGGRAPH 1977). The vertex colour is left out unless
+/// [`SurfaceShader::with_vertex_colors`] asks for it.
 #[derive(Clone, Debug)]
 pub struct SurfaceShader {
     base_color: Vec3,
     texture: Option<Arc<Texture>>,
     unlit: bool,
+    vertex_colors: bool,
     toward: Vec3,
     lamp: Vec3,
     ground: Vec3,
@@ -28,6 +30,9 @@ const HIGHLIGHT: f32 = 0.12;
 
 /// Base colour by texel: one multiplication for each of three channels.
 const BASE_OPS: u32 = 3;
+
+/// Base colour by vertex colour.
+const VERTEX_COLOR_OPS: u32 = 3;
 
 /// Counted from [`SurfaceShader::lit`]; a square root, a division, a comparison count as one operation each.
 /// Half vector: 3 additions, 3 multiply-adds, root, clamp, reciprocal, 3 to scale = 12; two cosines with their
@@ -45,11 +50,18 @@ impl SurfaceShader {
             base_color: material.base_color,
             texture: material.texture.clone(),
             unlit: material.unlit,
+            vertex_colors: false,
             toward: light.toward.unwrap_or(Vec3::Y),
             lamp: light.color,
             ground: light.ground,
             sky_over_ground: light.sky - light.ground,
         }
+    }
+
+    /// The same with the base colour multiplied by the colours of vertices.
+    #[must_use]
+    pub fn with_vertex_colors(self) -> Self {
+        Self { vertex_colors: true, ..self }
     }
 
     fn lit(&self, at: &ShadingPoint, base: Vec3) -> Vec3 {
@@ -74,7 +86,8 @@ fn pow32(x: f32) -> f32 {
 
 impl Shader for SurfaceShader {
     fn cost(&self) -> ShaderCost {
-        let pixel_ops = if self.unlit { BASE_OPS } else { BASE_OPS + LIT_OPS };
+        let base_ops = if self.vertex_colors { BASE_OPS + VERTEX_COLOR_OPS } else { BASE_OPS };
+        let pixel_ops = if self.unlit { base_ops } else { base_ops + LIT_OPS };
         ShaderCost { pixel_ops, vertex_ops: VERTEX_OPS }
     }
 
@@ -84,6 +97,7 @@ impl Shader for SurfaceShader {
 
     fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
         let base = self.base_color * texel.truncate();
+        let base = if self.vertex_colors { base * at.color } else { base };
         if self.unlit { base } else { self.lit(at, base) }
     }
 }
@@ -100,7 +114,7 @@ mod tests {
     }
 
     fn point(normal: Vec3) -> ShadingPoint {
-        ShadingPoint { position: Vec3::ZERO, normal, to_camera: Vec3::X, uv: Vec2::ZERO }
+        ShadingPoint { position: Vec3::ZERO, normal, to_camera: Vec3::X, uv: Vec2::ZERO, color: Vec3::ONE }
     }
 
     #[test]
@@ -114,6 +128,15 @@ mod tests {
     #[test]
     fn a_surface_turned_away_shows_the_ground_only() {
         assert_eq!(shader(false).shade(&point(Vec3::NEG_Y), Vec4::ONE), Vec3::ZERO);
+    }
+
+    #[test]
+    fn vertex_colours_multiply_and_cost_where_they_are_asked_for() {
+        let red = ShadingPoint { color: Vec3::new(1.0, 0.5, 0.0), ..point(Vec3::Z) };
+        let (plain, colored) = (shader(true), shader(true).with_vertex_colors());
+        assert_eq!(plain.shade(&red, Vec4::ONE), Vec3::new(0.5, 0.25, 1.0));
+        assert_eq!(colored.shade(&red, Vec4::ONE), Vec3::new(0.5, 0.125, 0.0));
+        assert_eq!(colored.cost().pixel_ops, plain.cost().pixel_ops + 3);
     }
 
     #[test]

@@ -8,8 +8,8 @@ use super::layout::Layout;
 use super::lenticular::Panel;
 use super::rig::{Rig, Target, Views};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
-use crate::scene::{Overrides, Scene, Settings};
+use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// How views become the one image that is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -107,22 +107,19 @@ impl MultiView {
         let refused = |message: &str| LoadError::Setting { setting: "size", message: message.to_owned() };
         let view = view.ok_or_else(|| refused("views of no size"))?;
         let job = Self { scene, options, settings, view, seed };
-        job.rig(job.settings.frames.start).map_err(|error| match error {
-            RigError::Load(error) => error,
-            RigError::Frame(error) => refused(&error.to_string()),
-        })?;
+        let first =
+            job.scene.frame(job.settings.frames.start).map_err(|error| refused(&error.to_string()))?;
+        job.rig(&first)?;
         Ok(job)
     }
 
-    fn rig(&self, number: u32) -> Result<Rig, RigError> {
-        let frame = self.scene.frame(number).map_err(RigError::Frame)?;
+    fn rig(&self, frame: &Frame) -> Result<Rig, LoadError> {
         let lens = frame.camera.lens().map(|lens| lens.focus());
         let focus = self.options.focus.or(lens).ok_or_else(|| {
             let message = "the scene has no lens and so no depth at which views agree: give one".to_owned();
-            RigError::Load(LoadError::Setting { setting: "focus", message })
+            LoadError::Setting { setting: "focus", message }
         })?;
-        let samples = self.settings.samples;
-        Rig::new(&frame.camera, focus, &self.options.layout(), samples, self.seed).map_err(RigError::Load)
+        Rig::new(&frame.camera, focus, &self.options.layout(), self.settings.samples, self.seed)
     }
 
     fn shown(&self, views: &Views) -> Vec<glam::Vec3> {
@@ -161,28 +158,24 @@ const ALL: CacheSpec = CacheSpec::lru(1 << 22, 16);
 /// The shader runs over those with a cache that holds everything, beyond which the cache is too small.
 pub const MOST_RUNS: f64 = 1.25;
 
-/// Why there is no rig.
-enum RigError {
-    Load(LoadError),
-    Frame(crate::FrameError),
-}
+impl Draws for MultiView {
+    type Input = Frame;
 
-impl Job for MultiView {
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    fn is_animated(&self) -> bool {
-        self.scene.is_animated()
+    fn warnings(&self) -> &[Warning] {
+        self.scene.warnings()
     }
 
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let frame = self.scene.frame(number)?;
+    fn input(&self, number: u32) -> Result<Frame, JobError> {
+        Ok(self.scene.frame(number)?)
+    }
+
+    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
         let draws = frame.draws(&self.scene)?;
-        let rig = self.rig(number).map_err(|error| match error {
-            RigError::Load(error) => JobError::Setting(error.to_string()),
-            RigError::Frame(error) => JobError::Frame(error),
-        })?;
+        let rig = self.rig(frame).map_err(|error| JobError::Setting(error.to_string()))?;
         let to = Target { viewport: self.view, spec, background: self.scene.background() };
         let views = if self.options.view_by_view {
             rig.view_by_view(&draws, &to, emit)?
@@ -199,10 +192,9 @@ impl Job for MultiView {
             facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value });
             warnings.extend(cache_warning(value, spec));
         }
-        warnings.retain(|_| number == self.settings.frames.start);
         let triangles = frame.triangle_count() * views.passes as usize;
-        let image = self.shown(&views);
-        Ok(Drawn { image, counts: views.counts, triangles, moving: true, lens: true, facts, warnings })
+        let (image, moving) = (self.shown(&views), frame.is_moving());
+        Ok(Drawn { image, counts: views.counts, triangles, moving, lens: true, facts, warnings })
     }
 }
 
@@ -231,7 +223,7 @@ fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
 
 /// The lens that counts is the one that holds all views.
 pub(crate) const FLAGS: Flags = Flags {
-    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Focus, Flag::Clip],
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Focus, Flag::Clip, Flag::Camera],
     instead: &[(Flag::Lens, "aperture")],
 };
 

@@ -111,6 +111,9 @@ fn with_positions<'a>(draw: &Draw<'a>, at: &'a [Vec3]) -> Result<Draw<'a>, pipel
     if !draw.geometry.uvs().is_empty() {
         geometry = geometry.with_uvs(draw.geometry.uvs())?;
     }
+    if !draw.geometry.colors().is_empty() {
+        geometry = geometry.with_colors(draw.geometry.colors())?;
+    }
     Ok(Draw { geometry, ..*draw })
 }
 

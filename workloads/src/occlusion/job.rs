@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
+    Drawn, Draws, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
     must_hold, shifted,
 };
 use crate::samples::SampleChoice;
@@ -109,16 +109,19 @@ const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_m
 /// A quarter of the tiles half covered: occluders are small, and what they hide together is not found hidden.
 pub const HALF_COVERED: f64 = 0.25;
 
-impl Job for Occlusion {
+impl Draws for Occlusion {
+    /// Every frame is the same shutter interval.
+    type Input = ();
+
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    fn is_animated(&self) -> bool {
-        false
+    fn input(&self, _: u32) -> Result<(), JobError> {
+        Ok(())
     }
 
-    fn frame(&self, _: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw(&self, (): &(), spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
         let refused = |what: &str| JobError::Setting(what.to_owned());
         let viewport = Viewport::new(self.settings.width, self.settings.height)
             .ok_or_else(|| refused("the image has no area"))?;

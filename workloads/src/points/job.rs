@@ -11,10 +11,10 @@ use pipeline::sampling::{HashedSamples, LensShape, SampleSource, mix};
 use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
 use serde::{Deserialize, Serialize};
 
-use super::poisson::{Cube, Domain, PoissonSpec, Spacing, poisson_disk_drawn};
+use super::poisson::{Cube, Domain, PoissonDisk, PoissonSpec, Spacing, poisson_disk_drawn};
 use super::volume::{camera, place};
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::Settings;
 
 /// What can be set.
@@ -79,6 +79,37 @@ impl Shader for Append {
     }
 }
 
+/// Points whose first darts were samples of rasterized voids.
+#[derive(Debug)]
+pub struct Rasterized {
+    /// The points, maximal.
+    pub found: PoissonDisk<2>,
+    /// How many of them come from samples.
+    pub drawn: usize,
+    /// Samples that hit a void.
+    pub candidates: u64,
+    /// Triangles drawn.
+    pub triangles: usize,
+    /// Rounds, a pass each.
+    pub passes: u16,
+    /// What was done.
+    pub counts: Counts,
+}
+
+/// Points of the unit square, with `samples` in each of `side` by `side` pixels.
+///
+/// # Errors
+/// When an option or the hardware cannot be.
+pub fn rasterized(
+    options: Options,
+    [side, samples]: [u32; 2],
+    seed: u64,
+    spec: &PipelineSpec,
+) -> Result<Rasterized, JobError> {
+    let settings = Settings { width: side, height: side, samples, ..Settings::default() };
+    Sampling { options, settings, seed }.points(0, spec, &mut |_, _| ())
+}
+
 /// What the rounds have done so far.
 #[derive(Default)]
 struct Done {
@@ -89,6 +120,19 @@ struct Done {
 }
 
 impl Sampling {
+    /// All rounds, and what the host adds to them.
+    fn points(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Rasterized, JobError> {
+        let domain = if self.options.periodic { Domain::Torus } else { Domain::Box };
+        let seed = mix(self.seed.wrapping_add(u64::from(number)));
+        let asked = PoissonSpec { radius: self.options.radius, domain, seed, spacing: Spacing::Double };
+        let mut done = Done::default();
+        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, spec, &mut done, emit);
+        let (found, drawn) = poisson_disk_drawn(&asked, self.options.rounds, draw)?
+            .map_err(|error| JobError::Setting(error.to_string()))?;
+        let Done { counts, triangles, candidates, round } = done;
+        Ok(Rasterized { found, drawn, candidates, triangles, passes: round, counts })
+    }
+
     /// Draws the voids of a round and takes the samples that hit, in random order.
     fn round(
         &self,
@@ -167,29 +211,30 @@ fn picture(points: &[[f64; 2]], side: u32, radius: f64) -> Vec<Vec3> {
     image
 }
 
-impl Job for Sampling {
+impl Draws for Sampling {
+    /// The number of the frame, which seeds its points.
+    type Input = u32;
+
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let domain = if self.options.periodic { Domain::Torus } else { Domain::Box };
-        let seed = mix(self.seed.wrapping_add(u64::from(number)));
-        let asked = PoissonSpec { radius: self.options.radius, domain, seed, spacing: Spacing::Double };
-        let mut done = Done::default();
-        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, spec, &mut done, emit);
-        let (found, drawn) = poisson_disk_drawn(&asked, self.options.rounds, draw)?
-            .map_err(|error| JobError::Setting(error.to_string()))?;
+    fn input(&self, number: u32) -> Result<u32, JobError> {
+        Ok(number)
+    }
+
+    fn draw(&self, &number: &u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let Rasterized { found, drawn, candidates, triangles, counts, .. } =
+            self.points(number, spec, emit)?;
         let fact = |name, value| Fact { name, value };
         let facts = vec![
             fact("points", found.points.len() as f64),
             fact("points_from_samples", drawn as f64),
-            fact("candidates_from_samples", done.candidates as f64),
+            fact("candidates_from_samples", candidates as f64),
             fact("voids", found.voids as f64),
             fact("thin_voids", found.thin_voids as f64),
         ];
-        let image = picture(&found.points, self.settings.height, asked.radius);
-        let Done { counts, triangles, .. } = done;
+        let image = picture(&found.points, self.settings.height, self.options.radius);
         Ok(Drawn { image, counts, triangles, facts, ..Drawn::default() })
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use pipeline::{Camera, CameraError, Lens};
+use serde::{Deserialize, Serialize};
 
 use super::deform::Pose;
 use super::track::{Instant, Track};
@@ -27,13 +28,22 @@ impl Place {
     }
 }
 
+/// Which way a camera looks.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Aim {
+    /// At a point, on which a lens is focused unless another depth is given.
+    At(Place),
+    /// Along a direction of any length.
+    Along(DVec3),
+}
+
 /// A line of sight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookAt {
     /// Where the camera is.
     pub position: Place,
-    /// What it looks at, and what a lens is focused on unless told otherwise.
-    pub target: Place,
+    /// Which way it looks.
+    pub aim: Aim,
     /// Which way is up.
     pub up: DVec3,
 }
@@ -41,19 +51,31 @@ pub struct LookAt {
 /// What holds a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rig {
-    /// It looks from one point at another.
+    /// It looks from a point at another or along a direction.
     LookAt(Box<LookAt>),
     /// It hangs on a node, looking down the node's -z with +y up (glTF 2.0, 3.10).
     Node(usize),
-    /// It is placed so that the whole scene is in view over all frames, from above the front and to the right.
-    Fitted,
+    /// It is placed by itself.
+    Fitted(Side),
+}
+
+/// From which side a camera that is placed by itself sees the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Side {
+    /// From inside where most of the scene's surface is enclosed by the rest of it, else from outside.
+    #[default]
+    Auto,
+    /// From inside, at eye height, along the deepest view.
+    Inside,
+    /// From above the front and to the right, so that the whole scene is in view over all frames.
+    Outside,
 }
 
 impl Rig {
     /// A camera that stays at `position` and looks at `target`, +y up.
     pub fn look_at(position: DVec3, target: DVec3) -> Self {
         let [position, target] = [position, target].map(Place::fixed);
-        Self::LookAt(Box::new(LookAt { position, target, up: DVec3::Y }))
+        Self::LookAt(Box::new(LookAt { position, aim: Aim::At(target), up: DVec3::Y }))
     }
 }
 
@@ -80,7 +102,7 @@ impl View {
     pub fn given(fov_deg: Option<f64>, view_height: Option<f64>) -> Result<Self, String> {
         match (fov_deg, view_height) {
             (Some(_), Some(_)) => Err(
-                "`fov_deg` makes a perspective camera and `view_height` an orthographic one: leave one out"
+                "`fov_deg` makes a perspective camera and `view_height` an orthographic one: remove one of them"
                     .to_owned(),
             ),
             (_, Some(height)) => Ok(Self::Orthographic { half_height: 0.5 * height }),
@@ -110,8 +132,8 @@ impl Default for View {
 pub struct SceneCamera {
     /// What holds it.
     pub rig: Rig,
-    /// How much it sees.
-    pub view: View,
+    /// How much it sees; `None` for a field of view of 40 degrees (60 for a camera that is placed inside).
+    pub view: Option<View>,
     /// Depth in scene units below which nothing is seen; `None` for a thousandth of the distance of the
     /// target (a quarter of the nearest vertex's depth for a fitted camera).
     pub near: Option<f64>,
@@ -127,7 +149,7 @@ pub fn tan_half(fov_deg: f64) -> f64 {
 
 impl Default for SceneCamera {
     fn default() -> Self {
-        Self { rig: Rig::Fitted, view: View::default(), near: None }
+        Self { rig: Rig::Fitted(Side::Auto), view: None, near: None }
     }
 }
 
@@ -182,25 +204,39 @@ fn unit(v: DVec3) -> Option<DVec3> {
 }
 
 impl SceneCamera {
-    /// Where the camera stands in `pose`; `None` for a camera that still has to be fitted or has no direction.
+    /// Where the camera stands in `pose`, relative to its origin; `None` for a camera that still has to be fitted or has no direction.
     pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<Stand> {
         match &self.rig {
             Rig::LookAt(sight) => {
                 let eye = sight.position.at(at);
-                Stand::new(eye, sight.target.at(at) - eye, sight.up)
+                let along = match &sight.aim {
+                    Aim::At(target) => target.at(at) - eye,
+                    Aim::Along(direction) => *direction,
+                };
+                Stand::new(eye - pose.origin, along, sight.up)
             }
             Rig::Node(node) => Stand::on_node(pose.world(*node)),
-            Rig::Fitted => None,
+            Rig::Fitted(_) => None,
         }
     }
 
-    /// Distance of what a lens is focused on when not told: the target, or `centre` for a camera on a node.
-    pub(super) fn subject_depth(&self, stand: &Stand, at: Instant, centre: DVec3) -> f64 {
-        let subject = match &self.rig {
-            Rig::LookAt(sight) => sight.target.at(at),
-            Rig::Node(_) | Rig::Fitted => centre,
+    /// Depth of what a lens is focused on by itself: the target, or `centre` for a camera without one.
+    pub(super) fn subject_depth(&self, stand: &Stand, (pose, at): (&Pose, Instant), centre: DVec3) -> f64 {
+        let target = match &self.rig {
+            Rig::LookAt(sight) => match &sight.aim {
+                Aim::At(target) => Some(target.at(at) - pose.origin),
+                Aim::Along(_) => None,
+            },
+            Rig::Node(_) | Rig::Fitted(_) => None,
         };
-        stand.depth(subject)
+        stand.depth(target.unwrap_or(centre))
+    }
+
+    /// Whether a track moves it; a camera on a node moves if the node does.
+    pub(super) fn has_track(&self) -> bool {
+        let Rig::LookAt(sight) = &self.rig else { return false };
+        let aimed = matches!(&sight.aim, Aim::At(Place { track: Some(_), .. }));
+        sight.position.track.is_some() || aimed
     }
 }
 

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::far::Bounds;
 use super::graph::Graph;
 use super::mesh::{Influences, Instance, Mesh, Normals, unit};
 use super::node::world_poses;
@@ -10,6 +11,8 @@ use super::track::Instant;
 /// Poses of all nodes and what the tracks say about weights, at one moment.
 pub(super) struct Pose {
     at: Instant,
+    /// What the transforms are relative to, in the coordinates of the scene's files.
+    pub origin: DVec3,
     worlds: Vec<DAffine3>,
 }
 
@@ -22,11 +25,14 @@ pub(super) struct Carriage {
 }
 
 impl Pose {
-    pub fn new(graph: &Graph, at: Instant) -> Self {
-        Self { at, worlds: world_poses(&graph.nodes, at) }
+    /// The pose of `graph` at `at`, everything relative to `origin`.
+    pub fn new(graph: &Graph, at: Instant, origin: DVec3) -> Self {
+        let mut worlds = world_poses(&graph.nodes, at);
+        worlds.iter_mut().for_each(|world| world.translation -= origin);
+        Self { at, origin, worlds }
     }
 
-    /// Node to world.
+    /// Node to world, relative to the origin of the pose.
     pub fn world(&self, node: usize) -> DAffine3 {
         self.worlds.get(node).copied().unwrap_or(DAffine3::IDENTITY)
     }
@@ -57,6 +63,11 @@ impl Carriage {
     /// Whether a rigid carrier turns the mesh inside out, so that triangles have to be turned back.
     pub fn mirrors(&self) -> bool {
         matches!(&self.matrices[..], [matrix] if matrix.matrix3.determinant() < 0.0)
+    }
+
+    /// The box around the vertices of a mesh that is `bounded` at rest; morph targets are not considered.
+    pub fn place(&self, bounded: &Bounds, into: &mut Bounds) {
+        self.matrices.iter().for_each(|matrix| into.add_placed(bounded, matrix));
     }
 
     /// World position of vertex `index`.

@@ -40,6 +40,8 @@ pub(crate) struct Extent {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fit {
     pub stand: Stand,
+    /// Which way it looks, as it was before it was normalized; up is +y.
+    pub direction: DVec3,
     /// A depth before the nearest point.
     pub near: f64,
     /// Depth of the middle of the scene.
@@ -99,6 +101,13 @@ impl Extent {
         Some(Fit { holds_lens: false, ..pinhole })
     }
 
+    /// Whether a point is in the image of the fitted camera, seen from the centre of the lens.
+    pub fn sees(&self, fit: &Fit, point: DVec3) -> bool {
+        let p = fit.stand.view(point);
+        let [across, up] = self.slopes.map(|slope| slope / FILL * p.z);
+        p.x.abs() <= across && p.y.abs() <= up
+    }
+
     /// How far the lens moves any point across the view, in scene units.
     fn blur(&self, fit: &Fit, radius: f64, focus: Option<f64>) -> f64 {
         let focus = focus.unwrap_or(fit.focus);
@@ -118,6 +127,7 @@ impl Extent {
         let eye = x * self.axes.right + y * self.axes.up + z * self.axes.forward;
         Fit {
             stand: Stand { eye, ..self.axes },
+            direction: -TOWARD_EYE,
             near: 0.25 * (self.low.z - z),
             focus: (self.low.z + self.high.z) / 2.0 - z,
             holds_lens: true,

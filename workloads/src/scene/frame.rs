@@ -4,20 +4,18 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
 use pipeline::{Camera, Cull, Draw, Geometry};
+use serde::Serialize;
 
 use super::Scene;
 use super::deform::{Carriage, Pose};
 use super::mesh::{Instance, Mesh, Normals, smooth_normals};
 
-/// A scene between the opening and the closing of one frame's shutter.
-#[derive(Clone, Debug)]
+/// A scene between the opening and the closing of one frame's shutter: everything that changes from frame to frame.
+///
+/// It does not know its number or its time, so two frames of a scene with the same content draw the same picture with the same
+/// work; their [`Fingerprint`](crate::Fingerprint)s tell.
+#[derive(Clone, Debug, Serialize)]
 pub struct Frame {
-    /// Number of the frame.
-    pub index: u32,
-    /// When the shutter opens, in seconds of the scene's time.
-    pub open_s: f64,
-    /// When the shutter closes.
-    pub close_s: f64,
     /// The camera, its motion and its lens.
     pub camera: Camera,
     /// Every mesh, in the scene's order.
@@ -28,7 +26,7 @@ pub struct Frame {
 ///
 /// A mesh that does not move during the shutter shares one storage for both ends, and one that never moves
 /// shares it between frames. A vertex that stays put in a moving mesh has the same bits at both ends.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct FrameMesh {
     /// Name for messages.
     pub name: String,
@@ -40,6 +38,8 @@ pub struct FrameMesh {
     pub normals: Arc<[Vec3]>,
     /// Texture coordinates; empty where there are none.
     pub uvs: Arc<[Vec2]>,
+    /// Vertex colours in linear RGB; empty where there are none.
+    pub colors: Arc<[Vec3]>,
     /// Vertex indices of each triangle, counter-clockwise seen from the front.
     pub triangles: Arc<[[u32; 3]]>,
     /// Index of the material in [`Scene::materials`].
@@ -89,6 +89,11 @@ impl Frame {
         self.meshes.iter().filter(|mesh| !mesh.triangles.is_empty()).map(|mesh| mesh.draw(scene)).collect()
     }
 
+    /// Whether the camera or any vertex moves while the shutter is open.
+    pub fn is_moving(&self) -> bool {
+        self.camera.open() != self.camera.close() || self.meshes.iter().any(|mesh| !mesh.is_still())
+    }
+
     /// Triangles in the frame.
     pub fn triangle_count(&self) -> usize {
         self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
@@ -103,7 +108,7 @@ impl FrameMesh {
 
     fn draw<'a>(&'a self, scene: &'a Scene) -> Result<Draw<'a>, FrameError> {
         let refused = |message: String| FrameError::Draw { mesh: self.name.clone(), message };
-        let shader = scene.shaders.get(self.material);
+        let shader = scene.shader(self.material, !self.colors.is_empty());
         let shader = shader.ok_or_else(|| refused(format!("there is no material {}", self.material)))?;
         let mut geometry =
             Geometry::new(&self.open, &self.close, &self.triangles).map_err(|e| refused(e.to_string()))?;
@@ -112,6 +117,9 @@ impl FrameMesh {
         }
         if !self.uvs.is_empty() {
             geometry = geometry.with_uvs(&self.uvs).map_err(|e| refused(e.to_string()))?;
+        }
+        if !self.colors.is_empty() {
+            geometry = geometry.with_colors(&self.colors).map_err(|e| refused(e.to_string()))?;
         }
         let cull = if scene.materials()[self.material].double_sided { Cull::None } else { Cull::Back };
         Ok(Draw { geometry, shader, cull })
@@ -158,6 +166,7 @@ impl Interval {
             open,
             close,
             uvs: Arc::clone(&mesh.uvs),
+            colors: Arc::clone(&mesh.colors),
             triangles,
             material: mesh.material,
         })

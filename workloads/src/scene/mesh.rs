@@ -47,6 +47,8 @@ pub struct Mesh {
     pub normals: Normals,
     /// Texture coordinates, one for each vertex or none.
     pub uvs: Arc<[Vec2]>,
+    /// Linear RGB by which the material's colour is multiplied, one for each vertex or none.
+    pub colors: Arc<[Vec3]>,
     /// Vertex indices of each triangle, all in range.
     pub triangles: Arc<[[u32; 3]]>,
     /// Index of the material.
@@ -105,6 +107,7 @@ impl Mesh {
             positions,
             normals: Normals::Flat,
             uvs: Arc::from([]),
+            colors: Arc::from([]),
             triangles: triangles.into(),
             material,
             targets: Vec::new(),
@@ -112,6 +115,60 @@ impl Mesh {
             influences: None,
         })
     }
+}
+
+impl Mesh {
+    /// A mesh of each part, `of_triangle` naming the part of each triangle, with the vertices it uses in the order in which it
+    /// uses them. The mesh has to be one that no joints carry.
+    pub(crate) fn split(&self, of_triangle: &[u32], parts: usize) -> Vec<Self> {
+        let mut triangles = vec![Vec::new(); parts];
+        for (corners, &part) in self.triangles.iter().zip(of_triangle) {
+            triangles[part as usize].push(*corners);
+        }
+        let mut places = vec![u32::MAX; self.positions.len()];
+        let part = |mut triangles: Vec<[u32; 3]>| {
+            let mut used: Vec<u32> = Vec::new();
+            for vertex in triangles.as_flattened_mut() {
+                let place = &mut places[*vertex as usize];
+                if *place == u32::MAX {
+                    *place = used.len() as u32;
+                    used.push(*vertex);
+                }
+                *vertex = *place;
+            }
+            used.iter().for_each(|&vertex| places[vertex as usize] = u32::MAX);
+            self.gathered(&used, triangles)
+        };
+        triangles.into_iter().map(part).collect()
+    }
+
+    /// The vertices `used` with `triangles` over them.
+    fn gathered(&self, used: &[u32], triangles: Vec<[u32; 3]>) -> Self {
+        let target = |target: &Target| Target {
+            positions: gathered(&target.positions, used),
+            normals: gathered(&target.normals, used),
+        };
+        Self {
+            name: self.name.clone(),
+            positions: gathered(&self.positions, used),
+            normals: match &self.normals {
+                Normals::Given(normals) => Normals::Given(gathered(normals, used)),
+                other => other.clone(),
+            },
+            uvs: gathered(&self.uvs, used).into(),
+            colors: gathered(&self.colors, used).into(),
+            triangles: triangles.into(),
+            material: self.material,
+            targets: self.targets.iter().map(target).collect(),
+            weights: self.weights.clone(),
+            influences: None,
+        }
+    }
+}
+
+/// The `used` ones of `values`, or nothing where there are none.
+fn gathered<T: Copy>(values: &[T], used: &[u32]) -> Vec<T> {
+    if values.is_empty() { Vec::new() } else { used.iter().map(|&vertex| values[vertex as usize]).collect() }
 }
 
 /// Unit normals from the faces around each vertex, weighted by area; +y where there are none.

@@ -1,28 +1,43 @@
 //! A scene: what there is, how it moves, and what of it one frame's shutter sees.
 
 pub(crate) mod camera;
+mod camera_choice;
+mod camera_spec;
+mod camera_used;
 pub(crate) mod clip;
 mod deform;
+pub(crate) mod far;
 pub(crate) mod fit;
 mod frame;
 mod graph;
+mod info;
+pub(crate) mod inside;
 mod light;
 pub(crate) mod measure;
 mod mesh;
 mod node;
 mod parts;
+mod rays;
 mod settings;
 mod track;
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use activity::Warning;
 use glam::{DVec3, Vec3};
 
-pub use camera::{DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, View, tan_half};
+pub use camera::{Aim, DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, Side, View, tan_half};
+pub use camera_choice::OwnCamera;
+pub(crate) use camera_spec::Wrong;
+pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
+pub use camera_used::{CameraSource, CameraUsed};
 pub use clip::{Clip, Property};
 pub use frame::{Frame, FrameError, FrameMesh};
 pub use graph::Graph;
+pub use info::{
+    CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
+};
 pub use light::Light;
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
 pub use node::{Channels, Local, Motion, Node, Spin, Trs, world_poses};
@@ -35,9 +50,9 @@ use crate::error::LoadError;
 use crate::material::{Material, SurfaceShader};
 use camera::{Stand, between};
 use deform::Pose;
-use fit::Fit;
 use frame::Interval;
-use measure::LENS_LEAVES_VIEW;
+use inside::Inside;
+use measure::Placed;
 
 /// A scene that can be asked for its frames.
 #[derive(Clone, Debug)]
@@ -45,18 +60,32 @@ pub struct Scene {
     name: String,
     graph: Graph,
     clips: Vec<Clip>,
+    /// The clip that plays, where there are any.
+    playing: Option<usize>,
+    /// Cameras that the scene brings along.
+    cameras: Vec<OwnCamera>,
     camera: SceneCamera,
+    camera_source: CameraSource,
     light: Light,
     background: Vec3,
     settings: Settings,
+    /// Frames that the scene renders where nothing else is asked for. What is placed once for all frames (a fitted camera, the
+    /// lamp over its shoulder, the centre that a lens is focused on) is placed for these, so that a frame looks the same whichever
+    /// frames are rendered with it.
+    own_frames: Range<u32>,
     warnings: Vec<Warning>,
-    shaders: Vec<SurfaceShader>,
+    /// Of each material the shader without vertex colours and the one with them.
+    shaders: Vec<[SurfaceShader; 2]>,
     moving: Vec<bool>,
     /// Meshes that never move, made when first asked for.
     still: Vec<OnceLock<FrameMesh>>,
-    /// Where a fitted camera has been put.
-    fit: Option<Fit>,
-    /// Middle of the scene's bounds in the first frame.
+    /// What positions of frames are relative to.
+    origin: DVec3,
+    /// Where a camera that is placed by itself has been put, relative to `origin`.
+    placed: Option<Placed>,
+    /// The place inside, once it is known whether there is one.
+    room: Option<Option<Inside>>,
+    /// Middle of the scene's bounds in the first of its own frames, relative to `origin`.
     centre: DVec3,
 }
 
@@ -71,19 +100,26 @@ impl Scene {
     /// [`LoadError`] when the settings make no sense, there is nothing to draw, or something is not finite.
     pub fn new(parts: Parts) -> Result<Self, LoadError> {
         parts.settings.check()?;
+        let (cameras, camera_source) = camera_choice::cameras(parts.cameras, &parts.camera);
         let mut scene = Self {
             name: parts.name,
             graph: parts.graph,
+            playing: (!parts.clips.is_empty()).then_some(0),
             clips: parts.clips,
+            cameras,
             camera: parts.camera,
+            camera_source,
             light: parts.light,
             background: parts.background,
+            own_frames: parts.settings.frames.clone(),
             settings: parts.settings,
-            warnings: parts.warnings,
+            warnings: Warning::fold(parts.warnings),
             shaders: Vec::new(),
             moving: Vec::new(),
             still: Vec::new(),
-            fit: None,
+            origin: DVec3::ZERO,
+            placed: None,
+            room: None,
             centre: DVec3::ZERO,
         };
         scene.graph.check().map_err(|message| scene.broken(message))?;
@@ -113,29 +149,58 @@ impl Scene {
     fn prepare(&mut self) -> Result<(), LoadError> {
         self.moving = self.graph.moving_instances();
         self.still = vec![OnceLock::new(); self.graph.instances.len()];
+        self.recentre();
         let measured = self.measure().map_err(|error| self.broken(error.to_string()))?;
-        (self.centre, self.fit) = measured;
-        let first = self.interval(self.settings.frames.start);
+        (self.centre, self.placed) = measured;
+        let first = self.interval(self.own_frames.start);
         let (stand, ..) = self.stands(&first).map_err(|error| self.broken(error.to_string()))?;
         let axes = [stand.right, stand.up, stand.forward].map(|axis| axis.as_vec3());
         let toward = self.light.toward.unwrap_or_else(|| light::over_the_shoulder(axes[0], axes[1], axes[2]));
         let light = Light { toward: Some(toward), ..self.light };
-        self.shaders =
-            self.graph.materials.iter().map(|material| SurfaceShader::new(material, &light)).collect();
+        let shaders = |material: &Material| {
+            let plain = SurfaceShader::new(material, &light);
+            [plain.clone(), plain.with_vertex_colors()]
+        };
+        self.shaders = self.graph.materials.iter().map(shaders).collect();
         Ok(())
+    }
+
+    /// Chooses what positions are relative to.
+    fn recentre(&mut self) {
+        self.origin = DVec3::ZERO;
+        let first = self.interval(self.own_frames.start).open;
+        let mut bounds = far::Bounds::default();
+        for instance in &self.graph.instances {
+            let at_rest = self.graph.meshes[instance.mesh].positions.iter().map(|point| point.as_dvec3());
+            first.carriage(&self.graph, *instance).place(&far::Bounds::of(at_rest), &mut bounds);
+        }
+        self.origin = bounds.origin();
+        if self.origin != DVec3::ZERO {
+            self.warnings.push(far::recentred(self.origin));
+        }
+    }
+
+    /// The shader of a material, with or without vertex colours.
+    fn shader(&self, material: usize, vertex_colors: bool) -> Option<&SurfaceShader> {
+        self.shaders.get(material).map(|shaders| &shaders[usize::from(vertex_colors)])
     }
 
     /// The scene with other settings, or playing another clip.
     ///
     /// # Errors
-    /// [`LoadError::Setting`] when a value makes no sense or there is no such clip.
+    /// [`LoadError::Setting`] when a value makes no sense or there is no such clip or camera; as [`CameraSpec::flag`] when
+    /// another camera cannot be read.
     pub fn with_overrides(mut self, overrides: &Overrides) -> Result<Self, LoadError> {
-        self.settings = self.settings.with(overrides)?;
+        let lens = self.choose_camera(overrides)?;
+        self.settings = self.settings.with(&lens.over(overrides))?;
         if let Some(wanted) = &overrides.clip {
             let index = clip::find(&self.clips, wanted)?;
             clip::play(&mut self.graph.nodes, &self.clips[index]);
+            self.playing = Some(index);
+            self.room = None;
         }
-        self.warnings.retain(|warning| warning.code != LENS_LEAVES_VIEW);
+        let placed = |code| code == far::RECENTRED || measure::CODES.contains(&code);
+        self.warnings.retain(|warning| !placed(warning.code));
         self.prepare()?;
         Ok(self)
     }
@@ -148,8 +213,7 @@ impl Scene {
         let interval = self.interval(index);
         let meshes = (0..self.graph.instances.len()).map(|instance| self.frame_mesh(&interval, instance));
         let meshes = meshes.collect::<Result<Vec<_>, _>>()?;
-        let (open_s, close_s) = self.shutter_s(index);
-        Ok(Frame { index, open_s, close_s, camera: self.frame_camera(&interval)?, meshes })
+        Ok(Frame { camera: self.frame_camera(&interval)?, meshes })
     }
 
     fn frame_mesh(&self, interval: &Interval, index: usize) -> Result<FrameMesh, FrameError> {
@@ -164,26 +228,21 @@ impl Scene {
         Ok(self.still[index].get_or_init(|| made).clone())
     }
 
-    /// When the shutter of frame `index` opens and closes, in seconds.
-    fn shutter_s(&self, index: u32) -> (f64, f64) {
-        let open_s = f64::from(index) / self.settings.frame_rate_hz;
-        (open_s, open_s + self.settings.shutter / self.settings.frame_rate_hz)
-    }
-
+    /// When the shutter of frame `index` opens, is halfway and closes.
     fn instants(&self, index: u32) -> [Instant; 3] {
-        let (open_s, _) = self.shutter_s(index);
+        let open_s = f64::from(index) / self.settings.frame_rate_hz;
         let length_s = self.settings.shutter / self.settings.frame_rate_hz;
         [0.0, 0.5, 1.0].map(|part| Instant { open_s, offset_s: part * length_s })
     }
 
     fn interval(&self, frame: u32) -> Interval {
-        let [open, middle, close] = self.instants(frame).map(|at| Pose::new(&self.graph, at));
+        let [open, middle, close] = self.instants(frame).map(|at| Pose::new(&self.graph, at, self.origin));
         Interval { frame, open, middle, close }
     }
 
     /// Where the camera stands at both ends, the near depth, and what it is focused on.
     fn stands(&self, interval: &Interval) -> Result<(Stand, Stand, f64, f64), FrameError> {
-        if let Some(fit) = &self.fit {
+        if let Some(Placed { fit, .. }) = &self.placed {
             return Ok((fit.stand, fit.stand, fit.near, fit.focus));
         }
         let [open_at, _, close_at] = self.instants(interval.frame);
@@ -194,18 +253,33 @@ impl Scene {
                     .to_owned();
             return Err(FrameError::Camera { frame: interval.frame, message });
         };
-        let subject = self.camera.subject_depth(&open, open_at, self.centre);
+        let subject = self.camera.subject_depth(&open, (&interval.open, open_at), self.centre);
         let distance = open.eye.distance(self.centre).max(subject);
         let near = self.camera.near.unwrap_or(1e-3 * distance.max(1e-3));
         Ok((open, close, near, subject.max(2.0 * near)))
     }
 
+    /// How much the camera sees.
+    fn sees(&self) -> View {
+        self.placed.as_ref().map_or_else(|| self.camera.view.unwrap_or_default(), |placed| placed.view)
+    }
+
+    /// Depth at which the lens is sharp: as given, else that of the subject, to the precision of one that is given.
+    fn focus(&self, subject: f64) -> f32 {
+        self.settings.focus.unwrap_or(subject as f32)
+    }
+
     fn frame_camera(&self, interval: &Interval) -> Result<pipeline::Camera, FrameError> {
         let (open, close, near, subject) = self.stands(interval)?;
         let radius = self.settings.lens_radius;
-        let lens = (radius > 0.0).then(|| (radius, self.settings.focus.map_or(subject, f64::from)));
-        between(&open, &close, self.camera.view, near, lens)
-            .map_err(|message| FrameError::Camera { frame: interval.frame, message })
+        let lens = (radius > 0.0).then(|| (radius, f64::from(self.focus(subject))));
+        between(&open, &close, self.sees(), near, lens).map_err(|message| {
+            let message = format!(
+                "{message}: coordinates of {} are too large for numbers of 32 bits, or too small; scale the scene",
+                self.name
+            );
+            FrameError::Camera { frame: interval.frame, message }
+        })
     }
 }
 
@@ -226,6 +300,12 @@ impl Scene {
         &self.warnings
     }
 
+    /// What positions and cameras of frames are relative to, in the coordinates of the scene's files: zero, unless the scene is
+    /// so far from its own origin that rounding to f32 would change its shape.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     /// Linear RGB radiance where nothing is hit.
     pub fn background(&self) -> Vec3 {
         self.background
@@ -241,6 +321,11 @@ impl Scene {
         self.clips.iter().map(|clip| clip.name.as_str())
     }
 
+    /// The name of the animation clip that plays.
+    pub fn clip(&self) -> Option<&str> {
+        Some(self.clips.get(self.playing?)?.name.as_str())
+    }
+
     /// Triangles in every frame.
     pub fn triangle_count(&self) -> usize {
         self.graph.triangle_count()
@@ -249,10 +334,5 @@ impl Scene {
     /// Vertices in every frame.
     pub fn vertex_count(&self) -> usize {
         self.graph.vertex_count()
-    }
-
-    /// Whether any vertex moves, leaving the camera aside.
-    pub fn is_animated(&self) -> bool {
-        self.moving.contains(&true)
     }
 }

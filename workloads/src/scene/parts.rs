@@ -4,6 +4,7 @@ use activity::Warning;
 use glam::Vec3;
 
 use super::camera::SceneCamera;
+use super::camera_choice::OwnCamera;
 use super::clip::Clip;
 use super::graph::Graph;
 use super::light::Light;
@@ -18,8 +19,10 @@ pub struct Parts {
     pub graph: Graph,
     /// Animation clips of which one at a time is played.
     pub clips: Vec<Clip>,
-    /// The camera.
+    /// The camera that sees the scene unless another is chosen.
     pub camera: SceneCamera,
+    /// Cameras that can be chosen by name or number; where there are none, `camera` can be, unless it is placed by itself.
+    pub cameras: Vec<OwnCamera>,
     /// The light.
     pub light: Light,
     /// Linear RGB radiance where nothing is hit.
@@ -41,6 +44,7 @@ impl Parts {
             graph: Graph::default(),
             clips: Vec::new(),
             camera: SceneCamera::default(),
+            cameras: Vec::new(),
             light: Light::default(),
             background: DEFAULT_BACKGROUND,
             settings: Settings::default(),

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::LoadError;
 
 /// Size of the image, sampling, time and lens.
@@ -45,7 +47,8 @@ impl Default for Settings {
 }
 
 /// Changes to [`Settings`] and to the choice of an animation; `None` keeps what the scene says.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Overrides {
     /// Width and height of the image in pixels.
     pub size: Option<(u32, u32)>,
@@ -65,10 +68,12 @@ pub struct Overrides {
     pub table: Option<String>,
     /// Name or index of an animation clip of a glTF scene.
     pub clip: Option<String>,
+    /// Name or number of one of the scene's own cameras, or a description: see [`CameraSpec::flag`](super::CameraSpec::flag).
+    pub camera: Option<String>,
 }
 
 /// The largest frame number: times stay exact to well below a microsecond.
-const LAST_FRAME: u32 = 10_000_000;
+pub(super) const LAST_FRAME: u32 = 10_000_000;
 
 impl Settings {
     /// These settings with the changes in `overrides`.

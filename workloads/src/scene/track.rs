@@ -95,6 +95,31 @@ impl Track {
         self.width
     }
 
+    /// Times of the keys in seconds.
+    pub(super) fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// How it goes from one key to the next.
+    pub(super) fn interpolation(&self) -> Interpolation {
+        self.interpolation
+    }
+
+    /// Seconds after which it starts over, where it does.
+    pub(super) fn period_s(&self) -> Option<f64> {
+        self.period_s
+    }
+
+    /// Keys.
+    pub fn key_count(&self) -> usize {
+        self.times_s.len()
+    }
+
+    /// The value of the key number `key`, `width` numbers.
+    pub(super) fn key(&self, key: usize) -> &[f64] {
+        self.value(key)
+    }
+
     fn clock_s(&self, at: Instant) -> f64 {
         match self.period_s {
             Some(period) => libm::fmod(at.open_s, period) + at.offset_s,

@@ -63,6 +63,7 @@ impl Builder {
             positions: self.positions,
             normals: Normals::Given(self.normals),
             uvs: self.uvs.into(),
+            colors: [].into(),
             triangles: self.triangles.into(),
             material,
             targets: Vec::new(),

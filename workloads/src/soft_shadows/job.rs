@@ -16,8 +16,8 @@ use super::shade::{Shadows, World};
 use super::stage::stage;
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
-use crate::scene::{Overrides, Scene, Settings};
+use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
+use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,8 +72,9 @@ impl SoftShadows {
     ///
     /// # Errors
     /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
-    pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
+    pub fn new(mut options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene = options.scene.as_deref().map_or_else(stage, crate::load)?.with_overrides(overrides)?;
+        options.light.move_by(-scene.origin());
         options.check()?;
         let light = AreaLight::new(&options.light)?;
         let samples = scene.settings().samples;
@@ -109,7 +110,7 @@ impl SoftShadows {
     }
 
     /// Where the set or the bias is known to be bad.
-    fn warnings(&self) -> Vec<Warning> {
+    fn regime_warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
         warnings.extend(self.banding());
         let texel = self.light.texel_width(DVec3::from_array(self.options.light.target), self.options.map_px);
@@ -147,18 +148,24 @@ impl SoftShadows {
     const BIAS_TEXELS: [f64; 2] = [0.5, 8.0];
 }
 
-impl Job for SoftShadows {
+impl Draws for SoftShadows {
+    type Input = Frame;
+
     fn settings(&self) -> &Settings {
         self.scene.settings()
     }
 
-    fn is_animated(&self) -> bool {
-        self.scene.is_animated()
+    fn warnings(&self) -> &[Warning] {
+        self.scene.warnings()
     }
 
-    fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let (frame, settings) = (self.scene.frame(number)?, self.scene.settings());
-        let (draws, albedos) = parts(&self.scene, &frame)?;
+    fn input(&self, number: u32) -> Result<Frame, JobError> {
+        Ok(self.scene.frame(number)?)
+    }
+
+    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        let settings = self.scene.settings();
+        let (draws, albedos) = parts(&self.scene, frame)?;
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
         let (camera, how, each) = (frame.camera.with_lens(None), (self.method(), spec), self.passes());
@@ -174,16 +181,13 @@ impl Job for SoftShadows {
         counts += &shaded;
         let triangles = map.triangles + seen.triangles;
         let facts = self.facts(&map, &shaded);
-        let warnings = if number == settings.frames.start { self.warnings() } else { Vec::new() };
-        Ok(Drawn { image, counts, triangles, moving: true, lens: true, facts, warnings })
+        let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
+        Ok(Drawn { image, counts, triangles, moving, lens: true, facts, warnings })
     }
 }
 
 /// The draws of a frame, both faces seen, and the reflectance of each.
-pub(crate) fn parts<'a>(
-    scene: &'a Scene,
-    frame: &'a crate::scene::Frame,
-) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
+pub(crate) fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
     let draws = frame.draws(scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
     let drawn = frame.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
@@ -191,7 +195,7 @@ pub(crate) fn parts<'a>(
 
 /// The lens of the map is the light; the camera is a pinhole, whatever the scene says.
 pub(crate) const FLAGS: Flags = Flags {
-    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Clip],
+    uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Clip, Flag::Camera],
     instead: &[(Flag::Table, "points")],
 };
 

@@ -31,6 +31,13 @@ impl Default for LightSpec {
 }
 
 impl LightSpec {
+    /// Moves the light and what it faces.
+    pub(super) fn move_by(&mut self, way: DVec3) {
+        for point in [&mut self.position, &mut self.target] {
+            *point = (DVec3::from_array(*point) + way).to_array();
+        }
+    }
+
     /// Refuses an angle or a length that cannot be, `way` scene units from the target.
     fn must_fit(&self, way: f64) -> Result<(), String> {
         let Self { radius, fov_deg, near, .. } = *self;

@@ -18,7 +18,7 @@ pub fn stage() -> Result<Scene, LoadError> {
     fill(&mut parts.graph);
     parts.camera = SceneCamera {
         rig: Rig::look_at(DVec3::new(-0.8, 3.4, 5.6), DVec3::new(0.0, 0.35, 0.0)),
-        view: View::Perspective { tan_half_height: tan_half(40.0) },
+        view: Some(View::Perspective { tan_half_height: tan_half(40.0) }),
         near: None,
     };
     parts.background = Vec3::new(0.32, 0.40, 0.52);

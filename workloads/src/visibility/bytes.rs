@@ -25,8 +25,9 @@ impl<'a> Bytes<'a> {
     /// The next `N` bytes.
     pub fn take<const N: usize>(&mut self) -> Result<[u8; N], LoadError> {
         let found = self.data.get(self.at..).and_then(|rest| rest.first_chunk());
-        let found = found
-            .ok_or_else(|| self.wrong("the file ends here; it is truncated, copy it again".to_owned()))?;
+        let found = found.ok_or_else(|| {
+            self.wrong("the file ends here; it is truncated: get the file again".to_owned())
+        })?;
         self.at += N;
         Ok(*found)
     }

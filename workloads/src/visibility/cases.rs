@@ -11,7 +11,7 @@ use crate::error::LoadError;
 use crate::import::Format;
 
 /// What a case can be loaded from, for messages.
-const KNOWN: &str = ".mts, and .ply or .obj two by two (each also gzipped)";
+const KNOWN: &str = ".mts, and .ply, .obj or .off two by two (each also gzipped)";
 
 /// Objects that may collide, and where they came from.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ enum Content {
 }
 
 impl CaseFiles {
-    /// Which of `files` go together: an `.mts` alone, PLY and OBJ files two by two. Of a file that cannot be read its name says what it is.
+    /// Which of `files` go together: an `.mts` alone, PLY, OBJ and OFF files two by two. Of a file that cannot be read its name says what it is.
     ///
     /// # Errors
     /// [`LoadError::is_usage`] for folders, files of no known kind or without a partner, and cases of one id; else a file that cannot be
@@ -52,7 +52,7 @@ impl CaseFiles {
         let mut files = files.iter().map(AsRef::as_ref);
         if let Some(folder) = files.clone().find(|path| path.is_dir()) {
             return Err(refused(format!(
-                "{} is a folder: give the .mts, .ply or .obj files in it",
+                "{} is a folder: give the .mts, .ply, .obj or .off files in it",
                 folder.display()
             )));
         }
@@ -76,8 +76,8 @@ impl CaseFiles {
         Ok(cases)
     }
 
-    /// Reads them. The parts of a mesh that hang together are its objects; coordinates of PLY and OBJ files are rounded to f32, and how far
-    /// that may be is given with them.
+    /// Reads them. The parts of a mesh that hang together are its objects; coordinates of PLY, OBJ and OFF files were
+    /// most likely rounded to f32 when they were written, and how far off that may be is given with them.
     ///
     /// # Errors
     /// What is broken, and where.
@@ -99,7 +99,7 @@ impl CaseFiles {
     }
 }
 
-/// Loads cases of collision detection: an `.mts` each with its objects, or two PLY or OBJ files as the two instants of a mesh.
+/// Loads cases of collision detection: an `.mts` each with its objects, or two PLY, OBJ or OFF files as the two instants of a mesh.
 ///
 /// # Errors
 /// As [`CaseFiles::of`] and [`CaseFiles::load`], at the first file.
@@ -116,7 +116,7 @@ pub(crate) fn load_objects(file: &Path) -> Result<Vec<MovingMesh>, LoadError> {
         Ok(Kind::Mts) => mts::load_mts(file),
         Ok(_) | Err(LoadError::Kind { .. }) => {
             let message = format!(
-                "{} is no .mts file, and one of those is taken here; `quintile ccd` takes .ply and .obj files, too, two by two",
+                "{} is no .mts file, and one of those is taken here; `quintile ccd` takes .ply, .obj and .off files, too, two by two",
                 file.display()
             );
             Err(LoadError::Setting { setting: "file", message })
@@ -146,7 +146,7 @@ fn refused(message: String) -> LoadError {
 
 fn no_partner(file: &Path) -> LoadError {
     refused(format!(
-        "{}: give .mts files, or .ply and .obj files two by two: the mesh at time 0 and at time 1",
+        "{}: give .mts files, or .ply, .obj and .off files two by two: the mesh at time 0 and at time 1",
         file.display()
     ))
 }

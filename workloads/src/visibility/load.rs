@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::camera::CameraSpec;
 use super::mesh::MovingMesh;
 use super::scene::{Subject, VisibilityScene};
 use super::{m5d, mts, pair};
 use crate::error::LoadError;
 use crate::import::{Format, reader};
+use crate::scene::CameraSpec;
 
 /// What can be loaded, for messages.
-const KNOWN: &str = ".m5d, .mts, and .ply or .obj, alone or as a pair (each also gzipped)";
+const KNOWN: &str = ".m5d, .mts, and .ply, .obj, .off or .stl, alone or as a pair (each also gzipped)";
 
 /// Kinds of files that hold a mesh or half of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,26 +44,26 @@ impl Kind {
 
     /// What its name ends in.
     pub fn named(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let bare = name.strip_suffix(".gz").unwrap_or(&name);
         match (bare.rsplit_once('.')?.1, Format::of(path)) {
             ("m5d", _) => Some(Self::M5d),
             ("mts", _) => Some(Self::Mts),
-            (_, Some(format @ (Format::Ply | Format::Obj))) => Some(Self::Surface(format)),
+            (_, Some(format)) if format.is_surface() => Some(Self::Surface(format)),
             _ => None,
         }
     }
 }
 
-/// Loads the moving mesh in `files`: an `.m5d` or `.mts`, a PLY or OBJ file that stays still, or two of them as the two
-/// ends of the shutter. `camera` is a camera in RON; without it an `.m5d` is seen by its own and the others by one that
-/// is fitted to them.
+/// Loads the moving mesh in `files`: an `.m5d` or `.mts`, a PLY, OBJ, OFF or STL file that stays still, or two of them as the two
+/// ends of the shutter. `camera` is what [`CameraSpec::flag`] takes; without it an `.m5d` is seen by its own and the others
+/// by one that is fitted to them.
 ///
 /// # Errors
 /// [`LoadError`]: [`LoadError::is_usage`] for files that do not go together or are of no known kind and for mistakes in
 /// the camera; else what is broken, and where.
-pub fn load(files: &[impl AsRef<Path>], camera: Option<&Path>) -> Result<VisibilityScene, LoadError> {
-    let spec = camera.map(CameraSpec::load).transpose()?;
+pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<VisibilityScene, LoadError> {
+    let spec = camera.map(described).transpose()?;
     let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
     let kinds = files.iter().map(|path| Kind::of(path)).collect::<Result<Vec<_>, _>>()?;
     let (path, objects) = match (&files[..], &kinds[..]) {
@@ -81,14 +81,24 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&Path>) -> Result<Visibil
     VisibilityScene::seen(Subject { path, objects }, &spec.unwrap_or_default())
 }
 
-/// Loads a mesh that stays still from a PLY or OBJ file.
+/// The camera that `text` describes, for a moving mesh.
+fn described(text: &str) -> Result<CameraSpec, LoadError> {
+    let (spec, file) = CameraSpec::flag(text)?;
+    spec.check_for_meshes().map_err(|wrong| CameraSpec::wrong(&file, wrong))?;
+    Ok(spec)
+}
+
+/// Loads a mesh that stays still from a PLY, OBJ, OFF or STL file.
 ///
 /// # Errors
 /// As [`load`].
 pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
     match Kind::of(path)? {
         Kind::Surface(format) => pair::still((path, format)),
-        _ => Err(LoadError::Kind { file: path.display().to_string(), known: ".ply and .obj (also gzipped)" }),
+        _ => Err(LoadError::Kind {
+            file: path.display().to_string(),
+            known: ".ply, .obj, .off and .stl (also gzipped)",
+        }),
     }
 }
 
@@ -106,7 +116,7 @@ fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {
             format!("{} holds both ends of the shutter: give it alone", file.display())
         }
         _ => format!(
-            "{} were given: give one, or two PLY or OBJ files as the ends of the shutter",
+            "{} were given: give one, or two PLY, OBJ, OFF or STL files as the ends of the shutter",
             files.len()
         ),
     };

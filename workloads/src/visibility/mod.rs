@@ -17,7 +17,7 @@ mod scene;
 mod table;
 mod unshaded;
 
-pub use camera::CameraSpec;
+pub use crate::scene::CameraSpec;
 pub(crate) use cases::load_objects;
 pub use cases::{CaseFiles, CollisionCase, load_cases};
 pub use hits::write_hits;

@@ -8,10 +8,11 @@ use glam::Vec3;
 use pipeline::sampling::HashedSamples;
 use pipeline::{Camera, LensShape, Viewport};
 
-use super::camera::{CameraSpec, View, Wrong, fit};
+use super::camera::{View, fit};
 use super::mesh::MovingMesh;
 use crate::error::{LoadError, Source};
 use crate::scene::measure::lens_leaves_view;
+use crate::scene::{CameraSpec, Wrong};
 
 /// Moving triangles in camera space (x right, y up, z forward) with the camera and sampling they are to be seen by.
 #[derive(Clone, Debug)]
@@ -67,13 +68,13 @@ impl VisibilityScene {
             (placed, if holds_lens { Vec::new() } else { vec![lens_leaves_view()] })
         };
         let unusable = |(place, message): Wrong| source.broken(format!("camera: {place}"), message);
-        let view = placed.view().map_err(unusable)?;
+        let view = placed.stands_and_image().map_err(unusable)?;
         let [open, close] =
             in_camera_space(&view, &mesh).map_err(|message| source.broken("vertices", message))?;
         Ok(Self {
             viewport: view.viewport,
-            per_pixel: placed.samples(),
-            seed: placed.seed(),
+            per_pixel: placed.samples_per_pixel(),
+            seed: placed.sample_seed(),
             camera: view.camera,
             shape: placed.shape(),
             open,

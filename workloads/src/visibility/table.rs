@@ -30,6 +30,11 @@ impl FixedSamples {
         Self::parse(path, &data)
     }
 
+    /// Width and height in pixels; a larger image repeats them.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Reads `data`; `path` names it in messages.
     ///
     /// # Errors

@@ -124,7 +124,7 @@ impl Files {
 
 /// Loads bytes as a `.glb`.
 pub fn load_glb(bytes: &[u8]) -> Result<workloads::Scene, LoadError> {
-    workloads::load(&Files::new().put("scene.glb", bytes))
+    workloads::load(Files::new().put("scene.glb", bytes))
 }
 
 /// The folder of real scenes, or nothing, saying so.

@@ -3,14 +3,17 @@
 //! - [`Ocean`]: light refracted into water by a surface of waves; one wave alone is the sinusoidal surface with a known answer.
 //! - [`MirrorRing`]: light reflected inside a ring, whose caustic is a nephroid or a cardioid.
 //! - [`BallLens`]: light through a ball of glass.
+//! - [`turned_beams`]: beams that turn about their way.
 
 mod lens;
 mod ocean;
 mod ring;
+mod turned;
 
 pub use lens::BallLens;
 pub use ocean::{Ocean, Wave};
 pub use ring::{MirrorRing, Source};
+pub use turned::turned_beams;
 
 #[cfg(test)]
 pub(in crate::caustics) mod tests {

@@ -1,0 +1,249 @@
+//! The camera that sees a scene, in numbers that make the same camera again.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::Scene;
+use super::camera::{Aim, LookAt, Rig, Side, View, tan_half};
+use super::camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
+use super::frame::{FrameError, Interval};
+use super::node::movers;
+use super::track::{Interpolation, Track};
+
+/// Where a camera comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "SourceFields")]
+pub enum CameraSource {
+    /// It is the scene's own.
+    Own {
+        /// Its number among them.
+        index: usize,
+        /// Its name.
+        name: String,
+    },
+    /// It was described by the caller.
+    Given,
+    /// It was placed by itself.
+    Placed {
+        /// The side from which it sees the scene.
+        side: Side,
+    },
+}
+
+/// The same with all fields, those of other kinds null.
+#[derive(Serialize)]
+struct SourceFields {
+    kind: &'static str,
+    index: Option<usize>,
+    name: Option<String>,
+    side: Option<Side>,
+}
+
+impl From<CameraSource> for SourceFields {
+    fn from(source: CameraSource) -> Self {
+        let of = |kind| Self { kind, index: None, name: None, side: None };
+        match source {
+            CameraSource::Own { index, name } => Self { index: Some(index), name: Some(name), ..of("own") },
+            CameraSource::Given => of("given"),
+            CameraSource::Placed { side } => Self { side: Some(side), ..of("placed") },
+        }
+    }
+}
+
+impl std::fmt::Display for CameraSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Own { index, name } => write!(f, "the scene's own, `{name}` (number {index})"),
+            Self::Given => f.write_str("as given"),
+            Self::Placed { side: Side::Inside } => f.write_str("placed inside"),
+            Self::Placed { .. } => f.write_str("placed outside"),
+        }
+    }
+}
+
+/// The camera of a scene. Its numbers are those of the moment when the first frame's shutter opens.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CameraUsed {
+    /// Where it comes from.
+    #[serde(flatten)]
+    pub source: CameraSource,
+    /// Whether it moves.
+    pub moves: bool,
+    /// Where it is, in scene units.
+    pub position: [f64; 3],
+    /// Which way it looks, a unit vector.
+    pub direction: [f64; 3],
+    /// Which way is up in the image, a unit vector.
+    pub up: [f64; 3],
+    /// Vertical field of view in degrees; `None` for an orthographic view.
+    pub fov_deg: Option<f64>,
+    /// Height of an orthographic view in scene units.
+    pub view_height: Option<f64>,
+    /// Depth in scene units below which nothing is seen.
+    pub near: f64,
+    /// Radius of the lens in scene units; zero for a pinhole.
+    pub lens_radius: f32,
+    /// Depth in scene units at which the lens is sharp; for a pinhole, at which a lens would be.
+    pub focus: f32,
+    /// The camera on one line of RON, to be given back with `--camera`.
+    pub ron: String,
+    /// Whether `ron` makes the same camera in every frame. If not, it is the camera of the first frame, standing still.
+    pub exact: bool,
+}
+
+impl Scene {
+    /// The camera that sees the scene.
+    ///
+    /// # Errors
+    /// [`FrameError::Camera`] when it looks nowhere in the first frame.
+    pub fn camera_used(&self) -> Result<CameraUsed, FrameError> {
+        let first = self.interval(self.settings.frames.start);
+        let (stand, _, near, subject) = self.stands(&first)?;
+        let eye = stand.eye + self.origin;
+        let (fov_deg, view_height) = match self.sees() {
+            View::Perspective { tan_half_height } => (Some(field_of_view(tan_half_height)), None),
+            View::Orthographic { half_height } => (None, Some(2.0 * half_height)),
+        };
+        let focus = self.focus(subject);
+        let described = CameraSpec {
+            position: Some(eye.to_array()),
+            fov_deg,
+            view_height,
+            near: Some(near),
+            lens_radius: Some(self.settings.lens_radius),
+            focus: (focus.is_finite() && focus > 0.0).then_some(focus),
+            ..CameraSpec::default()
+        };
+        let (description, exact) = self.with_sight(&first, described);
+        Ok(CameraUsed {
+            source: self.source_used(),
+            moves: self.camera_moves(),
+            position: eye.to_array(),
+            direction: stand.forward.to_array(),
+            up: stand.up.to_array(),
+            fov_deg,
+            view_height,
+            near,
+            lens_radius: self.settings.lens_radius,
+            focus,
+            ron: description.to_ron_line(),
+            exact: exact && fov_deg.is_none_or(|fov| (0.1..=175.0).contains(&fov)),
+        })
+    }
+
+    fn source_used(&self) -> CameraSource {
+        match (&self.camera_source, &self.placed) {
+            (CameraSource::Placed { .. }, Some(placed)) => CameraSource::Placed { side: placed.side },
+            (source, _) => source.clone(),
+        }
+    }
+
+    fn camera_moves(&self) -> bool {
+        match &self.camera.rig {
+            Rig::LookAt(_) => self.camera.has_track(),
+            Rig::Node(node) => movers(&self.graph.nodes).get(*node).copied().unwrap_or(false),
+            Rig::Fitted(_) => false,
+        }
+    }
+
+    /// `described` with which way it looks and how it moves, and whether that is all of it. Directions are given as they came
+    /// in, before they were normalized, so that the camera made from them is the same to the bit.
+    fn with_sight(&self, first: &Interval, described: CameraSpec) -> (CameraSpec, bool) {
+        let along = |direction: DVec3, up: DVec3| CameraSpec {
+            direction: Some(direction.to_array()),
+            up: (up != DVec3::Y).then_some(up.to_array()),
+            ..described.clone()
+        };
+        match (&self.camera.rig, &self.placed) {
+            (Rig::LookAt(sight), _) => self.with_path(sight, described),
+            (Rig::Node(node), _) => {
+                let axes = first.open.world(*node).matrix3;
+                (along(-axes.z_axis, axes.y_axis), !self.camera_moves())
+            }
+            (Rig::Fitted(_), Some(placed)) => (along(placed.fit.direction, DVec3::Y), true),
+            (Rig::Fitted(_), None) => (described, false),
+        }
+    }
+
+    fn with_path(&self, sight: &LookAt, described: CameraSpec) -> (CameraSpec, bool) {
+        let target = match &sight.aim {
+            Aim::At(target) => Some(target),
+            Aim::Along(_) => None,
+        };
+        let mut spec = CameraSpec {
+            position: Some(sight.position.rest.to_array()),
+            target: target.map(|target| target.rest.to_array()),
+            direction: match &sight.aim {
+                Aim::At(_) => None,
+                Aim::Along(direction) => Some(direction.to_array()),
+            },
+            up: (sight.up != DVec3::Y).then_some(sight.up.to_array()),
+            ..described
+        };
+        if !self.camera.has_track() {
+            return (spec, true);
+        }
+        // What follows the camera by itself, frame by frame, must go on doing so.
+        (spec.near, spec.focus) = (self.camera.near, self.settings.focus);
+        let tracks =
+            [Some(&sight.position), target].map(|place| place.and_then(|place| place.track.as_ref()));
+        match keys(tracks) {
+            Some((keyframes, interpolation)) => {
+                (spec.keyframes, spec.interpolation) = (keyframes, interpolation);
+                (spec, true)
+            }
+            None => (spec, false),
+        }
+    }
+}
+
+/// The keys of the tracks of a position and of a target; `None` where files cannot describe them.
+fn keys([position, target]: [Option<&Track>; 2]) -> Option<(Vec<CameraKey>, Option<InterpolationSpec>)> {
+    let first = position.or(target)?;
+    let alike = |track: &Track| {
+        track.times_s() == first.times_s()
+            && track.interpolation() == first.interpolation()
+            && track.period_s().is_none()
+    };
+    if ![position, target].into_iter().flatten().all(alike) {
+        return None;
+    }
+    let interpolation = match first.interpolation() {
+        Interpolation::Linear => None,
+        Interpolation::Step => Some(InterpolationSpec::Step),
+        Interpolation::CubicSpline => return None,
+    };
+    let point = |track: Option<&Track>, key: usize| {
+        track.map(|track| std::array::from_fn(|axis| track.key(key).get(axis).copied().unwrap_or(0.0)))
+    };
+    let key = |(index, &time_s): (usize, &f64)| CameraKey {
+        time_s,
+        position: point(position, index),
+        target: point(target, index),
+    };
+    Some((first.times_s().iter().enumerate().map(key).collect(), interpolation))
+}
+
+/// The vertical field of view in degrees whose half has the tangent `tan` in single precision, in as few digits as that takes.
+pub(super) fn field_of_view(tan: f64) -> f64 {
+    let degrees = 2.0 * libm::atan(tan).to_degrees();
+    let same = |degrees: &f64| tan_half(*degrees) as f32 == tan as f32;
+    let short = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6].map(|scale| (degrees * scale).round() / scale);
+    let near = [degrees, degrees.next_up(), degrees.next_down()];
+    short.into_iter().chain(near).find(same).unwrap_or(degrees)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_of_view_is_short_and_makes_the_same_camera() {
+        assert_eq!(field_of_view(tan_half(40.0)), 40.0);
+        assert_eq!(field_of_view(tan_half(37.85)), 37.85);
+        for step in 1..3000 {
+            let tan = libm::tan(f64::from(step as f32 * 1e-3) / 2.0);
+            assert_eq!(tan_half(field_of_view(tan)) as f32, tan as f32, "step {step}");
+        }
+    }
+}

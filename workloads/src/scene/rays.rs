@@ -1,0 +1,194 @@
+//! Rays through triangles that stand still, for questions about a scene's geometry before it is rendered.
+
+use glam::DVec3;
+
+/// Triangles of a leaf.
+const LEAF: usize = 4;
+
+/// Triangles sorted along a space-filling curve, and a binary tree of boxes over them: node `i` has the children `2 i + 1` and
+/// `2 i + 2`, each with half of its triangles.
+pub(super) struct Rays {
+    triangles: Vec<[DVec3; 3]>,
+    boxes: Vec<[DVec3; 2]>,
+}
+
+/// What a ray met first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hit {
+    /// How far away, in lengths of the ray's direction.
+    pub distance: f64,
+    /// Unit normal of the triangle, to the side from which its corners run counter-clockwise; zero if it has no area.
+    pub normal: DVec3,
+    /// Whether the ray came from that side.
+    pub front: bool,
+}
+
+impl Rays {
+    /// Prepares `triangles`, in O(n log n).
+    pub fn new(mut triangles: Vec<[DVec3; 3]>) -> Self {
+        let [low, high] = bounds(&triangles);
+        let size = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
+        triangles.sort_by_cached_key(|[a, b, c]| {
+            let middle = ((*a + *b + *c) / 3.0 - low) / size;
+            middle
+                .to_array()
+                .map(|part| spread((part * 2_097_151.0) as u64))
+                .iter()
+                .fold(0, |code, part| code << 1 | part)
+        });
+        let mut rays = Self { boxes: Vec::new(), triangles };
+        let leaves = rays.triangles.len().div_ceil(LEAF).next_power_of_two();
+        rays.boxes = vec![[DVec3::INFINITY, DVec3::NEG_INFINITY]; 2 * leaves - 1];
+        rays.fill(0, 0, rays.triangles.len());
+        rays
+    }
+
+    fn fill(&mut self, node: usize, first: usize, end: usize) -> [DVec3; 2] {
+        let own = if 2 * node + 2 < self.boxes.len() {
+            let middle = first + (end - first) / 2;
+            let [low, high] = self.fill(2 * node + 1, first, middle);
+            let other = self.fill(2 * node + 2, middle, end);
+            [low.min(other[0]), high.max(other[1])]
+        } else {
+            bounds(&self.triangles[first..end])
+        };
+        self.boxes[node] = own;
+        own
+    }
+
+    /// The triangles, in an order of their own.
+    pub fn triangles(&self) -> &[[DVec3; 3]] {
+        &self.triangles
+    }
+
+    /// Bounds of all triangles.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.boxes[0]
+    }
+
+    /// The first triangle along a ray, farther than `beyond` lengths of `along`.
+    pub fn first(&self, from: DVec3, along: DVec3, beyond: f64) -> Option<Hit> {
+        // A ray in the plane of a side must not become a ray nowhere: 0 / 0 is not a number.
+        let inverse =
+            DVec3::from_array(along.to_array().map(|part| 1.0 / if part == 0.0 { 1e-300 } else { part }));
+        let (mut nearest, mut found) = (f64::INFINITY, None);
+        let mut open = vec![(0, 0, self.triangles.len())];
+        while let Some((node, first, end)) = open.pop() {
+            if !enters(&self.boxes[node], from, inverse, nearest) {
+                continue;
+            }
+            if 2 * node + 2 < self.boxes.len() {
+                let middle = first + (end - first) / 2;
+                let mut children = [(2 * node + 1, first, middle), (2 * node + 2, middle, end)];
+                // The child whose box starts nearer is tried first: it comes last.
+                let start = |node: usize| (self.boxes[node][0] + self.boxes[node][1]).dot(along);
+                if start(children[0].0) < start(children[1].0) {
+                    children.swap(0, 1);
+                }
+                open.extend(children);
+                continue;
+            }
+            for triangle in &self.triangles[first..end] {
+                if let Some(distance) =
+                    meets(from, along, triangle).filter(|at| *at > beyond && *at < nearest)
+                {
+                    (nearest, found) = (distance, Some(triangle));
+                }
+            }
+        }
+        found.map(|triangle| {
+            let normal = normal(triangle).normalize_or_zero();
+            Hit { distance: nearest, normal, front: normal.dot(along) < 0.0 }
+        })
+    }
+}
+
+/// Twice the area of a triangle, along its normal.
+pub(super) fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (*b - *a).cross(*c - *a)
+}
+
+/// Every third bit, from the 21 lowest.
+fn spread(bits: u64) -> u64 {
+    let steps = [
+        (32, 0x001f_0000_0000_ffff),
+        (16, 0x001f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ];
+    steps.into_iter().fold(bits & 0x1f_ffff, |bits, (by, mask)| (bits | bits << by) & mask)
+}
+
+fn bounds(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    triangles.as_flattened().iter().fold(none, |[low, high], corner| [low.min(*corner), high.max(*corner)])
+}
+
+/// Whether a ray passes through a box nearer than `nearest`; `inverse` holds the inverses of its direction.
+fn enters([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3, nearest: f64) -> bool {
+    let (to_low, to_high) = ((*low - from) * inverse, (*high - from) * inverse);
+    let start = to_low.min(to_high).max_element();
+    let end = to_low.max(to_high).min_element();
+    start <= end && end >= 0.0 && start <= nearest
+}
+
+/// Where the line `from + s along` meets a triangle, as `s` (Möller and Trumbore 1997).
+fn meets(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let across = along.cross(ac);
+    let det = ab.dot(across);
+    if det == 0.0 {
+        return None;
+    }
+    let to = from - *a;
+    let u = to.dot(across) / det;
+    let turned = to.cross(ab);
+    let v = along.dot(turned) / det;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| ac.dot(turned) / det)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles strewn by a simple recurrence.
+    fn strewn(count: usize) -> Vec<[DVec3; 3]> {
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut point = |scale: f64| DVec3::new(next() - 0.5, next() - 0.5, next() - 0.5) * scale;
+        (0..count)
+            .map(|_| {
+                let at = point(4.0);
+                [at, at + point(0.8), at + point(0.8)]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_tree_finds_what_a_search_of_all_triangles_finds() {
+        for count in [1, 3, 4, 5, 63, 64, 65, 700] {
+            let triangles = strewn(count);
+            let rays = Rays::new(triangles.clone());
+            let aims = strewn(100);
+            for [from, to, _] in aims.iter().map(|[a, b, c]| [*a * 2.0, *b - *a, *c]) {
+                let all = triangles.iter().filter_map(|triangle| meets(from, to, triangle));
+                let expected = all.filter(|at| *at > 1e-9).min_by(f64::total_cmp);
+                assert_eq!(rays.first(from, to, 1e-9).map(|hit| hit.distance), expected, "{count}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_front_face_turns_counter_clockwise_to_the_viewer() {
+        let rays = Rays::new(vec![[DVec3::NEG_X, DVec3::X, DVec3::Y]]);
+        let from = DVec3::new(0.0, 0.25, 2.0);
+        let hit = rays.first(from, DVec3::NEG_Z, 0.0).unwrap();
+        assert_eq!((hit.distance, hit.front, hit.normal), (2.0, true, DVec3::Z));
+        assert!(!rays.first(-from + DVec3::Y * 0.5, DVec3::Z, 0.0).unwrap().front);
+        assert!(rays.first(from, DVec3::Z, 0.0).is_none());
+    }
+}
