@@ -99,7 +99,7 @@ impl<'a> LinearImage<'a> {
     /// # Errors
     /// [`OutputError::Write`] with the file and the cause.
     pub fn write_png(&self, dir: &OutDir, relative: &str) -> Result<(), OutputError> {
-        dir.write_atomic(relative, |out| Ok(out.write_all(&self.png()?)?)).map(drop)
+        dir.write_file(relative, |out| Ok(out.write_all(&self.png()?)?)).map(drop)
     }
 
     /// Writes [`Self::exr`] to `relative` in `dir`.
@@ -107,7 +107,7 @@ impl<'a> LinearImage<'a> {
     /// # Errors
     /// [`OutputError::Write`] with the file and the cause.
     pub fn write_exr(&self, dir: &OutDir, relative: &str) -> Result<(), OutputError> {
-        dir.write_atomic(relative, |out| Ok(out.write_all(&self.exr()?)?)).map(drop)
+        dir.write_file(relative, |out| Ok(out.write_all(&self.exr()?)?)).map(drop)
     }
 
     fn mean(&self, columns: (usize, usize), rows: (usize, usize)) -> [f32; 3] {

@@ -1,21 +1,31 @@
-//! Progress bars: on a terminal, and nowhere else.
+//! Progress bars: on a terminal, and nowhere else; and the messages printed above them.
 
 use std::io::{IsTerminal, stderr};
 
+use activity::Warning;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// The bars of a run, drawn to standard error. They may be used from any thread.
+use super::terminal::{Terminal, Verbosity};
+
+/// The bars of a run, drawn to standard error, and messages between them. They may be used from any thread.
 #[derive(Clone, Debug)]
 pub struct Progress {
     bars: MultiProgress,
+    terminal: Terminal,
 }
 
 impl Progress {
-    /// Bars on standard error, or none where `quiet` or where standard error is not a terminal.
+    /// Bars without colours on standard error; with `quiet` no bars and no messages.
     pub fn new(quiet: bool) -> Self {
-        let silent = quiet || !stderr().is_terminal();
+        let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
+        Terminal::new(verbosity, clap::ColorChoice::Never).progress(quiet)
+    }
+
+    /// Bars on standard error; none where the terminal is quiet, where `hidden`, or where standard error is no terminal.
+    pub(super) fn on(terminal: Terminal, hidden: bool) -> Self {
+        let silent = hidden || terminal.verbosity() == Verbosity::Quiet || !stderr().is_terminal();
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        Self { bars: MultiProgress::with_draw_target(target) }
+        Self { bars: MultiProgress::with_draw_target(target), terminal }
     }
 
     /// Whether nothing will be drawn.
@@ -35,10 +45,19 @@ impl Progress {
         Bar { bar }
     }
 
-    /// Prints a line to standard error without breaking the bars; where they are silent, prints nothing.
-    pub fn note(&self, line: &str) {
-        // A line that cannot be shown is no reason to stop a run.
-        let _ = self.bars.println(line);
+    /// Prints a note above the bars, unless the terminal is quiet; also where no bars are drawn.
+    pub fn note(&self, message: &str) {
+        self.bars.suspend(|| self.terminal.note(message));
+    }
+
+    /// Prints a warning above the bars, unless the terminal is quiet; also where no bars are drawn.
+    pub fn warn(&self, warning: &Warning) {
+        self.bars.suspend(|| self.terminal.warn(warning));
+    }
+
+    /// Prints a detail above the bars where details are wanted.
+    pub fn detail(&self, message: &str) {
+        self.bars.suspend(|| self.terminal.detail(message));
     }
 }
 

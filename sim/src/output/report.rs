@@ -9,8 +9,7 @@ use serde::{Serialize, Serializer};
 
 use super::MeanSd;
 use super::dir::{OutDir, OutputError};
-use super::plot::part_colour;
-use super::table::{grouped, si, si_digits, si_mean_sd};
+use super::table::{grouped, number, si, si_digits, si_mean_sd};
 
 mod rows;
 
@@ -41,7 +40,7 @@ pub struct Report<'a> {
     pub images: Vec<ReportImage>,
     /// The plots, in order.
     pub plots: Vec<ReportPlot>,
-    /// Energy by part over the run, in the order of [`super::plot::FramePower::parts`], so that colours agree.
+    /// Energy by part over the run.
     pub parts: Vec<PartRow>,
     /// One row per frame.
     pub frames: Vec<FrameRow>,
@@ -53,8 +52,12 @@ pub struct Report<'a> {
     pub counters: Vec<CounterRow>,
     /// Every setting that the results depend on.
     pub settings: Vec<FactRow>,
+    /// The files that the run was made from: path, hash, size.
+    pub inputs: Vec<FactRow>,
     /// The files beside the report.
     pub files: Vec<FileLink>,
+    /// The program, the call and the machine: in a section of their own, as results do not depend on them.
+    pub host: Vec<FactRow>,
 }
 
 /// A number of the run, per frame, measured and true.
@@ -99,7 +102,8 @@ struct PartView<'a> {
     #[serde(flatten)]
     part: &'a PartRow,
     share: f64,
-    colour: String,
+    /// Share of the energy while frames are drawn; `None` for what is drawn between them.
+    busy_share: Option<f64>,
 }
 
 impl Report<'_> {
@@ -117,6 +121,7 @@ impl Report<'_> {
             value.map_or("–".into(), |value| si_digits(value, unit, 4))
         });
         environment.add_filter("mean_sd", mean_sd);
+        environment.add_filter("number", |value: f64| number(value));
         environment.add_filter("grouped", |value: u64| grouped(value));
         environment.add_filter("percent", |value: Option<f64>| value.map_or("–".into(), percent));
         environment.add_template(TEMPLATE_NAME, TEMPLATE)?;
@@ -129,19 +134,21 @@ impl Report<'_> {
     /// # Errors
     /// [`OutputError::Write`] with the file and the cause.
     pub fn write(&self, dir: &OutDir, relative: &str) -> Result<(), OutputError> {
-        dir.write_atomic(relative, |out| Ok(out.write_all(self.html()?.as_bytes())?)).map(drop)
+        dir.write_file(relative, |out| Ok(out.write_all(self.html()?.as_bytes())?)).map(drop)
     }
 
+    /// The parts with their shares of all energy, and of that without what is drawn between frames.
     fn part_views(&self) -> Vec<PartView<'_>> {
-        let total: f64 = self.parts.iter().map(|part| part.energy_j).sum();
-        let mut seen = [0, 0];
-        let mut colour = |part: &PartRow| {
-            let index = &mut seen[usize::from(part.overhead)];
-            *index += 1;
-            part_colour(*index - 1, part.overhead).css()
+        let sum = |parts: &mut dyn Iterator<Item = &PartRow>| parts.map(|part| part.energy_j).sum::<f64>();
+        let total = sum(&mut self.parts.iter());
+        let busy = sum(&mut self.parts.iter().filter(|part| !part.idle));
+        let of = |part: &PartRow, whole: f64| if whole > 0.0 { part.energy_j / whole } else { 0.0 };
+        let view = |part| PartView {
+            part,
+            share: of(part, total),
+            busy_share: Some(of(part, busy)).filter(|_| !part.idle),
         };
-        let share = |part: &PartRow| if total > 0.0 { part.energy_j / total } else { 0.0 };
-        self.parts.iter().map(|part| PartView { part, share: share(part), colour: colour(part) }).collect()
+        self.parts.iter().map(view).collect()
     }
 }
 

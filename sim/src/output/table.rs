@@ -63,10 +63,13 @@ pub fn si(value: f64, unit: &str) -> String {
     si_digits(value, unit, 3)
 }
 
-/// `value` with `digits` significant digits (at least 1) and a prefix.
+/// `value` with `digits` significant digits (at least 1) and a prefix; a number without a unit has none, as a prefix alone says nothing.
 pub fn si_digits(value: f64, unit: &str, digits: usize) -> String {
     if !value.is_finite() {
         return "n/a".to_owned();
+    }
+    if unit.is_empty() {
+        return plain(value, digits);
     }
     let mut prefix = Prefix::of(value);
     let mut text = significant(value * prefix.factor, digits);
@@ -83,8 +86,9 @@ pub fn si_mean_sd(stats: MeanSd, unit: &str) -> String {
     if !stats.mean.is_finite() || !stats.sd.is_finite() {
         return "n/a".to_owned();
     }
-    let prefix = Prefix::of(stats.mean);
-    let decimals = decimals(stats.mean * prefix.factor, 4);
+    let prefix = if unit.is_empty() { Prefix::NONE } else { Prefix::of(stats.mean) };
+    let decimals =
+        if unit.is_empty() { plain_decimals(stats.mean, 4) } else { decimals(stats.mean * prefix.factor, 4) };
     let (mean, sd) = (stats.mean * prefix.factor, stats.sd * prefix.factor);
     format!("{mean:.decimals$} ± {sd:.decimals$} {}{unit}", prefix.sign).trim_end().to_owned()
 }
@@ -105,12 +109,31 @@ fn decimals(value: f64, digits: usize) -> usize {
 
 /// A number without a unit to four digits, without an exponent where it can be read without.
 pub fn digits(value: f64) -> String {
-    let magnitude = value.abs();
-    if magnitude == 0.0 || (1e-3..1e9).contains(&magnitude) {
-        let decimals = if magnitude == 0.0 { 0 } else { (3 - magnitude.log10().floor() as i32).max(0) };
-        return format!("{value:.*}", decimals as usize);
+    plain(value, 4)
+}
+
+/// A count as it is, any other number without a unit to four digits.
+pub fn count_or_digits(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value}") } else { digits(value) }
+}
+
+/// A number without a unit to three digits; whole and in groups of three where it is large.
+pub fn number(value: f64) -> String {
+    if (9999.5..1e18).contains(&value) { grouped(libm::round(value) as u64) } else { plain(value, 3) }
+}
+
+/// A number without a unit to so many significant digits.
+fn plain(value: f64, digits: usize) -> String {
+    if value == 0.0 || (1e-3..1e9).contains(&value.abs()) {
+        return format!("{value:.*}", plain_decimals(value, digits));
     }
-    format!("{value:.3e}")
+    format!("{value:.*e}", digits - 1)
+}
+
+/// How many decimals a number without a prefix has at so many significant digits.
+fn plain_decimals(value: f64, digits: usize) -> usize {
+    let power = if value == 0.0 { digits as i32 - 1 } else { libm::floor(libm::log10(value.abs())) as i32 };
+    (digits as i32 - 1 - power).clamp(0, 12) as usize
 }
 
 /// An integer in groups of three: `1 234 567`.
@@ -119,6 +142,12 @@ pub fn grouped(value: u64) -> String {
     let groups: Vec<&str> =
         digits.as_bytes().rchunks(3).rev().filter_map(|g| str::from_utf8(g).ok()).collect();
     groups.join(" ")
+}
+
+/// A number of things: `1 frame`, `2 frames`.
+pub fn counted(count: usize, thing: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {thing}{ending}")
 }
 
 /// Rows of text under a header, aligned for a terminal: the first column to the left, the others to the right.
@@ -165,6 +194,16 @@ impl fmt::Display for Table {
     }
 }
 
+/// Words as one would type them into a shell.
+pub fn shell_line<'a>(words: impl IntoIterator<Item = &'a String>) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./,:=%+@".contains(letter);
+    let quoted = |word: &String| match word.is_empty() || !word.chars().all(plain) {
+        true => format!("'{}'", word.replace('\'', "'\\''")),
+        false => word.clone(),
+    };
+    words.into_iter().map(quoted).collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,7 +216,18 @@ mod tests {
         assert_eq!(si(1e-3, "s"), "1.00 ms");
         assert_eq!(si(-2.5e-7, "A"), "-250 nA");
         assert_eq!(si_digits(1234.56, "Hz", 4), "1.235 kHz");
-        assert_eq!(si(7.0, ""), "7.00");
+    }
+
+    /// A report had "69.4 µ draws per pixel" and a table "52.9 m".
+    #[test]
+    fn numbers_without_a_unit_have_no_prefix() {
+        assert_eq!(
+            [si(7.0, ""), si(6.94e-5, ""), si(0.0529, ""), si(0.0, "")],
+            ["7.00", "6.94e-5", "0.0529", "0"]
+        );
+        assert_eq!([number(12_345_678.4), number(6.94e-5), number(123.4)], ["12 345 678", "6.94e-5", "123"]);
+        assert_eq!([si(12_345.0, ""), si_digits(0.529_12, "", 4)], ["12345", "0.5291"]);
+        assert_eq!(si_mean_sd(MeanSd { mean: 0.0529, sd: 0.0001 }, ""), "0.05290 ± 0.00010");
     }
 
     #[test]
@@ -213,5 +263,13 @@ mod tests {
     fn groups_of_three() {
         assert_eq!(grouped(0), "0");
         assert_eq!(grouped(1_234_567), "1 234 567");
+    }
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_change_them() {
+        let line =
+            |words: &[&str]| shell_line(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>());
+        assert_eq!(line(&["run", "a.ron", "--frames", "0..9"]), "run a.ron --frames 0..9");
+        assert_eq!(line(&["my scene.ron", "a'b", "", "$x"]), "'my scene.ron' 'a'\\''b' '' '$x'");
     }
 }

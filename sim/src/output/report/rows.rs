@@ -27,6 +27,8 @@ pub struct WarningRow {
     pub code: String,
     /// What happened, where, and what it means for the results.
     pub message: String,
+    /// The things it concerns, where it names several.
+    pub details: Vec<String>,
 }
 
 /// A part of the energy of the run.
@@ -36,8 +38,10 @@ pub struct PartRow {
     pub name: String,
     /// What it is, in a sentence.
     pub doc: String,
-    /// Whether it is spent whether or not any unit works.
-    pub overhead: bool,
+    /// Its colour, the same as in the plots, as CSS writes it.
+    pub colour: String,
+    /// Whether it is drawn between frames rather than by them.
+    pub idle: bool,
     /// Its energy in joules.
     pub energy_j: f64,
 }

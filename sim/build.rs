@@ -1,0 +1,48 @@
+//! Tells the program the git revision it is built from: in release builds within a clone. Without git, or in an archive of the sources,
+//! it has none.
+
+use std::path::Path;
+use std::process::Command;
+
+/// What the program is made of, from the root of the repository. A change of these builds the program anew anyway, so that asking git
+/// costs nothing more.
+const SOURCES: [&str; 14] = [
+    "Cargo.toml",
+    "Cargo.lock",
+    "pipeline/src",
+    "pipeline/activity/src",
+    "power-model/platforms",
+    "power-model/src",
+    "power-model/tables",
+    "sim/assets",
+    "sim/gpus",
+    "sim/src",
+    "timing/src",
+    "traces/src",
+    "workloads/scenes",
+    "workloads/src",
+];
+
+fn main() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
+        SOURCES.iter().for_each(|source| println!("cargo:rerun-if-changed={}", root.join(source).display()));
+        revision(&root).iter().for_each(|revision| println!("cargo:rustc-env=QUINTILE_REVISION={revision}"));
+    } else {
+        println!("cargo:rerun-if-changed=build.rs");
+    }
+}
+
+/// The revision, with `+changes` where the sources are not quite its.
+fn revision(root: &Path) -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").arg("-C").arg(root).args(arguments).output().ok()?;
+        let text = String::from_utf8(output.stdout).ok()?;
+        output.status.success().then(|| text.trim().to_owned())
+    };
+    // An archive may lie in the clone of something else.
+    git(&["ls-files", "--error-unmatch", "sim/build.rs"])?;
+    let revision = git(&["rev-parse", "--short=12", "HEAD"])?;
+    let changes = git(&[&["status", "--porcelain", "--"], &SOURCES[..]].concat())?;
+    Some(if changes.is_empty() { revision } else { revision + "+changes" })
+}

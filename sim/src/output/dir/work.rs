@@ -1,0 +1,167 @@
+//! The locked folder in which results are made.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use traces::io::unfinished::Unfinished;
+
+use super::OutputError;
+use super::manifest::MANIFEST;
+
+/// Below the folder of results.
+pub(super) const NAME: &str = ".quintile";
+
+/// The folder `.quintile` below a folder of results, with a lock on it that ends with the process.
+#[derive(Debug)]
+pub(super) struct Work {
+    path: PathBuf,
+    /// Removes the folder; before the lock goes.
+    _unfinished: Unfinished,
+    _lock: File,
+}
+
+impl Work {
+    /// Makes and locks the folder below `root`, which is made where it is missing.
+    pub fn lock(root: &Path) -> Result<Self, OutputError> {
+        let made = missing(root);
+        let path = root.join(NAME);
+        if path.is_symlink() {
+            let why = "it is a link, and new results are made in a folder of that name".to_owned();
+            return Err(OutputError::InTheWay { path, why, forcible: false });
+        }
+        let lock = locked(root, &path).inspect_err(|_| {
+            // Only folders without content go; a folder that another process uses has its lock.
+            let _ = fs::remove_dir(&path);
+            remove_empty(&made);
+        })?;
+        let unfinished = Unfinished::new({
+            let path = path.clone();
+            move || {
+                abandon(&path);
+                remove_empty(&made);
+            }
+        });
+        Ok(Self { path, _unfinished: unfinished, _lock: lock })
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the new file `relative` is made.
+    pub fn new_file(&self, relative: &str) -> PathBuf {
+        self.new_files().join(relative)
+    }
+
+    /// Where new files are made.
+    pub fn new_files(&self) -> PathBuf {
+        self.path.join("new")
+    }
+
+    /// Where older files go until new ones are in their place.
+    pub fn old_file(&self, relative: &str) -> PathBuf {
+        self.path.join("old").join(relative)
+    }
+
+    /// The list that says that the new files are whole.
+    pub fn manifest(&self) -> PathBuf {
+        self.path.join(MANIFEST)
+    }
+
+    /// Removes what is not needed any more.
+    pub fn clear(&self) {
+        clear(&self.path);
+    }
+
+    /// Finds out whether files can be moved into those of `folders` that are in `root`: before long work, not after it.
+    pub fn try_folders(&self, root: &Path, folders: BTreeSet<PathBuf>) -> Result<(), OutputError> {
+        let probe = self.path.join("probe");
+        for folder in folders.iter().map(|folder| root.join(folder)).filter(|folder| folder.is_dir()) {
+            let moved = folder.join(".quintile-probe");
+            let tried = File::create(&probe).and_then(|_| fs::rename(&probe, &moved));
+            let tried = tried.and_then(|()| fs::remove_file(&moved));
+            if let Err(source) = tried {
+                // Whichever of the two is there.
+                [probe, moved].iter().for_each(|file| drop(fs::remove_file(file)));
+                return Err(OutputError::Folder { path: folder, source });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The folders that have to be made for `folder` to be there, the innermost first.
+fn missing(folder: &Path) -> Vec<PathBuf> {
+    let above = folder.ancestors().filter(|folder| !folder.as_os_str().is_empty());
+    above.take_while(|folder| folder.symlink_metadata().is_err()).map(Path::to_owned).collect()
+}
+
+fn remove_empty(folders: &[PathBuf]) {
+    folders.iter().for_each(|folder| drop(fs::remove_dir(folder)));
+}
+
+/// Makes `work` and locks it.
+fn locked(root: &Path, work: &Path) -> Result<File, OutputError> {
+    let failed = |source| OutputError::Folder { path: root.to_owned(), source };
+    // A process that ends removes its lock, and between opening and locking that may happen: try again.
+    for _ in 0..100 {
+        fs::create_dir_all(work).map_err(failed)?;
+        let mut file = match open(&work.join("lock")) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            opened => opened.map_err(failed)?,
+        };
+        match file.try_lock() {
+            Ok(()) => {}
+            // A file system without locks.
+            Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(error)) => return Err(failed(error)),
+            Err(TryLockError::WouldBlock) => return Err(busy(root, &mut file)),
+        }
+        if is_still_there(&mut file, &work.join("lock")).map_err(failed)? {
+            return Ok(file);
+        }
+    }
+    Err(OutputError::Busy { path: root.to_owned(), process: String::new() })
+}
+
+fn open(path: &Path) -> io::Result<File> {
+    OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
+}
+
+fn busy(root: &Path, lock: &mut File) -> OutputError {
+    let mut number = String::new();
+    let known = lock.read_to_string(&mut number).is_ok() && number.parse::<u32>().is_ok();
+    let process = if known { format!(" (process {number})") } else { String::new() };
+    OutputError::Busy { path: root.to_owned(), process }
+}
+
+/// Writes the number of this process into the lock and reads it back by its name: whoever had the lock before may have removed the
+/// file between opening and locking, and then another process may lock another file.
+fn is_still_there(lock: &mut File, path: &Path) -> io::Result<bool> {
+    let number = std::process::id().to_string();
+    lock.set_len(0)?;
+    lock.write_all(number.as_bytes())?;
+    Ok(fs::read_to_string(path).is_ok_and(|found| found == number))
+}
+
+/// Removes all but whole results, and the lock last: from then on the folder may be another's.
+fn abandon(work: &Path) {
+    clear(work);
+    // What cannot be removed is left to the next process that locks the folder.
+    let _ = fs::remove_file(work.join("lock"));
+    let _ = fs::remove_dir(work);
+}
+
+/// Removes new and old files. Whole results, which the list says these are, wait for the next command.
+fn clear(work: &Path) {
+    if work.join(MANIFEST).exists() {
+        return;
+    }
+    for folder in ["new", "old"] {
+        let _ = fs::remove_dir_all(work.join(folder));
+    }
+    let _ = fs::remove_file(work.join("probe"));
+}
