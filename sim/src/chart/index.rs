@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::standing::Standing;
 use crate::output::report::ReportError;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
 const TEMPLATE: &str = include_str!("../../assets/charts.html");
 /// The end of the name makes every value escaped for HTML.
@@ -42,25 +42,23 @@ pub struct Index {
 }
 
 impl Entry {
-    /// Adds the files in `dir` that are the chart's: those whose names begin with `stems`.
-    ///
-    /// # Errors
-    /// When the folder cannot be read.
-    pub fn with_files(mut self, dir: &OutDir, stems: &[&str]) -> Result<Self, OutputError> {
-        for file in dir.files()?.into_iter().filter(|file| stems.iter().any(|stem| belongs(file, stem))) {
+    /// Adds the files of the chart, by their names relative to the page.
+    #[must_use]
+    pub fn with_files(mut self, files: Vec<String>) -> Self {
+        for file in files {
             match file.strip_suffix(".svg") {
                 Some(picture) => self.pictures.push(picture.to_owned()),
                 None if file.ends_with(".png") => {}
                 None => self.files.push(file),
             }
         }
-        Ok(self)
+        self
     }
 }
 
-/// Whether `file` is called `stem`, or `stem` and more after a `_` or a dot.
-fn belongs(file: &str, stem: &str) -> bool {
-    file.strip_prefix(stem).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_', '/']))
+/// The files of the page.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart all").files(["index.html"])
 }
 
 impl Index {
@@ -75,7 +73,7 @@ impl Index {
         environment.add_template(TEMPLATE_NAME, TEMPLATE).map_err(ReportError::from)?;
         let page = environment.get_template(TEMPLATE_NAME).map_err(ReportError::from)?;
         let html = page.render(context! { index => self }).map_err(ReportError::from)?;
-        dir.write_atomic("index.html", |out| Ok(out.write_all(html.as_bytes())?))?;
+        dir.write_file("index.html", |out| Ok(out.write_all(html.as_bytes())?))?;
         Ok(())
     }
 }
@@ -95,31 +93,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_belong_to_the_chart_they_are_named_after() {
-        let of = |stem| {
-            ["timing.svg", "timing_failures.svg", "sampling.md", "sampled.csv", "plots/stress_auto.svg"]
-                .map(|file| belongs(file, stem))
-        };
-        assert_eq!(of("timing"), [true, true, false, false, false]);
-        assert_eq!(of("sampl"), [false; 5]);
-        assert_eq!(of("plots/stress"), [false, false, false, false, true]);
-    }
-
-    #[test]
     fn names_are_escaped() {
         let folder = tempfile::tempdir().unwrap();
-        let dir = OutDir::create(folder.path()).unwrap();
         let entry = Entry {
             name: "<b>".into(),
             about: String::new(),
             text: "1 < 2".into(),
-            pictures: vec!["p".into()],
+            pictures: Vec::new(),
             files: Vec::new(),
             took_s: 1.0,
             standings: Vec::new(),
         };
+        let entry = entry.with_files(["p.csv", "p.png", "p.svg"].map(str::to_owned).into());
+        assert_eq!(
+            (&entry.pictures[..], &entry.files[..]),
+            (&["p".to_owned()][..], &["p.csv".to_owned()][..])
+        );
         let missing = vec!["timing".into()];
-        Index { command: "quintile".into(), entries: vec![entry], missing }.write(&dir).unwrap();
+        let index = Index { command: "quintile".into(), entries: vec![entry], missing };
+        OutDir::with(folder.path(), claim(), |dir| index.write(dir)).unwrap();
         let page = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
         assert!(page.contains("Not finished") && page.contains("timing"));
         assert!(page.contains("&lt;b&gt;") && page.contains("1 &lt; 2") && page.contains("p.svg"));

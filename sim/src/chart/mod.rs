@@ -21,6 +21,7 @@ pub mod collision;
 mod error;
 pub mod fit;
 pub mod frames;
+mod front;
 pub mod glossy;
 pub mod growth;
 mod image;

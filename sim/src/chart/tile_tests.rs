@@ -10,12 +10,13 @@ use workloads::Overrides;
 use workloads::stress::{Size, family};
 use workloads::visibility::Unshaded;
 
+use super::front::front;
 use crate::gpu::GpuSpec;
 use crate::output::dir::BoxError;
-use crate::output::plot::{Tradeoff, TradeoffPanel, TradeoffPoint};
+use crate::output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series};
 use crate::output::progress::Progress;
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 use crate::run::RunError;
 use crate::stress::intervals::Pairs;
 use crate::stress::measure::Work;
@@ -150,12 +151,6 @@ fn with_fronts(mut rows: Vec<Row>) -> Vec<Row> {
     rows
 }
 
-/// For each (cost, gain) whether no other costs no more and gains no less, one of the two strictly (Pareto).
-fn front(points: &[(f64, f64)]) -> Vec<bool> {
-    let beats = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 >= b.1 && a != b;
-    points.iter().map(|point| !points.iter().any(|other| beats(other, point))).collect()
-}
-
 impl TileTests {
     /// Samples lost over all rows: must be none.
     pub fn samples_lost(&self) -> u64 {
@@ -184,37 +179,75 @@ impl TileTests {
         format!("{table}\n{}; {} samples lost\n", key(), self.samples_lost())
     }
 
-    /// Writes the pictures, `tile_tests.csv` and, last, `summary.json`.
+    /// Writes the pictures, `tile_tests.csv` and `tile_tests.json`.
     ///
     /// # Errors
     /// [`OutputError`] with the file and the cause.
-    pub fn write(&self, dir: OutDir) -> Result<(), OutputError> {
-        let (x, subject) = ("multiply-adds per triangle", key());
-        let picture = |title, y, of: fn(&Row) -> (f64, bool)| {
-            Tradeoff { title, subject: &subject, x, y, panels: self.panels(of) }.picture()
-        };
-        picture("Sample test efficiency over cost", "efficiency (%)", |row| {
-            (row.efficiency, row.on_efficiency_front)
-        })
-        .write(&dir, "plots/tile_tests_efficiency")?;
-        picture("Tightness of the boxes over cost", "true volume over kept (%)", |row| {
-            (row.tightness, row.on_tightness_front)
-        })
-        .write(&dir, "plots/tile_tests_tightness")?;
-        dir.write_atomic("tile_tests.csv", |out| self.csv(out))?;
-        dir.complete(|out| Ok(serde_json::to_writer_pretty(out, self)?))?;
-        Ok(())
+    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+        let titles = ["Which tile tests pay: efficiency", "efficiency over the best (%)"];
+        self.picture(titles, |row| row.efficiency, look).write(dir, "plots/tile_tests_efficiency")?;
+        let titles = ["Which tile tests pay: tightness", "tightness over the best (%)"];
+        self.picture(titles, |row| row.tightness, look).write(dir, "plots/tile_tests_tightness")?;
+        dir.write_file("tile_tests.csv", |out| self.csv(out))?;
+        dir.write_json("tile_tests.json", self)
     }
 
-    fn panels(&self, of: fn(&Row) -> (f64, bool)) -> Vec<TradeoffPanel<'_>> {
-        let point = |row: &Row| {
-            let (gain, front) = of(row);
-            TradeoffPoint { label: row.tests.clone(), x: row.madds_per_triangle, y: 100.0 * gain, front }
+    /// Every combination as one point: cost and gain over those of the best of each scene, means over scenes.
+    fn picture(&self, [title, up]: [&str; 2], of: fn(&Row) -> f64, look: &Look) -> Picture {
+        let means = self.means(of);
+        let front = front(&means.iter().map(|mean| (mean.cost, mean.gain)).collect::<Vec<_>>());
+        let point = |mean: &Mean, name: String| (mean.cost, 100.0 * mean.gain, name);
+        let best = || means.iter().zip(&front).filter(|(_, on)| **on).map(|(mean, _)| mean);
+        let others = means.iter().zip(&front).filter(|(_, on)| !**on).map(|(mean, _)| mean);
+        // Named besides the frontier: no test, each alone, and all.
+        let named = |mean: &Mean| mean.tests.len() == 1 || mean.tests.len() == SWITCHES.len();
+        let mut steps: Vec<(f64, f64)> = best().map(|mean| (mean.cost, 100.0 * mean.gain)).collect();
+        steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let series = vec![
+            Series::new("frontier", Mark::Steps(steps)).painted(Paint::Ink),
+            Series::new(
+                "a combination of tests",
+                Mark::Rings(
+                    others
+                        .map(|m| point(m, if named(m) { words(&m.tests) } else { String::new() }))
+                        .collect(),
+                ),
+            )
+            .painted(Paint::Like(0)),
+            Series::new(
+                "on the frontier",
+                Mark::Dots(best().map(|mean| point(mean, words(&mean.tests))).collect()),
+            )
+            .painted(Paint::Like(1)),
+        ];
+        let scenes = self.rows.chunk_by(|a, b| a.scene == b.scene).count();
+        let subject = format!(
+            "multiply-adds of tile and sample tests for a triangle, over the least of each scene; means over {scenes} scenes; named: the \
+             frontier, each test alone, none and all"
+        );
+        let axes = [
+            AxisSpec { name: "cost over the least".to_owned(), scale: Scale::Decades, ..AxisSpec::default() },
+            AxisSpec { name: up.to_owned(), scale: Scale::FromZero, ..AxisSpec::default() },
+        ];
+        Chart::new(title, &subject, vec![ChartPanel::over("", axes, series)]).picture(look)
+    }
+
+    /// Cost and gain of every combination, over the least cost and the greatest gain of each scene: geometric and arithmetic means.
+    fn means(&self, of: fn(&Row) -> f64) -> Vec<Mean> {
+        let scenes: Vec<&[Row]> = self.rows.chunk_by(|a, b| a.scene == b.scene).collect();
+        let combinations = scenes.first().map_or(0, |rows| rows.len());
+        let count = scenes.len().max(1) as f64;
+        let mean = |place: usize| {
+            let (mut cost, mut gain) = (0.0, 0.0);
+            for rows in &scenes {
+                let least = rows.iter().map(|row| row.madds_per_triangle).fold(f64::INFINITY, f64::min);
+                let most = rows.iter().map(of).fold(f64::MIN_POSITIVE, f64::max);
+                cost += libm::log(rows[place].madds_per_triangle / least) / count;
+                gain += of(&rows[place]) / most / count;
+            }
+            Mean { tests: scenes[0][place].tests.clone(), cost: libm::exp(cost), gain }
         };
-        let by_scene = self.rows.chunk_by(|a, b| a.scene == b.scene);
-        by_scene
-            .map(|rows| TradeoffPanel { name: &rows[0].scene, points: rows.iter().map(point).collect() })
-            .collect()
+        (0..combinations).map(mean).collect()
     }
 
     fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {
@@ -222,6 +255,30 @@ impl TileTests {
         self.rows.iter().try_for_each(|row| csv.serialize(row))?;
         Ok(csv.flush()?)
     }
+}
+
+/// A combination of tests over all scenes.
+struct Mean {
+    tests: String,
+    cost: f64,
+    gain: f64,
+}
+
+/// The tests behind letters: `sides + edges`.
+fn words(letters: &str) -> String {
+    match letters.len() {
+        1 if letters == "-" => return "no test".to_owned(),
+        n if n == SWITCHES.len() => return "all tests".to_owned(),
+        _ => {}
+    }
+    let on = SWITCHES.iter().filter(|switch| letters.contains(switch.letter));
+    on.map(|switch| switch.name).collect::<Vec<_>>().join(" + ")
+}
+
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    let plots = ["plots/tile_tests_efficiency", "plots/tile_tests_tightness"];
+    Claim::new("chart tile-tests").plots(plots).files(["tile_tests.csv", "tile_tests.json"])
 }
 
 /// What the letters mean.
@@ -234,13 +291,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_front_is_what_nothing_beats() {
-        let points = [(1.0, 0.1), (2.0, 0.5), (2.0, 0.4), (3.0, 0.5), (4.0, 0.9), (4.0, 0.9)];
-        assert_eq!(front(&points), [true, true, false, false, true, true]);
-        assert!(front(&[]).is_empty());
-    }
-
-    #[test]
     fn every_combination_is_held_against_none_and_the_best_is_marked() {
         let gpu = GpuSpec::load("reference").unwrap();
         let rows = of_family("speed", 0.1, true, &gpu).unwrap();
@@ -251,10 +301,10 @@ mod tests {
         assert!(cheapest.on_efficiency_front && cheapest.tests != "-", "{cheapest:?}");
         let chart = TileTests { rows };
         let out = tempfile::tempdir().unwrap();
-        chart.write(OutDir::create(out.path()).unwrap()).unwrap();
+        OutDir::with(out.path(), claim(), |dir| chart.write(dir, &Look::default())).unwrap();
         let csv = std::fs::read_to_string(out.path().join("tile_tests.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + (1 << SWITCHES.len()));
         assert!(csv.starts_with("scene,tests,madds_per_triangle"));
-        assert!(chart.text().contains("s = side_planes") && out.path().join("summary.json").exists());
+        assert!(chart.text().contains("s = side_planes") && out.path().join("tile_tests.json").exists());
     }
 }

@@ -27,6 +27,7 @@ use crate::run::RunError;
 use choice::{Choices, Trial};
 use measure::Row;
 pub use report::Report;
+pub(crate) use report::claim;
 
 /// The seed of the scenes.
 const SEED: u64 = 1;

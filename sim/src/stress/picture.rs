@@ -1,15 +1,17 @@
-//! The pictures of a sweep: methods by families, and each family along its parameter.
+//! The pictures of a sweep: methods by families, and each family along its parameter, a small panel for each method.
 
 use workloads::stress::Family;
 
 use super::choice::{Choice, Choices};
 use super::measure::Row;
-use super::methods::METHODS;
+use super::methods::{METHODS, Method};
 use super::report::Report;
-use crate::output::plot::{Matrix, MatrixPanel, Picture, Sweep, SweepCurve, SweepPanel};
+use crate::output::plot::{
+    Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series,
+};
 
 /// Cost over that of the best method, by method and family: at the first and at the worst value.
-pub(super) fn matrix(report: &Report) -> Picture {
+pub(super) fn matrix(report: &Report, look: &Look) -> Picture {
     let panel = |name, first| MatrixPanel {
         name,
         rows: METHODS
@@ -35,11 +37,11 @@ pub(super) fn matrix(report: &Report) -> Picture {
             panel("at the value of each family that is worst for the method", false),
         ],
     }
-    .picture()
+    .picture(look)
 }
 
 /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that is worst for it.
-pub(super) fn auto(choices: &Choices) -> Picture {
+pub(super) fn auto(choices: &Choices, look: &Look) -> Picture {
     type Cost = fn(&Choice) -> f64;
     let costs: [(&str, Cost); 2] = [
         ("auto", |choice| choice.over_best),
@@ -64,63 +66,107 @@ pub(super) fn auto(choices: &Choices) -> Picture {
             MatrixPanel { name: "the worst value, with a choice for it alone", rows: values.to_vec() },
         ],
     }
-    .picture()
+    .picture(look)
 }
 
-/// Cost, efficiency and width of intervals of one family along its parameter.
-pub(super) fn family(report: &Report, family: &Family) -> Picture {
+/// Panels of a row on a page.
+const ACROSS: usize = 7;
+
+/// What is measured of a method at each value of a family.
+pub(super) struct Measure {
+    /// What is behind the family's name in names of files; nothing for the cost.
+    pub stem: &'static str,
+    title: &'static str,
+    /// The name of the axis.
+    name: &'static str,
+    scale: Scale,
+    of: fn(&Row) -> Option<f64>,
+}
+
+/// Cost and efficiency.
+pub(super) const MEASURES: [Measure; 2] = [
+    Measure {
+        stem: "",
+        title: "cost",
+        name: "madds per triangle",
+        scale: Scale::Decades,
+        of: |row| Some(row.work.madds().max(1) as f64 / row.triangles.max(1) as f64),
+    },
+    Measure {
+        stem: "_efficiency",
+        title: "sample test efficiency",
+        name: "efficiency (%)",
+        scale: Scale::FromZero,
+        of: |row| row.work.efficiency().map(|share| 100.0 * share),
+    },
+];
+
+/// A measure of one family along its parameter: a small panel for each method, the other methods as grey lines behind it.
+pub(super) fn family(report: &Report, family: &Family, measure: &Measure, look: &Look) -> Picture {
     let rows: Vec<&Row> = report.of(family).collect();
+    let line = |name: &str| -> Vec<(f64, f64)> {
+        let values = rows.iter().filter(|row| row.method == name).map(|row| (measure.of)(row)).enumerate();
+        values.filter_map(|(place, value)| Some((place as f64, value?))).collect()
+    };
+    let all: Vec<Vec<(f64, f64)>> = METHODS.iter().map(|method| line(method.name)).collect();
+    let panel = |(method, own): (&Method, &Vec<(f64, f64)>)| {
+        let others = Series::new("", Mark::Faint(all.clone())).painted(Paint::Grey);
+        let own = Series::curve("", own.iter().copied()).painted(Paint::Like(0));
+        ChartPanel::new(method.name, ["", measure.name], vec![others, own])
+            .on(Scale::Even, measure.scale.clone())
+            .along(family.parameter, &values(&rows))
+    };
+    let title = format!("Where methods fail: {}, {}", family.name, measure.title);
+    let subject = format!(
+        "{}; grey: all other methods; {} samples lost",
+        family.what,
+        rows.iter().map(|row| row.samples_lost).sum::<u64>()
+    );
+    let panels = METHODS.iter().zip(&all).map(panel).collect();
+    Chart::new(&title, &subject, panels).small(ACROSS).picture(look)
+}
+
+fn values(rows: &[&Row]) -> Vec<String> {
     let mut values: Vec<String> = rows.iter().map(|row| row.value.to_string()).collect();
     values.dedup();
-    let by_method = |of: &dyn Fn(&Row) -> Option<f64>| -> Vec<SweepCurve<'_>> {
-        let curve = |name| SweepCurve {
-            name,
-            points: rows.iter().filter(|row| row.method == name).map(|row| of(row)).collect(),
-        };
-        METHODS.iter().map(|method| curve(method.name)).collect()
-    };
-    let per_triangle = |row: &Row| Some(row.work.madds().max(1) as f64 / row.triangles.max(1) as f64);
-    let subject = format!(
-        "{}; {} samples lost; true intervals from {}",
-        family.what,
-        rows.iter().map(|row| row.samples_lost).sum::<u64>(),
-        rows.last().map_or("nothing", |row| row.truth),
-    );
-    let title = format!("Where methods fail: {}", family.name);
-    Sweep {
-        title: &title,
-        subject: &subject,
-        x: family.parameter,
-        values: &values,
-        panels: vec![
-            SweepPanel { name: "multiply-adds per triangle", log: true, series: by_method(&per_triangle) },
-            SweepPanel {
-                name: "sample test efficiency (%)",
-                log: false,
-                series: by_method(&|row| row.work.efficiency().map(|share| 100.0 * share)),
-            },
-            SweepPanel { name: "mean width of boxes (%)", log: false, series: widths(&rows) },
-        ],
-    }
-    .picture()
+    values
 }
 
-/// The boxes that the side planes leave, and the true ones.
-fn widths(rows: &[&Row]) -> Vec<SweepCurve<'static>> {
-    let curve = |name, of: fn(&Row) -> f64| SweepCurve {
-        name,
-        points: rows.iter().filter(|row| row.method == "sides").map(|row| Some(100.0 * of(row))).collect(),
+/// Width of the boxes that the side planes leave, and of the true ones.
+pub(super) fn intervals(report: &Report, family: &Family, look: &Look) -> Picture {
+    let rows: Vec<&Row> = report.of(family).collect();
+    let curve = |name: &str, of: fn(&Row) -> f64| {
+        let sides = rows.iter().filter(|row| row.method == "sides").enumerate();
+        Series::curve(name, sides.map(|(place, row)| (place as f64, 100.0 * of(row))))
     };
-    vec![
-        curve("t, side planes", |row| row.intervals.t_width),
-        curve("t, true", |row| row.intervals.t_true),
-        curve("u, side planes", |row| row.intervals.u_width),
-        curve("u, true", |row| row.intervals.u_true),
-        curve("tiles kept by side planes", |row| {
-            row.intervals.pairs_kept as f64 / row.intervals.pairs.max(1) as f64
-        }),
-        curve("tiles truly touched", |row| {
-            row.intervals.pairs_touching as f64 / row.intervals.pairs.max(1) as f64
-        }),
-    ]
+    let panel = |title: &str, curves| {
+        ChartPanel::new(title, ["", "share of all (%)"], curves)
+            .on(Scale::Even, Scale::FromZero)
+            .along(family.parameter, &values(&rows))
+    };
+    let by = ["side planes", "true"];
+    let panels = vec![
+        panel(
+            "time",
+            vec![curve(by[0], |row| row.intervals.t_width), curve(by[1], |row| row.intervals.t_true)],
+        ),
+        panel(
+            "lens, across",
+            vec![curve(by[0], |row| row.intervals.u_width), curve(by[1], |row| row.intervals.u_true)],
+        ),
+        panel(
+            "tiles",
+            vec![
+                curve(by[0], |row| row.intervals.pairs_kept as f64 / row.intervals.pairs.max(1) as f64),
+                curve(by[1], |row| row.intervals.pairs_touching as f64 / row.intervals.pairs.max(1) as f64),
+            ],
+        ),
+    ];
+    let title = format!("What side planes leave: {}", family.name);
+    let subject = format!(
+        "{}; means over triangles and tiles; true intervals from {}",
+        family.what,
+        rows.last().map_or("nothing", |row| row.truth)
+    );
+    Chart::new(&title, &subject, panels).picture(look)
 }

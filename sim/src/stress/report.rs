@@ -7,8 +7,10 @@ use super::choice::Choices;
 use super::measure::Row;
 use super::methods::METHODS;
 use super::picture;
+use crate::output::dir::SUMMARY;
+use crate::output::plot::Look;
 use crate::output::table::{Table, grouped};
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
 /// Everything a sweep found out.
 pub struct Report {
@@ -35,6 +37,23 @@ pub struct Summary<'a> {
     pub auto: &'a Choices,
     /// Every row.
     pub rows: &'a [Row],
+}
+
+/// The files of the catalogue.
+pub(crate) fn claim() -> Claim {
+    let endings = || picture::MEASURES.iter().map(|measure| measure.stem).chain(["_intervals"]);
+    let families = workloads::stress::families()
+        .flat_map(|family| endings().map(move |ending| format!("{}{ending}", stem(family.name))));
+    Claim::new("stress").plots(families.chain(["matrix", "auto"].map(stem))).files([
+        "stress.csv",
+        "auto.csv",
+        SUMMARY,
+    ])
+}
+
+/// The path of a picture without its ending.
+fn stem(name: &str) -> String {
+    format!("plots/stress_{}", name.replace('-', "_"))
 }
 
 impl Report {
@@ -146,29 +165,31 @@ impl Report {
         table
     }
 
-    /// Writes the pictures, `stress.csv` and, last, `summary.json`.
+    /// Writes the pictures, `stress.csv`, `auto.csv` and `summary.json`.
     ///
     /// # Errors
     /// [`OutputError`] with the file and the cause.
-    pub fn write(&self, dir: OutDir) -> Result<(), OutputError> {
-        dir.remove_stale("plots", "stress_", &["svg", "png"])?;
+    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
         if self.families.len() > 1 {
-            picture::matrix(self).write(&dir, "plots/stress_matrix")?;
-            picture::auto(&self.auto).write(&dir, "plots/stress_auto")?;
+            picture::matrix(self, look).write(dir, &stem("matrix"))?;
+            picture::auto(&self.auto, look).write(dir, &stem("auto"))?;
         }
         for family in &self.families {
-            let stem = format!("plots/stress_{}", family.name.replace('-', "_"));
-            picture::family(self, family).write(&dir, &stem)?;
+            let stem = stem(family.name);
+            for measure in &picture::MEASURES {
+                let stem = format!("{stem}{}", measure.stem);
+                picture::family(self, family, measure, look).write(dir, &stem)?;
+            }
+            picture::intervals(self, family, look).write(dir, &format!("{stem}_intervals"))?;
         }
-        dir.write_atomic("stress.csv", |out| self.csv(out))?;
-        dir.write_atomic("auto.csv", |out| {
+        dir.write_file("stress.csv", |out| self.csv(out))?;
+        dir.write_file("auto.csv", |out| {
             let mut csv = csv::Writer::from_writer(out);
             let choices = self.auto.families.iter().chain(&self.auto.values);
             choices.into_iter().try_for_each(|choice| csv.serialize(choice))?;
             Ok(csv.flush()?)
         })?;
-        dir.complete(|out| Ok(serde_json::to_writer_pretty(out, &self.summary())?))?;
-        Ok(())
+        dir.write_json(SUMMARY, &self.summary())
     }
 
     fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), crate::output::dir::BoxError> {

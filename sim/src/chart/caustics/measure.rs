@@ -6,7 +6,7 @@ use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
 use workloads::caustics::{Floor, Light, Method, Picture, SQUARES, Squares, crossing, doubts, draw, error};
 
-use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, water};
+use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, aside_of, water};
 use super::{CausticsChart, Coarse, Effort, Row, crossed};
 use crate::chart::ChartError;
 use crate::output::progress::{Bar, Progress};
@@ -30,12 +30,18 @@ pub struct Ocean {
     pub runs: Vec<Vec<u32>>,
 }
 
-/// Counts the executions of every method on an ocean of `2 cells^2` volumes.
+/// Counts the executions of every method on an ocean of `2 cells^2` volumes, its waves of this slope and so many metres deep.
 ///
 /// # Errors
 /// When `size` is no size of an image.
-pub fn ocean(cells: u32, size: [u32; 2], progress: &Progress) -> Result<Ocean, ChartError> {
-    let (beams, eye) = (water(cells, SLOPE).beams(0.0), aside(size)?);
+pub fn ocean(
+    cells: u32,
+    [slope, depth_m]: [f64; 2],
+    size: [u32; 2],
+    progress: &Progress,
+) -> Result<Ocean, ChartError> {
+    let water = Water { depth_m, ..water(cells, slope) };
+    let (beams, eye) = (water.beams(0.0), aside_of(depth_m, size)?);
     let bar = progress.bar("ocean", 4);
     let pictures = Method::ALL.map(|method| {
         let picture = draw(&beams, &eye, method, None);
@@ -52,7 +58,7 @@ pub fn ocean(cells: u32, size: [u32; 2], progress: &Progress) -> Result<Ocean, C
 }
 
 pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, ChartError> {
-    let ocean = ocean(effort.ocean_cells, effort.ocean_px, progress)?;
+    let ocean = ocean(effort.ocean_cells, [SLOPE, DEPTH_M], effort.ocean_px, progress)?;
     let steps = effort.slopes.len() * 4
         + COARSE_SLOPES.len() * effort.coarse_cells.len()
         + effort.pleated_cells.len() * effort.pleats.len();

@@ -6,17 +6,17 @@ mod measure;
 mod output;
 pub(crate) mod view;
 
-use std::path::Path;
-
 use serde::Serialize;
 use workloads::caustics::Method;
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use crossed::Crossed;
 pub use measure::{Ocean, ocean};
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -129,15 +129,18 @@ pub struct CausticsChart {
     pub crossed: Vec<Crossed>,
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<CausticsChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<CausticsChart, ChartError> {
     let chart = measure::measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 
@@ -161,7 +164,10 @@ mod tests {
             floor_px: 48,
             repeats: 1,
         };
-        let chart = chart(least, folder.path(), &Progress::new(true)).unwrap();
+        let chart = OutDir::with(folder.path(), claim(), |dir| {
+            chart(least, dir, &Look::default(), &Progress::new(true))
+        })
+        .unwrap();
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("caustics.json")).unwrap();
         assert_eq!(json["rows"].as_array().unwrap().len(), 2 * 4);

@@ -4,23 +4,32 @@ use workloads::caustics::Method;
 
 use super::{CausticsChart, Ocean, Row, failures};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, HeatMapPlot, HeatTile, Picture, Scale};
+use crate::output::plot::{Chart, ChartPanel, HeatMapPlot, HeatTile, Look, Picture, Scale, Series, Shading};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "caustics", &["svg", "png", "csv", "json"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart caustics")
+        .plots([
+            "caustics",
+            "caustics_failures",
+            "caustics_map_moving",
+            "caustics_map_refined",
+            "caustics_map_hull",
+            "caustics_map_prism",
+        ])
+        .files(["caustics.csv", "caustics.json"])
 }
 
 /// Writes pictures and numbers; `caustics.json` comes last.
-pub(super) fn write(chart: &CausticsChart, dir: &OutDir) -> Result<(), OutputError> {
-    chart.picture().write(dir, "caustics")?;
-    failures::picture(chart).write(dir, "caustics_failures")?;
+pub(super) fn write(chart: &CausticsChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+    chart.picture(look).write(dir, "caustics")?;
+    failures::picture(chart, look).write(dir, "caustics_failures")?;
     for (method, name) in Method::ALL.into_iter().zip(["moving", "refined", "hull", "prism"]) {
-        chart.ocean.map(method).write(dir, &format!("caustics_map_{name}"))?;
+        chart.ocean.map(method, look).write(dir, &format!("caustics_map_{name}"))?;
     }
-    dir.write_atomic("caustics.csv", |out| chart.csv(out))?;
+    dir.write_file("caustics.csv", |out| chart.csv(out))?;
     dir.write_json("caustics.json", chart)?;
     Ok(())
 }
@@ -29,9 +38,31 @@ pub(super) fn write(chart: &CausticsChart, dir: &OutDir) -> Result<(), OutputErr
 const MAP_PX: u32 = 4;
 
 impl Ocean {
-    /// Executions of a method at every pixel (Fig. 8).
-    pub fn map(&self, method: Method) -> Picture {
+    /// Executions of a method at every pixel (Fig. 8), in colours that are the same for all methods.
+    pub fn map(&self, method: Method, look: &Look) -> Picture {
         let place = Method::ALL.iter().position(|known| *known == method).unwrap_or(0);
+        let values = (0..self.runs.len()).flat_map(|place| self.tiles(place)).map(|tile| tile.value);
+        HeatMapPlot {
+            title: &format!("Shader executions of a pixel: {}", method.name()),
+            subject: &format!(
+                "{} volumes under waves, {}x{} pixels; {} executions in all, {:.2} of the prism's; the same colours for all methods",
+                self.volumes,
+                self.size[0],
+                self.size[1],
+                self.executions[place],
+                self.executions[place] as f64 / self.executions[3] as f64
+            ),
+            label: "executions",
+            size: self.size,
+            tiles: &self.tiles(place),
+            shading: Shading::UpTo(values.fold(0.0, f64::max)),
+            brightness: &[],
+        }
+        .picture(look)
+    }
+
+    /// Means over squares of pixels of the executions of the method at `place`.
+    fn tiles(&self, place: usize) -> Vec<HeatTile> {
         let ([width, height], runs) = (self.size, &self.runs[place]);
         let mean = |x: u32, y: u32| {
             let size = [MAP_PX.min(width - x), MAP_PX.min(height - y)];
@@ -43,23 +74,9 @@ impl Ocean {
             HeatTile { origin: [x, y], size, value: sum as f64 / f64::from(size[0] * size[1]) }
         };
         let rows = (0..height).step_by(MAP_PX as usize);
-        let tiles: Vec<_> = rows
-            .flat_map(|y| (0..width).step_by(MAP_PX as usize).map(move |x| (x, y)))
+        rows.flat_map(|y| (0..width).step_by(MAP_PX as usize).map(move |x| (x, y)))
             .map(|(x, y)| mean(x, y))
-            .collect();
-        HeatMapPlot {
-            title: &format!("Shader executions of a pixel: {}", method.name()),
-            subject: &format!(
-                "{} volumes under waves, {width}x{height} pixels; {} executions in all, {:.2} of the prism's",
-                self.volumes,
-                self.executions[place],
-                self.executions[place] as f64 / self.executions[3] as f64
-            ),
-            label: "executions",
-            size: self.size,
-            tiles: &tiles,
-        }
-        .picture()
+            .collect()
     }
 }
 
@@ -113,11 +130,11 @@ impl CausticsChart {
         Some(format!("{name} draws another image than the moving triangles; please report it"))
     }
 
-    fn picture(&self) -> Picture {
+    fn picture(&self, look: &Look) -> Picture {
         let by_method = |of: fn(&Row) -> f64| {
             let curve = |method: Method| {
                 let rows = self.rows.iter().filter(move |row| row.method == method);
-                Curve::new(method.name(), rows.map(|row| (row.slope, of(row))))
+                Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
             };
             Method::ALL.map(curve).into()
         };
@@ -130,14 +147,14 @@ impl CausticsChart {
             2 * self.effort.sweep_cells * self.effort.sweep_cells
         );
         let panel = |title: &str, up: &str, curves| {
-            CurvePanel::new(title, [slope, up], curves).on(Scale::Decades, Scale::Even)
+            ChartPanel::new(title, [slope, up], curves).on(Scale::Decades, Scale::Even)
         };
         let panels = vec![
             panel("cost", "shader executions", runs),
             panel("use", "share of executions that find light", useful),
             panel("cost", "CPU time (ms)", time),
         ];
-        Curves { title: "Caustics: beams and bodies about them", subject: &subject, panels }.picture()
+        Chart::new("Caustics: beams and bodies about them", &subject, panels).picture(look)
     }
 
     fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {

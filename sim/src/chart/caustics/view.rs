@@ -9,7 +9,7 @@ use crate::chart::ChartError;
 /// Side and depth of the water and its longest waves, in metres.
 pub(crate) const SIDE_M: f64 = 16.0;
 pub(crate) const DEPTH_M: f64 = 5.0;
-const WAVE_M: f64 = 4.0;
+pub(crate) const WAVE_M: f64 = 4.0;
 /// The slope of the paper's ocean is not given; this is a fresh breeze (Cox and Munk 1954 have 0.15 at some 4 m/s).
 pub(crate) const SLOPE: f64 = 0.15;
 /// Decides what the waves are like.
@@ -23,7 +23,12 @@ pub(crate) fn water(cells: u32, slope: f64) -> Ocean {
 
 /// All of the water from the side, a little above and askew.
 pub(crate) fn aside(size: [u32; 2]) -> Result<Eye, ChartError> {
-    from_the_side(DVec3::new(0.6, -0.5 * DEPTH_M, 0.3), 6.5, size)
+    aside_of(DEPTH_M, size)
+}
+
+/// The same for water of another depth.
+pub(crate) fn aside_of(depth_m: f64, size: [u32; 2]) -> Result<Eye, ChartError> {
+    from_the_side(DVec3::new(0.6, -0.5 * depth_m, 0.3), 6.5, size)
 }
 
 /// Water about `middle`, `reach` metres up and down.

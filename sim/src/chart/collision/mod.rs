@@ -4,15 +4,16 @@
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use serde::Serialize;
 use workloads::collision::families::{Case, cases, like_yardsticks};
 use workloads::collision::{Method, Search};
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
+
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -182,13 +183,16 @@ fn ways(effort: &Effort) -> Vec<Way> {
     [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(each).collect()
 }
 
-/// Measures and draws the chart into `out`.
+/// Measures and draws the chart into `dir`.
 ///
 /// # Errors
 /// When files cannot be written or a thread cannot be started.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<CollisionChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<CollisionChart, ChartError> {
     let sets = [
         (Set::Families, all_cases(&effort), ways(&effort)),
         (Set::LikeYardsticks, like_yardsticks(1, effort.yardsticks), yardstick_ways(&effort)),
@@ -204,6 +208,6 @@ pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<Collisio
     let slides = measure::slides(&effort, progress);
     let [pairs, yardstick_pairs] = sets.each_ref().map(|(_, cases, _)| measure::pairs(cases));
     let chart = CollisionChart { effort, pairs, yardstick_pairs, rows, slides };
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }

@@ -2,27 +2,29 @@
 
 use super::{CollisionChart, Row, Set};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "collision", &["svg", "png", "csv", "json"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart collision")
+        .plots(["collision", "collision_failures"])
+        .files(["collision.csv", "collision.json"])
 }
 
 /// Writes pictures and numbers; `collision.json` comes last.
-pub(super) fn write(chart: &CollisionChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &CollisionChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let subject = subject(&chart.pairs);
     let title = "Pairs kept in vain by collision detection";
-    Curves { title, subject: &subject, panels: chart.panels() }.picture().write(dir, "collision")?;
+    Chart::new(title, &subject, chart.panels()).picture(look).write(dir, "collision")?;
     let (title, subject) = (
         "Where collision detection fails: grazing contact",
         "plates of 72 triangles that slide along each other without touching, any way round, looked at closer: in how many ways to lie they are kept in vain. \
          Marked: nine in ten and more at every resolution, where a run warns (collision-near-everywhere)",
     );
-    Curves { title, subject, panels: vec![chart.failures()] }.picture().write(dir, "collision_failures")?;
-    dir.write_atomic("collision.csv", |out| chart.csv(out))?;
+    Chart::new(title, subject, vec![chart.failures()]).picture(look).write(dir, "collision_failures")?;
+    dir.write_file("collision.csv", |out| chart.csv(out))?;
     dir.write_json("collision.json", chart)?;
     Ok(())
 }
@@ -68,7 +70,7 @@ impl CollisionChart {
     }
 
     /// Two objects and many over resolution, and over time.
-    fn panels(&self) -> Vec<CurvePanel> {
+    fn panels(&self) -> Vec<ChartPanel> {
         let mut names: Vec<&str> = Vec::new();
         let in_images = || self.rows.iter().filter(|row| row.cases == Set::Families && row.resolution > 0);
         for row in in_images() {
@@ -76,15 +78,15 @@ impl CollisionChart {
                 names.push(&row.way);
             }
         }
-        let curves = |point: &dyn Fn(&Row) -> (f64, f64)| -> Vec<Curve> {
+        let curves = |point: &dyn Fn(&Row) -> (f64, f64)| -> Vec<Series> {
             let of = |name: &&str| {
                 let rows = in_images().filter(|row| row.way == *name);
-                Curve::new(*name, rows.map(point))
+                Series::curve(*name, rows.map(point))
             };
             names.iter().map(of).collect()
         };
         let panel = |title: &str, across: &str, scale, point: &dyn Fn(&Row) -> (f64, f64)| {
-            CurvePanel::new(title, [across, "share kept in vain"], curves(point)).on(scale, Scale::Even)
+            ChartPanel::new(title, [across, "share kept in vain"], curves(point)).on(scale, Scale::Even)
         };
         let pixels = |row: &Row| f64::from(row.resolution);
         vec![
@@ -96,13 +98,13 @@ impl CollisionChart {
         ]
     }
 
-    fn failures(&self) -> CurvePanel {
+    fn failures(&self) -> ChartPanel {
         let curve = |&resolution: &u32| {
             let of = self.slides.iter().filter(|slide| slide.resolution == resolution);
-            Curve::new(format!("{resolution} px"), of.map(|slide| (slide.gap, slide.kept)))
+            Series::curve(format!("{resolution} px"), of.map(|slide| (slide.gap, slide.kept)))
         };
         let curves = self.effort.resolutions.iter().map(curve).collect();
-        CurvePanel::new("share kept in vain", ["gap (lengths of a plate)", "share of ways to lie"], curves)
+        ChartPanel::new("share kept in vain", ["gap (lengths of a plate)", "share of ways to lie"], curves)
             .on(Scale::Decades, Scale::Even)
             .failing(self.failing_gap().map(|gap| 0.0..gap), "fails")
     }

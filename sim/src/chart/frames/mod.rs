@@ -8,17 +8,17 @@ mod output;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
-
 use serde::Serialize;
 use traces::synth::{Recording, SCENARIOS};
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use measure::Outcome;
 use measure::{Subject, joined};
+pub(crate) use output::claim;
 
 /// A method fails where its F1 is below this.
 pub const FAILS_BELOW: f64 = 0.9;
@@ -193,13 +193,16 @@ impl FramesChart {
     }
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<FramesChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<FramesChart, ChartError> {
     let subjects: Vec<Subject> =
         SCENARIOS.iter().map(|scenario| Subject::new(scenario, &effort)).collect::<Result<_, _>>()?;
     let settings = Axis::ALL.into_iter().flat_map(|axis| {
@@ -220,6 +223,6 @@ pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<FramesCh
         }
     }
     let chart = FramesChart { effort, rows };
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }

@@ -4,17 +4,21 @@ use std::fmt::Write as _;
 
 use super::{Axis, FAILS_BELOW, FramesChart, Outcome, Row, Way};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, Sweep, SweepCurve, SweepPanel};
+use crate::output::plot::{Chart, ChartPanel, Look, Mark, Paint, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "frames", &["svg", "png", "csv", "json", "md"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart frames").plots(["frames_rate", "frames_noise", "frames_bits", "frames_time"]).files([
+        "frames.csv",
+        "frames.md",
+        "frames.json",
+    ])
 }
 
 /// Writes pictures and numbers; `frames.json` comes last.
-pub(super) fn write(chart: &FramesChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &FramesChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let effort = &chart.effort;
     let (scenes, seeds) = (traces::synth::SCENARIOS.len(), effort.seeds.len());
     let subject = format!(
@@ -29,55 +33,57 @@ pub(super) fn write(chart: &FramesChart, dir: &OutDir) -> Result<(), OutputError
         };
         let values: Vec<String> =
             chart.values(axis).into_iter().map(|value| format!("{}", value / unit)).collect();
-        let panels = vec![found(chart, axis), energy(chart, axis)];
-        let sweep = Sweep { title, subject: &subject, x, values: &values, panels };
-        sweep.picture().write(dir, &format!("frames_{}", axis.name()))?;
+        let panels: [fn(&FramesChart, Axis) -> ChartPanel; 2] = [found, energy];
+        let panels = panels.map(|panel| panel(chart, axis).along(x, &values));
+        Chart::new(title, &subject, panels.into())
+            .picture(look)
+            .write(dir, &format!("frames_{}", axis.name()))?;
     }
     let panels = vec![host_time(chart), found_over_time(chart)];
-    Curves { title: "Host time of finding frames", subject: &subject, panels }
-        .picture()
-        .write(dir, "frames_time")?;
-    dir.write_atomic("frames.csv", |out| csv(chart, out))?;
-    dir.write_atomic("frames.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
+    Chart::new("Host time of finding frames", &subject, panels).picture(look).write(dir, "frames_time")?;
+    dir.write_file("frames.csv", |out| csv(chart, out))?;
+    dir.write_file("frames.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
     dir.write_json("frames.json", chart)?;
     Ok(())
 }
 
-fn along(chart: &FramesChart, axis: Axis, way: Way, of: fn(&Outcome) -> Option<f64>) -> Vec<Option<f64>> {
-    chart.values(axis).into_iter().map(|value| chart.mean(axis, value, way, of)).collect()
+/// A curve over the places of the values, without those at which nothing is known.
+fn along(chart: &FramesChart, axis: Axis, way: Way, of: fn(&Outcome) -> Option<f64>) -> Series {
+    let means = chart.values(axis).into_iter().map(|value| chart.mean(axis, value, way, of)).enumerate();
+    Series::curve(way.name(), means.filter_map(|(place, mean)| Some((place as f64, mean?))))
 }
 
 /// F1, with the line below which a method fails.
-fn found(chart: &FramesChart, axis: Axis) -> SweepPanel<'static> {
-    let curve = |way: Way| SweepCurve { name: way.name(), points: along(chart, axis, way, |o| Some(o.f1)) };
-    let limit = SweepCurve { name: "fails below", points: vec![Some(FAILS_BELOW); chart.values(axis).len()] };
-    let series = Way::ALL.into_iter().map(curve).chain([limit]).collect();
-    SweepPanel { name: "F1 of starts within 0.5 ms", log: false, series }
+fn found(chart: &FramesChart, axis: Axis) -> ChartPanel {
+    let last = chart.values(axis).len().saturating_sub(1) as f64;
+    let limit = Series::new("fails below", Mark::Line(vec![(0.0, FAILS_BELOW), (last, FAILS_BELOW)]));
+    let curves = Way::ALL.into_iter().map(|way| along(chart, axis, way, |o| Some(o.f1)));
+    let series = curves.chain([limit.painted(Paint::Ink)]).collect();
+    ChartPanel::new("", ["", "F1 of starts within 0.5 ms"], series).on(Scale::Even, Scale::FromZero)
 }
 
-fn energy(chart: &FramesChart, axis: Axis) -> SweepPanel<'static> {
+fn energy(chart: &FramesChart, axis: Axis) -> ChartPanel {
     let percent: fn(&Outcome) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
-    let curve = |way: Way| SweepCurve { name: way.name(), points: along(chart, axis, way, percent) };
-    let series = Way::ALL.into_iter().map(curve).collect();
-    SweepPanel { name: "median energy error, %", log: true, series }
+    let curves = Way::ALL.into_iter().map(|way| along(chart, axis, way, percent)).collect();
+    ChartPanel::new("", ["", "median energy error (%)"], curves)
 }
 
-fn host_time(chart: &FramesChart) -> CurvePanel {
+fn host_time(chart: &FramesChart) -> ChartPanel {
     let of = |way: Way| timed(chart, way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
     let axes = ["sampling rate, Hz", "host seconds for a million samples"];
-    let curves = Way::ALL.map(|way| Curve::new(way.name(), of(way)));
-    CurvePanel::new("time over sampling rate", axes, curves.into())
+    let curves = Way::ALL.map(|way| Series::curve(way.name(), of(way)));
+    ChartPanel::new("time over sampling rate", axes, curves.into())
 }
 
-fn found_over_time(chart: &FramesChart) -> CurvePanel {
+fn found_over_time(chart: &FramesChart) -> ChartPanel {
     let curve = |way: Way| {
         let mut points: Vec<(f64, f64)> =
             timed(chart, way).into_iter().map(|(_, host_s, f1)| (host_s, f1)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Curve::new(way.name(), points)
+        Series::curve(way.name(), points)
     };
     let axes = ["host seconds for a million samples", "F1"];
-    CurvePanel::new("F1 over time, a dot for each rate", axes, Way::ALL.map(curve).into())
+    ChartPanel::new("F1 over time, a dot for each rate", axes, Way::ALL.map(curve).into())
 }
 
 /// Rate, host seconds for a million samples, and F1.

@@ -4,7 +4,9 @@ const SMALL: Effort = Effort { frames: 40, rates_hz: &[1e3, 20e3], snrs_db: &[30
 
 fn small() -> (tempfile::TempDir, FramesChart) {
     let dir = tempfile::tempdir().unwrap();
-    let chart = chart(SMALL, dir.path(), &Progress::new(true)).unwrap();
+    let chart =
+        OutDir::with(dir.path(), claim(), |dir| chart(SMALL, dir, &Look::default(), &Progress::new(true)))
+            .unwrap();
     (dir, chart)
 }
 

@@ -69,6 +69,7 @@ pub struct Bench {
     gpu: GpuSpec,
     effect: (&'static str, Effect),
     effort: Effort,
+    radius: f64,
 }
 
 /// Seeds of references start here.
@@ -87,7 +88,13 @@ impl Bench {
     pub fn new(effect: (&'static str, Effect), effort: Effort) -> Result<Self, ChartError> {
         let scene = stage(effect.1 != Effect::Reflection)?;
         let frame = scene.frame(0)?;
-        Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort })
+        Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort, radius: ROUGHNESS })
+    }
+
+    /// The same with a lens of another radius.
+    #[must_use]
+    pub fn with_radius(self, radius: f64) -> Self {
+        Self { radius, ..self }
     }
 
     fn map(&self, radius: f64, texels: u32) -> Result<Map, ChartError> {
@@ -125,7 +132,7 @@ impl Bench {
     /// # Errors
     /// When the hardware cannot be built.
     pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<Row, ChartError> {
-        let (map, draws) = (self.map(ROUGHNESS, self.effort.texels)?, self.draws()?);
+        let (map, draws) = (self.map(self.radius, self.effort.texels)?, self.draws()?);
         let look = (&self.gpu.pipeline, self.scene.background());
         let table = SampleSpec::default().table(samples, 1)?;
         let started = Instant::now();
@@ -154,7 +161,7 @@ impl Bench {
     /// # Errors
     /// When the hardware cannot be built.
     pub fn blurs(&self) -> Result<Vec<Blur>, ChartError> {
-        let map = self.map(ROUGHNESS, 64)?;
+        let map = self.map(self.radius, 64)?;
         let table = SampleSpec { lens: LensShape::Square, ..SampleSpec::default() }.table(64, 1)?;
         let blur = |&height: &f64| {
             let y = height as f32;

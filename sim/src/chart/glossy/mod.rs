@@ -6,16 +6,16 @@
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use serde::Serialize;
 use workloads::glossy::Effect;
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use measure::{Bench, Blur, Row, Wide};
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -54,15 +54,18 @@ pub struct GlossyChart {
     pub wides: Vec<Wide>,
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<GlossyChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    dir.remove_stale("", "glossy", &["svg", "png", "csv", "json"])?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<GlossyChart, ChartError> {
     let chart = measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 
@@ -111,7 +114,10 @@ mod tests {
     #[test]
     fn the_files_are_all_there() {
         let folder = tempfile::tempdir().unwrap();
-        chart(Effort { texels: 4, most_samples: 2, ..LEAST }, folder.path(), &Progress::new(true)).unwrap();
+        OutDir::with(folder.path(), claim(), |dir| {
+            chart(Effort { texels: 4, most_samples: 2, ..LEAST }, dir, &Look::default(), &Progress::new(true))
+        })
+        .unwrap();
         for file in
             ["glossy.csv", "glossy.json", "glossy_error.svg", "glossy_blur.png", "glossy_failures.svg"]
         {

@@ -1,25 +1,32 @@
 //! The files of the chart.
 
 use super::{EFFECTS, GlossyChart, Row};
-use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
+
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart glossy")
+        .plots(["glossy_error", "glossy_blur", "glossy_failures"])
+        .files(["glossy.csv", "glossy.json"])
+}
 
 /// Writes pictures and numbers; `glossy.json` comes last.
-pub(super) fn write(chart: &GlossyChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &GlossyChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let subject = format!(
         "RMSE in linear light against {} rays a texel, a map of {} rows",
         256 * chart.effort.reference_tables,
         chart.effort.texels
     );
-    let picture = |title: &str, panels| Curves { title, subject: &subject, panels }.picture();
+    let picture = |title: &str, panels| Chart::new(title, &subject, panels).picture(look);
     picture("Glossy maps: error and cost", rows(chart)).write(dir, "glossy_error")?;
     let subject = "the width on the plane of the blur of an edge at some height, in a map of 64 rows; below a texel blurs are not resolved";
     let title = "Glossy maps: contact hardens";
-    Curves { title, subject, panels: vec![blurs(chart)] }.picture().write(dir, "glossy_blur")?;
+    Chart::new(title, subject, vec![blurs(chart)]).picture(look).write(dir, "glossy_blur")?;
     picture("Where glossy maps fail: a lens wider than the receiver", vec![wides(chart)])
         .write(dir, "glossy_failures")?;
-    dir.write_atomic("glossy.csv", |out| {
+    dir.write_file("glossy.csv", |out| {
         let mut table = csv::Writer::from_writer(out);
         chart.rows.iter().try_for_each(|row| table.serialize(row))?;
         Ok(table.flush()?)
@@ -32,12 +39,12 @@ pub(super) fn write(chart: &GlossyChart, dir: &OutDir) -> Result<(), OutputError
 const WARNED: f64 = 1.0;
 
 /// For each effect the error over samples and over cost.
-fn rows(chart: &GlossyChart) -> Vec<CurvePanel> {
+fn rows(chart: &GlossyChart) -> Vec<ChartPanel> {
     let both = |effect: &'static str, of: fn(&Row) -> [(f64, f64); 2]| {
         let of_effect = move || chart.rows.iter().filter(move |row| row.effect == effect);
         vec![
-            Curve::new("one pass", of_effect().map(|row| of(row)[0])),
-            Curve::new("accumulation", of_effect().map(|row| of(row)[1])),
+            Series::curve("one pass", of_effect().map(|row| of(row)[0])),
+            Series::curve("accumulation", of_effect().map(|row| of(row)[1])),
         ]
     };
     let samples: fn(&Row) -> [(f64, f64); 2] = |row| {
@@ -52,9 +59,9 @@ fn rows(chart: &GlossyChart) -> Vec<CurvePanel> {
         .iter()
         .flat_map(|&(effect, _)| {
             [
-                CurvePanel::new(effect, ["samples a texel", "RMSE"], both(effect, samples))
+                ChartPanel::new(effect, ["samples a texel", "RMSE"], both(effect, samples))
                     .on(Scale::Doublings, Scale::Decades),
-                CurvePanel::new(
+                ChartPanel::new(
                     &format!("{effect}, over cost"),
                     ["samples tested", "RMSE"],
                     both(effect, tests),
@@ -64,11 +71,12 @@ fn rows(chart: &GlossyChart) -> Vec<CurvePanel> {
         .collect()
 }
 
-fn blurs(chart: &GlossyChart) -> CurvePanel {
-    let found = Curve::new("found in the map", chart.blurs.iter().map(|blur| (blur.height, blur.width)));
-    let expected = Curve::new("2 R h / (d + h)", chart.blurs.iter().map(|blur| (blur.height, blur.expected)));
+fn blurs(chart: &GlossyChart) -> ChartPanel {
+    let found = Series::curve("found in the map", chart.blurs.iter().map(|blur| (blur.height, blur.width)));
+    let expected =
+        Series::curve("2 R h / (d + h)", chart.blurs.iter().map(|blur| (blur.height, blur.expected)));
     let axes = ["height over the plane (scene units)", "width on the plane (scene units)"];
-    CurvePanel::new("blur of an edge", axes, vec![found, expected])
+    ChartPanel::new("blur of an edge", axes, vec![found, expected])
         .failing(Some(0.0..thinnest(chart)), "thinner than a texel")
 }
 
@@ -78,12 +86,12 @@ fn thinnest(chart: &GlossyChart) -> f64 {
     chart.blurs.iter().find(found).map_or(0.0, |blur| 0.8 * blur.height)
 }
 
-fn wides(chart: &GlossyChart) -> CurvePanel {
+fn wides(chart: &GlossyChart) -> ChartPanel {
     let of =
         |error: fn(&super::Wide) -> f64| chart.wides.iter().map(move |wide| (wide.over_half, error(wide)));
-    let noise = Curve::new("noise of 16 samples", of(|wide| wide.rmse_of_samples));
-    let lobe = Curve::new("lens against a cone that is the same everywhere", of(|wide| wide.rmse_of_lobe));
-    CurvePanel::new(
+    let noise = Series::curve("noise of 16 samples", of(|wide| wide.rmse_of_samples));
+    let lobe = Series::curve("lens against a cone that is the same everywhere", of(|wide| wide.rmse_of_lobe));
+    ChartPanel::new(
         "error",
         ["radius of the lens over half of the receiver's shorter side", "RMSE"],
         vec![noise, lobe],

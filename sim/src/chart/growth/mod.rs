@@ -6,16 +6,16 @@
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::ChartError;
 use super::fit::{exponent, upper_half};
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use measure::Point;
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -174,15 +174,18 @@ impl Kind {
     }
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<GrowthChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<GrowthChart, ChartError> {
     let chart = measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 

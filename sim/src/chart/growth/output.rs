@@ -5,22 +5,22 @@ use std::fmt::Write;
 use super::measure::LAYERS;
 use super::{GrowthChart, Kind, Row, Sweep};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "growth", &["svg", "png", "csv", "json", "md"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart growth").plots(["growth"]).files(["growth.csv", "growth.md", "growth.json"])
 }
 
 /// Writes picture and numbers; `growth.json` comes last.
-pub(super) fn write(chart: &GrowthChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &GrowthChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let (title, subject) = ("Time of the visibility engine", chart.subject());
     let panels = Sweep::ALL.map(|sweep| chart.panel(sweep)).into();
-    Curves { title, subject: &subject, panels }.picture().write(dir, "growth")?;
-    dir.write_atomic("growth.csv", |out| chart.csv(out))?;
-    dir.write_atomic("growth.md", |out| Ok(out.write_all(chart.markdown().as_bytes())?))?;
+    Chart::new(title, &subject, panels).picture(look).write(dir, "growth")?;
+    dir.write_file("growth.csv", |out| chart.csv(out))?;
+    dir.write_file("growth.md", |out| Ok(out.write_all(chart.markdown().as_bytes())?))?;
     dir.write_json("growth.json", chart)?;
     Ok(())
 }
@@ -56,7 +56,7 @@ impl GrowthChart {
         )
     }
 
-    fn panel(&self, sweep: Sweep) -> CurvePanel {
+    fn panel(&self, sweep: Sweep) -> ChartPanel {
         let base = &self.effort.base;
         let (triangles, samples, blur) = (
             format!("{} triangles", base.triangles),
@@ -70,17 +70,17 @@ impl GrowthChart {
         };
         let scale = if sweep == Sweep::Triangles { Scale::Decades } else { Scale::Doublings };
         let curves = Kind::ALL.map(|kind| self.curve(sweep, kind)).into();
-        CurvePanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
+        ChartPanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
     }
 
     /// A curve without points where there is none, so that the others keep their colours.
-    fn curve(&self, sweep: Sweep, kind: Kind) -> Curve {
+    fn curve(&self, sweep: Sweep, kind: Kind) -> Series {
         let row = self.rows.iter().find(|row| row.sweep == sweep && row.kind == kind);
         let points = row.iter().flat_map(|row| &row.points);
-        Curve {
-            name: kind.name().to_owned(),
-            note: row.and_then(|row| row.exponent).map_or(String::new(), |p| format!("{p:.2}")),
-            points: points.map(|point| (sweep.of(point), 1e3 * point.cpu_s)).collect(),
+        let note = row.and_then(|row| row.exponent).map_or(String::new(), |p| format!("{p:.2}"));
+        Series {
+            note,
+            ..Series::curve(kind.name(), points.map(|point| (sweep.of(point), 1e3 * point.cpu_s)))
         }
     }
 

@@ -52,8 +52,10 @@ fn what_is_counted_is_the_same_each_time_and_grows_with_blur() {
 #[test]
 fn the_files_are_all_there_and_agree() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("growth_old.png"), b"stale").unwrap();
-    let chart = chart(LEAST, folder.path(), &Progress::new(true)).unwrap();
+    std::fs::write(folder.path().join("growth_old.png"), b"mine").unwrap();
+    let chart =
+        OutDir::with(folder.path(), claim(), |dir| chart(LEAST, dir, &Look::default(), &Progress::new(true)))
+            .unwrap();
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let json: serde_json::Value = serde_json::from_str(&read("growth.json")).unwrap();
     // Triangles and samples in four kinds, blur in three.
@@ -63,5 +65,5 @@ fn the_files_are_all_there_and_agree() {
     assert!(read("growth.csv").lines().nth(1).unwrap().starts_with("triangles,still,"));
     assert!(read("growth.md").contains("| blur | both |") && chart.text().contains("32x32 pixels"));
     assert!(read("growth.svg").ends_with("</svg>\n") && folder.path().join("growth.png").exists());
-    assert!(!folder.path().join("growth_old.png").exists(), "what an older chart left is gone");
+    assert!(folder.path().join("growth_old.png").exists(), "a file that no chart wrote is gone");
 }

@@ -32,12 +32,11 @@ const LENS: f32 = 0.15;
 pub(super) const GAPS: f32 = 0.02;
 
 impl Kind {
-    fn yard(self, effort: &Effort, seed: u64, slats: u32) -> Result<Yard, ChartError> {
+    /// A yard of this kind with so many boxes, its walls whole.
+    pub(crate) fn spec(self, boxes: u32, seed: u64) -> YardSpec {
         let motion = if self == Self::Defocus { 0.0 } else { MOTION };
         let lens = if self == Self::Motion { 0.0 } else { LENS };
-        let gaps = if slats > 1 { GAPS } else { 0.0 };
-        let spec = YardSpec { walls: WALLS, slats, gaps, boxes: effort.boxes, motion, lens, seed };
-        spec.yard().ok_or_else(|| ChartError::Pipeline("a yard".to_owned()))
+        YardSpec { walls: WALLS, slats: 1, gaps: 0.0, boxes, motion, lens, seed }
     }
 
     fn boxes(self) -> &'static [[u32; 3]] {
@@ -49,7 +48,7 @@ impl Kind {
     }
 
     /// Boxes in the middle of the range.
-    fn typical(self) -> [u32; 3] {
+    pub(crate) fn typical(self) -> [u32; 3] {
         match self {
             Self::Motion => [1, 1, 8],
             Self::Defocus => [4, 4, 1],
@@ -59,12 +58,13 @@ impl Kind {
 }
 
 /// A yard whose walls are drawn and whose boxes were asked for by samples.
-struct Drawn {
+pub(crate) struct Drawn {
     yard: Yard,
     viewport: Viewport,
     table: SampleTable,
     depths: Vec<f32>,
-    seen: Vec<Seen>,
+    /// What sampled queries found, by box.
+    pub seen: Vec<Seen>,
 }
 
 fn refused(error: CacheError) -> ChartError {
@@ -72,9 +72,14 @@ fn refused(error: CacheError) -> ChartError {
 }
 
 impl Drawn {
-    fn new(effort: &Effort, yard: Yard, samples: u32) -> Result<Self, ChartError> {
+    /// Draws the walls of a yard into an image of `size` with `samples` in a pixel, and asks for every box by samples.
+    ///
+    /// # Errors
+    /// When there is no such yard or image.
+    pub fn new(size: [u32; 2], yard: &YardSpec, samples: u32) -> Result<Self, ChartError> {
+        let yard = yard.yard().ok_or_else(|| ChartError::Pipeline("a yard".to_owned()))?;
         let gpu = GpuSpec::load("reference")?;
-        let viewport = Viewport::new(effort.size[0], effort.size[1])
+        let viewport = Viewport::new(size[0], size[1])
             .ok_or_else(|| ChartError::Pipeline("an image without area".to_owned()))?;
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
@@ -86,8 +91,13 @@ impl Drawn {
         Ok(Self { yard, viewport, table, depths, seen })
     }
 
+    /// Samples whose depths are stored.
+    pub fn stored(&self) -> usize {
+        self.depths.len()
+    }
+
     /// By intervals, with so many boxes of lens and time and tiles of this side.
-    fn ask(&self, boxes: [u32; 3], tile_px: u32) -> (Vec<Answer>, f64) {
+    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> (Vec<Answer>, f64) {
         let grid = BoxGrid::new(boxes, self.yard.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.yard.camera, self.viewport);
@@ -187,8 +197,12 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionCh
 }
 
 fn drawn(effort: &Effort, kind: Kind, slats: u32, samples: u32, bar: &Bar) -> Result<Vec<Drawn>, ChartError> {
-    let yards = (0..effort.yards).map(|seed| Drawn::new(effort, kind.yard(effort, seed, slats)?, samples));
-    let yards = yards.collect();
+    let gaps = if slats > 1 { GAPS } else { 0.0 };
+    let drawn = |seed| {
+        let yard = YardSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
+        Drawn::new(effort.size, &yard, samples)
+    };
+    let yards = (0..effort.yards).map(drawn).collect();
     bar.inc();
     yards
 }

@@ -3,13 +3,15 @@
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
+
+pub(crate) use measure::Drawn;
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -126,15 +128,18 @@ pub struct OcclusionChart {
     pub failing: Vec<Row>,
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<OcclusionChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<OcclusionChart, ChartError> {
     let chart = measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 
@@ -155,7 +160,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let least =
             Effort { size: [64, 36], boxes: 24, yards: 1, samples: &[4, 8], tiles: &[8], slats: &[1, 8] };
-        let chart = chart(least, folder.path(), &Progress::new(true)).unwrap();
+        let chart = OutDir::with(folder.path(), claim(), |dir| {
+            chart(least, dir, &Look::default(), &Progress::new(true))
+        })
+        .unwrap();
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("occlusion.json")).unwrap();
         let rows = chart.intervals.len() + chart.samples.len() + chart.failing.len();

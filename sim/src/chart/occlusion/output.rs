@@ -4,20 +4,22 @@ use workloads::occlusion::HALF_COVERED;
 
 use super::{Kind, OcclusionChart, Row, measure};
 use crate::output::dir::BoxError;
-use crate::output::plot::{Curve, CurvePanel, Curves, Picture, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Picture, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "occlusion", &["svg", "png", "csv", "json"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart occlusion")
+        .plots(["occlusion", "occlusion_failures"])
+        .files(["occlusion.csv", "occlusion.json"])
 }
 
 /// Writes picture and numbers; `occlusion.json` comes last.
-pub(super) fn write(chart: &OcclusionChart, dir: &OutDir) -> Result<(), OutputError> {
-    chart.picture().write(dir, "occlusion")?;
-    chart.failures().write(dir, "occlusion_failures")?;
-    dir.write_atomic("occlusion.csv", |out| chart.csv(out))?;
+pub(super) fn write(chart: &OcclusionChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+    chart.picture(look).write(dir, "occlusion")?;
+    chart.failures(look).write(dir, "occlusion_failures")?;
+    dir.write_file("occlusion.csv", |out| chart.csv(out))?;
     dir.write_json("occlusion.json", chart)?;
     Ok(())
 }
@@ -68,40 +70,39 @@ impl OcclusionChart {
         (wrong > 0).then(|| format!("{wrong} objects that are seen were called hidden; please report it"))
     }
 
-    fn picture(&self) -> Picture {
+    fn picture(&self, look: &Look) -> Picture {
         let panels = Kind::ALL.map(|kind| self.rates(kind)).into();
         let subject = format!(
             "share of hidden boxes that are found, over bytes of stored depth read for each box that is asked for; {} samples a pixel, sampled queries 16 to 64; \
              dots of a tile from few boxes of lens and time to many",
             self.effort.samples[0]
         );
-        Curves { title: "Occlusion queries: by intervals and by samples", subject: &subject, panels }
-            .picture()
+        Chart::new("Occlusion queries: by intervals and by samples", &subject, panels).picture(look)
     }
 
-    fn rates(&self, kind: Kind) -> CurvePanel {
+    fn rates(&self, kind: Kind) -> ChartPanel {
         let of_tile = |&tile: &u32| {
             let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
             let mut points: Vec<_> = rows.map(|row| (row.bytes, row.rate())).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            Curve::new(format!("{tile}-pixel tiles"), points)
+            Series::curve(format!("{tile}-pixel tiles"), points)
         };
-        let mut curves: Vec<Curve> = self.effort.tiles.iter().map(of_tile).collect();
+        let mut curves: Vec<Series> = self.effort.tiles.iter().map(of_tile).collect();
         let sampled = self.samples.iter().filter(|row| row.kind == kind && row.boxes.is_none());
-        curves.push(Curve::new("sampled queries", sampled.map(|row| (row.bytes, row.rate()))));
-        CurvePanel::new(kind.name(), ["bytes of depth read for a box", "share found"], curves)
+        curves.push(Series::curve("sampled queries", sampled.map(|row| (row.bytes, row.rate()))));
+        ChartPanel::new(kind.name(), ["bytes of depth read for a box", "share found"], curves)
             .on(Scale::Decades, Scale::Even)
     }
 
     /// Walls of more and more slats: what is found, and why not more is.
-    fn failures(&self) -> Picture {
+    fn failures(&self, look: &Look) -> Picture {
         let panel = |title: &str, up: &str, of: fn(&Row) -> f64, ways: &[Option<u32>]| {
             let curve = |tile_px: &Option<u32>| {
                 let rows = self.failing.iter().filter(|row| row.tile_px == *tile_px);
                 let name = tile_px.map_or("sampled queries".to_owned(), |px| format!("{px}-pixel tiles"));
-                Curve::new(name, rows.map(|row| (f64::from(row.slats), of(row))))
+                Series::curve(name, rows.map(|row| (f64::from(row.slats), of(row))))
             };
-            CurvePanel::new(title, ["slats of a wall", up], ways.iter().map(curve).collect())
+            ChartPanel::new(title, ["slats of a wall", up], ways.iter().map(curve).collect())
                 .on(Scale::Doublings, Scale::Even)
                 .failing(self.warned().map(|slats| slats..f64::INFINITY), "a run warns")
         };
@@ -122,8 +123,7 @@ impl OcclusionChart {
             self.effort.samples[0],
             measure::FAILING_TILES[0]
         );
-        Curves { title: "Where occlusion queries fail: many small occluders", subject: &subject, panels }
-            .picture()
+        Chart::new("Where occlusion queries fail: many small occluders", &subject, panels).picture(look)
     }
 
     /// The number of slats from which on a run with the smaller tiles warns.

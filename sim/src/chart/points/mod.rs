@@ -6,16 +6,16 @@ mod failures;
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use failures::{Coarse, Columns};
 pub use measure::Row;
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -54,13 +54,16 @@ pub struct PointsChart {
     pub columns: Vec<Columns>,
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<PointsChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<PointsChart, ChartError> {
     let bar = progress.bar("points", 14);
     let failed = |message: String| ChartError::Pipeline(message);
     let mut rows = measure::rows::<2>(&effort, effort.radius[0], &bar).map_err(|e| failed(e.to_string()))?;
@@ -70,7 +73,7 @@ pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<PointsCh
     let columns = failures::columns(&effort).map_err(|e| failed(e.to_string()))?;
     bar.inc();
     let chart = PointsChart { effort, rows, coarse, columns };
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 
@@ -82,7 +85,10 @@ mod tests {
     fn a_quick_chart_is_written_and_the_maximal_method_alone_is_maximal() {
         let effort = Effort { radius: [0.06, 0.2], darts: 5000, seeds: 1, finest_bits: 16, white: 2000 };
         let out = tempfile::tempdir().unwrap();
-        let chart = chart(effort, out.path(), &Progress::new(true)).unwrap();
+        let chart = OutDir::with(out.path(), claim(), |dir| {
+            chart(effort, dir, &Look::default(), &Progress::new(true))
+        })
+        .unwrap();
         for row in &chart.rows {
             let maximal = row.hole_over_r <= 1.0 + 1e-9;
             assert_eq!(maximal, row.method == measure::VOIDS, "{row:?}");

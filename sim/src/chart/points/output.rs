@@ -5,28 +5,32 @@ use std::fmt::Write;
 use workloads::points::THIN;
 
 use super::{Coarse, PointsChart, Row};
-use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "points", &["svg", "png", "csv", "json", "md"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart points").plots(["points_quality", "points_spectra", "points_failures"]).files([
+        "points.csv",
+        "points.md",
+        "points.json",
+    ])
 }
 
 /// Writes pictures and numbers; `points.json` comes last.
-pub(super) fn write(chart: &PointsChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &PointsChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let [plane, space] = chart.effort.radius;
     let subject = format!("torus, r {plane} in the plane and {space} in space; CPU time of one thread");
-    let picture = |title, panels| Curves { title, subject: &subject, panels }.picture();
+    let picture = |title, panels| Chart::new(title, &subject, panels).picture(look);
     picture("Largest hole and free share over speed", quality(chart)).write(dir, "points_quality")?;
     picture("Power over frequency, all directions", spectra(chart)).write(dir, "points_spectra")?;
     let (title, subject) = (
         "Where points fail",
         "points of the plane that keep their distance, on coarser and coarser numbers (marked: points-thin-voids), and candidates for points that follow a density",
     );
-    Curves { title, subject, panels: failures(chart) }.picture().write(dir, "points_failures")?;
-    dir.write_atomic("points.csv", |out| {
+    Chart::new(title, subject, failures(chart)).picture(look).write(dir, "points_failures")?;
+    dir.write_file("points.csv", |out| {
         let mut table = csv::Writer::from_writer(out);
         table.write_record([
             "dimensions",
@@ -53,7 +57,7 @@ pub(super) fn write(chart: &PointsChart, dir: &OutDir) -> Result<(), OutputError
         }
         Ok(table.flush()?)
     })?;
-    dir.write_atomic("points.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
+    dir.write_file("points.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
     dir.write_json("points.json", chart)?;
     Ok(())
 }
@@ -64,13 +68,13 @@ fn by_method(chart: &PointsChart, dimensions: usize) -> impl Iterator<Item = &[R
     chart.rows.chunk_by(same).filter(move |rows| rows[0].dimensions == dimensions)
 }
 
-fn quality(chart: &PointsChart) -> Vec<CurvePanel> {
+fn quality(chart: &PointsChart) -> Vec<ChartPanel> {
     let panel = |dimensions, up: &str, of: fn(&Row) -> f64| {
         let curve = |rows: &[Row]| {
-            Curve::new(long_name(rows[0].method), rows.iter().map(|row| (row.points_per_s, of(row))))
+            Series::curve(long_name(rows[0].method), rows.iter().map(|row| (row.points_per_s, of(row))))
         };
         let title = format!("{up}, {dimensions}D");
-        CurvePanel::new(&title, ["points a second", up], by_method(chart, dimensions).map(curve).collect())
+        ChartPanel::new(&title, ["points a second", up], by_method(chart, dimensions).map(curve).collect())
     };
     vec![
         panel(2, "largest hole over r", |row| row.hole_over_r).on(Scale::Decades, Scale::Even),
@@ -88,32 +92,32 @@ fn long_name(method: &str) -> &str {
     }
 }
 
-fn spectra(chart: &PointsChart) -> Vec<CurvePanel> {
+fn spectra(chart: &PointsChart) -> Vec<ChartPanel> {
     let panel = |dimensions| {
         let last = by_method(chart, dimensions).filter_map(<[Row]>::last);
-        let curve = |row: &Row| Curve {
+        let curve = |row: &Row| Series {
             note: format!("peak {:.2}", row.peak.1),
-            ..Curve::new(row.method, row.spectrum.iter().copied())
+            ..Series::curve(row.method, row.spectrum.iter().copied())
         };
         let title = format!("{dimensions}D");
-        CurvePanel::new(&title, ["frequency over rate of points", "power"], last.map(curve).collect())
+        ChartPanel::new(&title, ["frequency over rate of points", "power"], last.map(curve).collect())
     };
     vec![panel(2), panel(3)]
 }
 
 /// Numbers too coarse for the disks, and columns too few for the density.
-fn failures(chart: &PointsChart) -> Vec<CurvePanel> {
+fn failures(chart: &PointsChart) -> Vec<ChartPanel> {
     let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
-        let curve = Curve::new("voids, 2D", chart.coarse.iter().map(|c| (c.radius_in_numbers, of(c))));
+        let curve = Series::curve("voids, 2D", chart.coarse.iter().map(|c| (c.radius_in_numbers, of(c))));
         let warned = |c: &&Coarse| c.thin_voids as f64 > THIN * c.points as f64;
         let last = chart.coarse.iter().rfind(warned);
-        CurvePanel::new(title, ["r in spacings of numbers", up], vec![curve])
+        ChartPanel::new(title, ["r in spacings of numbers", up], vec![curve])
             .on(Scale::Doublings, Scale::Decades)
             .failing(last.map(|c| 0.0..c.radius_in_numbers), "a run warns")
     };
     let of = |dimensions: usize| {
         let rows = chart.columns.iter().filter(move |c| c.dimensions == dimensions);
-        Curve::new(format!("{dimensions}D"), rows.map(|c| (f64::from(c.across), c.candidates_each)))
+        Series::curve(format!("{dimensions}D"), rows.map(|c| (f64::from(c.across), c.candidates_each)))
     };
     let columns = (1..=4).map(of).collect();
     vec![
@@ -121,7 +125,7 @@ fn failures(chart: &PointsChart) -> Vec<CurvePanel> {
             c.thin_voids as f64 / c.points as f64
         }),
         coarse("what that costs: holes", "largest hole beyond r, share of r", |c| c.beyond),
-        CurvePanel::new(
+        ChartPanel::new(
             "too few columns under a bell",
             ["columns along an axis", "candidates for a point"],
             columns,

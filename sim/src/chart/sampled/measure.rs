@@ -8,7 +8,8 @@ use workloads::Overrides;
 use super::{Cost, Effort, QUANTITIES, Trial};
 use crate::output::progress::Progress;
 use crate::run::{
-    Forecast, Plan, Quantity, RunError, RunOptions, Scout, Signatures, SimulatedFrame, frames_of, taken,
+    Distinct, Forecast, Plan, Quantity, RunError, RunOptions, Scout, Signatures, SimulatedFrame, frames_of,
+    taken,
 };
 use crate::timing::Sampling;
 
@@ -68,12 +69,15 @@ fn plan(scene: &str, effort: Effort) -> Result<Plan, RunError> {
         frames: Some(0..effort.frames),
         ..Overrides::default()
     };
-    let plan = Plan::resolve(RunOptions { scene: scene.to_owned(), overrides, ..RunOptions::default() })?;
-    if plan.work.is_animated() {
+    let plan = Plan::resolve(RunOptions { scene: scene.into(), overrides, ..RunOptions::default() })?;
+    let distinct = Distinct::new(&plan.work)?;
+    if distinct.numbers().len() == distinct.groups().len() {
         return Ok(plan);
     }
     Err(RunError::Setting(format!(
-        "{scene}: nothing moves in it, so one frame tells all; give an animated scene"
+        "{scene}: {} of its {} frames differ, so there is too little to predict; name an animated scene",
+        distinct.numbers().len(),
+        distinct.groups().len()
     )))
 }
 
@@ -95,7 +99,7 @@ fn trial(quantity: &'static str, truth: f64, found: Quantity) -> Trial {
         value: found.value,
         interval: [found.low, found.high],
         error_percent: (found.value / truth - 1.0) * 100.0,
-        half_width_percent: found.half_width_percent,
+        half_width_percent: found.relative_half_width * 100.0,
         inside: found.holds(truth),
     }
 }

@@ -10,6 +10,8 @@ use crate::output::progress::Progress;
 use crate::output::table::Table;
 use crate::run::RunError;
 
+pub(crate) use output::claim;
+
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Effort {

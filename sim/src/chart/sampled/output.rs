@@ -2,22 +2,23 @@
 
 use std::fmt::Write as _;
 
-use super::{QUANTITIES, SampledChart};
-use crate::output::plot::{Tradeoff, TradeoffPanel, TradeoffPoint};
-use crate::output::{OutDir, OutputError};
+use super::{QUANTITIES, SampledChart, Trial};
+use crate::output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Series};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// Errors below this are drawn here: the axes are logarithmic.
-const LEAST_PERCENT: f64 = 1e-3;
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart sampled").plots(["sampled"]).files(["sampled.csv", "sampled.md", "sampled.json"])
+}
 
 impl SampledChart {
     /// Writes the picture, every trial and the tables of the book; `sampled.json` comes last.
     ///
     /// # Errors
     /// Those of the folder.
-    pub fn write(&self, dir: &OutDir) -> Result<(), OutputError> {
-        dir.remove_stale("", "sampled", &["svg", "png", "csv", "json", "md"])?;
-        self.picture().picture().write(dir, "sampled")?;
-        dir.write_atomic("sampled.csv", |out| {
+    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+        self.picture(look).write(dir, "sampled")?;
+        dir.write_file("sampled.csv", |out| {
             let mut table = csv::Writer::from_writer(out);
             table.write_record([
                 "scene",
@@ -40,30 +41,37 @@ impl SampledChart {
             }
             Ok(table.flush()?)
         })?;
-        dir.write_atomic("sampled.md", |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
+        dir.write_file("sampled.md", |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
         dir.write_json("sampled.json", self)?;
         Ok(())
     }
 
-    /// Errors over half-widths, a panel for each quantity.
-    fn picture(&self) -> Tradeoff<'_> {
+    /// Errors over half-widths of intervals, a panel for each quantity.
+    fn picture(&self, look: &Look) -> Picture {
+        let axis =
+            |name: &str| AxisSpec { name: name.to_owned(), zero: "exact".to_owned(), ..AxisSpec::default() };
         let panel = |quantity: &'static str| {
-            let trials = self.trials.iter().filter(|trial| trial.quantity == quantity);
-            let points = trials.map(|trial| TradeoffPoint {
-                label: format!("{} {}", trial.scene, trial.seed),
-                x: trial.half_width_percent.max(LEAST_PERCENT),
-                y: trial.error_percent.abs().max(LEAST_PERCENT),
-                front: false,
-            });
-            TradeoffPanel { name: quantity, points: points.collect() }
+            let trials: Vec<&Trial> = self.trials.iter().filter(|trial| trial.quantity == quantity).collect();
+            let widths = || trials.iter().map(|trial| trial.half_width_percent).filter(|width| *width > 0.0);
+            let ends = [widths().reduce(f64::min), widths().reduce(f64::max)];
+            let equal = ends.into_iter().flatten().map(|width| (width, width)).collect();
+            let mut series =
+                vec![Series::new("error as large as the half-width", Mark::Line(equal)).painted(Paint::Ink)];
+            for (number, trials) in trials.chunk_by(|a, b| a.scene == b.scene).enumerate() {
+                let dot =
+                    |trial: &&Trial| (trial.half_width_percent, trial.error_percent.abs(), String::new());
+                let dots = Mark::Dots(trials.iter().map(dot).collect());
+                series.push(Series::new(&trials[0].scene, dots).painted(Paint::Like(number)));
+            }
+            ChartPanel::over(
+                quantity,
+                [axis("half-width of the 95 % interval (%)"), axis("error (%)")],
+                series,
+            )
         };
-        Tradeoff {
-            title: "Frames predicted from few",
-            subject: "each dot a choice of representatives; the truth is inside where the error is below the half-width",
-            x: "half-width of the 95 % interval, %",
-            y: "error, %",
-            panels: QUANTITIES.into_iter().map(panel).collect(),
-        }
+        let subject = "each point a choice of representatives; the truth is inside the interval of those below the line";
+        Chart::new("Frames predicted from few", subject, QUANTITIES.into_iter().map(panel).collect())
+            .picture(look)
     }
 
     /// The tables of the book.

@@ -9,8 +9,6 @@ mod measure;
 mod output;
 mod stages;
 
-use std::path::Path;
-
 use glam::Vec3;
 use pipeline::SampleSpec;
 use serde::Serialize;
@@ -18,10 +16,12 @@ use serde::Serialize;
 use super::ChartError;
 use super::fit::exponent;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use failures::{Failures, Shared};
 pub use measure::Point;
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -99,15 +99,18 @@ pub struct SamplingChart {
     pub failures: Failures,
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<SamplingChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    output::remove_stale(&dir)?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<SamplingChart, ChartError> {
     let chart = measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 

@@ -3,28 +3,32 @@
 use std::fmt::Write;
 
 use super::{FIT_FROM, Point, Row, SamplingChart};
-use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
-use crate::output::{OutDir, OutputError};
+use crate::output::plot::{Chart, ChartPanel, Look, Scale, Series};
+use crate::output::{Claim, OutDir, OutputError};
 
-/// What an earlier chart left: should this one die on the way, nothing old may stand in for it.
-pub(super) fn remove_stale(dir: &OutDir) -> Result<(), OutputError> {
-    dir.remove_stale("", "sampling", &["svg", "png", "csv", "json", "md"])
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart sampling").plots(["sampling_error", "sampling_time", "sampling_failures"]).files([
+        "sampling.csv",
+        "sampling.md",
+        "sampling.json",
+    ])
 }
 
 /// Writes pictures and numbers; `sampling.json` comes last.
-pub(super) fn write(chart: &SamplingChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &SamplingChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let seconds = |point: &Point| point.host_s;
     let samples = |point: &Point| f64::from(point.samples_per_pixel);
     let subject = subject(chart);
     let over_samples = panels(&chart.rows, "samples per pixel", true, samples);
     let title = "Image error over samples per pixel";
-    Curves { title, subject: &subject, panels: over_samples }.picture().write(dir, "sampling_error")?;
+    Chart::new(title, &subject, over_samples).picture(look).write(dir, "sampling_error")?;
     let over_time = panels(&chart.rows, "host seconds a frame", false, seconds);
     let title = "Image error over host time";
-    Curves { title, subject: &subject, panels: over_time }.picture().write(dir, "sampling_time")?;
+    Chart::new(title, &subject, over_time).picture(look).write(dir, "sampling_time")?;
     let title = "Where sampling fails";
-    Curves { title, subject: &subject, panels: failures(chart) }.picture().write(dir, "sampling_failures")?;
-    dir.write_atomic("sampling.csv", |out| {
+    Chart::new(title, &subject, failures(chart)).picture(look).write(dir, "sampling_failures")?;
+    dir.write_file("sampling.csv", |out| {
         let mut table = csv::Writer::from_writer(out);
         table.write_record(["chart", "scene", "table", "samples_per_pixel", "rmse", "host_s"])?;
         for (name, row) in all(chart) {
@@ -35,7 +39,7 @@ pub(super) fn write(chart: &SamplingChart, dir: &OutDir) -> Result<(), OutputErr
         }
         Ok(table.flush()?)
     })?;
-    dir.write_atomic("sampling.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
+    dir.write_file("sampling.md", |out| Ok(out.write_all(markdown(chart).as_bytes())?))?;
     dir.write_json("sampling.json", chart)?;
     Ok(())
 }
@@ -59,22 +63,22 @@ fn subject(chart: &SamplingChart) -> String {
 }
 
 /// A panel for each scene.
-fn panels(rows: &[Row], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<CurvePanel> {
+fn panels(rows: &[Row], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
     let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
     let scale = if doubling { Scale::Doublings } else { Scale::Decades };
     let panel = |rows: &[Row]| {
         let curves = rows.iter().map(|row| curve(row, doubling, |p| (x(p), p.rmse))).collect();
-        CurvePanel::new(rows[0].scene, [across, "RMSE"], curves).on(scale, Scale::Decades)
+        ChartPanel::new(rows[0].scene, [across, "RMSE"], curves).on(scale.clone(), Scale::Decades)
     };
     scenes.map(panel).collect()
 }
 
-fn curve(row: &Row, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Curve {
+fn curve(row: &Row, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
     let note = row.exponent.filter(|_| noted).map_or(String::new(), |p| format!("{p:.2}"));
-    Curve { name: row.table.to_owned(), note, points: row.points.iter().map(place).collect() }
+    Series { note, ..Series::curve(row.table, row.points.iter().map(place)) }
 }
 
-fn failures(chart: &SamplingChart) -> Vec<CurvePanel> {
+fn failures(chart: &SamplingChart) -> Vec<ChartPanel> {
     let scaled = |p: &Point| {
         let n = f64::from(p.samples_per_pixel);
         (n, p.rmse * n.sqrt())
@@ -82,16 +86,16 @@ fn failures(chart: &SamplingChart) -> Vec<CurvePanel> {
     // In the order of the tables' colours everywhere; those not shown here keep their place.
     let every = |name: &str| chart.failures.every_number.iter().find(|row| row.table == name);
     let named = chart.failures.many_edges.iter().map(|row| row.table);
-    let curves =
-        named.map(|name| every(name).map_or_else(|| Curve::new(name, []), |row| curve(row, false, scaled)));
+    let curves = named
+        .map(|name| every(name).map_or_else(|| Series::curve(name, []), |row| curve(row, false, scaled)));
     let axes = ["samples per pixel", "RMSE x root of samples"];
-    let numbers = CurvePanel::new("motion, every number of samples", axes, curves.collect())
+    let numbers = ChartPanel::new("motion, every number of samples", axes, curves.collect())
         .on(Scale::Doublings, Scale::Decades);
     let fence =
         panels(&chart.failures.many_edges, "samples per pixel", true, |p| f64::from(p.samples_per_pixel));
     let fence = fence
         .into_iter()
-        .map(|panel| CurvePanel { title: "16 edges in a pixel (fence)".to_owned(), ..panel });
+        .map(|panel| ChartPanel { title: "16 edges in a pixel (fence)".to_owned(), ..panel });
     std::iter::once(numbers).chain(fence).collect()
 }
 

@@ -6,15 +6,15 @@
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::Progress;
 
 pub use measure::{Bias, Cost, Row};
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -60,15 +60,18 @@ impl ShadowsChart {
     }
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<ShadowsChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    dir.remove_stale("", "shadows", &["svg", "png", "csv", "json"])?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<ShadowsChart, ChartError> {
     let chart = measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 
@@ -120,7 +123,10 @@ mod tests {
     fn the_files_are_all_there() {
         let folder = tempfile::tempdir().unwrap();
         let effort = Effort { size: [16, 9], most_points: 2, ..LEAST };
-        chart(effort, folder.path(), &Progress::new(true)).unwrap();
+        OutDir::with(folder.path(), claim(), |dir| {
+            chart(effort, dir, &Look::default(), &Progress::new(true))
+        })
+        .unwrap();
         for file in
             ["shadows.csv", "shadows.json", "shadows_error.svg", "shadows_cost.png", "shadows_failures.svg"]
         {

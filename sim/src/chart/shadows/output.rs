@@ -1,23 +1,30 @@
 //! The files of the chart.
 
 use super::{Bias, Cost, Row, ShadowsChart};
-use crate::output::plot::{Curve, CurvePanel, Curves, Picture, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Picture, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
+
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart shadows")
+        .plots(["shadows_error", "shadows_cost", "shadows_failures"])
+        .files(["shadows.csv", "shadows.json"])
+}
 
 /// Writes pictures and numbers; `shadows.json` comes last.
-pub(super) fn write(chart: &ShadowsChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &ShadowsChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let [width, height] = chart.effort.size;
     let subject = format!(
         "{width}x{height} pixels, a map of {0}x{0} texels, RMSE in linear light against {1} rays a pixel",
         chart.effort.map_px, chart.reference_samples_per_pixel
     );
     let title = "Soft shadows: error and how alike neighbours err";
-    Curves { title, subject: &subject, panels: errors(chart) }.picture().write(dir, "shadows_error")?;
+    Chart::new(title, &subject, errors(chart)).picture(look).write(dir, "shadows_error")?;
     let title = "Soft shadows: one pass against accumulation";
-    Curves { title, subject: &subject, panels: costs(chart) }.picture().write(dir, "shadows_cost")?;
-    failures(chart).write(dir, "shadows_failures")?;
-    dir.write_atomic("shadows.csv", |out| {
+    Chart::new(title, &subject, costs(chart)).picture(look).write(dir, "shadows_cost")?;
+    failures(chart, look).write(dir, "shadows_failures")?;
+    dir.write_file("shadows.csv", |out| {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record([
             "points",
@@ -51,35 +58,35 @@ pub(super) fn write(chart: &ShadowsChart, dir: &OutDir) -> Result<(), OutputErro
     Ok(())
 }
 
-fn curve(name: &str, chart: &ShadowsChart, y: impl Fn(&Row) -> f64) -> Curve {
-    Curve::new(name, chart.rows.iter().map(|row| (f64::from(row.points), y(row))))
+fn curve(name: &str, chart: &ShadowsChart, y: impl Fn(&Row) -> f64) -> Series {
+    Series::curve(name, chart.rows.iter().map(|row| (f64::from(row.points), y(row))))
 }
 
-fn panel(title: &str, up: &str, curves: Vec<Curve>) -> CurvePanel {
-    CurvePanel::new(title, ["places (u, v, t)", up], curves).on(Scale::Doublings, Scale::Decades)
+fn panel(title: &str, up: &str, curves: Vec<Series>) -> ChartPanel {
+    ChartPanel::new(title, ["places (u, v, t)", up], curves).on(Scale::Doublings, Scale::Decades)
 }
 
 /// So many places on the light, and a run does not warn any more.
 const BANDS_BELOW: f64 = 16.0;
 
-fn errors(chart: &ShadowsChart) -> Vec<CurvePanel> {
+fn errors(chart: &ShadowsChart) -> Vec<ChartPanel> {
     let name = "both methods: equal to the bit";
     let over_cost = |method: fn(&Row) -> &Cost, name: &str| {
-        Curve::new(name, chart.rows.iter().map(|row| (method(row).madds as f64, row.rmse)))
+        Series::curve(name, chart.rows.iter().map(|row| (method(row).madds as f64, row.rmse)))
     };
     let banding = vec![curve(name, chart, |row| row.neighbour_correlation)];
     let costs =
         vec![over_cost(|row| &row.one_pass, "one pass"), over_cost(|row| &row.accumulation, "accumulation")];
-    let bands = |panel: CurvePanel| panel.failing(Some(0.0..BANDS_BELOW), "a run warns: shadow-banding");
+    let bands = |panel: ChartPanel| panel.failing(Some(0.0..BANDS_BELOW), "a run warns: shadow-banding");
     vec![
         bands(panel("error", "RMSE", vec![curve(name, chart, |row| row.rmse)])),
         bands(panel("banding", "correlation of neighbours' errors", banding))
             .on(Scale::Doublings, Scale::Even),
-        CurvePanel::new("error over cost of the map", ["multiply-adds of all tests", "RMSE"], costs),
+        ChartPanel::new("error over cost of the map", ["multiply-adds of all tests", "RMSE"], costs),
     ]
 }
 
-fn costs(chart: &ShadowsChart) -> Vec<CurvePanel> {
+fn costs(chart: &ShadowsChart) -> Vec<ChartPanel> {
     let both = |of: fn(&Cost) -> f64| {
         vec![
             curve("one pass", chart, |row| of(&row.one_pass)),
@@ -95,26 +102,31 @@ fn costs(chart: &ShadowsChart) -> Vec<CurvePanel> {
 }
 
 /// Wrong shadows over the bias; a bias of none is at zero.
-fn failures(chart: &ShadowsChart) -> Picture {
+fn failures(chart: &ShadowsChart, look: &Look) -> Picture {
     let of =
         |share: fn(&Bias) -> f64| chart.biases.iter().map(move |bias| (bias.texels, 100.0 * share(bias)));
     let across = "bias (widths of a texel)";
     let panel = |title: &str, up: &str, curve, failing| {
-        CurvePanel::new(title, [across, up], vec![curve])
+        ChartPanel::new(title, [across, up], vec![curve])
             .on(Scale::Doublings, Scale::Even)
             .failing(Some(failing), "a run warns")
     };
     let panels = vec![
-        panel("too small: acne", "lit samples in shadow (%)", Curve::new("acne", of(|b| b.acne)), 0.0..0.5),
+        panel(
+            "too small: acne",
+            "lit samples in shadow (%)",
+            Series::curve("acne", of(|b| b.acne)),
+            0.0..0.5,
+        ),
         panel(
             "too large: leak",
             "samples in shadow that are lit (%)",
-            Curve::new("leak", of(|b| b.leak)),
+            Series::curve("leak", of(|b| b.leak)),
             8.0..f64::INFINITY,
         ),
     ];
     let subject = "wrong shadows of a map of 16 places against rays; marked: where a run warns (shadow-bias)";
-    Curves { title: "Where shadow maps fail: the bias", subject, panels }.picture()
+    Chart::new("Where shadow maps fail: the bias", subject, panels).picture(look)
 }
 
 impl ShadowsChart {

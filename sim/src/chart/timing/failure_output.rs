@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{FailureRow, RateRow, TimingChart};
-use crate::output::plot::{Matrix, MatrixPanel, Picture};
+use crate::output::plot::{Look, Matrix, MatrixPanel, Picture};
 use crate::output::{OutDir, OutputError};
 use crate::timing::Level;
 
@@ -12,10 +12,9 @@ const LEVELS: [Level; 2] = [Level::Packet, Level::Bound];
 
 impl TimingChart {
     /// Writes the picture and the rows.
-    pub(super) fn write_failures(&self, dir: &OutDir) -> Result<(), OutputError> {
-        dir.remove_stale("", "timing_failures", &["svg", "png", "csv"])?;
-        self.failure_picture().write(dir, "timing_failures")?;
-        dir.write_atomic("timing_failures.csv", |out| {
+    pub(super) fn write_failures(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+        self.failure_picture(look).write(dir, "timing_failures")?;
+        dir.write_file("timing_failures.csv", |out| {
             let mut table = csv::Writer::from_writer(out);
             table.write_record([
                 "stream",
@@ -40,7 +39,7 @@ impl TimingChart {
     }
 
     /// Errors in cycles, a block for each level, streams by GPUs.
-    fn failure_picture(&self) -> Picture {
+    fn failure_picture(&self, look: &Look) -> Picture {
         let mut gpus: Vec<&str> = Vec::new();
         let mut streams: Vec<&str> = Vec::new();
         for row in &self.failures {
@@ -69,7 +68,7 @@ impl TimingChart {
             columns: streams.clone(),
             panels: LEVELS.map(panel).into(),
         }
-        .picture()
+        .picture(look)
     }
 
     /// The tables of the book.

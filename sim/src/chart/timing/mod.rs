@@ -1,10 +1,12 @@
 //! `quintile chart timing`: every level of timing against the reference, over scenes and GPUs.
 
 mod added;
+mod animations;
 mod failure_output;
 mod failures;
 mod measure;
 mod output;
+mod picture;
 mod subjects;
 
 use std::collections::BTreeMap;
@@ -19,8 +21,10 @@ use crate::run::RunError;
 use crate::timing::Level;
 
 pub use added::AddedRow;
+pub use animations::AnimationRow;
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::Row;
+pub(crate) use output::claim;
 
 /// GPUs in the chart: small, integrated, large.
 const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
@@ -78,6 +82,8 @@ pub struct TimingChart {
     pub levels: BTreeMap<&'static str, Figures>,
     /// How fast the reference is.
     pub reference: Reference,
+    /// Animations at every level, drawn and timed, on every GPU.
+    pub animations: Vec<AnimationRow>,
     /// A row for each scene, GPU and level but the reference.
     pub rows: Vec<Row>,
     /// What the cheap levels add to a run that only draws, scenes by GPUs.
@@ -93,7 +99,7 @@ pub struct TimingChart {
 /// # Errors
 /// When a scene cannot be loaded or a GPU fails.
 pub fn timing(files: &[String], quick: bool, progress: &Progress) -> Result<TimingChart, RunError> {
-    let gpus: Vec<GpuSpec> = GPUS.iter().map(|name| GpuSpec::load(name)).collect::<Result<_, _>>()?;
+    let gpus: Vec<GpuSpec> = GPUS.iter().map(GpuSpec::load).collect::<Result<_, _>>()?;
     let subjects = subjects::all(files, quick)?;
     let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
     // One after another: host times are part of what is measured.
@@ -106,16 +112,35 @@ pub fn timing(files: &[String], quick: bool, progress: &Progress) -> Result<Timi
             bar.inc();
         }
     }
+    let animations = animated(files, &gpus, quick, progress)?;
     let levels = Level::ALL.into_iter().map(|level| (level.name(), figures(level, &rows, &added))).collect();
     Ok(TimingChart {
         quick,
         levels,
         reference: reference.figures(),
+        animations,
         rows,
         added,
         failures: failures::failures(&gpus)?,
         rates: failures::rates()?,
     })
+}
+
+/// Every scene that is animated, on every GPU.
+fn animated(
+    files: &[String],
+    gpus: &[GpuSpec],
+    quick: bool,
+    progress: &Progress,
+) -> Result<Vec<AnimationRow>, RunError> {
+    let extent = animations::Extent::of(quick);
+    let mut rows = Vec::new();
+    for scene in subjects::SCENES.into_iter().chain(files.iter().map(String::as_str)) {
+        for gpu in gpus {
+            rows.extend(animations::rows(scene, gpu, extent, progress)?);
+        }
+    }
+    Ok(rows)
 }
 
 fn figures(level: Level, rows: &[Row], added: &[AddedRow]) -> Figures {

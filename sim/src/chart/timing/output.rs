@@ -3,20 +3,30 @@
 use std::fmt::Write as _;
 
 use super::{Row, TimingChart};
-use crate::output::plot::{Tradeoff, TradeoffPanel, TradeoffPoint};
-use crate::output::{OutDir, OutputError};
-use crate::timing::Level;
+use crate::output::plot::Look;
+use crate::output::{Claim, OutDir, OutputError};
+
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart timing").plots(["timing", "timing_failures"]).files([
+        "timing.csv",
+        "timing_points.csv",
+        "timing_failures.csv",
+        "timing.md",
+        "timing.json",
+    ])
+}
 
 impl TimingChart {
-    /// Writes the picture, the rows and the table of the book; `timing.json` comes last.
+    /// Writes the picture with its points, the rows and the table of the book; `timing.json` comes last.
     ///
     /// # Errors
     /// Those of the folder.
-    pub fn write(&self, dir: &OutDir) -> Result<(), OutputError> {
-        dir.remove_stale("", "timing", &["svg", "png", "csv", "json", "md"])?;
-        self.picture().picture().write(dir, "timing")?;
-        self.write_failures(dir)?;
-        dir.write_atomic("timing.csv", |out| {
+    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+        self.picture(look).write(dir, "timing")?;
+        self.write_points(dir)?;
+        self.write_failures(dir, look)?;
+        dir.write_file("timing.csv", |out| {
             let mut table = csv::Writer::from_writer(out);
             table.write_record([
                 "scene",
@@ -45,30 +55,36 @@ impl TimingChart {
             }
             Ok(table.flush()?)
         })?;
-        dir.write_atomic("timing.md", |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
+        dir.write_file("timing.md", |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
         dir.write_json("timing.json", self)?;
         Ok(())
     }
 
-    /// Speed over error, a panel for each level.
-    fn picture(&self) -> Tradeoff<'_> {
-        let panel = |level: Level| {
-            let rows = self.rows.iter().filter(|row| row.level == level);
-            let points = rows.map(|row| TradeoffPoint {
-                label: format!("{} {}", row.scene, row.gpu),
-                x: row.cycle_error_percent.abs().max(1e-3),
-                y: row.speedup_over_stepped,
-                front: row.cycle_error_percent.abs() > 8.0,
-            });
-            TradeoffPanel { name: level.name(), points: points.collect() }
-        };
-        Tradeoff {
-            title: "Levels of timing against the reference",
-            subject: "each dot a scene on a GPU; named where the error is above 8 %",
-            x: "error in cycles, %",
-            y: "times as fast as stepped",
-            panels: Level::ALL.into_iter().filter(|&level| level != Level::Stepped).map(panel).collect(),
-        }
+    /// The points of the picture.
+    fn write_points(&self, dir: &OutDir) -> Result<(), OutputError> {
+        dir.write_file("timing_points.csv", |out| {
+            let mut table = csv::Writer::from_writer(out);
+            table.write_record([
+                "kind",
+                "scene",
+                "gpu",
+                "level",
+                "seed",
+                "relative_host_time",
+                "cycle_error_percent",
+            ])?;
+            for row in &self.animations {
+                let kind = ("animation, drawn and timed", &row.scene, &row.gpu, row.level, row.seed);
+                table.serialize((kind, row.relative_host, row.cycle_error_percent))?;
+            }
+            for row in &self.rows {
+                let seed: Option<u64> = None;
+                let kind = ("frame, timing alone", &row.scene, &row.gpu, row.level.name(), seed);
+                table.serialize((kind, 1.0 / row.speedup_over_stepped, row.cycle_error_percent))?;
+            }
+            Ok(table.flush()?)
+        })?;
+        Ok(())
     }
 
     /// The tables of the book.

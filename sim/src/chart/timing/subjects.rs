@@ -14,7 +14,7 @@ use crate::gpu::GpuSpec;
 use crate::run::RunError;
 
 /// Built-in scenes.
-const SCENES: [&str; 2] = ["default", "tiny"];
+pub(super) const SCENES: [&str; 2] = ["default", "tiny"];
 /// Families of the failure catalogue, each at one value: large and tiny triangles, lens and motion, behind the camera.
 const FAMILIES: [(&str, f64); 4] =
     [("lens-and-motion", 2.0), ("micro", 1.0), ("behind", 0.0), ("diagonals", 128.0)];

@@ -63,6 +63,19 @@ pub struct Cached {
     pub increase: f64,
 }
 
+/// Pixel shader lanes of views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lanes {
+    /// Of all views in one pass.
+    pub all: u64,
+    /// Of one view alone.
+    pub one: u64,
+    /// Draws of the one pass.
+    pub draws: u64,
+    /// Samples of it that saw something.
+    pub samples_hit: u64,
+}
+
 /// One length of the camera line.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Angle {
@@ -93,10 +106,23 @@ impl Bench {
     ///
     /// # Errors
     /// When it cannot be loaded, or has no lens to say what is in focus.
-    pub fn new((name, number): (&'static str, u32), [width, height]: [u32; 2]) -> Result<Self, ChartError> {
+    pub fn new((name, number): (&str, u32), size: [u32; 2]) -> Result<Self, ChartError> {
+        Self::with_shutter((name, number), size, None)
+    }
+
+    /// The same with a shutter of its own, as a share of the frame's time.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_shutter(
+        (name, number): (&str, u32),
+        [width, height]: [u32; 2],
+        shutter: Option<f64>,
+    ) -> Result<Self, ChartError> {
         let refused = |why: &str| ChartError::Pipeline(why.to_owned());
         let size = Some((width, height));
-        let scene = workloads::load(name)?.with_overrides(&Overrides { size, ..Overrides::default() })?;
+        let scene =
+            workloads::load(name)?.with_overrides(&Overrides { size, shutter, ..Overrides::default() })?;
         let frame = scene.frame(number)?;
         let focus = frame.camera.lens().ok_or_else(|| refused("it has no lens"))?.focus();
         let viewport = Viewport::new(width, height).ok_or_else(|| refused("views of no size"))?;
@@ -108,9 +134,9 @@ impl Bench {
         f64::from(self.focus)
     }
 
-    fn rig(&self, layout: &Layout) -> Result<Rig, ChartError> {
+    fn rig(&self, layout: &Layout, samples: u32) -> Result<Rig, ChartError> {
         let strips = layout.overlap.max(1);
-        let per_strip = (SAMPLES / strips).min(256 / layout.strips());
+        let per_strip = (samples / strips).min(256 / layout.strips());
         Ok(Rig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
     }
 
@@ -121,7 +147,7 @@ impl Bench {
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.
     pub(super) fn row(&self, views: u32) -> Result<Row, ChartError> {
         let layout = if views == 2 { stereo() } else { line(views) };
-        let (rig, to) = (self.rig(&layout)?, self.target(&self.gpu.pipeline));
+        let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
         let draws = self.frame.draws(&self.scene)?;
         let one = self.one_view(&rig, &layout, &draws, &to)?;
         let run = |render: &dyn Fn() -> Result<Views, workloads::job::JobError>| {
@@ -170,28 +196,38 @@ impl Bench {
         (policy, replacement): (&'static str, Replacement),
         entries: u32,
     ) -> Result<Cached, ChartError> {
-        let shading_cache = CacheSpec { replacement, ..CacheSpec::lru(entries, 4) };
-        let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
-        let (rig, to) = (self.rig(&layout)?, self.target(&spec));
-        let draws = self.frame.draws(&self.scene)?;
-        let all = rig.one_pass(&draws, &to, &mut |_, _| ())?.counts[Event::PixelInvocations] as f64;
-        let one = self.one_view(&rig, &layout, &draws, &to)? as f64;
+        let cache = CacheSpec { replacement, ..CacheSpec::lru(entries, 4) };
+        let lanes = self.lanes(layout, cache, SAMPLES)?;
         let pixels = self.viewport.pixels() as f64;
         Ok(Cached {
             views: layout.views,
             policy,
             entries,
-            invocations_per_pixel: all / pixels,
-            one_view_per_pixel: one / pixels,
-            increase: all / one - 1.0,
+            invocations_per_pixel: lanes.all as f64 / pixels,
+            one_view_per_pixel: lanes.one as f64 / pixels,
+            increase: lanes.all as f64 / lanes.one as f64 - 1.0,
         })
+    }
+
+    /// Shader lanes of all views in one pass, and of the one nearest to the middle alone, with a cache and samples of each view.
+    ///
+    /// # Errors
+    /// When the cache cannot be built.
+    pub fn lanes(&self, layout: Layout, shading_cache: CacheSpec, samples: u32) -> Result<Lanes, ChartError> {
+        let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
+        let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
+        let draws = self.frame.draws(&self.scene)?;
+        let counts = rig.one_pass(&draws, &to, &mut |_, _| ())?.counts;
+        let one = self.one_view(&rig, &layout, &draws, &to)?;
+        let [draws, samples_hit] = [Event::Draws, Event::SamplesHit].map(|event| counts[event]);
+        Ok(Lanes { all: counts[Event::PixelInvocations], one, draws, samples_hit })
     }
 
     /// The error of two views at the ends of a camera line, shaded for its middle.
     pub(super) fn angle(&self, baseline: f64) -> Result<Angle, ChartError> {
         let spacing = baseline * self.focus();
         let layout = Layout::stereo(spacing, (0.4 * spacing).min(0.02));
-        let (rig, to) = (self.rig(&layout)?, self.target(&self.gpu.pipeline));
+        let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
         let error = |exponent| {
             let draws = self.frame.draws(&self.scene)?;
             let glosses: Vec<_> = draws.iter().map(|draw| Gloss { looks: draw.shader, exponent }).collect();

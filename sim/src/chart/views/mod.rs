@@ -7,17 +7,17 @@ mod gloss;
 mod measure;
 mod output;
 
-use std::path::Path;
-
 use pipeline::Replacement;
 use serde::Serialize;
 use workloads::multiview::Layout;
 
 use super::ChartError;
 use crate::output::OutDir;
+use crate::output::plot::Look;
 use crate::output::progress::{Bar, Progress};
 
-pub use measure::{Angle, Bench, Cached, Row, Run};
+pub use measure::{Angle, Bench, Cached, Lanes, Row, Run};
+pub(crate) use output::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -106,15 +106,18 @@ fn layouts(focus: f64) -> [(&'static str, Layout); 3] {
     [("two views", stereo()), ("seven views", line(7)), ("seven views far apart", far)]
 }
 
-/// Measures the chart and writes it into `out`.
+/// Measures the chart and writes it into `dir`.
 ///
 /// # Errors
-/// [`ChartError`], above all when `out` cannot be written to.
-pub fn chart(effort: Effort, out: &Path, progress: &Progress) -> Result<ViewsChart, ChartError> {
-    let dir = OutDir::create(out)?;
-    dir.remove_stale("", "views", &["svg", "png", "csv", "json"])?;
+/// [`ChartError`], above all when `dir` cannot be written to.
+pub fn chart(
+    effort: Effort,
+    dir: &OutDir,
+    look: &Look,
+    progress: &Progress,
+) -> Result<ViewsChart, ChartError> {
     let chart = measure(effort, progress)?;
-    output::write(&chart, &dir)?;
+    output::write(&chart, dir, look)?;
     Ok(chart)
 }
 
@@ -180,7 +183,10 @@ mod tests {
     fn the_files_are_all_there() {
         let folder = tempfile::tempdir().unwrap();
         let effort = Effort { views: &[1, 2], entries: &[64], baselines: &[0.1], ..LEAST };
-        chart(effort, folder.path(), &Progress::new(true)).unwrap();
+        OutDir::with(folder.path(), claim(), |dir| {
+            chart(effort, dir, &Look::default(), &Progress::new(true))
+        })
+        .unwrap();
         for file in ["views.csv", "views.json", "views_cost.svg", "views_cache.png", "views_failures.svg"] {
             assert!(folder.path().join(file).exists(), "{file}");
         }

@@ -3,25 +3,34 @@
 use workloads::multiview::{MOST_DEG, MOST_RUNS};
 
 use super::{Angle, Cached, Case, POLICIES, Row, Run, ViewsChart};
-use crate::output::plot::{Curve, CurvePanel, Curves, Scale};
+use crate::output::plot::{Chart, ChartPanel, Look, Scale, Series};
 use crate::output::table::Table;
-use crate::output::{OutDir, OutputError};
+use crate::output::{Claim, OutDir, OutputError};
+
+/// The files of the chart.
+pub(crate) fn claim() -> Claim {
+    Claim::new("chart views").plots(["views_cost", "views_cache", "views_failures"]).files([
+        "views.csv",
+        "views_cache.csv",
+        "views.json",
+    ])
+}
 
 /// Writes pictures and numbers; `views.json` comes last.
-pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError> {
+pub(super) fn write(chart: &ViewsChart, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
     let [width, height] = chart.effort.size;
     let subject =
         format!("{}, {width}x{height} pixels a view, 8 samples each where they fit", chart.effort.scene.0);
     let title = "Many views: one pass against its rivals";
-    Curves { title, subject: &subject, panels: costs(chart) }.picture().write(dir, "views_cost")?;
+    Chart::new(title, &subject, costs(chart)).picture(look).write(dir, "views_cost")?;
     let title = "Pixel shader lanes of one pass over the shading cache";
     let marked = format!(
         "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
     );
-    Curves { title, subject: &marked, panels: caches(chart) }.picture().write(dir, "views_cache")?;
+    Chart::new(title, &marked, caches(chart)).picture(look).write(dir, "views_cache")?;
     let title = "Where one pass fails: shading that depends on who looks";
-    Curves { title, subject: &subject, panels: angles(chart) }.picture().write(dir, "views_failures")?;
-    dir.write_atomic("views.csv", |out| {
+    Chart::new(title, &subject, angles(chart)).picture(look).write(dir, "views_failures")?;
+    dir.write_file("views.csv", |out| {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record([
             "views",
@@ -41,7 +50,7 @@ pub(super) fn write(chart: &ViewsChart, dir: &OutDir) -> Result<(), OutputError>
         }
         Ok(table.flush()?)
     })?;
-    dir.write_atomic("views_cache.csv", |out| {
+    dir.write_file("views_cache.csv", |out| {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record(CACHE_HEADER)?;
         chart.cached().try_for_each(|row| table.serialize(row))?;
@@ -55,13 +64,13 @@ fn runs(row: &Row) -> [(&'static str, &Run); 3] {
     [("one pass", &row.one_pass), ("view by view", &row.view_by_view), ("accumulation", &row.accumulation)]
 }
 
-fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
+fn costs(chart: &ViewsChart) -> Vec<ChartPanel> {
     let panel = |title: &str, up: &str, of: fn(&Run) -> f64| {
         let curve = |method: usize| {
             let points = chart.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1)));
-            Curve::new(runs(&chart.rows[0])[method].0, points)
+            Series::curve(runs(&chart.rows[0])[method].0, points)
         };
-        CurvePanel::new(title, ["views", up], (0..3).map(curve).collect())
+        ChartPanel::new(title, ["views", up], (0..3).map(curve).collect())
             .on(Scale::Doublings, Scale::Decades)
     };
     vec![
@@ -73,14 +82,17 @@ fn costs(chart: &ViewsChart) -> Vec<CurvePanel> {
 }
 
 /// Caches in which what is in use at a time has no room are marked.
-fn caches(chart: &ViewsChart) -> Vec<CurvePanel> {
+fn caches(chart: &ViewsChart) -> Vec<ChartPanel> {
     let panel = |case: &Case| {
         let curve = |(policy, _): &(&'static str, _)| {
             let rows = case.rows.iter().filter(|cached| cached.policy == *policy);
-            Curve::new(*policy, rows.map(|cached| (f64::from(cached.entries), cached.invocations_per_pixel)))
+            Series::curve(
+                *policy,
+                rows.map(|cached| (f64::from(cached.entries), cached.invocations_per_pixel)),
+            )
         };
         let axes = ["entries of the shading cache", "lanes of all views for a pixel of one"];
-        CurvePanel::new(case.name, axes, POLICIES.iter().map(curve).collect())
+        ChartPanel::new(case.name, axes, POLICIES.iter().map(curve).collect())
             .on(Scale::Doublings, Scale::Even)
             .failing(case.too_small().map(|entries| 0.0..entries), "a run warns")
     };
@@ -97,11 +109,11 @@ impl Case {
     }
 }
 
-fn angles(chart: &ViewsChart) -> Vec<CurvePanel> {
+fn angles(chart: &ViewsChart) -> Vec<ChartPanel> {
     let of = |error: fn(&Angle) -> f64| chart.angles.iter().map(move |angle| (angle.baseline, error(angle)));
     let curves = vec![
-        Curve::new("shading that is the same for all", of(|angle| angle.rmse_matt)),
-        Curve::new("with a highlight", of(|angle| angle.rmse_shiny)),
+        Series::curve("shading that is the same for all", of(|angle| angle.rmse_matt)),
+        Series::curve("with a highlight", of(|angle| angle.rmse_shiny)),
     ];
     let axes = [
         "length of the camera line over the distance of what is in focus",
@@ -111,7 +123,7 @@ fn angles(chart: &ViewsChart) -> Vec<CurvePanel> {
     let off = |angle: &&Angle| (angle.degrees / MOST_DEG).ln().abs();
     let nearest = chart.angles.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
     let warned = nearest.map(|angle| angle.baseline * MOST_DEG / angle.degrees);
-    let panel = CurvePanel::new("error of the outer views", axes, curves);
+    let panel = ChartPanel::new("error of the outer views", axes, curves);
     vec![panel.failing(warned.map(|baseline| baseline..f64::INFINITY), "a run warns: view-dependent-shading")]
 }
 

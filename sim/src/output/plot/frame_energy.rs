@@ -1,8 +1,10 @@
 //! Energy of each frame, measured against true.
 
-use super::axis::{Axis, is_drawable};
+use super::axis::{Axis, Way, is_drawable};
+use super::legend::{Key, legend_lines};
+use super::look::Look;
 use super::palette::{MEASURED, TRUTH};
-use super::panel::{Key, Panel, legend_line};
+use super::panel::{BELOW, Panel, aside};
 use super::picture::Picture;
 use crate::output::MeanSd;
 use crate::output::table::si_mean_sd;
@@ -33,9 +35,18 @@ pub struct FrameEnergy<'a> {
 
 impl FrameEnergy<'_> {
     /// Points and lines over the number of the frame, with the mean and its band.
-    pub fn picture(&self) -> Picture {
-        let mut picture = Picture::new(1200.0, 600.0, "Energy per frame", self.subject);
-        let Some(panel) = self.panel() else { return picture.nothing("no frames to show") };
+    pub fn picture(&self, look: &Look) -> Picture {
+        let mut picture = Picture::titled(look, (1200.0, 300.0), ["Energy per frame", self.subject]);
+        let Some(mut panel) = self.panel(&picture) else { return picture.nothing("no frames to show") };
+        let top = picture.height + 10.0;
+        let legend = legend_lines(&mut picture, top, &self.legend());
+        let height = panel.bottom - panel.top;
+        (panel.top, panel.bottom) = (top + legend, top + legend + height);
+        let per_pixel = (self.pixels > 0).then(|| {
+            let [low, high] = [panel.y.low, panel.y.high].map(|energy_j| energy_j / self.pixels as f64);
+            Axis::new("energy per pixel", "J", (low, high), (Way::Up, height))
+        });
+        panel.right -= per_pixel.as_ref().map_or(0.0, aside);
         self.band(&panel, &mut picture);
         panel.grid(&mut picture);
         let series = [(true, TRUTH), (false, MEASURED)];
@@ -43,10 +54,10 @@ impl FrameEnergy<'_> {
             self.series(truth, colour, &panel, &mut picture);
         }
         panel.axes(&mut picture, 0.0);
-        if self.pixels > 0 {
-            panel.right_axis(&mut picture, "energy per pixel", "J", 1.0 / self.pixels as f64);
+        if let Some(axis) = &per_pixel {
+            panel.right_axis(&mut picture, axis);
         }
-        legend_line(&mut picture, (panel.left, 78.0), &self.legend());
+        picture.height = panel.bottom + BELOW + 4.0;
         picture
     }
 
@@ -57,7 +68,8 @@ impl FrameEnergy<'_> {
         })
     }
 
-    fn panel(&self) -> Option<Panel> {
+    /// The panel, at the top of the picture.
+    fn panel(&self, picture: &Picture) -> Option<Panel> {
         let all = || self.values(true).chain(self.values(false));
         let (first, last) = (all().map(|p| p.0).reduce(f64::min)?, all().map(|p| p.0).reduce(f64::max)?);
         let bounds = self.measured_j.iter().flat_map(|stats| [stats.mean - stats.sd, stats.mean + stats.sd]);
@@ -69,9 +81,11 @@ impl FrameEnergy<'_> {
         }
         // Differences of a percent are to be seen, so the axis need not start at 0; its labels say where it does.
         let margin = (0.12 * (high - low)).max(0.002 * high.abs());
-        let x = Axis::whole("frame", first - 0.5, last + 0.5);
-        let y = Axis::new("energy per frame", "J", low - margin, high + margin);
-        Some(Panel { left: 100.0, top: 100.0, right: 1090.0, bottom: 530.0, x, y })
+        let height = if picture.is_narrow() { 210.0 } else { 430.0 };
+        let y = Axis::new("energy per frame", "J", (low - margin, high + margin), (Way::Up, height));
+        let (left, right) = (picture.margin() + aside(&y), picture.width() - picture.margin() - 4.0);
+        let x = Axis::whole("frame", (first - 0.5, last + 0.5), (Way::Across, right - left - 70.0));
+        Some(Panel { left, top: 0.0, right, bottom: height, x, y })
     }
 
     fn band(&self, panel: &Panel, picture: &mut Picture) {
@@ -103,7 +117,7 @@ impl FrameEnergy<'_> {
             entries.push((Key::Dot(TRUTH), "true, by the simulator".to_owned()));
         }
         if let Some(stats) = self.measured_j {
-            let label = format!("mean and standard deviation of the measured: {}", si_mean_sd(stats, "J"));
+            let label = format!("mean and deviation of the measured: {}", si_mean_sd(stats, "J"));
             entries.push((Key::Area(MEASURED.alpha(0.25)), label));
         }
         entries

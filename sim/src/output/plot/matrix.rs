@@ -1,8 +1,10 @@
 //! Costs or errors of methods by what they were tried on, as shaded cells.
 
+use super::legend::shortened;
+use super::look::Look;
 use super::palette::{BACKGROUND, INK, MUTED, heat};
-use super::panel::shortened;
 use super::picture::{Across, Picture, Text, text};
+use super::render::text_width;
 
 /// Cells of rows by columns, each a number of which more is worse: a cost over that of the best of its column, say.
 #[derive(Clone, Debug)]
@@ -28,8 +30,8 @@ pub struct MatrixPanel<'a> {
     pub rows: Vec<(&'a str, Vec<Option<f64>>)>,
 }
 
-const LEFT: f64 = 170.0;
-const RIGHT: f64 = 1380.0;
+/// Least and greatest width of a cell.
+const CELL: [f64; 2] = [38.0, 120.0];
 const ROW: f64 = 26.0;
 const HEADING: f64 = 34.0;
 /// Room for the columns' names, which read upwards.
@@ -39,47 +41,50 @@ const DARKEST: f64 = 32.0;
 
 impl Matrix<'_> {
     /// The blocks from top to bottom, columns named below the last.
-    pub fn picture(&self) -> Picture {
+    pub fn picture(&self, look: &Look) -> Picture {
         let rows: usize = self.panels.iter().map(|panel| panel.rows.len()).sum();
-        let height = 100.0 + HEADING * self.panels.len() as f64 + ROW * rows as f64 + NAMES;
-        let mut picture = Picture::new(1410.0, height, self.title, self.subject);
+        let names = self.panels.iter().flat_map(|panel| panel.rows.iter().map(|(name, _)| *name));
+        let left = names.map(|name| text_width(name, 13.0, false)).fold(60.0, f64::max) + 40.0;
+        let columns = self.columns.len().max(1) as f64;
+        let usual = (left + CELL[1] * columns + 24.0).clamp(760.0, 1410.0);
+        let least = left + CELL[0] * columns + 24.0;
+        let mut picture = Picture::titled(look, (usual, least), [self.title, self.subject]);
         if rows == 0 || self.columns.is_empty() {
             return picture.nothing("nothing to compare");
         }
-        scale(self.scale, &mut picture);
-        let mut top = 92.0;
+        let width = ((picture.width() - picture.margin() - left) / columns).clamp(CELL[0] - 2.0, CELL[1]);
+        let mut top = picture.height + 4.0;
+        scale(self.scale, (left, top + 10.0), &mut picture);
+        top += 26.0;
         for panel in &self.panels {
-            picture.text(Text { bold: true, ..text(panel.name, (LEFT, top + 0.5 * HEADING)) });
+            picture.text(Text { bold: true, ..text(panel.name, (left, top + 0.5 * HEADING)) });
             top += HEADING;
             for (name, cells) in &panel.rows {
-                self.row(name, cells, top, &mut picture);
+                draw_cells(name, cells, (left, top, width), &mut picture);
                 top += ROW;
             }
         }
         for (index, name) in self.columns.iter().enumerate() {
-            let at = (LEFT + (index as f64 + 0.5) * self.width(), top + 0.5 * NAMES);
+            let at = (left + (index as f64 + 0.5) * width, top + 0.5 * NAMES);
             let name = shortened(name, 13.0, NAMES - 16.0);
             picture.text(Text { across: Across::Centre, upwards: true, ..text(&name, at) });
         }
+        picture.height = top + NAMES;
         picture
     }
+}
 
-    fn width(&self) -> f64 {
-        ((RIGHT - LEFT) / self.columns.len() as f64).min(120.0)
-    }
-
-    fn row(&self, name: &str, cells: &[Option<f64>], top: f64, picture: &mut Picture) {
-        let (width, middle) = (self.width(), top + 0.5 * ROW);
-        picture.text(Text { across: Across::Right, ..text(name, (LEFT - 10.0, middle)) });
-        for (index, value) in cells.iter().enumerate() {
-            let Some(value) = value.filter(|value| value.is_finite()) else { continue };
-            let left = LEFT + index as f64 * width;
-            let shade = shade(value);
-            picture.rect((left + 1.0, top + 1.0), (left + width - 1.0, top + ROW - 1.0), heat(shade));
-            let colour = if shade > 0.55 { BACKGROUND } else { INK };
-            let at = (left + 0.5 * width, middle);
-            picture.text(Text { across: Across::Centre, colour, size: 11.5, ..text(&number(value), at) });
-        }
+fn draw_cells(name: &str, cells: &[Option<f64>], (left, top, width): (f64, f64, f64), picture: &mut Picture) {
+    let middle = top + 0.5 * ROW;
+    picture.text(Text { across: Across::Right, ..text(name, (left - 10.0, middle)) });
+    for (index, value) in cells.iter().enumerate() {
+        let Some(value) = value.filter(|value| value.is_finite()) else { continue };
+        let left = left + index as f64 * width;
+        let shade = shade(value);
+        picture.rect((left + 1.0, top + 1.0), (left + width - 1.0, top + ROW - 1.0), heat(shade));
+        let colour = if shade > 0.55 { BACKGROUND } else { INK };
+        let at = (left + 0.5 * width, middle);
+        picture.text(Text { across: Across::Centre, colour, size: 11.5, ..text(&number(value), at) });
     }
 }
 
@@ -101,15 +106,16 @@ fn number(value: f64) -> String {
     }
 }
 
-fn scale([least, most]: [&str; 2], picture: &mut Picture) {
-    let (left, top) = (RIGHT - 330.0, 70.0);
-    for step in 0..100 {
-        let from = left + f64::from(step) * 2.0;
-        picture.rect((from, top), (from + 2.0, top + 12.0), heat(f64::from(step) / 99.0));
-    }
+/// The scale of shades from `left` on.
+fn scale([least, most]: [&str; 2], (left, middle): (f64, f64), picture: &mut Picture) {
     let note = |text: Text| Text { size: 12.0, colour: MUTED, ..text };
-    picture.text(note(Text { across: Across::Right, ..text(least, (left - 8.0, top + 6.0)) }));
-    picture.text(note(text(most, (left + 208.0, top + 6.0))));
+    picture.text(note(text(least, (left, middle))));
+    let left = left + text_width(least, 12.0, false) + 8.0;
+    for step in 0..60 {
+        let from = left + f64::from(step) * 2.0;
+        picture.rect((from, middle - 6.0), (from + 2.0, middle + 6.0), heat(f64::from(step) / 59.0));
+    }
+    picture.text(note(text(most, (left + 128.0, middle))));
 }
 
 #[cfg(test)]
@@ -130,11 +136,11 @@ mod tests {
     #[test]
     fn nothing_is_said_and_cells_are_there() {
         let empty = Matrix { title: "t", subject: "s", scale: ["a", "b"], columns: vec![], panels: vec![] };
-        assert!(empty.picture().svg().unwrap().contains("nothing to compare"));
+        assert!(empty.picture(&Look::default()).svg().unwrap().contains("nothing to compare"));
         let rows = vec![("one", vec![Some(1.0), None]), ("two", vec![Some(77.0), Some(f64::NAN)])];
         let panels = vec![MatrixPanel { name: "all", rows }];
         let svg = Matrix { title: "t", subject: "s", scale: ["a", "b"], columns: vec!["a", "b"], panels }
-            .picture()
+            .picture(&Look::default())
             .svg()
             .unwrap();
         assert!(svg.contains("77") && svg.contains("one"), "{svg}");

@@ -1,55 +1,55 @@
-//! The plots of a run. Each is described once as a [`Picture`] and rendered into SVG and PNG from there.
+//! The plots of a run and of charts. Each is described once as a [`Picture`] and rendered into SVG, PNG and PDF from there, as wide
+//! and with letters as large as a [`Look`] asks for.
+//!
+//! Of a run:
 //!
 //! - [`PowerRun`]: power over the whole run, with every spike.
 //! - [`FramePower`]: one frame's power over time, stacked by part.
 //! - [`FrameEnergy`]: energy of each frame, measured against true.
 //! - [`UnitBusy`]: how busy each unit was over one frame.
-//! - [`Curves`]: curves over one parameter, on the [`Scale`] that suits them.
-//! - [`Lines`]: bands, lines, dots and bars over plain axes.
+//! - [`StallLanes`]: what each unit waited for over one frame.
 //! - [`HeatMapPlot`]: where in the image something happens.
 //!
-//! And those of comparisons of methods:
+//! Of anything else:
 //!
+//! - [`Chart`]: panels of [`Series`] over axes of any [`Scale`].
 //! - [`Matrix`]: costs of methods by what they were tried on.
-//! - [`Sweep`]: several measures along one parameter.
-//! - [`Tradeoff`]: gain over cost with its front.
 //!
-//! Nothing to draw (no samples, no frames, nothing finite) is a plot that says so, never an error. All use of the
-//! `plotters` crate is in `render`.
+//! A unit has one colour in all of them ([`part_colour`]). Nothing to draw (no samples, no frames, nothing finite) is a plot that says
+//! so, never an error. All use of the `plotters` crate is in `render`.
 
 mod axis;
+mod chart;
 mod columns;
-mod curves;
 mod frame_energy;
 mod frame_power;
 mod heat_map;
-mod lines;
+mod labels;
+mod legend;
+mod look;
 mod matrix;
 mod palette;
 mod panel;
 mod picture;
 mod power_run;
 mod render;
-mod scale;
+mod series;
 mod stalls;
-mod sweep;
-mod tradeoff;
 mod unit_busy;
 
-pub use curves::{Curve, CurvePanel, Curves};
+pub use axis::{AxisSpec, Scale};
+pub use chart::{Chart, ChartPanel};
 pub use frame_energy::{FrameEnergy, FrameEnergyPoint};
 pub use frame_power::{FramePower, PowerPart};
-pub use heat_map::{HeatMapPlot, HeatTile};
-pub use lines::{Lines, Mark, Series};
+pub use heat_map::{HeatMapPlot, HeatTile, Shading};
+pub use look::{COLUMN_MM, Look};
 pub use matrix::{Matrix, MatrixPanel};
 pub use palette::{Colour, part_colour};
 pub use picture::Picture;
 pub use power_run::PowerRun;
 pub use render::PlotError;
-pub use scale::Scale;
+pub use series::{Mark, Paint, Series, Spread};
 pub use stalls::{StallLane, StallLanes};
-pub use sweep::{Sweep, SweepCurve, SweepPanel};
-pub use tradeoff::{Tradeoff, TradeoffPanel, TradeoffPoint};
 pub use unit_busy::{UnitBusy, UnitLane};
 
 #[cfg(test)]

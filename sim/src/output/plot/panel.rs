@@ -1,9 +1,8 @@
-//! The area that data are drawn in, with its axes, and legends.
+//! The area that data are drawn in, with its axes.
 
-use super::axis::Axis;
-use super::palette::{AXIS, Colour, GRID, INK, MUTED};
+use super::axis::{Axis, RAISED, TICK_PX, Tick, label_width};
+use super::palette::{AXIS, GRID, MUTED};
 use super::picture::{Across, Picture, Point, Text, text};
-use super::render::text_width;
 
 /// A rectangle of the picture and the values at its edges.
 #[derive(Clone, Debug)]
@@ -14,6 +13,16 @@ pub(super) struct Panel {
     pub bottom: f64,
     pub x: Axis,
     pub y: Axis,
+}
+
+/// Height of what is written below a panel.
+pub(super) const BELOW: f64 = 50.0;
+/// Lengths of ticks, of those with and without a label.
+const TICKS: [f64; 2] = [5.0, 3.0];
+
+/// The room left of a panel for the labels of its axis and its name.
+pub(super) fn aside(y: &Axis) -> f64 {
+    y.widest() + if y.label.is_empty() { 14.0 } else { 34.0 }
 }
 
 impl Panel {
@@ -29,23 +38,66 @@ impl Panel {
         (self.x_px(x), self.y_px(y))
     }
 
-    /// Lines across at the ticks of `y`, to be drawn before the data.
+    /// Where a point is; nothing where an axis has no place for it.
+    pub fn place(&self, (x, y): (f64, f64)) -> Option<Point> {
+        (self.x.place(x).is_some() && self.y.place(y).is_some()).then(|| self.at(x, y))
+    }
+
+    fn tick_x(&self, tick: &Tick) -> f64 {
+        self.left + (self.right - self.left) * self.x.fraction_at(tick.at)
+    }
+
+    fn tick_y(&self, tick: &Tick) -> f64 {
+        self.bottom - (self.bottom - self.top) * self.y.fraction_at(tick.at)
+    }
+
+    /// Lines across at the labelled ticks of `y`, to be drawn before the data, and a break above the row of zero.
     pub fn grid(&self, picture: &mut Picture) {
-        for (value, _) in &self.y.ticks {
-            let y = self.y_px(*value);
+        for tick in self.y.ticks.iter().filter(|tick| !tick.label.is_empty()) {
+            let y = self.tick_y(tick);
             picture.line((self.left, y), (self.right, y), GRID, 1.0);
+        }
+        if let Some(broken) = self.y.broken_at {
+            let y = self.bottom - (self.bottom - self.top) * self.y.fraction_at(broken);
+            picture.dashed(&[(self.left, y), (self.right, y)], AXIS, 1.0, [3.0, 3.0]);
+        }
+    }
+
+    /// Lines up at the labelled ticks of `x`.
+    pub fn grid_up(&self, picture: &mut Picture) {
+        for tick in self.x.ticks.iter().filter(|tick| !tick.label.is_empty()) {
+            let x = self.tick_x(tick);
+            picture.line((x, self.top), (x, self.bottom), GRID, 1.0);
+        }
+        if let Some(broken) = self.x.broken_at {
+            let x = self.left + (self.right - self.left) * self.x.fraction_at(broken);
+            picture.dashed(&[(x, self.top), (x, self.bottom)], AXIS, 1.0, [3.0, 3.0]);
         }
     }
 
     /// Axis lines, ticks, labels and names; `gap` is how far below the panel the axis across stands.
     pub fn axes(&self, picture: &mut Picture, gap: f64) {
         self.axis_across(picture, gap);
-        for (value, label) in &self.y.ticks {
-            let at = (self.left - 8.0, self.y_px(*value));
-            picture.text(Text { across: Across::Right, colour: MUTED, size: 12.0, ..text(label, at) });
+        self.axis_up(picture);
+    }
+
+    /// The axis up alone; a logarithmic one with its line and all its ticks.
+    pub fn axis_up(&self, picture: &mut Picture) {
+        if self.y.is_logarithmic() {
+            let end = self.y.broken_at.map_or(self.bottom, |broken| {
+                self.bottom - (self.bottom - self.top) * self.y.fraction_at(broken)
+            });
+            picture.line((self.left, self.top), (self.left, end), AXIS, 1.0);
         }
-        let aside = widest(&self.y).max(30.0);
-        let middle = (self.left - 8.0 - aside - 16.0, (self.top + self.bottom) / 2.0);
+        for tick in &self.y.ticks {
+            let y = self.tick_y(tick);
+            if self.y.is_logarithmic() {
+                let length = TICKS[usize::from(tick.label.is_empty())];
+                picture.line((self.left - length, y), (self.left, y), AXIS, 1.0);
+            }
+            tick_label(picture, &tick.label, (self.left - 8.0, y), Across::Right);
+        }
+        let middle = (self.left - aside(&self.y) + 10.0, (self.top + self.bottom) / 2.0);
         picture.text(Text { across: Across::Centre, upwards: true, ..text(&self.y.label, middle) });
     }
 
@@ -53,132 +105,43 @@ impl Panel {
     pub fn axis_across(&self, picture: &mut Picture, gap: f64) {
         let line = self.bottom + gap;
         picture.line((self.left, line), (self.right, line), AXIS, 1.0);
-        for (value, label) in &self.x.ticks {
-            let x = self.x_px(*value);
-            picture.line((x, line), (x, line + 5.0), AXIS, 1.0);
-            let at = (x, line + 16.0);
-            picture.text(Text { across: Across::Centre, colour: MUTED, size: 12.0, ..text(label, at) });
+        for tick in &self.x.ticks {
+            let (x, length) = (self.tick_x(tick), TICKS[usize::from(tick.label.is_empty())]);
+            picture.line((x, line), (x, line + length), AXIS, 1.0);
+            tick_label(picture, &tick.label, (x, line + 16.0), Across::Centre);
         }
         let middle = ((self.left + self.right) / 2.0, line + 38.0);
         picture.text(Text { across: Across::Centre, ..text(&self.x.label, middle) });
     }
 
-    /// A second axis to the right with its own labels at the same height: `factor` times the values of `y`.
-    pub fn right_axis(&self, picture: &mut Picture, name: &str, unit: &str, factor: f64) {
-        let axis = Axis::new(name, unit, self.y.low * factor, self.y.high * factor);
-        for (value, label) in &axis.ticks {
-            let y = self.bottom - (self.bottom - self.top) * axis.fraction(*value);
+    /// A second axis to the right with its own labels: that of `y` times a factor, made by `axis`.
+    pub fn right_axis(&self, picture: &mut Picture, axis: &Axis) {
+        for tick in &axis.ticks {
+            let y = self.bottom - (self.bottom - self.top) * axis.fraction_at(tick.at);
             picture.line((self.right, y), (self.right + 5.0, y), AXIS, 1.0);
-            picture.text(Text { colour: MUTED, size: 12.0, ..text(label, (self.right + 9.0, y)) });
+            tick_label(picture, &tick.label, (self.right + 9.0, y), Across::Left);
         }
-        let aside = widest(&axis).max(30.0);
-        let middle = (self.right + 9.0 + aside + 16.0, (self.top + self.bottom) / 2.0);
+        let middle = (self.right + aside(axis) - 10.0, (self.top + self.bottom) / 2.0);
         picture.text(Text { across: Across::Centre, upwards: true, ..text(&axis.label, middle) });
     }
 }
 
-/// The width of the widest label of a tick.
-fn widest(axis: &Axis) -> f64 {
-    axis.ticks.iter().map(|(_, label)| text_width(label, 12.0, false)).fold(0.0, f64::max)
-}
-
-/// How an entry of a legend is drawn.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Key {
-    Area(Colour),
-    Line(Colour),
-    Dot(Colour),
-    Tick(Colour),
-}
-
-impl Key {
-    fn draw(self, picture: &mut Picture, (x, y): Point) {
-        match self {
-            Self::Area(colour) => picture.rect((x, y - 6.0), (x + 14.0, y + 6.0), colour),
-            Self::Line(colour) => picture.line((x - 2.0, y), (x + 16.0, y), colour, 2.0),
-            Self::Dot(colour) => picture.dot((x + 7.0, y), 4.0, colour),
-            Self::Tick(colour) => picture.line((x + 7.0, y - 6.0), (x + 7.0, y + 6.0), colour, 2.0),
-        }
+/// The label of a tick; what stands behind a `^` is raised.
+pub(super) fn tick_label(picture: &mut Picture, label: &str, (x, y): Point, across: Across) {
+    let (base, raised) = label.split_once('^').unwrap_or((label, ""));
+    if base.is_empty() {
+        return;
     }
-}
-
-/// A legend in one line, starting at `from`.
-pub(super) fn legend_line(picture: &mut Picture, from: Point, entries: &[(Key, String)]) {
-    let (mut x, y) = from;
-    for (key, label) in entries {
-        key.draw(picture, (x, y));
-        picture.text(Text { size: 12.5, ..text(label, (x + 22.0, y)) });
-        x += 22.0 + text_width(label, 12.5, false) + 26.0;
+    let left = x - match across {
+        Across::Left => 0.0,
+        Across::Centre => 0.5 * label_width(label),
+        Across::Right => label_width(label),
+    };
+    let plain = |words: &str, at: Point| Text { colour: MUTED, size: TICK_PX, ..text(words, at) };
+    if raised.is_empty() {
+        return picture.text(Text { across, ..plain(base, (x, y)) });
     }
-}
-
-/// Entries of a legend, as many to a line as have room in `width` pixels.
-pub(super) fn legend_lines(entries: &[(Key, String)], width: f64) -> Vec<Vec<(Key, String)>> {
-    let (mut lines, mut x) = (Vec::<Vec<_>>::new(), f64::INFINITY);
-    for (key, label) in entries {
-        let wide = 22.0 + text_width(label, 12.5, false) + 26.0;
-        if x + wide > width + 26.0 {
-            lines.push(Vec::new());
-            x = 0.0;
-        }
-        x += wide;
-        if let Some(line) = lines.last_mut() {
-            line.push((*key, label.clone()));
-        }
-    }
-    lines
-}
-
-/// `label` in lines of at most `room` pixels, broken between words.
-pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in label.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if text_width(&format!("{line} {word}"), size, bold) <= room => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
-}
-
-/// Size of the names in a legend, where there is room.
-pub(super) const LEGEND_PX: f64 = 12.5;
-
-/// A legend in one column, top entry at `from`; each entry has a label and a value that ends at `right`.
-pub(super) fn legend_column(
-    picture: &mut Picture,
-    from: Point,
-    right: f64,
-    entries: &[(Key, String, String)],
-) {
-    let pitch = (470.0 / entries.len().max(1) as f64).min(22.0);
-    let size = (pitch * 0.62).clamp(7.0, LEGEND_PX);
-    for (index, (key, label, value)) in entries.iter().enumerate() {
-        let y = from.1 + pitch * index as f64;
-        key.draw(picture, (from.0, y));
-        let room = right - from.0 - 30.0 - text_width(value, size, false);
-        picture.text(Text { size, colour: INK, ..text(&shortened(label, size, room), (from.0 + 22.0, y)) });
-        if !value.is_empty() {
-            picture.text(Text { size, colour: MUTED, across: Across::Right, ..text(value, (right, y)) });
-        }
-    }
-}
-
-/// `label`, cut with `…` where it is wider than `room` pixels.
-pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
-    let mut short: Vec<char> = label.chars().collect();
-    if text_width(label, size, false) <= room {
-        return label.to_owned();
-    }
-    while !short.is_empty() {
-        short.pop();
-        let candidate: String = short.iter().chain(['…'].iter()).collect();
-        if text_width(&candidate, size, false) <= room {
-            return candidate;
-        }
-    }
-    String::new()
+    picture.text(plain(base, (left, y)));
+    let behind = left + super::render::text_width(base, TICK_PX, false);
+    picture.text(Text { size: RAISED * TICK_PX, ..plain(raised, (behind + 0.5, y - 5.0)) });
 }

@@ -1,6 +1,7 @@
 //! Pictures into files: SVG through `plotters`' backend, PNG through its rasterizer into a buffer of our own.
 //!
-//! Both are drawn on a grid twice as fine as the picture; for PNG two by two pixels are then averaged.
+//! Both are drawn on a grid twice as fine as the picture; for PNG two by two pixels are then averaged, and a pixel of the layout is as
+//! many of the file as the picture's [`Paper`](super::look::Paper) says.
 
 use std::fmt::Display;
 use std::sync::OnceLock;
@@ -10,7 +11,7 @@ use plotters::style::{FontFamily, FontStyle, FontTransform, IntoFont, RGBAColor,
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend, DrawingErrorKind};
 
-use super::palette::Colour;
+use super::palette::{BACKGROUND, Colour};
 use super::picture::{Across, Picture, Point, Shape, Text};
 use crate::output::dir::{OutDir, OutputError};
 use crate::output::{font, image};
@@ -20,7 +21,7 @@ mod raster;
 
 use raster::Raster;
 
-/// How much finer than the picture things are drawn.
+/// How much finer than the picture SVG is drawn, and PNG before it is halved.
 const SCALE: f64 = 2.0;
 
 /// What `plotters` calls a font's size over its em.
@@ -46,15 +47,17 @@ impl Picture {
     /// # Errors
     /// [`PlotError`] when the font is damaged or the backend fails.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let (width, height) = self.fine_size();
+        let (width, height) = self.fine_size(SCALE);
         let mut svg = String::new();
-        self.play(&mut SVGBackend::with_string(&mut svg, (width, height)))?;
+        self.play(&mut SVGBackend::with_string(&mut svg, (width, height)), SCALE)?;
         let fine = format!("width=\"{width}\" height=\"{height}\"");
         let label = attribute(&font::drawable(&self.title));
-        let shown = format!(
-            "width=\"{}\" height=\"{}\" role=\"img\" aria-label=\"{label}\"",
-            self.width, self.height
-        );
+        let size = |side: f64| match self.paper.width_mm {
+            Some(width_mm) => format!("{:.2}mm", side / self.width() * width_mm),
+            None => format!("{:.0}", side * self.paper.zoom),
+        };
+        let (width, height) = (size(self.width()), size(self.height));
+        let shown = format!("width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"{label}\"");
         Ok(svg.replacen(&fine, &shown, 1))
     }
 
@@ -63,9 +66,10 @@ impl Picture {
     /// # Errors
     /// [`PlotError`] when the font is damaged, or drawing or encoding fails.
     pub fn png(&self) -> Result<Vec<u8>, PlotError> {
-        let (width, height) = self.fine_size();
+        let scale = SCALE * self.paper.zoom;
+        let (width, height) = self.fine_size(scale);
         let mut raster = Raster::new(width, height);
-        self.play(&mut raster)?;
+        self.play(&mut raster, scale)?;
         Ok(image::encode_png(width / 2, height / 2, &raster.halved())?)
     }
 
@@ -74,19 +78,21 @@ impl Picture {
     /// # Errors
     /// [`OutputError::Write`] with the file and the cause.
     pub fn write(&self, dir: &OutDir, stem: &str) -> Result<(), OutputError> {
-        dir.write_atomic(&format!("{stem}.svg"), |out| Ok(out.write_all(self.svg()?.as_bytes())?))?;
-        dir.write_atomic(&format!("{stem}.png"), |out| Ok(out.write_all(&self.png()?)?))?;
+        dir.write_file(&format!("{stem}.svg"), |out| Ok(out.write_all(self.svg()?.as_bytes())?))?;
+        dir.write_file(&format!("{stem}.png"), |out| Ok(out.write_all(&self.png()?)?))?;
         Ok(())
     }
 
-    fn fine_size(&self) -> (u32, u32) {
-        ((self.width * SCALE) as u32, (self.height * SCALE) as u32)
+    fn fine_size(&self, scale: f64) -> (u32, u32) {
+        ((self.width() * scale) as u32, (self.height * scale) as u32)
     }
 
-    fn play<B: DrawingBackend>(&self, backend: &mut B) -> Result<(), PlotError> {
+    /// Draws everything with `scale` steps of the backend to a pixel of the layout.
+    fn play<B: DrawingBackend>(&self, backend: &mut B, scale: f64) -> Result<(), PlotError> {
         register()?;
-        for shape in &self.shapes {
-            draw(backend, shape).map_err(failed)?;
+        let paper = Shape::Rect { from: (0.0, 0.0), to: (self.width(), self.height), fill: BACKGROUND };
+        for shape in std::iter::once(&paper).chain(&self.shapes) {
+            draw(backend, shape, scale).map_err(failed)?;
         }
         backend.present().map_err(failed)
     }
@@ -121,22 +127,31 @@ impl BackendStyle for Stroke {
     }
 }
 
-fn draw<B: DrawingBackend>(backend: &mut B, shape: &Shape) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+fn draw<B: DrawingBackend>(
+    backend: &mut B,
+    shape: &Shape,
+    scale: f64,
+) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+    let at = |point: Point| fine(point, scale);
     match shape {
-        Shape::Rect { from, to, fill } => backend.draw_rect(fine(*from), fine(*to), &colour(*fill), true),
+        Shape::Rect { from, to, fill } => backend.draw_rect(at(*from), at(*to), &colour(*fill), true),
         Shape::Polyline { points, stroke, width } => {
-            let width = (width * SCALE).max(1.0) as u32;
-            backend.draw_path(fine_path(points), &Stroke { colour: colour(*stroke), width })
+            let width = (width * scale).max(1.0) as u32;
+            backend.draw_path(fine_path(points, scale), &Stroke { colour: colour(*stroke), width })
         }
-        Shape::Polygon { points, fill } => backend.fill_polygon(fine_path(points), &colour(*fill)),
+        Shape::Polygon { points, fill } => backend.fill_polygon(fine_path(points, scale), &colour(*fill)),
         Shape::Dot { centre, radius, fill } => {
-            backend.draw_circle(fine(*centre), (radius * SCALE) as u32, &colour(*fill), true)
+            backend.draw_circle(at(*centre), (radius * scale) as u32, &colour(*fill), true)
         }
-        Shape::Text(text) => draw_text(backend, text),
+        Shape::Text(text) => draw_text(backend, text, scale),
     }
 }
 
-fn draw_text<B: DrawingBackend>(backend: &mut B, text: &Text) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+fn draw_text<B: DrawingBackend>(
+    backend: &mut B,
+    text: &Text,
+    scale: f64,
+) -> Result<(), DrawingErrorKind<B::ErrorType>> {
     let h_pos = match text.across {
         Across::Left => HPos::Left,
         Across::Centre => HPos::Center,
@@ -144,16 +159,17 @@ fn draw_text<B: DrawingBackend>(backend: &mut B, text: &Text) -> Result<(), Draw
     };
     let turn = if text.upwards { FontTransform::Rotate270 } else { FontTransform::None };
     let style = TextStyle {
-        font: plotters_font(text.size, text.bold).transform(turn),
+        font: plotters_font(text.size * scale, text.bold).transform(turn),
         color: colour(text.colour),
         pos: Pos::new(h_pos, VPos::Center),
     };
-    backend.draw_text(&text.text, &style, fine(text.at))
+    backend.draw_text(&text.text, &style, fine(text.at, scale))
 }
 
+/// The font with an em of `size` steps of the backend.
 fn plotters_font(size: f64, bold: bool) -> plotters::style::FontDesc<'static> {
     let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
-    (FontFamily::Name(font::FAMILY), size * SCALE * SIZE_OVER_EM, style).into_font()
+    (FontFamily::Name(font::FAMILY), size * SIZE_OVER_EM, style).into_font()
 }
 
 /// The width in pixels of `text` in letters of `size`.
@@ -163,7 +179,7 @@ pub(super) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     if register().is_err() {
         return guess;
     }
-    plotters_font(size, bold).box_size(text).map_or(guess, |(width, _)| f64::from(width) / SCALE)
+    plotters_font(size * SCALE, bold).box_size(text).map_or(guess, |(width, _)| f64::from(width) / SCALE)
 }
 
 fn colour(colour: Colour) -> BackendColor {
@@ -172,14 +188,14 @@ fn colour(colour: Colour) -> BackendColor {
     BackendColor { alpha, rgb: (r, g, b) }
 }
 
-fn fine(point: Point) -> BackendCoord {
-    let round = |value: f64| libm::round(value * SCALE) as i32;
+fn fine(point: Point, scale: f64) -> BackendCoord {
+    let round = |value: f64| libm::round(value * scale) as i32;
     (round(point.0), round(point.1))
 }
 
 /// The path on the fine grid, without points that fall together.
-fn fine_path(points: &[Point]) -> Vec<BackendCoord> {
-    let mut path: Vec<BackendCoord> = points.iter().map(|point| fine(*point)).collect();
+fn fine_path(points: &[Point], scale: f64) -> Vec<BackendCoord> {
+    let mut path: Vec<BackendCoord> = points.iter().map(|point| fine(*point, scale)).collect();
     path.dedup();
     path
 }

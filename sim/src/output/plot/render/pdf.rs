@@ -2,7 +2,7 @@
 //!
 //! Operators and structure are those of ISO 32000-1:2008, sections 7.5 and 8.5.
 
-use super::super::palette::Colour;
+use super::super::palette::{BACKGROUND, Colour};
 use super::super::picture::{Across, Picture, Point, Shape, Text};
 use super::text_width;
 
@@ -13,6 +13,14 @@ impl Picture {
     /// The bytes of a PDF file. The same picture gives the same bytes.
     pub fn pdf(&self) -> Vec<u8> {
         let mut page = Page { height: self.height, content: String::new(), alphas: Vec::new() };
+        let points = match self.paper.width_mm {
+            Some(width_mm) => width_mm / 25.4 * 72.0 / self.width(),
+            None => self.paper.zoom,
+        };
+        if points != 1.0 {
+            page.put(&format!("{0} 0 0 {0} 0 0 cm", exact(points)));
+        }
+        page.draw(&Shape::Rect { from: (0.0, 0.0), to: (self.width(), self.height), fill: BACKGROUND });
         self.shapes.iter().for_each(|shape| page.draw(shape));
         let states: String =
             page.alphas.iter().enumerate().map(|(i, a)| format!("/A{i} << /ca {a} /CA {a} >> ")).collect();
@@ -22,7 +30,8 @@ impl Picture {
             format!(
                 "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {} {}] /Contents 4 0 R /Resources << /Font << \
                  /F0 5 0 R /F1 6 0 R >> /ExtGState << {states}>> >> >>",
-                self.width, self.height
+                n(self.width() * points),
+                n(self.height * points)
             ),
             // A letter is a byte in the file.
             format!("<< /Length {} >>\nstream\n{}endstream", page.content.chars().count(), page.content),
@@ -60,6 +69,8 @@ fn latin(letter: char) -> u8 {
     match letter {
         '\u{2013}' => 150,
         '\u{2026}' => 133,
+        '\u{2265}' => b'>',
+        '\u{2264}' => b'<',
         '\u{2212}' => b'-',
         _ => u8::try_from(u32::from(letter)).unwrap_or(b'?'),
     }
@@ -168,13 +179,19 @@ fn n(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// A number as exact as a scale of a whole page has to be.
+fn exact(value: f64) -> String {
+    format!("{value:.7}")
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::super::look::Look;
     use super::*;
 
     #[test]
     fn the_table_points_at_the_objects() {
-        let mut picture = Picture::new(200.0, 100.0, "A (title)", "below – it");
+        let mut picture = Picture::titled(&Look::default(), (200.0, 100.0), ["A (title)", "below – it"]);
         picture.dot((10.0, 10.0), 3.0, Colour::hex(0xff_0000).alpha(0.5));
         let bytes = picture.pdf();
         let text: String = bytes.iter().map(|&byte| char::from(byte)).collect();

@@ -1,0 +1,133 @@
+//! Legends, and words cut and wrapped to the room there is.
+
+use super::palette::{BACKGROUND, Colour, INK, MUTED};
+use super::picture::{Across, Picture, Point, Text, text};
+use super::render::text_width;
+use super::series::Style;
+
+/// How an entry of a legend is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Key {
+    Area(Colour),
+    Line(Colour),
+    /// A line with markers.
+    Curve(Style),
+    /// A large marker with a cross.
+    Spread(Style),
+    /// A marker, filled or hollow.
+    Marker(Style, bool),
+    Dot(Colour),
+    /// A step of a frontier.
+    Steps(Colour),
+    Tick(Colour),
+}
+
+/// Size of the names in a legend, where there is room.
+pub(super) const LEGEND_PX: f64 = 12.5;
+/// Distance of the lines of a legend.
+pub(super) const LEGEND_LINE: f64 = 22.0;
+/// Room of a key, and between entries.
+const KEY: f64 = 22.0;
+const GAP: f64 = 24.0;
+
+impl Key {
+    fn draw(self, picture: &mut Picture, (x, y): Point) {
+        match self {
+            Self::Area(colour) => picture.rect((x, y - 6.0), (x + 14.0, y + 6.0), colour),
+            Self::Line(colour) => picture.line((x - 2.0, y), (x + 16.0, y), colour, 2.0),
+            Self::Curve(style) => {
+                style.line(picture, &[(x - 3.0, y), (x + 17.0, y)], 1.6);
+                style.marker(picture, (x + 7.0, y), 3.2);
+            }
+            Self::Spread(style) => {
+                picture.line((x - 2.0, y), (x + 16.0, y), style.colour, 2.0);
+                picture.line((x + 7.0, y - 8.0), (x + 7.0, y + 8.0), style.colour, 2.0);
+                style.marker(picture, (x + 7.0, y), 5.0);
+            }
+            Self::Marker(style, true) => style.marker(picture, (x + 7.0, y), 4.0),
+            Self::Marker(style, false) => style.hollow(picture, (x + 7.0, y), 4.0),
+            Self::Dot(colour) => picture.dot((x + 7.0, y), 4.0, colour),
+            Self::Steps(colour) => {
+                picture.polyline(
+                    vec![(x - 2.0, y - 5.0), (x + 7.0, y - 5.0), (x + 7.0, y + 5.0), (x + 16.0, y + 5.0)],
+                    colour,
+                    1.5,
+                );
+            }
+            Self::Tick(colour) => picture.line((x + 7.0, y - 6.0), (x + 7.0, y + 6.0), colour, 2.0),
+        }
+    }
+}
+
+/// A legend in as many lines as it takes within the margins, the first around `top`; returns the height of all.
+pub(super) fn legend_lines(picture: &mut Picture, top: f64, entries: &[(Key, String)]) -> f64 {
+    let (left, right) = (picture.margin() + 2.0, picture.width() - picture.margin());
+    let (mut x, mut y) = (left, top);
+    for (key, label) in entries {
+        let label = shortened(label, LEGEND_PX, right - left - KEY);
+        let wide = KEY + text_width(&label, LEGEND_PX, false);
+        if x > left && x + wide > right {
+            (x, y) = (left, y + LEGEND_LINE);
+        }
+        key.draw(picture, (x, y));
+        picture.text(Text { size: LEGEND_PX, ..text(&label, (x + KEY, y)) });
+        x += wide + GAP;
+    }
+    if entries.is_empty() { 0.0 } else { y - top + LEGEND_LINE }
+}
+
+/// A legend in one column within `height`, top entry at `from`; each entry has a label and a value that ends at `right`.
+pub(super) fn legend_column(
+    picture: &mut Picture,
+    from: Point,
+    (right, height): (f64, f64),
+    entries: &[(Key, String, String)],
+) {
+    let pitch = (height / entries.len().max(1) as f64).min(LEGEND_LINE);
+    let size = (pitch * 0.62).clamp(7.0, LEGEND_PX);
+    for (index, (key, label, value)) in entries.iter().enumerate() {
+        let y = from.1 + pitch * index as f64;
+        key.draw(picture, (from.0, y));
+        let room = right - from.0 - KEY - 8.0 - text_width(value, size, false);
+        picture.text(Text { size, colour: INK, ..text(&shortened(label, size, room), (from.0 + KEY, y)) });
+        if !value.is_empty() {
+            picture.text(Text { size, colour: MUTED, across: Across::Right, ..text(value, (right, y)) });
+        }
+    }
+}
+
+/// A white plate under a legend that stands within a panel.
+pub(super) fn plate(picture: &mut Picture, from: Point, to: Point) {
+    picture.rect(from, to, BACKGROUND.alpha(0.85));
+}
+
+/// `label` in lines of at most `room` pixels, broken between words.
+pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in label.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), size, bold) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// `label`, cut with `…` where it is wider than `room` pixels.
+pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
+    let mut short: Vec<char> = label.chars().collect();
+    if text_width(label, size, false) <= room {
+        return label.to_owned();
+    }
+    while !short.is_empty() {
+        short.pop();
+        let candidate: String = short.iter().chain(['…'].iter()).collect();
+        if text_width(&candidate, size, false) <= room {
+            return candidate;
+        }
+    }
+    String::new()
+}

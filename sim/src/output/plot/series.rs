@@ -1,0 +1,381 @@
+//! Series: what is drawn within a panel, each with its style.
+
+use super::legend::Key;
+use super::palette::{BACKGROUND, Colour, FAINT, INK, SERIES};
+use super::panel::Panel;
+use super::picture::{Picture, Point};
+
+/// Something to draw.
+#[derive(Clone, Debug)]
+pub enum Mark {
+    /// From a lowest to a highest value at each place, as a filled strip.
+    Band(Vec<(f64, f64, f64)>),
+    /// A line through points.
+    Line(Vec<(f64, f64)>),
+    /// A line through points, each with a marker.
+    Curve(Vec<(f64, f64)>),
+    /// Many faint lines.
+    Faint(Vec<Vec<(f64, f64)>>),
+    /// Markers, each with a name that may be empty.
+    Dots(Vec<(f64, f64, String)>),
+    /// Hollow markers, each with a name that may be empty.
+    Rings(Vec<(f64, f64, String)>),
+    /// Large markers, each with a cross as long as its spread.
+    Spreads(Vec<Spread>),
+    /// The frontier of points of which less across is better: level until the next point, then straight to it.
+    Steps(Vec<(f64, f64)>),
+    /// Bars from zero, `(from, to, height)`.
+    Bars(Vec<(f64, f64, f64)>),
+    /// Lines from bottom to top.
+    Uprights(Vec<f64>),
+}
+
+/// A point with its spread.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spread {
+    /// Where it is.
+    pub at: (f64, f64),
+    /// From where to where across.
+    pub across: [f64; 2],
+    /// From where to where up.
+    pub up: [f64; 2],
+    /// Its name; it may be empty.
+    pub name: String,
+}
+
+impl Spread {
+    /// The lines of its cross.
+    fn cross(&self) -> [[(f64, f64); 2]; 2] {
+        let ((x, y), [x0, x1], [y0, y1]) = (self.at, self.across, self.up);
+        [[(x0, y), (x1, y)], [(x, y0), (x, y1)]]
+    }
+}
+
+/// Which colour and marker a series has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Paint {
+    /// Those of its place in the panel.
+    #[default]
+    Own,
+    /// Those of the series at a place.
+    Like(usize),
+    /// The colour of letters.
+    Ink,
+    /// That of lines behind others.
+    Grey,
+}
+
+/// A named mark.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name in the legend; empty for one that is not in it.
+    pub name: String,
+    /// What the panel says of it, for example its exponent.
+    pub note: String,
+    /// Its points, from left to right where they are connected; those that an axis has no place for are left out.
+    pub mark: Mark,
+    /// Its colour and marker.
+    pub paint: Paint,
+}
+
+impl Series {
+    /// A mark with a name and the usual style.
+    pub fn new(name: impl Into<String>, mark: Mark) -> Self {
+        Self { name: name.into(), note: String::new(), mark, paint: Paint::Own }
+    }
+
+    /// A line with markers.
+    pub fn curve(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(name, Mark::Curve(points.into_iter().collect()))
+    }
+
+    /// The same with another style.
+    #[must_use]
+    pub fn painted(self, paint: Paint) -> Self {
+        Self { paint, ..self }
+    }
+
+    /// How it is drawn as number `index` of a panel.
+    pub(super) fn style(&self, index: usize) -> Style {
+        match self.paint {
+            Paint::Own => Style::of(index),
+            Paint::Like(place) => Style::of(place),
+            Paint::Ink => Style { colour: INK, ..Style::of(0) },
+            Paint::Grey => Style { colour: FAINT, ..Style::of(0) },
+        }
+    }
+}
+
+/// The outline of a marker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Marker {
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+}
+
+const MARKERS: [Marker; 4] = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond];
+
+/// Colour, marker and strokes of a series: what tells it apart on paper without colours, too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Style {
+    pub colour: Colour,
+    pub marker: Marker,
+    /// Lengths of strokes and of gaps between them; a whole line without.
+    pub dash: Option<[f64; 2]>,
+}
+
+impl Style {
+    /// The style of series number `index`: as many as there are colours, then again with strokes.
+    pub fn of(index: usize) -> Self {
+        let dash = [None, Some([7.0, 4.0]), Some([2.0, 3.0])][index / SERIES.len() % 3];
+        Self { colour: SERIES[index % SERIES.len()], marker: MARKERS[index % MARKERS.len()], dash }
+    }
+
+    /// A line in its colour and strokes.
+    pub fn line(&self, picture: &mut Picture, points: &[Point], width: f64) {
+        match self.dash {
+            Some(dash) => picture.dashed(points, self.colour, width, dash),
+            None => picture.polyline(points.to_vec(), self.colour, width),
+        }
+    }
+
+    /// A filled marker.
+    pub fn marker(&self, picture: &mut Picture, at: Point, radius: f64) {
+        match self.marker {
+            Marker::Circle => picture.dot(at, radius, self.colour),
+            _ => picture.polygon(self.corners(at, radius), self.colour),
+        }
+    }
+
+    /// A hollow marker.
+    pub fn hollow(&self, picture: &mut Picture, at: Point, radius: f64) {
+        let mut inner = *self;
+        inner.colour = BACKGROUND;
+        self.marker(picture, at, radius + 0.4);
+        inner.marker(picture, at, radius - 1.0);
+    }
+
+    fn corners(&self, (x, y): Point, r: f64) -> Vec<Point> {
+        // As large in area as the circle.
+        match self.marker {
+            Marker::Circle | Marker::Square => {
+                let r = 0.89 * r;
+                vec![(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)]
+            }
+            Marker::Triangle => {
+                let r = 1.25 * r;
+                vec![(x, y - r), (x + 0.95 * r, y + 0.7 * r), (x - 0.95 * r, y + 0.7 * r)]
+            }
+            Marker::Diamond => {
+                let r = 1.25 * r;
+                vec![(x, y - r), (x + r, y), (x, y + r), (x - r, y)]
+            }
+        }
+    }
+}
+
+/// Radius of a marker of a point among many, of a named one, and of the middle of a spread.
+const RADII: [f64; 3] = [2.4, 3.0, 5.5];
+/// More points than this are drawn smaller.
+const MANY: usize = 60;
+
+impl Mark {
+    /// Every value of `x` and `y` that the axes have to show.
+    pub(super) fn values(&self) -> [Vec<f64>; 2] {
+        let points: Vec<Point> = match self {
+            Self::Band(band) => band.iter().flat_map(|&(x, low, high)| [(x, low), (x, high)]).collect(),
+            Self::Line(points) | Self::Curve(points) | Self::Steps(points) => points.clone(),
+            Self::Faint(lines) => lines.concat(),
+            Self::Dots(dots) | Self::Rings(dots) => dots.iter().map(|&(x, y, _)| (x, y)).collect(),
+            Self::Spreads(spreads) => spreads.iter().flat_map(|spread| spread.cross().concat()).collect(),
+            Self::Bars(bars) => bars.iter().flat_map(|&(from, to, y)| [(from, 0.0), (to, y)]).collect(),
+            Self::Uprights(places) => return [places.clone(), Vec::new()],
+        };
+        let finite = points.into_iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+        finite.unzip::<f64, f64, Vec<f64>, Vec<f64>>().into()
+    }
+
+    /// Whether it has markers, which keep off the frame.
+    pub(super) fn has_markers(&self) -> bool {
+        matches!(self, Self::Curve(_) | Self::Dots(_) | Self::Rings(_) | Self::Spreads(_))
+    }
+
+    /// Its entry in a legend.
+    pub(super) fn key(&self, style: Style) -> Key {
+        match self {
+            Self::Band(_) => Key::Area(style.colour.alpha(0.55)),
+            Self::Bars(_) => Key::Area(style.colour),
+            Self::Line(_) | Self::Faint(_) => Key::Line(style.colour),
+            Self::Curve(_) => Key::Curve(style),
+            Self::Dots(_) => Key::Marker(style, true),
+            Self::Spreads(_) => Key::Spread(style),
+            Self::Rings(_) => Key::Marker(style, false),
+            Self::Steps(_) => Key::Steps(style.colour),
+            Self::Uprights(_) => Key::Tick(style.colour),
+        }
+    }
+
+    /// Names of points with where these are, and the radius that is kept free around them.
+    pub(super) fn names(&self, panel: &Panel) -> Vec<(Point, f64, &str)> {
+        let named =
+            |x: f64, y: f64, name: &'_ String| (!name.is_empty()).then(|| panel.place((x, y))).flatten();
+        match self {
+            Self::Dots(dots) | Self::Rings(dots) => dots
+                .iter()
+                .filter_map(|(x, y, name)| Some((named(*x, *y, name)?, RADII[1], name.as_str())))
+                .collect(),
+            Self::Spreads(spreads) => spreads
+                .iter()
+                .filter_map(|s| Some((named(s.at.0, s.at.1, &s.name)?, RADII[2], s.name.as_str())))
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Where its markers are, and along its lines some places: what names keep off.
+    pub(super) fn obstacles(&self, panel: &Panel) -> Vec<Point> {
+        let path =
+            |points: &[(f64, f64)]| points.iter().filter_map(|&point| panel.place(point)).collect::<Vec<_>>();
+        match self {
+            Self::Dots(dots) | Self::Rings(dots) => {
+                dots.iter().filter_map(|&(x, y, _)| panel.place((x, y))).collect()
+            }
+            Self::Spreads(spreads) => {
+                spreads.iter().flat_map(Spread::cross).flat_map(|line| along(&path(&line))).collect()
+            }
+            Self::Line(points) | Self::Curve(points) => along(&path(points)),
+            Self::Steps(points) => along(&stairs(&path(points))),
+            Self::Band(_) | Self::Faint(_) | Self::Bars(_) | Self::Uprights(_) => Vec::new(),
+        }
+    }
+
+    /// Draws it; `beneath` is how many curves come after it, as one below another is seen beside it where it is thicker.
+    pub(super) fn draw(&self, panel: &Panel, style: Style, beneath: usize, picture: &mut Picture) {
+        let path =
+            |points: &[(f64, f64)]| points.iter().filter_map(|&point| panel.place(point)).collect::<Vec<_>>();
+        let colour = style.colour;
+        match self {
+            Self::Band(band) => {
+                for (index, &(_, low, high)) in band.iter().enumerate() {
+                    let (top, bottom) = (panel.y_px(high), panel.y_px(low));
+                    let (left, right) = width_px(band, index, panel);
+                    picture.rect((left, top - 0.5), (right, bottom.max(top) + 0.5), colour.alpha(0.55));
+                }
+            }
+            Self::Line(line) => style.line(picture, &path(line), 1.6),
+            Self::Curve(points) => {
+                let (points, thicker) = (path(points), beneath.min(3) as f64);
+                if points.len() > 1 {
+                    style.line(picture, &points, 1.5 + 0.5 * thicker);
+                }
+                points.iter().for_each(|&at| style.marker(picture, at, 2.8 + 0.4 * thicker));
+            }
+            Self::Faint(lines) => {
+                let alpha =
+                    if colour == FAINT { 1.0 } else { (3.0 / lines.len().max(1) as f64).clamp(0.04, 0.6) };
+                lines.iter().for_each(|line| picture.polyline(path(line), colour.alpha(alpha), 1.0));
+            }
+            Self::Dots(dots) | Self::Rings(dots) => {
+                let radius = RADII[usize::from(dots.len() <= MANY)];
+                for at in dots.iter().filter_map(|&(x, y, _)| panel.place((x, y))) {
+                    match self {
+                        Self::Dots(_) => style.marker(picture, at, radius),
+                        _ => style.hollow(picture, at, radius),
+                    }
+                }
+            }
+            Self::Spreads(spreads) => {
+                for spread in spreads {
+                    for line in spread.cross().map(|line| path(&line)) {
+                        picture.polyline(line.clone(), BACKGROUND, 4.5);
+                        picture.polyline(line, colour, 2.0);
+                    }
+                    let Some(at) = panel.place(spread.at) else { continue };
+                    Style { colour: BACKGROUND, ..style }.marker(picture, at, RADII[2] + 1.5);
+                    style.marker(picture, at, RADII[2]);
+                }
+            }
+            Self::Steps(points) => picture.polyline(stairs(&path(points)), colour, 1.3),
+            Self::Bars(bars) => {
+                for &(from, to, y) in bars {
+                    picture.rect(panel.at(from, y), (panel.x_px(to) - 1.0, panel.y_px(0.0)), colour);
+                }
+            }
+            Self::Uprights(places) => {
+                for x in places.iter().filter(|place| panel.x.place(**place).is_some()) {
+                    let x = panel.x_px(*x);
+                    picture.dashed(&[(x, panel.top), (x, panel.bottom)], colour, 1.2, [5.0, 3.0]);
+                }
+            }
+        }
+    }
+}
+
+/// Level from each point until the next, then straight up or down to it.
+fn stairs(points: &[Point]) -> Vec<Point> {
+    let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
+    corners.chain(points.last().copied()).collect()
+}
+
+/// Places along a path, some pixels apart.
+fn along(path: &[Point]) -> Vec<Point> {
+    let between = |pair: &[Point]| {
+        let ((ax, ay), (bx, by)) = (pair[0], pair[1]);
+        let steps = (libm::hypot(bx - ax, by - ay) / 6.0).min(400.0) as u32 + 1;
+        let at = move |step: u32| f64::from(step) / f64::from(steps);
+        (0..=steps)
+            .map(move |step| (ax + (bx - ax) * at(step), ay + (by - ay) * at(step)))
+            .collect::<Vec<_>>()
+    };
+    path.windows(2).flat_map(between).chain(path.first().copied()).collect()
+}
+
+/// From where to where a place of a band is drawn: halfway to its neighbours, and never thinner than a pixel, so that a
+/// lone spike is still seen.
+fn width_px(band: &[(f64, f64, f64)], index: usize, panel: &Panel) -> (f64, f64) {
+    let x_px = |index: usize| band.get(index).map(|place| panel.x_px(place.0));
+    let x = panel.x_px(band[index].0);
+    let before = index.checked_sub(1).and_then(x_px).map(|before| 0.5 * (x - before));
+    let after = x_px(index + 1).map(|after| 0.5 * (after - x));
+    let reach = |side: Option<f64>, other: Option<f64>| side.or(other).unwrap_or(0.0).max(0.5);
+    ((x - reach(before, after)).max(panel.left), (x + reach(after, before)).min(panel.right))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::axis::{Axis, Way};
+    use super::*;
+
+    fn panel(right: f64) -> Panel {
+        let x = Axis::new("time", "s", (0.0, 4.0), (Way::Across, right));
+        let y = Axis::new("power", "W", (0.0, 1.0), (Way::Up, 100.0));
+        Panel { left: 0.0, top: 0.0, right, bottom: 100.0, x, y }
+    }
+
+    #[test]
+    fn places_of_a_band_touch_however_few_there_are() {
+        let band = [(1.0, 0.0, 1.0), (2.0, 0.0, 1.0), (3.0, 0.0, 1.0)];
+        let ends: Vec<_> = (0..3).map(|index| width_px(&band, index, &panel(400.0))).collect();
+        assert_eq!(ends, [(50.0, 150.0), (150.0, 250.0), (250.0, 350.0)]);
+        let (left, right) = width_px(&band[..1], 0, &panel(400.0));
+        assert_eq!(right - left, 1.0);
+        let (left, right) = width_px(&band, 1, &panel(1.0));
+        assert!(right - left >= 0.75, "{left} {right}");
+    }
+
+    /// Between two settings of a frontier there is none: the better of them holds until the next one.
+    #[test]
+    fn a_frontier_goes_in_steps() {
+        assert_eq!(stairs(&[(0.0, 9.0), (5.0, 4.0)]), [(0.0, 9.0), (5.0, 9.0), (5.0, 4.0)]);
+        assert_eq!(stairs(&[(1.0, 1.0)]), [(1.0, 1.0)]);
+        assert!(stairs(&[]).is_empty());
+    }
+
+    #[test]
+    fn no_two_of_two_dozen_series_look_the_same() {
+        let styles: Vec<Style> = (0..24).map(Style::of).collect();
+        assert!((0..24).all(|a| (0..a).all(|b| styles[a] != styles[b])));
+    }
+}
