@@ -1,6 +1,6 @@
 //! Figures of the papers, drawn anew.
 
-use crate::output::plot::{Curve, CurvePanel, Curves, Lines, Mark, Picture, Scale, Series};
+use crate::output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Picture, Scale, Series};
 
 /// A picture and its name.
 pub struct Figure {
@@ -21,22 +21,34 @@ impl Figure {
         name: &'static str,
         title: &str,
         subject: &str,
-        [x, y]: [(&str, &str); 2],
+        axes: [(&str, &str); 2],
         series: Vec<Series>,
     ) -> Self {
-        Self { name, picture: Lines { title, subject, x, y, series }.picture() }
+        let axes = axes.map(|(name, unit)| AxisSpec::even(name, unit));
+        Self::of(name, [title, subject], ChartPanel::over("", axes, series))
+    }
+
+    /// Points in a plane, distances the same across and up.
+    pub(super) fn plane(name: &'static str, title: &str, subject: &str, series: Vec<Series>) -> Self {
+        let axes = ["x", "y"].map(|name| AxisSpec::even(name, ""));
+        Self::of(name, [title, subject], ChartPanel::over("", axes, series).equal())
+    }
+
+    /// One panel.
+    pub(super) fn of(name: &'static str, [title, subject]: [&str; 2], panel: ChartPanel) -> Self {
+        Self { name, picture: Chart::new(title, subject, vec![panel]).picture(&Look::default()) }
     }
 }
 
 /// Curves over a number that doubles, `axes` saying what goes across and up.
 pub(super) fn over_doublings(
     name: &'static str,
-    [title, subject]: [&str; 2],
+    titles: [&str; 2],
     axes: [&str; 2],
-    curves: Vec<Curve>,
+    curves: Vec<Series>,
 ) -> Figure {
-    let panel = CurvePanel::new("", axes, curves).on(Scale::Doublings, Scale::Even);
-    Figure { name, picture: Curves { title, subject, panels: vec![panel] }.picture() }
+    let panel = ChartPanel::new("", axes, curves).on(Scale::Doublings, Scale::Even);
+    Figure::of(name, titles, panel)
 }
 
 /// Time.
@@ -48,13 +60,13 @@ pub(super) const ENERGY: (&str, &str) = ("energy per frame", "J");
 
 /// A line.
 pub(super) fn line(name: &str, points: Vec<(f64, f64)>) -> Series {
-    Series { name: name.to_owned(), mark: Mark::Line(points) }
+    Series::new(name, Mark::Line(points))
 }
 
 /// Dots without names.
 pub(super) fn dots(name: &str, points: Vec<(f64, f64)>) -> Series {
     let dots = points.into_iter().map(|(x, y)| (x, y, String::new())).collect();
-    Series { name: name.to_owned(), mark: Mark::Dots(dots) }
+    Series::new(name, Mark::Dots(dots))
 }
 
 /// A level line across from one place to another.

@@ -1,12 +1,14 @@
-//! What the six papers report, computed from scratch and held against them: a module for each paper, a function for each row
-//! of the list of claims.
+//! What the papers report, computed from scratch and compared with them: a module for each paper, a function for each row of the
+//! list of claims.
 //!
 //! ```text
-//! scenes -> Stage (pipeline, clock, watts) -> Recording (pacing, surroundings, recorder, analysis) -> Row, Figure
+//! settings -> scenes -> Stage (pipeline, clock, watts) -> Recording (pacing, surroundings, recorder, analysis) -> Row, Figure
 //! ```
 //!
-//! Nothing is looked up but what the papers themselves say.
+//! Nothing is looked up but what the papers themselves say. What they state and what they leave open is in one committed file of
+//! settings for each paper; a row is judged over all that is left open (`Band`).
 
+mod band;
 mod figure;
 mod paper2;
 mod paper3;
@@ -15,19 +17,24 @@ mod recording;
 mod report;
 mod row;
 mod scenes;
+mod settings;
 mod stage;
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::output::OutDir;
+use crate::output::Destination;
 use crate::output::progress::Progress;
 use crate::run::RunError;
 
+use settings::Form;
+
+pub use band::{Band, Case, Turn};
 pub use figure::Figure;
 pub use report::Report;
-pub use row::{Kind, Row, Verdict};
+pub use row::{Kind, Number, Row, Verdict};
+pub use settings::{About, Listed, Origin};
 
 /// The papers whose rows there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -66,28 +73,37 @@ impl Paper {
     }
 }
 
-/// How much is simulated and recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Effort {
-    /// Distinct frames of the PC's animation.
-    pub pc_frames: u32,
-    /// Every how many frames of the phone's sequence of 24 one is simulated.
-    pub phone_step: u32,
-    /// Frames in a recording of an animation.
-    pub recorded_frames: usize,
-    /// Frames in a recording of one frame drawn again and again.
-    pub still_frames: usize,
-    /// Recordings of the same thing.
-    pub repeats: u64,
+/// How, and how much, to compute.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Fewer values and less work: less than a minute.
+    pub quick: bool,
+    /// Rows to compute, by their ids; all of them where it is empty.
+    pub rows: Vec<String>,
+    /// A file of settings in place of the committed one.
+    pub settings: Option<PathBuf>,
+    /// A folder with public cases of collision detection.
+    pub collision_data: Option<PathBuf>,
 }
 
-impl Effort {
-    /// Minutes.
-    pub const FULL: Self =
-        Self { pc_frames: 36, phone_step: 1, recorded_frames: 144, still_frames: 900, repeats: 12 };
-    /// Less than a minute.
-    pub const QUICK: Self =
-        Self { pc_frames: 6, phone_step: 4, recorded_frames: 72, still_frames: 600, repeats: 5 };
+impl Options {
+    fn form(&self) -> Form {
+        if self.quick { Form::Quick } else { Form::Full }
+    }
+
+    /// Whether a row is asked for.
+    fn wants(&self, id: &str) -> bool {
+        self.rows.is_empty() || self.rows.iter().any(|row| row.eq_ignore_ascii_case(id))
+    }
+
+    /// Refuses rows that the paper does not have.
+    fn check(&self, paper: Paper, ids: &[&str]) -> Result<(), RunError> {
+        let unknown = self.rows.iter().find(|row| !ids.iter().any(|id| id.eq_ignore_ascii_case(row)));
+        unknown.map_or(Ok(()), |row| {
+            let message = format!("no row `{row}` in Paper {}; its rows: {}", paper.number(), ids.join(", "));
+            Err(RunError::Setting(message))
+        })
+    }
 }
 
 /// A row and what it draws.
@@ -96,28 +112,40 @@ struct Done {
     figures: Vec<Figure>,
 }
 
-/// Computes every row of `paper`.
-///
-/// # Errors
-/// When a part of the line fails; a row that differs is none.
-pub fn compute(paper: Paper, effort: Effort, progress: &Progress) -> Result<Report, RunError> {
-    let done = match paper {
-        Paper::Two => paper2::rows(effort, progress),
-        Paper::Three => paper3::rows(effort, progress),
-        Paper::Six => paper6::rows(effort, progress),
-    }?;
-    Ok(Report::new(paper, effort, done))
+impl Done {
+    /// A row without a figure.
+    fn bare(row: Row) -> Self {
+        Self { row, figures: Vec::new() }
+    }
 }
 
-/// Computes every row of `paper` and writes table and figures into `out`.
+/// Computes the rows of `paper` that are asked for.
+///
+/// # Errors
+/// When settings cannot be used or a part of the line fails; a row that differs is none.
+pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<Report, RunError> {
+    let (origin, done) = match paper {
+        Paper::Two => paper2::rows(options, progress),
+        Paper::Three => paper3::rows(options, progress),
+        Paper::Six => paper6::rows(options, progress),
+    }?;
+    Ok(Report::new(paper, options.form(), origin, done))
+}
+
+/// Computes them and writes table and figures into `out`.
 ///
 /// # Errors
 /// As [`compute`], and when `out` cannot be written.
-pub fn reproduce(paper: Paper, effort: Effort, out: &Path, progress: &Progress) -> Result<Report, RunError> {
+pub fn reproduce(
+    paper: Paper,
+    options: &Options,
+    out: &Destination,
+    progress: &Progress,
+) -> Result<Report, RunError> {
     // The folder first: that it cannot be made is better known before the work than after it.
-    let dir = OutDir::create(out)?;
-    report::remove_stale(&dir, paper)?;
-    let report = compute(paper, effort, progress)?;
+    let mut dir = out.open([report::claim(paper)])?;
+    let report = compute(paper, options, progress)?;
     report.write(&dir)?;
+    dir.publish()?;
     Ok(report)
 }

@@ -70,17 +70,17 @@ impl Recording {
         Ok(Frames { end_s: found.end_s, found: PowerIntegral::new(&self.trace).frames(&found) })
     }
 
-    /// Found starts against the true ones, and how many of those missed had a disturbance on them.
-    pub fn score(&self, frames: &Frames) -> (Score, usize) {
+    /// Found starts against the true ones, and how many of those missed had a disturbance on them; a start may be so far off.
+    pub fn score(&self, frames: &Frames, within_s: f64) -> (Score, usize) {
         let truth = self.truth.frames.iter();
         let truth: Vec<_> =
             truth.map(|frame| TrueFrame { start_s: frame.start_s, energy_j: frame.energy_j }).collect();
-        let beside = score::truth_beside(&frames.found, &truth, TOLERANCE_S);
+        let beside = score::truth_beside(&frames.found, &truth, within_s);
         let missed = truth.iter().filter(|frame| !beside.contains(&Some(**frame)));
         let Window { pre_s, post_s } = self.marks(1).window;
         let disturbed =
             missed.filter(|frame| self.is_disturbed(frame.start_s - pre_s, frame.start_s + post_s));
-        (score::score(&frames.found, &truth, TOLERANCE_S), disturbed.count())
+        (score::score(&frames.found, &truth, within_s), disturbed.count())
     }
 
     fn is_disturbed(&self, from_s: f64, to_s: f64) -> bool {

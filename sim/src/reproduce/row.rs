@@ -1,9 +1,12 @@
 //! One claim of a paper beside what came out here.
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::band::Band;
+use super::settings::{About, Form, Listed, listed};
 
 /// What has to agree for a row to hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 pub enum Kind {
     /// An equality that holds exactly.
     Equality,
@@ -24,21 +27,33 @@ impl Kind {
     }
 }
 
+impl Serialize for Kind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.letter())
+    }
+}
+
 /// What became of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Verdict {
-    /// It came out.
+    /// It came out, at every setting that the paper leaves open.
     #[serde(rename = "holds")]
     Holds,
-    /// It did not.
+    /// It did not, at any.
     #[serde(rename = "differs")]
     Differs,
+    /// It comes out at some settings that the paper leaves open and not at others.
+    #[serde(rename = "depends")]
+    Depends,
     /// It waits for a part that does not exist.
     #[serde(rename = "not yet")]
     NotYet,
 }
 
 impl Verdict {
+    /// Every verdict.
+    pub const ALL: [Self; 4] = [Self::Holds, Self::Differs, Self::Depends, Self::NotYet];
+
     /// Holds or differs.
     pub const fn of(holds: bool) -> Self {
         if holds { Self::Holds } else { Self::Differs }
@@ -49,6 +64,7 @@ impl Verdict {
         match self {
             Self::Holds => "holds",
             Self::Differs => "differs",
+            Self::Depends => "depends",
             Self::NotYet => "not yet",
         }
     }
@@ -57,23 +73,25 @@ impl Verdict {
 /// A row of the list of claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Its name in the list, for example `III-3`.
-    pub id: &'static str,
-    /// What has to agree; an `F` is added where there are figures.
-    #[serde(serialize_with = "letters")]
-    pub kind: Kind,
-    /// The claim in a few words.
-    pub claim: &'static str,
-    /// What the paper says.
-    pub paper: &'static str,
+    /// The claim, and the condition it is judged by.
+    #[serde(flatten)]
+    pub about: About,
     /// What came out here.
     pub ours: String,
     /// Whether that agrees.
     pub verdict: Verdict,
-    /// When it holds, and why it differs or what it waits for.
+    /// Over what the verdict was reached, where settings were varied.
+    pub band: Option<Band>,
+    /// Why it differs, where it turns, or what it waits for.
     pub note: String,
+    /// How much was run: draws, passes, fragments, samples. A row of which any is 0 has shown nothing.
+    pub ran: Vec<Number>,
     /// The numbers behind `ours`, by name.
     pub numbers: Vec<Number>,
+    /// What it was computed with.
+    pub settings: Vec<Listed>,
+    /// SHA-256 of the file of these settings.
+    pub settings_sha256: String,
     /// The first of its figures, as a path below the folder of results.
     pub figure: Option<String>,
     /// All of them.
@@ -89,46 +107,122 @@ pub struct Number {
     pub value: f64,
 }
 
+impl Number {
+    /// Whether nothing was counted.
+    fn is_nothing(&self) -> bool {
+        self.value.is_nan() || self.value <= 0.0
+    }
+}
+
 /// Numbers from names and values.
 pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<Number> {
     pairs.into_iter().map(|(name, value)| Number { name, value }).collect()
 }
 
-fn letters<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(kind.letter())
+/// What a row is computed with, and how much of it.
+pub(super) struct With<'a, S> {
+    pub settings: &'a S,
+    pub form: Form,
+    /// SHA-256 of the file.
+    pub sha256: &'a str,
+}
+
+impl<S: Serialize> With<'_, S> {
+    /// The row with what came out: `ours`, the verdict and a note.
+    pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> Row {
+        Row {
+            about: about.clone(),
+            ours,
+            verdict,
+            band: None,
+            note,
+            ran: Vec::new(),
+            numbers: Vec::new(),
+            settings: listed(self.settings, self.form),
+            settings_sha256: self.sha256.to_owned(),
+            figure: None,
+            figures: Vec::new(),
+        }
+    }
+
+    /// The same with a verdict by the band over all settings that were tried.
+    pub fn banded(&self, about: &About, ours: String, band: Band) -> Row {
+        let row = self.row(about, (ours, band.verdict(), band.text()));
+        Row { band: Some(band), ..row }
+    }
 }
 
 impl Row {
-    /// Whether the row is one that has to hold and does not.
+    /// Whether nothing was run of something that had to be.
+    pub fn ran_nothing(&self) -> bool {
+        self.ran.is_empty() || self.ran.iter().any(Number::is_nothing)
+    }
+
+    /// Whether the row is an equality that does not hold.
+    pub fn is_unequal(&self) -> bool {
+        self.about.kind == Kind::Equality && self.verdict != Verdict::Holds
+    }
+
+    /// Whether the row is one that has to hold and does not, or that has run nothing.
     pub fn fails(&self) -> bool {
-        self.kind == Kind::Equality && self.verdict != Verdict::Holds
+        self.is_unequal() || self.ran_nothing()
+    }
+
+    /// A row that has run nothing has shown nothing, whatever its condition says.
+    #[must_use]
+    pub(super) fn judged(self) -> Self {
+        if !self.ran_nothing() || self.verdict == Verdict::NotYet {
+            return self;
+        }
+        let none: Vec<&str> =
+            self.ran.iter().filter(|number| number.is_nothing()).map(|number| number.name).collect();
+        let note = format!("nothing was run ({}), so nothing was shown. {}", none.join(", "), self.note);
+        Self { verdict: Verdict::Differs, note, ..self }
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    #[test]
-    fn only_an_equality_that_does_not_hold_fails() {
-        let row = |kind, verdict| Row {
-            id: "X-1",
+    pub fn row(id: &str, kind: Kind, verdict: Verdict) -> Row {
+        let about = About {
+            id: id.to_owned(),
             kind,
-            claim: "",
-            paper: "",
-            ours: String::new(),
-            verdict,
-            note: String::new(),
-            numbers: Vec::new(),
-            figure: None,
-            figures: Vec::new(),
+            claim: "a claim".to_owned(),
+            paper: "one".to_owned(),
+            holds_when: "it does".to_owned(),
+            limits: "Little.".to_owned(),
         };
-        assert!(
-            row(Kind::Equality, Verdict::Differs).fails() && row(Kind::Equality, Verdict::NotYet).fails()
+        let with = With { settings: &(), form: Form::Full, sha256: "abc" };
+        let row = with.row(&about, ("two".to_owned(), verdict, "because".to_owned()));
+        Row { ran: numbers([("draws", 3.0)]), numbers: numbers([("n", 2.0)]), ..row }
+    }
+
+    #[test]
+    fn an_equality_that_does_not_hold_fails() {
+        for verdict in [Verdict::Differs, Verdict::Depends, Verdict::NotYet] {
+            assert!(row("X-1", Kind::Equality, verdict).fails());
+            assert!(!row("X-1", Kind::Number, verdict).fails() && !row("X-1", Kind::Order, verdict).fails());
+        }
+        assert!(!row("X-1", Kind::Equality, Verdict::Holds).fails());
+        assert_eq!(
+            serde_json::to_value(row("X-1", Kind::Order, Verdict::NotYet)).unwrap()["verdict"],
+            "not yet"
         );
-        assert!(!row(Kind::Equality, Verdict::Holds).fails());
-        assert!(!row(Kind::Number, Verdict::Differs).fails() && !row(Kind::Order, Verdict::NotYet).fails());
-        assert_eq!(serde_json::to_value(row(Kind::Order, Verdict::NotYet)).unwrap()["verdict"], "not yet");
-        assert_eq!((Verdict::of(true), Verdict::of(false)), (Verdict::Holds, Verdict::Differs));
+    }
+
+    #[test]
+    fn a_row_that_ran_nothing_fails_and_shows_nothing() {
+        for ran in [Vec::new(), numbers([("draws", 3.0), ("fragments", 0.0)]), numbers([("draws", f64::NAN)])]
+        {
+            let empty = Row { ran, ..row("X-1", Kind::Order, Verdict::Holds) };
+            assert!(empty.fails());
+            let judged = empty.judged();
+            assert_eq!(judged.verdict, Verdict::Differs);
+            assert!(judged.note.starts_with("nothing was run"), "{}", judged.note);
+        }
+        let good = row("X-1", Kind::Order, Verdict::Holds);
+        assert_eq!(good.clone().judged(), good);
     }
 }

@@ -3,7 +3,9 @@
 use glam::{Vec3, Vec4};
 use pipeline::frame::render_with_heat;
 use pipeline::{Draw, Settings, Shader, ShaderCost, ShadingPoint, Texture, Viewport};
-use power_model::{EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel};
+use power_model::{
+    EnergyTable, Finish, FramePower, Launch, Pacing, Platform, PowerModel, Seconds, Source, Sourced, Watts,
+};
 use rayon::prelude::*;
 use timing::Recorder;
 use workloads::{SampleChoice, Scene};
@@ -15,6 +17,7 @@ use crate::run::{BIN_PS, RunError};
 use crate::timing::{FrameClock, Level};
 
 /// GPU, platform and energies.
+#[derive(Clone)]
 pub(super) struct Stage {
     pub gpu: GpuSpec,
     pub platform: Platform,
@@ -58,6 +61,39 @@ impl Stage {
     /// The PC of the papers.
     pub fn pc() -> Result<Self, RunError> {
         Self::new("hd_4000", "hd_4000", Sensor::HALL)
+    }
+
+    /// The phone with another draw between frames. Its processor feeds the driver on top of that while a frame runs, so that goes with it.
+    pub fn phone_idling(idle_w: f64) -> Result<Self, RunError> {
+        let mut stage = Self::phone()?;
+        let platform = &mut stage.platform;
+        let constant_w = idle_w + platform.constant_w.value() - platform.idle_w.value();
+        platform.idle_w = swept(Watts::new(idle_w))?;
+        platform.constant_w = swept(Watts::new(constant_w))?;
+        stage.model = PowerModel::new(&EnergyTable::builtin("28nm")?, &stage.platform)?;
+        Ok(stage)
+    }
+
+    /// The same machine, its waiting processor drawing another power on top.
+    pub fn waiting(mut self, waiting_w: f64) -> Result<Self, RunError> {
+        let finish = Finish { waiting_w: swept(Watts::new(waiting_w))?, ..self.finish()?.clone() };
+        self.platform.system.finish = Some(finish);
+        Ok(self)
+    }
+
+    /// The same machine, drawing more for another time after launch.
+    pub fn launching(mut self, duration_s: f64) -> Result<Self, RunError> {
+        let launch = Launch { duration_s: swept(Seconds::new(duration_s))?, ..self.launch()?.clone() };
+        self.platform.system.launch = Some(launch);
+        Ok(self)
+    }
+
+    /// The same machine, the disturbances of the kind that is listed first drawing another power on top.
+    pub fn disturbed(mut self, extra_w: f64) -> Result<Self, RunError> {
+        let first = self.platform.system.disturbances.first_mut();
+        let Some(first) = first else { return Err(self.without("disturbances")) };
+        *first = first.clone().drawing(swept(Watts::new(extra_w))?);
+        Ok(self)
     }
 
     /// V-sync at the rate at which the platform's applications are capped.
@@ -108,12 +144,17 @@ impl Stage {
         self.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })
     }
 
-    /// The phone's sequence, every `step`-th of its frames simulated and each shown until the next one.
-    pub fn phone_sequence(&self, step: u32, progress: &Progress) -> Result<Vec<FramePower>, RunError> {
+    /// The phone's sequence with objects of this edge, every `step`-th of its frames simulated and each shown until the next one.
+    pub fn phone_sequence(
+        &self,
+        edge: f64,
+        step: u32,
+        progress: &Progress,
+    ) -> Result<Vec<FramePower>, RunError> {
         let numbers: Vec<u32> = (0..scenes::PHONE_FRAMES).step_by(step as usize).collect();
         let bar = progress.bar("phone", numbers.len() as u64);
         let simulate = |&number: &u32| {
-            let frame = self.frame(&scenes::phone(number)?, 0, scenes::PHONE_COST);
+            let frame = self.frame(&scenes::phone(number, edge)?, 0, scenes::PHONE_COST);
             bar.inc();
             frame
         };
@@ -131,6 +172,13 @@ impl Stage {
         };
         (0..frames).into_par_iter().map(simulate).collect()
     }
+}
+
+/// A quantity that a row varies.
+fn swept<T>(value: Result<T, impl std::fmt::Display>) -> Result<Sourced<T>, RunError> {
+    let value = value.map_err(RunError::setting)?;
+    let source = Source::try_from("varied by `quintile reproduce`".to_owned()).map_err(RunError::setting)?;
+    Ok(Sourced::Assumed(value, source))
 }
 
 /// A shader that looks like another one at a cost of its own.

@@ -3,11 +3,15 @@
 use power_model::{Circumstances, FramePower};
 use traces::energy::{Pooled, pooled};
 
-use super::super::figure::{ENERGY, POWER, TIME, dots, line};
-use super::super::recording::MARKED;
-use super::super::row::{Kind, Row, Verdict, numbers};
+use super::super::band::Cases;
+use super::super::figure::{ENERGY, POWER, TIME, level, line};
+use super::super::recording::{MARKED, looped};
+use super::super::row::{Row, numbers};
+use super::super::stage::Stage;
 use super::super::{Done, Figure, scenes};
+use super::settings::BlockingPhone;
 use super::{Bench, FRAME, settled};
+use crate::output::plot::Series;
 use crate::run::RunError;
 
 fn blocked(seed: u64) -> Circumstances {
@@ -25,62 +29,149 @@ fn work_ms(frames: &[FramePower], pick: fn(f64, f64) -> f64) -> f64 {
     frames.iter().map(|frame| 1e3 * frame.duration_s()).reduce(pick).unwrap_or(f64::NAN)
 }
 
+/// What both methods measure of the frames of the phone's sequence.
+struct Methods {
+    new: Vec<f64>,
+    old: Vec<f64>,
+}
+
+impl Methods {
+    /// On a machine that draws these frames.
+    fn of(bench: &Bench<'_>, stage: &Stage, frames: &[FramePower]) -> Result<Self, RunError> {
+        let shown: Vec<&FramePower> = frames.iter().collect();
+        let (mut new, mut old) = (Vec::new(), Vec::new());
+        for seed in 1..=bench.repeats() {
+            let plain = bench.on(stage, &shown, settled(seed))?;
+            // The paper's phone application records its own timestamps, which its frames are cut by.
+            new.push(plain.by_timestamps_j());
+            old.push(bench.on(stage, &shown, blocked(seed + 1000))?.begin_to_finish_j());
+        }
+        Ok(Self { new: means(&new), old: means(&old) })
+    }
+
+    fn higher(&self) -> usize {
+        self.new.iter().zip(&self.old).filter(|(new, old)| old > new).count()
+    }
+
+    fn lower(&self) -> usize {
+        self.new.len() - self.higher()
+    }
+
+    /// As a band has it: the share of frames for which the old method gives more, and whether it errs both ways.
+    fn judged(&self) -> (f64, bool) {
+        (self.higher() as f64 / self.new.len() as f64, self.higher() > 0 && self.lower() > 0)
+    }
+
+    /// The least or most that the old method gives more, mJ.
+    fn gain_mj(&self, pick: fn(f64, f64) -> f64) -> f64 {
+        self.new.iter().zip(&self.old).map(|(new, old)| 1e3 * (old - new)).reduce(pick).unwrap_or(0.0)
+    }
+}
+
 /// III-4: on the phone the old method gives more for some frames and less for others.
 pub(super) fn phone(bench: &Bench<'_>) -> Result<Done, RunError> {
-    let shown: Vec<&FramePower> = bench.phone_frames.iter().collect();
-    let (mut new, mut old) = (Vec::new(), Vec::new());
-    for seed in 1..=bench.effort.repeats {
-        let plain = bench.on_phone(&shown, settled(seed))?;
-        // The paper's phone application records its own timestamps, which its frames are cut by.
-        new.push(plain.by_timestamps_j());
-        old.push(bench.on_phone(&shown, blocked(seed + 1000))?.begin_to_finish_j());
-    }
-    let (new, old) = (means(&new), means(&old));
-    let higher = new.iter().zip(&old).filter(|(new, old)| old > new).count();
-    let lower = new.len() - higher;
-    let gain = |pick: fn(f64, f64) -> f64| {
-        new.iter().zip(&old).map(|(new, old)| 1e3 * (old - new)).reduce(pick).unwrap_or(0.0)
+    let with = bench.with(|settings| &settings.iii_4);
+    let (row, form) = (with.settings, with.form);
+    let (waiting_w, idle_w, edge) = (*row.waiting_w.get(form), *row.idle_w.get(form), *row.edge.get(form));
+    let base_stage = Stage::phone_idling(idle_w)?.waiting(waiting_w)?;
+    let mut waits = row.waiting_w.all(form).to_vec();
+    waits.sort_by(f64::total_cmp);
+    let at = waits.iter().map(|&waiting_w| {
+        let stage = base_stage.clone().waiting(waiting_w)?;
+        let (share, both) = Methods::of(bench, &stage, &bench.phone_frames)?.judged();
+        Ok((waiting_w, share, both))
+    });
+    let at: Vec<_> = at.collect::<Result<_, RunError>>()?;
+    let mut tried = Cases::new("share of frames for which the old method gives more");
+    let over_waiting = at.iter().map(|(waiting_w, share, _)| (*waiting_w, *share)).collect();
+    tried.along("waiting_w", at).standing_at(waiting_w);
+    tried.along("idle_w", over_idle(bench, row, waiting_w)?).standing_at(idle_w);
+    tried.along("edge", over_edge(bench, row, &base_stage)?).standing_at(edge);
+    let band = tried.band().ok_or_else(|| RunError::setting("III-4 has nothing to try"))?;
+    let base = Methods::of(bench, &base_stage, &bench.phone_frames)?;
+    let (least, most) = (base.gain_mj(f64::min), base.gain_mj(f64::max));
+    let ours = format!(
+        "with {waiting_w} W waiting, {idle_w} W idle and objects of {edge}: of {} frames the old method gives more for {} and less for {} \
+         ({least:+.1} to {most:+.1} mJ, {} repetitions)",
+        base.new.len(),
+        base.higher(),
+        base.lower(),
+        bench.repeats()
+    );
+    let facts = numbers([
+        ("shortest_work_ms", work_ms(&bench.phone_frames, f64::min)),
+        ("longest_work_ms", work_ms(&bench.phone_frames, f64::max)),
+        ("frames_higher", base.higher() as f64),
+        ("frames_lower", base.lower() as f64),
+        ("least_difference_mJ", least),
+        ("most_difference_mJ", most),
+    ]);
+    let recordings = 2 * bench.repeats() * (1 + band.cases.len() as u64);
+    let ran = numbers([
+        ("frames_simulated", bench.phone_frames.len() as f64),
+        ("recordings", recordings as f64),
+        ("frames_recorded", (recordings * base.new.len() as u64) as f64),
+    ]);
+    let figures = vec![by_objects(bench, &base), turning(over_waiting), three_frames(bench)?];
+    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }, figures })
+}
+
+/// A value, the share of frames for which the old method gives more, and whether it errs both ways.
+type Judged = Vec<(f64, f64, bool)>;
+
+/// Other draws between frames.
+fn over_idle(bench: &Bench<'_>, row: &BlockingPhone, waiting_w: f64) -> Result<Judged, RunError> {
+    let all = row.idle_w.all(bench.form);
+    let one = |&idle_w: &f64| {
+        let stage = Stage::phone_idling(idle_w)?.waiting(waiting_w)?;
+        let frames = stage.phone_sequence(*row.edge.get(bench.form), bench.phone_step(), bench.progress)?;
+        let (share, both) = Methods::of(bench, &stage, &frames)?.judged();
+        Ok((idle_w, share, both))
     };
-    let (least, most) = (gain(f64::min), gain(f64::max));
-    let row = Row {
-        id: "III-4",
-        kind: Kind::Order,
-        claim: "blocking raises the phone's power and leaves out idle: the old method errs both ways",
-        paper: "glFinish raises rendering power, idle is not measured: some frames higher, some lower (Figure 6, 7)",
-        ours: format!(
-            "of {} frames the old method gives more for {higher} and less for {lower} ({least:+.1} to {most:+.1} mJ, {} repetitions)",
-            new.len(),
-            bench.effort.repeats
-        ),
-        verdict: Verdict::of(higher > 0 && lower > 0),
-        note: format!(
-            "holds where both happen. The {} W of a waiting processor and the {} W of idle are assumed; a frame that works for less than \
-             their share of a period comes out lower",
-            bench.phone.finish()?.waiting_w.value(),
-            bench.phone.platform.idle_w.value()
-        ),
-        numbers: numbers([
-            ("shortest_work_ms", work_ms(&bench.phone_frames, f64::min)),
-            ("longest_work_ms", work_ms(&bench.phone_frames, f64::max)),
-            ("frames_higher", higher as f64),
-            ("frames_lower", lower as f64),
-            ("least_difference_mJ", least),
-            ("most_difference_mJ", most),
-        ]),
-        figure: None,
-        figures: Vec::new(),
+    if all.len() < 2 { Ok(Vec::new()) } else { all.iter().map(one).collect() }
+}
+
+/// Objects of other sizes, so that frames take longer or shorter.
+fn over_edge(bench: &Bench<'_>, row: &BlockingPhone, stage: &Stage) -> Result<Judged, RunError> {
+    let all = row.edge.all(bench.form);
+    let one = |&edge: &f64| {
+        let frames = stage.phone_sequence(edge, bench.phone_step(), bench.progress)?;
+        let (share, both) = Methods::of(bench, stage, &frames)?.judged();
+        Ok((edge, share, both))
     };
-    let objects = |place: usize| f64::from(scenes::objects(bench.effort.phone_step * place as u32));
-    let points =
-        |list: &[f64]| list.iter().enumerate().map(|(place, value)| (objects(place), *value)).collect();
-    let methods = Figure::lines(
+    if all.len() < 2 { Ok(Vec::new()) } else { all.iter().map(one).collect() }
+}
+
+/// Figure 6.
+fn by_objects(bench: &Bench<'_>, methods: &Methods) -> Figure {
+    let objects = |place: usize| f64::from(scenes::objects(bench.phone_step() * place as u32));
+    let points = |list: &[f64]| -> Vec<(f64, f64)> {
+        let mut points: Vec<_> =
+            list.iter().enumerate().map(|(place, value)| (objects(place), *value)).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points
+    };
+    Figure::lines(
         "III_fig6",
         "Two methods on the phone (Paper III, Figure 6)",
         "energy of each frame of the synthetic sequence over its objects, mean of all repetitions",
         [("objects in the frame", ""), ENERGY],
-        vec![dots("new: start to start", points(&new)), dots("old: blocking, begin to finish", points(&old))],
-    );
-    Ok(Done { row, figures: vec![methods, three_frames(bench)?] })
+        vec![
+            Series::curve("new: start to start", points(&methods.new)),
+            Series::curve("old: blocking, begin to finish", points(&methods.old)),
+        ],
+    )
+}
+
+/// The sweep of what the waiting processor draws.
+fn turning(shares: Vec<(f64, f64)>) -> Figure {
+    Figure::lines(
+        "III_blocking_sweep",
+        "Frames for which the old method gives more (Paper III, section 5.2)",
+        "over what the waiting processor draws, which the paper does not give; the row holds between 0 and 1",
+        [("power of the waiting processor", "W"), ("share of frames", "")],
+        vec![line("share of the phone's frames", shares)],
+    )
 }
 
 /// Figure 7: one frame when settled, just after launch, and with a blocking finish.
@@ -105,55 +196,113 @@ fn three_frames(bench: &Bench<'_>) -> Result<Figure, RunError> {
     ))
 }
 
+/// Energies with a blocking finish and without.
+struct Both {
+    with: Pooled,
+    without: Pooled,
+}
+
+impl Both {
+    fn of(bench: &Bench<'_>, stage: &Stage) -> Result<Self, RunError> {
+        Ok(Self { with: pool(bench, stage, blocked, 1)?, without: pool(bench, stage, settled, 2000)? })
+    }
+
+    fn difference_j(&self) -> f64 {
+        (self.with.mean - self.without.mean).abs()
+    }
+
+    /// As a band has it: the difference over the smaller deviation, and whether it is below 1.
+    fn judged(&self) -> (f64, bool) {
+        let over = self.difference_j() / self.with.deviation.min(self.without.deviation);
+        (over, over < 1.0)
+    }
+}
+
+/// Recordings of the PC's animation, pooled.
+fn pool(
+    bench: &Bench<'_>,
+    stage: &Stage,
+    how: fn(u64) -> Circumstances,
+    first: u64,
+) -> Result<Pooled, RunError> {
+    let shown_frames = looped(&bench.pc_frames, bench.recorded_frames());
+    let run = |seed| {
+        let recording = bench.on(stage, &shown_frames, how(seed))?;
+        Ok(recording.by_true_frame_j(&recording.find(MARKED)?))
+    };
+    let runs = (first..first + bench.repeats()).map(run);
+    let runs: Vec<Vec<Option<f64>>> = runs.collect::<Result<_, RunError>>()?;
+    Ok(by_frame(&runs, bench.pc_frames.len()))
+}
+
 /// III-5: on the PC it changes nothing.
 pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
-    let pacing = bench.pc.capped()?;
-    let [with, without] = [(blocked as fn(u64) -> Circumstances, 1), (settled, 2000)].map(
-        |(how, first)| -> Result<_, RunError> {
-            let run = |seed| {
-                let recording = bench.on_pc(pacing, how(seed))?;
-                Ok(recording.by_true_frame_j(&recording.find(MARKED)?))
-            };
-            let runs = (first..first + bench.effort.repeats).map(run);
-            let runs: Vec<Vec<Option<f64>>> = runs.collect::<Result<_, RunError>>()?;
-            Ok(by_frame(&runs, bench.pc_frames.len()))
-        },
+    let row_with = bench.with(|settings| &settings.iii_5);
+    let (row, form) = (row_with.settings, row_with.form);
+    let (waiting_w, background_w) = (*row.waiting_w.get(form), *row.background_w.get(form));
+    let stage = bench.pc.clone().waiting(waiting_w)?.disturbed(background_w)?;
+    let base = Both::of(bench, &stage)?;
+    let mut waits = row.waiting_w.all(form).to_vec();
+    waits.sort_by(f64::total_cmp);
+    let at = waits.iter().map(|&other_w| {
+        let other =
+            (other_w != waiting_w).then(|| Both::of(bench, &stage.clone().waiting(other_w)?)).transpose()?;
+        let (over, below) = other.as_ref().unwrap_or(&base).judged();
+        Ok((other_w, over, below))
+    });
+    let mut tried = Cases::new("difference of the means over the smaller deviation");
+    let at: Vec<_> = at.collect::<Result<_, RunError>>()?;
+    let over_waiting = at.iter().map(|(watts, over, _)| (*watts, *over)).collect();
+    tried.along("waiting_w", at).standing_at(waiting_w);
+    if row.background_w.all(form).len() > 1 {
+        let at = row.background_w.all(form).iter().map(|&other_w| {
+            let other = (other_w != background_w)
+                .then(|| Both::of(bench, &stage.clone().disturbed(other_w)?))
+                .transpose()?;
+            let (over, below) = other.as_ref().unwrap_or(&base).judged();
+            Ok((other_w, over, below))
+        });
+        tried.along("background_w", at.collect::<Result<Vec<_>, RunError>>()?).standing_at(background_w);
+    }
+    let band = tried.band().ok_or_else(|| RunError::setting("III-5 has nothing to try"))?;
+    let Both { with, without } = &base;
+    let ours = format!(
+        "with {waiting_w} W waiting and {background_w} W of services: {} with, {} without, {} and {} frames",
+        shown(with),
+        shown(without),
+        with.values,
+        without.values
     );
-    let (with, without) = (with?, without?);
-    let difference_j = (with.mean - without.mean).abs();
-    let least_j = with.deviation.min(without.deviation);
-    let row = Row {
-        id: "III-5",
-        kind: Kind::Number,
-        claim: "on the HD 4000 blocking changes nothing",
-        paper: "629.73 (21.07) mJ with glFinish, 630.18 (19.02) mJ without",
-        ours: format!(
-            "{} with, {} without, {} and {} frames",
-            shown(&with),
-            shown(&without),
-            with.values,
-            without.values
-        ),
-        verdict: Verdict::of(difference_j < least_j),
-        note: format!(
-            "holds as the difference of {:.2} mJ is below either pooled standard deviation. That a waiting processor draws {} W here, and \
-             how much the operating system scatters frames, is assumed",
-            1e3 * difference_j,
-            bench.pc.finish()?.waiting_w.value()
-        ),
-        numbers: numbers([
-            ("shortest_work_ms", work_ms(&bench.pc_frames, f64::min)),
-            ("longest_work_ms", work_ms(&bench.pc_frames, f64::max)),
-            ("with_mean_J", with.mean),
-            ("with_pooled_deviation_J", with.deviation),
-            ("without_mean_J", without.mean),
-            ("without_pooled_deviation_J", without.deviation),
-            ("difference_J", difference_j),
-        ]),
-        figure: None,
-        figures: Vec::new(),
-    };
-    Ok(Done { row, figures: Vec::new() })
+    let facts = numbers([
+        ("shortest_work_ms", work_ms(&bench.pc_frames, f64::min)),
+        ("longest_work_ms", work_ms(&bench.pc_frames, f64::max)),
+        ("with_mean_J", with.mean),
+        ("with_pooled_deviation_J", with.deviation),
+        ("without_mean_J", without.mean),
+        ("without_pooled_deviation_J", without.deviation),
+        ("difference_J", base.difference_j()),
+    ]);
+    let recordings = 2 * bench.repeats() * (band.tried as u64);
+    let ran = numbers([
+        ("frames_simulated", bench.pc_frames.len() as f64),
+        ("recordings", recordings as f64),
+        ("frames_found_with_and_without", (with.values + without.values) as f64),
+    ]);
+    let row = Row { numbers: facts, ran, ..row_with.banded(&row.about, ours, band) };
+    Ok(Done { row, figures: vec![over_deviation(over_waiting)] })
+}
+
+/// The sweep of what the waiting processor draws.
+fn over_deviation(points: Vec<(f64, f64)>) -> Figure {
+    let ends = |pick: fn(f64, f64) -> f64| points.iter().map(|point| point.0).reduce(pick).unwrap_or(0.0);
+    let (from, to) = (ends(f64::min), ends(f64::max));
+    Figure::lines(
+        "III_finish_sweep",
+        "What a blocking finish changes on the PC (Paper III, section 5.2)",
+        "difference of the mean energies over the smaller pooled deviation; 0.02 W was chosen because the paper finds very little difference",
+        [("power of the waiting processor", "W"), ("difference over deviation", "")],
+        vec![line("computed", points), level("the row holds below", from, to, 1.0)],
+    )
 }
 
 /// Repetitions pooled by frame of the animation: the standard deviation is that of one frame drawn again and again.

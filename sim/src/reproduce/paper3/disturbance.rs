@@ -3,17 +3,16 @@
 use power_model::{Cause, Pulse};
 use traces::energy::{Spread, outliers};
 
+use super::super::band::Cases;
 use super::super::figure::{ENERGY, POWER, TIME, by_place, dots, line};
 use super::super::recording::Recording;
-use super::super::row::{Kind, Row, Verdict, numbers};
+use super::super::row::{Row, numbers};
 use super::super::{Done, Figure};
 use super::{Bench, settled, unflagged};
 use crate::run::RunError;
 
 /// Frames of a short repeated measurement for the upper half of Figure 8.
 const SHORT: usize = 24;
-/// How many of them.
-pub(super) const SHORT_REPEATS: u64 = 40;
 
 /// The disturbances of the kind that is listed first: those every five seconds.
 fn five_second_ones(recording: &Recording) -> Vec<&Pulse> {
@@ -60,62 +59,105 @@ fn tally(recording: &Recording, flags: &[bool]) -> Tally {
     }
 }
 
-/// III-6: the frames that the disturbance hits are those flagged, three or four each, and they lift the deviation.
-pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
-    let shown = vec![bench.frame(); bench.effort.still_frames];
-    let recording = bench.on_phone(&shown, settled(5))?;
-    // A frame that was not found counts as one of no energy, which nobody could overlook.
-    let found = recording.by_true_frame_j(&recording.find(1)?);
-    let energies: Vec<f64> = found.iter().map(|energy| energy.unwrap_or(0.0)).collect();
-    let flags = outliers(&energies);
-    let tally = tally(&recording, &flags);
-    let kept = unflagged(&energies, &flags);
-    let deviation_mj = |values: &[f64]| 1e3 * Spread::of(values).map_or(f64::NAN, |spread| spread.deviation);
-    let (all_mj, without_mj) = (deviation_mj(&energies), deviation_mj(&kept));
-    let [fewest, most] = tally.frames;
-    let same = tally.both == tally.touched && tally.both == tally.flagged;
-    let row = Row {
-        id: "III-6",
-        kind: Kind::Number,
-        claim: "a disturbance every 5 s hits 3-4 frames and lifts the standard deviation",
-        paper: "90 ms every 5 s, 3-4 frames at 30 fps; the root cause of rises of the standard deviation (Figure 8)",
-        ours: format!(
-            "{} disturbances of {fewest} to {most} frames; {} frames touched, {} flagged, {} of them both; deviation {all_mj:.3} mJ, {without_mj:.3} mJ \
-             without them",
-            tally.disturbances, tally.touched, tally.flagged, tally.both
-        ),
-        verdict: Verdict::of(same && fewest >= 3 && most <= 4 && all_mj > without_mj),
-        note: reason(&recording, &flags, same),
-        numbers: numbers([
-            ("touched_frames", tally.touched as f64),
-            ("flagged_frames", tally.flagged as f64),
-            ("both_frames", tally.both as f64),
-            ("fewest_frames", fewest as f64),
-            ("most_frames", most as f64),
-            ("deviation_mJ", all_mj),
-            ("deviation_without_outliers_mJ", without_mj),
-        ]),
-        figure: None,
-        figures: Vec::new(),
-    };
-    let mut figures = vec![hit(&recording)];
-    figures.push(flagged(&energies, &flags));
-    figures.push(growing(bench)?);
-    Ok(Done { row, figures })
+/// One frame drawn again and again, with what the analysis makes of it.
+struct Still {
+    recording: Recording,
+    energies: Vec<f64>,
+    flags: Vec<bool>,
+    tally: Tally,
+    /// Deviation of all frames and of those that are not flagged, mJ.
+    deviations_mj: [f64; 2],
 }
 
-/// Which frames are not told right, with how much of them was disturbed.
-fn reason(recording: &Recording, flags: &[bool], same: bool) -> String {
-    if same {
-        return "holds as the flagged frames are those touched, all of them and no other".to_owned();
+impl Still {
+    fn new(bench: &Bench<'_>, extra_w: f64) -> Result<Self, RunError> {
+        let shown = vec![bench.frame(); *bench.settings.work.still_frames.get(bench.form)];
+        let recording = bench.on(&bench.phone.clone().disturbed(extra_w)?, &shown, settled(5))?;
+        // A frame that was not found counts as one of no energy, which nobody could overlook.
+        let found = recording.by_true_frame_j(&recording.find(1)?);
+        let energies: Vec<f64> = found.iter().map(|energy| energy.unwrap_or(0.0)).collect();
+        let flags = outliers(&energies);
+        let tally = tally(&recording, &flags);
+        let kept = unflagged(&energies, &flags);
+        let deviation_mj =
+            |values: &[f64]| 1e3 * Spread::of(values).map_or(f64::NAN, |spread| spread.deviation);
+        let deviations_mj = [deviation_mj(&energies), deviation_mj(&kept)];
+        Ok(Self { recording, energies, flags, tally, deviations_mj })
     }
-    let overlaps = overlaps_s(recording);
-    let wrong =
-        overlaps.iter().zip(flags).enumerate().filter(|(_, (overlap_s, flag))| (**overlap_s > 0.0) != **flag);
+
+    /// Whether the frames flagged are those touched.
+    fn same(&self) -> bool {
+        self.tally.both == self.tally.touched && self.tally.both == self.tally.flagged
+    }
+
+    fn holds(&self, (fewest, most): (usize, usize)) -> bool {
+        let [low, high] = self.tally.frames;
+        self.same() && low >= fewest && high <= most && self.deviations_mj[0] > self.deviations_mj[1]
+    }
+}
+
+/// III-6: the frames that the disturbance hits are those flagged, three or four each, and they lift the deviation.
+pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
+    let with = bench.with(|settings| &settings.iii_6);
+    let (row, form) = (with.settings, with.form);
+    let frames = *row.frames.get(form);
+    let base = Still::new(bench, *row.extra_w.get(form))?;
+    let mut watts = row.extra_w.all(form).to_vec();
+    watts.sort_by(f64::total_cmp);
+    let at = watts.iter().map(|&extra_w| {
+        let still = Still::new(bench, extra_w)?;
+        let right = still.tally.both as f64 / still.tally.touched.max(still.tally.flagged).max(1) as f64;
+        Ok((extra_w, right, still.holds(frames)))
+    });
+    let mut tried = Cases::new("share of the frames touched or flagged that are both");
+    tried.along("extra_w", at.collect::<Result<Vec<_>, RunError>>()?);
+    let band = tried.band().ok_or_else(|| RunError::setting("III-6 has nothing to try"))?;
+    let Tally { touched, flagged: flags, both, frames: [fewest, most], disturbances } = base.tally;
+    let [all_mj, without_mj] = base.deviations_mj;
+    let ours = format!(
+        "with {} W: {disturbances} disturbances of {fewest} to {most} frames; {touched} frames touched, {flags} flagged, {both} of them both; \
+         deviation {all_mj:.3} mJ, {without_mj:.3} mJ without them",
+        row.extra_w.get(form)
+    );
+    let facts = numbers([
+        ("touched_frames", touched as f64),
+        ("flagged_frames", flags as f64),
+        ("both_frames", both as f64),
+        ("fewest_frames", fewest as f64),
+        ("most_frames", most as f64),
+        ("deviation_mJ", all_mj),
+        ("deviation_without_outliers_mJ", without_mj),
+    ]);
+    let ran = numbers([
+        ("recordings", watts.len() as f64 + 1.0 + *row.shorts.get(form) as f64),
+        ("frames_of_one", base.energies.len() as f64),
+        ("disturbances", disturbances as f64),
+        ("samples_of_one", base.recording.trace.samples() as f64),
+    ]);
+    let made = with.banded(&row.about, ours, band);
+    let note = match reason(&base) {
+        None => made.note.clone(),
+        Some(reason) => format!("{}; {reason}", made.note),
+    };
+    let figures = vec![hit(&base.recording), flagged(&base.energies, &base.flags), growing(bench)?];
+    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures })
+}
+
+/// Which frames are flagged wrongly, with how much of them was disturbed.
+fn reason(still: &Still) -> Option<String> {
+    if still.same() {
+        return None;
+    }
+    let overlaps = overlaps_s(&still.recording);
+    let wrong = overlaps
+        .iter()
+        .zip(&still.flags)
+        .enumerate()
+        .filter(|(_, (overlap_s, flag))| (**overlap_s > 0.0) != **flag);
     // A frame whose start was missed counts as one without energy, and is flagged.
     let list: Vec<String> =
         wrong.map(|(place, (overlap_s, _))| format!("{place} ({:.2} ms)", 1e3 * overlap_s)).collect();
-    format!("frames told wrong, with how long they were disturbed: {}", list.join(", "))
+    Some(format!("frames flagged wrongly, with how long they were disturbed: {}", list.join(", ")))
 }
 
 /// Figure 8, lower right: power over a group of disturbed frames.
@@ -154,7 +196,7 @@ fn flagged(energies: &[f64], flags: &[bool]) -> Figure {
 fn growing(bench: &Bench<'_>) -> Result<Figure, RunError> {
     let shown = vec![bench.frame(); SHORT];
     let (mut energies, mut first_hits) = (vec![Vec::new(); SHORT], [None; SHORT]);
-    for seed in 0..SHORT_REPEATS {
+    for seed in 0..*bench.settings.iii_6.shorts.get(bench.form) {
         let recording = bench.on_phone(&shown, settled(100 + seed))?;
         let frames = recording.by_timestamps_j().into_iter().zip(overlaps_s(&recording));
         for ((energy, overlap_s), (list, first_hit)) in frames.zip(energies.iter_mut().zip(&mut first_hits)) {

@@ -7,63 +7,58 @@ use traces::score::Score;
 
 use super::super::figure::{POWER, TIME, dots, line};
 use super::super::recording::{Frames, MARKED, Recording};
-use super::super::row::{Kind, Row, Verdict, numbers};
+use super::super::row::{Row, Verdict, numbers};
 use super::super::{Done, Figure};
 use super::{Bench, settled};
 use crate::run::RunError;
 
-/// Least F1 at which starts count as found, set before the first run: all of them where V-sync helps, and that which is asked
-/// of the finder in its worst case where it does not.
-const FOUND: [f64; 2] = [0.99, 0.90];
-/// Beyond this two sums are not the same.
-const SAME: f64 = 1e-9;
-
 /// III-1: one marked start finds the others, with V-sync and without. It is judged by the method of the paper; the tracking of
 /// this program stands beside it.
 pub(super) fn found(bench: &Bench<'_>) -> Result<Done, RunError> {
-    let (capped, [with, with_tracking]) = scored(bench, bench.pc.capped()?, 1)?;
+    let with = bench.with(|settings| &settings.iii_1);
+    let (row, form) = (with.settings, with.form);
+    let (capped, [vsync, vsync_tracking]) = scored(bench, bench.pc.capped()?, 1)?;
     let (free, [without, without_tracking]) = scored(bench, Pacing::FreeRunning, 5000)?;
-    let row = Row {
-        id: "III-1",
-        kind: Kind::Number,
-        claim: "one marked start finds the others",
-        paper: "found by least squared difference; V-sync greatly simplifies the search, without it in most cases",
-        ours: format!(
-            "least squares: V-sync {}, without {}; tracking: V-sync {}, without {}; {} recordings of {} frames each, within 0.5 ms",
-            with.text(),
-            without.text(),
-            with_tracking.text(),
-            without_tracking.text(),
-            bench.effort.repeats,
-            bench.effort.recorded_frames
-        ),
-        verdict: Verdict::of(with.f1 >= FOUND[0] && without.f1 >= FOUND[1]),
-        note: format!(
-            "holds at a mean F1 of least squares of at least {} with V-sync and {} without; it is {:.3} and {:.3}{}",
-            FOUND[0],
-            FOUND[1],
-            with.f1,
-            without.f1,
-            missed(&[with, without, with_tracking, without_tracking])
-        ),
-        numbers: numbers([
-            ("vsync_f1", with.f1),
-            ("vsync_precision", with.mean[0]),
-            ("vsync_recall", with.mean[1]),
-            ("free_f1", without.f1),
-            ("free_precision", without.mean[0]),
-            ("free_recall", without.mean[1]),
-            ("vsync_tracking_f1", with_tracking.f1),
-            ("free_tracking_f1", without_tracking.f1),
-        ]),
-        figure: None,
-        figures: Vec::new(),
-    };
+    let least = [*row.found_vsync.get(form), *row.found_free.get(form)];
+    let ours = format!(
+        "least squares: V-sync {}, without {}; tracking: V-sync {}, without {}; {} recordings of {} frames each, within {} ms",
+        vsync.text(),
+        without.text(),
+        vsync_tracking.text(),
+        without_tracking.text(),
+        bench.repeats(),
+        bench.recorded_frames(),
+        row.within_ms.get(form)
+    );
+    let note = format!(
+        "mean F1 of least squares is {:.3} with V-sync and {:.3} without{}",
+        vsync.f1,
+        without.f1,
+        missed(&[vsync, without, vsync_tracking, without_tracking])
+    );
+    let facts = numbers([
+        ("vsync_f1", vsync.f1),
+        ("vsync_precision", vsync.mean[0]),
+        ("vsync_recall", vsync.mean[1]),
+        ("free_f1", without.f1),
+        ("free_precision", without.mean[0]),
+        ("free_recall", without.mean[1]),
+        ("vsync_tracking_f1", vsync_tracking.f1),
+        ("free_tracking_f1", without_tracking.f1),
+    ]);
+    let recordings = 2 * bench.repeats();
+    let ran = numbers([
+        ("recordings", recordings as f64),
+        ("frames_drawn", (recordings * bench.recorded_frames() as u64) as f64),
+        ("samples_of_one", capped.0.trace.samples() as f64),
+    ]);
+    let holds = vsync.f1 >= least[0] && without.f1 >= least[1];
+    let made = with.row(&row.about, (ours, Verdict::of(holds), note));
     let figures = vec![
         shown_frames("III_fig3", "Two frames at 30 Hz (Paper III, Figure 3)", &capped, 2),
         shown_frames("III_fig4", "Three frames without V-sync (Paper III, Figure 4)", &free, 3),
     ];
-    Ok(Done { row, figures })
+    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures })
 }
 
 /// How well starts were found over several recordings.
@@ -128,13 +123,15 @@ type Searched = (Recording, Frames);
 
 /// Recordings of the PC's animation with one mark each: the first, and how well all of them are found by either method.
 fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Searched, [Found; 2]), RunError> {
+    let row = &bench.settings.iii_1;
+    let (marked, within_s) = (*row.marked.get(bench.form), 1e-3 * row.within_ms.get(bench.form));
     let mut first = None;
     let (mut squares, mut tracking) = (Vec::new(), Vec::new());
-    for seed in first_seed..first_seed + bench.effort.repeats {
+    for seed in first_seed..first_seed + bench.repeats() {
         let recording = bench.on_pc(pacing, settled(seed))?;
-        let tracked = recording.find(1)?;
-        squares.push(recording.score(&recording.find_by(Method::SumOfSquares, 1)?));
-        tracking.push(recording.score(&tracked));
+        let tracked = recording.find(marked)?;
+        squares.push(recording.score(&recording.find_by(Method::SumOfSquares, marked)?, within_s));
+        tracking.push(recording.score(&tracked, within_s));
         first.get_or_insert((recording, tracked));
     }
     let none = || RunError::Setting("no recording was asked for".to_owned());
@@ -160,36 +157,34 @@ fn shown_frames(name: &'static str, title: &str, (recording, frames): &Searched,
 
 /// III-2: start-to-start energies sum to the whole, begin-to-finish ones do not.
 pub(super) fn sums(bench: &Bench<'_>) -> Result<Done, RunError> {
+    let with = bench.with(|settings| &settings.iii_2);
+    let same = *with.settings.same.get(with.form);
     let capped = bench.on_pc(bench.pc.capped()?, settled(1))?;
     let frames = capped.find(MARKED)?;
     let integral = PowerIntegral::new(&capped.trace);
-    let whole_j = integral.energy_j(frames.found[0].start_s, frames.end_s);
+    let from_s = frames.found.first().map_or(0.0, |frame| frame.start_s);
+    let whole_j = integral.energy_j(from_s, frames.end_s);
     let new_j: f64 = frames.energies_j().iter().sum();
     let drawn_j = integral.energy_j(capped.truth.start_s, capped.truth.end_s);
     let old_j: f64 = capped.begin_to_finish_j().iter().sum();
     let [new, old] = [(new_j / whole_j - 1.0).abs(), 1.0 - old_j / drawn_j];
-    let row = Row {
-        id: "III-2",
-        kind: Kind::Equality,
-        claim: "start-to-start energies sum to the whole",
-        paper: "no energy is unaccounted for from start to start; from begin to finish the sum is not the whole",
-        ours: format!(
-            "start to start {new_j:.6} J of {whole_j:.6} J, off by {new:.1e}; begin to finish {old_j:.3} J, short by {:.1} %",
-            100.0 * old
-        ),
-        verdict: Verdict::of(new < SAME && old.abs() > SAME),
-        note: format!(
-            "holds within {SAME:.0e}; what the old method leaves out is the idle time before the next frame"
-        ),
-        numbers: numbers([
-            ("whole_J", whole_j),
-            ("start_to_start_J", new_j),
-            ("relative_error", new),
-            ("begin_to_finish_J", old_j),
-            ("begin_to_finish_missing", old),
-        ]),
-        figure: None,
-        figures: Vec::new(),
-    };
-    Ok(Done { row, figures: Vec::new() })
+    let ours = format!(
+        "start to start {new_j:.6} J of {whole_j:.6} J, off by {new:.1e}; begin to finish {old_j:.3} J, short by {:.1} %",
+        100.0 * old
+    );
+    let facts = numbers([
+        ("whole_J", whole_j),
+        ("start_to_start_J", new_j),
+        ("relative_error", new),
+        ("begin_to_finish_J", old_j),
+        ("begin_to_finish_missing", old),
+    ]);
+    let ran = numbers([
+        ("frames_drawn", capped.truth.frames.len() as f64),
+        ("frames_found", frames.found.len() as f64),
+        ("samples", capped.trace.samples() as f64),
+    ]);
+    let verdict = Verdict::of(new < same && old.abs() > same);
+    let made = with.row(&with.settings.about, (ours, verdict, String::new()));
+    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
 }

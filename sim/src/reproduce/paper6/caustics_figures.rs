@@ -6,7 +6,8 @@ use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, draw};
 
 use super::super::Figure;
 use crate::chart::caustics::view;
-use crate::output::plot::{HeatMapPlot, HeatTile};
+use crate::output::plot::{HeatMapPlot, HeatTile, Look, Shading};
+use crate::reproduce::settings::Form;
 use crate::run::RunError;
 
 /// Pixels across and down of the view of one method.
@@ -27,11 +28,13 @@ pub(super) fn warped() -> Result<Figure, RunError> {
     let map = HeatMapPlot {
         title: "The pixels of one warped beam (Paper VI, Figure 7)",
         subject: &format!("from left to right, with pixels that are shaded: {}", areas.join(", ")),
-        label: "1 shaded in vain, 2 with light",
+        label: "",
         size: [4 * PANEL_PX[0], PANEL_PX[1]],
         tiles: &tiles,
+        shading: Shading::Classes(&["not shaded", "shaded without light", "shaded with light"]),
+        brightness: &[],
     };
-    Ok(Figure { name: "VI_fig7", picture: map.picture() })
+    Ok(Figure { name: "VI_fig7", picture: map.picture(&Look::default()) })
 }
 
 /// The view of the beam.
@@ -66,8 +69,8 @@ fn twisted() -> Beam {
 }
 
 /// The light of the ocean in the water from the side, and on its floor from above.
-pub(super) fn light(quick: bool) -> Result<[Figure; 2], RunError> {
-    let (cells, [width, height]) = if quick { (48, [128, 72]) } else { (128, [256, 144]) };
+pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
+    let (cells, [width, height]) = if form == Form::Quick { (48, [128, 72]) } else { (128, [256, 144]) };
     let water = Ocean { overshoot: 0.02, ..view::water(cells, view::SLOPE) };
     let beams = water.beams(0.0);
     let aside = view::aside([width, height]).map_err(RunError::setting)?;
@@ -80,7 +83,10 @@ pub(super) fn light(quick: bool) -> Result<[Figure; 2], RunError> {
         let size = [eye.viewport().width(), eye.viewport().height()];
         let title = "Caustics under waves (Paper VI, section 4)";
         let tiles = &tiles(&picture.light, size[0]);
-        Figure { name, picture: HeatMapPlot { title, subject: &subject, label, size, tiles }.picture() }
+        // Next to a focus light has no bound.
+        let shading = Shading::Clipped;
+        let map = HeatMapPlot { title, subject: &subject, label, size, tiles, shading, brightness: &[] };
+        Figure { name, picture: map.picture(&Look::default()) }
     };
     Ok([
         image("VI_caustics_volume", "in the water, from the side", "W/m", &aside, Light::Volume),
@@ -88,15 +94,12 @@ pub(super) fn light(quick: bool) -> Result<[Figure; 2], RunError> {
     ])
 }
 
-/// Pixels of light in rows of `width`. The brightest hundredth is cut to what is just below it: next to a focus light has no bound.
+/// Pixels of light in rows of `width`.
 fn tiles(light: &[f64], width: u32) -> Vec<HeatTile> {
-    let mut sorted = light.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let most = sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0);
     let tile = |(place, light): (u32, &f64)| HeatTile {
         origin: [place % width, place / width],
         size: [1, 1],
-        value: light.min(most),
+        value: *light,
     };
     (0..).zip(light).map(tile).collect()
 }
