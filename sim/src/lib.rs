@@ -7,12 +7,14 @@
 //! - [`stress`]: the failure catalogue, each tile test on each family of triangles.
 //! - [`chart`]: charts of the book, measured and drawn.
 //! - [`reproduce`]: what the papers report, computed and held against them.
+//! - [`compare`]: two runs, two images, two folders of images.
 //! - [`output`]: files, plots, the timeline and the report.
 //! - [`visibility`]: what every sample of a scene sees, and how fast.
 //! - [`cli`]: the command `quintile`.
 
 pub mod chart;
 pub mod cli;
+pub mod compare;
 pub mod gpu;
 pub mod output;
 pub mod reproduce;

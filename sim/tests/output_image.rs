@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use image::GenericImageView;
-use sim::output::OutDir;
 use sim::output::image::{ImageError, LinearImage};
+use sim::output::{Claim, Destination};
 
 fn ramp() -> Vec<[f32; 3]> {
     (0..12).map(|i| [i as f32 / 11.0, 1.0 - i as f32 / 11.0, 2.5]).collect()
@@ -13,11 +13,13 @@ fn ramp() -> Vec<[f32; 3]> {
 #[test]
 fn png_holds_srgb_and_exr_the_very_values() {
     let temp = tempfile::tempdir().unwrap();
-    let dir = OutDir::create(temp.path()).unwrap();
+    let claim = Claim::new("test").files(["images/a.png", "images/a.exr"]);
+    let mut dir = Destination::new(temp.path()).open([claim]).unwrap();
     let pixels = ramp();
     let picture = LinearImage::new(4, 3, &pixels).unwrap();
     picture.write_png(&dir, "images/a.png").unwrap();
     picture.write_exr(&dir, "images/a.exr").unwrap();
+    dir.publish().unwrap();
     let png = image::open(temp.path().join("images/a.png")).unwrap();
     assert_eq!(png.dimensions(), (4, 3));
     assert_eq!(png.to_rgb8().get_pixel(0, 0).0, [0, 255, 255]);

@@ -2,20 +2,22 @@
 
 #![allow(clippy::unwrap_used)]
 
+use power_model::Part;
 use sim::output::report::{
     CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, Report, ReportImage,
     ReportPlot, UnitRow, WarningRow,
 };
-use sim::output::{MeanSd, OutDir, plot};
+use sim::output::{Claim, Destination, MeanSd, plot};
 
 const EVIL: &str = "<script>alert('\"1\"')</script><img src=x onerror=alert(2)>";
 
 fn svg() -> String {
     let samples = [(0.0, 1.0)];
-    let part = plot::PowerPart { name: EVIL, overhead: false, power_w: vec![1.0; 10] };
+    let part = plot::PowerPart { part: Part::Leakage, power_w: vec![1.0; 10] };
+    let parts = vec![part];
     let frame =
-        plot::FramePower { subject: EVIL, frame: 0, bin_s: 1e-3, parts: vec![part], samples: &samples };
-    frame.picture().svg().unwrap()
+        plot::FramePower { subject: EVIL, frame: 0, bin_s: 1e-3, parts, samples: &samples, frame_j: None };
+    frame.picture(&plot::Look::default()).svg().unwrap()
 }
 
 fn frames(text: &str, number: f64) -> Vec<FrameRow> {
@@ -45,11 +47,11 @@ fn report(text: &str, number: f64) -> Report<'static> {
     Report {
         title: owned().into(),
         facts: vec![fact.clone()],
-        warnings: vec![WarningRow { code: owned(), message: owned() }],
+        warnings: vec![WarningRow { code: owned(), message: owned(), details: vec![owned(), owned()] }],
         headline: vec![Headline { label: owned(), unit: "J".into(), measured: stats, truth: stats }],
         images: vec![image.clone(), image.clone(), image],
         plots: vec![ReportPlot { caption: owned(), svg: svg(), stem: Some(owned()) }],
-        parts: vec![PartRow { name: owned(), doc: owned(), overhead: true, energy_j: number }],
+        parts: vec![part(text, 99.0 * number, true), part(text, number, false)],
         frames: frames(text, number),
         pixels: 1000,
         units: vec![UnitRow {
@@ -60,9 +62,27 @@ fn report(text: &str, number: f64) -> Report<'static> {
             note: owned(),
         }],
         counters: vec![counter(text, number)],
-        settings: vec![fact],
+        settings: vec![fact.clone()],
+        inputs: vec![fact.clone()],
         files: vec![FileLink { path: owned(), what: owned() }],
+        host: vec![fact],
     }
+}
+
+fn part(text: &str, energy_j: f64, idle: bool) -> PartRow {
+    let (name, doc) = (text.to_owned(), text.to_owned());
+    PartRow { name, doc, colour: plot::part_colour(Part::Idle).css(), idle, energy_j }
+}
+
+/// With V-sync a bar that is 99 % idle said nothing of the rest.
+#[test]
+fn shares_are_given_of_the_busy_part_too() {
+    let page = report("plain", 0.5).html().unwrap();
+    assert!(
+        page.contains("99.0 %") && page.contains("100.0 %") && page.contains("share while busy"),
+        "{page}"
+    );
+    assert_eq!(page.matches("class=\"stack\"").count(), 2);
 }
 
 #[test]
@@ -124,8 +144,9 @@ fn an_empty_report_is_a_page_without_empty_sections() {
 #[test]
 fn the_same_report_gives_the_same_bytes_in_a_file() {
     let temp = tempfile::tempdir().unwrap();
-    let dir = OutDir::create(temp.path()).unwrap();
+    let mut dir = Destination::new(temp.path()).open([Claim::new("test").files(["report.html"])]).unwrap();
     let report = report("plain", 0.5);
     report.write(&dir, "report.html").unwrap();
+    dir.publish().unwrap();
     assert_eq!(std::fs::read_to_string(temp.path().join("report.html")).unwrap(), report.html().unwrap());
 }

@@ -1,17 +1,30 @@
 //! What can be typed. One declaration per flag makes all of its docs.
 
+use std::path::PathBuf;
+
 use clap::{Args, Parser, Subcommand};
 
 use super::trace::args::TraceArgs;
 
 mod chart;
+mod compare;
+mod info;
+mod look;
+mod messages;
 mod run;
 mod samples;
+mod scene;
 mod visibility;
 
 pub use chart::{ChartArg, ChartArgs, StressArgs};
+pub use compare::CompareArgs;
+pub use info::InfoArgs;
+pub use look::LookArgs;
+pub use messages::MessageArgs;
+pub(super) use messages::color_of;
 pub use run::{BoundArg, PacingArg, RunArgs};
 pub use samples::SamplesArgs;
+pub use scene::SceneArgs;
 pub use visibility::VisibilityArgs;
 
 /// A cycle-approximate simulator of a tile-based 5D rasterization pipeline, with an energy trace for every frame.
@@ -21,6 +34,9 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    /// How much is printed.
+    #[command(flatten)]
+    pub messages: MessageArgs,
 }
 
 /// What to do.
@@ -28,6 +44,10 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene, time it, turn it into watts, record a trace and find the energy of every frame in it
     Run(Box<RunArgs>),
+    /// Say what is in a scene, which camera sees it, and what is ignored
+    Info(InfoArgs),
+    /// Compare two runs, two images or two folders of images
+    Compare(CompareArgs),
     /// Find the triangle each sample sees and its depth, to be held against another program sample by sample
     Visibility(VisibilityArgs),
     /// Find the pairs of moving objects that may collide
@@ -44,8 +64,33 @@ pub enum Command {
     Reproduce(super::reproduce::ReproduceArgs),
     /// Analyse a power trace, recorded or synthetic: frames, energies, alignment, formats, plots, Pareto frontiers
     Trace(TraceArgs),
+    /// Print a script that completes commands and options in a shell
+    Completions(CompletionsArgs),
+    /// Print the manual page, or write one for each command into a folder
+    Man(ManArgs),
     /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
     List(ListArgs),
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  quintile completions bash > ~/.local/share/bash-completion/completions/quintile\n  \
+    quintile completions zsh > ~/.zfunc/_quintile\n  quintile completions fish > ~/.config/fish/completions/quintile.fish"
+)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_enum, value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  quintile man | man -l -\n  quintile man ~/.local/share/man/man1")]
+pub struct ManArgs {
+    /// Folder for the pages of all commands, such as quintile-run.1; without it the main page is printed
+    #[arg(value_name = "DIR")]
+    pub folder: Option<PathBuf>,
 }
 
 /// Arguments of `list`.

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use clap::ValueEnum;
 use serde::Serialize;
 
 use super::Failure;
@@ -10,23 +11,59 @@ use super::terminal::{json_text, print};
 use crate::chart::ChartError;
 use crate::chart::sampling::{self, Effort, SamplingChart};
 use crate::chart::standing::{Standing, Standings};
-use crate::chart::tile_tests::tile_tests;
-use crate::chart::timing::timing;
-use crate::chart::{caustics, collision, frames, glossy, growth, occlusion, points, sampled, shadows, views};
-use crate::output::OutDir;
+use crate::chart::{
+    caustics, collision, frames, glossy, growth, index, occlusion, points, sampled, shadows, tile_tests,
+    timing, views,
+};
 use crate::output::progress::Progress;
 use crate::output::table::Table;
+use crate::output::terminal::Terminal;
+use crate::output::{Claim, Destination, OutDir, OutputError};
 use crate::run::RunError;
 
 mod all;
 
 impl From<ChartError> for Failure {
     fn from(error: ChartError) -> Self {
-        Self { message: error.to_string(), code: 1 }
+        match error {
+            ChartError::Output(error) => error.into(),
+            error => Self { message: error.to_string(), code: 1 },
+        }
     }
 }
 
-pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        RunError::from(error).into()
+    }
+}
+
+/// The files that a chart may write, for each command that makes them.
+fn claims(chart: ChartArg) -> Vec<Claim> {
+    let claim = match chart {
+        ChartArg::All => {
+            let charts = ChartArg::value_variants().iter().filter(|&&chart| chart != ChartArg::All);
+            let charts = charts.flat_map(|&chart| claims(chart));
+            return charts.chain([crate::stress::claim(), index::claim()]).collect();
+        }
+        ChartArg::Caustics => caustics::claim(),
+        ChartArg::Collision => collision::claim(),
+        ChartArg::Frames => frames::claim(),
+        ChartArg::Glossy => glossy::claim(),
+        ChartArg::Growth => growth::claim(),
+        ChartArg::Occlusion => occlusion::claim(),
+        ChartArg::Points => points::claim(),
+        ChartArg::Sampled => sampled::claim(),
+        ChartArg::Sampling => sampling::claim(),
+        ChartArg::Shadows => shadows::claim(),
+        ChartArg::TileTests => tile_tests::claim(),
+        ChartArg::Timing => timing::claim(),
+        ChartArg::Views => views::claim(),
+    };
+    vec![claim]
+}
+
+pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> {
     let takes_scenes =
         matches!(args.chart, ChartArg::All | ChartArg::Sampled | ChartArg::TileTests | ChartArg::Timing);
     if !args.scene.is_empty() && !takes_scenes {
@@ -34,17 +71,19 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Failure> {
             "--scene goes with `chart all`, `sampled`, `tile-tests` and `timing`; leave it out".to_owned();
         return Err(Failure { message, code: 2 });
     }
-    // What can be known to be wrong is told before minutes of work.
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+    // What can be known to be wrong is reported before minutes of work.
+    let out = Destination { folder: args.out.clone(), force: args.force };
+    let mut dir = out.open(claims(args.chart))?;
     for scene in &args.scene {
         workloads::load(scene).map_err(RunError::from)?;
     }
     let pool = super::threads(args.threads)?;
-    let progress = Progress::new(args.json);
+    let progress = terminal.progress(args.json);
     if args.chart == ChartArg::All {
-        return pool.install(|| all::run(args, &dir, &progress));
+        return pool.install(|| all::run(args, &mut dir, &progress));
     }
     let done = pool.install(|| make(args.chart, args, &dir, &progress))?;
+    dir.publish()?;
     match args.json {
         true => print(&done.json)?,
         false => print(&format!("{}results: {}", done.text, args.out.display()))?,
@@ -71,48 +110,48 @@ impl Done {
 fn make(chart: ChartArg, args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     match chart {
         ChartArg::All => Err(Failure { message: "`all` is no chart of its own".to_owned(), code: 1 }),
-        ChartArg::Caustics => chart_caustics(args, progress),
-        ChartArg::Collision => chart_collision(args, progress),
-        ChartArg::Frames => chart_frames(args, progress),
-        ChartArg::Glossy => chart_glossy(args, progress),
-        ChartArg::Growth => chart_growth(args, progress),
-        ChartArg::Occlusion => chart_occlusion(args, progress),
-        ChartArg::Points => chart_points(args, progress),
+        ChartArg::Caustics => chart_caustics(args, dir, progress),
+        ChartArg::Collision => chart_collision(args, dir, progress),
+        ChartArg::Frames => chart_frames(args, dir, progress),
+        ChartArg::Glossy => chart_glossy(args, dir, progress),
+        ChartArg::Growth => chart_growth(args, dir, progress),
+        ChartArg::Occlusion => chart_occlusion(args, dir, progress),
+        ChartArg::Points => chart_points(args, dir, progress),
         ChartArg::Sampled => chart_sampled(args, dir, progress),
-        ChartArg::Sampling => chart_sampling(args, progress),
-        ChartArg::Shadows => chart_shadows(args, progress),
-        ChartArg::TileTests => chart_tile_tests(args, progress),
+        ChartArg::Sampling => chart_sampling(args, dir, progress),
+        ChartArg::Shadows => chart_shadows(args, dir, progress),
+        ChartArg::TileTests => chart_tile_tests(args, dir, progress),
         ChartArg::Timing => chart_timing(args, dir, progress),
-        ChartArg::Views => chart_views(args, progress),
+        ChartArg::Views => chart_views(args, dir, progress),
     }
 }
 
-fn chart_collision(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_collision(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { collision::Effort::QUICK } else { collision::Effort::FULL };
-    let chart = collision::chart(effort, &args.out, progress)?;
+    let chart = collision::chart(effort, dir, &args.look.look(), progress)?;
     let missed = chart.missed();
     let fault = format!("{missed} pairs that collide were not kept: a bound does not hold; please report it");
     Ok(Done { fault: (missed > 0).then_some(fault), ..Done::new(&chart, chart.text())? })
 }
 
-fn chart_caustics(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_caustics(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { caustics::Effort::QUICK } else { caustics::Effort::FULL };
-    let chart = caustics::chart(effort, &args.out, progress)?;
+    let chart = caustics::chart(effort, dir, &args.look.look(), progress)?;
     let (text, fault) = (chart.text(), chart.fault());
     Ok(Done { text, json: json_text(&chart, true)?, standings: Vec::new(), fault })
 }
 
-fn chart_occlusion(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_occlusion(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { occlusion::Effort::QUICK } else { occlusion::Effort::FULL };
-    let chart = occlusion::chart(effort, &args.out, progress)?;
+    let chart = occlusion::chart(effort, dir, &args.look.look(), progress)?;
     let (text, fault) = (chart.text(), chart.fault());
     Ok(Done { text, json: json_text(&chart, true)?, standings: Vec::new(), fault })
 }
 
-fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_frames(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let started = Instant::now();
     let effort = if args.quick { frames::Effort::QUICK } else { frames::Effort::FULL };
-    let chart = frames::chart(effort, &args.out, progress)?;
+    let chart = frames::chart(effort, dir, &args.look.look(), progress)?;
     let (table, below, took_s) = (chart.text(), frames::FAILS_BELOW, started.elapsed().as_secs_f64());
     let text = format!(
         "{table}*: mean F1 below {below}; in brackets how many scenes are below\ntook {took_s:.1} s\n"
@@ -120,28 +159,28 @@ fn chart_frames(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> 
     Done::new(&chart, text)
 }
 
-fn chart_glossy(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_glossy(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { glossy::Effort::QUICK } else { glossy::Effort::FULL };
-    let chart = glossy::chart(effort, &args.out, progress)?;
+    let chart = glossy::chart(effort, dir, &args.look.look(), progress)?;
     Done::new(&chart, chart.text())
 }
 
-fn chart_growth(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_growth(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { growth::Effort::QUICK } else { growth::Effort::FULL };
-    let chart = growth::chart(effort, &args.out, progress)?;
+    let chart = growth::chart(effort, dir, &args.look.look(), progress)?;
     Done::new(&chart, chart.text())
 }
 
-fn chart_points(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_points(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { points::Effort::QUICK } else { points::Effort::FULL };
-    let chart = points::chart(effort, &args.out, progress)?;
+    let chart = points::chart(effort, dir, &args.look.look(), progress)?;
     Done::new(&chart, chart.text())
 }
 
-fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_sampling(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let started = Instant::now();
     let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
-    let chart = sampling::chart(effort, &args.out, progress)?;
+    let chart = sampling::chart(effort, dir, &args.look.look(), progress)?;
     let took_s = started.elapsed().as_secs_f64();
     Done::new(&chart, format!("{}took {took_s:.1} s\n", text(&chart)))
 }
@@ -149,21 +188,20 @@ fn chart_sampling(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure
 fn chart_sampled(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { sampled::Effort::QUICK } else { sampled::Effort::FULL };
     let chart = sampled::sampled(&args.scene, effort, progress)?;
-    chart.write(dir).map_err(RunError::from)?;
+    chart.write(dir, &args.look.look())?;
     Done::new(&chart, format!("{}\n{}", chart.text(), chart.cost_text()))
 }
 
-fn chart_shadows(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_shadows(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { shadows::Effort::QUICK } else { shadows::Effort::FULL };
-    let chart = shadows::chart(effort, &args.out, progress)?;
+    let chart = shadows::chart(effort, dir, &args.look.look(), progress)?;
     let fault = (!chart.is_equal()).then(|| "one pass and accumulation differ; please report it".to_owned());
     Ok(Done { fault, ..Done::new(&chart, chart.text())? })
 }
 
-fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
-    let chart = tile_tests(&args.scene, args.quick, progress)?;
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
-    chart.write(dir).map_err(RunError::from)?;
+fn chart_tile_tests(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
+    let chart = tile_tests::tile_tests(&args.scene, args.quick, progress)?;
+    chart.write(dir, &args.look.look())?;
     let lost = chart.samples_lost();
     let fault = format!("{lost} samples were lost: a test is not conservative; please report it");
     Ok(Done { fault: (lost > 0).then_some(fault), ..Done::new(&chart, chart.text())? })
@@ -171,8 +209,8 @@ fn chart_tile_tests(args: &ChartArgs, progress: &Progress) -> Result<Done, Failu
 
 fn chart_timing(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let started = Instant::now();
-    let chart = timing(&args.scene, args.quick, progress)?;
-    chart.write(dir).map_err(RunError::from)?;
+    let chart = timing::timing(&args.scene, args.quick, progress)?;
+    chart.write(dir, &args.look.look())?;
     let speed = &chart.reference;
     let text = format!(
         "{}the reference: {:.1} million unit-cycles, {:.2} million cycles a second\ntook {:.1} s\n",
@@ -184,9 +222,9 @@ fn chart_timing(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<D
     Done::new(&chart, text)
 }
 
-fn chart_views(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn chart_views(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let effort = if args.quick { views::Effort::QUICK } else { views::Effort::FULL };
-    let chart = views::chart(effort, &args.out, progress)?;
+    let chart = views::chart(effort, dir, &args.look.look(), progress)?;
     Done::new(&chart, chart.text())
 }
 

@@ -11,7 +11,7 @@ use crate::gpu::GpuSpec;
 #[derive(Serialize)]
 struct Listing {
     scenes: Vec<Entry>,
-    gpus: Vec<Entry>,
+    gpus: Vec<Gpu>,
     platforms: Vec<Entry>,
     energy_tables: Vec<Entry>,
     sample_tables: Vec<Entry>,
@@ -24,6 +24,34 @@ struct Listing {
 struct Entry {
     name: String,
     what: String,
+}
+
+/// A GPU with the platform and the energy table that belong to it, if any do.
+#[derive(Serialize)]
+struct Gpu {
+    #[serde(flatten)]
+    entry: Entry,
+    platform: Option<String>,
+    energy_table: Option<String>,
+}
+
+impl Gpu {
+    fn builtin(name: &str) -> Self {
+        let spec = GpuSpec::load(name).ok();
+        let (doc, power) = spec.map(|spec| (spec.doc, spec.power)).unwrap_or_default();
+        let (platform, energy_table) = power.map(|power| (power.platform, power.energy)).unzip();
+        Self { entry: Entry::new(name, doc), platform, energy_table }
+    }
+
+    /// The entry with what belongs to it in words.
+    fn line(&self) -> Entry {
+        let Entry { name, what } = &self.entry;
+        let own = match (&self.platform, &self.energy_table) {
+            (Some(platform), Some(table)) => format!("platform {platform}, energy table {table}"),
+            _ => "no platform belongs to it".to_owned(),
+        };
+        Entry::new(name, format!("{what} [{own}]"))
+    }
 }
 
 impl Entry {
@@ -39,7 +67,7 @@ pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
     }
     let groups = [
         ("scenes", &listing.scenes),
-        ("GPUs", &listing.gpus),
+        ("GPUs", &listing.gpus.iter().map(Gpu::line).collect()),
         ("platforms", &listing.platforms),
         ("energy tables", &listing.energy_tables),
         ("sample tables", &listing.sample_tables),
@@ -56,7 +84,6 @@ pub(super) fn list(args: &ListArgs) -> Result<(), Failure> {
 }
 
 fn listing() -> Listing {
-    let gpu = |name| Entry::new(name, GpuSpec::load(name).map(|gpu| gpu.doc).unwrap_or_default());
     let platform = |name| {
         Entry::new(
             name,
@@ -71,7 +98,7 @@ fn listing() -> Listing {
     };
     Listing {
         scenes: workloads::builtin_names().map(|(name, what)| Entry::new(name, what)).collect(),
-        gpus: GpuSpec::names().map(gpu).collect(),
+        gpus: GpuSpec::names().map(Gpu::builtin).collect(),
         platforms: power_model::Platform::names().map(platform).collect(),
         energy_tables: power_model::EnergyTable::names().map(table).collect(),
         sample_tables: pipeline::SampleSpec::names().map(|(name, what)| Entry::new(name, what)).collect(),

@@ -3,9 +3,15 @@
 mod args;
 mod ccd;
 mod chart;
+mod compare;
+mod crash;
+mod info;
+mod interrupt;
 mod list;
+mod manual;
 mod outputs;
 mod parse;
+mod quantity;
 mod reproduce;
 mod run;
 mod sample;
@@ -15,35 +21,52 @@ mod terminal;
 mod trace;
 mod visibility;
 
+use std::ffi::OsString;
+use std::panic::AssertUnwindSafe;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches};
 
+use crate::output::terminal::Terminal;
 use crate::run::RunError;
+use crash::Crashes;
 
 pub use args::{Cli, Command};
 
 /// Runs the command line of this process and says how it ended: 0 for success, 2 for a mistake of the caller, 1 for a
 /// failure.
 pub fn main() -> ExitCode {
-    // A panic is a fault of the program; it is told once, in one line, below.
-    std::panic::set_hook(Box::new(|_| ()));
-    let cli = Cli::parse();
-    match std::panic::catch_unwind(|| dispatch(&cli)) {
+    let cli = parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
+    let terminal = cli.messages.terminal();
+    interrupt::handle(terminal.clone());
+    let crashes = Crashes::watch();
+    match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal))) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(failure)) => {
-            terminal::complain(&failure.message);
+            terminal.error(&failure.message);
             ExitCode::from(failure.code)
         }
         Err(panic) => {
-            let message = panic.downcast_ref::<String>().map(String::as_str);
-            let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-            terminal::complain(&format!(
-                "a fault of the program, please report it with the command line: {message}"
-            ));
+            let arguments: Vec<String> =
+                std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+            terminal.error(&crashes.report(&*panic, &arguments));
             ExitCode::FAILURE
         }
     }
+}
+
+/// The command line, in the colours it asks for also where it is wrong.
+fn parse(args: Vec<OsString>) -> Result<Cli, clap::Error> {
+    let mut command = Cli::command().color(args::color_of(&args));
+    let matches = command.try_get_matches_from_mut(args)?;
+    let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    // Options of every command may be written at two levels, each of which the parser checks by itself.
+    if cli.messages.quiet && cli.messages.verbose {
+        let message = "the argument '--quiet' cannot be used with '--verbose'";
+        return Err(command.error(ErrorKind::ArgumentConflict, message));
+    }
+    Ok(cli)
 }
 
 /// A message and an exit code.
@@ -70,17 +93,21 @@ fn threads(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
     pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
 }
 
-fn dispatch(cli: &Cli) -> Result<(), Failure> {
+fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
     match &cli.command {
-        Command::Run(args) => run::run(args),
+        Command::Run(args) => run::run(args, terminal),
+        Command::Info(args) => info::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Completions(args) => manual::completions(args),
+        Command::Man(args) => manual::man(args),
         Command::List(args) => list::list(args),
-        Command::Visibility(args) => visibility::run(args),
-        Command::Ccd(args) => ccd::run(args),
-        Command::Sample(args) => sample::run(args),
+        Command::Visibility(args) => visibility::run(args, terminal),
+        Command::Ccd(args) => ccd::run(args, terminal),
+        Command::Sample(args) => sample::run(args, terminal),
         Command::Samples(args) => samples::run(args),
-        Command::Stress(args) => stress::run(args),
-        Command::Chart(args) => chart::run(args),
-        Command::Reproduce(args) => reproduce::run(args),
-        Command::Trace(args) => trace::run(args),
+        Command::Stress(args) => stress::run(args, terminal),
+        Command::Chart(args) => chart::run(args, terminal),
+        Command::Reproduce(args) => reproduce::run(args, terminal),
+        Command::Trace(args) => trace::run(args, terminal),
     }
 }

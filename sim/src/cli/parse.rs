@@ -1,17 +1,26 @@
 //! Values of flags that have a form of their own. Errors say which form.
 
 use std::ops::Range;
+use std::str::FromStr;
 
 use pipeline::Features;
 
+use super::quantity::length_of_time;
 use crate::stress::methods::SWITCHES;
 
-/// Frames from the first to one past the last.
+/// Frames from the first to one past the last, at least one.
 pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {
     let wrong = || format!("`{text}` is not a range of frames; write it as 0..36");
     let (start, end) = text.split_once("..").ok_or_else(wrong)?;
-    let number = |part: &str| part.trim().parse().map_err(|_| wrong());
-    Ok(number(start)?..number(end)?)
+    let number = |part: &str| part.trim().parse::<u32>().map_err(|_| wrong());
+    let (start, end) = (number(start)?, number(end)?);
+    match start < end {
+        true => Ok(start..end),
+        false => Err(format!(
+            "the range `{text}` is empty; the end is not included, so one frame is {start}..{}",
+            start.saturating_add(1)
+        )),
+    }
 }
 
 /// Tile tests by the names they have in a GPU's file.
@@ -51,18 +60,13 @@ pub(super) fn percent(text: &str) -> Result<f64, String> {
     Err(format!("`{text}` cannot be met; it has to be more than 0% and at most 100%, for example 2%"))
 }
 
-/// Units of time and their seconds, those that end like another first.
-const TIMES: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("h", 3600.0), ("s", 1.0)];
-
-/// A length of time in seconds.
+/// A length of time in seconds. Its unit is required: a bare number may be meant in minutes.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     let wrong = || format!("`{text}` is not a time; write it as 30s, 500ms, 2min or 1h");
-    let (number, unit_s) = TIMES
-        .iter()
-        .find_map(|(unit, seconds)| Some((text.trim().strip_suffix(unit)?, seconds)))
-        .ok_or_else(wrong)?;
-    let value: f64 = number.trim().parse().map_err(|_| wrong())?;
-    if value > 0.0 && value.is_finite() { Ok(value * unit_s) } else { Err(wrong()) }
+    if text.trim().ends_with(|last: char| last.is_ascii_digit() || last == '.') {
+        return Err(wrong());
+    }
+    length_of_time(text).map_err(|_| wrong())
 }
 
 /// A seed.
@@ -70,12 +74,63 @@ pub(super) fn seed(text: &str) -> Result<u64, String> {
     text.trim().parse().map_err(|_| format!("a seed has to be a whole number from 0 to {}", u64::MAX))
 }
 
-/// Width and height.
+/// Width and height, each 1 to 16384.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || format!("`{text}` is not a size; write it as 1280x720");
+    let wrong = || format!("`{text}` is not a size; write it as 1280x720, each side 1 to 16384 pixels");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
-    let side = |part: &str| part.trim().parse().map_err(|_| wrong());
+    let side = |part: &str| {
+        let pixels = part.trim().parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
+        pixels.ok_or_else(wrong)
+    };
     Ok((side(width)?, side(height)?))
+}
+
+/// The most pixels along a side of an image.
+const MAX_SIDE: u32 = 16_384;
+
+/// Samples in a pixel.
+pub(super) fn per_pixel(text: &str) -> Result<u32, String> {
+    let samples = text.trim().parse().ok().filter(|samples| (1..=256).contains(samples));
+    samples.ok_or_else(|| format!("`{text}` is not a number of samples; it has to be 1 to 256"))
+}
+
+/// The radius of a lens in scene units.
+pub(super) fn lens(text: &str) -> Result<f32, String> {
+    number(text, "a radius of the lens in scene units; it has to be a finite number of at least 0", |r| {
+        r >= 0.0
+    })
+}
+
+/// A depth in scene units.
+pub(super) fn depth(text: &str) -> Result<f32, String> {
+    number(text, "a depth in scene units; it has to be a finite number above zero", |depth| depth > 0.0)
+}
+
+/// A fraction of the frame period.
+pub(super) fn shutter(text: &str) -> Result<f64, String> {
+    number(text, "a fraction of the frame period; it has to be 0 to 1", |open| (0.0..=1.0).contains(&open))
+}
+
+/// A share of at least 0 and below 1.
+pub(super) fn share_below_one(text: &str) -> Result<f64, String> {
+    number(text, "a share; it has to be at least 0 and below 1, for example 0.01", |share| {
+        (0.0..1.0).contains(&share)
+    })
+}
+
+/// What a device multiplies by.
+pub(super) fn gain(text: &str) -> Result<f64, String> {
+    number(text, "a gain; it has to be a finite number above zero, for example 1.01", |gain| gain > 0.0)
+}
+
+/// A finite number that fits; `due` says what is asked for.
+fn number<T: FromStr + Into<f64> + Copy>(
+    text: &str,
+    due: &str,
+    fits: impl Fn(f64) -> bool,
+) -> Result<T, String> {
+    let value = text.trim().parse::<T>().ok().filter(|&value| value.into().is_finite() && fits(value.into()));
+    value.ok_or_else(|| format!("`{text}` is not {due}"))
 }
 
 #[cfg(test)]
@@ -105,7 +160,8 @@ mod tests {
             [duration("30s"), duration("500ms"), duration("2 min"), duration("1h")].map(Result::unwrap),
             [30.0, 0.5, 120.0, 3600.0]
         );
-        for wrong in ["30", "s", "-1s", "0s", "infs", "NaNs", "3 days"] {
+        assert_eq!(duration("250us"), Ok(250.0 * 1e-6));
+        for wrong in ["30", "1e3", "s", "-1s", "0s", "infs", "NaNs", "3 days"] {
             assert!(duration(wrong).unwrap_err().contains("30s"), "{wrong}");
         }
     }
@@ -123,7 +179,30 @@ mod tests {
         assert_eq!(frames("3..7"), Ok(3..7));
         assert!(frames("3-7").unwrap_err().contains("0..36"));
         assert!(frames("-3..7").is_err());
+        for empty in ["3..3", "7..3"] {
+            assert!(frames(empty).unwrap_err().contains("is empty"), "{empty}");
+        }
         assert_eq!(size("1280x720"), Ok((1280, 720)));
-        assert!(size("1280").unwrap_err().contains("1280x720"));
+        for wrong in ["1280", "0x1", "1x16385", "4294967297x1", "-1x1"] {
+            assert!(size(wrong).unwrap_err().contains("1280x720, each side 1 to 16384 pixels"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_a_scene_say_what_would_fit() {
+        assert_eq!([lens("0"), lens("2.5"), depth("1e3")], [Ok(0.0), Ok(2.5), Ok(1e3)]);
+        assert_eq!([shutter("0"), shutter("1"), share_below_one("0.5")], [Ok(0.0), Ok(1.0), Ok(0.5)]);
+        assert_eq!([per_pixel("1"), per_pixel("256")], [Ok(1), Ok(256)]);
+        assert_eq!(
+            lens("-1").unwrap_err(),
+            "`-1` is not a radius of the lens in scene units; it has to be a finite number of at least 0"
+        );
+        for wrong in ["-1", "inf", "NaN", "1e39", "2mm", ""] {
+            assert!(lens(wrong).is_err() && depth(wrong).is_err() && shutter(wrong).is_err(), "{wrong}");
+        }
+        assert!(depth("0").is_err() && shutter("1.5").is_err() && share_below_one("1").is_err());
+        for wrong in ["0", "257", "1.5", "many"] {
+            assert!(per_pixel(wrong).unwrap_err().contains("1 to 256"), "{wrong}");
+        }
     }
 }

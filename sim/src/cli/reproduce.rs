@@ -7,28 +7,44 @@ use clap::Args;
 
 use super::Failure;
 use super::terminal::{print, print_json};
-use crate::output::progress::Progress;
-use crate::reproduce::{Effort, Paper, reproduce};
+use crate::output::Destination;
+use crate::output::terminal::Terminal;
+use crate::reproduce::{Options, Paper, reproduce};
 
 /// Arguments of `reproduce`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  quintile reproduce III --quick --out claims\n\n\
-    Each row of the paper is computed from scratch, by simulating, recording and analysing, and held against what the paper\n\
-    says: it holds, it differs, or it is not yet there because a part is missing. Rows of kind E have to hold exactly, N are\n\
-    numbers to be near, O orders or signs that have to come out, F have figures.\n\n\
-    Results are in DIR: plots/ as SVG and PNG, reproduce_III.md and, last, reproduce_III.json with a list `rows` of id, kind,\n\
-    paper, ours, verdict and figure. Ends with 0 if every row of kind E holds, otherwise with 1; one that is not yet there\n\
-    does not hold.")]
+#[command(after_help = "Examples:\n  quintile reproduce III --quick --out claims\n  \
+    quintile reproduce VI --row VI-13 --row VI-14\n  \
+    quintile reproduce VI --row VI-1 --collision-data ccd\n\n\
+    Each row of the paper is computed from scratch, by simulating, recording and analysing, and compared with what the paper\n\
+    says, at every value of the settings that the paper leaves open. It holds at all of them, differs at all of them, depends\n\
+    on them, or is not yet there because a part is missing. Rows of kind E have to hold exactly, N are numbers to be near, O\n\
+    orders or signs that have to come out, F have figures. The settings are in sim/data/reproduce; every row names the SHA-256\n\
+    of its file, what was run, and what it does not exercise.\n\n\
+    Results are in DIR: plots/ as SVG and PNG, reproduce_III.md and, last, reproduce_III.json with a list `rows`. Ends with 0\n\
+    if every row of kind E holds and every row ran something, otherwise with 1; one that is not yet there does not hold.")]
 pub struct ReproduceArgs {
     /// Which paper
     #[arg(value_enum, value_name = "PAPER", ignore_case = true)]
     pub paper: Paper,
-    /// Fewer frames and fewer repetitions: less than a minute
+    /// Fewer values, frames and repetitions: less than a minute
     #[arg(long)]
     pub quick: bool,
+    /// Only this row, for example VI-13; may be given more than once
+    #[arg(long, value_name = "ID")]
+    pub row: Vec<String>,
+    /// Settings in place of the committed ones; a copy of sim/data/reproduce/paper6.ron with other values
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
+    /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is run
+    #[arg(long, value_name = "DIR")]
+    pub collision_data: Option<PathBuf>,
     /// Folder for the results; made where it is missing
     #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
     pub out: PathBuf,
+    /// Overwrite files in DIR that Quintile did not write
+    #[arg(long)]
+    pub force: bool,
     /// Worker threads; all cores without it. The results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -37,12 +53,18 @@ pub struct ReproduceArgs {
     pub json: bool,
 }
 
-pub(super) fn run(args: &ReproduceArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &ReproduceArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
     let pool = super::threads(args.threads)?;
-    let progress = Progress::new(args.json);
-    let effort = if args.quick { Effort::QUICK } else { Effort::FULL };
-    let report = pool.install(|| reproduce(args.paper, effort, &args.out, &progress))?;
+    let progress = terminal.progress(args.json);
+    let out = Destination { folder: args.out.clone(), force: args.force };
+    let options = Options {
+        quick: args.quick,
+        rows: args.row.clone(),
+        settings: args.settings.clone(),
+        collision_data: args.collision_data.clone(),
+    };
+    let report = pool.install(|| reproduce(args.paper, &options, &out, &progress))?;
     if args.json {
         print_json(&report, true)?;
     } else {
@@ -53,6 +75,9 @@ pub(super) fn run(args: &ReproduceArgs) -> Result<(), Failure> {
     if failing.is_empty() {
         return Ok(());
     }
-    let message = format!("rows of kind E that do not hold: {}; the table says why", failing.join(", "));
+    let message = format!(
+        "rows of kind E that do not hold, or that ran nothing: {}; the table says why",
+        failing.join(", ")
+    );
     Err(Failure { message, code: 1 })
 }

@@ -4,44 +4,70 @@ use std::time::Instant;
 
 use power_model::Bound;
 use serde::Serialize;
-use workloads::Overrides;
 use workloads::job::OptionSource;
 
 use super::Failure;
 use super::args::{BoundArg, PacingArg, RunArgs};
 use super::terminal::{print, print_json};
-use crate::output::MeanSd;
 use crate::output::progress::Progress;
-use crate::output::table::{Table, digits, si, si_mean_sd};
-use crate::run::{Detection, Outcome, PacingChoice, RunOptions, Summary, Wish};
+use crate::output::table::{Table, count_or_digits, counted, si, si_mean_sd};
+use crate::output::terminal::{Terminal, Verbosity};
+use crate::output::{Destination, MeanSd};
+use crate::run::{
+    DryRun, Outcome, PacingChoice, Plan, Prepared, RunError, RunOptions, Summary, Wish, again, open, prepare,
+};
 
-pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
-    let progress = Progress::new(args.json);
+    let progress = terminal.progress(args.json);
+    let out = Destination { folder: args.out.clone(), force: args.force };
     let pool = super::threads(args.threads)?;
-    let outcome = pool.install(|| crate::run::run(options(args), &args.out, &progress))?;
+    let options = match &args.again {
+        Some(summary) => again(summary, args.force)?,
+        None => options(args),
+    };
+    let plan = Plan::resolve(options)?;
+    let dir = open(&plan, &out)?;
+    let prepared = pool.install(|| prepare(plan, &progress))?;
+    if args.dry_run {
+        return dry_run(args, &pool.install(|| DryRun::new(&prepared))?, terminal);
+    }
+    if !args.json && terminal.verbosity() > Verbosity::Quiet {
+        pool.install(|| note_expected(&prepared, &progress))?;
+    }
+    let outcome = pool.install(|| prepared.run(dir, &progress))?;
     if args.json {
         let printed = Printed { out: args.out.display().to_string(), summary: &outcome.summary };
         return print_json(&printed, true);
     }
+    outcome.summary.warnings.iter().for_each(|warning| terminal.warn(warning));
     print(&format!("{}took {:.1} s", text(args, &outcome), started.elapsed().as_secs_f64()))
+}
+
+/// Says how long the run will take, where that can be known.
+fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunError> {
+    if let Some(expected) = prepared.expected()? {
+        progress.note(&format!("expected time: {}", expected.line()));
+    }
+    Ok(())
+}
+
+/// Prints what would be run and where results would go.
+fn dry_run(args: &RunArgs, dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
+    if args.json {
+        return print_json(dry_run, true);
+    }
+    dry_run.warnings.iter().for_each(|warning| terminal.warn(warning));
+    let results = ("results", format!("would be written into {}; nothing was", args.out.display()));
+    let rows = dry_run.rows().into_iter().chain([results]);
+    print(&rows.map(|(name, value)| format!("{name:<9} {value}")).collect::<Vec<_>>().join("\n"))
 }
 
 fn options(args: &RunArgs) -> RunOptions {
     RunOptions {
         scene: args.scene.clone(),
         options: OptionSource { file: args.options.clone(), set: args.set.clone() },
-        overrides: Overrides {
-            size: args.size,
-            samples: args.samples,
-            frame_rate_hz: args.rate,
-            shutter: args.shutter,
-            frames: args.frames.clone(),
-            lens_radius: args.lens,
-            focus: args.focus,
-            clip: args.clip.clone(),
-            table: args.table.clone(),
-        },
+        overrides: args.view.overrides(),
         gpu: args.gpu.clone(),
         platform: args.platform.clone(),
         energy: args.energy.clone(),
@@ -53,6 +79,7 @@ fn options(args: &RunArgs) -> RunOptions {
         timing: args.timing.level(),
         sampling: args.timing.sampling(),
         wish: Wish { accuracy: args.accuracy, budget_s: args.budget },
+        repeat: None,
         verify: args.verify,
         pacing: match args.pacing {
             PacingArg::Vsync => PacingChoice::Vsync,
@@ -64,6 +91,7 @@ fn options(args: &RunArgs) -> RunOptions {
         seed: args.seed,
         exr: args.exr,
         heat: args.heat.clone(),
+        look: args.look.look(),
     }
 }
 
@@ -80,25 +108,25 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
     let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
     let mut lines = vec![
         format!(
-            "{} on {}, {}x{}, {} samples per pixel, {} frames, {} triangles",
+            "{} on {}, {}x{}, {} per pixel, {}, {}",
             summary.scene,
             summary.gpu,
             settings.width,
             settings.height,
-            settings.samples,
-            settings.frames,
-            settings.triangles
+            counted(settings.samples as usize, "sample"),
+            counted(settings.frames as usize, "frame"),
+            counted(settings.triangles, "triangle")
         ),
         format!("modelled: {}", summary.modelled.line()),
         judged(summary),
         figures(outcome).to_string(),
-        found(&summary.detection),
+        found(summary),
     ];
+    lines.extend(summary.recorder.raised_line());
     if let Some(efficiency) = summary.sample_test_efficiency {
         lines.push(format!("sample test efficiency {:.1} %", efficiency * 100.0));
     }
-    lines.extend(summary.facts.iter().map(|(name, value)| format!("{name}: {}", digits(*value))));
-    lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(summary.facts.iter().map(|(name, value)| format!("{name}: {}", count_or_digits(*value))));
     lines.push(format!("results: {}", args.out.display()));
     lines.push(format!("report:  {}\n", args.out.join("report.html").display()));
     lines.join("\n")
@@ -110,7 +138,11 @@ fn judged(summary: &Summary) -> String {
     lines.collect()
 }
 
-fn found(detection: &Detection) -> String {
+fn found(summary: &Summary) -> String {
+    let detection = &summary.detection;
+    if summary.measured.is_none() {
+        return "no frame but the marked one was found in the trace: nothing is measured by frame".to_owned();
+    }
     format!(
         "{} of {} frame starts found in the trace ({} false), worst timing error {}",
         detection.matched_frames,

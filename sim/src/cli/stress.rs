@@ -3,25 +3,22 @@
 use super::Failure;
 use super::args::StressArgs;
 use super::terminal::{print, print_json};
-use crate::output::OutDir;
-use crate::output::progress::Progress;
-use crate::run::RunError;
+use crate::output::Destination;
+use crate::output::terminal::Terminal;
 
-pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
-    // The folder first: that it cannot be made is better known before the work than after it.
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
+pub(super) fn run(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure> {
+    // The folder first: that it cannot be written is better known before the work than after it.
+    let out = Destination { folder: args.out.clone(), force: args.force };
+    let mut dir = out.open([crate::stress::claim()])?;
     let pool = super::threads(args.threads)?;
-    let progress = Progress::new(args.json);
+    let progress = terminal.progress(args.json);
     let report = pool.install(|| crate::stress::stress(args.family.as_deref(), args.quick, &progress))?;
+    report.write(&dir, &args.look.look())?;
+    dir.publish()?;
     if args.json {
         print_json(&report.summary(), true)?;
     } else {
-        print(&report.text())?;
+        print(&format!("{}results: {}", report.text(), args.out.display()))?;
     }
-    let fault = report.fault();
-    report.write(dir).map_err(RunError::from)?;
-    if !args.json {
-        print(&format!("results: {}", args.out.display()))?;
-    }
-    fault.map_or(Ok(()), |fault| Err(Failure { message: fault.to_owned(), code: 1 }))
+    report.fault().map_or(Ok(()), |fault| Err(Failure { message: fault.to_owned(), code: 1 }))
 }

@@ -1,4 +1,4 @@
-//! Printing without panics: a reader that went away is no fault, a full disk is a failure.
+//! Printing results without panics: a reader that closed the pipe is no error, a full disk is a failure.
 
 use std::io::{self, ErrorKind, Write};
 
@@ -24,9 +24,4 @@ pub(super) fn print_json(value: &impl serde::Serialize, pretty: bool) -> Result<
 pub(super) fn json_text(value: &impl serde::Serialize, pretty: bool) -> Result<String, Failure> {
     let text = if pretty { serde_json::to_string_pretty(value) } else { serde_json::to_string(value) };
     text.map_err(|error| Failure { message: format!("printing JSON: {error}"), code: 1 })
-}
-
-/// Tells `message` on standard error; there is nowhere to say that this failed.
-pub(super) fn complain(message: &str) {
-    let _ = writeln!(io::stderr(), "quintile: {message}");
 }

@@ -14,6 +14,7 @@ use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, wri
 use super::Failure;
 use super::args::VisibilityArgs;
 use super::terminal::{print, print_json};
+use crate::output::terminal::Terminal;
 use crate::run::fits_memory;
 use crate::visibility::{Rates, find};
 
@@ -34,12 +35,10 @@ struct Found {
     rates: Rates,
 }
 
-pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
-    let inputs = args.files.iter().chain(&args.camera).map(PathBuf::as_path);
-    super::outputs::may_hold_results(
-        ("--out", args.out.as_deref()),
-        inputs.chain([Path::new(&args.samples)]),
-    )?;
+pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let named = args.camera.iter().chain([&args.samples]).map(Path::new);
+    let inputs = args.files.iter().map(PathBuf::as_path).chain(named);
+    super::outputs::may_hold_results(("--out", args.out.as_deref()), inputs)?;
     let scene = visibility::load(&args.files, args.camera.as_deref())?;
     if args.print_camera {
         return print_camera(args, &scene);
@@ -50,7 +49,7 @@ pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
         return print_json(&found, false);
     }
     let camera = found.camera.as_ref().map(|camera| format!("\nthe camera was fitted: {}", camera.to_ron()));
-    let warnings = found.warnings.iter().map(|warning| format!("\nwarning {warning}"));
+    found.warnings.iter().for_each(|warning| terminal.warn(warning));
     let rates = format!(
         "\n{:.1} million samples/s by the CPU time of a thread ({} runs on {} threads), {:.1} end to end",
         found.rates.samples_per_s / 1e6,
@@ -58,7 +57,7 @@ pub(super) fn run(args: &VisibilityArgs) -> Result<(), Failure> {
         found.rates.threads,
         found.rates.end_to_end_samples_per_s / 1e6
     );
-    let remarks: String = std::iter::once(rates).chain(camera).chain(warnings).collect();
+    let remarks: String = std::iter::once(rates).chain(camera).collect();
     print(&format!(
         "{} triangles, {}x{} pixels of {} samples: {} of {} samples see a triangle{remarks}",
         found.triangles, found.width, found.height, found.samples_per_pixel, found.hits, found.samples
@@ -101,7 +100,7 @@ fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> 
         samples: found.seen.len(),
         hits: found.seen.iter().filter(|(triangle, _)| *triangle != u32::MAX).count(),
         camera: scene.fitted,
-        warnings,
+        warnings: Warning::fold(warnings),
         rates: found.rates,
     })
 }

@@ -2,4 +2,4 @@
 
 mod spec;
 
-pub use spec::{GpuError, GpuSpec};
+pub use spec::{GpuError, GpuSpec, PowerFiles};

@@ -24,9 +24,7 @@ pub enum RunError {
     Table(#[from] power_model::TableError),
     #[error("energy table and platform: {0}")]
     Model(#[from] power_model::ModelError),
-    #[error(
-        "frame {frame}: the timing model broke its promise: {source}. This is a fault of the program; please report it"
-    )]
+    #[error("frame {frame}: internal error of the timing model: {source}. Please report it")]
     Timeline { frame: u32, source: power_model::TimelineError },
     #[error("timing: {0}")]
     Timing(#[from] TimingError),
@@ -48,6 +46,10 @@ pub enum RunError {
     Image(#[from] ImageError),
     #[error("frames.csv: {0}")]
     Frames(#[from] traces::energy::TableError),
+    #[error("{path}: cannot read it: {source}; check the path and its permissions")]
+    Input { path: String, source: std::io::Error },
+    #[error(transparent)]
+    Spec(#[from] activity::spec::SpecError),
     /// Two settings that cannot be together, or one that cannot be.
     #[error("{0}")]
     Setting(String),
@@ -64,10 +66,13 @@ impl RunError {
         match self {
             Self::Scene(error) => error.is_usage(),
             Self::Gpu(GpuError::Spec(activity::spec::SpecError::Read { .. })) => false,
+            Self::Output(error) => error.is_usage(),
             Self::Platform(error) => !is_unreadable(error),
             Self::Table(error) => !is_unreadable(error),
-            Self::Pacing(power_model::PacingError::Rate(_)) => true,
-            Self::Gpu(_)
+            Self::Spec(activity::spec::SpecError::Read { .. }) => false,
+            Self::Pacing(power_model::PacingError::Rate(_)) | Self::Timing(TimingError::TooLong) => true,
+            Self::Spec(_)
+            | Self::Gpu(_)
             | Self::Marks(_)
             | Self::Sample(_)
             | Self::Samples(_)

@@ -22,26 +22,24 @@ pub struct FrameRow {
     pub start_s: f64,
     /// Cycles of the core clock for which the GPU worked on it.
     pub cycles: u64,
-    /// For how long the GPU worked on it, in milliseconds.
-    pub busy_ms: f64,
-    /// From start to start, in milliseconds.
-    pub duration_ms: f64,
-    /// True energy in millijoules.
-    pub energy_mj: f64,
-    /// True energy in nanojoules per pixel.
-    pub energy_nj_per_pixel: f64,
+    /// For how long the GPU worked on it, in seconds.
+    pub busy_s: f64,
+    /// From start to start, in seconds.
+    pub duration_s: f64,
+    /// True energy in joules.
+    pub energy_j: f64,
+    /// True energy per pixel in joules.
+    pub energy_per_pixel_j: f64,
     /// True mean power in watts.
     pub power_w: f64,
     /// True energy by part in joules; summed in this order it is the frame's, exactly.
     pub energy_by_part_j: Energy,
     /// Where it was predicted: the ends of the interval in which its cycles lie.
     pub cycles_interval: Option<[f64; 2]>,
-    /// The same for its energy, in millijoules.
-    pub energy_mj_interval: Option<[f64; 2]>,
-    /// True energy in joules.
-    pub energy_j: f64,
-    /// Energy as measured in the trace, in millijoules, where the frame was found.
-    pub measured_energy_mj: Option<f64>,
+    /// The same for its energy, in joules.
+    pub energy_interval_j: Option<[f64; 2]>,
+    /// Energy as measured in the trace, in joules, where the frame was found.
+    pub measured_energy_j: Option<f64>,
     /// Error of the found start in seconds.
     pub start_error_s: Option<f64>,
 }
@@ -77,16 +75,15 @@ pub(super) fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement
                 counts_hash: known.predicted.is_none().then(|| format!("{:016x}", hash(0, &known.counts))),
                 start_s: paced.start_s,
                 cycles: known.cycles,
-                busy_ms: (paced.busy_end_s - paced.start_s) * 1e3,
-                duration_ms: duration_s * 1e3,
-                energy_mj: energy_j * 1e3,
-                cycles_interval: around(known.cycles as f64, known.predicted.map(|half| half.cycles)),
-                energy_mj_interval: around(energy_j * 1e3, known.predicted.map(|half| half.energy_j * 1e3)),
-                energy_by_part_j: paced.energy,
+                busy_s: paced.busy_end_s - paced.start_s,
+                duration_s,
                 energy_j,
-                energy_nj_per_pixel: energy_j * 1e9 / plan.pixels() as f64,
+                energy_per_pixel_j: energy_j / plan.pixels() as f64,
+                cycles_interval: around(known.cycles as f64, known.predicted.map(|half| half.cycles)),
+                energy_interval_j: around(energy_j, known.predicted.map(|half| half.energy_j)),
+                energy_by_part_j: paced.energy,
                 power_w: energy_j / duration_s,
-                measured_energy_mj: measured.map(|m| m.energy_j * 1e3),
+                measured_energy_j: measured.map(|m| m.energy_j),
                 start_error_s: measured.map(|m| m.start_s - paced.start_s),
             }
         })

@@ -1,13 +1,14 @@
 //! Heat maps: where in a frame a counter counted, as files.
 
 use activity::Event;
+use glam::{Vec3, vec3};
 use pipeline::frame::{HeatMap, TileHeat};
 
 use super::{Plan, RunError};
 use crate::output::OutDir;
 use crate::output::dir::BoxError;
 use crate::output::image::LinearImage;
-use crate::output::plot::{HeatMapPlot, HeatTile};
+use crate::output::plot::{HeatMapPlot, HeatTile, Picture, Shading};
 use crate::output::table::grouped;
 
 /// A heat map of the report.
@@ -25,19 +26,30 @@ pub(super) fn heat_name(event: Event, frame: u32) -> String {
     format!("heat/{}_{frame:04}", event.name())
 }
 
-/// Writes picture, values of the pixels and counts of the tiles; returns the picture.
-pub(super) fn write(plan: &Plan, dir: &OutDir, frame: u32, map: &HeatMap) -> Result<HeatPicture, RunError> {
+/// Writes picture, values of the pixels and counts of the tiles; returns the picture. `image` is that of the frame, for its outlines.
+pub(super) fn write(
+    plan: &Plan,
+    dir: &OutDir,
+    frame: u32,
+    (map, image): (&HeatMap, &[Vec3]),
+) -> Result<HeatPicture, RunError> {
     let name = heat_name(map.event, frame);
-    let png = picture(plan, frame, map)?;
-    dir.write_atomic(&format!("{name}.png"), |out| Ok(out.write_all(&png)?))?;
+    let png = picture(plan, frame, map, &brightness(image)).png()?;
+    dir.write_file(&format!("{name}.png"), |out| Ok(out.write_all(&png)?))?;
     let pixels: Vec<[f32; 3]> = map.pixels().into_iter().map(|value| [value; 3]).collect();
     LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?
         .write_exr(dir, &format!("{name}.exr"))?;
-    dir.write_atomic(&format!("{name}.csv"), |out| table(map, out))?;
+    dir.write_file(&format!("{name}.csv"), |out| table(map, out))?;
     Ok(HeatPicture { event: map.event, frame, png })
 }
 
-fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> {
+/// Brightness of each pixel as displayed.
+fn brightness(image: &[Vec3]) -> Vec<f32> {
+    let luminance = |pixel: &Vec3| pixel.dot(vec3(0.2126, 0.7152, 0.0722)).clamp(0.0, 1.0);
+    image.iter().map(|pixel| libm::powf(luminance(pixel), 1.0 / 2.2)).collect()
+}
+
+fn picture(plan: &Plan, frame: u32, map: &HeatMap, brightness: &[f32]) -> Picture {
     let side = if map.samples.is_empty() { plan.gpu.pipeline.tile_px } else { block_px(map) };
     let spread = if side == 1 { String::new() } else { format!(", the mean over {side}x{side} pixels") };
     let elsewhere = match map.elsewhere {
@@ -55,8 +67,10 @@ fn picture(plan: &Plan, frame: u32, map: &HeatMap) -> Result<Vec<u8>, RunError> 
         label: "events per pixel",
         size: [plan.viewport.width(), plan.viewport.height()],
         tiles: &if map.samples.is_empty() { tiles(plan, map) } else { blocks(plan, map, side) },
+        shading: Shading::Clipped,
+        brightness,
     };
-    Ok(plot.picture().png()?)
+    plot.picture(&plan.options.look)
 }
 
 /// The most blocks that are drawn; larger pictures would show no more of them.

@@ -1,13 +1,15 @@
 //! From watts over time to a trace, and back to joules per frame as an analyst would.
 
 use power_model::{FramePower, PARTS, Run, pace};
-use traces::device::{Device, DeviceSpec, Sampled};
+use traces::device::{Device, Sampled};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
 use traces::frames::{Found, Marks, default_window, find, marked_only};
 use traces::score::{self, Score, TOLERANCE_S};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 use super::checks::Checks;
+use super::limits::trace_fits;
+use super::recorder::{Resolution, device_spec};
 use super::{Plan, RunError, Simulated};
 
 /// The trace of a run and what was found in it.
@@ -20,6 +22,8 @@ pub struct Measurement {
     pub clipped: usize,
     /// The recorder.
     pub device: Device,
+    /// How finely it records the frames.
+    pub resolution: Resolution,
     /// The one marked frame and the end of the run.
     pub marks: Marks,
     /// Frame starts found.
@@ -35,8 +39,17 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// For each frame of the run, the one found in the trace at its place, if any.
+    /// Whether no frame of several was found but the one that was marked, so that nothing is measured by frame.
+    pub fn is_mark_alone(&self) -> bool {
+        self.truth.len() > 1 && self.found.starts.len() == 1
+    }
+
+    /// For each frame of the run, the one found in the trace at its place, if any; none where only the marked frame was
+    /// found, because that one then reaches from the mark to the end mark.
     pub fn by_true_frame(&self) -> Vec<Option<&FrameEnergy>> {
+        if self.is_mark_alone() {
+            return vec![None; self.truth.len()];
+        }
         let starts: Vec<f64> = self.truth.iter().map(|frame| frame.start_s).collect();
         let found: Vec<f64> = self.frames.iter().map(|frame| frame.start_s).collect();
         let beside = score::found_beside_true(&found, &starts, TOLERANCE_S);
@@ -48,7 +61,10 @@ impl Measurement {
 pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement, RunError> {
     let powers: Vec<&FramePower> = simulated.in_order().map(|frame| &frame.power).collect();
     let run = pace(&powers, &plan.platform, plan.pacing)?;
-    let device = Device::new(device_spec(plan, &powers))?;
+    let resolution = Resolution::new(plan.options.trace_rate_hz, &run);
+    // Frames may last longer than their share of the display's ticks.
+    trace_fits(run.curve.end_s(), resolution.rate_hz)?;
+    let device = Device::new(device_spec(plan, resolution.rate_hz, &powers))?;
     let Sampled { mut trace, clipped_currents, clipped_voltages } =
         device.sample(&run.curve, 0.0, run.curve.end_s())?;
     let marks = marks(&run, &trace);
@@ -63,34 +79,7 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     let score = score::score(&frames, &truth, TOLERANCE_S);
     let checks = Checks::new(&run, &device, &integral, &found, &frames)?;
     let clipped = clipped_currents + clipped_voltages;
-    Ok(Measurement { run, clipped, device, marks, found, frames, truth, score, checks, trace })
-}
-
-/// A recorder on the platform's rail with the smallest range of a 1-3-10 series that holds the peak, as one would choose
-/// in a laboratory; its noise goes with the range.
-fn device_spec(plan: &Plan, powers: &[&FramePower]) -> DeviceSpec {
-    let default = DeviceSpec::default();
-    let rail_v = plan.platform.rail.voltage_v.value();
-    let peak_w = powers.iter().map(|power| power.peak_w()).fold(plan.platform.idle_w.value(), f64::max);
-    let needed_a = 1.25 * peak_w / rail_v;
-    let series = (-3..6).flat_map(|decade| [1.0, 3.0].map(|step| step * libm::pow(10.0, f64::from(decade))));
-    let range_a = series.into_iter().find(|range| *range >= needed_a).unwrap_or(needed_a);
-    let scale = range_a / default.current_range_a[1];
-    let range_v = 1.5 * rail_v;
-    DeviceSpec {
-        rate_hz: plan.options.trace_rate_hz,
-        rail_v,
-        current_range_a: [-range_a, range_a],
-        voltage_range_v: [-range_v, range_v],
-        current_noise_a: default.current_noise_a * scale,
-        voltage_noise_v: default.voltage_noise_v * range_v / default.voltage_range_v[1],
-        // A tenth of a volt of sag at full scale at most, so that the rail carries any load in range.
-        rail_ohm: default.rail_ohm.min(0.1 / range_a),
-        packet_samples: plan.options.packet_samples,
-        packet_loss: plan.options.packet_loss,
-        seed: plan.options.seed,
-        ..default
-    }
+    Ok(Measurement { run, clipped, device, resolution, marks, found, frames, truth, score, checks, trace })
 }
 
 /// The middle frame is marked, as an analyst would pick one from the steady part. The last frame ends at the end of the run,

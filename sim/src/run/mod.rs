@@ -1,20 +1,28 @@
 //! A run: scene, pipeline, clock, watts, trace, frames, files.
 //!
 //! ```text
-//! RunOptions -> Plan -> choose -> simulate -> measure -> Outcome -> write
+//! RunOptions -> Plan -> open -> prepare: Distinct -> choose -> Prepared -> run: simulate -> measure -> Outcome -> write
 //! ```
 
+mod again;
 mod checks;
 mod choice;
+mod distinct;
+mod dry_run;
 mod error;
+mod expected;
 mod facts;
 mod frame_rows;
 mod heat;
 mod limits;
 mod measure;
 mod modelled;
+mod one_frame;
 mod options;
+mod pairing;
 mod pictures;
+mod provenance;
+mod recorder;
 mod regime;
 mod regime_warnings;
 mod report;
@@ -27,24 +35,29 @@ mod warnings;
 mod work;
 mod write;
 
-use std::path::Path;
-
-use crate::output::OutDir;
 use crate::output::progress::Progress;
+use crate::output::{Destination, OutDir};
 
+pub use again::again;
 pub use checks::Checks;
-pub use choice::{Choice, Verified, Wish, cheapest_level};
+pub use choice::{Choice, Dimensions, ProbeSummary, Verified, Wish, cheapest_level};
+pub use distinct::Distinct;
+pub use dry_run::DryRun;
 pub use error::RunError;
+pub use expected::Expected;
 pub use frame_rows::FrameRow;
 pub use heat::HeatPicture;
 pub use limits::fits_memory;
 pub use measure::Measurement;
 pub use modelled::Modelled;
+pub use one_frame::MachineTexts;
 pub use options::{PacingChoice, Plan, RunOptions};
+pub use provenance::{Host, Input, Provenance};
+pub use recorder::Resolution;
 pub use regime::Regime;
 pub use sampled::{Forecast, Glimpse, Preview, Quantity, SampledSummary, Scout, Signatures, Taken, taken};
 pub(crate) use simulate::BIN_PS;
-pub use simulate::{Simulated, SimulatedFrame, frames_of};
+pub use simulate::{CrashedFrame, Simulated, SimulatedFrame, frames_of};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};
 pub use work::Work;
@@ -61,25 +74,92 @@ pub struct Outcome {
     pub summary: Summary,
 }
 
+/// A run with everything loaded, checked and chosen, of which nothing is simulated and nothing written yet.
+pub struct Prepared {
+    plan: Plan,
+    provenance: Provenance,
+    distinct: Distinct,
+    choice: Option<Choice>,
+}
+
+/// Prepares a run: finds the frames that differ, and makes the choices that were left to the program.
+///
+/// # Errors
+/// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures.
+pub fn prepare(mut plan: Plan, progress: &Progress) -> Result<Prepared, RunError> {
+    say_camera(&plan, progress);
+    let provenance = Provenance::new(&plan)?;
+    let distinct = Distinct::new(&plan.work)?;
+    let choice = choice::choose(&mut plan, &distinct, progress)?;
+    Ok(Prepared { plan, provenance, distinct, choice })
+}
+
+impl Prepared {
+    /// What the run is expected to take, found by drawing a frame small; nothing for a workload.
+    ///
+    /// # Errors
+    /// When that frame cannot be drawn.
+    pub fn expected(&self) -> Result<Option<Expected>, RunError> {
+        Expected::new(&self.plan, &self.distinct)
+    }
+
+    /// Simulates, measures and writes the results into `dir`.
+    ///
+    /// # Errors
+    /// As [`prepare`]. Earlier results in `dir` are then as they were.
+    pub fn run(self, mut dir: OutDir, progress: &Progress) -> Result<Outcome, RunError> {
+        let Self { plan, provenance, distinct, mut choice } = self;
+        let simulated = simulate::simulate(&plan, &distinct, &dir, progress)?;
+        if let Some(choice) = &mut choice {
+            choice.settle(&simulated);
+        }
+        let verified =
+            plan.options.verify.then(|| choice::verify(&plan, &simulated, progress)).transpose()?;
+        let measurement = measure::measure(&plan, &simulated)?;
+        let summary =
+            Summary { choice, verified, ..Summary::new(&plan, provenance, &simulated, &measurement) }
+                .warned();
+        let outcome = Outcome { plan, simulated, measurement, summary };
+        write::write(&outcome, &dir, progress)?;
+        dir.publish()?;
+        Ok(outcome)
+    }
+}
+
+/// Locks the folder `out` for the results of `plan`.
+///
+/// # Errors
+/// As [`Destination::open`]: before any work, where results cannot go there.
+pub fn open(plan: &Plan, out: &Destination) -> Result<OutDir, RunError> {
+    Ok(out.open([write::claim(plan)])?)
+}
+
 /// Runs the whole line and writes its results into `out`.
 ///
 /// # Errors
-/// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures. Whatever was written before is not
-/// marked as whole: `summary.json` comes last.
-pub fn run(options: RunOptions, out: &Path, progress: &Progress) -> Result<Outcome, RunError> {
-    let mut plan = Plan::resolve(options)?;
-    let dir = OutDir::create(out)?;
-    let mut choice = choice::choose(&mut plan, progress)?;
-    let simulated = simulate::simulate(&plan, &dir, progress)?;
-    if let Some(choice) = &mut choice {
-        choice.settle(&simulated);
+/// As [`open`], [`prepare`] and [`Prepared::run`].
+pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Result<Outcome, RunError> {
+    let plan = Plan::resolve(options)?;
+    let dir = open(&plan, out)?;
+    prepare(plan, progress)?.run(dir, progress)
+}
+
+/// Says in detail which camera sees the scene, before minutes of work are spent on it.
+fn say_camera(plan: &Plan, progress: &Progress) {
+    let Work::Scene(scene) = &plan.work else { return };
+    if let Ok(camera) = scene.camera_used() {
+        progress.detail(&format!("camera, {}: --camera '{}'", camera.source, camera.ron));
     }
-    let verified = plan.options.verify.then(|| choice::verify(&plan, &simulated, progress)).transpose()?;
-    let measurement = measure::measure(&plan, &simulated)?;
-    let summary = Summary { choice, verified, ..Summary::new(&plan, &simulated, &measurement) }.warned();
-    let outcome = Outcome { plan, simulated, measurement, summary };
-    write::write(&outcome, dir, progress)?;
-    Ok(outcome)
+}
+
+/// Simulates and measures as [`run`] does, and writes nothing.
+///
+/// # Errors
+/// As [`run`].
+pub fn unwritten(plan: &Plan, progress: &Progress) -> Result<(Simulated, Measurement), RunError> {
+    let simulated = simulate::unwritten(plan, progress)?;
+    let measurement = measure::measure(plan, &simulated)?;
+    Ok((simulated, measurement))
 }
 
 /// The figures that every run draws into `plots/`, and what they show.

@@ -41,8 +41,11 @@ impl Modelled {
             "one voltage and clock state; no governor, no temperature change",
             "caches are walked in the order of the stream, whenever it is timed",
         ];
-        if !plan.work.is_animated() && simulated.frames.len() > 1 {
-            limits.push("the scene is still: one frame was simulated and repeated");
+        if simulated.distinct.len() < simulated.frames.len() {
+            limits.push(match simulated.distinct.len() {
+                1 => "nothing changes from frame to frame: one frame was simulated and repeated",
+                _ => "some frames equal an earlier one: these were not simulated again",
+            });
         }
         if predicted > 0 {
             limits.push(

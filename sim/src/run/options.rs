@@ -1,22 +1,26 @@
 //! What was asked for, and what it means.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use activity::Event;
+use activity::{Event, inputs};
 use pipeline::Viewport;
 use pipeline::sampling::SampleSource;
 use power_model::{Bound, EnergyTable, Pacing, Platform, PowerModel};
+use serde::{Deserialize, Serialize, Serializer};
 use traces::device::RATES_HZ;
 use workloads::job::OptionSource;
 use workloads::{Overrides, SampleChoice};
 
 use super::limits::Size;
-use super::{RunError, Wish, Work};
+use super::recorder::DEFAULT_RATE_HZ;
+use super::{Choice, RunError, Wish, Work};
 use crate::gpu::GpuSpec;
+use crate::output::plot::Look;
 use crate::timing::{Level, Sampling};
 
 /// When the next frame starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PacingChoice {
     /// On the next tick of a display that runs at the scene's frame rate.
     #[default]
@@ -25,21 +29,26 @@ pub enum PacingChoice {
     Free,
 }
 
-/// A run as asked for.
-#[derive(Clone, Debug)]
+/// A run as asked for: all that its results depend on but the content of files.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RunOptions {
     /// A built-in scene, a file or a workload.
-    pub scene: String,
+    #[serde(serialize_with = "as_text")]
+    pub scene: PathBuf,
     /// Options of a workload.
     pub options: OptionSource,
     /// Changes to the scene's settings.
     pub overrides: Overrides,
     /// A built-in GPU or a RON file.
-    pub gpu: String,
-    /// A built-in platform or a RON file.
-    pub platform: String,
-    /// A built-in energy table or a RON file.
-    pub energy: String,
+    #[serde(serialize_with = "as_text")]
+    pub gpu: PathBuf,
+    /// A built-in platform or a RON file; without it the one that belongs to the GPU.
+    #[serde(serialize_with = "as_text_if_any")]
+    pub platform: Option<PathBuf>,
+    /// A built-in energy table or a RON file; without it the one that belongs to the GPU.
+    #[serde(serialize_with = "as_text_if_any")]
+    pub energy: Option<PathBuf>,
     /// Which of the table's values is used.
     pub bound: Bound,
     /// How time is modelled.
@@ -48,12 +57,15 @@ pub struct RunOptions {
     pub sampling: Sampling,
     /// What is wanted instead: then level and frames are chosen.
     pub wish: Wish,
+    /// The choice of an earlier run, to be made again.
+    #[serde(skip)]
+    pub repeat: Option<Box<Choice>>,
     /// Whether the run is held against every frame at the reference.
     pub verify: bool,
     /// When the next frame starts.
     pub pacing: PacingChoice,
-    /// Samples per second of the recorder.
-    pub trace_rate_hz: f64,
+    /// Samples per second of the recorder; without it 50 kHz, or more where frames are short ([`Resolution`](super::Resolution)).
+    pub trace_rate_hz: Option<f64>,
     /// Samples of the recorder that travel together and are lost together.
     pub packet_samples: u32,
     /// Share of these packets that are lost, 0 to below 1.
@@ -64,29 +76,42 @@ pub struct RunOptions {
     pub exr: bool,
     /// Counters whose heat maps are wanted.
     pub heat: Vec<Event>,
+    /// How pictures look.
+    pub look: Look,
+}
+
+/// JSON holds Unicode alone: other bytes of a path are replaced, so that a run does not fail when it writes its summary.
+fn as_text<S: Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(&path.to_string_lossy())
+}
+
+fn as_text_if_any<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
+    path.as_ref().map(|path| path.to_string_lossy()).serialize(to)
 }
 
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
-            scene: "default".to_owned(),
+            scene: "default".into(),
             options: OptionSource::default(),
             overrides: Overrides::default(),
-            gpu: "reference".to_owned(),
-            platform: "reference".to_owned(),
-            energy: "28nm".to_owned(),
+            gpu: "reference".into(),
+            platform: None,
+            energy: None,
             bound: Bound::Nominal,
             timing: Level::default(),
             sampling: Sampling::default(),
             wish: Wish::default(),
+            repeat: None,
             verify: false,
             pacing: PacingChoice::default(),
-            trace_rate_hz: 50e3,
+            trace_rate_hz: None,
             packet_samples: 512,
             packet_loss: 0.0,
             seed: 1,
             exr: false,
             heat: Vec::new(),
+            look: Look::default(),
         }
     }
 }
@@ -111,6 +136,8 @@ pub struct Plan {
     pub model: PowerModel,
     /// When the next frame starts.
     pub pacing: Pacing,
+    /// The files that all this was read from, by name.
+    pub files: Vec<PathBuf>,
 }
 
 impl Plan {
@@ -119,8 +146,12 @@ impl Plan {
     /// # Errors
     /// The first thing that is missing, broken or makes no sense.
     pub fn resolve(options: RunOptions) -> Result<Self, RunError> {
-        if !RATES_HZ.contains(&options.trace_rate_hz) {
-            let rate = options.trace_rate_hz;
+        let (plan, files) = inputs::record(|| Self::load(options));
+        Ok(Self { files, ..plan? })
+    }
+
+    fn load(options: RunOptions) -> Result<Self, RunError> {
+        if let Some(rate) = options.trace_rate_hz.filter(|rate| !RATES_HZ.contains(rate)) {
             return Err(RunError::Setting(format!(
                 "trace rate: {rate}; a recorder takes 1 to 1e7 samples a second"
             )));
@@ -145,26 +176,56 @@ impl Plan {
             PacingChoice::Vsync => Pacing::vsync(settings.frame_rate_hz)?,
             PacingChoice::Free => Pacing::FreeRunning,
         };
-        let platform = file_or_name(&options.platform, Platform::load, Platform::builtin)?;
-        Size {
-            pixels: viewport.pixels() as u64,
-            samples: settings.samples,
-            frames: settings.frames.end - settings.frames.start,
-            pacing,
-            trace_rate_hz: options.trace_rate_hz,
-            idle_s: platform.lead_in_s.value() + platform.tail_s.value(),
-        }
-        .check()?;
-        let samples = table.source(settings.samples, options.seed)?;
         let gpu = GpuSpec::load(&options.gpu)?;
-        let table = file_or_name(&options.energy, EnergyTable::load, EnergyTable::builtin)?;
+        let files = gpu.power.clone().unwrap_or_default();
+        let platform = options.platform.as_deref().unwrap_or(Path::new(&files.platform));
+        let platform = file_or_name(platform, Platform::load, Platform::builtin)?;
+        size_of(&work, viewport, pacing, &platform, options.trace_rate_hz).check()?;
+        let samples = table.source(settings.samples, options.seed)?;
+        let table = options.energy.as_deref().unwrap_or(Path::new(&files.energy));
+        let table = file_or_name(table, EnergyTable::load, EnergyTable::builtin)?;
         let model = PowerModel::at(&table, &platform, options.bound)?;
-        Ok(Self { work, viewport, samples, gpu, platform, table, model, pacing, options })
+        let files = Vec::new();
+        Ok(Self { work, viewport, samples, gpu, platform, table, model, pacing, options, files })
+    }
+
+    /// The same plan on another GPU, platform and energy table.
+    ///
+    /// # Errors
+    /// When platform and table do not go together, or what is recorded would be too large.
+    pub fn on(self, gpu: GpuSpec, platform: Platform, table: EnergyTable) -> Result<Self, RunError> {
+        let model = PowerModel::at(&table, &platform, self.options.bound)?;
+        let plan = Self { gpu, platform, table, model, ..self };
+        plan.size().check()?;
+        Ok(plan)
+    }
+
+    pub(super) fn size(&self) -> Size {
+        size_of(&self.work, self.viewport, self.pacing, &self.platform, self.options.trace_rate_hz)
     }
 
     /// Pixels of the image.
     pub fn pixels(&self) -> u64 {
         self.viewport.pixels() as u64
+    }
+}
+
+/// What decides how large a run is.
+fn size_of(
+    work: &Work,
+    viewport: Viewport,
+    pacing: Pacing,
+    platform: &Platform,
+    trace_rate_hz: Option<f64>,
+) -> Size {
+    let settings = work.settings();
+    Size {
+        pixels: viewport.pixels() as u64,
+        samples: settings.samples,
+        frames: settings.frames.end - settings.frames.start,
+        pacing,
+        trace_rate_hz: trace_rate_hz.unwrap_or(DEFAULT_RATE_HZ),
+        idle_s: platform.lead_in_s.value() + platform.tail_s.value(),
     }
 }
 
@@ -184,9 +245,12 @@ fn work(options: &RunOptions) -> Result<(Work, SampleChoice), RunError> {
 }
 
 fn file_or_name<T, E>(
-    name: &str,
+    name: &Path,
     load: impl FnOnce(&Path) -> Result<T, E>,
     builtin: impl FnOnce(&str) -> Result<T, E>,
 ) -> Result<T, E> {
-    if name.ends_with(".ron") { load(Path::new(name)) } else { builtin(name) }
+    match name.extension().is_some_and(|ending| ending == "ron") {
+        true => load(name),
+        false => builtin(&name.to_string_lossy()),
+    }
 }

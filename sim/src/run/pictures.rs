@@ -24,7 +24,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
         Plot {
             stem: "plots/power_run",
             caption: "Power over the run as recorded, lowest and highest sample of each column, with the frame starts \
-                      found from the marked window and the true ones."
+                      found from the marked window and the true ones. Idle time before and after the frames is left out."
                 .to_owned(),
             picture: power_run(outcome, &subject),
         },
@@ -47,7 +47,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
             picture: frame_energy(outcome, &subject),
         },
     ];
-    plots.extend(stalls::picture(shown.1, &subject).map(|picture| Plot {
+    plots.extend(stalls::picture(shown.1, &subject, &outcome.plan.options.look).map(|picture| Plot {
         stem: "plots/stalls",
         caption: format!("Frame {}: what each unit waited for, and which held it up.", shown.1.index),
         picture,
@@ -79,7 +79,7 @@ fn power_run(outcome: &Outcome, subject: &str) -> Picture {
         true_starts_s: &truth,
         mark_s: Some((mark - window.pre_s, mark + window.post_s)),
     }
-    .picture()
+    .picture(&outcome.plan.options.look)
 }
 
 /// Parts that drew power, in the order in which every picture shows them: what is always there first.
@@ -106,15 +106,12 @@ fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &Simula
         frame: u64::from(frame.index),
         bin_s: frame.power.bin_s(),
         parts: parts
-            .map(|part| PowerPart {
-                name: part.name(),
-                overhead: !matches!(part, Part::Unit(_)),
-                power_w: watts.iter().map(|bin| bin[part.index()]).collect(),
-            })
+            .map(|part| PowerPart { part, power_w: watts.iter().map(|bin| bin[part.index()]).collect() })
             .collect(),
         samples: &samples,
+        frame_j: outcome.summary.frames.get(place).map(|row| row.energy_j),
     }
-    .picture()
+    .picture(&outcome.plan.options.look)
 }
 
 fn unit_busy(outcome: &Outcome, subject: &str, frame: &SimulatedFrame) -> Picture {
@@ -129,7 +126,7 @@ fn unit_busy(outcome: &Outcome, subject: &str, frame: &SimulatedFrame) -> Pictur
         bin_s: frame.power.bin_s(),
         units: Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(lane).collect(),
     }
-    .picture()
+    .picture(&outcome.plan.options.look)
 }
 
 fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
@@ -139,8 +136,8 @@ fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
         .iter()
         .map(|row| FrameEnergyPoint {
             frame: u64::from(row.frame),
-            measured_j: row.measured_energy_mj.map(|mj| mj * 1e-3),
-            true_j: Some(row.energy_mj * 1e-3),
+            measured_j: row.measured_energy_j,
+            true_j: Some(row.energy_j),
         })
         .collect();
     FrameEnergy {
@@ -149,5 +146,5 @@ fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
         measured_j: MeanSd::of(outcome.measurement.frames.iter().map(|frame| frame.energy_j)),
         pixels: outcome.plan.pixels(),
     }
-    .picture()
+    .picture(&outcome.plan.options.look)
 }

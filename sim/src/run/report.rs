@@ -9,6 +9,7 @@ use super::pictures::{Plot, parts_in_use};
 use super::simulate::image_name;
 use super::{Outcome, RunError, facts};
 use crate::output::image::LinearImage;
+use crate::output::plot::part_colour;
 use crate::output::report::{
     CounterRow, FrameNumbers, FrameRow, PartRow, Report, ReportImage, ReportPlot, UnitRow, WarningRow,
 };
@@ -29,12 +30,18 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
         units: units(outcome),
         counters: counters(outcome),
         settings: facts::settings(outcome),
+        inputs: facts::inputs(outcome),
         files: facts::files(outcome),
+        host: facts::host(outcome),
     })
 }
 
 fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
-    let row = |w: &activity::Warning| WarningRow { code: w.code.to_owned(), message: w.message.clone() };
+    let row = |w: &activity::Warning| WarningRow {
+        code: w.code.to_owned(),
+        message: w.message.clone(),
+        details: w.details.clone(),
+    };
     outcome.summary.warnings.iter().map(row).collect()
 }
 
@@ -44,6 +51,11 @@ fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
     // The middle one first, large; the others in order as thumbnails.
     let middle = pictures.len() / 2;
     pictures[..=middle].rotate_right(1);
+    let shown = outcome.plan.work.shows();
+    let first = |number: u32| match shown {
+        "" => format!("frame {number}"),
+        shown => format!("frame {number}: {shown}"),
+    };
     pictures
         .into_iter()
         .enumerate()
@@ -51,7 +63,7 @@ fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
             let pixels: Vec<[f32; 3]> = image.iter().map(Vec3::to_array).collect();
             let linear = LinearImage::new(viewport.width(), viewport.height(), &pixels)?;
             Ok(ReportImage {
-                caption: format!("frame {number}"),
+                caption: if place == 0 { first(*number) } else { format!("frame {number}") },
                 png: linear.thumbnail_png(if place == 0 { 1280 } else { 320 })?,
                 link: Some(format!("{}.png", image_name(*number))),
             })
@@ -77,7 +89,8 @@ fn parts(outcome: &Outcome) -> Vec<PartRow> {
     let row = |part: Part| PartRow {
         name: part.name().to_owned(),
         doc: part.doc().to_owned(),
-        overhead: !matches!(part, Part::Unit(_)),
+        colour: part_colour(part).css(),
+        idle: part == Part::Idle,
         energy_j: energy[part],
     };
     parts_in_use(outcome).into_iter().map(row).collect()
@@ -88,17 +101,13 @@ fn frames(outcome: &Outcome) -> Vec<FrameRow> {
     rows.map(|(row, measured)| FrameRow {
         frame: u64::from(row.frame),
         start_s: row.start_s,
-        busy_s: Some(row.busy_ms * 1e-3),
+        busy_s: Some(row.busy_s),
         measured: measured.map(|m| FrameNumbers {
             time_s: m.duration_s(),
             energy_j: m.energy_j,
             power_w: m.power_w(),
         }),
-        truth: Some(FrameNumbers {
-            time_s: row.duration_ms * 1e-3,
-            energy_j: row.energy_mj * 1e-3,
-            power_w: row.power_w,
-        }),
+        truth: Some(FrameNumbers { time_s: row.duration_s, energy_j: row.energy_j, power_w: row.power_w }),
         flags: remarks(row.predicted, measured.map_or("missed".to_owned(), |m| m.flags.to_string())),
     })
     .collect()

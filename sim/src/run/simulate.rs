@@ -1,5 +1,8 @@
 //! The frames of a run through pipeline, clock and watts.
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
 use activity::{Counts, Timeline, Unit, Warning};
 use glam::Vec3;
 use pipeline::frame::HeatMap;
@@ -11,7 +14,7 @@ use workloads::job::Fact;
 use super::heat::{self, HeatPicture};
 use super::regime::Regime;
 use super::sampled::{self, SampledSummary, Taken};
-use super::{Plan, RunError, work};
+use super::{Distinct, Plan, RunError, work};
 use crate::output::OutDir;
 use crate::output::image::LinearImage;
 use crate::output::progress::Progress;
@@ -63,7 +66,7 @@ pub struct SimulatedFrame {
 pub struct Simulated {
     /// Frames that differ.
     pub distinct: Vec<SimulatedFrame>,
-    /// For each frame of the run, its place in `distinct`: a still scene is simulated once.
+    /// For each frame of the run, its place in `distinct`: frames with the same input share one.
     pub frames: Vec<usize>,
     /// Pictures for the report: frame number and the linear image.
     pub pictures: Vec<(u32, Vec<Vec3>)>,
@@ -94,29 +97,46 @@ impl Simulated {
 }
 
 /// Simulates the frames that the plan asks for, writing the image of each as soon as it is done.
-pub(super) fn simulate(plan: &Plan, dir: &OutDir, progress: &Progress) -> Result<Simulated, RunError> {
-    remove_stale(dir)?;
-    let range = plan.work.settings().frames.clone();
-    let animated = plan.work.is_animated();
-    let numbers: Vec<u32> = if animated { range.collect() } else { vec![range.start] };
-    let stage = Stage { plan, dir: Some(dir), most_bins: (MOST_BINS / numbers.len()).max(FEWEST_BINS) };
-    if animated && plan.options.sampling != Sampling::Every {
-        return sampled::simulate(&stage, &numbers, progress);
+pub(super) fn simulate(
+    plan: &Plan,
+    distinct: &Distinct,
+    dir: &OutDir,
+    progress: &Progress,
+) -> Result<Simulated, RunError> {
+    let most_bins = (MOST_BINS / distinct.numbers().len()).max(FEWEST_BINS);
+    let stage = Stage { plan, distinct, dir: Some(dir), most_bins };
+    if plan.options.sampling == Sampling::Every || is_few(distinct, plan.options.sampling) {
+        return every(&stage, progress);
     }
-    every(&stage, &numbers, progress)
+    sampled::simulate(&stage, progress)
+}
+
+/// Whether frames repeat so often that simulating all that differ takes no more than predicting some of them.
+fn is_few(distinct: &Distinct, sampling: Sampling) -> bool {
+    let (differ, all) = (distinct.numbers().len(), distinct.groups().len());
+    differ == 1 || differ < all && differ <= sampling.first(all)
+}
+
+/// Simulates the frames that the plan asks for, each of them, and writes nothing.
+pub(super) fn unwritten(plan: &Plan, progress: &Progress) -> Result<Simulated, RunError> {
+    let distinct = &Distinct::new(&plan.work)?;
+    let most_bins = (MOST_BINS / distinct.numbers().len()).max(FEWEST_BINS);
+    every(&Stage { plan, distinct, dir: None, most_bins }, progress)
 }
 
 /// Simulates every frame that differs. Pictures are kept of the first, the middle and the last.
-pub(super) fn every(stage: &Stage<'_>, numbers: &[u32], progress: &Progress) -> Result<Simulated, RunError> {
+fn every(stage: &Stage<'_>, progress: &Progress) -> Result<Simulated, RunError> {
+    let numbers = stage.distinct.numbers();
     let middle = numbers[numbers.len() / 2];
     let shown = [middle, numbers[0], numbers[numbers.len() - 1]];
     let bar = progress.bar("frames", numbers.len() as u64);
-    let simulate = |&number: &u32| {
-        let done = stage.whole(number, shown.contains(&number))?;
+    let simulate = |group: usize| {
+        let done = stage.whole(group, shown.contains(&numbers[group]))?;
         bar.inc();
         Ok(done)
     };
-    let done: Vec<Whole> = numbers.par_iter().map(simulate).collect::<Result<_, RunError>>()?;
+    let done: Vec<Whole> =
+        (0..numbers.len()).into_par_iter().map(simulate).collect::<Result<_, RunError>>()?;
     let (mut distinct, mut pictures, mut heat) = (Vec::new(), Vec::new(), Vec::new());
     for done in done {
         if done.frame.index == middle {
@@ -125,9 +145,7 @@ pub(super) fn every(stage: &Stage<'_>, numbers: &[u32], progress: &Progress) -> 
         pictures.extend(done.picture.map(|picture| (done.frame.index, picture)));
         distinct.push(done.frame);
     }
-    let frames = stage.plan.work.settings().frames.clone();
-    let frames =
-        frames.map(|number| if numbers.len() == 1 { 0 } else { (number - numbers[0]) as usize }).collect();
+    let frames = stage.distinct.groups().to_vec();
     Ok(Simulated { distinct, frames, pictures, heat, sampled: None })
 }
 
@@ -137,19 +155,36 @@ pub(super) fn every(stage: &Stage<'_>, numbers: &[u32], progress: &Progress) -> 
 /// When a frame cannot be made or timed.
 pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Vec<SimulatedFrame>, RunError> {
     let most_bins = (MOST_BINS / numbers.len().max(1)).max(FEWEST_BINS);
-    let stage = Stage { plan, dir: None, most_bins };
     let bar = progress.bar("frames", numbers.len() as u64);
     let simulate = |&number: &u32| {
-        let done = stage.whole(number, false)?;
+        let (frame, ..) = simulate_frame(plan, number, most_bins)?;
         bar.inc();
-        Ok(done.frame)
+        Ok(frame)
     };
     numbers.par_iter().map(simulate).collect()
+}
+
+/// What a panic carries through the threads, so that it is known which frame it happened in.
+pub struct CrashedFrame {
+    /// The frame.
+    pub frame: u32,
+    /// What the panic itself carried.
+    pub panic: Box<dyn Any + Send>,
+}
+
+/// Lets tests of builds with assertions see a crash; elsewhere it is nothing.
+fn panic_where_asked(number: u32) {
+    if cfg!(debug_assertions)
+        && std::env::var("QUINTILE_PANIC_IN_FRAME").is_ok_and(|asked| asked == number.to_string())
+    {
+        panic!("a test asked for it");
+    }
 }
 
 /// Where frames are simulated.
 pub(super) struct Stage<'a> {
     pub plan: &'a Plan,
+    pub distinct: &'a Distinct,
     /// Where images and heat maps go; nowhere without it.
     pub dir: Option<&'a OutDir>,
     /// Bins of a frame at most.
@@ -165,35 +200,24 @@ pub(super) struct Whole {
 }
 
 impl Stage<'_> {
-    /// Simulates frame `number` and writes its image.
-    pub fn whole(&self, number: u32, picture: bool) -> Result<Whole, RunError> {
-        let plan = self.plan;
-        let (frame, image, maps) = simulate_frame(plan, number, self.most_bins)?;
+    /// Simulates the frames of group `group` once and writes the image of each.
+    pub fn whole(&self, group: usize, picture: bool) -> Result<Whole, RunError> {
+        let (plan, dir, number) = (self.plan, self.dir, self.distinct.numbers()[group]);
+        let simulate = || {
+            panic_where_asked(number);
+            simulate_frame(plan, number, self.most_bins)
+        };
+        let simulated = catch_unwind(AssertUnwindSafe(simulate))
+            .unwrap_or_else(|panic| resume_unwind(Box::new(CrashedFrame { frame: number, panic })));
+        let (frame, image, maps) = simulated?;
         let mut heat = Vec::new();
-        if let Some(dir) = self.dir {
-            heat = maps.iter().map(|map| heat::write(plan, dir, number, map)).collect::<Result<_, _>>()?;
-            // A still scene is simulated once; every frame of the run has its image all the same.
-            let range = plan.work.settings().frames.clone();
-            let mut shown_as = if plan.work.is_animated() { number..number + 1 } else { range };
-            shown_as.try_for_each(|frame| write_image(plan, dir, frame, &image))?;
+        if let Some(dir) = dir {
+            let write = |map| heat::write(plan, dir, number, (map, &image));
+            heat = maps.iter().map(write).collect::<Result<_, _>>()?;
+            self.distinct.members(group).try_for_each(|number| write_image(plan, dir, number, &image))?;
         }
         Ok(Whole { frame, picture: picture.then_some(image), heat })
     }
-}
-
-/// What an earlier run left: should this one die on the way, nothing old may stand in for it.
-fn remove_stale(dir: &OutDir) -> Result<(), RunError> {
-    dir.remove_stale("images", "frame_", &["png", "exr"])?;
-    dir.remove_stale("heat", "", &["png", "exr", "csv"])?;
-    dir.remove_stale("", "report.", &["html"])?;
-    dir.remove_stale("", "frames.", &["csv"])?;
-    dir.remove_stale("", "trace.", &["csv", "json", "parquet"])?;
-    dir.remove_stale("plots", "stalls", &["svg", "png"])?;
-    dir.remove_stale("", "timeline.", &["perfetto-trace"])?;
-    for (figure, _) in super::FIGURES {
-        dir.remove_stale("plots", figure, &["svg", "png"])?;
-    }
-    Ok(())
 }
 
 fn simulate_frame(

@@ -8,7 +8,7 @@ use timing::{Stalls, UnitTime};
 
 use super::{Simulated, SimulatedFrame};
 use crate::output::perfetto::CounterTrack;
-use crate::output::plot::{Picture, StallLane, StallLanes};
+use crate::output::plot::{Look, Picture, StallLane, StallLanes};
 
 /// Columns of the picture at most.
 const COLUMNS: usize = 128;
@@ -57,7 +57,7 @@ fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
 }
 
 /// What the units waited for in a frame.
-pub(super) fn picture(frame: &SimulatedFrame, subject: &str) -> Option<Picture> {
+pub(super) fn picture(frame: &SimulatedFrame, subject: &str, look: &Look) -> Option<Picture> {
     let stalls = frame.stalls.as_ref()?;
     let group = stalls.intervals().len().div_ceil(COLUMNS).max(1);
     let bottlenecks = stalls.bottlenecks();
@@ -74,7 +74,7 @@ pub(super) fn picture(frame: &SimulatedFrame, subject: &str) -> Option<Picture> 
     };
     let units = Unit::ALL.into_iter().filter(|&unit| frame.counts.uses(unit)).map(of).collect();
     let interval_s = stalls.interval_ps() as f64 * 1e-12 * group as f64;
-    Some(StallLanes { subject, frame: u64::from(frame.index), interval_s, units }.picture())
+    Some(StallLanes { subject, frame: u64::from(frame.index), interval_s, units }.picture(look))
 }
 
 /// Names of the tracks, by unit.

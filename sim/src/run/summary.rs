@@ -6,6 +6,7 @@ use activity::{Counts, Unit, Warning};
 use power_model::Energy;
 use serde::Serialize;
 use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
+use workloads::scene::CameraUsed;
 
 use super::checks::Checks;
 use super::frame_rows::{FrameRow, hash, rows};
@@ -13,13 +14,17 @@ use super::measure::mean_parts_w;
 use super::modelled::Modelled;
 use super::sampled::SampledSummary;
 use super::stalls::{self, StallShares};
-use super::{Choice, Measurement, Plan, Simulated, Verified, warnings};
+use super::{
+    Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, Simulated, Verified, warnings,
+};
 use crate::output::MeanSd;
 use crate::output::report::Headline;
 
 /// A run in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
+    /// Version of the form of this file: see [`SCHEMA`].
+    pub schema: u32,
     /// Version of the program.
     pub version: &'static str,
     /// Name of the scene.
@@ -30,16 +35,24 @@ pub struct Summary {
     pub platform: String,
     /// Name of the energy table, and which of its values were used.
     pub energy_table: [String; 2],
+    /// What was asked for: all that the results depend on but the content of `inputs`.
+    pub request: RunOptions,
+    /// The files that the run was made from, by name.
+    pub inputs: Vec<Input>,
     /// Settings in use.
     pub settings: SettingsSummary,
+    /// The camera of the first frame; workloads have cameras of their own.
+    pub camera: Option<CameraUsed>,
     /// What was modelled and what not.
     pub modelled: Modelled,
     /// Regimes in which the methods are known to be bad.
     pub warnings: Vec<Warning>,
-    /// Frames as measured in the trace.
+    /// Frames as measured in the trace; nothing where no frame was found but the marked one.
     pub measured: Option<Figures>,
     /// Frames as the simulator knows them.
     pub truth: Option<Figures>,
+    /// How finely the frames were recorded.
+    pub recorder: Resolution,
     /// Found against true frame starts.
     pub detection: Detection,
     /// Sums that have to agree.
@@ -68,7 +81,13 @@ pub struct Summary {
     pub sampled: Option<SampledSummary>,
     /// Every frame of the run.
     pub frames: Vec<FrameRow>,
+    /// The program, the call and the machine. Everything else is the same on every machine.
+    pub host: Host,
 }
+
+/// The version of the form of `summary.json`, described by `docs/summary.schema.json`. Within a version keys may be added; one that
+/// goes, or changes its meaning or unit, makes the next version.
+pub const SCHEMA: u32 = 1;
 
 /// Settings as they came to be.
 #[derive(Clone, Debug, Serialize)]
@@ -77,6 +96,8 @@ pub struct SettingsSummary {
     pub width: u32,
     pub height: u32,
     pub samples: u32,
+    pub table: String,
+    pub clip: Option<String>,
     pub frame_rate_hz: f64,
     pub shutter: f64,
     pub first_frame: u32,
@@ -89,17 +110,17 @@ pub struct SettingsSummary {
     pub triangles: usize,
 }
 
-/// A table of frames in a few numbers, in the units people read.
+/// A table of frames in a few numbers.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Figures {
     /// How many frames.
     pub frames: usize,
-    /// Milliseconds from start to start.
-    pub duration_ms: Spread,
-    /// Millijoules.
-    pub energy_mj: Spread,
-    /// Nanojoules per pixel.
-    pub energy_nj_per_pixel: Spread,
+    /// Seconds from start to start.
+    pub duration_s: Spread,
+    /// Joules.
+    pub energy_j: Spread,
+    /// Joules per pixel.
+    pub energy_per_pixel_j: Spread,
     /// Watts.
     pub power_w: Spread,
     /// Joules of all frames.
@@ -111,9 +132,9 @@ impl Figures {
         let summary = FrameSummary::of(frames)?;
         Some(Self {
             frames: summary.frames,
-            duration_ms: scaled(summary.duration_s, 1e3),
-            energy_mj: scaled(summary.energy_j, 1e3),
-            energy_nj_per_pixel: scaled(summary.energy_j, 1e9 / pixels as f64),
+            duration_s: summary.duration_s,
+            energy_j: summary.energy_j,
+            energy_per_pixel_j: scaled(summary.energy_j, 1.0 / pixels as f64),
             power_w: summary.power_w,
             total_j: summary.total_j,
         })
@@ -142,18 +163,18 @@ pub struct Detection {
 impl Summary {
     /// The quantities that people compare, measured beside true, mean and standard deviation over frames in SI units.
     pub fn headline(&self) -> Vec<Headline> {
-        let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread, scale: f64| {
+        let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread| {
             let number = |figures: &Option<Figures>| {
-                figures.as_ref().map(pick).map(|s| MeanSd { mean: s.mean * scale, sd: s.deviation * scale })
+                figures.as_ref().map(pick).map(|s| MeanSd { mean: s.mean, sd: s.deviation })
             };
             let (measured, truth) = (number(&self.measured), number(&self.truth));
             Headline { label: label.to_owned(), unit: unit.to_owned(), measured, truth }
         };
         vec![
-            row("time per frame", "s", |f| f.duration_ms, 1e-3),
-            row("energy per frame", "J", |f| f.energy_mj, 1e-3),
-            row("energy per pixel", "J", |f| f.energy_nj_per_pixel, 1e-9),
-            row("power", "W", |f| f.power_w, 1.0),
+            row("time per frame", "s", |f| f.duration_s),
+            row("energy per frame", "J", |f| f.energy_j),
+            row("energy per pixel", "J", |f| f.energy_per_pixel_j),
+            row("power", "W", |f| f.power_w),
         ]
     }
 
@@ -169,26 +190,37 @@ impl Summary {
     /// With a warning where what was asked for is not met.
     pub(super) fn warned(mut self) -> Self {
         self.warnings.extend(self.choice.iter().flat_map(warnings::missed));
-        self.warnings.sort();
+        self.warnings = Warning::fold(self.warnings);
         self
     }
 
-    pub(super) fn new(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Self {
+    pub(super) fn new(
+        plan: &Plan,
+        provenance: Provenance,
+        simulated: &Simulated,
+        measurement: &Measurement,
+    ) -> Self {
+        let Provenance { request, inputs, camera, host } = provenance;
         let counts = simulated.total();
         let truth = true_frames(measurement);
         let by_part = mean_parts_w(&measurement.run);
         let pixels = plan.pixels();
         Self {
+            schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
             scene: plan.work.name().to_owned(),
             gpu: plan.gpu.name.clone(),
             platform: plan.platform.name.clone(),
             energy_table: [plan.table.name().to_owned(), format!("{:?}", plan.options.bound).to_lowercase()],
-            settings: settings(plan, simulated),
+            request,
+            inputs,
+            settings: settings(plan, simulated, measurement),
+            camera,
             modelled: Modelled::new(plan, simulated),
             warnings: warnings::gather(plan, simulated, measurement),
-            measured: Figures::of(&measurement.frames, pixels),
+            measured: Figures::of(&measurement.frames, pixels).filter(|_| !measurement.is_mark_alone()),
             truth: Figures::of(&truth, pixels),
+            recorder: measurement.resolution,
             detection: detection(measurement),
             checks: measurement.checks.clone(),
             energy_by_part_j: measurement.run.energy(),
@@ -209,6 +241,7 @@ impl Summary {
             verified: None,
             sampled: simulated.sampled.clone(),
             frames: rows(plan, simulated, measurement),
+            host,
         }
     }
 }
@@ -236,12 +269,14 @@ fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
     measurement.run.frames.iter().map(frame).collect()
 }
 
-fn settings(plan: &Plan, simulated: &Simulated) -> SettingsSummary {
+fn settings(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> SettingsSummary {
     let scene = plan.work.settings();
     SettingsSummary {
         width: scene.width,
         height: scene.height,
         samples: scene.samples,
+        table: scene.table.clone(),
+        clip: plan.work.clip().map(str::to_owned),
         frame_rate_hz: scene.frame_rate_hz,
         shutter: scene.shutter,
         first_frame: scene.frames.start,
@@ -252,7 +287,7 @@ fn settings(plan: &Plan, simulated: &Simulated) -> SettingsSummary {
             super::PacingChoice::Vsync => "vsync",
             super::PacingChoice::Free => "free",
         },
-        trace_rate_hz: plan.options.trace_rate_hz,
+        trace_rate_hz: measurement.resolution.rate_hz,
         seed: plan.options.seed,
         triangles: simulated.distinct.first().map_or(0, |frame| frame.triangles),
     }

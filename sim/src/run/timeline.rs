@@ -36,8 +36,8 @@ fn frames(outcome: &Outcome) -> Vec<FrameSpan> {
         busy_end_ns: ns(paced.busy_end_s),
         end_ns: ns(paced.end_s),
         numbers: vec![
-            ("energy_mJ", row.energy_mj),
-            ("energy_nJ_per_pixel", row.energy_nj_per_pixel),
+            ("energy_mJ", row.energy_j * 1e3),
+            ("energy_nJ_per_pixel", row.energy_per_pixel_j * 1e9),
             ("power_W", row.power_w),
         ],
     })

@@ -1,35 +1,60 @@
 //! Regimes in which the methods of a run are known to be bad.
 
+use std::collections::BTreeMap;
+
 use activity::{Counts, Event, Warning};
+use power_model::PacedFrame;
 use traces::frames::Flag;
 
-use super::{Choice, Measurement, Plan, Simulated, regime_warnings};
+use super::recorder::MIN_BUSY_SAMPLES;
+use super::{Choice, Measurement, Plan, Simulated, SimulatedFrame, pairing, regime_warnings};
+use crate::output::table::si;
 use crate::timing::Doubt;
-
-/// A frame shorter than this many samples cannot be integrated well: each end is uncertain by a good part of a sample.
-const FEWEST_SAMPLES: f64 = 50.0;
 
 /// Every warning of a run, sorted and each once.
 pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.work.warnings().to_vec();
-    all.extend(simulated.distinct.iter().flat_map(|frame| frame.warnings.iter().cloned()));
+    all.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+    all.extend(of_frames(simulated.distinct.iter().map(|frame| (frame.index, &frame.warnings[..]))));
     all.extend(measurement.run.warnings.iter().cloned());
-    // A run of one frame has no other that could resemble it.
-    let alone = simulated.frames.len() == 1;
-    let told = measurement.found.warnings.iter().filter(|w| !(alone && w.code == "only-mark"));
-    all.extend(told.map(|w| Warning::new(w.code, w.message.clone())));
+    let short = short_frames(measurement);
+    // A run of one frame has no other that could resemble it, and frames too short to be seen resemble nothing.
+    let unseen = short.is_some() && measurement.is_mark_alone();
+    let explained = simulated.frames.len() == 1 || unseen;
+    let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
+    all.extend(of_trace.map(|w| Warning::new(w.code, w.message.clone())));
     all.extend(doubted(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
-    all.extend(short_frames(measurement));
-    all.extend(detection(measurement));
+    all.extend(short);
+    all.extend(detection(measurement).filter(|_| !unseen));
+    all.extend(idle_above_busy(plan, simulated));
     all.extend(clipped(measurement));
     all.extend(lost(measurement));
     all.extend(unsure(simulated));
     all.extend(regime_warnings::gather(simulated));
-    all.sort();
-    all.dedup();
-    all
+    Warning::fold(all)
+}
+
+/// The warnings of single frames: of each code the message of the first frame that has it, with the number of frames where they
+/// differ.
+fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) -> Vec<Warning> {
+    let of = frames.len();
+    let mut by_code: BTreeMap<&str, Vec<(u32, &Warning)>> = BTreeMap::new();
+    for (frame, warning) in frames.flat_map(|(frame, warnings)| warnings.iter().map(move |w| (frame, w))) {
+        by_code.entry(warning.code).or_default().push((frame, warning));
+    }
+    let joined = |found: Vec<(u32, &Warning)>| {
+        let (first, warning) = found[0];
+        if found.iter().all(|(_, other)| other.message == warning.message) {
+            return warning.clone();
+        }
+        let frames = found.len();
+        let message = format!("{} (frame {first}; the same in {frames} of {of} frames)", warning.message);
+        let details = found.iter().map(|(frame, warning)| format!("frame {frame}: {}", warning.message));
+        Warning::new(warning.code, message).with_details(frames, details)
+    };
+    by_code.into_values().map(joined).collect()
 }
 
 /// Of each reason not to trust times, the frame that gives most of it.
@@ -91,8 +116,8 @@ pub(super) fn missed(choice: &Choice) -> Vec<Warning> {
             format!(
                 "the error is expected to be {:.2} %, more than the {} % of --accuracy: --budget allows no more, or all \
                  frames would have to be simulated; give more time, or less accuracy",
-                choice.expected_error_percent,
-                choice.accuracy_percent.unwrap_or_default()
+                choice.expected_error * 100.0,
+                choice.accuracy.unwrap_or_default() * 100.0
             ),
         )
     });
@@ -104,7 +129,7 @@ const WIDE_PERCENT: f64 = 5.0;
 
 fn unsure(simulated: &Simulated) -> Option<Warning> {
     let sampled = simulated.sampled.as_ref()?;
-    let worst = sampled.worst_percent();
+    let worst = sampled.worst() * 100.0;
     (worst > WIDE_PERCENT).then(|| {
         Warning::new(
             "prediction-unsure",
@@ -118,25 +143,28 @@ fn unsure(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
+/// Frames whose work the recorder may miss between two samples, with the remedy and what came of it.
 fn short_frames(measurement: &Measurement) -> Option<Warning> {
-    let rate_hz = measurement.trace.rate_hz();
-    let samples = |busy_s: f64| busy_s * rate_hz;
-    let shortest = measurement
-        .run
-        .frames
-        .iter()
-        .map(|frame| frame.busy_end_s - frame.start_s)
-        .fold(f64::INFINITY, f64::min);
-    let short =
-        measurement.run.frames.iter().filter(|f| samples(f.busy_end_s - f.start_s) < FEWEST_SAMPLES).count();
+    let resolution = &measurement.resolution;
+    let frames = &measurement.run.frames;
+    let is_short =
+        |frame: &&PacedFrame| (frame.busy_end_s - frame.start_s) * resolution.rate_hz < MIN_BUSY_SAMPLES;
+    let short = frames.iter().filter(is_short).count();
     (short > 0).then(|| {
+        let found = if measurement.is_mark_alone() {
+            "only the marked one was found, so that nothing is measured by frame"
+        } else {
+            "they may be missed, or found elsewhere"
+        };
+        let faster = resolution.needed_hz().map_or(String::new(), |rate_hz| format!("--trace-rate {rate_hz}, or "));
         Warning::new(
             "short-frame",
             format!(
-                "{short} of {} frames are busy for less than {FEWEST_SAMPLES} samples of the trace (the shortest for \
-                 {:.1}): their shape is not resolved and starts are uncertain; record at a higher rate",
-                measurement.run.frames.len(),
-                samples(shortest)
+                "{short} of {} frames are too short for the recorder: at {} it takes {:.1} samples while the shortest is busy, and \
+                 {found}; {faster}a larger image",
+                frames.len(),
+                si(resolution.rate_hz, "Hz"),
+                resolution.samples_in_shortest()
             ),
         )
     })
@@ -159,6 +187,23 @@ fn detection(measurement: &Measurement) -> Option<Warning> {
     })
 }
 
+/// A platform that draws more between frames than while the GPU works.
+fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
+    let idle_w = plan.platform.idle_w.value();
+    let busy_w = |frame: &SimulatedFrame| frame.power.energy().total_j() / frame.power.duration_s();
+    let lowest_w = simulated.distinct.iter().map(busy_w).fold(f64::INFINITY, f64::min);
+    (idle_w > lowest_w).then(|| {
+        let message = format!(
+            "platform `{}` draws {} between frames and only {} in a frame: the longer a frame takes the less energy it needs, and \
+             frames show as dips; lower `idle_w`, or raise `constant_w`",
+            plan.platform.name,
+            si(idle_w, "W"),
+            si(lowest_w, "W")
+        );
+        Warning::new("idle-above-busy", message)
+    })
+}
+
 fn clipped(measurement: &Measurement) -> Option<Warning> {
     (measurement.clipped > 0).then(|| {
         Warning::new(
@@ -178,19 +223,36 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_warning_of_many_frames_is_one_line() {
+        let of = |frames: &[u32]| -> Vec<(u32, Vec<Warning>)> {
+            let warned = |frame| Warning::new("caustics-coarse", format!("waves of {frame} squares"));
+            (0..5).map(|f| (f, if frames.contains(&f) { vec![warned(f)] } else { vec![] })).collect()
+        };
+        let fold = |all: &[(u32, Vec<Warning>)]| of_frames(all.iter().map(|(f, w)| (*f, &w[..])));
+        let one = fold(&of(&[3]));
+        assert_eq!(one, [Warning::new("caustics-coarse", "waves of 3 squares")]);
+        let three = fold(&of(&[1, 2, 4]));
+        assert_eq!(three.len(), 1);
+        assert_eq!(three[0].message, "waves of 1 squares (frame 1; the same in 3 of 5 frames)");
+        assert_eq!((three[0].count, three[0].details[2].as_str()), (3, "frame 4: waves of 4 squares"));
+        assert!(fold(&of(&[])).is_empty());
+    }
+
+    #[test]
     fn wide_intervals_are_told_and_narrow_ones_are_not() {
-        let of = |half_width_percent: f64| {
+        let of = |percent: f64| {
+            let relative_half_width = percent / 100.0;
             let quantity =
-                |half_width_percent| Quantity { value: 1.0, low: 0.9, high: 1.1, half_width_percent };
+                |relative_half_width| Quantity { value: 1.0, low: 0.9, high: 1.1, relative_half_width };
             let sampled = SampledSummary {
                 simulated_frames: vec![0, 7, 30],
                 frames_per_simulated: 12.0,
                 strata: 2,
                 preview: [160, 90, 1],
                 confidence: 0.95,
-                cycles_per_frame: quantity(1.0),
-                busy_energy_per_frame_j: quantity(half_width_percent),
-                busy_power_w: quantity(1.0),
+                cycles_per_frame: quantity(0.01),
+                busy_energy_per_frame_j: quantity(relative_half_width),
+                busy_power_w: quantity(0.01),
             };
             let (distinct, pictures, heat) = (Vec::new(), Vec::new(), Vec::new());
             unsure(&Simulated { distinct, frames: vec![0; 36], pictures, heat, sampled: Some(sampled) })

@@ -1,10 +1,12 @@
 //! What a run draws: the frames of a scene, or those of a job.
 
+use std::path::Path;
+
 use activity::{Event, LineAccess, Packet, Warning};
 use pipeline::frame::{HeatMap, render_with_heat};
 use pipeline::{Settings, Viewport};
-use workloads::job::{self, Drawn, Job, OptionSource, Request};
-use workloads::{Frame, LoadError, Overrides, Scene};
+use workloads::job::{self, Drawn, Job, JobError, OptionSource, Request};
+use workloads::{Fingerprint, Frame, LoadError, Overrides, Scene};
 
 use super::regime::Regime;
 use super::{Plan, RunError};
@@ -35,18 +37,21 @@ impl Work {
     /// # Errors
     /// [`LoadError`] when it cannot be loaded, or its settings make no sense.
     pub fn find(
-        name: &str,
+        name: &Path,
         overrides: &Overrides,
         options: &OptionSource,
         seed: u64,
     ) -> Result<Self, LoadError> {
-        if let Some(job) = job::find(name, options, &Request { overrides, seed }) {
-            return Ok(Self::Job { name: name.to_owned(), job: job? });
+        // A workload has a name; a path of other bytes is none.
+        let text = name.to_str().unwrap_or_default();
+        if let Some(job) = job::find(text, options, &Request { overrides, seed }) {
+            return Ok(Self::Job { name: text.to_owned(), job: job? });
         }
         let scene = workloads::load(name).map_err(job::or_job)?;
         if *options != OptionSource::default() {
             let jobs: Vec<&str> = job::names().map(|(name, _)| name).collect();
-            let message = format!("`{name}` is a scene; only workloads have options: {}", jobs.join(", "));
+            let message =
+                format!("`{}` is a scene; only workloads have options: {}", name.display(), jobs.join(", "));
             return Err(LoadError::Setting { setting: "set", message });
         }
         Ok(Self::Scene(Box::new(scene.with_overrides(overrides)?)))
@@ -60,6 +65,14 @@ impl Work {
         }
     }
 
+    /// What its images show, for captions; empty where that is plain.
+    pub fn shows(&self) -> &'static str {
+        match self {
+            Self::Scene(_) => "",
+            Self::Job { job, .. } => job.shows(),
+        }
+    }
+
     /// Size of the image, sampling, time and lens.
     pub fn settings(&self) -> &workloads::Settings {
         match self {
@@ -68,11 +81,22 @@ impl Work {
         }
     }
 
-    /// Whether frames differ.
-    pub fn is_animated(&self) -> bool {
+    /// The animation clip that plays; none without a scene file that has clips.
+    pub fn clip(&self) -> Option<&str> {
         match self {
-            Self::Scene(scene) => scene.is_animated(),
-            Self::Job { job, .. } => job.is_animated(),
+            Self::Scene(scene) => scene.clip(),
+            Self::Job { .. } => None,
+        }
+    }
+
+    /// The fingerprint of everything that frame `number` is drawn from and that changes from frame to frame.
+    ///
+    /// # Errors
+    /// When the frame cannot be made.
+    pub(super) fn fingerprint(&self, number: u32) -> Result<Fingerprint, RunError> {
+        match self {
+            Self::Scene(scene) => Ok(Fingerprint::of(&scene.frame(number)?).map_err(JobError::from)?),
+            Self::Job { job, .. } => Ok(job.fingerprint(number)?),
         }
     }
 
@@ -80,7 +104,7 @@ impl Work {
     pub fn warnings(&self) -> &[Warning] {
         match self {
             Self::Scene(scene) => scene.warnings(),
-            Self::Job { .. } => &[],
+            Self::Job { job, .. } => job.warnings(),
         }
     }
 
@@ -106,7 +130,7 @@ pub(super) fn draw(
     mut emit: impl FnMut(&Packet, &[LineAccess]),
 ) -> Result<Drawing, RunError> {
     match &plan.work {
-        Work::Scene(scene) => draw_scene(plan, scene, number, events, emit),
+        Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, events, emit),
         Work::Job { job, .. } => {
             let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
             Ok(Drawing { drawn, regime: Regime::default(), heat: Vec::new() })
@@ -114,14 +138,15 @@ pub(super) fn draw(
     }
 }
 
+/// Draws from `frame` and from what is the same in all frames. It must not know which frame it draws, because frames with the
+/// same fingerprint are drawn once.
 fn draw_scene(
     plan: &Plan,
     scene: &Scene,
-    number: u32,
+    frame: &Frame,
     events: &[Event],
     emit: impl FnMut(&Packet, &[LineAccess]),
 ) -> Result<Drawing, RunError> {
-    let frame = scene.frame(number)?;
     let draws = frame.draws(scene)?;
     let viewport: Viewport = plan.viewport;
     let background = scene.background();
@@ -132,14 +157,10 @@ fn draw_scene(
         image: rendered.image,
         counts: rendered.counts,
         triangles: frame.triangle_count(),
-        moving: is_moving(&frame),
+        moving: frame.is_moving(),
         lens: frame.camera.lens().is_some(),
         ..Drawn::default()
     };
     let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
     Ok(Drawing { drawn, regime, heat })
-}
-
-pub(super) fn is_moving(frame: &Frame) -> bool {
-    frame.camera.open() != frame.camera.close() || frame.meshes.iter().any(|mesh| !mesh.is_still())
 }

@@ -1,47 +1,61 @@
-//! The files of a run. `summary.json` comes last: where it is, all is there.
+//! The files of a run.
 
 use std::io::Write;
 
 use traces::energy::FrameTable;
 use traces::score::{TOLERANCE_S, truth_beside};
 
-use super::{Outcome, RunError, pictures, report, timeline};
-use crate::output::dir::{BoxError, OutDir};
+use super::heat::heat_name;
+use super::simulate::image_name;
+use super::{FIGURES, Outcome, Plan, RunError, pictures, report, timeline};
+use crate::output::dir::{BoxError, Claim, OutDir, SUMMARY};
 use crate::output::perfetto;
 use crate::output::progress::Progress;
 
+/// The files that a run may write.
+pub(super) fn claim(plan: &Plan) -> Claim {
+    let ends: &[&str] = if plan.options.exr { &["png", "exr"] } else { &["png"] };
+    let frames = || plan.work.settings().frames.clone();
+    let images =
+        frames().flat_map(|frame| ends.iter().map(move |end| format!("{}.{end}", image_name(frame))));
+    let maps = plan.options.heat.iter().flat_map(|&event| frames().map(move |frame| heat_name(event, frame)));
+    let heat = maps.flat_map(|name| ["png", "exr", "csv"].map(|end| format!("{name}.{end}")));
+    let figures = FIGURES.map(|(figure, _)| figure).into_iter().chain(["stalls"]);
+    Claim::new("run")
+        .files(images.chain(heat))
+        .plots(figures.map(|figure| format!("plots/{figure}")))
+        .files(["trace.parquet", "trace.csv", "trace.json", "frames.csv"])
+        .files(["timeline.perfetto-trace", "report.html", SUMMARY])
+}
+
 /// Writes everything but the images, which are there already.
-pub(super) fn write(outcome: &Outcome, dir: OutDir, progress: &Progress) -> Result<(), RunError> {
+pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Result<(), RunError> {
     let bar = progress.bar("files", 4);
     let trace = &outcome.measurement.trace;
-    dir.write_atomic("trace.parquet", |out| Ok(traces::io::parquet::write(trace, out)?))?;
-    dir.write_atomic("trace.csv", |out| Ok(traces::io::csv::write(trace, out)?))?;
-    dir.write_atomic("trace.json", |out| Ok(traces::io::csv::write_sidecar(trace, out)?))?;
+    dir.write_file("trace.parquet", |out| Ok(traces::io::parquet::write(trace, out)?))?;
+    dir.write_file("trace.csv", |out| Ok(traces::io::csv::write(trace, out)?))?;
+    dir.write_file("trace.json", |out| Ok(traces::io::csv::write_sidecar(trace, out)?))?;
     bar.inc();
-    write_frames(outcome, &dir)?;
+    write_frames(outcome, dir)?;
     let process = format!("quintile {} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
     let timeline = timeline::timeline(outcome, &process);
-    dir.write_atomic("timeline.perfetto-trace", |out| Ok(perfetto::write(&timeline, out)?))?;
+    dir.write_file("timeline.perfetto-trace", |out| Ok(perfetto::write(&timeline, out)?))?;
     bar.inc();
     let plots = pictures::plots(outcome);
     for plot in &plots {
-        plot.picture.write(&dir, plot.stem)?;
+        plot.picture.write(dir, plot.stem)?;
     }
     bar.inc();
-    report::report(outcome, &plots)?.write(&dir, "report.html")?;
+    report::report(outcome, &plots)?.write(dir, "report.html")?;
     bar.inc();
-    dir.complete(|out| {
-        serde_json::to_writer_pretty(&mut *out, &outcome.summary)?;
-        Ok(writeln!(out)?)
-    })?;
-    Ok(())
+    Ok(dir.write_json(SUMMARY, &outcome.summary)?)
 }
 
 fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
     let measurement = &outcome.measurement;
     let truth = truth_beside(&measurement.frames, &measurement.truth, TOLERANCE_S);
     let table = FrameTable::new(measurement.frames.clone(), Some(outcome.plan.pixels())).with_truth(truth)?;
-    dir.write_atomic("frames.csv", |out| {
+    dir.write_file("frames.csv", |out| {
         if outcome.simulated.sampled.is_none() {
             return Ok(table.write_csv(out)?);
         }
@@ -68,9 +82,9 @@ fn marked(outcome: &Outcome, plain: &[u8], out: &mut dyn Write) -> Result<(), Bo
         let truth = by_truth.iter().position(|matched| *matched == Some(found));
         let row = truth.map(|place| &outcome.summary.frames[place]);
         record.push_field(row.map_or("", |row| if row.predicted { "1" } else { "0" }));
-        let interval = row.and_then(|row| row.energy_mj_interval);
+        let interval = row.and_then(|row| row.energy_interval_j);
         for end in 0..2 {
-            record.push_field(&interval.map_or(String::new(), |ends| (ends[end] * 1e-3).to_string()));
+            record.push_field(&interval.map_or(String::new(), |ends| ends[end].to_string()));
         }
         writer.write_record(&record)?;
     }

@@ -1,14 +1,16 @@
 //! The levels, and a clock of any of them.
 
 use activity::{LineAccess, Packet};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use timing::stepped::{self, Manner, Stalled, Stream};
-use timing::{BoundClock, Clocks, Jobs, PacketClock, Recorder, Timed};
+use timing::{BoundClock, Clocks, Jobs, MAX_CYCLES, PacketClock, Recorder, Timed};
 
 use crate::gpu::GpuSpec;
 
 /// How time is modelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Every unit from cycle to cycle: the reference, slow
@@ -40,6 +42,12 @@ pub enum TimingError {
     /// The reference came to a stop.
     #[error(transparent)]
     Stalled(#[from] Stalled),
+    /// A frame takes longer than what the level `packet` keeps in memory.
+    #[error(
+        "a frame takes more than {MAX_CYCLES} cycles of the core clock, more than `--timing packet` holds: check the rates of the \
+         GPU file, ask for fewer pixels or samples, or use `--timing bound`"
+    )]
+    TooLong,
     /// The clocks have no common cycle; validated GPUs have one.
     #[error("the clocks of GPU `{0}` have no common cycle")]
     Clocks(String),
@@ -95,6 +103,7 @@ impl<'a> FrameClock<'a> {
                 let (makes, stream, recorder) = *state;
                 stepped::run(&self.gpu.units, self.clocks, &makes, &stream, recorder, &Manner::default())?
             }
+            State::Packet(clock) if clock.is_too_long() => return Err(TimingError::TooLong),
             State::Packet(clock) => clock.finish(),
             State::Bound(clock) => clock.finish(),
         })

@@ -1,5 +1,7 @@
 //! What `--timing` takes: a level for every frame, or for some of them.
 
+use serde::{Deserialize, Serialize};
+
 use super::Level;
 
 /// How the times of a run are found.
@@ -36,7 +38,8 @@ impl Method {
 }
 
 /// How many frames of a run are simulated whole.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// All that differ.
     #[default]

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::LookArgs;
+
 /// Arguments of `stress`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  quintile stress slivers --out slivers\n\n\
@@ -14,6 +16,9 @@ pub struct StressArgs {
     /// Folder for the results; made where it is missing
     #[arg(long, value_name = "DIR", default_value = "out/stress")]
     pub out: PathBuf,
+    /// Overwrite files in DIR that Quintile did not write
+    #[arg(long)]
+    pub force: bool,
     /// Smaller images, fewer triangles
     #[arg(long)]
     pub quick: bool,
@@ -23,6 +28,9 @@ pub struct StressArgs {
     /// Print summary.json to standard output and nothing else
     #[arg(long)]
     pub json: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
 }
 
 /// Arguments of `chart`.
@@ -42,12 +50,18 @@ pub struct ChartArgs {
     /// Folder for the results; made where it is missing
     #[arg(long, value_name = "DIR", default_value = "out/charts")]
     pub out: PathBuf,
+    /// Overwrite files in DIR that Quintile did not write
+    #[arg(long)]
+    pub force: bool,
     /// Worker threads; all cores without it. Only times depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print the numbers as JSON and nothing else
     #[arg(long)]
     pub json: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
 }
 
 /// The charts there are.

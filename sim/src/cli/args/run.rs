@@ -1,13 +1,14 @@
 //! Arguments of `run`.
 
-use std::ops::Range;
 use std::path::PathBuf;
 
 use activity::{Event, spec::suggestion};
 use clap::{Args, ValueEnum};
 use pipeline::frame::HeatMap;
 
-use crate::cli::parse::{duration, frames, percent, setting, size};
+use super::{LookArgs, SceneArgs};
+use crate::cli::parse::{duration, percent, setting, share_below_one};
+use crate::cli::quantity::rate;
 use crate::timing::Method;
 
 /// Arguments of `run`.
@@ -19,12 +20,17 @@ use crate::timing::Method;
     A workload's options with their defaults are in its chapter of the book; `--set` names them when one is misspelled. It takes no\n\
     --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuses flags of scenes that would change nothing.\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
-    timeline.perfetto-trace (open it at ui.perfetto.dev). summary.json is written last: where it is, all is there."
+    timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run\n\
+    are replaced then, and other files in DIR are left alone."
 )]
 pub struct RunArgs {
-    /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .ply or .obj file
+    /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .obj, .ply, .off or .stl file
     #[arg(default_value = "default", value_name = "SCENE|WORKLOAD|FILE")]
-    pub scene: String,
+    pub scene: PathBuf,
+    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads and --json go with it. Refused
+    /// where the version of the program or an input is another, unless with --force
+    #[arg(long, value_name = "SUMMARY", conflicts_with_all = SETTINGS)]
+    pub again: Option<PathBuf>,
     /// Options of a workload in a .ron file
     #[arg(long, value_name = "FILE.ron")]
     pub options: Option<PathBuf>,
@@ -34,43 +40,21 @@ pub struct RunArgs {
     /// Folder for the results; made where it is missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
-    /// Frames to render, the end not included
-    #[arg(long, value_name = "A..B", value_parser = frames)]
-    pub frames: Option<Range<u32>>,
-    /// Samples in a pixel, 1 to 256
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub samples: Option<u32>,
-    /// Where and when each pixel looks: a built-in sample table (see `quintile list`), a description of one in a .ron
-    /// file, or the samples themselves in a .smp file
-    #[arg(long, value_name = "TABLE")]
-    pub table: Option<String>,
-    /// Size of the image in pixels
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub size: Option<(u32, u32)>,
-    /// Frames in a second of the scene's time, and ticks of the display
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
-    pub rate: Option<f64>,
-    /// Radius of the lens in scene units, 0 for a pinhole
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    pub lens: Option<f32>,
-    /// Depth in scene units at which the lens is sharp
-    #[arg(long, value_name = "F", allow_negative_numbers = true)]
-    pub focus: Option<f32>,
-    /// How long the shutter is open, as a fraction of the frame period
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    pub shutter: Option<f64>,
-    /// Animation of a glTF scene, by name or number
-    #[arg(long, value_name = "CLIP")]
-    pub clip: Option<String>,
-    /// A built-in GPU or a .ron file
-    #[arg(long, value_name = "FILE", default_value = "reference")]
-    pub gpu: String,
-    /// A built-in platform or a .ron file
-    #[arg(long, value_name = "FILE", default_value = "reference")]
-    pub platform: String,
-    /// A built-in energy table or a .ron file
-    #[arg(long, value_name = "FILE", default_value = "28nm")]
-    pub energy: String,
+    /// Overwrite files in DIR that Quintile did not write; with --again, repeat it although the program or an input is another
+    #[arg(long)]
+    pub force: bool,
+    /// Changes to the scene
+    #[command(flatten)]
+    pub view: SceneArgs,
+    /// A built-in GPU or a .ron file; its file names the platform and the energy table that belong to it (see `quintile list`)
+    #[arg(long, value_name = "NAME|FILE", default_value = "reference")]
+    pub gpu: PathBuf,
+    /// A built-in platform or a .ron file [default: the GPU's own]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub platform: Option<PathBuf>,
+    /// A built-in energy table or a .ron file [default: the GPU's own]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub energy: Option<PathBuf>,
     /// Which values of the energy table to use
     #[arg(long, value_enum, default_value_t)]
     pub bound: BoundArg,
@@ -91,14 +75,15 @@ pub struct RunArgs {
     /// When the next frame starts
     #[arg(long, value_enum, default_value_t)]
     pub pacing: PacingArg,
-    /// Samples per second of the recorder
-    #[arg(long, value_name = "HZ", default_value_t = 50e3, allow_negative_numbers = true)]
-    pub trace_rate: f64,
+    /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz or 1MHz [default: 50kHz,
+    /// or up to 1MHz where frames are shorter than two samples or, without idle time between them, than fifty]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
+    pub trace_rate: Option<f64>,
     /// Samples of the recorder that travel together, and are lost together
-    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=i64::from(traces::device::MAX_PACKET_SAMPLES)))]
     pub packet_samples: u32,
     /// Share of these packets that are lost, 0 to below 1: gaps in trace.parquet
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_hyphen_values = true, value_parser = share_below_one)]
     pub packet_loss: f64,
     /// Seed of samples, noise and losses
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
@@ -112,10 +97,51 @@ pub struct RunArgs {
     /// Worker threads; all cores without it. The results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Print what would be run, with the expected time, and stop before anything is simulated or written
+    #[arg(long)]
+    pub dry_run: bool,
     /// Print summary.json to standard output and nothing else
     #[arg(long)]
     pub json: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
 }
+
+/// What `--again` takes from the summary.
+const SETTINGS: [&str; 31] = [
+    "scene",
+    "options",
+    "set",
+    "frames",
+    "samples",
+    "table",
+    "size",
+    "rate",
+    "lens",
+    "focus",
+    "shutter",
+    "clip",
+    "camera",
+    "gpu",
+    "platform",
+    "energy",
+    "bound",
+    "timing",
+    "accuracy",
+    "budget",
+    "verify",
+    "pacing",
+    "trace_rate",
+    "packet_samples",
+    "packet_loss",
+    "seed",
+    "exr",
+    "heat",
+    "width",
+    "title",
+    "font_size",
+];
 
 /// Which values of the energy table to use.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
@@ -149,6 +175,22 @@ fn counter(text: &str) -> Result<Event, String> {
         None => {
             let known: Vec<&str> = placed().map(Event::name).collect();
             Err(format!("no counter is called `{text}`; {}", suggestion(text, &known)))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Args as _, Command};
+
+    use super::*;
+
+    #[test]
+    fn again_takes_every_setting_from_the_summary() {
+        let command = RunArgs::augment_args(Command::new("run"));
+        let beside = ["again", "out", "force", "dry_run", "threads", "json"];
+        for argument in command.get_arguments().map(|argument| argument.get_id().as_str()) {
+            assert!(SETTINGS.contains(&argument) != beside.contains(&argument), "{argument}");
         }
     }
 }

@@ -4,21 +4,21 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::parse::size;
+use crate::cli::parse::{per_pixel, size};
 
 /// Arguments of `samples`.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  quintile samples jittered --samples 16 --size 640x360 --out mine.smp\n\n\
-    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is that of\n\
-    shared/peers/embree5d/README.md."
+    `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is\n\
+    described in docs/guide/visibility.md."
 )]
 pub struct SamplesArgs {
     /// A built-in sample table (see `quintile list`) or a description of one in a .ron file
     #[arg(value_name = "TABLE", default_value = "owen")]
     pub table: String,
     /// Samples in a pixel, 1 to 256
-    #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 16, allow_hyphen_values = true, value_parser = per_pixel)]
     pub samples: u32,
     /// Pixels to write; an image that is larger repeats them
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "64x64")]

@@ -12,15 +12,15 @@ use crate::cli::parse::tests;
 #[command(after_help = "Examples:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n  \
     quintile visibility start.ply end.ply --camera camera.ron --json\n  \
     quintile visibility cloth-ball.mts.gz --print-camera > camera.ron\n\n\
-    The layouts of .m5d, of sample tables, of the hashed samples and of the result are those of\n\
-    shared/peers/embree5d/README.md, that of .mts is in shared/ccd/README.md.")]
+    The layouts of all files, and the hashed samples, are described in docs/guide/visibility.md.")]
 pub struct VisibilityArgs {
-    /// A moving mesh: an .m5d or .mts file, or two .ply or .obj files of equal topology as the ends of the shutter
+    /// A moving mesh: an .m5d or .mts file, a .ply, .obj, .off or .stl file, or two of equal topology as the ends of the shutter
     #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
     pub files: Vec<PathBuf>,
-    /// A camera in RON; without it an .m5d is seen by its own, other files by one that is fitted to them
-    #[arg(long, value_name = "CAM.ron")]
-    pub camera: Option<PathBuf>,
+    /// A .ron file, or a description such as 'position: (1, 2, 3), target: (0, 0, 0)'; without it an .m5d is seen by its own
+    /// camera, other files by one that is fitted to them
+    #[arg(long, value_name = "CAMERA", allow_hyphen_values = true)]
+    pub camera: Option<String>,
     /// Print the camera that was fitted as RON, and do no more
     #[arg(long, conflicts_with_all = ["camera", "json", "out"])]
     pub print_camera: bool,

@@ -11,9 +11,10 @@ use workloads::collision::{Answer, Method, Object, Search, Verdict, candidates, 
 use workloads::visibility::CaseFiles;
 
 use super::Failure;
-use super::terminal::{complain, print, print_json};
+use super::terminal::{print, print_json};
 use crate::output::progress::Progress;
 use crate::output::table::{Table, grouped};
+use crate::output::terminal::Terminal;
 use rows::Rows;
 
 /// Arguments of `ccd`.
@@ -24,7 +25,7 @@ use rows::Rows;
     A file that is broken or has coordinates beyond 1e60 does not keep the others from being answered: it is told, the exit code is 1, and\n\
     its case has no row in the CSV and an `error` in the JSON. A case without a row is one that nothing is known of.")]
 pub struct CcdArgs {
-    /// .mts files (gzipped or not), a case each, or .ply or .obj files two by two: a mesh at time 0 and at time 1
+    /// .mts files (gzipped or not), a case each, or .ply, .obj or .off files two by two: a mesh at time 0 and at time 1
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Pixels across each of the three images
@@ -166,11 +167,11 @@ fn pair(answer: &Answer) -> Option<Pair> {
     Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels, seen })
 }
 
-pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
     let (search, rows) = (args.search(), Rows::of(args)?);
     let cases = CaseFiles::of(&args.files)?;
     let pool = super::threads(args.threads)?;
-    let progress = Progress::new(args.json);
+    let progress = terminal.progress(args.json);
     if !search.zoom && search.resolution * search.bins > SLOW {
         progress.note(
             "looking once at so many pixels and bins takes minutes for a pair; without --no-zoom it is seconds",
@@ -182,7 +183,7 @@ pub(super) fn run(args: &CcdArgs) -> Result<(), Failure> {
     if known {
         rows.write(&outcomes)?;
     }
-    let unanswered = unanswered(&outcomes);
+    let unanswered = unanswered(&outcomes, terminal);
     if args.json {
         print_json(&outcomes, false)?;
     } else if known && rows != Rows::Printed {
@@ -203,7 +204,7 @@ fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Ou
 }
 
 /// Fails where nothing is known of a case, and names each.
-fn unanswered(outcomes: &[Outcome]) -> Result<(), Failure> {
+fn unanswered(outcomes: &[Outcome], terminal: &Terminal) -> Result<(), Failure> {
     let errors = outcomes.iter().filter_map(|outcome| match outcome {
         Outcome::Found(_) => None,
         Outcome::Unknown(unknown) => Some(unknown.error.clone()),
@@ -213,7 +214,7 @@ fn unanswered(outcomes: &[Outcome]) -> Result<(), Failure> {
         ([], _) => return Ok(()),
         ([error], 1) => error.clone(),
         (several, all) => {
-            several.iter().for_each(|error| complain(error));
+            several.iter().for_each(|error| terminal.error(error));
             format!("{} of {all} cases have no answer: mend their files or leave them out", several.len())
         }
     };

@@ -13,13 +13,12 @@ use crate::cli::args::{ChartArg, ChartArgs};
 use crate::cli::terminal::{json_text, print, print_json};
 use crate::output::OutDir;
 use crate::output::progress::Progress;
-use crate::run::RunError;
 
 /// The failure catalogue, which has a command of its own.
 const STRESS: &str = "stress";
 
 /// Makes every chart and the page; a broken promise of one does not keep the others.
-pub(super) fn run(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<(), Failure> {
+pub(super) fn run(args: &ChartArgs, dir: &mut OutDir, progress: &Progress) -> Result<(), Failure> {
     let (mut json, mut faults) = (Map::new(), Vec::new());
     let charts: Vec<_> = charts();
     let mut index = Index { command: command(args), ..Index::default() };
@@ -31,16 +30,18 @@ pub(super) fn run(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result
         let started = Instant::now();
         let done = match chart {
             Some(chart) => make(*chart, args, dir, progress)?,
-            None => stress(args, progress)?,
+            None => stress(args, dir, progress)?,
         };
         if !args.json {
             print(&done.text)?;
         }
         json.insert(name.clone(), serde_json::from_str(&done.json).unwrap_or(Value::Null));
         faults.extend(done.fault.iter().map(|fault| format!("{name}: {fault}")));
-        index.entries.push(entry(name.clone(), done, started.elapsed().as_secs_f64(), dir)?);
+        let files = dir.publish()?;
+        index.entries.push(entry(name.clone(), done, started.elapsed().as_secs_f64()).with_files(files));
         // After each, so that what there is can be looked at while the next one runs.
         index.write(dir).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+        dir.publish()?;
     }
     match args.json {
         true => print_json(&Value::Object(json), true)?,
@@ -57,33 +58,28 @@ fn charts() -> Vec<(String, Option<ChartArg>)> {
     named.chain([(STRESS.to_owned(), None)]).collect()
 }
 
-fn entry(name: String, done: Done, took_s: f64, dir: &OutDir) -> Result<Entry, Failure> {
+fn entry(name: String, done: Done, took_s: f64) -> Entry {
     let about = CHARTS.iter().find(|(chart, _)| *chart == name).map_or(
         "each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, cost",
         |(_, about)| about,
     );
-    let file = name.replace('-', "_");
-    let plots = format!("plots/{file}");
-    let stems: &[&str] = if name == STRESS { &["stress", "auto", &plots] } else { &[&file, &plots] };
-    let entry = Entry {
+    Entry {
         about: about.to_owned(),
         text: done.text,
         pictures: Vec::new(),
         files: Vec::new(),
         took_s,
         standings: done.standings,
-        name: name.clone(),
-    };
-    Ok(entry.with_files(dir, stems).map_err(RunError::from)?)
+        name,
+    }
 }
 
 /// The failure catalogue as a chart among the others.
-fn stress(args: &ChartArgs, progress: &Progress) -> Result<Done, Failure> {
+fn stress(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
     let report = crate::stress::stress(None, args.quick, progress)?;
     let (text, fault) = (report.text(), report.fault().map(str::to_owned));
     let json = json_text(&report.summary(), false)?;
-    let dir = OutDir::create(&args.out).map_err(RunError::from)?;
-    report.write(dir).map_err(RunError::from)?;
+    report.write(dir, &args.look.look())?;
     Ok(Done { text, json, standings: Vec::new(), fault })
 }
 

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::Failure;
 use super::terminal::{print, print_json};
+use crate::output::terminal::Terminal;
 use file::Points;
 
 /// Arguments of `sample`.
@@ -103,9 +104,9 @@ fn usage(message: impl std::fmt::Display) -> Failure {
     Failure { message: message.to_string(), code: 2 }
 }
 
-pub(super) fn run(args: &SampleArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure> {
     match &args.kind {
-        Kind::Poisson(args) => poisson::run(args),
+        Kind::Poisson(args) => poisson::run(args, terminal),
         Kind::White(args) => white::run(args),
         Kind::Volume(args) => volume::run(args),
     }

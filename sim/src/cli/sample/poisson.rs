@@ -10,7 +10,7 @@ use workloads::points::poisson::{
 
 use super::file::Points;
 use super::{Common, Failure, usage};
-use crate::output::progress::Progress;
+use crate::output::terminal::Terminal;
 
 /// Arguments of `sample poisson`.
 #[derive(Debug, Args)]
@@ -49,13 +49,13 @@ struct Facts {
     warnings: Vec<Warning>,
 }
 
-pub(super) fn run(args: &PoissonArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &PoissonArgs, terminal: &Terminal) -> Result<(), Failure> {
     args.common.check(None)?;
     match args.dim {
-        1 => sample::<1>(args),
-        2 => sample::<2>(args),
-        3 => sample::<3>(args),
-        _ => sample::<4>(args),
+        1 => sample::<1>(args, terminal),
+        2 => sample::<2>(args, terminal),
+        3 => sample::<3>(args, terminal),
+        _ => sample::<4>(args, terminal),
     }
 }
 
@@ -77,11 +77,15 @@ fn long(points: f64, dimensions: usize) -> Option<String> {
     (LONG_S..f64::INFINITY).contains(&seconds).then_some(told)
 }
 
-/// Makes the points, with a bar and a word of warning on a terminal.
-fn make<const D: usize>(spec: &PoissonSpec, args: &PoissonArgs) -> Result<PoissonDisk<D>, Failure> {
+/// Makes the points, with a bar on a terminal and a note where they take long.
+fn make<const D: usize>(
+    spec: &PoissonSpec,
+    args: &PoissonArgs,
+    terminal: &Terminal,
+) -> Result<PoissonDisk<D>, Failure> {
     let pool = crate::cli::threads(args.common.threads)?;
     let volume = ball(D) * spec.radius.powi(D as i32);
-    let progress = Progress::new(false);
+    let progress = terminal.progress(false);
     let points = saturation(D) / volume;
     if let Some(note) = long(points, D) {
         progress.note(&note);
@@ -100,7 +104,7 @@ fn shortfall(args: &PoissonArgs, made: usize) -> String {
     }
 }
 
-fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
+fn sample<const D: usize>(args: &PoissonArgs, terminal: &Terminal) -> Result<(), Failure> {
     let domain = if args.boxed { Domain::Box } else { Domain::Torus };
     let spec = PoissonSpec {
         radius: args.r.unwrap_or_else(|| radius(args.count.unwrap_or(1), D, domain)),
@@ -108,7 +112,7 @@ fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
         seed: args.common.seed,
         spacing: if args.common.single { Spacing::Single } else { Spacing::Double },
     };
-    let found: PoissonDisk<D> = make(&spec, args)?;
+    let found: PoissonDisk<D> = make(&spec, args, terminal)?;
     let facts = Facts {
         r: spec.radius,
         periodic: !args.boxed,
@@ -125,9 +129,10 @@ fn sample<const D: usize>(args: &PoissonArgs) -> Result<(), Failure> {
         thin => format!("no other number fits; {thin} voids thinner than the spacing of numbers are left"),
     };
     let short = shortfall(args, found.points.len());
-    let warnings: String = facts.warnings.iter().map(|warning| format!("\nwarning: {warning}")).collect();
-    let line =
-        format!("r {}, packing density {:.4}, {thin}{short}{warnings}", spec.radius, facts.packing_density);
+    if !args.common.json {
+        facts.warnings.iter().for_each(|warning| terminal.warn(warning));
+    }
+    let line = format!("r {}, packing density {:.4}, {thin}{short}", spec.radius, facts.packing_density);
     args.common.deliver(&Points::new(&found.points), facts, &line)
 }
 
@@ -166,7 +171,8 @@ mod tests {
             [("0.6", "r is 0.6; "), ("1e-300", "r is 1e-300; "), ("0", "r is 0; "), ("nan", "r is NaN; ")]
         {
             let args = parsed(&["--r", r]).unwrap();
-            let message = sample::<2>(&args).map_err(|failure| failure.message).unwrap_err();
+            let message =
+                sample::<2>(&args, &Terminal::default()).map_err(|failure| failure.message).unwrap_err();
             let limits = "it has to be 1.4e-14 to 0.5, or from 0.707 on for a single point";
             assert!(message.contains(said) && message.ends_with(limits), "{message}");
         }
@@ -191,7 +197,11 @@ mod tests {
                 seed: 1,
                 spacing: Spacing::Double,
             };
-            let made = make::<2>(&spec, &args).map_err(|failure| failure.message).unwrap().points.len();
+            let made = make::<2>(&spec, &args, &Terminal::default())
+                .map_err(|failure| failure.message)
+                .unwrap()
+                .points
+                .len();
             (made, shortfall(&args, made))
         };
         assert_eq!(said("1"), (1, String::new()));

@@ -16,7 +16,7 @@ pub struct VolumeArgs {
     /// Dimensions: 3
     #[arg(long, value_name = "D", default_value_t = 3, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(3..=3))]
     pub dim: u8,
-    /// A closed surface, .ply or .obj; without it a torus about the middle of the unit cube
+    /// A closed surface, .ply, .obj, .off or .stl; without it a torus about the middle of the unit cube
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
     /// From the axis of the torus to the middle of its tube
@@ -139,6 +139,7 @@ mod tests {
     use clap::Parser;
 
     use crate::cli::args::{Cli, Command};
+    use crate::output::terminal::Terminal;
 
     #[test]
     fn a_mesh_has_no_ring_and_no_tube() {
@@ -152,10 +153,10 @@ mod tests {
 
     fn refusal(typed: &[&str]) -> String {
         let typed = ["quintile", "sample", "volume"].iter().chain(typed);
-        let Ok(Cli { command: Command::Sample(args) }) = Cli::try_parse_from(typed) else {
+        let Ok(Cli { command: Command::Sample(args), .. }) = Cli::try_parse_from(typed) else {
             return String::new();
         };
-        super::super::run(&args).err().map_or_else(String::new, |failure| {
+        super::super::run(&args, &Terminal::default()).err().map_or_else(String::new, |failure| {
             assert_eq!(failure.code, 2);
             failure.message
         })

@@ -10,10 +10,12 @@ use traces::io::atomic::write_file;
 use super::args::AlignArgs;
 use super::energy::is_within;
 use super::input::wrong;
+use super::report;
 use super::times::times;
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::terminal::print_json;
+use crate::output::terminal::Terminal;
 
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {
@@ -36,8 +38,10 @@ fn check_anchor((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Fa
 const SLOPE_OFF: f64 = 0.02;
 
 /// Tells of anchors that are likely wrong: stamps in another unit, or of another recording.
-fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f64]) {
-    let told = |what: String| complain(&format!("warning anchors-off: {what}; look at --anchor STAMP=TIME"));
+fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f64], terminal: &Terminal) {
+    let told = |what: String| {
+        terminal.warn_of("anchors-off", &format!("{what}; look at --anchor STAMP=TIME"));
+    };
     if (alignment.scale - 1.0).abs() > SLOPE_OFF {
         told(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
     }
@@ -49,28 +53,29 @@ fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f6
     }
 }
 
-pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
     let mut stamps = times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {
         [a, b] => {
-            let trace = args.input.source()?.0.heading();
+            let trace = args.input.source(terminal)?.0.heading();
             [a, b].iter().try_for_each(|anchor| check_anchor(*anchor, &trace))?;
             let alignment = Alignment::by_anchors(a, b)?;
-            warn_of_anchors([a, b], &alignment, &stamps);
+            warn_of_anchors([a, b], &alignment, &stamps, terminal);
             alignment
         }
         [] => {
-            let found = args.find.frames(&args.input, &args.input.trace)?.found;
+            let found = args.find.frames(&args.input, &args.input.trace, terminal)?.found;
             let starts: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
             Alignment::by_fit(&stamps, &starts)?
         }
         _ => return Err(wrong("--anchor is given twice, or not at all for a fit to the frames found")),
     };
     if alignment.ambiguous {
-        complain(
-            "warning ambiguous-alignment: another pairing fits about as well, as frame times are even; give two anchors",
+        terminal.warn_of(
+            "ambiguous-alignment",
+            "another pairing fits about as well, as frame times are even; give two anchors",
         );
     }
     if let Some(out) = &args.out {
@@ -83,8 +88,9 @@ pub(super) fn run(args: &AlignArgs) -> Result<(), Failure> {
         let aligned: Vec<f64> = stamps.iter().map(|stamp| alignment.time_s(*stamp)).collect();
         return print_json(&json!({ "alignment": alignment, "times_s": aligned }), true);
     }
-    print(&format!(
+    let line = format!(
         "time = {} s + {} x stamp ({} pairs, {:.3e} s left)",
         alignment.offset_s, alignment.scale, alignment.pairs, alignment.residual_s
-    ))
+    );
+    report(&line, args.piped, terminal)
 }

@@ -7,20 +7,22 @@ use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, p
 
 use super::args::ConvertArgs;
 use super::input::wrong;
+use super::report;
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::terminal::print_json;
 use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
+use crate::output::terminal::Terminal;
 
 /// Bytes of a row of CSV, about; larger files than this many are announced.
 const ROW_BYTES: u64 = 50;
 const LARGE_BYTES: u64 = 1 << 30;
 
-pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure> {
     check(&args.out)?;
     may_be_saved("OUT", &args.out, [args.input.trace.as_path()])?;
-    let (trace, repairs) = args.input.source()?;
-    save(&*trace, &args.out)?;
+    let (trace, repairs) = args.input.source(terminal)?;
+    save(&*trace, &args.out, terminal)?;
     let Heading { samples, rate_hz, .. } = trace.heading();
     if args.json {
         let out = args.out.display().to_string();
@@ -29,7 +31,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
             true,
         );
     }
-    print(&format!("{}: {samples} samples at {rate_hz} Hz", args.out.display()))
+    report(&format!("{}: {samples} samples at {rate_hz} Hz", args.out.display()), args.piped, terminal)
 }
 
 fn name(path: &Path) -> String {
@@ -67,11 +69,11 @@ fn description_path(out: &Path) -> Option<PathBuf> {
     let name = name(out);
     let plain = name.trim_end_matches(".gz");
     let text = plain.ends_with(".csv") || plain.ends_with(".tsv");
-    text.then(|| csv::description_path(out, name.ends_with(".gz")))
+    text.then(|| csv::description_path(out))
 }
 
 /// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].
-pub(super) fn save(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
+pub(super) fn save(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let name = name(path);
     let plain = name.trim_end_matches(".gz");
     if name.ends_with(".parquet") {
@@ -81,11 +83,11 @@ pub(super) fn save(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
         return Ok(jls::save(trace, path)?);
     }
     if name.ends_with(".perfetto-trace") {
-        return perfetto(trace, path);
+        return perfetto(trace, path, terminal);
     }
     let bytes = trace.heading().samples * ROW_BYTES;
     if bytes > LARGE_BYTES {
-        complain(&format!(
+        terminal.note(&format!(
             "{}: about {:.1} GB as text; Parquet takes a tenth",
             path.display(),
             bytes as f64 * 1e-9
@@ -96,7 +98,7 @@ pub(super) fn save(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
 }
 
 /// A counter track of the power, thinned out to what the viewer holds.
-fn perfetto(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
+fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let heading = trace.heading();
     let mut thinner = Thinner::new(heading.samples, MAX_POINTS);
     trace.pour(&mut thinner)?;
@@ -105,7 +107,7 @@ fn perfetto(trace: &dyn Source, path: &Path) -> Result<(), Failure> {
     let points: Vec<(u64, f64)> = thinner.kept().into_iter().map(place).collect();
     let (kept, samples) = (points.len() as u64, heading.samples);
     if kept < samples {
-        complain(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
+        terminal.note(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
     }
     let counters = vec![CounterTrack { name: "power", unit: "W", points }];
     let timeline = Timeline { process: "trace", counters, ..Timeline::default() };

@@ -13,24 +13,26 @@ use traces::io::{Heading, Repair, Source};
 use super::args::{Discard, EnergyArgs, IdleBy};
 use super::input::wrong;
 use crate::cli::Failure;
-use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::terminal::{print, print_json};
+use crate::output::table::counted;
+use crate::output::terminal::Terminal;
 
 /// Samples from which the lowest power is taken, about.
 const LEVELS: u64 = 65_536;
 
-pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure> {
     passes_differ(&args.pass)?;
-    let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path)).transpose()?;
+    let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path, terminal)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
-        let (trace, repairs) = args.input.source()?;
+        let (trace, repairs) = args.input.source(terminal)?;
         return stretch(args, (&*trace, &repairs), recording.as_ref());
     }
-    let (first, repairs, of_file) = one_run(args, &args.input.trace, recording.as_ref())?;
+    let (first, repairs, of_file) = one_run(args, &args.input.trace, recording.as_ref(), terminal)?;
     let pixels = args.find.pixels.or(of_file);
     let mut runs = vec![first];
     for path in &args.run {
-        runs.push(one_run(args, path, recording.as_ref())?.0);
+        runs.push(one_run(args, path, recording.as_ref(), terminal)?.0);
     }
     let energies: Vec<Vec<f64>> =
         runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
@@ -47,9 +49,9 @@ pub(super) fn run(args: &EnergyArgs) -> Result<(), Failure> {
 fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
     let per_pixel = pixels.filter(|&pixels| pixels > 0).map(|pixels| pool.mean / pixels as f64 * 1e9);
     format!(
-        "{} runs, {} frames: {:.4} mJ/frame{}, pooled standard deviation {:.4} mJ",
-        pool.runs,
-        pool.values,
+        "{}, {}: {:.4} mJ/frame{}, pooled standard deviation {:.4} mJ",
+        counted(pool.runs, "run"),
+        counted(pool.values, "frame"),
         pool.mean * 1e3,
         per_pixel.map_or(String::new(), |nj| format!(", {nj:.3} nJ/pixel")),
         pool.deviation * 1e3
@@ -96,10 +98,16 @@ pub(super) fn check_within(
     what: &str,
 ) -> Result<(), Failure> {
     let extent = [start_s, end_s];
-    if is_within(extent, from_s) && is_within(extent, to_s) && from_s < to_s {
-        return Ok(());
+    let inside = is_within(extent, from_s) && is_within(extent, to_s);
+    match (inside, from_s < to_s) {
+        (true, true) => Ok(()),
+        (true, false) => Err(wrong(format!(
+            "{what}: {from_s} s to {to_s} s ends before it begins or has no length; give the earlier time first"
+        ))),
+        (false, _) => Err(wrong(format!(
+            "{what}: {from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s; give times inside it"
+        ))),
     }
-    Err(wrong(format!("{what}: {from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s")))
 }
 
 fn idle<'a>(
@@ -150,9 +158,10 @@ fn one_run(
     args: &EnergyArgs,
     path: &Path,
     recording: Option<&PowerIntegral<'_>>,
+    terminal: &Terminal,
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
-    let (found, trace) = args.find.frames_and_samples(&args.input, path)?;
-    found.warn();
+    let (found, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
+    found.warn(terminal);
     let mut frames = whole(&found.energies).to_vec();
     let (trace, start_s) = (&*trace, trace.heading().start_s);
     let idle = idle(args, trace, recording)?;
@@ -174,8 +183,14 @@ fn one_run(
     let kept: Vec<FrameEnergy> =
         frames.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, f)| *f).collect();
     let old: Vec<f64> = old.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, j)| j).collect();
-    let none = || wrong(format!("of {} frames none is left after {discarded} are discarded", frames.len()));
+    let none = || {
+        wrong(format!(
+            "of {} none is left after {discarded} are discarded; discard fewer",
+            counted(frames.len(), "frame")
+        ))
+    };
     let old = Spread::of(&old).ok_or_else(none)?;
+    args.pass.iter().try_for_each(|mark| within_frames(mark, &kept, terminal))?;
     let passes = passes(args, trace, &kept, &idle_j)?;
     let run = Run { kept, discarded, clearness: warm.clearness, outliers: count, old, passes };
     Ok((run, found.repairs, found.metadata.pixels))
@@ -220,13 +235,12 @@ fn passes(
     if marks.is_empty() {
         return Ok(Vec::new());
     }
-    marks.iter().try_for_each(|mark| within_frames(mark, frames))?;
     marks.sort_by(|a, b| a.1.total_cmp(&b.1));
     if marks[0].1 > 0.0 {
         marks.insert(0, ("before".to_owned(), 0.0));
     }
     let span = &|index: usize, frame: &FrameEnergy| {
-        let at = |mark: &(String, f64)| (frame.start_s + mark.1 * 1e-3).min(frame.end_s);
+        let at = |mark: &(String, f64)| (frame.start_s + mark.1).min(frame.end_s);
         (at(&marks[index]), marks.get(index + 1).map_or(frame.end_s, at))
     };
     // Pass by pass, and all at once: the samples may have to be read anew for each question.
@@ -249,20 +263,27 @@ fn passes_differ(passes: &[(String, f64)]) -> Result<(), Failure> {
 }
 
 /// Refuses a pass that begins in no frame, and tells of one that begins in some alone.
-fn within_frames((name, ms): &(String, f64), frames: &[FrameEnergy]) -> Result<(), Failure> {
-    let beyond = frames.iter().filter(|frame| frame.duration_s() <= ms * 1e-3).count();
+fn within_frames(
+    (name, begins_s): &(String, f64),
+    frames: &[FrameEnergy],
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let beyond = frames.iter().filter(|frame| frame.duration_s() <= *begins_s).count();
     if beyond == frames.len() {
         let longest_s = frames.iter().map(FrameEnergy::duration_s).fold(0.0, f64::max);
         return Err(wrong(format!(
-            "--pass {name}={ms}: no frame is longer than {:.3} ms; let the pass begin before that",
+            "--pass {name}={}: no frame is longer than {:.3} ms; let the pass begin before that",
+            begins_s * 1e3,
             longest_s * 1e3
         )));
     }
     if beyond > 0 {
         let frames = frames.len();
-        complain(&format!(
-            "warning pass-beyond: {beyond} of {frames} frames end before pass {name} begins, {ms} ms after their start: it has no energy there"
-        ));
+        let message = format!(
+            "{beyond} of {frames} frames end before pass {name} begins, {} ms after their start: it has no energy there",
+            begins_s * 1e3
+        );
+        terminal.warn_of("pass-beyond", &message);
     }
     Ok(())
 }
@@ -283,10 +304,10 @@ impl Run {
         let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
         let spread = Spread::of(&energies).unwrap_or_default();
         let mut text = format!(
-            "{} frames ({} discarded, {} outliers): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
-            self.kept.len(),
+            "{} ({} discarded, {}): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
+            counted(self.kept.len(), "frame"),
             self.discarded,
-            self.outliers,
+            counted(self.outliers, "outlier"),
             spread.mean * 1e3,
             spread.deviation * 1e3,
             self.old.mean * 1e3

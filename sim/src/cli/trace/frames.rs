@@ -9,20 +9,22 @@ use traces::frames::{Rule, Threshold};
 
 use super::args::FramesArgs;
 use super::input::{Frames, wrong};
+use super::report;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::{complain, print, print_json};
+use crate::cli::terminal::print_json;
 use crate::cli::{Failure, threads};
-use crate::output::table::{Table, si, si_digits};
+use crate::output::table::{Table, counted, si, si_digits};
+use crate::output::terminal::Terminal;
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;
 
-pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &FramesArgs, terminal: &Terminal) -> Result<(), Failure> {
     let inputs = args.find.mark_file.as_deref().into_iter().chain([args.input.trace.as_path()]);
     may_hold_results(("--out", args.out.as_deref()), inputs)?;
     args.out.as_deref().map_or(Ok(()), is_table)?;
     let (frames, table, summary, pixels) = threads(args.threads)?.install(|| {
-        let mut frames = args.find.frames(&args.input, &args.input.trace)?;
+        let mut frames = args.find.frames(&args.input, &args.input.trace, terminal)?;
         let pixels = args.find.pixels.or(frames.metadata.pixels);
         let table = FrameTable::new(std::mem::take(&mut frames.energies), pixels);
         let write = |out| traces::io::atomic::write_file(out, |file| table.write_csv(file));
@@ -32,14 +34,16 @@ pub(super) fn run(args: &FramesArgs) -> Result<(), Failure> {
         Ok::<_, Failure>((frames, table, summary, pixels))
     })?;
     if args.json {
-        return print_json(&report(&frames, &table, summary, pixels, args.inverse), true);
+        return print_json(&json_report(&frames, &table, summary, pixels, args.inverse), true);
     }
-    frames.warn();
-    print(&text(&frames, &table, summary, pixels))?;
+    frames.warn(terminal);
+    report(&text(&frames, &table, summary, pixels), args.piped, terminal)?;
     if args.inverse {
-        print(&inverse_text(&table, pixels))?;
+        report(&inverse_text(&table, pixels, terminal), args.piped, terminal)?;
     }
-    args.out.as_ref().map_or(Ok(()), |out| print(&format!("frames: {}", out.display())))
+    args.out
+        .as_ref()
+        .map_or(Ok(()), |out| report(&format!("frames: {}", out.display()), args.piped, terminal))
 }
 
 /// Refuses a name that promises another kind of file.
@@ -69,7 +73,7 @@ struct Row {
     outlier: u8,
 }
 
-fn report(
+fn json_report(
     frames: &Frames,
     table: &FrameTable,
     summary: Option<Summary>,
@@ -116,10 +120,10 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
         );
     }
     lines += &format!(
-        "{} samples at {}, {} frames by {}; {}\n",
-        frames.samples,
+        "{} at {}, {} by {}; {}\n",
+        counted(frames.samples as usize, "sample"),
         si(frames.rate_hz, "Hz"),
-        table.frames().len(),
+        counted(table.frames().len(), "frame"),
         frames.found.method,
         reason(&frames.found.threshold)
     );
@@ -153,7 +157,7 @@ fn text(frames: &Frames, table: &FrameTable, summary: Option<Summary>, pixels: O
         }
         let outliers = table.outliers().iter().filter(|out| **out).count();
         let cut = if s.frames < table.frames().len() { "; without the last, which is cut" } else { "" };
-        lines += &format!("; {outliers} outliers{cut}\n");
+        lines += &format!("; {}{cut}\n", counted(outliers, "outlier"));
     }
     lines
 }
@@ -183,10 +187,11 @@ fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
     })
 }
 
-fn inverse_text(table: &FrameTable, pixels: Option<u64>) -> String {
+fn inverse_text(table: &FrameTable, pixels: Option<u64>, terminal: &Terminal) -> String {
     let units = inverse_units(table, pixels);
-    complain(
-        "warning inverse-units: inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
+    terminal.warn_of(
+        "inverse-units",
+        "inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
     );
     let number = |key: &str| units[key].as_f64().unwrap_or(f64::NAN);
     let per_pixel =

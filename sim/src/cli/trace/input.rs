@@ -8,12 +8,13 @@ use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window,
 use traces::io::{ReadError, ReadOptions, Recording, Repair, Rows, Source, WriteError, rail_of_sums, read};
 use traces::stream::{self, StreamError};
 use traces::trace::RATE_LIMITS_HZ;
-use traces::{MarkKind, Metadata, Trace, Warning};
+use traces::{MarkKind, Metadata, Trace};
 
 use super::args::{FindArgs, InputArgs};
+use super::pipes::shown;
 use super::times::times;
 use crate::cli::Failure;
-use crate::cli::terminal::complain;
+use crate::output::terminal::Terminal;
 
 /// Traces of more samples are read in pieces.
 const LONG: u64 = 1 << 24;
@@ -91,30 +92,34 @@ impl InputArgs {
     }
 
     /// The whole trace in memory; what was mended is told.
-    pub(super) fn load(&self) -> Result<(Trace, Vec<Repair>), Failure> {
-        self.load_other(&self.trace)
+    pub(super) fn load(&self, terminal: &Terminal) -> Result<(Trace, Vec<Repair>), Failure> {
+        self.load_other(&self.trace, terminal)
     }
 
     /// Another trace, read in the same way.
-    pub(super) fn load_other(&self, path: &Path) -> Result<(Trace, Vec<Repair>), Failure> {
+    pub(super) fn load_other(
+        &self,
+        path: &Path,
+        terminal: &Terminal,
+    ) -> Result<(Trace, Vec<Repair>), Failure> {
         let loaded = read(path, &self.options()?)?;
-        self.warn_of_sums(path)?;
-        tell_repairs(path, &loaded.repairs);
+        self.warn_of_sums(path, terminal)?;
+        note_repairs(path, &loaded.repairs, terminal);
         Ok((loaded.trace, loaded.repairs))
     }
 
     /// The trace as a source of samples, read in pieces; one that has to be mended is in memory, as what is mended depends
     /// on all of it. What was mended is told.
-    pub(super) fn source(&self) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
+    pub(super) fn source(&self, terminal: &Terminal) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
         match Recording::open(&self.trace, &self.options()?) {
             Ok(recording) => {
-                self.warn_of_sums(&self.trace)?;
+                self.warn_of_sums(&self.trace, terminal)?;
                 let repairs = recording.repairs().to_vec();
-                tell_repairs(&self.trace, &repairs);
+                note_repairs(&self.trace, &repairs, terminal);
                 Ok((Box::new(recording), repairs))
             }
             Err(_) if self.repair => {
-                let (trace, repairs) = self.load()?;
+                let (trace, repairs) = self.load(terminal)?;
                 Ok((Box::new(trace), repairs))
             }
             Err(error) => Err(error.into()),
@@ -124,22 +129,22 @@ impl InputArgs {
 
 impl InputArgs {
     /// Tells where a rail is added to those that it is the sum of.
-    pub(super) fn warn_of_sums(&self, path: &Path) -> Result<(), Failure> {
+    pub(super) fn warn_of_sums(&self, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
         if !self.rail.is_empty() {
             return Ok(());
         }
         if let Some(sum) = rail_of_sums(path, &self.options()?)? {
             let others: Vec<String> = sum.others.iter().map(|rail| format!("--rail {rail}")).collect();
             let alone = if sum.rail.is_empty() { String::new() } else { format!("--rail {}, or ", sum.rail) };
-            complain(&format!("warning rail-counted-twice: {sum}: give {alone}{}", others.join(" ")));
+            terminal.warn_of("rail-counted-twice", &format!("{sum}: give {alone}{}", others.join(" ")));
         }
         Ok(())
     }
 }
 
-fn tell_repairs(path: &Path, repairs: &[Repair]) {
+fn note_repairs(path: &Path, repairs: &[Repair], terminal: &Terminal) {
     for repair in repairs {
-        complain(&format!("{}: mended: {}", path.display(), repair.message));
+        terminal.note(&format!("{}: repaired: {}", shown(path), repair.message));
     }
 }
 
@@ -157,22 +162,24 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    pub(super) fn warn(&self) {
-        self.found.warnings.iter().for_each(tell);
+    pub(super) fn warn(&self, terminal: &Terminal) {
+        let warnings = self.found.warnings.iter();
+        warnings.for_each(|warning| terminal.warn_of(warning.code, &warning.message));
     }
-}
-
-fn tell(warning: &Warning) {
-    complain(&format!("warning {}: {}", warning.code, warning.message));
 }
 
 impl FindArgs {
     /// Finds frames in memory, or in pieces where the trace is long.
-    pub(super) fn frames(&self, input: &InputArgs, path: &Path) -> Result<Frames, Failure> {
+    pub(super) fn frames(
+        &self,
+        input: &InputArgs,
+        path: &Path,
+        terminal: &Terminal,
+    ) -> Result<Frames, Failure> {
         if self.streams(input, path)? {
-            return self.in_pieces(input, path);
+            return self.in_pieces(input, path, terminal);
         }
-        let (trace, repairs) = input.load_other(path)?;
+        let (trace, repairs) = input.load_other(path, terminal)?;
         self.at_once(&trace, repairs)
     }
 
@@ -181,12 +188,13 @@ impl FindArgs {
         &self,
         input: &InputArgs,
         path: &Path,
+        terminal: &Terminal,
     ) -> Result<(Frames, Box<dyn Source>), Failure> {
         if self.streams(input, path)? {
             let recording = Recording::open(path, &input.options()?)?;
-            return Ok((self.in_pieces(input, path)?, Box::new(recording)));
+            return Ok((self.in_pieces(input, path, terminal)?, Box::new(recording)));
         }
-        let (trace, repairs) = input.load_other(path)?;
+        let (trace, repairs) = input.load_other(path, terminal)?;
         Ok((self.at_once(&trace, repairs)?, Box::new(trace)))
     }
 
@@ -219,7 +227,7 @@ impl FindArgs {
         Ok(self.stream || rows.count().map_or(bytes > LONG_BYTES, |count| count > LONG))
     }
 
-    fn in_pieces(&self, input: &InputArgs, path: &Path) -> Result<Frames, Failure> {
+    fn in_pieces(&self, input: &InputArgs, path: &Path, terminal: &Terminal) -> Result<Frames, Failure> {
         let options = input.options()?;
         if self.auto {
             return Err(wrong("--auto looks at traces that fit into memory; mark a frame with --mark"));
@@ -227,9 +235,9 @@ impl FindArgs {
         let rows = Rows::open(path, &options)?;
         let starts_s = self.marks(rows.metadata())?;
         let end_s = self.end.or_else(|| end_mark(rows.metadata())).unwrap_or(f64::INFINITY);
-        let marks = Marks { starts_s, window: self.window_s()?, end_s };
+        let marks = Marks { starts_s, window: self.window_s(), end_s };
         let streamed = stream::find(path, &options, &marks)?;
-        input.warn_of_sums(path)?;
+        input.warn_of_sums(path, terminal)?;
         let clock = streamed.clock;
         Ok(Frames {
             found: streamed.found,
@@ -265,16 +273,13 @@ impl FindArgs {
             None => self.marks(&trace.metadata)?,
         };
         let end_s = self.end.or_else(|| end_mark(&trace.metadata)).unwrap_or(trace.end_s());
-        let marks = Marks { starts_s, window: self.window_s()?, end_s };
+        let marks = Marks { starts_s, window: self.window_s(), end_s };
         Ok((find_with(trace, &marks, &Options { method: self.method })?, proposal))
     }
 
-    fn window_s(&self) -> Result<Window, Failure> {
-        let (pre, post) = self.window;
-        if pre < 0.0 || post < 0.0 {
-            return Err(wrong(format!("--window {pre},{post}: both have to be at least 0 ms")));
-        }
-        Ok(Window { pre_s: pre * 1e-3, post_s: post * 1e-3 })
+    fn window_s(&self) -> Window {
+        let (pre_s, post_s) = self.window;
+        Window { pre_s, post_s }
     }
 
     fn marks(&self, metadata: &Metadata) -> Result<Vec<f64>, Failure> {

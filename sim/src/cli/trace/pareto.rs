@@ -10,13 +10,16 @@ use traces::table::{Table as Columns, TableReadError};
 
 use super::args::{ParetoArgs, ParetoShow};
 use super::input::wrong;
+use super::pipes::shown;
 use super::plot::{Ending, write};
+use super::report;
 use super::units::{Quantity, scale_with};
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::{print, print_json};
-use crate::output::plot::{Lines, Mark, Series};
+use crate::cli::terminal::print_json;
+use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Series};
 use crate::output::table::{Table, si_digits};
+use crate::output::terminal::Terminal;
 
 impl From<TableReadError> for Failure {
     fn from(error: TableReadError) -> Self {
@@ -27,7 +30,7 @@ impl From<TableReadError> for Failure {
 
 type Groups = BTreeMap<String, Vec<Standing>>;
 
-pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &ParetoArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.table.as_path()])?;
     let table = Columns::read(&args.table)?;
     let groups = groups(args, &table)?;
@@ -41,7 +44,7 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), Failure> {
     if args.json {
         print_json(&json!({ "idle_W": args.idle_w, "groups": groups }), true)
     } else {
-        print(&text(&groups))
+        report(&text(&groups), args.piped, terminal)
     }
 }
 
@@ -156,38 +159,40 @@ fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
     }
 }
 
-/// All groups in one picture: points with their deviations, and each group's frontier as a line.
-fn picture(args: &ParetoArgs, groups: &Groups) -> crate::output::plot::Picture {
+/// All groups in one picture: points with their names and deviations, and each group's frontier as steps, as between two settings
+/// there is none.
+fn picture(args: &ParetoArgs, groups: &Groups) -> Picture {
     let place = |s: &Standing| place(args.show, &s.point);
     let all = || groups.values().flatten();
     let of = |on: bool| {
-        let chosen = all().filter(|s| s.on_frontier == on);
-        let label = |s: &Standing| if on { s.point.label.clone() } else { String::new() };
-        Mark::Dots(chosen.map(|s| (place(s).0, place(s).1, label(s))).collect())
+        let chosen = all().filter(move |s| s.on_frontier == on);
+        chosen.map(|s| (place(s).0, place(s).1, s.point.label.clone())).collect()
     };
-    let mut series = vec![
-        Series { name: "beaten by another".to_owned(), mark: of(false) },
-        Series { name: "on the frontier".to_owned(), mark: of(true) },
-    ];
-    let blurred: Vec<_> = all().map(place).filter(|(_, _, dx, dy)| *dx > 0.0 || *dy > 0.0).collect();
-    if !blurred.is_empty() {
-        series.push(Series { name: "one standard deviation".to_owned(), mark: Mark::Crosses(blurred) });
+    let mut series = Vec::new();
+    let crosses: Vec<_> = all().map(place).filter(|(_, _, dx, dy)| *dx > 0.0 || *dy > 0.0).collect();
+    for (x, y, dx, dy) in &crosses {
+        let lines = vec![vec![(x - dx, *y), (x + dx, *y)], vec![(*x, y - dy), (*x, y + dy)]];
+        series.push(Series::new("", Mark::Faint(lines)).painted(Paint::Ink));
     }
-    for (group, standings) in groups {
+    if let Some(first) = series.first_mut() {
+        first.name = "one standard deviation".to_owned();
+    }
+    for (number, (group, standings)) in groups.iter().enumerate() {
         let on = standings.iter().filter(|s| s.on_frontier);
-        let mut line: Vec<(f64, f64)> = on.map(|s| (place(s).0, place(s).1)).collect();
-        line.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if line.len() > 1 && series.len() < 8 {
-            series.push(Series {
-                name: if group.is_empty() { "frontier".to_owned() } else { group.clone() },
-                mark: Mark::Line(line),
-            });
+        let mut steps: Vec<(f64, f64)> = on.map(|s| (place(s).0, place(s).1)).collect();
+        steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if steps.len() > 1 {
+            let name = if group.is_empty() { "frontier".to_owned() } else { group.clone() };
+            series.push(Series::new(name, Mark::Steps(steps)).painted(Paint::Like(2 + number % 6)));
         }
     }
-    let subject = format!("{} - idle power charged: {} W", args.table.display(), args.idle_w);
+    series.push(Series::new("dominated", Mark::Rings(of(false))).painted(Paint::Like(0)));
+    series.push(Series::new("on the frontier", Mark::Dots(of(true))).painted(Paint::Like(0)));
+    let subject = format!("{} - idle power charged: {} W", shown(&args.table), args.idle_w);
     let (title, y) = match args.show {
         ParetoShow::Energy => ("Time and energy", ("energy", "J")),
         ParetoShow::Power => ("Time and mean power", ("power", "W")),
     };
-    Lines { title, subject: &subject, x: ("time", "s"), y, series }.picture()
+    let axes = [("time", "s"), y].map(|(name, unit)| AxisSpec::even(name, unit));
+    Chart::new(title, &subject, vec![ChartPanel::over("", axes, series)]).picture(&args.look.look())
 }

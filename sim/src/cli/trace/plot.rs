@@ -5,16 +5,20 @@ use std::path::Path;
 use serde_json::json;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
+use traces::io::{ReadError, ReadOptions};
 use traces::pyramid::{Column, Pyramid, pyramid_path};
 
 use super::args::{PlotArgs, PlotKind};
 use super::energy::check_within;
 use super::input::wrong;
+use super::pipes::shown as name_of;
+use super::report;
 use crate::cli::Failure;
 use crate::cli::outputs::may_hold_results;
-use crate::cli::terminal::{complain, print, print_json};
-use crate::output::plot::{Lines, Mark, Picture, Series};
-use crate::output::table::si;
+use crate::cli::terminal::print_json;
+use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};
+use crate::output::table::{counted, si};
+use crate::output::terminal::Terminal;
 
 /// Columns of the curve.
 const COLUMNS: usize = 1050;
@@ -23,18 +27,18 @@ const BARS: usize = 60;
 /// Frames drawn on top of one another, at most.
 const OVERLAID: usize = 400;
 
-pub(super) fn run(args: &PlotArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &PlotArgs, terminal: &Terminal) -> Result<(), Failure> {
     let kind = Ending::of(&args.out)?;
     may_hold_results(("--out", Some(&args.out)), [args.input.trace.as_path()])?;
     let (picture, shown) = match args.kind {
-        PlotKind::Curve => curve(args)?,
-        _ => framed(args)?,
+        PlotKind::Curve => curve(args, terminal)?,
+        _ => framed(args, terminal)?,
     };
     write(&picture, &args.out, kind)?;
     if args.json {
         return print_json(&json!({ "out": args.out.display().to_string(), "shown": shown }), true);
     }
-    print(&format!("{}: {shown}", args.out.display()))
+    report(&format!("{}: {shown}", args.out.display()), args.piped, terminal)
 }
 
 /// What kind of file a name asks for.
@@ -72,19 +76,24 @@ fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure
     Ok((from_s.max(start_s), to_s.min(end_s)))
 }
 
+type Make = fn(&Path, &ReadOptions) -> Result<Pyramid, ReadError>;
+
 /// What is shown, and its columns: from the pyramid beside the file, or from the samples where these are few.
-fn columns(args: &PlotArgs) -> Result<((f64, f64), Vec<Column>), Failure> {
+fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<((f64, f64), Vec<Column>), Failure> {
     if args.input.repair {
         // What is mended is told, so it is mended anew each time.
-        let trace = args.input.load()?.0;
+        let trace = args.input.load(terminal)?.0;
         let shown = span(args, trace.start_s(), trace.end_s())?;
         let columns = Pyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
         return Ok((shown, columns.unwrap_or_default()));
     }
     let (path, options) = (args.input.trace.as_path(), args.input.options()?);
-    args.input.warn_of_sums(path)?;
-    let pyramid = Pyramid::of_file(path, &options)?;
-    let told = || complain(&format!("{}: damaged; made anew", pyramid_path(path).display()));
+    args.input.warn_of_sums(path, terminal)?;
+    let (pyramid, make): (_, Make) = match args.keep_pyramid {
+        true => (Pyramid::of_file(path, &options)?, Pyramid::anew),
+        false => (Pyramid::look(path, &options)?, Pyramid::build),
+    };
+    let told = || terminal.note(&format!("{}: damaged; made anew", pyramid_path(path).display()));
     if pyramid.was_damaged() {
         told();
     }
@@ -93,27 +102,24 @@ fn columns(args: &PlotArgs) -> Result<((f64, f64), Vec<Column>), Failure> {
         return Ok((shown, columns));
     }
     told();
-    let columns = Pyramid::anew(path, &options)?.columns_of_file((path, &options), shown, COLUMNS)?;
+    let columns = make(path, &options)?.columns_of_file((path, &options), shown, COLUMNS)?;
     Ok((shown, columns.unwrap_or_default()))
 }
 
 /// Lowest, highest and mean power of each column.
-fn curve(args: &PlotArgs) -> Result<(Picture, String), Failure> {
-    let ((from_s, to_s), columns) = columns(args)?;
+fn curve(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Failure> {
+    let ((from_s, to_s), columns) = columns(args, terminal)?;
     let middle = |column: &Column| 0.5 * (column.from_s + column.to_s);
     let band = columns.iter().map(|c| (middle(c), f64::from(c.low_w), f64::from(c.high_w))).collect();
-    let width_s = args.low_pass.map_or((to_s - from_s) / 50.0, |ms| ms * 1e-3);
+    let width_s = args.low_pass.unwrap_or((to_s - from_s) / 50.0);
     let mean = smoothed(&columns, width_s).into_iter().zip(&columns).map(|(w, c)| (middle(c), w)).collect();
     let shown = format!("{from_s} s to {to_s} s in {} columns", columns.len());
     let series = vec![
-        Series { name: "lowest to highest".to_owned(), mark: Mark::Band(band) },
-        Series { name: format!("mean over {}", si(width_s, "s")), mark: Mark::Line(mean) },
+        series("lowest to highest", Mark::Band(band)),
+        series(&format!("mean over {}", si(width_s, "s")), Mark::Line(mean)),
     ];
-    let subject = args.input.trace.display().to_string();
-    Ok((
-        Lines { title: "Power", subject: &subject, x: ("time", "s"), y: ("power", "W"), series }.picture(),
-        shown,
-    ))
+    let subject = name_of(&args.input.trace);
+    Ok((drawn(args, &subject, ("Power", ("time", "s"), POWER, series)), shown))
 }
 
 /// Means of the columns within half a width on either side.
@@ -132,22 +138,29 @@ fn smoothed(columns: &[Column], width_s: f64) -> Vec<f64> {
 }
 
 /// The kinds that need frames.
-fn framed(args: &PlotArgs) -> Result<(Picture, String), Failure> {
+fn framed(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Failure> {
     if args.from.is_some() || args.to.is_some() {
         return Err(wrong("--from and --to choose a part of --kind curve; leave them out"));
     }
-    let (count, (title, x, y, series)) = match args.kind {
-        PlotKind::Frame | PlotKind::Overlay => samples(args)?,
-        _ => energies(args)?,
+    let (count, plot) = match args.kind {
+        PlotKind::Frame | PlotKind::Overlay => samples(args, terminal)?,
+        _ => energies(args, terminal)?,
     };
-    let shown = format!("{count} frames");
-    let subject = format!("{} - {shown}", args.input.trace.display());
-    Ok((Lines { title, subject: &subject, x, y, series }.picture(), shown))
+    let shown = counted(count, "frame");
+    let subject = format!("{} - {shown}", name_of(&args.input.trace));
+    Ok((drawn(args, &subject, plot), shown))
+}
+
+/// The picture of a plot; power starts at zero in all kinds.
+fn drawn(args: &PlotArgs, subject: &str, (title, x, y, series): Drawn) -> Picture {
+    let scale = if y == POWER { Scale::FromZero } else { Scale::Even };
+    let axes = [AxisSpec::even(x.0, x.1), AxisSpec { scale, ..AxisSpec::even(y.0, y.1) }];
+    Chart::new(title, subject, vec![ChartPanel::over("", axes, series)]).picture(&args.look.look())
 }
 
 /// The kinds that show samples of frames, which are held.
-fn samples(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
-    let (trace, _) = args.input.load()?;
+fn samples(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Failure> {
+    let (trace, _) = args.input.load(terminal)?;
     let found = args.find.found_at_once(&trace)?;
     let frames = PowerIntegral::new(&trace).frames(&found);
     let drawn = match args.kind {
@@ -158,14 +171,14 @@ fn samples(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
 }
 
 /// The energy of each frame of one recording, J, in pieces where it is long.
-fn energies_of(args: &PlotArgs, path: &Path) -> Result<Vec<f64>, Failure> {
-    let frames = args.find.frames(&args.input, path)?;
+fn energies_of(args: &PlotArgs, path: &Path, terminal: &Terminal) -> Result<Vec<f64>, Failure> {
+    let frames = args.find.frames(&args.input, path, terminal)?;
     Ok(frames.energies.iter().map(|frame| frame.energy_j).collect())
 }
 
 /// The kinds that show energies of frames.
-fn energies(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
-    let energies = energies_of(args, &args.input.trace)?;
+fn energies(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Failure> {
+    let energies = energies_of(args, &args.input.trace, terminal)?;
     let drawn = match args.kind {
         PlotKind::Histogram => histogram(&energies),
         PlotKind::Discard => {
@@ -179,7 +192,7 @@ fn energies(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
                 vec![series("mean of the rest", Mark::Line(line))],
             )
         }
-        PlotKind::Repeats => repeats(args, &energies)?,
+        PlotKind::Repeats => repeats(args, &energies, terminal)?,
         _ => {
             let out = traces::energy::outliers(&energies);
             let of = |odd: bool| {
@@ -195,40 +208,61 @@ fn energies(args: &PlotArgs) -> Result<(usize, Drawn), Failure> {
 
 type Drawn = (&'static str, (&'static str, &'static str), (&'static str, &'static str), Vec<Series>);
 
+/// What goes up where power is shown.
+const POWER: (&str, &str) = ("power", "W");
+
 fn series(name: &str, mark: Mark) -> Series {
-    Series { name: name.to_owned(), mark }
+    Series::new(name, mark)
 }
+
+/// How much of what is before and after one frame is shown beside it, as a share of the frame.
+const BESIDE: f64 = 0.08;
 
 /// Power within a frame, over the time since its start.
 fn within(trace: &Trace, frame: &FrameEnergy) -> Vec<(f64, f64)> {
+    between(trace, (frame.start_s, frame.end_s), frame.start_s)
+}
+
+/// Power between two times, over the time since a third.
+fn between(trace: &Trace, (from_s, to_s): (f64, f64), since_s: f64) -> Vec<(f64, f64)> {
     let place = |time_s: f64| trace.position(time_s).clamp(0.0, trace.samples() as f64) as usize;
-    (place(frame.start_s)..place(frame.end_s))
-        .map(|index| (trace.time_s(index) - frame.start_s, trace.power_w(index)))
-        .collect()
+    let samples = place(from_s)..place(to_s);
+    samples.map(|index| (trace.time_s(index) - since_s, trace.power_w(index))).collect()
 }
 
 fn one_frame(args: &PlotArgs, trace: &Trace, frames: &[FrameEnergy]) -> Result<Drawn, Failure> {
     let number = args.frame.unwrap_or(frames.len() / 2);
-    let frame = frames
-        .get(number)
-        .ok_or_else(|| wrong(format!("--frame {number}: there are {} frames", frames.len())))?;
+    let frame = frames.get(number).ok_or_else(|| {
+        wrong(format!(
+            "--frame {number}: the trace has {}, from 0 on; give a lower number",
+            counted(frames.len(), "frame")
+        ))
+    })?;
     let name = format!("frame {number}, {}", si(frame.energy_j, "J"));
+    let margin_s = BESIDE * (frame.end_s - frame.start_s);
+    let beside = [(frame.start_s - margin_s, frame.start_s), (frame.end_s, frame.end_s + margin_s)];
+    let beside = beside.map(|(from_s, to_s)| between(trace, (from_s, to_s), frame.start_s));
     Ok((
         "Power of one frame",
         ("time since its start", "s"),
-        ("power", "W"),
-        vec![series(&name, Mark::Line(within(trace, frame)))],
+        POWER,
+        vec![
+            series("before and after it", Mark::Faint(beside.into())).painted(Paint::Grey),
+            series(&name, Mark::Line(within(trace, frame))).painted(Paint::Like(0)),
+            series("start and end", Mark::Uprights(vec![0.0, frame.end_s - frame.start_s]))
+                .painted(Paint::Ink),
+        ],
     ))
 }
 
 fn overlay(trace: &Trace, frames: &[FrameEnergy]) -> Drawn {
     let step = frames.len().div_ceil(OVERLAID).max(1);
     let lines: Vec<_> = frames.iter().step_by(step).map(|frame| within(trace, frame)).collect();
-    let name = format!("{} frames", lines.len());
+    let name = counted(lines.len(), "frame");
     (
         "Frames on top of one another",
         ("time since the start", "s"),
-        ("power", "W"),
+        POWER,
         vec![series(&name, Mark::Faint(lines))],
     )
 }
@@ -253,17 +287,16 @@ fn histogram(energies: &[f64]) -> Drawn {
 }
 
 /// Mean and deviation of the n-th frame over all runs.
-fn repeats(args: &PlotArgs, first: &[f64]) -> Result<Drawn, Failure> {
+fn repeats(args: &PlotArgs, first: &[f64], terminal: &Terminal) -> Result<Drawn, Failure> {
     let mut runs = vec![first.to_vec()];
     for path in &args.run {
-        runs.push(energies_of(args, path)?);
+        runs.push(energies_of(args, path, terminal)?);
     }
     let (frames, most) =
         (runs.iter().map(Vec::len).min().unwrap_or(0), runs.iter().map(Vec::len).max().unwrap_or(0));
     if frames < most {
-        complain(&format!(
-            "warning uneven-runs: runs have {frames} to {most} frames; the first {frames} are shown"
-        ));
+        let message = format!("runs have {frames} to {most} frames; the first {frames} are shown");
+        terminal.warn_of("uneven-runs", &message);
     }
     let spreads =
         (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));
@@ -275,7 +308,7 @@ fn repeats(args: &PlotArgs, first: &[f64]) -> Result<Drawn, Failure> {
         .map(|(i, s)| (at(i), s.mean - s.deviation, s.mean + s.deviation))
         .collect();
     let mean = spreads.iter().enumerate().map(|(i, s)| (at(i), s.mean)).collect();
-    let name = format!("one deviation over {} runs", runs.len());
+    let name = format!("one deviation over {}", counted(runs.len(), "run"));
     Ok((
         "Energy of each frame over repeated runs",
         ("frame", ""),

@@ -13,9 +13,9 @@ mod verify;
 use std::collections::BTreeMap;
 
 use pipeline::Features;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{Plan, RunError, Simulated};
+use super::{Distinct, Plan, RunError, Simulated};
 use crate::output::progress::Progress;
 use crate::timing::{Level, Sampling};
 
@@ -24,7 +24,8 @@ pub use verify::Verified;
 pub(super) use verify::verify;
 
 /// What the caller wants of a run, instead of a level of timing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Wish {
     /// The largest relative error of cycles and energy of the run, against every frame at the reference.
     pub accuracy: Option<f64>,
@@ -39,99 +40,132 @@ impl Wish {
     }
 }
 
-/// What was chosen, why, and how wrong it is expected to be.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// What was chosen, why, and how wrong it is expected to be. Errors are relative.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Choice {
     /// The accuracy that was asked for.
-    pub accuracy_percent: Option<f64>,
+    pub accuracy: Option<f64>,
     /// The time that was asked for.
     pub budget_s: Option<f64>,
     /// The level of timing.
     pub level: Level,
-    /// How that level models memory.
-    pub memory: &'static str,
-    /// Whether frames are simulated only until intervals are narrow enough, and the others predicted.
-    pub sampled: bool,
-    /// Dimensions: those of each triangle as they are, or those left out that hardly show.
-    pub dimensions: &'static str,
+    /// Which frames are simulated; the others are predicted.
+    pub sampling: Sampling,
+    /// The dimensions of each triangle that are drawn.
+    pub dimensions: Dimensions,
     /// What the probe found.
     pub probe: ProbeSummary,
-    /// Expected error of cycles and energy of the run: of the level and of the dimensions in the probe, and half of the widest interval
-    /// where frames are predicted.
-    pub expected_error_percent: f64,
+    /// Expected error of cycles and energy of the run by the level and the dimensions, as the probe found it.
+    pub level_error: f64,
+    /// Expected error of cycles and energy of the run: that of level and dimensions, and half of the widest interval where frames are
+    /// predicted.
+    pub expected_error: f64,
     /// Whether that is within the accuracy asked for, where one was.
     pub meets_accuracy: Option<bool>,
     /// Seconds that simulating was expected to take; only where a budget was given, as it is no property of the scene.
     pub expected_host_s: Option<f64>,
 }
 
-/// What the probe found. Errors are the worst of its frames, of cycles and energy, against `stepped`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// The dimensions of each triangle that are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Dimensions {
+    /// As they are.
+    All,
+    /// Motion and blur of less than a quarter pixel are left out.
+    WithoutSmallBlur,
+}
+
+impl Dimensions {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::WithoutSmallBlur => "without motion and blur of less than a quarter pixel",
+        }
+    }
+}
+
+/// What the probe found. Errors are relative, the worst of its frames, of cycles and energy, against `stepped`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ProbeSummary {
     /// Frames that were looked at.
     pub frames: Vec<u32>,
     /// Width and height of the image.
     pub size: [u32; 2],
     /// The error of each level.
-    pub error_percent: BTreeMap<&'static str, f64>,
+    pub error: BTreeMap<Level, f64>,
     /// The error of leaving out dimensions that hardly show, where any triangle has some.
-    pub dimensions_error_percent: Option<f64>,
-    /// Multiply-adds of tests that this saves.
-    pub dimensions_saved_percent: Option<f64>,
+    pub dimensions_error: Option<f64>,
+    /// The share of multiply-adds of tests that this saves.
+    pub dimensions_saved: Option<f64>,
 }
 
-/// Probes the scene and changes the plan to what it needs; nothing where nothing was wished.
-pub(super) fn choose(plan: &mut Plan, progress: &Progress) -> Result<Option<Choice>, RunError> {
+/// Probes the scene, or takes the choice of the run that is repeated, and changes the plan to it; nothing where nothing was wished.
+pub(super) fn choose(
+    plan: &mut Plan,
+    distinct: &Distinct,
+    progress: &Progress,
+) -> Result<Option<Choice>, RunError> {
     let wish = plan.options.wish;
     if !wish.is_any() {
         return Ok(None);
     }
-    let probe = probe::Probe::new(plan, progress)?;
-    let decision = decide::decide(&wish, &probe.findings, probe.run_frames);
-    plan.options.timing = decision.level;
-    plan.options.sampling = decision.sampling;
-    if decision.fewer_dimensions {
+    let choice = match plan.options.repeat.take() {
+        Some(choice) => Choice { expected_error: choice.level_error, meets_accuracy: None, ..*choice },
+        None => probed(plan, distinct, &wish, progress)?,
+    };
+    plan.options.timing = choice.level;
+    plan.options.sampling = choice.sampling;
+    if choice.dimensions == Dimensions::WithoutSmallBlur {
         plan.gpu.pipeline.features = fewer(plan.gpu.pipeline.features, 1.0);
     }
-    Ok(Some(Choice {
-        accuracy_percent: wish.accuracy.map(|accuracy| accuracy * 100.0),
+    Ok(Some(choice))
+}
+
+fn probed(plan: &Plan, distinct: &Distinct, wish: &Wish, progress: &Progress) -> Result<Choice, RunError> {
+    let probe = probe::Probe::new(plan, distinct, progress)?;
+    let decision = decide::decide(wish, &probe.findings, distinct.numbers().len());
+    Ok(Choice {
+        accuracy: wish.accuracy,
         budget_s: wish.budget_s,
         level: decision.level,
-        memory: memory(decision.level),
-        sampled: decision.sampling != Sampling::Every,
-        dimensions: if decision.fewer_dimensions {
-            "without motion and blur of less than a quarter pixel"
-        } else {
-            "all"
-        },
+        sampling: decision.sampling,
+        dimensions: if decision.fewer_dimensions { Dimensions::WithoutSmallBlur } else { Dimensions::All },
         probe: probe.summary(),
-        expected_error_percent: decision.error * 100.0,
+        level_error: decision.error,
+        expected_error: decision.error,
         meets_accuracy: None,
         expected_host_s: wish.budget_s.map(|_| decision.host_s),
-    }))
+    })
 }
 
 impl Choice {
     /// Adds what is known when frames have been predicted.
     pub(super) fn settle(&mut self, simulated: &Simulated) {
         if let Some(sampled) = &simulated.sampled {
-            self.expected_error_percent += sampled.worst_percent();
+            self.expected_error += sampled.worst();
         }
-        self.meets_accuracy = self.accuracy_percent.map(|asked| self.expected_error_percent <= asked);
+        self.meets_accuracy = self.accuracy.map(|asked| self.expected_error <= asked);
     }
 
     /// A line for the terminal and the report.
     pub fn line(&self) -> String {
-        let frames = if self.sampled { "some frames, the others predicted" } else { "every frame" };
-        let asked = self.accuracy_percent.map(|asked| format!(" of {asked} % asked for")).unwrap_or_default();
+        let frames = match self.sampling {
+            Sampling::Every => "every frame",
+            _ => "some frames, the others predicted",
+        };
+        let asked =
+            self.accuracy.map(|asked| format!(" of {} % asked for", asked * 100.0)).unwrap_or_default();
         let time =
             self.expected_host_s.map(|s| format!(", about {s:.1} s on this machine")).unwrap_or_default();
         format!(
             "{}, {frames}, dimensions: {}, memory: {}; expected error {:.2} %{asked}{time}",
             self.level.name(),
-            self.dimensions,
-            self.memory,
-            self.expected_error_percent
+            self.dimensions.words(),
+            memory(self.level),
+            self.expected_error * 100.0
         )
     }
 }

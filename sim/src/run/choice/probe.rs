@@ -8,14 +8,14 @@ use pipeline::frame::render_with_heat;
 use pipeline::{PipelineSpec, Settings, Viewport};
 use timing::Recorder;
 
-use super::super::{Plan, RunError, Taken, simulate};
+use super::super::{Distinct, Plan, RunError, Taken, simulate};
 use super::decide::Findings;
 use super::{ProbeSummary, fewer};
 use crate::output::progress::Progress;
 use crate::timing::{FrameClock, Level};
 
 /// Frames that are looked at: the middles of as many equal parts of the run.
-const FRAMES: u32 = 3;
+const FRAMES: usize = 3;
 /// The image is as many times smaller along each axis as leaves it so wide, and at most [`SMALLEST`] times.
 const WIDTH_PX: u32 = 320;
 const SMALLEST: u32 = 4;
@@ -25,8 +25,6 @@ pub(super) struct Probe {
     numbers: Vec<u32>,
     viewport: Viewport,
     pub findings: Findings,
-    /// Frames of the run that differ.
-    pub run_frames: usize,
 }
 
 /// A frame at one level.
@@ -39,13 +37,12 @@ struct Seen {
 }
 
 impl Probe {
-    /// Looks at the scene of `plan`.
-    pub fn new(plan: &Plan, progress: &Progress) -> Result<Self, RunError> {
-        let range = plan.work.settings().frames.clone();
-        let run_frames = if plan.work.is_animated() { range.end - range.start } else { 1 };
-        let some = FRAMES.min(run_frames);
+    /// Simulates some of the frames that differ.
+    pub fn new(plan: &Plan, distinct: &Distinct, progress: &Progress) -> Result<Self, RunError> {
+        let differ = distinct.numbers();
+        let some = FRAMES.min(differ.len());
         let numbers: Vec<u32> =
-            (0..some).map(|part| range.start + (2 * part + 1) * run_frames / (2 * some)).collect();
+            (0..some).map(|part| differ[(2 * part + 1) * differ.len() / (2 * some)]).collect();
         let by = (plan.viewport.width() / WIDTH_PX).clamp(1, SMALLEST);
         let [width, height] = [plan.viewport.width(), plan.viewport.height()].map(|side| side.div_ceil(by));
         let viewport = Viewport::new(width, height)
@@ -57,19 +54,19 @@ impl Probe {
             bar.inc();
         }
         // Host times are for all frames of the probe; a frame of the run has more pixels.
-        let scale = plan.pixels() as f64 / viewport.pixels() as f64 / f64::from(some);
+        let scale = plan.pixels() as f64 / viewport.pixels() as f64 / some as f64;
         findings.scale_times(scale);
-        Ok(Self { numbers, viewport, findings, run_frames: run_frames as usize })
+        Ok(Self { numbers, viewport, findings })
     }
 
     pub fn summary(&self) -> ProbeSummary {
-        let error = |level: Level| (level.name(), self.findings.error(level) * 100.0);
+        let error = |level: Level| (level, self.findings.error(level));
         ProbeSummary {
             frames: self.numbers.clone(),
             size: [self.viewport.width(), self.viewport.height()],
-            error_percent: Level::ALL.map(error).into_iter().collect(),
-            dimensions_error_percent: self.findings.dimensions_error.map(|error| error * 100.0),
-            dimensions_saved_percent: self.findings.dimensions_error.map(|_| self.findings.saved() * 100.0),
+            error: Level::ALL.map(error).into_iter().collect(),
+            dimensions_error: self.findings.dimensions_error,
+            dimensions_saved: self.findings.dimensions_error.map(|_| self.findings.saved()),
         }
     }
 }

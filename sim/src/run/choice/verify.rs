@@ -10,15 +10,15 @@ use crate::timing::{Level, Sampling};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Verified {
     /// Error of the cycles of all frames together.
-    pub cycles_error_percent: f64,
+    pub cycles_error: f64,
     /// Error of their energy, idle not counted.
-    pub energy_error_percent: f64,
+    pub energy_error: f64,
     /// Error of mean power while busy.
-    pub power_error_percent: f64,
+    pub power_error: f64,
     /// The larger of the errors of cycles and energy.
-    pub error_percent: f64,
+    pub error: f64,
     /// The worst error of the cycles of a single frame.
-    pub worst_frame_error_percent: f64,
+    pub worst_frame_error: f64,
 }
 
 impl Verified {
@@ -26,10 +26,10 @@ impl Verified {
     pub fn line(&self) -> String {
         format!(
             "cycles {:+.2} %, energy {:+.2} %, power {:+.2} %, worst frame {:.2} %, against every frame at `stepped`",
-            self.cycles_error_percent,
-            self.energy_error_percent,
-            self.power_error_percent,
-            self.worst_frame_error_percent
+            self.cycles_error * 100.0,
+            self.energy_error * 100.0,
+            self.power_error * 100.0,
+            self.worst_frame_error * 100.0
         )
     }
 }
@@ -46,26 +46,28 @@ pub(in super::super) fn verify(
     let reference = Plan::resolve(options)?;
     let numbers: Vec<u32> = simulated.distinct.iter().map(|frame| frame.index).collect();
     let truth = frames_of(&reference, &numbers, progress)?;
-    Ok(compare(&simulated.distinct, &truth))
+    Ok(compare(&simulated.distinct, &truth, &simulated.frames))
 }
 
-fn compare(found: &[SimulatedFrame], truth: &[SimulatedFrame]) -> Verified {
-    let total = |frames: &[SimulatedFrame]| {
-        frames.iter().map(taken).fold(Taken { cycles: 0.0, energy_j: 0.0 }, |sum, frame| Taken {
+/// Compares frames found with true ones; `frames` holds for each frame of the run its index in both.
+fn compare(found: &[SimulatedFrame], truth: &[SimulatedFrame], frames: &[usize]) -> Verified {
+    let total = |distinct: &[SimulatedFrame]| {
+        let taken = frames.iter().map(|&index| taken(&distinct[index]));
+        taken.fold(Taken { cycles: 0.0, energy_j: 0.0 }, |sum, frame| Taken {
             cycles: sum.cycles + frame.cycles,
             energy_j: sum.energy_j + frame.energy_j,
         })
     };
-    let percent = |found: f64, truth: f64| if found == truth { 0.0 } else { (found / truth - 1.0) * 100.0 };
+    let relative = |found: f64, truth: f64| if found == truth { 0.0 } else { found / truth - 1.0 };
     let (all, right) = (total(found), total(truth));
-    let cycles = percent(all.cycles, right.cycles);
-    let energy = percent(all.energy_j, right.energy_j);
-    let frames = found.iter().zip(truth).map(|(a, b)| percent(a.cycles as f64, b.cycles as f64).abs());
+    let cycles = relative(all.cycles, right.cycles);
+    let energy = relative(all.energy_j, right.energy_j);
+    let frames = found.iter().zip(truth).map(|(a, b)| relative(a.cycles as f64, b.cycles as f64).abs());
     Verified {
-        cycles_error_percent: cycles,
-        energy_error_percent: energy,
-        power_error_percent: percent(all.energy_j / all.cycles, right.energy_j / right.cycles),
-        error_percent: cycles.abs().max(energy.abs()),
-        worst_frame_error_percent: frames.fold(0.0, f64::max),
+        cycles_error: cycles,
+        energy_error: energy,
+        power_error: relative(all.energy_j / all.cycles, right.energy_j / right.cycles),
+        error: cycles.abs().max(energy.abs()),
+        worst_frame_error: frames.fold(0.0, f64::max),
     }
 }

@@ -26,14 +26,14 @@ pub struct Quantity {
     pub low: f64,
     /// The upper end.
     pub high: f64,
-    /// Half the width over the value, in percent.
-    pub half_width_percent: f64,
+    /// Half the width over the value.
+    pub relative_half_width: f64,
 }
 
 impl From<Interval> for Quantity {
     fn from(interval: Interval) -> Self {
         let Interval { value, low, high } = interval;
-        Self { value, low, high, half_width_percent: interval.relative() * 100.0 }
+        Self { value, low, high, relative_half_width: interval.relative() }
     }
 }
 
@@ -82,7 +82,7 @@ impl Forecast {
     /// The half-width of the widest interval, relative to its value.
     pub fn relative(&self) -> f64 {
         let all = [self.cycles_per_frame(), self.energy_per_frame_j(), self.busy_power_w(1.0)];
-        all.iter().map(|quantity| quantity.half_width_percent / 100.0).fold(0.0, f64::max)
+        all.iter().map(|quantity| quantity.relative_half_width).fold(0.0, f64::max)
     }
 
     /// What frame `place` takes, most likely, and half the width of the intervals in which its own values lie.

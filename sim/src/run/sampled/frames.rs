@@ -5,42 +5,39 @@ use std::collections::BTreeMap;
 use activity::{Counts, Unit};
 
 use super::super::simulate::Whole;
-use super::super::{Plan, Regime, Simulated, SimulatedFrame};
+use super::super::{Distinct, Plan, Regime, Simulated, SimulatedFrame};
 use super::{Forecast, SampledSummary, Scout, Taken};
 
 /// Frames are never predicted to take less than this share of what the one they are made from takes.
 const LEAST_SHARE: f64 = 0.01;
 
-/// Every frame of the run, simulated or predicted.
+/// Every frame of the run, simulated or predicted. `whole` holds the groups of frames that were simulated.
 pub(super) fn all(
     plan: &Plan,
-    numbers: &[u32],
+    frames: &Distinct,
     scout: &Scout,
     forecast: &Forecast,
     mut whole: BTreeMap<usize, Whole>,
 ) -> Simulated {
-    let predicted: BTreeMap<usize, SimulatedFrame> = (0..numbers.len())
-        .filter(|place| !whole.contains_key(place))
-        .map(|place| {
-            let like = &whole[&nearest(scout, forecast, place)].frame;
-            (place, predict(numbers[place], scout, forecast, place, like))
-        })
-        .collect();
-    let summary = SampledSummary::new(plan, numbers, scout, forecast);
-    let pictures = whole.iter_mut().filter_map(|(&place, done)| Some((numbers[place], done.picture.take()?)));
+    let (numbers, groups) = (frames.numbers(), frames.groups());
+    let mut distinct: BTreeMap<usize, SimulatedFrame> = BTreeMap::new();
+    for (place, &group) in groups.iter().enumerate().filter(|(_, group)| !whole.contains_key(group)) {
+        distinct.entry(group).or_insert_with(|| {
+            let like = &whole[&groups[nearest(scout, forecast, place)]].frame;
+            predict(numbers[group], scout, forecast, place, like)
+        });
+    }
+    let summary = SampledSummary::new(plan, frames, scout, forecast);
+    let pictures = whole.iter_mut().filter_map(|(&group, done)| Some((numbers[group], done.picture.take()?)));
     let pictures = pictures.collect();
-    let heat = whole.remove(&scout.pilot).map(|mut pilot| {
-        let heat = std::mem::take(&mut pilot.heat);
-        whole.insert(scout.pilot, pilot);
-        heat
-    });
-    let mut distinct = predicted;
-    distinct.extend(whole.into_iter().map(|(place, done)| (place, done.frame)));
+    let pilot = whole.get_mut(&groups[scout.pilot]);
+    let heat = pilot.map(|pilot| std::mem::take(&mut pilot.heat)).unwrap_or_default();
+    distinct.extend(whole.into_iter().map(|(group, done)| (group, done.frame)));
     Simulated {
         distinct: distinct.into_values().collect(),
-        frames: (0..numbers.len()).collect(),
+        frames: groups.to_vec(),
         pictures,
-        heat: heat.unwrap_or_default(),
+        heat,
         sampled: Some(summary),
     }
 }

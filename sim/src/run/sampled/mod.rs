@@ -12,7 +12,7 @@ mod preview;
 mod signature;
 mod summary;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use pipeline::sampling::mix;
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ pub struct Scout {
 }
 
 impl Scout {
-    /// Looks at the frames called `numbers`.
+    /// Previews the frames called `numbers`.
     pub fn look(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Self, RunError> {
         let preview = Preview::new(plan)?;
         let bar = progress.bar("previews", numbers.len() as u64);
@@ -51,6 +51,12 @@ impl Scout {
         Ok(Self { preview, glimpses, pilot })
     }
 
+    /// The same previews for a run in which frame `place` is drawn as the frame at `groups[place]` of those previewed.
+    fn spread(self, groups: &[usize]) -> Self {
+        let glimpses: Vec<Glimpse> = groups.iter().map(|&group| self.glimpses[group]).collect();
+        Self { pilot: signature::median(&glimpses), glimpses, ..self }
+    }
+
     /// Chooses `count` frames, the pilot among them.
     pub fn design(&self, signatures: &Signatures, count: usize, seed: u64) -> Design {
         let word = |frame: u64| mix(mix(seed.wrapping_add(0x73A3_7D1E)) ^ frame);
@@ -59,26 +65,23 @@ impl Scout {
 }
 
 /// Simulates as many frames as the plan asks for and predicts the others.
-pub(super) fn simulate(
-    stage: &Stage<'_>,
-    numbers: &[u32],
-    progress: &Progress,
-) -> Result<Simulated, RunError> {
-    let plan = stage.plan;
-    let scout = Scout::look(plan, numbers, progress)?;
-    let mut whole = BTreeMap::from([(scout.pilot, stage.whole(numbers[scout.pilot], true)?)]);
-    let signatures = Signatures::new(&scout.glimpses, scout.pilot, &whole[&scout.pilot].frame, &plan.model);
-    let mut count = plan.options.sampling.first(numbers.len());
+pub(super) fn simulate(stage: &Stage<'_>, progress: &Progress) -> Result<Simulated, RunError> {
+    let (plan, groups) = (stage.plan, stage.distinct.groups());
+    let scout = Scout::look(plan, stage.distinct.numbers(), progress)?.spread(groups);
+    let pilot = groups[scout.pilot];
+    let mut whole = BTreeMap::from([(pilot, stage.whole(pilot, true)?)]);
+    let signatures = Signatures::new(&scout.glimpses, scout.pilot, &whole[&pilot].frame, &plan.model);
+    let mut count = plan.options.sampling.first(groups.len());
     let forecast = loop {
         let design = scout.design(&signatures, count, plan.options.seed);
-        represent(stage, numbers, &design, &mut whole, progress)?;
-        let forecast = Forecast::new(design, &signatures, |place| taken(&whole[&place].frame));
-        match plan.options.sampling.next(count, numbers.len(), forecast.relative()) {
+        represent(stage, &design, &mut whole, progress)?;
+        let forecast = Forecast::new(design, &signatures, |place| taken(&whole[&groups[place]].frame));
+        match plan.options.sampling.next(count, groups.len(), forecast.relative()) {
             Some(more) => count = more,
             None => break forecast,
         }
     };
-    Ok(frames::all(plan, numbers, &scout, &forecast, whole))
+    Ok(frames::all(plan, stage.distinct, &scout, &forecast, whole))
 }
 
 /// What a frame took, as estimates have it.
@@ -86,22 +89,23 @@ pub fn taken(frame: &SimulatedFrame) -> Taken {
     Taken { cycles: frame.cycles as f64, energy_j: frame.power.energy().total_j() }
 }
 
-/// Simulates the representatives that are not yet known. Pictures are kept of the first and the last of the first ones.
+/// Simulates the groups of the chosen frames that are not yet known. Pictures are kept of the first and the last of the first
+/// ones.
 fn represent(
     stage: &Stage<'_>,
-    numbers: &[u32],
     design: &Design,
     whole: &mut BTreeMap<usize, Whole>,
     progress: &Progress,
 ) -> Result<(), RunError> {
-    let chosen = design.chosen();
+    let chosen: BTreeSet<usize> =
+        design.chosen().into_iter().map(|place| stage.distinct.groups()[place]).collect();
     let ends = if whole.len() == 1 { [chosen.first(), chosen.last()] } else { [None; 2] };
-    let missing: Vec<usize> = chosen.iter().copied().filter(|place| !whole.contains_key(place)).collect();
+    let missing: Vec<usize> = chosen.iter().copied().filter(|group| !whole.contains_key(group)).collect();
     let bar = progress.bar("frames", missing.len() as u64);
-    let simulate = |&place: &usize| {
-        let done = stage.whole(numbers[place], ends.contains(&Some(&place)))?;
+    let simulate = |&group: &usize| {
+        let done = stage.whole(group, ends.contains(&Some(&group)))?;
         bar.inc();
-        Ok((place, done))
+        Ok((group, done))
     };
     whole.extend(missing.par_iter().map(simulate).collect::<Result<Vec<_>, RunError>>()?);
     Ok(())

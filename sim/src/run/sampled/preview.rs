@@ -7,7 +7,7 @@ use pipeline::{Settings, Viewport};
 use timing::Recorder;
 use workloads::SampleChoice;
 
-use super::super::{Plan, RunError, simulate, work};
+use super::super::{Plan, RunError, simulate};
 use crate::timing::{FrameClock, Level};
 
 /// The preview is as many times smaller along each axis as leaves it so wide, and at most [`SMALLEST`] times.
@@ -80,7 +80,7 @@ impl Preview {
         let timed = clock.finish()?;
         Ok(Glimpse {
             triangles: frame.triangle_count(),
-            moving: work::is_moving(&frame),
+            moving: frame.is_moving(),
             lens: frame.camera.lens().is_some(),
             counts: rendered.0.counts,
             busy_ps: timed.timeline.busy_ps(),

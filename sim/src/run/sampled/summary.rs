@@ -1,8 +1,10 @@
 //! What a sampled run says of itself.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
-use super::super::Plan;
+use super::super::{Distinct, Plan};
 use super::forecast::CONFIDENCE;
 use super::{Forecast, Quantity, Scout};
 
@@ -28,12 +30,14 @@ pub struct SampledSummary {
 }
 
 impl SampledSummary {
-    pub(super) fn new(plan: &Plan, numbers: &[u32], scout: &Scout, forecast: &Forecast) -> Self {
-        let chosen = forecast.design().chosen();
+    pub(super) fn new(plan: &Plan, frames: &Distinct, scout: &Scout, forecast: &Forecast) -> Self {
+        let (numbers, groups) = (frames.numbers(), frames.groups());
+        let chosen: BTreeSet<u32> =
+            forecast.design().chosen().into_iter().map(|place| numbers[groups[place]]).collect();
         let viewport = scout.preview.viewport;
         Self {
-            frames_per_simulated: numbers.len() as f64 / chosen.len() as f64,
-            simulated_frames: chosen.into_iter().map(|place| numbers[place]).collect(),
+            frames_per_simulated: groups.len() as f64 / chosen.len() as f64,
+            simulated_frames: chosen.into_iter().collect(),
             strata: forecast.design().strata().len(),
             preview: [viewport.width(), viewport.height(), scout.preview.per_pixel()],
             confidence: CONFIDENCE,
@@ -58,7 +62,7 @@ impl SampledSummary {
             format!(
                 "{name} {} ± {:.2} %",
                 crate::output::table::si(quantity.value, unit),
-                quantity.half_width_percent
+                quantity.relative_half_width * 100.0
             )
         });
         format!(
@@ -69,8 +73,8 @@ impl SampledSummary {
         )
     }
 
-    /// The widest interval in percent of its value, half of it.
-    pub fn worst_percent(&self) -> f64 {
-        self.quantities().iter().map(|(_, _, quantity)| quantity.half_width_percent).fold(0.0, f64::max)
+    /// Half of the widest interval, over its value.
+    pub fn worst(&self) -> f64 {
+        self.quantities().iter().map(|(_, _, quantity)| quantity.relative_half_width).fold(0.0, f64::max)
     }
 }

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::parse::anchor;
-use super::{FindArgs, InputArgs};
+use super::{FindArgs, InputArgs, TraceFormat};
 
 /// Arguments of `trace align`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Examples:\n  quintile trace align meter.csv stamps.csv --anchor 0.0=2.513 --anchor 33.1=35.613\n  quintile trace align meter.csv stamps.csv --mark 2.513"
 )]
@@ -25,25 +25,34 @@ pub struct AlignArgs {
     /// The frames.
     #[command(flatten)]
     pub find: FindArgs,
-    /// File for the stamps with their times
+    /// File for the stamps with their times; `-` prints them and nothing else
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Print as JSON and nothing else
     #[arg(long)]
     pub json: bool,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
 }
 
 /// Arguments of `trace convert`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = "Example:\n  quintile trace convert meter.csv.gz meter.parquet --repair")]
 pub struct ConvertArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
-    /// File to write: .parquet, .jls (Joulescope), .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace
+    /// File to write: .parquet, .jls (Joulescope), .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace; `-` is standard output
     #[arg(value_name = "OUT")]
     pub out: PathBuf,
     /// Print what was read, mended and written as JSON
     #[arg(long)]
     pub json: bool,
+    /// Format of standard output, where OUT is `-` (default: csv)
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub format: Option<TraceFormat>,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
 }

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::{discard, finite, not_negative, pass, stretch};
+use super::parse::{discard, pass, stretch};
 use super::{FindArgs, InputArgs};
+use crate::cli::quantity::{power, size_of_power, time};
 
 /// What is asked of frames, not of a stretch.
 const OF_FRAMES: [&str; 11] = [
@@ -23,7 +24,7 @@ const OF_FRAMES: [&str; 11] = [
 ];
 
 /// Arguments of `trace energy`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Examples:\n  quintile trace energy meter.csv --from 1.5 --to 2.5\n  quintile trace energy meter.csv --mark 2.513 --idle 0..0.4 --pass shadow=0 --pass light=4.2 --discard auto --drop-outliers"
 )]
@@ -34,17 +35,17 @@ pub struct EnergyArgs {
     /// The frames.
     #[command(flatten)]
     pub find: FindArgs,
-    /// Begin of the stretch, which needs no frames
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = OF_FRAMES)]
+    /// Begin of a segment, in seconds or with its unit; a segment needs no frames
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time, conflicts_with_all = OF_FRAMES)]
     pub from: Option<f64>,
-    /// End of the stretch
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = OF_FRAMES)]
+    /// End of the segment, in seconds or with its unit
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time, conflicts_with_all = OF_FRAMES)]
     pub to: Option<f64>,
-    /// A stretch without rendering: its mean power is taken off
+    /// A segment without rendering, in seconds or with units; its mean power is subtracted
     #[arg(long, value_name = "A..B", value_parser = stretch, allow_hyphen_values = true, conflicts_with_all = ["idle_w", "idle_trace"])]
     pub idle: Option<(f64, f64)>,
-    /// Idle power to take off
-    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_negative_numbers = true, value_parser = not_negative)]
+    /// Idle power to subtract, in W
+    #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_hyphen_values = true, value_parser = size_of_power)]
     pub idle_w: Option<f64>,
     /// A recording without rendering to take off
     #[arg(long, value_name = "TRACE")]
@@ -52,7 +53,7 @@ pub struct EnergyArgs {
     /// How the recording is taken off
     #[arg(long, value_enum, default_value_t, requires = "idle_trace")]
     pub idle_by: IdleBy,
-    /// A pass within every frame, from so many milliseconds after its start to the next pass
+    /// A pass within every frame: its name, and when it begins after the start of the frame, in milliseconds or with its unit
     #[arg(long, value_name = "NAME=MS", value_parser = pass)]
     pub pass: Vec<(String, f64)>,
     /// Leave out the first frames: a number, or `auto` to find the warm-up
@@ -64,8 +65,8 @@ pub struct EnergyArgs {
     /// Another run of the same thing, with the same marks; may be given several times
     #[arg(long, value_name = "TRACE")]
     pub run: Vec<PathBuf>,
-    /// Power above which the old method takes a frame's work to go on; a tenth above idle without it
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = finite)]
+    /// Power above which the old method takes a frame's work to go on, in W; a tenth above idle without it
+    #[arg(long, value_name = "W", allow_hyphen_values = true, value_parser = power)]
     pub busy_above: Option<f64>,
     /// Print everything as JSON and nothing else
     #[arg(long)]

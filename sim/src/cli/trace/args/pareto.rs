@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::not_negative;
+use crate::cli::args::LookArgs;
+use crate::cli::quantity::size_of_power;
 
 /// Arguments of `trace pareto`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Example:\n  quintile trace pareto results.csv --time time_ms --energy energy_mJ --label algorithm --group scene --group msaa --idle-w 14 --out pareto.svg"
 )]
 pub struct ParetoArgs {
-    /// A table with a row for each setting: CSV, TSV or Parquet
+    /// A table with a row for each setting: CSV, TSV or Parquet; `-` reads standard input
     #[arg(value_name = "TABLE")]
     pub table: PathBuf,
     /// The column of times; its unit is taken from its name (s without one)
@@ -33,8 +34,8 @@ pub struct ParetoArgs {
     /// A column whose values make groups, each with a frontier; may be given several times
     #[arg(long, value_name = "COLUMN")]
     pub group: Vec<String>,
-    /// Idle power that the faster of two is charged for the time it saves
-    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = not_negative)]
+    /// Idle power that the faster of two is charged for the time it saves, in W
+    #[arg(long, value_name = "W", default_value = "0", allow_hyphen_values = true, value_parser = size_of_power)]
     pub idle_w: f64,
     /// Seed of the draws for probabilities
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
@@ -42,12 +43,18 @@ pub struct ParetoArgs {
     /// What the plot shows over time: energy, or mean power as Paper IV does
     #[arg(long, value_enum, default_value_t)]
     pub show: ParetoShow,
-    /// File for a plot (.svg, .png, .pdf) or a table (.csv)
+    /// File for a plot (.svg, .png, .pdf) or a table (.csv); `-` prints the table as CSV and nothing else
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Print as JSON and nothing else
     #[arg(long)]
     pub json: bool,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
 }
 
 /// What a plot of frontiers shows over time.

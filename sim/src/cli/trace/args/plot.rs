@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::not_negative;
 use super::{FindArgs, InputArgs};
+use crate::cli::args::LookArgs;
+use crate::cli::quantity::{milliseconds, time};
 
 /// Arguments of `trace plot`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Examples:\n  quintile trace plot meter.parquet --from 2 --to 2.5 --out curve.svg\n  quintile trace plot meter.parquet --kind energy --mark 2.513 --out energy.png"
 )]
@@ -22,27 +23,59 @@ pub struct PlotArgs {
     /// What to draw
     #[arg(long, value_enum, default_value_t)]
     pub kind: PlotKind,
-    /// Begin of what is shown of the curve
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Begin of what is shown of the curve, in seconds or with its unit
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub from: Option<f64>,
-    /// End of what is shown of the curve
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// End of what is shown of the curve, in seconds or with its unit
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time)]
     pub to: Option<f64>,
-    /// Time over which the curve's mean is drawn, in milliseconds; the whole range over 50 without it
-    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = not_negative)]
+    /// Time over which the curve's mean is drawn, in milliseconds or with its unit; a fiftieth of the range without it
+    #[arg(long, value_name = "MS", allow_hyphen_values = true, value_parser = milliseconds)]
     pub low_pass: Option<f64>,
+    /// Keep the overview of a curve beside the trace as TRACE.pyramid: later plots of a long trace are then drawn at once
+    #[arg(long)]
+    pub keep_pyramid: bool,
     /// Which frame, for `frame`; the middle one without it
     #[arg(long, value_name = "N")]
     pub frame: Option<usize>,
     /// Another run of the same thing, for `repeats`
     #[arg(long, value_name = "TRACE")]
     pub run: Vec<PathBuf>,
-    /// File: .svg, .png or .pdf
+    /// File: .svg, .png or .pdf; `-` is standard output
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Print what was drawn as JSON
     #[arg(long)]
     pub json: bool,
+    /// Format of standard output, where --out is `-` (default: svg)
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub format: Option<PlotFormat>,
+    /// Whether the result goes to standard output.
+    #[arg(skip)]
+    pub piped: bool,
+    /// How pictures look.
+    #[command(flatten)]
+    pub look: LookArgs,
+}
+
+/// Formats of plots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs, reason = "the names of the formats")]
+pub enum PlotFormat {
+    Svg,
+    Png,
+    Pdf,
+}
+
+impl PlotFormat {
+    /// The ending of files of this format.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Png => "png",
+            Self::Pdf => "pdf",
+        }
+    }
 }
 
 /// What to draw.

@@ -1,0 +1,311 @@
+//! `quintile info`.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use workloads::job::{self, OptionSource, Request};
+use workloads::scene::{CameraUsed, SceneInfo, SettingsInfo};
+use workloads::visibility::{self, FixedSamples, VisibilityScene};
+
+use super::Failure;
+use super::args::InfoArgs;
+use super::terminal::{print, print_json};
+use crate::output::table::{Table, digits, grouped};
+
+pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    let overrides = args.view.overrides();
+    let name = &*args.scene.to_string_lossy();
+    if let Some(found) =
+        job::find(name, &OptionSource::default(), &Request { overrides: &overrides, seed: 1 })
+    {
+        let what = job::names().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
+        return print_workload((name, what), args.json, SettingsInfo::new(found?.settings()));
+    }
+    match ending(name).as_deref() {
+        Some("m5d" | "mts") => {
+            print_mesh(name, args.json, &visibility::load(&[&args.scene], args.view.camera.as_deref())?)
+        }
+        Some("smp") => print_samples(name, args.json, &FixedSamples::load(&args.scene)?),
+        _ => {
+            let scene = workloads::load(&args.scene).map_err(job::or_job)?.with_overrides(&overrides)?;
+            let info = scene.info().map_err(crate::run::RunError::from)?;
+            if args.json { print_json(&info, true) } else { print(&scene_text(&info)) }
+        }
+    }
+}
+
+/// What the name of a file ends in, without `.gz`, in lower case.
+fn ending(name: &str) -> Option<String> {
+    let name = name.to_ascii_lowercase();
+    let bare = name.strip_suffix(".gz").unwrap_or(&name);
+    bare.rsplit_once('.').map(|(_, ending)| ending.to_owned())
+}
+
+#[derive(Serialize)]
+struct WorkloadInfo<'a> {
+    workload: &'a str,
+    what: &'a str,
+    settings: SettingsInfo,
+}
+
+fn print_workload((workload, what): (&str, &str), json: bool, settings: SettingsInfo) -> Result<(), Failure> {
+    if json {
+        return print_json(&WorkloadInfo { workload, what, settings }, true);
+    }
+    print(&format!("{workload}: {what}\n{}", settings_text(&settings)))
+}
+
+#[derive(Serialize)]
+struct MeshFile<'a> {
+    name: &'a str,
+    triangles: usize,
+    vertices: usize,
+    objects: usize,
+    /// Whether any vertex moves while the shutter is open.
+    moves: bool,
+    width: u32,
+    height: u32,
+    samples_per_pixel: u32,
+    seed: u64,
+    lens_radius: f32,
+    focus: Option<f32>,
+    near: f32,
+    /// The camera, where the file does not carry one.
+    camera: Option<String>,
+    warnings: &'a [activity::Warning],
+}
+
+fn print_mesh(name: &str, json: bool, scene: &VisibilityScene) -> Result<(), Failure> {
+    let lens = scene.camera.lens();
+    let info = MeshFile {
+        name,
+        triangles: scene.triangles.len(),
+        vertices: scene.open.len(),
+        objects: scene.objects.len(),
+        moves: scene.open != scene.close,
+        width: scene.viewport.width(),
+        height: scene.viewport.height(),
+        samples_per_pixel: scene.per_pixel,
+        seed: scene.seed,
+        lens_radius: lens.map_or(0.0, |lens| lens.radius()),
+        focus: lens.map(|lens| lens.focus()),
+        near: scene.camera.near(),
+        camera: scene.fitted.as_ref().map(|camera| camera.to_ron_line()),
+        warnings: &scene.warnings,
+    };
+    if json {
+        return print_json(&info, true);
+    }
+    let mut lines = vec![
+        format!("{}: a moving mesh for `quintile visibility`", info.name),
+        format!(
+            "  {} triangles, {} vertices, {}; {}",
+            grouped(info.triangles as u64),
+            grouped(info.vertices as u64),
+            counted(info.objects, "object"),
+            if info.moves { "moves" } else { "still" }
+        ),
+        format!(
+            "  {}x{} pixels, {} samples, seed {}, lens radius {}, near depth {}",
+            info.width, info.height, info.samples_per_pixel, info.seed, info.lens_radius, info.near
+        ),
+    ];
+    lines.push(match &info.camera {
+        Some(camera) => format!("  camera, fitted: --camera '{camera}'"),
+        None => "  camera: the file's own".to_owned(),
+    });
+    lines.extend(warnings_text(info.warnings));
+    print(&lines.join("\n"))
+}
+
+#[derive(Serialize)]
+struct SamplesFile<'a> {
+    name: &'a str,
+    width: u32,
+    height: u32,
+    samples_per_pixel: u32,
+}
+
+fn print_samples(name: &str, json: bool, samples: &FixedSamples) -> Result<(), Failure> {
+    use pipeline::sampling::SampleSource;
+    let [width, height] = samples.size();
+    let info = SamplesFile { name, width, height, samples_per_pixel: samples.per_pixel() };
+    if json {
+        return print_json(&info, true);
+    }
+    print(&format!(
+        "{}: a sample table of {width}x{height} pixels, {} samples in each",
+        info.name, info.samples_per_pixel
+    ))
+}
+
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{} {what}s", grouped(count as u64)) }
+}
+
+/// A point or a size, each coordinate to a few digits.
+fn point(values: [f64; 3]) -> String {
+    format!("({})", values.map(digits).join(", "))
+}
+
+fn settings_text(settings: &SettingsInfo) -> String {
+    let [first, end] = settings.frames;
+    format!(
+        "  image     {}x{} pixels, {} samples in a pixel of table `{}`\n  time      frames {first}..{end} at {} Hz, shutter open for {} of a frame",
+        settings.width,
+        settings.height,
+        settings.samples,
+        settings.table,
+        settings.frame_rate_hz,
+        settings.shutter
+    )
+}
+
+fn scene_text(info: &SceneInfo) -> String {
+    let skinned = info.meshes.iter().filter(|mesh| mesh.skinned).count();
+    let targets: usize = info.meshes.iter().map(|mesh| mesh.morph_targets).sum();
+    let moving = info.meshes.iter().filter(|mesh| mesh.moves).count();
+    let mut text = format!(
+        "{}\n  triangles {}, vertices {}, in {}",
+        info.name,
+        grouped(info.triangles as u64),
+        grouped(info.vertices as u64),
+        counted(info.meshes.len(), "mesh").replace("meshs", "meshes"),
+    );
+    let mut line = |name: &str, value: String| {
+        let _ = write!(text, "\n  {name:<9} {value}");
+    };
+    line(
+        "bounds",
+        format!("{} to {}, extent {}", point(info.bounds[0]), point(info.bounds[1]), point(info.extent)),
+    );
+    let motion = [
+        (moving, format!("{moving} of {} meshes move", info.meshes.len())),
+        (skinned, format!("{skinned} skinned, skins of {:?} joints", info.skins)),
+        (targets, counted(targets, "morph target")),
+    ];
+    let motion: Vec<String> =
+        motion.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text).collect();
+    line(
+        "motion",
+        if motion.is_empty() { "none: all meshes are still".to_owned() } else { motion.join("; ") },
+    );
+    line("light", light_text(info));
+    text += &format!("\n{}\n", settings_text(&info.settings));
+    for table in [clips(info), cameras(info), meshes(info), materials(info)] {
+        text += &table;
+    }
+    text += &camera_text(info);
+    for line in warnings_text(&info.warnings) {
+        text += &format!("{line}\n");
+    }
+    text
+}
+
+fn light_text(info: &SceneInfo) -> String {
+    match info.light.toward {
+        Some(toward) => format!("one lamp at infinity, toward {}", point(toward.map(f64::from))),
+        None => "one lamp at infinity, over the camera's right shoulder".to_owned(),
+    }
+}
+
+fn section(title: &str, table: &Table) -> String {
+    let lines: Vec<String> = table.to_string().lines().map(|line| format!("  {line}\n")).collect();
+    format!("{title}:\n{}", lines.concat())
+}
+
+fn clips(info: &SceneInfo) -> String {
+    if info.clips.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new(["clip", "number", "length", "tracks", "keys"]);
+    for (index, clip) in info.clips.iter().enumerate() {
+        let length = format!("{:.3} s", clip.duration_s);
+        table.row([
+            clip.name.clone(),
+            index.to_string(),
+            length,
+            clip.tracks.to_string(),
+            clip.keys.to_string(),
+        ]);
+    }
+    section("animation (--clip)", &table)
+}
+
+fn cameras(info: &SceneInfo) -> String {
+    if info.cameras.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new(["camera", "number", "view", "moves"]);
+    for (index, camera) in info.cameras.iter().enumerate() {
+        let view = match (camera.fov_deg, camera.view_height) {
+            (Some(fov), _) => format!("{} degrees", digits(fov)),
+            (None, height) => format!("{} high", digits(height.unwrap_or(0.0))),
+        };
+        let moves = if camera.moves { "yes" } else { "no" };
+        table.row([camera.name.clone(), index.to_string(), view, moves.to_owned()]);
+    }
+    section("cameras (--camera)", &table)
+}
+
+/// Rows of a table for people; `--json` has all.
+const ROWS: usize = 20;
+
+fn more(count: usize, section: String) -> String {
+    if count > ROWS { format!("{section}  and {} more: --json names them\n", count - ROWS) } else { section }
+}
+
+fn meshes(info: &SceneInfo) -> String {
+    let mut table = Table::new(["mesh", "triangles", "vertices", "material"]);
+    for mesh in info.meshes.iter().take(ROWS) {
+        let material = info.materials.get(mesh.material).map_or("-", |material| material.name.as_str());
+        let [triangles, vertices] = [mesh.triangles, mesh.vertices].map(|count| grouped(count as u64));
+        table.row([mesh.name.clone(), triangles, vertices, material.to_owned()]);
+    }
+    more(info.meshes.len(), section("meshes", &table))
+}
+
+fn materials(info: &SceneInfo) -> String {
+    let mut table = Table::new(["material", "color", "texture", "sides", "light"]);
+    for material in info.materials.iter().take(ROWS) {
+        let texture = material.texture.and_then(|texture| info.textures.get(texture));
+        table.row([
+            material.name.clone(),
+            material.color.map(|part| format!("{part:.2}")).join(" "),
+            texture.map_or("-".to_owned(), |texture| format!("{}x{}", texture.width, texture.height)),
+            if material.double_sided { "both" } else { "front" }.to_owned(),
+            if material.unlit { "unlit" } else { "lit" }.to_owned(),
+        ]);
+    }
+    more(info.materials.len(), section("materials", &table))
+}
+
+fn camera_text(info: &SceneInfo) -> String {
+    let CameraUsed { source, position, direction, focus, lens_radius, near, ron, .. } = &info.camera;
+    let view = match (info.camera.fov_deg, info.camera.view_height) {
+        (Some(fov), _) => format!("field of view {} degrees", digits(fov)),
+        (None, height) => format!("orthographic, {} high", digits(height.unwrap_or(0.0))),
+    };
+    let lens = if *lens_radius > 0.0 {
+        format!("lens radius {lens_radius}, sharp at depth {focus}")
+    } else {
+        format!("pinhole; a lens would be sharp at depth {focus}")
+    };
+    let mut text = format!(
+        "camera in use: {source}\n  at {} toward {}, {view}, nothing nearer than {}\n  {lens}\n",
+        point(*position),
+        point(*direction),
+        digits(*near)
+    );
+    if let Some(suggested) = info.suggested {
+        text += &format!("  to begin with: --lens {} --focus {}\n", suggested.lens_radius, suggested.focus);
+    }
+    if !info.camera.exact {
+        text += "  it moves: this is where it is when the first frame's shutter opens\n";
+    }
+    text + &format!("  --camera '{ron}'\n")
+}
+
+fn warnings_text(warnings: &[activity::Warning]) -> Vec<String> {
+    warnings.iter().map(|warning| format!("warning: {warning}")).collect()
+}
