@@ -2,7 +2,8 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use tempfile::TempDir;
 
@@ -25,6 +26,49 @@ pub struct Ended {
     pub stderr: String,
 }
 
+/// A call that is not done.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+}
+
+impl Running {
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// If its output cannot be read.
+    pub fn end(self) -> Ended {
+        let output = self.child.wait_with_output().expect("the output of a call");
+        let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+        Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+
+    /// Waits until `begun` holds.
+    ///
+    /// # Panics
+    /// If the call ends before.
+    #[must_use]
+    pub fn once(mut self, begun: impl Fn() -> bool) -> Self {
+        while !begun() {
+            let ended = self.child.try_wait().expect("the state of a call");
+            assert!(ended.is_none(), "it ended too early: {:?}", self.end());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self
+    }
+
+    /// Sends it the signal called `name`, such as `INT`.
+    ///
+    /// # Panics
+    /// If that fails.
+    #[must_use]
+    pub fn signal(self, name: &str) -> Self {
+        let sent = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "SIG{name} could not be sent");
+        self
+    }
+}
+
 impl Quintile {
     /// The program at `program`; tests say `quintile!()`.
     pub fn new(program: impl Into<PathBuf>) -> Self {
@@ -36,11 +80,30 @@ impl Quintile {
     /// # Panics
     /// If the program cannot be started.
     pub fn call<S: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = S>) -> Ended {
-        let mut command = Command::new(&self.program);
-        let output = command.args(args).stdin(Stdio::null()).output();
-        let output = output.unwrap_or_else(|error| panic!("starting {}: {error}", self.program.display()));
-        let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-        Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+        self.spawn(args).end()
+    }
+
+    /// Calls it with `args` in the current directory `folder`.
+    ///
+    /// # Panics
+    /// If the program cannot be started.
+    pub fn call_in<S: AsRef<OsStr>>(&self, folder: &Path, args: impl IntoIterator<Item = S>) -> Ended {
+        self.start(Command::new(&self.program).current_dir(folder).args(args)).end()
+    }
+
+    /// Starts it with `args` and does not wait.
+    ///
+    /// # Panics
+    /// If the program cannot be started.
+    pub fn spawn<S: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = S>) -> Running {
+        self.start(Command::new(&self.program).args(args))
+    }
+
+    fn start(&self, command: &mut Command) -> Running {
+        let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        Running {
+            child: child.unwrap_or_else(|error| panic!("starting {}: {error}", self.program.display())),
+        }
     }
 
     /// `quintile run SCENE ARGS...` into a folder of its own that goes away with the results.

@@ -9,14 +9,16 @@ mod mts;
 mod picture;
 mod refusals;
 mod results;
+mod schema;
 
-pub use command::{Ended, Quintile};
+pub use command::{Ended, Quintile, Running};
 pub use glb::Glb;
 pub use inputs::{Inputs, real_scenes, root};
 pub use mts::mts;
 pub use picture::{Bounds, lit_bounds, mean_where};
 pub use refusals::Refusals;
-pub use results::{FrameRow, Results, number};
+pub use results::{FrameRow, Results, number, without_host};
+pub use schema::Schema;
 
 /// The command under test, built by cargo from the source of `quintile`.
 #[macro_export]

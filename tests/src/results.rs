@@ -37,6 +37,11 @@ impl Results {
         Self { folder, _temporary: temporary, ended }
     }
 
+    /// What is in a folder, and the call that put it there.
+    pub fn in_folder(folder: &Path, ended: Ended) -> Self {
+        Self::new(folder.to_owned(), None, ended)
+    }
+
     /// The folder of the results.
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -126,6 +131,36 @@ impl Results {
         collect(&self.folder, Path::new(""), &mut files);
         files
     }
+}
+
+/// `files` without what is about the machine and the call: `host` in the summary and in the report, and with it the hashes of these two.
+/// Everything else is the same for the same run on every machine.
+///
+/// # Panics
+/// If there is none of it to be left out.
+#[must_use]
+pub fn without_host(mut files: BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut edit = |name: &str, change: fn(&mut Value)| {
+        let file = files.get_mut(Path::new(name)).unwrap_or_else(|| panic!("no {name}"));
+        let mut json: Value = serde_json::from_slice(file).unwrap_or_else(|error| panic!("{name}: {error}"));
+        change(&mut json);
+        *file = json.to_string().into_bytes();
+    };
+    edit("summary.json", |summary| {
+        let host = summary.as_object_mut().and_then(|summary| summary.remove("host"));
+        assert!(host.is_some_and(|host| host["command"].is_array()), "no host in the summary");
+    });
+    edit("manifest.json", |manifest| {
+        for name in ["summary.json", "report.html"] {
+            assert!(manifest["files"][name].take().is_object(), "{name} is not in the manifest");
+        }
+    });
+    let report = files.get_mut(Path::new("report.html")).expect("a report");
+    let text = String::from_utf8_lossy(report).into_owned();
+    let (before, host) = text.split_once("<section id=\"host\">").expect("a section of the host");
+    let (_, after) = host.split_once("</section>").expect("the end of that section");
+    *report = [before, after].concat().into_bytes();
+    files
 }
 
 fn collect(root: &Path, below: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {

@@ -13,7 +13,7 @@ fn refusals() -> Refusals {
 #[test]
 fn flags() {
     let mut refusals = refusals();
-    let cases: [(&[&str], &[&str]); 27] = [
+    let cases: [(&[&str], &[&str]); 31] = [
         (&["--size", "0x48"], &["size", "0x48", "1 to 16384 pixels"]),
         (&["--size", "64x0"], &["size", "64x0"]),
         (&["--size", "99999x99999"], &["size", "99999x99999"]),
@@ -37,7 +37,11 @@ fn flags() {
         (&["--threads", "0"], &["--threads", "1..=1024"]),
         (&["--threads", "99999"], &["--threads", "1..=1024"]),
         (&["--clip", "Run"], &["clip", "Run"]),
-        (&["--trace-rate", "-5"], &["trace rate", "-5"]),
+        (&["--trace-rate", "-5"], &["--trace-rate", "`-5` is not a rate above 0"]),
+        (&["--trace-rate", "1mhz"], &["--trace-rate", "50kHz or 1MHz"]),
+        (&["--rate", "0"], &["--rate", "`0` is not a rate above 0"]),
+        (&["--lens=-1"], &["--lens", "finite number of at least 0"]),
+        (&["--lens", "2mm"], &["--lens", "in scene units"]),
         (&["--trace-rate", "0.001"], &["trace rate"]),
         (&["--nonsense"], &["--nonsense"]),
         (&["--bound", "highest"], &["--bound", "low, nominal, high"]),
@@ -90,9 +94,9 @@ fn names_of_nothing() {
     refusals.call(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
     refusals.call(&["samplng"], 2, &["samplng", "did you mean `sampling`?", "workloads: caustics, ccd, "]);
     refusals.call(&["wibble-wobble"], 2, &["built in: default, tiny; workloads: caustics, ccd, "]);
-    refusals.call(&["scene.blend"], 2, &["scene.blend", ".gltf"]);
-    refusals.call(&[""], 2, &["scene"]);
-    refusals.call(&["."], 2, &["`.`"]);
+    refusals.call(&["scene.blend"], 2, &["scene.blend", "convert it to glTF"]);
+    refusals.call(&[""], 2, &["SCENE|WORKLOAD|FILE"]);
+    refusals.call(&["."], 2, &[".: it is a folder; give a .ron, .gltf"]);
     refusals.call(&["tiny", "--gpu", "referense"], 2, &["referense", "did you mean `reference`?"]);
     refusals.call(&["tiny", "--platform", "referense"], 2, &["referense", "did you mean `reference`?"]);
     refusals.call(&["tiny", "--energy", "28mm"], 2, &["28mm", "did you mean `28nm`?"]);
@@ -124,7 +128,7 @@ fn names_that_are_no_text() {
     use std::os::unix::ffi::OsStrExt;
     let name = OsStr::from_bytes(b"sc\xffene.glb");
     let ended = quintile!().call([OsStr::new("run"), name]);
-    refusals.check(&ended, 2, &["UTF-8"]);
+    refusals.check(&ended, 1, &["ene.glb: cannot read it"]);
 }
 
 #[test]
@@ -216,12 +220,12 @@ fn scene_files_with_mistakes() {
     let cases = [
         (format!("(\n  settings: (widht: 640),\n  {sphere})"), ":2:", "did you mean `width`?"),
         (format!("(\n\n  settings: (width: 0), {sphere})"), ":3:", "1 to 16384"),
-        (format!("(settings: (frame_rate_hz: -60), {sphere})"), ":1:", "above zero"),
+        (format!("(settings: (frame_rate_hz: -60), {sphere})"), ":1:28:", "0.1 to 100000 frames per second"),
         (format!("(settings: (shutter: -1), {sphere})"), ":1:", "0 to 1"),
         (format!("(settings: (samples: 0), {sphere})"), ":1:", "1 to 256"),
         (format!("(settings: (frames: (4, 4)), {sphere})"), ":1:", "range of frames"),
         ("(objects: [(shape: Spere(radius: 1))])".to_owned(), ":1:", "did you mean `Sphere`?"),
-        ("(objects: [(shape: Sphere(radius: NaN))])".to_owned(), "objects[0]", "above zero"),
+        ("(objects: [(shape: Sphere(radius: NaN))])".to_owned(), ":1:35:", "a length above 0"),
         (format!("(camera: (position: (0, 0, 0), target: (0, 0, 0)), {sphere})"), "camera", "move one"),
         ("(".to_owned(), ":1:", "end of RON"),
         (String::new(), ":1:", "Expected opening `(`"),
@@ -243,7 +247,7 @@ fn gpu_and_platform_files_with_mistakes() {
         ("--gpu", gpu.replace("tile_px: 8", "tile_sise: 8"), "did you mean `tile_px`?"),
         ("--gpu", gpu.replace("core_hz: 400e6", "core_hz: -400e6"), "core_hz"),
         ("--gpu", gpu.replace("core_hz: 400e6", "core_hz: NaN"), "core_hz"),
-        ("--gpu", gpu.replace("queue: 32", "queue: 0"), "at least 1"),
+        ("--gpu", gpu.replace("queue: 32", "queue: 0"), "1 to 65536"),
         ("--platform", platform.replace("idle_w:", "idel_w:"), "did you mean `idle_w`?"),
         ("--platform", platform.replace("constant_w: Assumed(0.80", "constant_w: Assumed(-0.80"), "-0.8"),
         ("--energy", table.replace("low_pj: 100,", "low_pj: -100,"), "-100"),
@@ -255,4 +259,29 @@ fn gpu_and_platform_files_with_mistakes() {
         assert!(text != gpu && text != platform && text != table, "{flag}: nothing was broken");
         refusals.call(&["tiny", flag, &file], 2, &[&file, says]);
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn paths_that_are_no_utf8_are_read() {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt;
+    use std::path::Path;
+    let inputs = Inputs::new();
+    let named = |name: &[u8]| Path::new(&inputs.path("")).join(OsString::from_vec(name.to_vec()));
+    let copies = [
+        (named(b"sc\xe9ne.ron"), "workloads/scenes/pendulum.ron"),
+        (named(b"g\xe9ant.ron"), "sim/gpus/mobile.ron"),
+    ];
+    for (path, source) in &copies {
+        fs::copy(tests::root().join(source), path).expect("a copy");
+    }
+    let out = named(b"\xe9t\xe9");
+    let options = ["--size", "32x18", "--samples", "1", "--frames", "0..1", "--gpu"].map(OsString::from);
+    let mut args = vec![OsString::from("run"), copies[0].0.clone().into()];
+    args.extend(options);
+    args.extend([copies[1].0.clone().into(), OsString::from("--out"), out.clone().into()]);
+    let ended = quintile!().call(args);
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert!(out.join("summary.json").is_file());
 }

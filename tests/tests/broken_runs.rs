@@ -1,4 +1,4 @@
-//! Failure modes: however a run dies, nothing it leaves looks like a whole result, and results of the run before stay whole or go.
+//! Failure modes: however a run dies, nothing it leaves looks like a whole result, and the results of the run before stay whole.
 
 use std::fs;
 use std::path::Path;
@@ -22,9 +22,9 @@ fn results_that_cannot_be_written() {
     assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
 }
 
-/// Whatever stops a run on its way, early or at the last file: the summary of the run before is gone.
+/// What no run can write over is found before any work, and the results of the run before stay as they are.
 #[test]
-fn a_run_that_dies_on_the_way_does_not_look_whole() {
+fn what_stands_in_the_way_leaves_old_results_alone() {
     let mut refusals = refusals();
     for (name, is_folder) in [
         ("images", false),
@@ -32,20 +32,19 @@ fn a_run_that_dies_on_the_way_does_not_look_whole() {
         ("trace.parquet", true),
         ("frames.csv", true),
         ("report.html", true),
+        ("manifest.json", true),
     ] {
         let inputs = Inputs::new();
         let out = inputs.path("out");
-        let arguments = ["run", "tiny", "--out", &out];
-        assert_eq!(quintile!().call(arguments).code, Some(0));
-        let (path, summary) = (Path::new(&out).join(name), Path::new(&out).join("summary.json"));
-        assert!(summary.exists());
-        block(&path, is_folder);
-        let ended = quintile!().call(arguments);
-        refusals.check(&ended, 1, &[name]);
-        assert!(!summary.exists(), "{name}: the old summary makes the broken run look whole");
-        let temporary = fs::read_dir(&out).into_iter().flatten().flatten();
-        let temporary: Vec<_> = temporary.map(|entry| entry.file_name()).collect();
-        assert!(!temporary.iter().any(|name| name.to_string_lossy().ends_with(".tmp")), "{temporary:?}");
+        let results = quintile!().run_in(Path::new(&out), "tiny", &[]);
+        block(&results.path(name), is_folder);
+        let before = results.files();
+        assert!(before.contains_key(Path::new("summary.json")));
+        for force in [&[][..], &["--force"]] {
+            let ended = quintile!().call(["run", "tiny", "--out", &out].iter().chain(force));
+            refusals.check(&ended, 2, &[&format!("out/{name}: "), "--out", "move it away"]);
+            assert!(before == results.files(), "{name}: something was changed");
+        }
     }
 }
 
@@ -87,7 +86,7 @@ fn runs_beyond_all_memory() {
     let cases: [(&[&str], &str); 3] = [
         (&[&still, "--frames", "0..10000000"], "frames"),
         (&[&still, "--size", "16384x16384", "--samples", "256"], "size"),
-        (&["tiny", "--rate", "0.2", "--trace-rate", "1e7"], "trace rate"),
+        (&["tiny", "--rate", "0.2", "--trace-rate", "1e7"], "--trace-rate"),
     ];
     for (args, says) in cases {
         let out = inputs.path("out");

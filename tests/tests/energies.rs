@@ -83,7 +83,7 @@ fn joules_by_part_summed_in_their_order_are_the_energy_exactly() {
         for frame in summary["frames"].as_array().into_iter().flatten() {
             let by_part = by_part_j(&frame["energy_by_part_j"]);
             let sum: f64 = by_part.iter().fold(0.0, |sum, joules| sum + joules);
-            assert_eq!(sum * 1e3, number(frame, "/energy_mj"), "frame {}", frame["frame"]);
+            assert_eq!(sum, number(frame, "/energy_j"), "frame {}", frame["frame"]);
             sums_j.iter_mut().zip(by_part).for_each(|(sum, joules)| *sum += joules);
         }
         assert_eq!(sums_j, by_part_j(&summary["energy_by_part_j"]));
@@ -107,10 +107,10 @@ fn joules_by_part_follow_from_counts_and_times() {
             assert!((found - expected).abs() <= 1e-9 * expected, "{}: {found} J, {expected} J", unit.name());
         }
         let frames = summary["frames"].as_array().cloned().unwrap_or_default();
-        let total_s = |key: &str| frames.iter().map(|frame| number(frame, key)).sum::<f64>() * 1e-3;
-        let busy_s = total_s("/busy_ms");
+        let total_s = |key: &str| frames.iter().map(|frame| number(frame, key)).sum::<f64>();
+        let busy_s = total_s("/busy_s");
         for (part, watts, seconds) in [
-            ("idle", platform.idle_w.value(), total_s("/duration_ms") - busy_s),
+            ("idle", platform.idle_w.value(), total_s("/duration_s") - busy_s),
             ("constant", platform.constant_w.value(), busy_s),
             ("leakage", platform.leakage_w(), busy_s),
         ] {
@@ -149,9 +149,9 @@ fn the_recording_holds_the_energy_that_was_spent() {
 fn energy_per_pixel_and_power_follow_from_energy() {
     let results = quintile!().run("default", &["--size", "64x36", "--frames", "0..2"]);
     for frame in results.summary()["frames"].as_array().into_iter().flatten() {
-        let (energy_mj, ms) = (number(frame, "/energy_mj"), number(frame, "/duration_ms"));
-        let per_pixel_nj = energy_mj * 1e6 / (64.0 * 36.0);
-        assert!((number(frame, "/energy_nj_per_pixel") / per_pixel_nj - 1.0).abs() < 1e-12);
-        assert!((number(frame, "/power_w") / (energy_mj / ms) - 1.0).abs() < 1e-12);
+        let (energy_j, s) = (number(frame, "/energy_j"), number(frame, "/duration_s"));
+        let per_pixel_j = energy_j / (64.0 * 36.0);
+        assert!((number(frame, "/energy_per_pixel_j") / per_pixel_j - 1.0).abs() < 1e-12);
+        assert!((number(frame, "/power_w") / (energy_j / s) - 1.0).abs() < 1e-12);
     }
 }

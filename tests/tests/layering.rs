@@ -89,6 +89,23 @@ fn only_sim_ends_the_process() {
     }
 }
 
+/// What a run is made from is recorded where it is opened: nothing else opens files there.
+#[test]
+fn inputs_are_opened_in_one_place() {
+    let ways = ["fs::read", "File::open", "OpenOptions"];
+    let opener = Path::new("pipeline/activity/src/inputs.rs");
+    for name in ["pipeline/activity", "pipeline", "workloads", "power-model"] {
+        for file in rust_files(&root().join(name).join("src")).iter().filter(|file| !file.ends_with(opener)) {
+            let text = fs::read_to_string(file).expect("a source file");
+            // Unit tests come last in a file.
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            for way in ways {
+                assert!(!code.contains(way), "{}: {way}: use activity::inputs", file.display());
+            }
+        }
+    }
+}
+
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {

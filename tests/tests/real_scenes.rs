@@ -55,7 +55,7 @@ fn assert_sound(results: &Results, triangles: u64, frames: u32) {
     let covered = coverage(&results.image(0));
     assert!((0.03..0.9).contains(&covered), "the subject covers {covered} of the picture");
     assert!(number(&summary, "/sample_test_efficiency") > 0.0);
-    assert!(number(&summary, "/truth/energy_nj_per_pixel/mean") > 0.0);
+    assert!(number(&summary, "/truth/energy_per_pixel_j/mean") > 0.0);
 }
 
 /// The fitted camera holds the whole scene: nothing touches the border.
@@ -87,6 +87,27 @@ fn the_fox_runs_moves_and_wears_its_texture() {
     );
     assert!(results.summary()["counts"]["texture_fetches"].as_u64() > Some(10_000));
     assert!(!results.warning_codes().contains(&"missing-image".to_owned()));
+}
+
+#[test]
+fn no_real_object_is_taken_for_a_room() {
+    for name in [
+        "AnimatedMorphCube/AnimatedMorphCube.gltf",
+        "CesiumMilkTruck/CesiumMilkTruck.gltf",
+        "Fox.glb",
+        "MosquitoInAmber/MosquitoInAmber.gltf",
+        "RiggedFigure/RiggedFigure.gltf",
+        "SimpleSkin/SimpleSkin.gltf",
+        "ToyCar/ToyCar.gltf",
+        "cloth-ball/cloth_ball92.ply",
+        "dragon_vrip_res3.ply.gz",
+    ] {
+        let Some(scene) = real_scenes(name) else { return };
+        let ended = quintile!().call(["info", &scene, "--camera", "fitted: Auto", "--json"]);
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        let found: Value = serde_json::from_str(&ended.stdout).expect("JSON");
+        assert_eq!(found["camera"]["side"], "Outside", "{name}");
+    }
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
     for (args, says) in [
         (vec!["convert", &trace, &out, "--voltage", "0"], vec!["--voltage", "above 0"]),
         (vec!["convert", &trace, &out, "--voltage", "-3"], vec!["--voltage", "above 0"]),
-        ([&marked[..], &["--idle-w=-3"]].concat(), vec!["--idle-w", "at or above 0"]),
+        ([&marked[..], &["--idle-w=-3"]].concat(), vec!["--idle-w", "at least 0"]),
         ([&marked[..], &["--pass", "a=0", "--pass", "a=1"]].concat(), vec!["--pass a is given twice"]),
         (
             vec!["align", &trace, &stamps, "--anchor", "1=0.01", "--anchor", "2=7"],
@@ -34,8 +34,8 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
         ),
         (vec!["convert", &trace, &out, "--rate", "9000"], vec!["column time_s it is 5000 Hz", "--rate"]),
         (vec!["convert", &trace, &out, "--rate", "9000", "--repair"], vec!["column time_s it is 5000 Hz"]),
-        ([&sample[..], &["--specified-voltage", "0"]].concat(), vec!["specified_voltage_v", "above 0"]),
-        ([&sample[..], &["--current-gain=-1"]].concat(), vec!["current_gain", "above 0"]),
+        ([&sample[..], &["--specified-voltage", "0"]].concat(), vec!["--specified-voltage", "above 0"]),
+        ([&sample[..], &["--current-gain=-1"]].concat(), vec!["--current-gain", "above zero"]),
         (vec!["plot", &trace, "--from", "0.05", "--to", "1", "--out", &svg], vec!["not within the trace"]),
         (vec!["frames", &trace, "--mark-file", &bad], vec!["line 1: `0.02s` holds no time"]),
     ] {
@@ -78,7 +78,8 @@ fn plots_show_samples_where_they_are_few_and_a_damaged_pyramid_is_made_anew() {
     let inputs = Inputs::new();
     let (trace, svg) = (recording(&inputs), inputs.path("o.svg"));
     let plot = |more: &[&str]| {
-        let ended = quintile!().call(["trace", "plot", &trace, "--out", &svg].iter().chain(more));
+        let ended =
+            quintile!().call(["trace", "plot", &trace, "--keep-pyramid", "--out", &svg].iter().chain(more));
         assert_eq!(ended.code, Some(0), "{}", ended.stderr);
         (ended, std::fs::read(&svg).unwrap_or_default())
     };
@@ -135,7 +136,7 @@ fn a_rail_that_is_the_sum_of_others_is_told_unless_rails_are_chosen() {
     let out = inputs.path("o.csv");
     let told = quintile!().call(["trace", "convert", &trace, &out]).stderr;
     assert!(
-        told.contains("warning rail-counted-twice: board is, to rounding, the sum of cpu, gpu"),
+        told.contains("warning: [rail-counted-twice] board is, to rounding, the sum of cpu, gpu"),
         "{told}"
     );
     assert!(told.contains("give --rail board, or --rail cpu --rail gpu"), "{told}");
@@ -155,8 +156,8 @@ fn anchors_of_another_clock_or_beyond_the_stamps_are_told() {
         ended.stderr
     };
     assert_eq!(told("1.01=0.02", "1.04=0.05"), "");
-    assert!(told("1.01=0.02", "1.04=0.06").contains("warning anchors-off: by the anchors, a second"));
+    assert!(told("1.01=0.02", "1.04=0.06").contains("warning: [anchors-off] by the anchors, a second"));
     assert!(
-        told("1.01=0.02", "1.09=0.1").contains("warning anchors-off: stamp 1.09 s of an anchor is beyond")
+        told("1.01=0.02", "1.09=0.1").contains("warning: [anchors-off] stamp 1.09 s of an anchor is beyond")
     );
 }

@@ -202,7 +202,12 @@ fn wrong_inputs_are_told_from_failures() {
         inputs.put("both.ron", "(position: (0, 0, 1), target: (0, 0, 0), fov_deg: 40, view_height: 2)");
     let adrift = inputs.put("adrift.ron", "(view_height: 2)");
     let cases: [Case<'_>; 13] = [
-        (&[&start, &end], &["--camera", &both], 2, &["both.ron: camera", "`view_height`", "leave one out"]),
+        (
+            &[&start, &end],
+            &["--camera", &both],
+            2,
+            &["both.ron: camera", "`view_height`", "remove one of them"],
+        ),
         (&[&start, &end], &["--camera", &adrift], 2, &["adrift.ron: camera", "give `position` and `target`"]),
         (
             &[&start, &short],
@@ -212,7 +217,7 @@ fn wrong_inputs_are_told_from_failures() {
         ),
         (&[&cut], &[], 1, &["cut.mts: object 1", "only 3968 follow", "get it again"]),
         (&[&gone], &[], 1, &["gone.mts: cannot read it", "check the path"]),
-        (&[&start, &end], &["--camera", &gone], 1, &["gone.mts: cannot read it", "check the path"]),
+        (&[&start, &end], &["--camera", &gone], 2, &["gone.mts` is not a camera: give `inside`"]),
         (&[&start, &end], &["--camera", &typo], 2, &["typo.ron:2:", "`widht`, did you mean `width`?"]),
         (&[&start, &whole], &[], 2, &["a.mts holds both ends", "give it alone"]),
         (&[&strange], &[], 2, &["a.glb: ", "known here: .m5d, .mts"]),

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::json;
-use tests::{Glb, Inputs, Results, quintile, root};
+use tests::{Glb, Inputs, Results, number, quintile, root};
 
 /// Why a warning of a workload is not brought about here.
 const TESTED: &str = "tests of the workload bring it about, each in a run of its own";
@@ -46,40 +46,53 @@ const NOT_PROVOKED: [(&str, &str); 12] = [
 ];
 
 /// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
-const PROVOKED: [&str; 36] = [
+const PROVOKED: [&str; 49] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
     "blur-beyond-image",
     "budget-missed",
     "camera-ignored",
+    "camera-inside",
     "caustics-coarse",
     "caustics-crossed",
+    "coordinates-far-from-origin",
     "coordinates-out-of-range",
+    "coordinates-recentred",
     "degenerate-triangle",
+    "emissive-ignored",
     "empty-frame",
+    "extension-ignored",
+    "face-colors-ignored",
     "fast-motion",
     "few-samples",
     "focus-of-fitted-camera",
     "frames-missed",
+    "idle-above-busy",
     "irregular-spacing",
+    "leaves-fitted-view",
     "lens-leaves-view",
     "light-ignored",
     "memory-rows",
-    "missing-image",
-    "missing-texcoord",
+    "metallic-ignored",
     "missed-vsync",
-    "obj-materials-ignored",
+    "missing-image",
+    "missing-material",
+    "missing-texcoord",
+    "normal-map-ignored",
+    "occlusion-map-ignored",
     "occlusion-small-occluders",
     "only-mark",
     "orthographic-view",
     "packets-lost",
+    "platform-mismatch",
     "points-thin-voids",
     "primitive-dropped",
     "short-frame",
     "sliver-triangles",
     "sub-sample-triangles",
-    "vertex-colors-ignored",
+    "texture-filter-ignored",
+    "texture-ignored",
     "weak-separation",
     "window-cut",
     "window-longer-than-frame",
@@ -95,7 +108,11 @@ fn assert_warns(results: &Results, code: &str) {
     let message = warning["message"].as_str().unwrap_or_default();
     assert!(message.len() > 20, "{code} says too little: {message}");
     let line = format!("warning: [{code}] {message}");
-    assert!(results.ended.stdout.lines().any(|printed| printed == line), "{}", results.ended.stdout);
+    assert!(
+        results.ended.stderr.lines().any(|printed| printed.starts_with(&line)),
+        "{}",
+        results.ended.stderr
+    );
     let report = results.text("report.html");
     assert!(report.contains(code), "{code} is not in the report");
     let word = message.split_whitespace().max_by_key(|word| word.len()).unwrap_or_default();
@@ -125,8 +142,89 @@ const SPHERE: &str = "(shape: Sphere(radius: 1, segments: 12))";
 
 #[test]
 fn frames_too_short_for_the_recorder() {
-    let results = quintile!().run("tiny", &[]);
+    let results = quintile!().run("tiny", &["--trace-rate", "50000"]);
     assert_warns(&results, "short-frame");
+    // One message says it all, and nothing that was not measured looks as if it had been.
+    assert_eq!(results.warning_codes(), ["short-frame"]);
+    let summary = results.summary();
+    assert!(summary["measured"].is_null() && summary["truth"].is_object());
+    let rows = summary["frames"].as_array().into_iter().flatten();
+    assert!(rows.into_iter().all(|row| row.get("measured_energy_j") == Some(&json!(null))));
+    let printed = &results.ended.stdout;
+    let row = printed.lines().find(|line| line.starts_with("time per frame")).unwrap_or_default();
+    assert_eq!(row.split_whitespace().nth(3), Some("-"), "{printed}");
+    assert!(printed.contains("no frame but the marked one was found"), "{printed}");
+    assert!(summary["warnings"].to_string().contains("--trace-rate 200000"), "{}", summary["warnings"]);
+}
+
+/// Without a rate of the recorder, the frames decide: those of `tiny` are measured as they are.
+#[test]
+fn the_recorder_follows_short_frames() {
+    let results = quintile!().run("tiny", &[]);
+    let summary = results.summary();
+    assert_eq!(number(&summary, "/recorder/rate_hz"), 200e3);
+    assert_eq!(number(&summary, "/settings/trace_rate_hz"), 200e3);
+    assert!(
+        results.ended.stdout.contains("recorder: 200 kHz, raised from 50.0 kHz"),
+        "{}",
+        results.ended.stdout
+    );
+    for pointer in ["duration_s", "energy_j", "power_w"] {
+        let [measured, truth] =
+            ["measured", "truth"].map(|of| number(&summary, &format!("/{of}/{pointer}/mean")));
+        assert!((measured / truth - 1.0).abs() < 0.001, "{pointer}: {measured} for {truth}");
+    }
+    let larger = quintile!().run("tiny", &["--size", "320x180"]).summary();
+    assert_eq!((number(&larger, "/recorder/rate_hz"), &larger["recorder"]["raised"]), (50e3, &json!(false)));
+}
+
+/// The page of the book on warnings says what some commands warn of. They do.
+#[test]
+fn the_page_says_what_a_fresh_checkout_warns_of() {
+    let page = fs::read_to_string(root().join("docs/warnings.md")).expect("the book's chapter on warnings");
+    let section = page.split("## In a fresh checkout").nth(1).unwrap_or_default();
+    let promises: Vec<(&str, &str)> = section.lines().filter_map(promise).collect();
+    assert!(promises.len() >= 5, "{section}");
+    for (command, promised) in promises {
+        let args: Vec<&str> = command.split_whitespace().skip(2).collect();
+        // The whole default run takes too long for a test, so a part of it stands for it.
+        let (scene, args) = match args.split_first() {
+            Some((scene, args)) => (*scene, args.to_vec()),
+            None => ("default", vec!["--frames", "17..19", "--timing", "bound"]),
+        };
+        let codes = quintile!().run(scene, &args).warning_codes();
+        assert_eq!(codes.join(" "), promised, "{command}");
+    }
+}
+
+/// The command of a line, and the code that it warns of; no code where it warns of nothing.
+fn promise(line: &str) -> Option<(&str, &str)> {
+    let (command, rest) = line.strip_prefix("- `")?.split_once("` warns of ")?;
+    let code = if rest.starts_with("nothing") { "" } else { rest.strip_prefix('`')?.split('`').next()? };
+    Some((command, code))
+}
+
+#[test]
+fn a_gpu_on_a_platform_of_another() {
+    let warned = |args: &[&str]| quintile!().run("tiny", args);
+    assert_warns(&warned(&["--gpu", "discrete"]), "platform-mismatch");
+    assert_warns(&warned(&["--gpu", "mobile", "--platform", "hd_4000"]), "platform-mismatch");
+}
+
+#[test]
+fn a_platform_that_rests_at_more_than_it_works() {
+    let inputs = Inputs::new();
+    let path = root().join("power-model/platforms/reference.ron");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let idle = text.replace("idle_w: Assumed(0.95", "idle_w: Assumed(9.5");
+    assert_ne!(text, idle, "the platform idles at other watts now");
+    let results = quintile!().run("tiny", &["--platform", &inputs.put("idle.ron", idle)]);
+    assert_warns(&results, "idle-above-busy");
+    assert_eq!(
+        results.warning_codes().iter().filter(|code| *code == "platform-mismatch").count(),
+        0,
+        "its name is still `reference`"
+    );
 }
 
 #[test]
@@ -140,7 +238,7 @@ fn packets_that_the_recorder_lost_are_gaps_in_its_file() {
     let mended = traces::io::ReadOptions { repair: true, ..Default::default() };
     assert!(!traces::io::read(&trace, &mended).unwrap().repairs.is_empty());
     let ended = quintile!().call(["run", "tiny", "--packet-loss", "1"]);
-    assert!(ended.code == Some(2) && ended.stderr.contains("packet loss: 1"), "{}", ended.stderr);
+    assert!(ended.code == Some(2) && ended.stderr.contains("--packet-loss"), "{}", ended.stderr);
 }
 
 #[test]
@@ -240,23 +338,48 @@ fn images_that_are_not_there() {
 #[test]
 fn materials_that_are_not_drawn_as_they_ask() {
     let mut glb = Glb::square();
-    glb.material(json!({"alphaMode": "BLEND"}));
-    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "alpha-ignored");
+    let see_through = json!({"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 1});
+    let map = json!({"index": 0});
+    glb.material(json!({"alphaMode": "BLEND", "pbrMetallicRoughness": see_through, "normalTexture": map,
+                        "occlusionTexture": map, "emissiveFactor": [1, 0, 0]}));
+    glb.json["textures"] = json!([{"source": 0}]);
+    glb.json["images"] = json!([{"uri": "not read"}]);
+    glb.json["extensionsUsed"] = json!(["KHR_materials_sheen"]);
+    let results = run_file("a.glb", glb.bytes(), &[]);
+    let ignored = ["alpha", "metallic", "normal-map", "occlusion-map", "emissive", "extension"];
+    ignored.iter().for_each(|what| assert_warns(&results, &format!("{what}-ignored")));
     let mut glb = Glb::square();
-    let colors = glb.floats(&[1.0; 12], 3);
-    glb.primitive()["attributes"]["COLOR_0"] = json!(colors);
-    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "vertex-colors-ignored");
+    glb.texture_coordinates();
+    glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    glb.json["textures"] = json!([{"source": 0, "sampler": 0}]);
+    glb.json["samplers"] = json!([{"magFilter": 9728}]);
+    glb.json["images"] = json!([{"uri": format!("data:image/png;base64,{PIXEL}")}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "texture-filter-ignored");
     let mut glb = Glb::square();
     glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
     glb.json["textures"] = json!([{"source": 0}]);
     glb.json["images"] = json!([{"uri": format!("data:image/png;base64,{PIXEL}")}]);
     assert_warns(&run_file("a.glb", glb.bytes(), &[]), "missing-texcoord");
-    let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
-    let inputs = Inputs::new();
-    inputs.put("a.mtl", "newmtl red\nKd 1 0 0\n");
-    let scene = inputs.put("a.obj", obj);
-    let results = quintile!().run(&scene, &["--size", "32x32", "--frames", "0..1"]);
-    assert_warns(&results, "obj-materials-ignored");
+    let obj = "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    assert_warns(&run_file("a.obj", obj, &[]), "missing-material");
+    let properties = "property float x\nproperty float y\nproperty float z\n";
+    let face = "property list uchar int vertex_indices\nproperty uchar red\n";
+    let ply = format!(
+        "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\n{properties}element face 1\n{face}end_header\n\
+         0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n"
+    );
+    let results = run_file("a.ply", ply, &[]);
+    assert_warns(&results, "face-colors-ignored");
+    assert_warns(&results, "texture-ignored");
+}
+
+#[test]
+fn coordinates_far_from_the_origin() {
+    let far = "v 4000000 0 0\nv 4000001 0 0\nv 4000000 1 0\nf 1 2 3\n";
+    assert_warns(&run_file("far.obj", far, &[]), "coordinates-recentred");
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]: [f32; 2]| [x + 4e6, y, 0.0]);
+    let results = run_file("far.glb", Glb::with_positions(&corners).bytes(), &[]);
+    assert_warns(&results, "coordinates-far-from-origin");
 }
 
 /// A PNG of one grey pixel.
@@ -282,12 +405,25 @@ fn parts_of_a_gltf_scene_that_are_left_out() {
     assert_warns(&run_file("a.glb", glb.bytes(), &[]), "light-ignored");
 }
 
+/// A box whose faces are seen from inside.
+const ROOM: &str = "v 0 0 0\nv 9 0 0\nv 0 3 0\nv 9 3 0\nv 0 0 4\nv 9 0 4\nv 0 3 4\nv 9 3 4\n\
+                    f 3 7 5 1\nf 6 8 4 2\nf 5 6 2 1\nf 4 8 7 3\nf 2 4 3 1\nf 7 8 6 5\n";
+
+#[test]
+fn a_camera_inside_a_room() {
+    assert_warns(&run_file("a.obj", ROOM, &[]), "camera-inside");
+    let outside = run_file("a.obj", ROOM, &["--camera", "outside"]);
+    assert!(!outside.warning_codes().iter().any(|code| code == "camera-inside"));
+}
+
 #[test]
 fn a_lens_for_a_camera_placed_by_itself() {
     let focus = format!("(settings: (lens_radius: 0.1, focus: 3), objects: [{SPHERE}])");
     assert_warns(&run_file("a.ron", focus, &[]), "focus-of-fitted-camera");
     let wide = format!("(objects: [{SPHERE}])");
     assert_warns(&run_file("a.ron", wide, &["--lens", "1", "--focus", "1"]), "lens-leaves-view");
+    let leaves = "(settings: (frames: (0, 1)), objects: [(shape: Sphere(radius: 1, segments: 12), velocity: (900, 0, 0))])";
+    assert_warns(&run_file("a.ron", leaves, &[]), "leaves-fitted-view");
 }
 
 /// A code, a scene that provokes it with its flags, and one that does not with its flags.
@@ -386,7 +522,7 @@ fn every_code_is_accounted_for() {
     assert!(unexplained.is_empty(), "the book does not explain {unexplained:?}");
 }
 
-/// The codes that stand in `Warning::new("code"`, or in a constant of the same file that stands there.
+/// The codes that are the first argument of what makes warnings, or a constant of the same file that stands there.
 fn collect_codes(folder: &Path, codes: &mut BTreeSet<String>) {
     for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
         let path = entry.expect("an entry of a source folder").path();
@@ -395,8 +531,10 @@ fn collect_codes(folder: &Path, codes: &mut BTreeSet<String>) {
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             let text = fs::read_to_string(&path).expect("a source file");
             let product = text.split("#[cfg(test)]").next().unwrap_or_default();
-            let made = product.split("Warning::new(").skip(1);
-            codes.extend(made.filter_map(|rest| code_of(rest.trim_start(), product)));
+            for maker in ["Warning::new(", "Warning::about(", "about_material("] {
+                let made = product.split(maker).skip(1);
+                codes.extend(made.filter_map(|rest| code_of(rest.trim_start(), product)));
+            }
         }
     }
 }
