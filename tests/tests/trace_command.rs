@@ -314,7 +314,7 @@ fn numbers_that_are_none_and_flags_that_would_do_nothing_are_refused() {
         (&["frames", "t.csv", "--mark", "0.2", "--rail", "main", "--power-column", "1"], "leave one out"),
         (
             &["plot", "t.csv", "--low-pass", "nan", "--out", "a.svg"],
-            "`nan` is not a time of at least 0; write a number in ms",
+            "`nan` is not a time; write a number in ms",
         ),
         (
             &["plot", "t.csv", "--kind", "energy", "--mark", "0.2", "--from", "0.1", "--out", "a.svg"],
