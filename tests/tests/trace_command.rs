@@ -277,8 +277,7 @@ fn sampling_alignment_energy_and_frontiers_answer() {
 #[test]
 fn noise_below_zero_is_sampled_like_anything_else() {
     let folder = tempfile::tempdir().unwrap();
-    let row =
-        |i: u32| format!("{},12,{}\n", f64::from(i) / 1000.0, if i % 2 == 0 { "0.002" } else { "-0.001" });
+    let row = |i: u32| format!("{},12,{}\n", f64::from(i) / 1000.0, ["0.002", "-0.001"][(i % 2) as usize]);
     let text = "time_s,voltage_V,current_A\n".to_owned() + &(0..5000).map(row).collect::<String>();
     fs::write(folder.path().join("idle.csv"), text).unwrap();
     let output = quintile(folder.path(), &["sample", "idle.csv", "--bits", "24", "--out", "out.csv"]);

@@ -23,7 +23,7 @@ use crate::output::report::Headline;
 /// A run in numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Version of the form of this file: see [`SCHEMA`].
+    /// Version of the form of this file.
     pub schema: u32,
     /// Version of the program.
     pub version: &'static str,

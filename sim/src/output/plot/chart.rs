@@ -459,11 +459,11 @@ mod tests {
     use super::*;
 
     fn texts(picture: &Picture) -> Vec<&str> {
-        let text = |shape| match shape {
-            &Shape::Text(ref text) => Some(text.text.as_str()),
+        let texts = picture.shapes.iter().filter_map(|shape| match shape {
+            Shape::Text(text) => Some(text.text.as_str()),
             _ => None,
-        };
-        picture.shapes.iter().filter_map(text).collect()
+        });
+        texts.collect()
     }
 
     fn dots(points: &[(f64, f64)]) -> Series {
