@@ -10,9 +10,9 @@ use std::path::Path;
 use activity::spec::{self, SpecError};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::row::Kind;
+use crate::output::dir::sha256_of_text;
 use crate::run::RunError;
 
 /// How much is computed.
@@ -197,11 +197,7 @@ pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunErr
 fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunError> {
     let settings: T = spec::parse(text, name)?;
     settings.check().map_err(|message| RunError::Setting(format!("{name}: {message}")))?;
-    Ok((settings, Origin { file: name.to_owned(), sha256: sha256(text), committed: text == T::TEXT }))
-}
-
-fn sha256(text: &str) -> String {
-    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+    Ok((settings, Origin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT }))
 }
 
 /// A setting as a report lists it.

@@ -131,6 +131,11 @@ pub fn sha256_of(path: &Path) -> io::Result<String> {
     Ok(hex(hash))
 }
 
+/// The same of a text.
+pub fn sha256_of_text(text: &str) -> String {
+    hex(Sha256::new_with_prefix(text))
+}
+
 struct Hashing<'a>(&'a mut Sha256);
 
 impl io::Write for Hashing<'_> {

@@ -26,7 +26,7 @@ use traces::io::unfinished;
 
 pub use claim::Claim;
 pub use error::OutputError;
-pub use manifest::{Entry, MANIFEST, Manifest, sha256_of};
+pub use manifest::{Entry, MANIFEST, Manifest, sha256_of, sha256_of_text};
 use swap::Swap;
 use work::Work;
 
