@@ -3,6 +3,8 @@
 use glam::{DVec3, Vec3};
 use pipeline::Draw;
 
+use crate::scene::hit;
+
 /// A triangle at both ends of the shutter, in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Face {
@@ -61,21 +63,6 @@ impl Rays {
         });
         hits.min_by(|a, b| a.1.total_cmp(&b.1))
     }
-}
-
-/// Where the line `from + s along` meets a triangle: `s` and two barycentric coordinates (Möller and Trumbore 1997).
-fn hit(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<(f64, [f64; 2])> {
-    let (ab, ac) = (*b - *a, *c - *a);
-    let across = along.cross(ac);
-    let det = ab.dot(across);
-    if det == 0.0 {
-        return None;
-    }
-    let to = from - *a;
-    let u = to.dot(across) / det;
-    let turned = to.cross(ab);
-    let v = along.dot(turned) / det;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| (ac.dot(turned) / det, [u, v]))
 }
 
 #[cfg(test)]

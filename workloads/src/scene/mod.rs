@@ -42,6 +42,7 @@ pub use light::Light;
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
 pub use node::{Channels, Local, Motion, Node, Spin, Trs, world_poses};
 pub use parts::{DEFAULT_BACKGROUND, Parts};
+pub(crate) use rays::hit;
 pub use settings::{Overrides, Settings};
 pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};

@@ -90,7 +90,7 @@ impl Rays {
             }
             for triangle in &self.triangles[first..end] {
                 if let Some(distance) =
-                    meets(from, along, triangle).filter(|at| *at > beyond && *at < nearest)
+                    hit(from, along, triangle).map(|(at, _)| at).filter(|at| *at > beyond && *at < nearest)
                 {
                     (nearest, found) = (distance, Some(triangle));
                 }
@@ -133,8 +133,8 @@ fn enters([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3, nearest: f64) -
     start <= end && end >= 0.0 && start <= nearest
 }
 
-/// Where the line `from + s along` meets a triangle, as `s` (Möller and Trumbore 1997).
-fn meets(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
+/// Where the line `from + s along` meets a triangle: `s` and two barycentric coordinates (Möller and Trumbore 1997).
+pub(crate) fn hit(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<(f64, [f64; 2])> {
     let (ab, ac) = (*b - *a, *c - *a);
     let across = along.cross(ac);
     let det = ab.dot(across);
@@ -145,7 +145,7 @@ fn meets(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
     let u = to.dot(across) / det;
     let turned = to.cross(ab);
     let v = along.dot(turned) / det;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| ac.dot(turned) / det)
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| (ac.dot(turned) / det, [u, v]))
 }
 
 #[cfg(test)]
@@ -175,7 +175,7 @@ mod tests {
             let rays = Rays::new(triangles.clone());
             let aims = strewn(100);
             for [from, to, _] in aims.iter().map(|[a, b, c]| [*a * 2.0, *b - *a, *c]) {
-                let all = triangles.iter().filter_map(|triangle| meets(from, to, triangle));
+                let all = triangles.iter().filter_map(|triangle| hit(from, to, triangle)).map(|(at, _)| at);
                 let expected = all.filter(|at| *at > 1e-9).min_by(f64::total_cmp);
                 assert_eq!(rays.first(from, to, 1e-9).map(|hit| hit.distance), expected, "{count}");
             }
