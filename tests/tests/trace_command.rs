@@ -287,6 +287,17 @@ fn noise_below_zero_is_sampled_like_anything_else() {
     assert!((energy_j - 0.03).abs() < 1e-3, "{energy}");
 }
 
+#[test]
+fn a_trace_without_energy_has_no_relative_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..2000).map(|i| format!("{},12,0\n", f64::from(i) / 1000.0)).collect();
+    fs::write(folder.path().join("off.csv"), "time_s,voltage_V,current_A\n".to_owned() + &rows).unwrap();
+    let out = quintile(folder.path(), &["sample", "off.csv", "--out", "out.csv"]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success() && !text.contains("inf") && !text.contains("NaN"), "{text}");
+    assert!(json(folder.path(), &["sample", "off.csv", "--out", "again.csv"])["relative_error"].is_null());
+}
+
 /// The output of a call that has to fail as one that was asked wrongly, in one line.
 fn refused(folder: &Path, args: &[&str], says: &str) {
     let output = quintile(folder, args);
@@ -299,7 +310,7 @@ fn refused(folder: &Path, args: &[&str], says: &str) {
 fn numbers_that_are_none_and_flags_that_would_do_nothing_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
-    let cases: [(&[&str], &str); 18] = [
+    let cases: [(&[&str], &str); 19] = [
         (&["energy", "t.csv", "--mark", "0.2", "--idle-w", "nan"], "`nan` is not a power"),
         (&["energy", "t.csv", "--mark", "0.2", "--busy-above", "inf"], "`inf` is not a power"),
         (&["energy", "t.csv", "--mark", "0.2", "--from", "0.1"], "cannot be used with"),
@@ -320,6 +331,7 @@ fn numbers_that_are_none_and_flags_that_would_do_nothing_are_refused() {
             "--kind curve",
         ),
         (&["sample", "t.csv", "--device-rate", "0.5", "--out", "a.csv"], "--device-rate 0.5"),
+        (&["sample", "t.csv", "--device", "joulescope", "--out", "a.csv"], "--device takes a JSON file"),
         (&["pareto", "t.csv", "--idle-w", "-1"], "`-1` is not a power of at least 0"),
         (&["frames", "t.csv", "--mark", "nan"], "`nan` is not a time"),
         (&["energy", "t.csv", "--from", "0.3", "--to", "0.1"], "0.3 s to 0.1 s ends before it begins"),

@@ -88,7 +88,9 @@ fn binary(bytes: &[u8], welded: &mut Welded) -> Result<(), (String, String)> {
 fn ascii(bytes: &[u8], welded: &mut Welded) -> Result<(), (usize, String)> {
     let (mut corners, mut last) = (Vec::with_capacity(3), 0);
     let mut ended = false;
-    for (line, text) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
+    // Old Macintosh programs end lines with a carriage return alone.
+    let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    for (line, text) in (1..).zip(bytes.split(|byte| *byte == end_of_line)) {
         let text = String::from_utf8_lossy(text);
         let mut words = text.split_ascii_whitespace();
         let word = words.next().unwrap_or_default().to_ascii_lowercase();
@@ -179,7 +181,12 @@ mod tests {
 
     #[test]
     fn both_kinds_give_the_same_triangles_over_shared_vertices() {
-        let texts = [in_ascii(), in_ascii().to_uppercase(), in_ascii().replace('\n', "\r\n")];
+        let texts = [
+            in_ascii(),
+            in_ascii().to_uppercase(),
+            in_ascii().replace('\n', "\r\n"),
+            in_ascii().replace('\n', "\r"),
+        ];
         let binaries =
             [&b"made by hand"[..], b"solid, and yet binary"].map(|header| in_binary(header, 2, &SQUARE));
         for bytes in texts.iter().map(|text| text.as_bytes()).chain(binaries.iter().map(|bytes| &bytes[..])) {

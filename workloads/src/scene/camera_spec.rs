@@ -347,8 +347,9 @@ impl CameraSpec {
             (None, false) => self.keyframes.iter().map(|key| (key.time_s, of(key).unwrap_or(rest))).unzip(),
         };
         let interpolation = self.interpolation.unwrap_or_default().into();
+        let given = if self.keyframes.is_empty() { place } else { "keyframes" };
         let track =
-            Track::new(times, points.into_flattened(), 3, interpolation).map_err(|what| (place, what))?;
+            Track::new(times, points.into_flattened(), 3, interpolation).map_err(|what| (given, what))?;
         Ok(Place { rest: DVec3::from(rest), track: Some(track) })
     }
 }
@@ -412,6 +413,13 @@ mod tests {
         }
         assert!(!CameraSpec::load(Path::new("/nowhere/c.ron")).unwrap_err().is_usage());
         assert!(!CameraSpec::load(Path::new("/")).unwrap_err().is_usage());
+    }
+
+    #[test]
+    fn keys_that_make_no_track_are_named_as_keys() {
+        let spec = "position: (0, 0, 3), target: (0, 0, 0), keyframes: [(time_s: 1), (time_s: 0.5)]";
+        let wrong = parse(&format!("({spec})")).unwrap().scene_camera(&Settings::default());
+        assert_eq!(wrong.err().map(|(place, _)| place), Some("keyframes"));
     }
 
     #[test]

@@ -41,7 +41,8 @@ pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure>
     let heading = sampled.heading();
     let before_j = energies_j(&*trace, &[(heading.start_s, heading.end_s())])?[0];
     let after_j = sampled.energy_j;
-    let error = after_j / before_j - 1.0;
+    // A trace of no energy has no relative error.
+    let error = (before_j != 0.0).then(|| after_j / before_j - 1.0);
     let samples = heading.samples;
     if args.json {
         return print_json(
@@ -52,12 +53,12 @@ pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure>
         );
     }
     let DeviceSpec { rate_hz, bits, current_range_a, .. } = device.spec();
+    let relative = error.map_or(String::new(), |error| format!(" ({:+.3} %)", 100.0 * error));
     let line = format!(
-        "{}: {samples} samples at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J ({:+.3} %)",
+        "{}: {samples} samples at {rate_hz} Hz, {bits} bits of {} to {}; {before_j:.6} J became {after_j:.6} J{relative}",
         args.out.display(),
         si(current_range_a[0], "A"),
         si(current_range_a[1], "A"),
-        100.0 * error
     );
     report(&line, args.piped, terminal)
 }
@@ -106,7 +107,8 @@ impl SampleArgs {
             let rail_v = self.rail_voltage.unwrap_or(peaks.voltage_v);
             return Ok(DeviceSpec::fitting(rail_v, peaks.power_w));
         };
-        let unread = |error: String| wrong(format!("{}: {error}", path.display()));
+        let hint = "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
+        let unread = |error: String| wrong(format!("{}: {error}; {hint}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|error| unread(error.to_string()))?;
         serde_json::from_str(&text).map_err(|error| unread(error.to_string()))
     }
