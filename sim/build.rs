@@ -17,7 +17,7 @@ const SOURCES: [&str; 14] = [
     "sim/assets",
     "sim/gpus",
     "sim/src",
-    "timing/src",
+    "sim/timing/src",
     "traces/src",
     "workloads/scenes",
     "workloads/src",

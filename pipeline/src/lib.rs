@@ -9,6 +9,7 @@
 //! - [`setup`]: triangles ready for traversal,
 //! - [`traversal`]: tile tests, which bound where in lens and time a triangle may touch a tile,
 //! - [`sample_test`]: the exact test of a sample against a triangle,
+//! - [`random`]: counter-based random numbers,
 //! - [`sampling`]: where and when each pixel looks,
 //! - [`depth`]: depth intervals and culling,
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
@@ -30,6 +31,7 @@ pub mod depth;
 pub mod frame;
 pub mod geometry;
 pub mod memory;
+pub mod random;
 pub mod sample_test;
 pub mod sampling;
 pub mod setup;
@@ -39,9 +41,9 @@ pub mod texture;
 pub mod traversal;
 pub mod visibility;
 
-pub use frame::{Features, PipelineSpec, Rendered, Settings, Shading, render};
+pub use frame::{Draw, Features, PipelineSpec, Rendered, Settings, Shading, render};
 pub use geometry::{
-    Camera, CameraError, Clip, Cull, Draw, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
+    Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,
 };
 pub use memory::{CacheSpec, MemorySpec, Replacement};
 pub use sampling::{LensShape, SampleSpec, SampleTable};

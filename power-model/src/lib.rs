@@ -35,13 +35,13 @@ pub use frame::FramePower;
 pub use model::PowerModel;
 pub use pacing::{PacedFrame, Pacing, Run, pace};
 pub use parts::{Energy, PARTS, Part};
-pub use platform::{Leakage, Platform, Provenance, Rail, ScaledFrom, UnitPower};
+pub use platform::{
+    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, ScaledFrom, System, UnitPower,
+};
 pub use quantity::{
     Basis, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds, Share,
     Source, Sourced, Volts, Watts,
 };
 pub use row::{EnergyRow, Supply};
-pub use system::{
-    Cause, Circumstances, Disturbance, Finish, Launch, Pulse, Surrounded, SurroundedFrame, System, overlay,
-};
+pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
 pub use table::{Bound, EnergyTable, Entry};

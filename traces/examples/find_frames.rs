@@ -42,8 +42,8 @@ fn run() -> Result<(), Box<dyn Error>> {
 
 fn read(path: &Path) -> Result<Trace, io::ReadError> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        io::csv::read(path)
+        io::read_csv(path)
     } else {
-        io::parquet::read(path)
+        io::read_parquet(path)
     }
 }

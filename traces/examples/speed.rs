@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     tell("write", clock);
     println!("{:.2} bytes a sample", std::fs::metadata(&path)?.len() as f64 / 1e6 / millions);
     let clock = Instant::now();
-    let read = io::parquet::read(&path);
+    let read = io::read_parquet(&path);
     tell("read", clock);
     std::fs::remove_file(&path)?;
     assert!(read? == trace);

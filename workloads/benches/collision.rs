@@ -7,8 +7,8 @@
 use std::path::PathBuf;
 
 use cpu_time::ProcessTime;
+use workloads::collision::load_cases;
 use workloads::collision::{Object, Search, detect};
-use workloads::visibility::load_cases;
 
 /// Times that each scene is looked at; the median counts.
 const ROUNDS: usize = 5;

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
 use glam::{Affine3A, Vec3};
-use pipeline::sampling::{HashedSamples, mix};
+use pipeline::random::mix;
+use pipeline::sampling::HashedSamples;
 use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
 use pipeline::{Camera, Cull, Geometry, Lens, LensShape, Viewport};
 

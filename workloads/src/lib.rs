@@ -4,7 +4,7 @@
 //! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]), and
 //!   [`Frame::draws`] hands them to the pipeline.
 //! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
-//! - [`job`] is for work that is more than one rendering of a scene.
+//! - [`job`] is for work that is more than one rendering of a scene; [`catalog`] finds one by name.
 //! - [`caustics`] draws refracted and reflected light, beams as moving triangles.
 //! - [`glossy`] makes glossy reflections and refractions on planar receivers.
 //! - [`multiview`] draws stereo and multi-view images in one pass.
@@ -31,6 +31,7 @@
 pub mod accumulation;
 mod bounded;
 pub mod builtin;
+pub mod catalog;
 pub mod caustics;
 pub mod collision;
 mod error;
@@ -55,6 +56,6 @@ pub use error::LoadError;
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use job::Job;
 pub use load::load;
-pub use material::Material;
+pub use material::{Light, Material};
 pub use samples::SampleChoice;
-pub use scene::{Frame, FrameError, FrameMesh, Light, Overrides, Scene, Settings};
+pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use activity::spec::suggestion;
-use pipeline::SampleSpec;
 use pipeline::sampling::SampleSource;
+use pipeline::{SampleSpec, SampleTable};
 
 use crate::error::LoadError;
 use crate::visibility::FixedSamples;
@@ -58,7 +58,7 @@ impl SampleChoice {
                 ))
             }
             Self::Fixed(table) => Ok(Box::new(table.clone())),
-            Self::Described(spec) => match spec.table(per_pixel, seed) {
+            Self::Described(spec) => match SampleTable::new(spec, per_pixel, seed) {
                 Ok(table) => Ok(Box::new(table)),
                 Err(error) => wrong(error.to_string()),
             },
@@ -99,9 +99,10 @@ mod tests {
         assert_eq!(described("()").unwrap(), SampleSpec::default());
         let text = "(pattern: Interleaved(points: 16), lens: Polygon(blades: 7, rotation_deg: 12), regions: Grid(2, 1))";
         let spec = described(text).unwrap();
-        assert_eq!(spec.table(4, 1).unwrap().regions().len(), 2);
+        assert_eq!(SampleTable::new(&spec, 4, 1).unwrap().regions().len(), 2);
         let given = described("(pattern: Given(points: [(0, 0.5, 0.25), (-1, 1, 0)]))").unwrap();
-        let found: Vec<f32> = given.table(2, 1).unwrap().pixel(0, 0).iter().map(|s: &Sample| s.t).collect();
+        let found: Vec<f32> =
+            SampleTable::new(&given, 2, 1).unwrap().pixel(0, 0).iter().map(|s: &Sample| s.t).collect();
         assert!(found.contains(&0.25) && found.contains(&0.0), "{found:?}");
         assert!(
             described("(regions: Rectangles([(u: (-1, 0), v: (-1, 1)), (u: (0, 1), v: (-1, 1))]))").is_ok()

@@ -5,6 +5,7 @@ use std::ops::{AddAssign, Index, IndexMut};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
+use crate::events::EVENTS;
 use crate::{Event, Unit};
 
 /// How often each event happened. Workers own their counts and add them up with `+=`, which is exact and
@@ -36,7 +37,7 @@ impl Counts {
 
     /// The counts of the events of `unit`, in declaration order, to be added to.
     pub fn of_mut(&mut self, unit: Unit) -> &mut [u64] {
-        let (first, end) = crate::packet::EVENTS[unit as usize];
+        let (first, end) = EVENTS[unit as usize];
         &mut self.0[first..end]
     }
 

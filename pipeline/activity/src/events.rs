@@ -192,6 +192,18 @@ impl TryFrom<String> for Event {
     }
 }
 
+/// First event and one past the last, by unit.
+pub(crate) const EVENTS: [(usize, usize); Unit::COUNT] = {
+    let mut ranges = [(0, 0); Unit::COUNT];
+    let mut at = 0;
+    while at < Unit::COUNT {
+        let range = Unit::ALL[at].events();
+        ranges[at] = (range.start, range.end);
+        at += 1;
+    }
+    ranges
+};
+
 #[cfg(test)]
 mod tests {
     use super::*;

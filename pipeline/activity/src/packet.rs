@@ -2,6 +2,7 @@
 
 use std::ops::{AddAssign, Index, IndexMut};
 
+use crate::events::EVENTS;
 use crate::{Counts, Event, Unit};
 
 /// What kind of work a packet is, which decides the units it passes through.
@@ -43,18 +44,6 @@ impl PacketCounts {
         &self.0[EVENTS[unit as usize].0..EVENTS[unit as usize].1]
     }
 }
-
-/// First event and one past the last, by unit.
-pub(crate) const EVENTS: [(usize, usize); Unit::COUNT] = {
-    let mut ranges = [(0, 0); Unit::COUNT];
-    let mut at = 0;
-    while at < Unit::COUNT {
-        let range = Unit::ALL[at].events();
-        ranges[at] = (range.start, range.end);
-        at += 1;
-    }
-    ranges
-};
 
 impl Index<Event> for PacketCounts {
     type Output = u32;

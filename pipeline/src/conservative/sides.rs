@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn the_root_is_kept_whatever_is_rounded() {
         for seed in 1..200_000_u64 {
-            let bits = crate::sampling::mix(seed);
+            let bits = crate::random::mix(seed);
             let start = 0.25 + (bits % 1000) as f64 / 3000.0;
             let range = [start, start + 1.0 / (3_u64 << (bits >> 20 & 31)) as f64];
             let (p, q) = ((bits >> 40) % 4096 + 1, (bits >> 52) + 1);

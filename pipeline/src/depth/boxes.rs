@@ -269,7 +269,7 @@ mod tests {
     }
 
     fn mix(a: u32, b: u32) -> u32 {
-        (crate::sampling::mix(u64::from(a) << 32 | u64::from(b)) >> 40) as u32
+        (crate::random::mix(u64::from(a) << 32 | u64::from(b)) >> 40) as u32
     }
 
     #[test]

@@ -93,7 +93,7 @@ fn seen_area<R: Real>(ends: &[Points<R>], slopes: &[[R; 2]; 2]) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{mix, unit};
+    use crate::random::{mix, unit};
 
     struct Numbers(u64);
 

@@ -1,10 +1,7 @@
 //! Bins: coarse tiles, each rasterized by one worker, triangle by triangle through its fine tiles.
 
-use super::counters::BinLog;
 use super::judge::Judge;
 use super::pass::Pass;
-use super::vertices::Ready;
-use super::worker::{Scratch, Worker};
 use crate::depth::DepthTile;
 
 /// A coarse tile of the image and what its samples see.
@@ -59,20 +56,5 @@ impl Bin {
             let pixels = (0..rows).fold(0_u64, |mask, r| mask | row << (r * side));
             (pixels != 0).then(|| (Self::tile_number(pass, [x, y]), place, pixels, tile.is_some()))
         })
-    }
-
-    /// Rasterizes the listed triangles of a batch.
-    pub fn rasterize(
-        &mut self,
-        pass: &Pass<'_>,
-        ready: &[Ready],
-        list: &[u32],
-        scratch: &mut Scratch,
-    ) -> BinLog {
-        let mut worker = Worker::new(pass, self, scratch);
-        for &index in list {
-            worker.triangle(&ready[index as usize]);
-        }
-        worker.finish()
     }
 }

@@ -2,6 +2,7 @@
 
 mod bin;
 mod counters;
+mod draw;
 mod heat;
 mod judge;
 mod look;
@@ -22,15 +23,17 @@ use judge::Judge;
 use rayon::prelude::*;
 use vertices::Ready;
 
-use crate::geometry::{Camera, Draw};
+use crate::geometry::Camera;
 use crate::memory::CacheError;
 use crate::setup::distribute;
 use bin::Bin;
 use counters::BinLog;
+pub use draw::Draw;
 pub use heat::{HeatMap, TileHeat};
 use pass::Pass;
 use replay::Replay;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
+use worker::Worker;
 
 /// A rendered frame.
 #[derive(Clone, Debug)]
@@ -209,7 +212,7 @@ fn rasterize_bins(pass: &Pass<'_>, bins: &mut [Bin], ready: &[Ready], lists: &[V
         all.filter(|(number, _)| chosen(*number)).for_each_init(
             worker::Scratch::default,
             |scratch, (_, ((bin, list), log))| {
-                *log = bin.rasterize(pass, ready, list, scratch);
+                *log = Worker::new(pass, bin, scratch).rasterize(ready, list);
             },
         );
     };

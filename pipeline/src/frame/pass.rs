@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use glam::Vec4;
 
+use super::draw::Draw;
 use super::{Features, Settings};
 use crate::depth::BoxGrid;
-use crate::geometry::{Camera, Clip, Draw, MovingVertex, Projection, Viewport};
+use crate::geometry::{Camera, Clip, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressMap, Allocator};
 use crate::setup::Corner;
 use crate::texture::Texture;

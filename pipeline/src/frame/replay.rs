@@ -8,7 +8,8 @@ use super::counters::{BinLog, Work};
 use super::pass::Pass;
 use super::surface::Surface;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
-use crate::sampling::{Sample, mix};
+use crate::random::mix;
+use crate::sampling::Sample;
 use crate::shading::QuadAccess;
 
 /// Bytes of a stored depth or colour of one sample, and of a pixel of the image.

@@ -12,7 +12,8 @@ use super::look::Look;
 use super::pass::Pass;
 use super::surface::{Grid, Surface};
 use crate::depth::DepthTile;
-use crate::sampling::{TileSamples, mix};
+use crate::random::mix;
+use crate::sampling::TileSamples;
 
 /// The images: each pixel the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {

@@ -7,8 +7,8 @@ use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
-    self, Box5, Edges, Facing, LensLines, Piece, SCREEN_GAIN_MADDS as GAIN, Screen, TileRect, Timeline, View,
-    narrow_counted,
+    self, Box5, EdgeBounds, Edges, Facing, LensLines, Piece, SCREEN_GAIN_MADDS as GAIN, Screen, TileRect,
+    Timeline, View, narrow_counted,
 };
 
 /// A triangle with what set-up found for its tile tests.
@@ -217,7 +217,7 @@ impl Subject<'_> {
 
     fn edge_bounds(&self, rect: &TileRect, left: &mut Left, work: &mut TileWork) -> Option<()> {
         let edges = *self.edges(rect, left, work);
-        let (times, more) = edges.bounds().timeline(&edges, &left.times, self.triangle.faces);
+        let (times, more) = EdgeBounds::new(&edges).timeline(&edges, &left.times, self.triangle.faces);
         work.edge_bound_madds += traversal::edge_bound_madds(self.triangle.moving, left.within.lens) + more;
         left.times = times;
         let hull = left.times.hull();
@@ -256,7 +256,8 @@ impl Subject<'_> {
     /// The screen for the samples of a piece of the time that is left.
     pub fn screen(&self, rect: &TileRect, left: &mut Left, piece: &Piece, work: &mut TileWork) -> Screen {
         let edges = self.edges(rect, left, work);
-        let (screen, whole) = (edges.screen(piece.t, piece.seen(self.triangle.faces)), edges.spans(piece.t));
+        let (screen, whole) =
+            (Screen::new(edges, piece.t, piece.seen(self.triangle.faces)), edges.spans(piece.t));
         work.screen_setup_madds +=
             traversal::screen_setup_madds(self.triangle.moving, left.within.lens, whole);
         screen

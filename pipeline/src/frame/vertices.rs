@@ -6,9 +6,9 @@ use activity::{Event, LineAccess, Packet, PacketKind};
 use rayon::prelude::*;
 
 use super::Features;
+use super::draw::Draw;
 use super::pass::{Pass, Staged};
 use super::replay::Replay;
-use crate::geometry::Draw;
 use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
 use crate::traversal::{self, Box5, LensLines, small};
 

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::sampling::mix;
+use crate::random::mix;
 
 /// Size and organization of a cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]

@@ -1,7 +1,7 @@
 //! Samples made by hashing, as the ray-casting peer makes them: plain random, reproducible to the bit anywhere.
 
-use super::hash::mix;
 use super::{LensShape, Sample, SampleSource};
+use crate::random::mix;
 
 /// Independent uniform samples, each a hash of (seed, pixel, index).
 ///

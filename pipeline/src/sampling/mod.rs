@@ -1,6 +1,5 @@
 //! Where and when each pixel looks: sample tables over the image, the lens and the shutter.
 
-mod hash;
 mod hashed;
 mod lens;
 mod pattern;
@@ -12,7 +11,6 @@ mod spec;
 mod table;
 mod tile;
 
-pub use hash::{mix, unit};
 pub use hashed::HashedSamples;
 pub use lens::LensShape;
 pub use pattern::Pattern;

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::Sample;
-use super::hash::word;
 use super::sobol::{owen, sobol};
+use crate::random::word;
 
 /// How the samples of a pixel are spread.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LensRegions, LensShape, Pattern, SampleTable, TableError};
+use super::{LensRegions, LensShape, Pattern};
 
 /// What a sample table is to be like; a file in RON holds one. What is left out is as in the default table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -43,24 +43,17 @@ impl SampleSpec {
         };
         Some(Self { pattern, ..Self::default() })
     }
-
-    /// The table itself, with `per_pixel` samples in each pixel.
-    ///
-    /// # Errors
-    /// When `per_pixel` is out of range or cannot be shared out among the regions, or the description cannot be.
-    pub fn table(&self, per_pixel: u32, seed: u64) -> Result<SampleTable, TableError> {
-        SampleTable::described(self, per_pixel, seed)
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::SampleTable;
     use super::*;
 
     #[test]
     fn every_name_makes_a_table() {
         for (name, _) in SampleSpec::names() {
-            let table = SampleSpec::named(name).unwrap().table(6, 1).unwrap();
+            let table = SampleTable::new(&SampleSpec::named(name).unwrap(), 6, 1).unwrap();
             assert_eq!(table.per_pixel(), 6, "{name}");
         }
         assert_eq!(SampleSpec::named("owen"), Some(SampleSpec::default()));

@@ -1,7 +1,7 @@
 //! A programmable table of samples, tiled over the image.
 
-use super::hash::word;
 use super::{LensRegion, LensShape, Sample, SampleSource, SampleSpec};
+use crate::random::word;
 
 /// Samples for a square block of pixels. The block repeats over the image, each copy turned round in itself by an
 /// offset hashed from the seed, so that a sample is a pure function of (seed, pixel, index).
@@ -70,11 +70,15 @@ impl SampleTable {
     /// # Errors
     /// When `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
     pub fn low_discrepancy(per_pixel: u32, seed: u64, shape: LensShape) -> Result<Self, TableError> {
-        SampleSpec { lens: shape, ..SampleSpec::default() }.table(per_pixel, seed)
+        Self::new(&SampleSpec { lens: shape, ..SampleSpec::default() }, per_pixel, seed)
     }
 
-    /// The table that `spec` describes. Every region of the lens has a run of the pattern's samples of its own.
-    pub(super) fn described(spec: &SampleSpec, per_pixel: u32, seed: u64) -> Result<Self, TableError> {
+    /// The table that `spec` describes, with `per_pixel` samples in each pixel. Every region of the lens has a run of the
+    /// pattern's samples of its own.
+    ///
+    /// # Errors
+    /// When `per_pixel` is out of range or cannot be shared out among the regions, or the description cannot be.
+    pub fn new(spec: &SampleSpec, per_pixel: u32, seed: u64) -> Result<Self, TableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
             return Err(TableError::PerPixel(per_pixel));
         }
@@ -238,7 +242,7 @@ mod tests {
         for regions in [LensRegions::Across(2), LensRegions::Grid(2, 2), LensRegions::Across(8)] {
             for lens in [LensShape::Square, LensShape::Disk] {
                 let spec = SampleSpec { lens, regions: regions.clone(), ..SampleSpec::default() };
-                let table = spec.table(16, 5).unwrap();
+                let table = SampleTable::new(&spec, 16, 5).unwrap();
                 let each = 16 / table.regions().len();
                 for (px, py) in [(0, 0), (70, 9)] {
                     for (index, s) in (0_u32..).zip(table.pixel(px, py)) {
@@ -256,7 +260,7 @@ mod tests {
     fn the_samples_of_each_region_are_stratified_in_time() {
         use super::super::LensRegions;
         let spec = SampleSpec { regions: LensRegions::Across(2), ..SampleSpec::default() };
-        let table = spec.table(16, 5).unwrap();
+        let table = SampleTable::new(&spec, 16, 5).unwrap();
         for run in table.pixel(9, 33).chunks_exact(8) {
             let mut strata: Vec<_> = run.iter().map(|s| (s.t * 8.0) as u32).collect();
             strata.sort_unstable();
@@ -268,10 +272,16 @@ mod tests {
     fn samples_that_cannot_be_shared_out_are_refused() {
         use super::super::{LensRegions, Pattern};
         let three = SampleSpec { regions: LensRegions::Across(3), ..SampleSpec::default() };
-        assert_eq!(three.table(8, 1).unwrap_err(), TableError::Shares { per_pixel: 8, regions: 3 });
+        assert_eq!(
+            SampleTable::new(&three, 8, 1).unwrap_err(),
+            TableError::Shares { per_pixel: 8, regions: 3 }
+        );
         let pattern = Pattern::Given { points: vec![(0.0, 0.0, 0.0)] };
-        assert_eq!(SampleSpec { pattern, ..three }.table(9, 1).unwrap_err(), TableError::GivenRegions);
+        assert_eq!(
+            SampleTable::new(&SampleSpec { pattern, ..three }, 9, 1).unwrap_err(),
+            TableError::GivenRegions
+        );
         let none = SampleSpec { pattern: Pattern::Interleaved { points: 0 }, ..SampleSpec::default() };
-        assert_eq!(none.table(9, 1).unwrap_err(), TableError::Points);
+        assert_eq!(SampleTable::new(&none, 9, 1).unwrap_err(), TableError::Points);
     }
 }

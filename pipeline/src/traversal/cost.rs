@@ -90,17 +90,17 @@ mod tests {
             let (madds, (_, bisections)) = count(|| facing.timeline(within.t, [true; 2], 3));
             println!("bisect {moving} {lens} {madds} {bisections}");
             assert_eq!(madds, facing_madds(moving, lens, bisections) - facing_madds(moving, lens, 0));
-            let (madds, bounds) = count(|| edges.bounds());
+            let (madds, bounds) = count(|| EdgeBounds::new(&edges));
             println!("bounds {moving} {lens} {madds}");
             assert_eq!(madds, edge_bound_madds(moving, lens), "bounds {moving} {lens}");
             let times = Timeline::one(Piece { t: within.t, faces: [true; 2] });
             let (madds, (_, more)) = count(|| bounds.timeline(&edges, &times, [true; 2]));
             println!("narrow {moving} {lens} {madds} {more}");
             assert!(madds <= more, "{madds} > {more}");
-            let (madds, _) = count(|| edges.screen(within.t, [true; 2]));
+            let (madds, _) = count(|| Screen::new(&edges, within.t, [true; 2]));
             println!("screen {moving} {lens} {madds}");
             assert_eq!(madds, screen_setup_madds(moving, lens, true), "screen {moving} {lens}");
-            let (madds, _) = count(|| edges.screen([0.25, 0.5], [true; 2]));
+            let (madds, _) = count(|| Screen::new(&edges, [0.25, 0.5], [true; 2]));
             println!("screen part {moving} {lens} {madds}");
             assert_eq!(madds, screen_setup_madds(moving, lens, !moving), "part {moving} {lens}");
         }
@@ -117,8 +117,8 @@ mod tests {
             let (found, edges) =
                 count(|| Edges::<Counted>::new(View::new(&triangle, &shear, &tile, &within)));
             let (facing, _) = count(|| Facing::new(&edges));
-            let (bounds, _) = count(|| edges.bounds());
-            let (screen, _) = count(|| edges.screen(within.t, [true; 2]));
+            let (bounds, _) = count(|| EdgeBounds::new(&edges));
+            let (screen, _) = count(|| Screen::new(&edges, within.t, [true; 2]));
             let (sides, (_, told)) = count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
             println!("{moving} {lens}: {found} {facing} {bounds} {screen} {sides}");
             assert!(10 * found <= 11 * edge_madds(moving, lens) + 1, "{found}");

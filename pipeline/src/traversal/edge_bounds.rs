@@ -1,10 +1,10 @@
 //! When a sample of a box may lie on the right side of every edge (after Munkberg and Akenine-Moeller 2012).
 
 use super::cost;
-use super::edges::{Edges, Faces};
+use super::edges::Edges;
 use super::number::Number;
 use super::quadratic::Quadratic;
-use super::timeline::{Piece, Timeline};
+use super::timeline::{Faces, Piece, Timeline};
 
 /// The lowest and the highest values of three edges over a box, as quadratics of time.
 #[derive(Clone, Copy, Debug)]
@@ -14,6 +14,13 @@ pub struct EdgeBounds<N = f64> {
 }
 
 impl<N: Number> EdgeBounds<N> {
+    /// Bounds on each of `edges` all over their box.
+    pub fn new(edges: &Edges<N>) -> Self {
+        let skew = edges.skew();
+        let ranges = edges.edges.map(|edge| edge.range(&edges.view, skew));
+        Self { ranges, moving: edges.view.moving }
+    }
+
     /// The part of the time, from 0 to 1, in which a sample may see one of `faces`, and how many quadratics had to be solved for
     /// it. To see the clockwise face all three edges have to reach above zero, to see the other one all below. So where
     /// facing is decided one edge is enough to cull, and else it takes one below zero and another above.
@@ -92,7 +99,7 @@ mod tests {
             let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
             let whole = Timeline::one(Piece { t: case.within.t, faces: [true; 2] });
             for drawn in [[true, true], [true, false], [false, true]] {
-                let (left, _) = edges.bounds().timeline(&edges, &whole, drawn);
+                let (left, _) = EdgeBounds::new(&edges).timeline(&edges, &whole, drawn);
                 culled += u32::from(left.hull().is_none());
                 shrunk += u32::from(left.hull().is_some_and(|t| t != case.within.t));
                 for _ in 0..60 {

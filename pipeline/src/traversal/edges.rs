@@ -20,10 +20,8 @@
 //! the box is our own).
 
 use super::View;
-use super::edge_bounds::EdgeBounds;
 use super::number::Number;
 use super::quadratic::Quadratic;
-use super::screen::{Screen, linearized};
 
 /// The edges of a triangle over a box; edge `k` is the one opposite vertex `k`.
 #[derive(Clone, Copy, Debug)]
@@ -43,10 +41,6 @@ pub(super) struct Edge<N> {
     pub depths: [N; 2],
 }
 
-/// Which faces a sample of a box may see: the one that appears clockwise on the screen (edges above zero), and the
-/// counter-clockwise one.
-pub type Faces = [bool; 2];
-
 impl<N: Number> Edges<N> {
     /// The edges of the triangle in `view`.
     pub fn new(view: View<N>) -> Self {
@@ -55,20 +49,13 @@ impl<N: Number> Edges<N> {
         Self { view, edges }
     }
 
-    /// Bounds on each edge all over the box.
-    pub fn bounds(&self) -> EdgeBounds<N> {
-        let skew = self.skew();
-        let ranges = self.edges.map(|edge| edge.range(&self.view, skew));
-        EdgeBounds { ranges, moving: self.view.moving }
-    }
-
     /// Whether `t` is all of the time of the box, as far as that matters.
     pub fn spans(&self, t: [f32; 2]) -> bool {
         !self.view.moving || t == self.view.t
     }
 
     /// How strongly the difference of depths bends an edge over lens and tile.
-    fn skew(&self) -> N {
+    pub(super) fn skew(&self) -> N {
         let View { half, s, a, lens, parallel, .. } = &self.view;
         if !lens {
             return N::zero();
@@ -76,11 +63,6 @@ impl<N: Number> Edges<N> {
         let twist = (a[0] * s[1] - a[1] * s[0]).abs();
         let with_image = (if *parallel { a } else { s }).map(N::abs);
         half[1] * with_image[0] * half[2] + (half[0] * with_image[1] + twist * half[2]) * half[3]
-    }
-
-    /// The screen for single samples with times `t`, within those of the box, of which only `faces` can be seen.
-    pub fn screen(&self, t: [f32; 2], faces: Faces) -> Screen {
-        linearized(self, t, faces, self.skew())
     }
 }
 
@@ -134,7 +116,7 @@ impl<N: Number> Edge<N> {
     }
 
     /// The lowest and the highest it can be in the arithmetic of the sample test, as quadratics of time.
-    fn range(&self, view: &View<N>, skew: N) -> [Quadratic<N>; 2] {
+    pub(super) fn range(&self, view: &View<N>, skew: N) -> [Quadratic<N>; 2] {
         let [from, to] = self.depths.map(N::abs);
         let bend = [from, from.max(to), to];
         let axes = if view.lens { 4 } else { 2 };
@@ -159,6 +141,7 @@ impl<N: Number> Edge<N> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::EdgeBounds;
     use super::super::testing::{Case, Uniform, cases};
     use super::*;
 
@@ -176,7 +159,7 @@ mod tests {
         let mut r = Uniform::new(3);
         for (seed, case) in cases(300) {
             let edges = edges(&case);
-            let bounds = edges.bounds();
+            let bounds = EdgeBounds::new(&edges);
             for _ in 0..40 {
                 let place = case.place(&mut r);
                 let phase = edges.view.phase(place[4] as f32);
@@ -195,7 +178,7 @@ mod tests {
         for (_, mut case) in cases(50).filter(|(_, case)| !case.within.lens) {
             (case.tile.x[1], case.tile.y[1]) = (case.tile.x[0], case.tile.y[0]);
             let edges = edges(&case);
-            for (k, [low, high]) in edges.bounds().ranges.iter().enumerate() {
+            for (k, [low, high]) in EdgeBounds::new(&edges).ranges.iter().enumerate() {
                 for step in 0..=4_u8 {
                     let phase = f64::from(step) / 4.0;
                     let [start, end] = case.within.t.map(f64::from);
@@ -220,7 +203,7 @@ mod tests {
                 (thin.within.u, thin.within.v) = (flat(2, case.within.u), flat(3, case.within.v));
                 let edges = edges(&thin);
                 let ranges = [thin.tile.x, thin.tile.y, thin.within.u, thin.within.v];
-                for (k, [_, high]) in edges.bounds().ranges.iter().enumerate() {
+                for (k, [_, high]) in EdgeBounds::new(&edges).ranges.iter().enumerate() {
                     let most = [0, 1].map(|end| {
                         let mut place = [middle[0], middle[1], middle[2], middle[3], 0.0];
                         place[axis] = f64::from(ranges[axis][end]);

@@ -16,9 +16,9 @@
 //! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one, or `det = sum(e_k)`:
 //! the sign of `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
 
-use super::edges::{Edges, Faces};
+use super::edges::Edges;
 use super::number::Number;
-use super::timeline::{Piece, Timeline};
+use super::timeline::{Faces, Piece, Timeline};
 
 /// Bounds on the determinant over a box: its lowest and highest Bernstein coefficients.
 #[derive(Clone, Copy, Debug)]

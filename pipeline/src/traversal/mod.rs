@@ -26,7 +26,7 @@ pub use cost::{
     side_madds,
 };
 pub use edge_bounds::EdgeBounds;
-pub use edges::{Edges, Faces};
+pub use edges::Edges;
 pub use facing::Facing;
 pub use lens_lines::LensLines;
 pub use number::Number;
@@ -34,5 +34,5 @@ pub use quadratic::{Pieces, Quadratic};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
-pub use timeline::{Piece, Timeline};
+pub use timeline::{Faces, Piece, Timeline};
 pub use view::View;

@@ -1,9 +1,10 @@
 //! The edges linearized in (X, Y, u, v, t), to screen single samples by (Munkberg and Akenine-Moeller 2012, whose
 //! hyperplanes these are; the remainder is our own).
 
-use super::edges::{Edge, Edges, Faces};
+use super::edges::{Edge, Edges};
 use super::number::Number;
 use super::quadratic::Quadratic;
+use super::timeline::Faces;
 use super::view::View;
 
 /// Linear edges in the arithmetic of the sample test. A sample is outside where one edge is below `-margin` and another above
@@ -26,6 +27,28 @@ pub struct Screen {
 pub const SCREEN_GAIN_MADDS: u32 = 3 * 5 + 1;
 
 impl Screen {
+    /// The screen for single samples of the box of `edges` with times `t`, within those of the box, of which only `faces` can be
+    /// seen.
+    pub fn new<N: Number>(edges: &Edges<N>, t: [f32; 2], faces: Faces) -> Self {
+        let (view, skew) = (&edges.view, edges.skew());
+        let [x, y, u, v] = view.middle;
+        let middle = [x, y, u, v, if view.moving { 0.5 * (t[0] + t[1]) } else { 0.0 }];
+        let part = (view.moving && t != view.t).then(|| t.map(|t| view.phase(t)));
+        let half_t = (N::from(t[1]) - N::from(t[0])) * N::from(0.5);
+        let linear = edges.edges.map(|edge| edge.linear(view, part, half_t, skew));
+        let mut screen =
+            Self { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3], extent: [0.0; 3] };
+        for (k, linear) in linear.iter().enumerate() {
+            // The middle of the times is rounded; what it moves by goes into the margin.
+            let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle[4].abs());
+            let [value, margin] = one_sided(linear, off, faces);
+            (screen.value[k], screen.margin[k]) = (value, margin);
+            screen.extent[k] = Into::<f64>::into(linear.extent) as f32;
+            screen.gradient[k] = linear.slopes.map(|slope| Into::<f64>::into(slope) as f32);
+        }
+        screen
+    }
+
     /// The share of samples that it takes away, were the edges spread evenly over their extents and independent.
     pub fn gain(&self) -> f32 {
         let mut kept = [1.0_f32; 2];
@@ -52,27 +75,6 @@ pub(super) struct Linear<N> {
 /// Multiply-adds of screening one sample: three edges, one for each dimension in use.
 pub const fn screen_madds(moving: bool, lens: bool) -> u32 {
     3 * (2 + moving as u32 + 2 * lens as u32)
-}
-
-/// The screen of `edges` over the times `t`, which lie within those of its box.
-pub(super) fn linearized<N: Number>(edges: &Edges<N>, t: [f32; 2], faces: Faces, skew: N) -> Screen {
-    let view = &edges.view;
-    let [x, y, u, v] = view.middle;
-    let middle = [x, y, u, v, if view.moving { 0.5 * (t[0] + t[1]) } else { 0.0 }];
-    let part = (view.moving && t != view.t).then(|| t.map(|t| view.phase(t)));
-    let half_t = (N::from(t[1]) - N::from(t[0])) * N::from(0.5);
-    let linear = edges.edges.map(|edge| edge.linear(view, part, half_t, skew));
-    let mut screen =
-        Screen { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3], extent: [0.0; 3] };
-    for (k, linear) in linear.iter().enumerate() {
-        // The middle of the times is rounded; what it moves by goes into the margin.
-        let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle[4].abs());
-        let [value, margin] = one_sided(linear, off, faces);
-        (screen.value[k], screen.margin[k]) = (value, margin);
-        screen.extent[k] = Into::<f64>::into(linear.extent) as f32;
-        screen.gradient[k] = linear.slopes.map(|slope| Into::<f64>::into(slope) as f32);
-    }
-    screen
 }
 
 /// The value of an edge and its margin. Where only one face can be seen, one edge on the wrong side is enough: the zero that values
@@ -138,7 +140,7 @@ impl<N: Number> Edge<N> {
 #[cfg(test)]
 mod tests {
     use super::super::testing::{Uniform, cases};
-    use super::super::{Edges, View};
+    use super::super::{Edges, Screen, View};
 
     #[test]
     fn edges_stay_within_the_margin_and_one_sided_screens_say_the_same() {
@@ -152,7 +154,7 @@ mod tests {
                 [start + 0.25 * (end - start), 0.5 * (start + end)]
             };
             for (kind, faces) in [[true, true], [true, false], [false, true]].into_iter().enumerate() {
-                let screen = edges.screen(part, faces);
+                let screen = Screen::new(&edges, part, faces);
                 for _ in 0..30 {
                     let mut place = case.place(&mut r);
                     place[4] = f64::from(r.often_an_end(part));

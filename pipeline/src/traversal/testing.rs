@@ -2,7 +2,7 @@
 
 use super::{Box5, TileRect};
 use crate::geometry::{Cull, MovingVertex, Shear};
-use crate::sampling::mix;
+use crate::random::mix;
 use crate::setup::{Outcome, Triangle, set_up};
 
 pub const NEAR: f32 = 0.25;

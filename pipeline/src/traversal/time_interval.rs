@@ -10,7 +10,7 @@
 //! caller asks for the depth at the times found.
 
 use super::quadratic::{Pieces, Quadratic};
-use super::{Edges, Faces, TileRect, View};
+use super::{EdgeBounds, Edges, Faces, TileRect, View};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 
@@ -110,7 +110,7 @@ fn rounding_of_places(triangle: &Triangle, shear: &Shear, at: [f64; 2], size: [f
 pub fn time_interval_over(triangle: &Triangle, shear: &Shear, rect: &TileRect) -> [TimeIntervals; 2] {
     let moving = Triangle { moving: true, ..*triangle };
     let edges = Edges::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
-    [[true, false], [false, true]].map(|face: Faces| inside(edges.bounds().tallest(face)))
+    [[true, false], [false, true]].map(|face: Faces| inside(EdgeBounds::new(&edges).tallest(face)))
 }
 
 fn inside(edges: [Quadratic; 3]) -> TimeIntervals {

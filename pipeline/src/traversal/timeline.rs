@@ -1,6 +1,8 @@
 //! Pieces of time, and the faces that a triangle may show in each.
 
-use super::edges::Faces;
+/// Which faces a sample of a box may see: the one that appears clockwise on the screen (edges above zero), and the
+/// counter-clockwise one.
+pub type Faces = [bool; 2];
 
 /// A part of the time in which only some faces can be seen.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,8 @@
 //! One cell of a triangle against blocks and against the packets of a block, sixteen at a time.
 
-use super::cells::{CellSetup, EdgeRows};
-use super::layout::Boxes;
+use super::bin::Boxes;
+use super::cells::CellSetup;
+use super::scene::EdgeRows;
 use crate::simd::{Lanes, Mask, Row};
 
 /// What bounds a triangle in a cell, each number in all lanes.

@@ -3,16 +3,10 @@
 //! For every cell, a box of lens and time: where on the screen the triangle may be, which faces it may show (`faces`), and a
 //! linear function in X and Y above each of its edge functions (`edges`).
 
-use super::edges::Extent;
-use super::facing::Facing;
-use super::layout::{BinSamples, CellRange};
-use crate::geometry::Shear;
+use super::bin::CellRange;
+use super::scene::{EdgeRows, Extent, ROUNDING, Scene};
 use crate::sample_test::block::View;
-use crate::setup::Triangle;
 use crate::simd::{LANES, Lanes, Mask, Row};
-
-/// What rounding may do to a sum of products of `f32`, as a share of the sum of magnitudes.
-pub(super) const ROUNDING: f32 = 1.0 / 524_288.0;
 
 /// Depths below this are not divided by.
 const TINY: f32 = 1e-30;
@@ -34,36 +28,12 @@ pub(super) struct CellSetup {
     pub faces: [Mask; 2],
 }
 
-/// An edge by cell.
-#[derive(Clone, Debug)]
-pub(super) struct EdgeRows {
-    /// By face: what the edge is at most anywhere in the cell, in the sign of the face, less its slopes times X and Y.
-    pub most: [Row; 2],
-    pub slope_x: Row,
-    pub slope_y: Row,
-}
-
 impl CellSetup {
     pub const EMPTY: Self = {
         const ZERO: Row = Row::splat(0.0);
         const EDGE: EdgeRows = EdgeRows { most: [ZERO; 2], slope_x: ZERO, slope_y: ZERO };
         Self { x: [ZERO; 2], y: [ZERO; 2], rows: [ZERO; 2], nearest: ZERO, edges: [EDGE; 3], faces: [0; 2] }
     };
-}
-
-/// What a worker needs to know of triangle, camera and bin.
-#[derive(Clone, Copy)]
-pub(super) struct Scene<'a> {
-    pub triangle: &'a Triangle,
-    pub facing: &'a Facing,
-    pub shear: &'a Shear,
-    pub near: f32,
-    pub bin: &'a BinSamples,
-    /// The largest |X| and |Y| of the image.
-    pub half_px: [f32; 2],
-    /// Height of a block, and rows of blocks in a bin.
-    pub block_px: u32,
-    pub block_rows: u32,
 }
 
 impl Scene<'_> {

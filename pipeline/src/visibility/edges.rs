@@ -15,7 +15,7 @@
 //! which is exact, as `a r = b s` for a lens. All is in `f32` with an allowance for the rounding of both sides: the sample test
 //! sees each vertex within `slack` of its place (see [`crate::setup::Triangle::slack`]), and so does this.
 
-use super::cells::{EdgeRows, ROUNDING, Scene};
+use super::scene::{EdgeRows, Extent, ROUNDING, Scene};
 use crate::sample_test::block::{Seen, View};
 use crate::setup::Corner;
 use crate::simd::Lanes;
@@ -28,17 +28,6 @@ pub(super) struct Vertex<V> {
     dw: V,
     reach: [V; 2],
     pub w_abs: V,
-}
-
-/// Half the extents of a cell and what follows from them.
-pub(super) struct Extent<V> {
-    pub screen: [V; 2],
-    pub lens: [V; 2],
-    pub t: V,
-    /// The largest `a du - dX`, in x and y.
-    pub turn: [V; 2],
-    /// The largest `s du`.
-    pub shift: [V; 2],
 }
 
 impl Scene<'_> {

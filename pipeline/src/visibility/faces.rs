@@ -1,7 +1,6 @@
 //! Which faces a triangle may show in each of sixteen cells.
 
-use super::cells::{ROUNDING, Scene};
-use super::edges::Extent;
+use super::scene::{Extent, ROUNDING, Scene};
 use crate::simd::{Lanes, Mask};
 
 impl Scene<'_> {

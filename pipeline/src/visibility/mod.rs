@@ -13,6 +13,7 @@
 //!
 //! The result is that of the sample test on all samples, bit for bit.
 
+mod bin;
 mod block;
 mod cells;
 mod edges;
@@ -22,6 +23,7 @@ mod layout;
 mod plan;
 mod queue;
 mod raster;
+mod scene;
 mod sorter;
 
 use rayon::prelude::*;

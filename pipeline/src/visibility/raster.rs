@@ -1,10 +1,12 @@
 //! One worker at one bin: each triangle through cells, blocks and packets.
 
 use super::Placed;
+use super::bin::BinSamples;
 use super::block::{CellBounds, in_front_of_edges};
-use super::cells::{CellSetup, Scene, all};
-use super::layout::{BinSamples, SampleLayout};
+use super::cells::{CellSetup, all};
+use super::layout::SampleLayout;
 use super::queue::Queue;
+use super::scene::Scene;
 use crate::sample_test::block::{Crossing, View};
 use crate::sample_test::exact;
 use crate::setup::Triangle;

@@ -1,6 +1,6 @@
 //! Dividing the samples of a bin into cells and packets.
 
-use super::layout::{BinSamples, Boxes, CellBoxes, CellRange, NOTHING, Packet};
+use super::bin::{BinSamples, Boxes, CellBoxes, CellRange, NOTHING, Packet};
 use super::plan::{Axis, Plan};
 use crate::geometry::{Clip, Shear, Viewport};
 use crate::sampling::{Sample, SampleSource};

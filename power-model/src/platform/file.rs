@@ -3,11 +3,10 @@
 use activity::{Event, Unit, spec};
 use serde::Deserialize;
 
-use super::{Leakage, Platform, Rail, ScaledFrom, UnitPower};
+use super::{Leakage, Platform, Rail, ScaledFrom, System, UnitPower};
 use crate::PlatformError;
 use crate::quantity::{Nanometres, RecordedIdle, Seconds, Source, Sourced, Volts, Watts};
 use crate::row::EnergyRow;
-use crate::system::System;
 
 /// A platform as it is written in a file.
 #[derive(Deserialize)]

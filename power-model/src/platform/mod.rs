@@ -1,6 +1,7 @@
 //! What surrounds the events: voltages, constant power, leakage, clock trees, idle.
 
 mod file;
+mod system;
 
 use std::path::Path;
 
@@ -8,12 +9,12 @@ use activity::{Unit, spec};
 use serde::Deserialize;
 
 use self::file::Written;
+pub use self::system::{Disturbance, Finish, Launch, System};
 use crate::PlatformError;
 use crate::quantity::{
     Basis, Celsius, Exponent, Nanometres, Quantity, Ratio, RecordedIdle, Seconds, Sourced, Volts, Watts,
 };
 use crate::row::EnergyRow;
-use crate::system::System;
 
 /// The platforms that come with the crate, by name.
 const BUILTIN: [(&str, &str); 3] = [
@@ -222,7 +223,7 @@ impl Platform {
     }
 }
 
-pub(crate) fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> Provenance<'a> {
+fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> Provenance<'a> {
     Provenance {
         field: field.to_owned(),
         value: number.value(),

@@ -3,9 +3,7 @@
 //! All of it is extra power over stretches of time, on top of what [`crate::pace`] made: it does not delay frames.
 
 mod pulse;
-mod spec;
 mod surround;
 
 pub use pulse::{Cause, Pulse, overlay};
-pub use spec::{Disturbance, Finish, Launch, System};
 pub use surround::{Circumstances, Surrounded, SurroundedFrame};

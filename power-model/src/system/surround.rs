@@ -3,9 +3,9 @@
 use traces::{Curve, random};
 
 use super::pulse::{Cause, Pulse, overlay};
-use super::spec::{Disturbance, System};
 use crate::error::PacingError;
 use crate::pacing::{PacedFrame, Run};
+use crate::platform::{Disturbance, System};
 
 /// How a run was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use workloads::job::{self, OptionSource, Request};
+use workloads::catalog;
+use workloads::job::{OptionSource, Request};
 use workloads::scene::{CameraUsed, SceneInfo, SettingsInfo};
 use workloads::visibility::{self, FixedSamples, VisibilityScene};
 
@@ -16,9 +17,9 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let overrides = args.view.overrides();
     let name = &*args.scene.to_string_lossy();
     if let Some(found) =
-        job::find(name, &OptionSource::default(), &Request { overrides: &overrides, seed: 1 })
+        catalog::find(name, &OptionSource::default(), &Request { overrides: &overrides, seed: 1 })
     {
-        let what = job::names().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
+        let what = catalog::names().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
         return print_workload((name, what), args.json, SettingsInfo::new(found?.settings()));
     }
     match ending(name).as_deref() {
@@ -27,7 +28,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
         Some("smp") => print_samples(name, args.json, &FixedSamples::load(&args.scene)?),
         _ => {
-            let scene = workloads::load(&args.scene).map_err(job::or_job)?.with_overrides(&overrides)?;
+            let scene = workloads::load(&args.scene).map_err(catalog::or_job)?.with_overrides(&overrides)?;
             let info = scene.info().map_err(crate::run::RunError::from)?;
             if args.json { print_json(&info, true) } else { print(&scene_text(&info)) }
         }

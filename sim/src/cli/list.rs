@@ -103,7 +103,7 @@ fn listing() -> Listing {
         energy_tables: power_model::EnergyTable::names().map(table).collect(),
         sample_tables: pipeline::SampleSpec::names().map(|(name, what)| Entry::new(name, what)).collect(),
         charts: crate::chart::CHARTS.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
-        workloads: workloads::job::names().map(|(name, what)| Entry::new(name, what)).collect(),
+        workloads: workloads::catalog::names().map(|(name, what)| Entry::new(name, what)).collect(),
         figures: crate::run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
     }
 }

@@ -8,6 +8,7 @@ use clap::Args;
 use super::Failure;
 use super::terminal::{print, print_json};
 use crate::output::Destination;
+use crate::output::progress::Progress;
 use crate::output::terminal::Terminal;
 use crate::reproduce::{Options, Paper, reproduce};
 
@@ -56,7 +57,7 @@ pub struct ReproduceArgs {
 pub(super) fn run(args: &ReproduceArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
     let pool = super::threads(args.threads)?;
-    let progress = terminal.progress(args.json);
+    let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
     let options = Options {
         quick: args.quick,

@@ -19,16 +19,16 @@ use crate::run::{
 
 pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
-    let progress = terminal.progress(args.json);
+    let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
     let pool = super::threads(args.threads)?;
-    let options = match &args.again {
+    let (options, made) = match &args.again {
         Some(summary) => again(summary, args.force)?,
-        None => options(args),
+        None => (options(args), None),
     };
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, &out)?;
-    let prepared = pool.install(|| prepare(plan, &progress))?;
+    let prepared = pool.install(|| prepare(plan, made, &progress))?;
     if args.dry_run {
         return dry_run(args, &pool.install(|| DryRun::new(&prepared))?, terminal);
     }
@@ -79,7 +79,6 @@ fn options(args: &RunArgs) -> RunOptions {
         timing: args.timing.level(),
         sampling: args.timing.sampling(),
         wish: Wish { accuracy: args.accuracy, budget_s: args.budget },
-        repeat: None,
         verify: args.verify,
         pacing: match args.pacing {
             PacingArg::Vsync => PacingChoice::Vsync,

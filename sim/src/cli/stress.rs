@@ -4,6 +4,7 @@ use super::Failure;
 use super::args::StressArgs;
 use super::terminal::{print, print_json};
 use crate::output::Destination;
+use crate::output::progress::Progress;
 use crate::output::terminal::Terminal;
 
 pub(super) fn run(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure> {
@@ -11,7 +12,7 @@ pub(super) fn run(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure>
     let out = Destination { folder: args.out.clone(), force: args.force };
     let mut dir = out.open([crate::stress::claim()])?;
     let pool = super::threads(args.threads)?;
-    let progress = terminal.progress(args.json);
+    let progress = Progress::on(terminal, args.json);
     let report = pool.install(|| crate::stress::stress(args.family.as_deref(), args.quick, &progress))?;
     report.write(&dir, &args.look.look())?;
     dir.publish()?;

@@ -32,7 +32,8 @@ mod tests {
     fn the_subset_has_every_letter_it_says() {
         for font in [REGULAR, BOLD].map(|bytes| FontRef::try_from_slice(bytes).unwrap()) {
             let named = |letter: char| font.glyph_id(letter).0 != 0;
-            let lacking: String = ('\0'..'\u{3000}').filter(|&letter| has(letter) && !named(letter)).collect();
+            let lacking: String =
+                ('\0'..'\u{3000}').filter(|&letter| has(letter) && !named(letter)).collect();
             assert_eq!(lacking, "");
             assert!(!has('\u{4e2d}') && !named('\u{4e2d}'));
         }

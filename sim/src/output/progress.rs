@@ -18,14 +18,14 @@ impl Progress {
     /// Bars without colours on standard error; with `quiet` no bars and no messages.
     pub fn new(quiet: bool) -> Self {
         let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
-        Terminal::new(verbosity, clap::ColorChoice::Never).progress(quiet)
+        Self::on(&Terminal::new(verbosity, clap::ColorChoice::Never), quiet)
     }
 
     /// Bars on standard error; none where the terminal is quiet, where `hidden`, or where standard error is no terminal.
-    pub(super) fn on(terminal: Terminal, hidden: bool) -> Self {
+    pub fn on(terminal: &Terminal, hidden: bool) -> Self {
         let silent = hidden || terminal.verbosity() == Verbosity::Quiet || !stderr().is_terminal();
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        Self { bars: MultiProgress::with_draw_target(target), terminal }
+        Self { bars: MultiProgress::with_draw_target(target), terminal: terminal.clone() }
     }
 
     /// Whether nothing will be drawn.
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn quiet_means_silent() {
         let progress = Progress::new(true);
-        assert!(progress.is_silent());
+        assert!(progress.is_silent() && Progress::on(&Terminal::default(), true).is_silent());
         progress.note("unseen");
     }
 

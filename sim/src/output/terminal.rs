@@ -8,8 +8,6 @@ use clap::ColorChoice;
 use clap::builder::Styles;
 use clap::builder::styling::{AnsiColor, Style};
 
-use super::progress::Progress;
-
 /// How much is printed on standard error. Results on standard output do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verbosity {
@@ -45,11 +43,6 @@ impl Terminal {
     /// How much is printed.
     pub fn verbosity(&self) -> Verbosity {
         self.verbosity
-    }
-
-    /// Progress bars of this terminal; none where it is quiet, where `hidden`, or where standard error is no terminal.
-    pub fn progress(&self, hidden: bool) -> Progress {
-        Progress::on(self.clone(), hidden)
     }
 
     /// Prints why the command failed.
@@ -106,11 +99,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colors_follow_the_choice_and_bars_the_verbosity() {
+    fn colors_follow_the_choice() {
         let [always, never] =
             [ColorChoice::Always, ColorChoice::Never].map(|color| Terminal::new(Verbosity::Normal, color));
         assert!(always.colored && !never.colored);
-        assert!(Terminal::new(Verbosity::Quiet, ColorChoice::Always).progress(false).is_silent());
-        assert!(never.progress(true).is_silent());
     }
 }

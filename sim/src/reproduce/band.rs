@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::row::Verdict;
+use super::verdict::Verdict;
 
 /// One setting of everything, and what came out.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -19,6 +19,7 @@ mod row;
 mod scenes;
 mod settings;
 mod stage;
+mod verdict;
 
 use std::path::PathBuf;
 
@@ -33,8 +34,9 @@ use settings::Form;
 pub use band::{Band, Case, Turn};
 pub use figure::Figure;
 pub use report::Report;
-pub use row::{Kind, Number, Row, Verdict};
+pub use row::{Number, Row};
 pub use settings::{About, Listed, Origin};
+pub use verdict::{Kind, Verdict};
 
 /// The papers whose rows there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]

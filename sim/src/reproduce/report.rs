@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::row::{Row, Verdict};
+use super::row::Row;
 use super::settings::{Form, Listed, Origin};
+use super::verdict::Verdict;
 use super::{Done, Figure, Paper};
 use crate::output::table::Table;
 use crate::output::{Claim, OutDir, OutputError};
@@ -188,8 +189,8 @@ fn stem_of(path: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use super::super::row::Kind;
     use super::super::row::tests::row;
+    use super::super::verdict::Kind;
     use super::*;
 
     fn done(id: &'static str, kind: Kind, verdict: Verdict) -> Done {

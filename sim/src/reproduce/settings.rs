@@ -11,7 +11,7 @@ use activity::spec::{self, SpecError};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::row::Kind;
+use super::verdict::Kind;
 use crate::output::dir::sha256_of_text;
 use crate::run::RunError;
 

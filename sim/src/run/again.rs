@@ -31,7 +31,7 @@ struct Form {
 ///
 /// # Errors
 /// When that is no summary of this version, or, without `force`, when the program or an input is another.
-pub fn again(path: &Path, force: bool) -> Result<RunOptions, RunError> {
+pub fn again(path: &Path, force: bool) -> Result<(RunOptions, Option<Choice>), RunError> {
     let name = path.display();
     let text = std::fs::read(path).map_err(|source| RunError::Input { path: name.to_string(), source })?;
     let refuse = |message: String| RunError::Setting(format!("{name}: {message}"));
@@ -50,7 +50,7 @@ pub fn again(path: &Path, force: bool) -> Result<RunOptions, RunError> {
     if !force {
         recorded.check().map_err(refuse)?;
     }
-    Ok(RunOptions { repeat: recorded.choice.map(Box::new), ..recorded.request })
+    Ok((recorded.request, recorded.choice))
 }
 
 impl Recorded {

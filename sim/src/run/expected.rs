@@ -9,7 +9,7 @@ use workloads::{Frame, FrameMesh, Scene};
 
 use super::limits::BYTES_PER_SAMPLE;
 use super::regime::Regime;
-use super::{Distinct, Plan, RunError, Work, simulate};
+use super::{Distinct, Plan, RunError, Work, frame};
 use crate::timing::{FrameClock, Level, Sampling};
 
 /// What a run is expected to take on this machine. It is no result: nothing of a run depends on it.
@@ -127,7 +127,7 @@ impl<'a> Probe<'a> {
         let draws: Vec<Draw<'_>> = self.frame.draws(self.scene)?;
         let background = self.scene.background();
         let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-        let recorder = Recorder::new(simulate::BIN_PS, simulate::FEWEST_BINS);
+        let recorder = Recorder::new(frame::BIN_PS, frame::FEWEST_BINS);
         let mut clock = FrameClock::new(level, &plan.gpu, recorder)?;
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         render_with_heat(&self.frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;

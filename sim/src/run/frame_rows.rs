@@ -4,7 +4,7 @@ use activity::{Counts, Event};
 use power_model::Energy;
 use serde::Serialize;
 
-use super::simulate::image_name;
+use super::frame::image_name;
 use super::{Measurement, Plan, Simulated};
 
 /// One frame of a run.
@@ -47,7 +47,7 @@ pub struct FrameRow {
 /// A hash of counts that goes on from that of others.
 pub(super) fn hash(seed: u64, counts: &Counts) -> u64 {
     Event::ALL.iter().fold(seed, |hash: u64, &event| {
-        pipeline::sampling::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
+        pipeline::random::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
     })
 }
 

@@ -8,10 +8,12 @@ mod again;
 mod checks;
 mod choice;
 mod distinct;
+mod draw;
 mod dry_run;
 mod error;
 mod expected;
 mod facts;
+mod frame;
 mod frame_rows;
 mod heat;
 mod limits;
@@ -21,6 +23,7 @@ mod one_frame;
 mod options;
 mod pairing;
 mod pictures;
+mod plan;
 mod provenance;
 mod recorder;
 mod regime;
@@ -28,6 +31,7 @@ mod regime_warnings;
 mod report;
 mod sampled;
 mod simulate;
+mod simulated;
 mod stalls;
 mod summary;
 mod timeline;
@@ -40,24 +44,26 @@ use crate::output::{Destination, OutDir};
 
 pub use again::again;
 pub use checks::Checks;
-pub use choice::{Choice, Dimensions, ProbeSummary, Verified, Wish, cheapest_level};
+pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
 pub use distinct::Distinct;
 pub use dry_run::DryRun;
 pub use error::RunError;
 pub use expected::Expected;
+pub(crate) use frame::BIN_PS;
+pub use frame::{CrashedFrame, frames_of};
 pub use frame_rows::FrameRow;
 pub use heat::HeatPicture;
 pub use limits::fits_memory;
 pub use measure::Measurement;
 pub use modelled::Modelled;
 pub use one_frame::MachineTexts;
-pub use options::{PacingChoice, Plan, RunOptions};
+pub use options::{PacingChoice, RunOptions, Wish};
+pub use plan::Plan;
 pub use provenance::{Host, Input, Provenance};
 pub use recorder::Resolution;
 pub use regime::Regime;
-pub use sampled::{Forecast, Glimpse, Preview, Quantity, SampledSummary, Scout, Signatures, Taken, taken};
-pub(crate) use simulate::BIN_PS;
-pub use simulate::{CrashedFrame, Simulated, SimulatedFrame, frames_of};
+pub use sampled::{Forecast, Glimpse, Preview, Scout, Signatures, taken};
+pub use simulated::{Quantity, SampledSummary, Simulated, SimulatedFrame, Taken};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};
 pub use work::Work;
@@ -82,15 +88,16 @@ pub struct Prepared {
     choice: Option<Choice>,
 }
 
-/// Prepares a run: finds the frames that differ, and makes the choices that were left to the program.
+/// Prepares a run: finds the frames that differ, and makes the choices that were left to the program, or those `made` by the run
+/// that is repeated.
 ///
 /// # Errors
 /// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures.
-pub fn prepare(mut plan: Plan, progress: &Progress) -> Result<Prepared, RunError> {
+pub fn prepare(mut plan: Plan, made: Option<Choice>, progress: &Progress) -> Result<Prepared, RunError> {
     say_camera(&plan, progress);
     let provenance = Provenance::new(&plan)?;
     let distinct = Distinct::new(&plan.work)?;
-    let choice = choice::choose(&mut plan, &distinct, progress)?;
+    let choice = choice::choose(&mut plan, made, &distinct, progress)?;
     Ok(Prepared { plan, provenance, distinct, choice })
 }
 
@@ -141,7 +148,7 @@ pub fn open(plan: &Plan, out: &Destination) -> Result<OutDir, RunError> {
 pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Result<Outcome, RunError> {
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, out)?;
-    prepare(plan, progress)?.run(dir, progress)
+    prepare(plan, None, progress)?.run(dir, progress)
 }
 
 /// Says in detail which camera sees the scene, before minutes of work are spent on it.

@@ -6,10 +6,9 @@ use serde::Serialize;
 use traces::device::{DeviceSpec, RATES_HZ};
 
 use super::Plan;
+use super::options::DEFAULT_RATE_HZ;
 use crate::output::table::si;
 
-/// The rate of the recorder that the methodology of per-frame energy is described with.
-pub(super) const DEFAULT_RATE_HZ: f64 = 50e3;
 /// Rates that are chosen from where none is given, lowest first. A run with short frames is recorded at a higher one.
 const CHOSEN_RATES_HZ: [f64; 5] = [DEFAULT_RATE_HZ, 100e3, 200e3, 500e3, 1e6];
 /// Work that takes less than this many samples may fall between two of them: its frame may then not be found.

@@ -4,9 +4,9 @@ use activity::{Event, Unit};
 use glam::Vec3;
 use power_model::Part;
 
+use super::frame::image_name;
 use super::heat::heat_name;
 use super::pictures::{Plot, parts_in_use};
-use super::simulate::image_name;
 use super::{Outcome, RunError, facts};
 use crate::output::image::LinearImage;
 use crate::output::plot::part_colour;

@@ -12,10 +12,10 @@ use super::checks::Checks;
 use super::frame_rows::{FrameRow, hash, rows};
 use super::measure::mean_parts_w;
 use super::modelled::Modelled;
-use super::sampled::SampledSummary;
 use super::stalls::{self, StallShares};
 use super::{
-    Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, Simulated, Verified, warnings,
+    Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated,
+    Verified, warnings,
 };
 use crate::output::MeanSd;
 use crate::output::report::Headline;

@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use activity::{Event, LineAccess, Packet, Warning};
-use pipeline::frame::{HeatMap, render_with_heat};
-use pipeline::{Settings, Viewport};
-use workloads::job::{self, Drawn, Job, JobError, OptionSource, Request};
-use workloads::{Fingerprint, Frame, LoadError, Overrides, Scene};
+use activity::Warning;
+use workloads::catalog;
+use workloads::job::{Job, JobError, OptionSource, Request};
+use workloads::{Fingerprint, LoadError, Overrides, Scene};
 
-use super::regime::Regime;
-use super::{Plan, RunError};
+use super::RunError;
 
 /// The frames of a run.
 pub enum Work {
@@ -22,13 +20,6 @@ pub enum Work {
         /// What draws.
         job: Box<dyn Job>,
     },
-}
-
-/// A frame as it was drawn.
-pub(super) struct Drawing {
-    pub drawn: Drawn,
-    pub regime: Regime,
-    pub heat: Vec<HeatMap>,
 }
 
 impl Work {
@@ -44,12 +35,12 @@ impl Work {
     ) -> Result<Self, LoadError> {
         // A workload has a name; a path of other bytes is none.
         let text = name.to_str().unwrap_or_default();
-        if let Some(job) = job::find(text, options, &Request { overrides, seed }) {
+        if let Some(job) = catalog::find(text, options, &Request { overrides, seed }) {
             return Ok(Self::Job { name: text.to_owned(), job: job? });
         }
-        let scene = workloads::load(name).map_err(job::or_job)?;
+        let scene = workloads::load(name).map_err(catalog::or_job)?;
         if *options != OptionSource::default() {
-            let jobs: Vec<&str> = job::names().map(|(name, _)| name).collect();
+            let jobs: Vec<&str> = catalog::names().map(|(name, _)| name).collect();
             let message =
                 format!("`{}` is a scene; only workloads have options: {}", name.display(), jobs.join(", "));
             return Err(LoadError::Setting { setting: "set", message });
@@ -120,47 +111,4 @@ impl Work {
             ))),
         }
     }
-}
-
-/// Draws frame `number`, with heat maps of `events`.
-pub(super) fn draw(
-    plan: &Plan,
-    number: u32,
-    events: &[Event],
-    mut emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Drawing, RunError> {
-    match &plan.work {
-        Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, events, emit),
-        Work::Job { job, .. } => {
-            let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
-            Ok(Drawing { drawn, regime: Regime::default(), heat: Vec::new() })
-        }
-    }
-}
-
-/// Draws from `frame` and from what is the same in all frames. It must not know which frame it draws, because frames with the
-/// same fingerprint are drawn once.
-fn draw_scene(
-    plan: &Plan,
-    scene: &Scene,
-    frame: &Frame,
-    events: &[Event],
-    emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Drawing, RunError> {
-    let draws = frame.draws(scene)?;
-    let viewport: Viewport = plan.viewport;
-    let background = scene.background();
-    let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
-    let (rendered, heat) =
-        render_with_heat(&frame.camera, &draws, &settings, events, emit).map_err(RunError::setting)?;
-    let drawn = Drawn {
-        image: rendered.image,
-        counts: rendered.counts,
-        triangles: frame.triangle_count(),
-        moving: frame.is_moving(),
-        lens: frame.camera.lens().is_some(),
-        ..Drawn::default()
-    };
-    let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
-    Ok(Drawing { drawn, regime, heat })
 }

@@ -5,8 +5,8 @@ use std::io::Write;
 use traces::energy::FrameTable;
 use traces::score::{TOLERANCE_S, truth_beside};
 
+use super::frame::image_name;
 use super::heat::heat_name;
-use super::simulate::image_name;
 use super::{FIGURES, Outcome, Plan, RunError, pictures, report, timeline};
 use crate::output::dir::{BoxError, Claim, OutDir, SUMMARY};
 use crate::output::perfetto;

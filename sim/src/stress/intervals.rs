@@ -1,7 +1,7 @@
 //! How wide the boxes of tile tests are, held against the true ones.
 
 use pipeline::geometry::Projection;
-use pipeline::sampling::mix;
+use pipeline::random::mix;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::traversal::Box5;
 use pipeline::{Features, Shear};

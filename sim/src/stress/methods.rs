@@ -2,7 +2,9 @@
 
 use pipeline::Features;
 use pipeline::setup::Triangle;
-use pipeline::traversal::{Box5, Edges, Facing, LensLines, Piece, TileRect, Timeline, View, narrow};
+use pipeline::traversal::{
+    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, Timeline, View, narrow,
+};
 use pipeline::{Shear, Viewport};
 
 /// A named set of tests.
@@ -121,7 +123,7 @@ impl Place {
             times = Facing::new(&edges).timeline(within.t, triangle.faces, features.facing_splits).0;
         }
         if features.edges {
-            times = edges.bounds().timeline(&edges, &times, triangle.faces).0;
+            times = EdgeBounds::new(&edges).timeline(&edges, &times, triangle.faces).0;
         }
         times
     }

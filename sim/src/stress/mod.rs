@@ -27,7 +27,7 @@ use crate::run::RunError;
 use choice::{Choices, Trial};
 use measure::Row;
 pub use report::Report;
-pub(crate) use report::claim;
+pub(crate) use write::claim;
 
 /// The seed of the scenes.
 const SEED: u64 = 1;
@@ -74,6 +74,8 @@ fn choose(only: Option<&str>) -> Result<Vec<&'static Family>, RunError> {
     };
     Ok(vec![family(name).ok_or_else(unknown)?])
 }
+
+mod write;
 
 #[cfg(test)]
 mod tests;

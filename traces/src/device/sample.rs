@@ -2,6 +2,7 @@
 
 use super::Device;
 use crate::curve::{Curve, CurveError};
+use crate::io::WriteError;
 use crate::metadata::Metadata;
 use crate::random::Random;
 use crate::trace::{Trace, TraceError};
@@ -73,6 +74,12 @@ pub enum SampleError {
     /// The result is no valid trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
+}
+
+impl From<SampleError> for WriteError {
+    fn from(error: SampleError) -> Self {
+        Self::Source(Box::new(error))
+    }
 }
 
 /// A synthetic trace, and how many of its samples were beyond the device's range.

@@ -1,6 +1,6 @@
 //! How alike frames are to their neighbours: starts that were put where there is nothing have windows with nothing in common.
 
-use super::find::Found;
+use super::found::Found;
 use crate::median::median;
 use crate::trace::Trace;
 use rayon::prelude::*;

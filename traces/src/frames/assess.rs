@@ -1,7 +1,7 @@
 //! How sure the finder is, and what it has to say about the result as a whole.
 
-use super::find::{Found, FrameStart};
 use super::flags::Flag;
+use super::found::{Found, FrameStart};
 use super::marks::{Marks, Placement, Window};
 use super::spans::{Sampling, median_duration_s, spans};
 use super::threshold::{DISTINCT, Rule, Threshold};

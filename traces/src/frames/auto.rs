@@ -2,7 +2,7 @@
 
 use super::alike;
 use super::beat;
-use super::find::Found;
+use super::found::Found;
 use super::marks::{MarkError, Marks};
 use super::matched::find_matched;
 use super::method::Method;

@@ -1,7 +1,7 @@
 //! The first frame of a free-running stretch: nothing was drawn before it, so what lies before the mark differs.
 
 use super::assess::confidence;
-use super::find::FrameStart;
+use super::found::FrameStart;
 use super::matched::{REACH, View};
 use super::profile::summed_squared_difference;
 use super::refine::align;

@@ -1,8 +1,8 @@
 //! Starts by distance to the marked windows alone: threshold and local minima.
 
 use super::correlate::squares;
-use super::find::{Found, FrameStart, marked_starts, spacing};
 use super::flat::flat_mark_of;
+use super::found::{Found, FrameStart, marked_starts, spacing};
 use super::marks::{MarkError, Marks, Placement};
 use super::method::Method;
 use super::minima::spaced_minima;

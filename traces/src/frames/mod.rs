@@ -12,6 +12,7 @@ mod find;
 mod first;
 mod flags;
 mod flat;
+mod found;
 mod lock;
 mod marks;
 mod matched;
@@ -34,8 +35,9 @@ mod tracked;
 mod uncovered;
 mod unrested;
 
-pub use find::{Found, FrameSpan, FrameStart, Options, find, find_with, marked_only};
+pub use find::{Options, find, find_with, marked_only};
 pub use flags::{Flag, Flags};
+pub use found::{Found, FrameSpan, FrameStart};
 pub use marks::{MarkError, Marks, Window, default_window};
 pub use method::Method;
 pub use propose::{Proposal, propose};

@@ -1,8 +1,8 @@
 //! The frames between starts, and what is remarkable about each.
 
 use super::beat;
-use super::find::{FrameSpan, FrameStart};
 use super::flags::{Flag, Flags};
+use super::found::{FrameSpan, FrameStart};
 use crate::median::median;
 
 /// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.

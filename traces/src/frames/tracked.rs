@@ -2,8 +2,8 @@
 
 use super::alternate::Turns;
 use super::assess;
-use super::find::{Found, FrameStart, spacing};
 use super::flat::flat_mark_of;
+use super::found::{Found, FrameStart, spacing};
 use super::lock::{Ticks, ticks};
 use super::marks::{MarkError, Marks, Placed, Placement};
 use super::matched::noise_variance;

@@ -22,7 +22,7 @@ pub mod unfinished;
 
 pub use error::{ReadError, WriteError};
 pub use options::ReadOptions;
-pub use read::{Loaded, read};
+pub use read::{Loaded, read, read_csv, read_parquet};
 pub use recording::Recording;
 pub use repair::Repair;
 pub use rows::{Rows, SumOfRails, rail_of_sums};

@@ -1,6 +1,6 @@
 //! A whole file into memory.
 
-use super::repair::{Repair, mend};
+use super::repair::{Columns, Repair, mend};
 use super::rows::{Chunk, Rows};
 use super::timing::{self, Stamps};
 use super::{ReadError, ReadOptions};
@@ -19,13 +19,6 @@ pub struct Loaded {
     pub repairs: Vec<Repair>,
 }
 
-/// All rows of a file as they stand in it.
-pub(super) struct Columns {
-    pub stamps: Stamps,
-    pub voltage_v: Vec<f32>,
-    pub current_a: Vec<f32>,
-}
-
 /// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), told apart by their first bytes.
 ///
 /// # Errors
@@ -34,7 +27,28 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     load(Rows::open(path, options)?)
 }
 
-pub(super) fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
+/// Reads a CSV file, and its description if there is one at [`csv::description_path`](super::csv::description_path) or
+/// [`csv::sidecar_path`](super::csv::sidecar_path).
+///
+/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if the
+/// description states the rate. Without a description the rate is that of the time stamps.
+///
+/// # Errors
+/// [`ReadError`] names the file, the row and how to mend it.
+pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
+    Ok(load(Rows::csv(path, &ReadOptions::default(), false)?)?.trace)
+}
+
+/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64) and
+/// `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
+///
+/// # Errors
+/// [`ReadError`] names the file, the row and how to mend it.
+pub fn read_parquet(path: &Path) -> Result<Trace, ReadError> {
+    Ok(load(Rows::parquet(path, &ReadOptions::default())?)?.trace)
+}
+
+fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     let path = rows.path().to_owned();
     let mut columns = gather(&mut rows)?;
     let read = columns.voltage_v.len();

@@ -2,7 +2,6 @@
 
 use super::ReadError;
 use super::header::Header;
-use super::read::Columns;
 use super::timing::{Stamps, rounded_rate_hz};
 use serde::Serialize;
 use std::path::Path;
@@ -11,6 +10,13 @@ use std::path::Path;
 const OFF: f64 = 0.25;
 /// A repair that would make the trace longer than this many times is refused.
 const LONGER: usize = 16;
+
+/// All rows of a file as they stand in it.
+pub(super) struct Columns {
+    pub stamps: Stamps,
+    pub voltage_v: Vec<f32>,
+    pub current_a: Vec<f32>,
+}
 
 /// Something that was mended.
 #[derive(Clone, Debug, PartialEq, Serialize)]

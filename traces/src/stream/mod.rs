@@ -19,7 +19,7 @@ pub use error::StreamError;
 
 use crate::energy::FrameEnergy;
 use crate::frames::{Found, Marks};
-use crate::io::ReadOptions;
+use crate::io::{ReadOptions, Rows};
 use crate::metadata::Metadata;
 use std::path::Path;
 
@@ -44,7 +44,13 @@ pub struct Streamed {
 /// # Errors
 /// [`StreamError`] if the file cannot be read, its samples are not even or finite, or the marks are not in it.
 pub fn find(path: &Path, options: &ReadOptions, marks: &Marks) -> Result<Streamed, StreamError> {
-    pass::run(path, options, marks)
+    let clock = clock(path, options)?;
+    let plan = pass::Plan::new(path, options, marks, clock)?;
+    let mut rows = Rows::open(path, options)?;
+    let gathered = plan.gather(&mut rows)?;
+    rows.header.check_rows(path, gathered.samples)?;
+    rows.header.check_end(path)?;
+    Ok(conclude::conclude(plan, marks, gathered, rows.header.metadata)?)
 }
 
 #[cfg(test)]

@@ -1,13 +1,12 @@
 //! The one pass over the file.
 
-use super::clock::{Clock, clock};
-use super::conclude::conclude;
+use super::StreamError;
+use super::clock::Clock;
 use super::minima::minima;
 use super::piece::Piece;
 use super::screen::Screen;
 use super::template::{difference, powers, templates};
 use super::workspace::{Workspace, Workspaces};
-use super::{StreamError, Streamed};
 use crate::frames::{Marks, Placed, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
 use crate::sum::PairSum;
@@ -74,18 +73,8 @@ pub(super) struct Plan {
     positions: Vec<f64>,
 }
 
-pub(super) fn run(path: &Path, options: &ReadOptions, marks: &Marks) -> Result<Streamed, StreamError> {
-    let clock = clock(path, options)?;
-    let plan = Plan::new(path, options, marks, clock)?;
-    let mut rows = Rows::open(path, options)?;
-    let gathered = plan.gather(&mut rows)?;
-    rows.header.check_rows(path, gathered.samples)?;
-    rows.header.check_end(path)?;
-    Ok(conclude(plan, marks, gathered, rows.header.metadata)?)
-}
-
 impl Plan {
-    fn new(path: &Path, options: &ReadOptions, marks: &Marks, clock: Clock) -> Result<Self, StreamError> {
+    pub fn new(path: &Path, options: &ReadOptions, marks: &Marks, clock: Clock) -> Result<Self, StreamError> {
         let samples = clock.samples.unwrap_or(u64::MAX >> 12);
         let placement = marks.place_on(clock.start_s, clock.rate_hz, samples)?;
         let templates = templates(path, options, &placement, marks, clock)?;
@@ -99,7 +88,7 @@ impl Plan {
         Ok(Self { clock, placement, templates, spacing, mean_w, screen, stride, positions })
     }
 
-    fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
+    pub fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
         let (mut piece, mut chunk, mut coming) = (Piece::default(), Chunk::default(), Piece::default());
         let mut read = self.read(rows, &mut chunk, &mut piece)?;

@@ -9,9 +9,11 @@
 mod maker;
 mod recording;
 mod scenario;
+mod scene;
 
 pub use recording::{Recording, SynthError};
-pub use scenario::{SCENARIOS, Scenario, Scene};
+pub use scenario::{SCENARIOS, Scenario};
+pub use scene::Scene;
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! What a recorder makes of a scene.
 
-use super::scenario::Scene;
+use super::scene::Scene;
 use crate::device::{Device, DeviceError, DeviceSpec, SampleError};
 use crate::trace::Trace;
 use thiserror::Error;

@@ -10,7 +10,7 @@ mod sweep;
 use cpu_time::ProcessTime;
 use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSpec;
-use pipeline::{Cull, Draw, LensShape, PipelineSpec, Viewport};
+use pipeline::{Cull, Draw, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
 use workloads::multiview::{Layout, Rig, Target};
 use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
@@ -69,7 +69,7 @@ fn gloss(spec: &PipelineSpec) {
     let map = glossy::Map::new(&glossy::receiver(), eye, glossy::Effect::Reflection, 0.25, 128).unwrap();
     let to = (spec, Vec3::ZERO);
     for count in [16, 64] {
-        let table = SampleSpec::default().table(count, 1).unwrap();
+        let table = SampleTable::new(&SampleSpec::default(), count, 1).unwrap();
         let set = SharedSamples::interleaved(&SampleSpec::default(), count, 1).unwrap();
         let one = time(|| _ = map.one_pass(&draws, &table, to, &mut |_, _| ()).unwrap());
         let many = time(|| _ = map.accumulated(&draws, &set, to, &mut |_, _| ()).unwrap());

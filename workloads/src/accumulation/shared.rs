@@ -20,7 +20,7 @@ impl SharedSamples {
     /// # Errors
     /// When the table cannot be made.
     pub fn from_spec(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, TableError> {
-        Ok(Self(spec.table(count, seed)?.pixel(0, 0).to_vec()))
+        Ok(Self(SampleTable::new(spec, count, seed)?.pixel(0, 0).to_vec()))
     }
 
     /// `count` places, the first ones of a scrambled Sobol sequence.

@@ -1,7 +1,7 @@
 //! Light by random rays, for comparison: nothing of it is shared with how beams are rasterized.
 
 use glam::{DVec2, DVec3};
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 use rayon::prelude::*;
 
 use super::generator::Ocean;

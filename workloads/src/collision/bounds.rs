@@ -1,5 +1,8 @@
 //! Boxes of space and time.
 
+/// A triangle at time 0 and at time 1.
+pub(super) type Ends = [[[f64; 3]; 3]; 2];
+
 /// A closed box of space and a range of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {

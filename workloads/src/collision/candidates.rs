@@ -24,7 +24,7 @@ pub fn candidates(objects: &[Object]) -> Vec<(usize, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pipeline::sampling::mix;
+    use pipeline::random::mix;
 
     #[test]
     fn the_sweep_finds_what_all_against_all_does() {

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::object::Ends;
+use super::bounds::Ends;
 
 /// The corners at time `t`.
 fn at(ends: &Ends, t: f64) -> [DVec3; 3] {

@@ -6,6 +6,7 @@ use activity::Warning;
 use pipeline::PipelineSpec;
 use serde::{Deserialize, Serialize};
 
+use super::cases::load_objects;
 use super::compare::Scratch;
 use super::easel::{Easel, Sheet};
 use super::families::swarm_of;
@@ -15,7 +16,6 @@ use crate::job::{
     Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Passes, Request, must_hold,
 };
 use crate::scene::Settings;
-use crate::visibility::load_objects;
 
 /// What is drawn, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -21,6 +21,7 @@
 mod bounds;
 mod buffer;
 mod candidates;
+mod cases;
 mod closer;
 mod compare;
 mod crossing;
@@ -36,11 +37,13 @@ mod pair;
 mod pass;
 mod picture;
 mod plain;
+mod run;
 mod search;
 mod window;
 
 pub use bounds::Bounds;
 pub use candidates::candidates;
+pub use cases::{CaseFiles, CollisionCase, load_cases};
 pub use detect::{Answer, detect, detect_each};
 pub(crate) use job::FLAGS;
 pub use job::{Options, job};

@@ -3,12 +3,9 @@
 use glam::DVec3;
 use pipeline::conservative::LEAST_UNCERTAINTY;
 
-use super::Bounds;
+use super::bounds::{Bounds, Ends};
 use super::window::times_inside;
 use crate::visibility::MovingMesh;
-
-/// A triangle at time 0 and at time 1.
-pub(super) type Ends = [[[f64; 3]; 3]; 2];
 
 /// Triangles that move as one.
 #[derive(Clone, Debug)]

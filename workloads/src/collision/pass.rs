@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, View};
 
+use super::bounds::Ends;
 use super::bounds::{Bounds, NOTHING, hull, meet};
 use super::buffer::TzBox;
-use super::object::{Ends, Object};
+use super::object::Object;
 
 /// Part of an object: the triangles that come near.
 #[derive(Clone, Copy)]

@@ -6,7 +6,8 @@ use super::bounds::Bounds;
 use super::compare::{Comparison, Scratch, Watch};
 use super::object::Object;
 use super::pass::{Effort, Fit, Fragment, Part, Pass};
-use super::search::{Method, TINY, enlarging};
+use super::run::{TINY, enlarging};
+use super::search::Method;
 
 /// What the passes have drawn, and what they have left of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,8 +1,6 @@
 //! When a triangle may be inside a box: a bound that costs a few divisions.
 
-use super::Bounds;
-use super::bounds::{NOTHING, hull, meet};
-use super::object::Ends;
+use super::bounds::{Bounds, Ends, NOTHING, hull, meet};
 
 /// Times come from one quotient of differences, so they are off by a few units in 2^53 of numbers up to one.
 const ROUNDING: f64 = 1e-14;

@@ -137,7 +137,7 @@ impl Glossy {
     }
 
     fn table(&self, samples: u32) -> Result<SampleTable, JobError> {
-        SampleSpec::default().table(samples, self.seed).map_err(refused)
+        SampleTable::new(&SampleSpec::default(), samples, self.seed).map_err(refused)
     }
 
     /// The scene with the map on its receiver.

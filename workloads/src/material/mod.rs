@@ -1,5 +1,6 @@
 //! Materials: how a surface looks, and the shader that makes it so.
 
+mod light;
 mod shade;
 
 use std::sync::Arc;
@@ -7,6 +8,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use pipeline::Texture;
 
+pub use light::Light;
 pub use shade::SurfaceShader;
 
 /// How a surface looks. Surfaces are opaque and diffuse, with a faint highlight.

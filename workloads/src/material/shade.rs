@@ -5,8 +5,7 @@ use std::sync::Arc;
 use glam::{Vec3, Vec4};
 use pipeline::{Shader, ShaderCost, ShadingPoint, Texture};
 
-use super::Material;
-use crate::scene::Light;
+use super::{Light, Material};
 
 /// Colours a material under a scene's light.
 ///

@@ -81,7 +81,7 @@ impl Rig {
         // Boxes have the shape of a box; lenses of their own are round.
         let shape = if layout.overlap == 0 { LensShape::Disk } else { LensShape::Square };
         let spec = SampleSpec { lens: shape, regions: layout.regions(), ..SampleSpec::default() };
-        let table = spec.table(per_strip * layout.strips(), seed);
+        let table = SampleTable::new(&spec, per_strip * layout.strips(), seed);
         let table = table.map_err(|error| refused("samples", format!("all views together: {error}")))?;
         Ok(Self {
             camera: camera.with_lens(Some(lens)),

@@ -124,7 +124,7 @@ mod tests {
     fn every_level_knows_the_farthest_of_its_samples() {
         let viewport = Viewport::new(37, 21).unwrap();
         let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
-        let depth = |n: usize| (pipeline::sampling::mix(n as u64) % 1000) as f32;
+        let depth = |n: usize| (pipeline::random::mix(n as u64) % 1000) as f32;
         let depths: Vec<f32> = (0..viewport.pixels() * 4).map(depth).collect();
         let grid = BoxGrid::new([2, 1, 3], true).unwrap();
         let pyramid = Pyramid::new(viewport, &table, &depths, 8, grid);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
-use pipeline::sampling::mix;
+use pipeline::random::mix;
 use pipeline::{Camera, Cull, Draw, DrawError, Geometry, Lens, Shader};
 
 use super::MovingBox;

@@ -7,7 +7,8 @@
 use activity::{Counts, LineAccess, Packet};
 use glam::{Vec3, Vec4};
 use pipeline::frame::{render_with_heat, visibility};
-use pipeline::sampling::{HashedSamples, LensShape, SampleSource, mix};
+use pipeline::random::mix;
+use pipeline::sampling::{HashedSamples, LensShape, SampleSource};
 use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
 use serde::{Deserialize, Serialize};
 

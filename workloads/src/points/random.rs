@@ -1,6 +1,6 @@
 //! Counter-based random numbers: what is drawn depends on the seed and the counter alone.
 
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 

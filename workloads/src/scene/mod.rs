@@ -12,7 +12,6 @@ mod frame;
 mod graph;
 mod info;
 pub(crate) mod inside;
-mod light;
 pub(crate) mod measure;
 mod mesh;
 mod node;
@@ -38,7 +37,6 @@ pub use graph::Graph;
 pub use info::{
     CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
 };
-pub use light::Light;
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
 pub use node::{Channels, Local, Motion, Node, Spin, Trs, world_poses};
 pub use parts::{DEFAULT_BACKGROUND, Parts};
@@ -48,7 +46,7 @@ pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};
 
 use crate::error::LoadError;
-use crate::material::{Material, SurfaceShader};
+use crate::material::{Light, Material, SurfaceShader};
 use camera::{Stand, between};
 use deform::Pose;
 use frame::Interval;
@@ -156,7 +154,7 @@ impl Scene {
         let first = self.interval(self.own_frames.start);
         let (stand, ..) = self.stands(&first).map_err(|error| self.broken(error.to_string()))?;
         let axes = [stand.right, stand.up, stand.forward].map(|axis| axis.as_vec3());
-        let toward = self.light.toward.unwrap_or_else(|| light::over_the_shoulder(axes[0], axes[1], axes[2]));
+        let toward = self.light.toward.unwrap_or_else(|| over_the_shoulder(axes[0], axes[1], axes[2]));
         let light = Light { toward: Some(toward), ..self.light };
         let shaders = |material: &Material| {
             let plain = SurfaceShader::new(material, &light);
@@ -336,4 +334,9 @@ impl Scene {
     pub fn vertex_count(&self) -> usize {
         self.graph.vertex_count()
     }
+}
+
+/// Direction towards a lamp over the right shoulder of a camera with the axes `right`, `up`, `forward`.
+fn over_the_shoulder(right: Vec3, up: Vec3, forward: Vec3) -> Vec3 {
+    mesh::unit((0.45 * right + 0.75 * up - 0.65 * forward).as_dvec3())
 }

@@ -7,8 +7,8 @@ use super::camera::SceneCamera;
 use super::camera_choice::OwnCamera;
 use super::clip::Clip;
 use super::graph::Graph;
-use super::light::Light;
 use super::settings::Settings;
+use crate::material::Light;
 
 /// What an importer or a program puts together; [`Scene::new`](super::Scene::new) makes it renderable.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Where scenes are put together: places on the image in pixels, depths in scene units, numbers from a hash.
 
 use glam::{Affine3A, DVec2, DVec3};
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 use pipeline::{Camera, CameraError, Lens, SampleTable, Viewport};
 
 use super::{Size, StressScene};

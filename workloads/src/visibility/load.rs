@@ -14,7 +14,7 @@ const KNOWN: &str = ".m5d, .mts, and .ply, .obj, .off or .stl, alone or as a pai
 
 /// Kinds of files that hold a mesh or half of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     M5d,
     Mts,
     Surface(Format),

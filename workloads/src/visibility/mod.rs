@@ -6,7 +6,6 @@
 
 mod bytes;
 mod camera;
-mod cases;
 mod hits;
 mod load;
 mod m5d;
@@ -18,13 +17,13 @@ mod table;
 mod unshaded;
 
 pub use crate::scene::CameraSpec;
-pub(crate) use cases::load_objects;
-pub use cases::{CaseFiles, CollisionCase, load_cases};
 pub use hits::write_hits;
+pub(crate) use load::Kind;
 pub use load::{load, load_surface};
 pub use m5d::parse as parse_m5d;
 pub use mesh::MovingMesh;
 pub use mts::{load_mts, parse_mts};
+pub(crate) use pair::moving;
 pub use scene::VisibilityScene;
 pub use table::{FixedSamples, write_samples};
 pub use unshaded::Unshaded;

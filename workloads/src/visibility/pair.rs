@@ -31,7 +31,7 @@ fn whole((path, format): File<'_>) -> Result<Surface, LoadError> {
 }
 
 /// The mesh that is in one file when the shutter opens and in the other when it closes.
-pub(super) fn moving(start: File<'_>, end: File<'_>) -> Result<MovingMesh, LoadError> {
+pub(crate) fn moving(start: File<'_>, end: File<'_>) -> Result<MovingMesh, LoadError> {
     let [open, close] = [whole(start)?, whole(end)?];
     let pair = Pair { paths: [start.0, end.0], open: &open, close: &close };
     let close = match (start.1, end.1) {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec};
+use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec, SampleTable};
 use serde::Serialize;
 use workloads::accumulation::{Rays, SharedSamples};
 use workloads::glossy::{Effect, Lobe, Map, receiver, stage};
@@ -118,7 +118,7 @@ impl Bench {
 
     fn by_rays(&self, map: &Map, lobe: Lobe) -> Result<Vec<Vec3>, ChartError> {
         let seeds = 0..u64::from(self.effort.reference_tables);
-        let tables = seeds.map(|seed| SampleSpec::default().table(256, REFERENCE_SEED + seed));
+        let tables = seeds.map(|seed| SampleTable::new(&SampleSpec::default(), 256, REFERENCE_SEED + seed));
         let tables = tables.collect::<Result<Vec<_>, _>>()?;
         let tables: Vec<&dyn SampleSource> = tables.iter().map(|table| table as &dyn SampleSource).collect();
         let colour = |mesh: &workloads::FrameMesh| self.scene.materials()[mesh.material].base_color;
@@ -134,7 +134,7 @@ impl Bench {
     pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<Row, ChartError> {
         let (map, draws) = (self.map(self.radius, self.effort.texels)?, self.draws()?);
         let look = (&self.gpu.pipeline, self.scene.background());
-        let table = SampleSpec::default().table(samples, 1)?;
+        let table = SampleTable::new(&SampleSpec::default(), samples, 1)?;
         let started = Instant::now();
         let (one, counts) = map.one_pass(&draws, &table, look, &mut |_, _| ())?;
         let host_s = started.elapsed().as_secs_f64();
@@ -162,7 +162,8 @@ impl Bench {
     /// When the hardware cannot be built.
     pub fn blurs(&self) -> Result<Vec<Blur>, ChartError> {
         let map = self.map(self.radius, 64)?;
-        let table = SampleSpec { lens: LensShape::Square, ..SampleSpec::default() }.table(64, 1)?;
+        let table =
+            SampleTable::new(&SampleSpec { lens: LensShape::Square, ..SampleSpec::default() }, 64, 1)?;
         let blur = |&height: &f64| {
             let y = height as f32;
             let corners =
@@ -186,7 +187,7 @@ impl Bench {
             let map = self.map(over_half * half, self.effort.texels)?;
             let truth = self.by_rays(&map, Lobe::Lens)?;
             let cone = self.by_rays(&map, Lobe::Cone)?;
-            let table = SampleSpec::default().table(FEW, 1)?;
+            let table = SampleTable::new(&SampleSpec::default(), FEW, 1)?;
             let look = (&self.gpu.pipeline, self.scene.background());
             let (few, _) = map.one_pass(&self.draws()?, &table, look, &mut |_, _| ())?;
             let rmse = |image: &[Vec3]| mean_square(&errors(image, &truth)).sqrt();

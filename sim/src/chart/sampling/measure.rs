@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
-use pipeline::{SampleSpec, Settings};
+use pipeline::{SampleSpec, SampleTable, Settings};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -30,7 +30,7 @@ const REFERENCE_SEED: u64 = 1_000;
 /// The table called `name`.
 pub(super) fn table(name: &str, samples: u32, seed: u64) -> Result<Box<dyn SampleSource>, ChartError> {
     let spec = SampleSpec::named(name).unwrap_or_default();
-    Ok(Box::new(spec.table(samples, seed)?))
+    Ok(Box::new(SampleTable::new(&spec, samples, seed)?))
 }
 
 /// An image of the stage.

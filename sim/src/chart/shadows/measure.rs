@@ -5,7 +5,7 @@ use std::time::Instant;
 use activity::{Counts, Event};
 use glam::Vec3;
 use pipeline::sampling::SampleSource;
-use pipeline::{Cull, Draw, PipelineSpec, SampleSpec, Settings, Viewport};
+use pipeline::{Cull, Draw, PipelineSpec, SampleSpec, SampleTable, Settings, Viewport};
 use serde::Serialize;
 use workloads::accumulation::SharedSamples;
 use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap, Shadows, World, see, stage};
@@ -125,7 +125,7 @@ impl Bench<'_> {
         let tables = self.stage.effort.reference_tables;
         let mut sum = vec![Vec3::ZERO; self.viewport.pixels()];
         for seed in 0..u64::from(tables) {
-            let table = SampleSpec::default().table(MOST, REFERENCE_SEED + seed)?;
+            let table = SampleTable::new(&SampleSpec::default(), MOST, REFERENCE_SEED + seed)?;
             let image = self.by_rays(&table)?;
             sum.iter_mut().zip(image).for_each(|(sum, pixel)| *sum += pixel / tables as f32);
         }

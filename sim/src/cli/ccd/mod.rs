@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use serde::Serialize;
+use workloads::collision::CaseFiles;
 use workloads::collision::{Answer, Method, Object, Search, Verdict, candidates, detect_each};
-use workloads::visibility::CaseFiles;
 
 use super::Failure;
 use super::terminal::{print, print_json};
@@ -171,7 +171,7 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
     let (search, rows) = (args.search(), Rows::of(args)?);
     let cases = CaseFiles::of(&args.files)?;
     let pool = super::threads(args.threads)?;
-    let progress = terminal.progress(args.json);
+    let progress = Progress::on(terminal, args.json);
     if !search.zoom && search.resolution * search.bins > SLOW {
         progress.note(
             "looking once at so many pixels and bins takes minutes for a pair; without --no-zoom it is seconds",

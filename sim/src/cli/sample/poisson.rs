@@ -10,6 +10,7 @@ use workloads::points::poisson::{
 
 use super::file::Points;
 use super::{Common, Failure, usage};
+use crate::output::progress::Progress;
 use crate::output::terminal::Terminal;
 
 /// Arguments of `sample poisson`.
@@ -85,7 +86,7 @@ fn make<const D: usize>(
 ) -> Result<PoissonDisk<D>, Failure> {
     let pool = crate::cli::threads(args.common.threads)?;
     let volume = ball(D) * spec.radius.powi(D as i32);
-    let progress = terminal.progress(false);
+    let progress = Progress::on(terminal, false);
     let points = saturation(D) / volume;
     if let Some(note) = long(points, D) {
         progress.note(&note);

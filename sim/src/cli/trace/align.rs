@@ -7,12 +7,12 @@ use traces::align::{AlignError, Alignment};
 use traces::io::Heading;
 use traces::io::atomic::write_file;
 
-use super::args::AlignArgs;
 use super::energy::is_within;
-use super::input::wrong;
+use super::failure::wrong;
 use super::report;
 use super::times::times;
 use crate::cli::Failure;
+use crate::cli::args::trace::AlignArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::output::terminal::Terminal;

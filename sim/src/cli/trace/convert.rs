@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, parquet};
 
-use super::args::ConvertArgs;
-use super::input::wrong;
+use super::failure::wrong;
 use super::report;
 use crate::cli::Failure;
+use crate::cli::args::trace::ConvertArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};

@@ -10,9 +10,9 @@ use traces::energy::{
 };
 use traces::io::{Heading, Repair, Source};
 
-use super::args::{Discard, EnergyArgs, IdleBy};
-use super::input::wrong;
+use super::failure::wrong;
 use crate::cli::Failure;
+use crate::cli::args::trace::{Discard, EnergyArgs, IdleBy};
 use crate::cli::terminal::{print, print_json};
 use crate::output::table::counted;
 use crate::output::terminal::Terminal;

@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 use traces::energy::{FrameTable, Summary, whole};
 use traces::frames::{Rule, Threshold};
 
-use super::args::FramesArgs;
-use super::input::{Frames, wrong};
+use super::failure::wrong;
+use super::input::Frames;
 use super::report;
+use crate::cli::args::trace::FramesArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::cli::{Failure, threads};

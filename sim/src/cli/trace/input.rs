@@ -4,62 +4,23 @@ use std::fs;
 use std::path::Path;
 
 use traces::energy::{FrameEnergy, PowerIntegral};
-use traces::frames::{Found, MarkError, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadError, ReadOptions, Recording, Repair, Rows, Source, WriteError, rail_of_sums, read};
-use traces::stream::{self, StreamError};
+use traces::frames::{Found, Marks, Method, Options, Proposal, Window, find_with, propose};
+use traces::io::{ReadOptions, Recording, Repair, Rows, Source, rail_of_sums, read};
+use traces::stream;
 use traces::trace::RATE_LIMITS_HZ;
 use traces::{MarkKind, Metadata, Trace};
 
-use super::args::{FindArgs, InputArgs};
+use super::failure::wrong;
 use super::pipes::shown;
 use super::times::times;
 use crate::cli::Failure;
+use crate::cli::args::trace::{FindArgs, InputArgs};
 use crate::output::terminal::Terminal;
 
 /// Traces of more samples are read in pieces.
 const LONG: u64 = 1 << 24;
 /// So are texts of more bytes.
 const LONG_BYTES: u64 = 1 << 30;
-
-impl From<ReadError> for Failure {
-    fn from(error: ReadError) -> Self {
-        let asked = matches!(
-            error,
-            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Asked { .. }
-        ) || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
-        Self { message: error.to_string(), code: if asked { 2 } else { 1 } }
-    }
-}
-
-impl From<MarkError> for Failure {
-    fn from(error: MarkError) -> Self {
-        Self { message: error.to_string(), code: 2 }
-    }
-}
-
-impl From<StreamError> for Failure {
-    fn from(error: StreamError) -> Self {
-        match error {
-            StreamError::Read(error) => error.into(),
-            StreamError::Mark(error) => error.into(),
-        }
-    }
-}
-
-impl From<WriteError> for Failure {
-    fn from(error: WriteError) -> Self {
-        match error {
-            WriteError::Read(error) => error.into(),
-            WriteError::Sample(error) => wrong(error.to_string()),
-            error => Self { message: error.to_string(), code: 1 },
-        }
-    }
-}
-
-/// A mistake of the caller.
-pub(super) fn wrong(message: impl Into<String>) -> Failure {
-    Failure { message: message.into(), code: 2 }
-}
 
 impl InputArgs {
     pub(super) fn options(&self) -> Result<ReadOptions, Failure> {

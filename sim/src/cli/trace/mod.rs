@@ -1,9 +1,9 @@
 //! `quintile trace`: analysis of any power trace, recorded or synthetic.
 
 mod align;
-pub(super) mod args;
 mod convert;
 mod energy;
+mod failure;
 mod frames;
 mod input;
 mod pareto;
@@ -14,9 +14,10 @@ mod times;
 mod units;
 
 use super::Failure;
+use super::args::trace::{TraceArgs, TraceCommand};
 use super::terminal::print;
 use crate::output::terminal::Terminal;
-use args::{TraceArgs, TraceCommand};
+
 use pipes::Pipes;
 
 pub(super) fn run(args: &TraceArgs, terminal: &Terminal) -> Result<(), Failure> {

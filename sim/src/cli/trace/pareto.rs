@@ -8,13 +8,13 @@ use traces::io::atomic::write_file;
 use traces::pareto::{Point, Standing, frontier};
 use traces::table::{Table as Columns, TableReadError};
 
-use super::args::{ParetoArgs, ParetoShow};
-use super::input::wrong;
+use super::failure::wrong;
 use super::pipes::shown;
 use super::plot::{Ending, write};
 use super::report;
 use super::units::{Quantity, scale_with};
 use crate::cli::Failure;
+use crate::cli::args::trace::{ParetoArgs, ParetoShow};
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Series};

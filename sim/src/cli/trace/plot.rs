@@ -8,12 +8,12 @@ use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
 use traces::io::{ReadError, ReadOptions};
 use traces::pyramid::{Column, Pyramid, pyramid_path};
 
-use super::args::{PlotArgs, PlotKind};
 use super::energy::check_within;
-use super::input::wrong;
+use super::failure::wrong;
 use super::pipes::shown as name_of;
 use super::report;
 use crate::cli::Failure;
+use crate::cli::args::trace::{PlotArgs, PlotKind};
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};

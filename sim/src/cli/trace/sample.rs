@@ -5,11 +5,11 @@ use traces::device::{Device, DeviceSpec, Peaks, RATES_HZ};
 use traces::energy::energies_j;
 use traces::io::Source;
 
-use super::args::SampleArgs;
 use super::convert::{check, may_be_saved, save};
-use super::input::wrong;
+use super::failure::wrong;
 use super::report;
 use crate::cli::Failure;
+use crate::cli::args::trace::SampleArgs;
 use crate::cli::terminal::print_json;
 use crate::output::table::si;
 use crate::output::terminal::Terminal;
@@ -107,7 +107,8 @@ impl SampleArgs {
             let rail_v = self.rail_voltage.unwrap_or(peaks.voltage_v);
             return Ok(DeviceSpec::fitting(rail_v, peaks.power_w));
         };
-        let hint = "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
+        let hint =
+            "--device takes a JSON file with the fields of a device, such as those that `--json` prints";
         let unread = |error: String| wrong(format!("{}: {error}; {hint}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|error| unread(error.to_string()))?;
         serde_json::from_str(&text).map_err(|error| unread(error.to_string()))

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use super::input::wrong;
+use super::failure::wrong;
 use super::units::{Quantity, scale};
 use crate::cli::Failure;
 

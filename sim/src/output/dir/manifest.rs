@@ -12,6 +12,8 @@ use super::OutputError;
 
 /// The name of the list in a folder of results.
 pub const MANIFEST: &str = "manifest.json";
+/// Below the folder of results.
+pub(super) const WORK_FOLDER: &str = ".quintile";
 
 /// The version of the list's form.
 const SCHEMA: u32 = 1;
@@ -90,7 +92,7 @@ impl Manifest {
         let inside = |name: &String| {
             let path = Path::new(name);
             path.components().all(|part| matches!(part, Component::Normal(_)))
-                && !path.starts_with(super::work::NAME)
+                && !path.starts_with(WORK_FOLDER)
                 && name != MANIFEST
         };
         self.schema == SCHEMA && self.files.keys().all(inside)

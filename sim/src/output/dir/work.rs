@@ -8,10 +8,7 @@ use std::path::{Path, PathBuf};
 use traces::io::unfinished::Unfinished;
 
 use super::OutputError;
-use super::manifest::MANIFEST;
-
-/// Below the folder of results.
-pub(super) const NAME: &str = ".quintile";
+use super::manifest::{MANIFEST, WORK_FOLDER};
 
 /// The folder `.quintile` below a folder of results, with a lock on it that ends with the process.
 #[derive(Debug)]
@@ -26,7 +23,7 @@ impl Work {
     /// Makes and locks the folder below `root`, which is made where it is missing.
     pub fn lock(root: &Path) -> Result<Self, OutputError> {
         let made = missing(root);
-        let path = root.join(NAME);
+        let path = root.join(WORK_FOLDER);
         if path.is_symlink() {
             let why = "it is a link, and new results are made in a folder of that name".to_owned();
             return Err(OutputError::InTheWay { path, why, forcible: false });

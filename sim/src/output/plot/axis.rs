@@ -1,6 +1,6 @@
 //! Axes: what they show, the range of it, and ticks that have room.
 
-use super::render::text_width;
+use super::text::text_width;
 use crate::output::table::{Prefix, power_of_ten};
 
 /// How values lie along an axis.

@@ -4,13 +4,14 @@ use std::ops::Range;
 
 use super::axis::{Axis, AxisSpec, Extent, Scale, Way};
 use super::labels::{self, Label};
-use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, legend_lines, plate, shortened, wrapped};
+use super::legend::{Key, LEGEND_LINE, LEGEND_PX, legend_column, legend_lines, plate};
 use super::look::Look;
 use super::palette::{INK, MARK, MUTED};
 use super::panel::{BELOW, Panel, aside};
 use super::picture::{Across, Picture, Text, text};
-use super::render::text_width;
 use super::series::{Mark, Series};
+use super::text::text_width;
+use super::text::{shortened, wrapped};
 
 /// Series over two axes.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use super::palette::{AXIS, Colour};
 use super::panel::Panel;
 use super::picture::{Picture, Point, Text, text};
-use super::render::text_width;
+use super::text::text_width;
 
 /// A name, the point it belongs to, and the radius of the point's marker.
 #[derive(Clone, Copy, Debug)]

@@ -2,8 +2,8 @@
 
 use super::palette::{BACKGROUND, Colour, INK, MUTED};
 use super::picture::{Across, Picture, Point, Text, text};
-use super::render::text_width;
-use super::series::Style;
+use super::style::Style;
+use super::text::{shortened, text_width};
 
 /// How an entry of a legend is drawn.
 #[derive(Clone, Copy, Debug)]
@@ -99,35 +99,4 @@ pub(super) fn legend_column(
 /// A white plate under a legend that stands within a panel.
 pub(super) fn plate(picture: &mut Picture, from: Point, to: Point) {
     picture.rect(from, to, BACKGROUND.alpha(0.85));
-}
-
-/// `label` in lines of at most `room` pixels, broken between words.
-pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in label.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if text_width(&format!("{line} {word}"), size, bold) <= room => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
-}
-
-/// `label`, cut with `…` where it is wider than `room` pixels.
-pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
-    let mut short: Vec<char> = label.chars().collect();
-    if text_width(label, size, false) <= room {
-        return label.to_owned();
-    }
-    while !short.is_empty() {
-        short.pop();
-        let candidate: String = short.iter().chain(['…'].iter()).collect();
-        if text_width(&candidate, size, false) <= room {
-            return candidate;
-        }
-    }
-    String::new()
 }

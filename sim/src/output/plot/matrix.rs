@@ -1,10 +1,10 @@
 //! Costs or errors of methods by what they were tried on, as shaded cells.
 
-use super::legend::shortened;
 use super::look::Look;
 use super::palette::{BACKGROUND, INK, MUTED, heat};
 use super::picture::{Across, Picture, Text, text};
-use super::render::text_width;
+use super::text::shortened;
+use super::text::text_width;
 
 /// Cells of rows by columns, each a number of which more is worse: a cost over that of the best of its column, say.
 #[derive(Clone, Debug)]

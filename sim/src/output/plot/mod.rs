@@ -35,6 +35,8 @@ mod power_run;
 mod render;
 mod series;
 mod stalls;
+mod style;
+mod text;
 mod unit_busy;
 
 pub use axis::{AxisSpec, Scale};

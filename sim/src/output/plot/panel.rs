@@ -142,6 +142,6 @@ pub(super) fn tick_label(picture: &mut Picture, label: &str, (x, y): Point, acro
         return picture.text(Text { across, ..plain(base, (x, y)) });
     }
     picture.text(plain(base, (left, y)));
-    let behind = left + super::render::text_width(base, TICK_PX, false);
+    let behind = left + super::text::text_width(base, TICK_PX, false);
     picture.text(Text { size: RAISED * TICK_PX, ..plain(raised, (behind + 0.5, y - 5.0)) });
 }

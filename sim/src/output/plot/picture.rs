@@ -1,8 +1,8 @@
 //! A plot as a list of shapes, before it is any kind of file.
 
-use super::legend::wrapped;
 use super::look::{Look, Paper};
 use super::palette::{Colour, INK, MUTED};
+use super::text::wrapped;
 
 /// A point in pixels of the layout, from the top left.
 pub(super) type Point = (f64, f64);

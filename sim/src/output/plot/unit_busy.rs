@@ -2,12 +2,12 @@
 
 use super::axis::{Axis, Way, is_drawable};
 use super::columns::means;
-use super::legend::shortened;
 use super::look::Look;
 use super::palette::{MUTED, heat, named_unit_colour};
 use super::panel::{BELOW, Panel};
 use super::picture::{Across, Picture, Text, text};
-use super::render::text_width;
+use super::text::shortened;
+use super::text::text_width;
 use crate::output::table::si;
 
 /// A unit's busy fraction over time.

@@ -7,9 +7,10 @@ use traces::energy::PowerIntegral;
 
 use super::figure::{POWER, TIME, line};
 use super::recording::{Frames, MARKED, Recording, looped};
-use super::row::{Number, Row, Verdict, With, numbers};
+use super::row::{Number, Row, With, numbers};
 use super::settings::{Origin, load};
 use super::stage::Stage;
+use super::verdict::Verdict;
 use super::{Done, Figure, Options, Paper};
 use crate::output::progress::Progress;
 use crate::run::RunError;

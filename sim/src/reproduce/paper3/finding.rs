@@ -7,7 +7,8 @@ use traces::score::Score;
 
 use super::super::figure::{POWER, TIME, dots, line};
 use super::super::recording::{Frames, MARKED, Recording};
-use super::super::row::{Row, Verdict, numbers};
+use super::super::row::{Row, numbers};
+use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::{Bench, settled};
 use crate::run::RunError;

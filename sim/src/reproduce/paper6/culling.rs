@@ -13,7 +13,8 @@ use super::settings::{Bound, Hardware};
 use super::{Task, catalogue};
 use crate::gpu::GpuSpec;
 use crate::reproduce::Done;
-use crate::reproduce::row::{Row, Verdict, numbers};
+use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::verdict::Verdict;
 use crate::run::RunError;
 
 impl Hardware {

@@ -4,7 +4,7 @@ use glam::{Affine3A, Vec3};
 use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Touch, View};
 use pipeline::depth::{Bounder, DepthBound};
 use pipeline::geometry::Projection;
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 use pipeline::setup::Triangle;
 use pipeline::{Camera, Draw, Features, Geometry, LensShape, MovingVertex, SampleTable, Viewport};
 use rayon::prelude::*;

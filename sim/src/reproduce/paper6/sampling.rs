@@ -14,7 +14,8 @@ use workloads::points::white::{
 
 use super::super::band::Cases;
 use super::super::figure::{dots, line};
-use super::super::row::{Row, Verdict, numbers};
+use super::super::row::{Row, numbers};
+use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
 use super::settings::Darts;

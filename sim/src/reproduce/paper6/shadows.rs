@@ -9,7 +9,8 @@ use workloads::soft_shadows::{Options, SoftShadows};
 use super::Task;
 use crate::gpu::GpuSpec;
 use crate::reproduce::Done;
-use crate::reproduce::row::{Row, Verdict, numbers};
+use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::verdict::Verdict;
 use crate::run::RunError;
 
 pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {

@@ -15,30 +15,13 @@ use std::collections::BTreeMap;
 use pipeline::Features;
 use serde::{Deserialize, Serialize};
 
-use super::{Distinct, Plan, RunError, Simulated};
+use super::{Distinct, Plan, RunError, Simulated, Wish};
 use crate::output::progress::Progress;
 use crate::timing::{Level, Sampling};
 
 pub use decide::cheapest_level;
 pub use verify::Verified;
 pub(super) use verify::verify;
-
-/// What the caller wants of a run, instead of a level of timing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Wish {
-    /// The largest relative error of cycles and energy of the run, against every frame at the reference.
-    pub accuracy: Option<f64>,
-    /// The longest that simulating may take, in seconds by the clock.
-    pub budget_s: Option<f64>,
-}
-
-impl Wish {
-    /// Whether anything was asked for.
-    pub fn is_any(&self) -> bool {
-        self.accuracy.is_some() || self.budget_s.is_some()
-    }
-}
 
 /// What was chosen, why, and how wrong it is expected to be. Errors are relative.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,9 +85,11 @@ pub struct ProbeSummary {
     pub dimensions_saved: Option<f64>,
 }
 
-/// Probes the scene, or takes the choice of the run that is repeated, and changes the plan to it; nothing where nothing was wished.
+/// Probes the scene, or takes the choice `made` by the run that is repeated, and changes the plan to it; nothing where nothing was
+/// wished.
 pub(super) fn choose(
     plan: &mut Plan,
+    made: Option<Choice>,
     distinct: &Distinct,
     progress: &Progress,
 ) -> Result<Option<Choice>, RunError> {
@@ -112,8 +97,8 @@ pub(super) fn choose(
     if !wish.is_any() {
         return Ok(None);
     }
-    let choice = match plan.options.repeat.take() {
-        Some(choice) => Choice { expected_error: choice.level_error, meets_accuracy: None, ..*choice },
+    let choice = match made {
+        Some(choice) => Choice { expected_error: choice.level_error, meets_accuracy: None, ..choice },
         None => probed(plan, distinct, &wish, progress)?,
     };
     plan.options.timing = choice.level;

@@ -8,7 +8,7 @@ use pipeline::frame::render_with_heat;
 use pipeline::{PipelineSpec, Settings, Viewport};
 use timing::Recorder;
 
-use super::super::{Distinct, Plan, RunError, Taken, simulate};
+use super::super::{Distinct, Plan, RunError, Taken, frame};
 use super::decide::Findings;
 use super::{ProbeSummary, fewer};
 use crate::output::progress::Progress;
@@ -113,8 +113,7 @@ fn see(
     let frame = scene.frame(number)?;
     let draws = frame.draws(scene)?;
     let settings = Settings { spec, viewport, samples: &*plan.samples, background: scene.background() };
-    let mut clock =
-        FrameClock::new(level, &plan.gpu, Recorder::new(simulate::BIN_PS, simulate::FEWEST_BINS))?;
+    let mut clock = FrameClock::new(level, &plan.gpu, Recorder::new(frame::BIN_PS, frame::FEWEST_BINS))?;
     let mut packets = Vec::new();
     let mut lines = Vec::new();
     let emit = |packet: &activity::Packet, asked: &[activity::LineAccess]| {

@@ -1,48 +1,12 @@
 //! What the representatives say of all frames.
 
-use serde::Serialize;
-use timing::sampled::{Design, Estimate, Interval};
+use timing::sampled::{Design, Estimate};
 
+use super::super::simulated::{Quantity, Taken};
 use super::Signatures;
 
 /// How sure an interval is to hold the truth.
 pub const CONFIDENCE: f64 = 0.95;
-
-/// What a simulated frame took.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Taken {
-    /// Cycles of the core clock.
-    pub cycles: f64,
-    /// Joules while busy.
-    pub energy_j: f64,
-}
-
-/// A quantity of the whole run with its interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Quantity {
-    /// The most likely value.
-    pub value: f64,
-    /// The lower end of the 95 % interval.
-    pub low: f64,
-    /// The upper end.
-    pub high: f64,
-    /// Half the width over the value.
-    pub relative_half_width: f64,
-}
-
-impl From<Interval> for Quantity {
-    fn from(interval: Interval) -> Self {
-        let Interval { value, low, high } = interval;
-        Self { value, low, high, relative_half_width: interval.relative() }
-    }
-}
-
-impl Quantity {
-    /// Whether `truth` is inside.
-    pub fn holds(&self, truth: f64) -> bool {
-        (self.low..=self.high).contains(&truth)
-    }
-}
 
 /// Cycles and energy of every frame, as the representatives and the previews have it.
 pub struct Forecast {

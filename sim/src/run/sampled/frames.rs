@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use activity::{Counts, Unit};
 
-use super::super::simulate::Whole;
-use super::super::{Distinct, Plan, Regime, Simulated, SimulatedFrame};
-use super::{Forecast, SampledSummary, Scout, Taken};
+use super::super::frame::Whole;
+use super::super::{Distinct, Plan, Regime, Simulated, SimulatedFrame, Taken};
+use super::summary::summary;
+use super::{Forecast, Scout};
 
 /// Frames are never predicted to take less than this share of what the one they are made from takes.
 const LEAST_SHARE: f64 = 0.01;
@@ -27,7 +28,7 @@ pub(super) fn all(
             predict(numbers[group], scout, forecast, place, like)
         });
     }
-    let summary = SampledSummary::new(plan, frames, scout, forecast);
+    let sampled = summary(plan, frames, scout, forecast);
     let pictures = whole.iter_mut().filter_map(|(&group, done)| Some((numbers[group], done.picture.take()?)));
     let pictures = pictures.collect();
     let pilot = whole.get_mut(&groups[scout.pilot]);
@@ -38,7 +39,7 @@ pub(super) fn all(
         frames: groups.to_vec(),
         pictures,
         heat,
-        sampled: Some(summary),
+        sampled: Some(sampled),
     }
 }
 

@@ -14,18 +14,17 @@ mod summary;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pipeline::sampling::mix;
+use pipeline::random::mix;
 use rayon::prelude::*;
 use timing::sampled::Design;
 
-use super::simulate::{Stage, Whole};
-use super::{Plan, RunError, Simulated, SimulatedFrame};
+use super::frame::{Stage, Whole};
+use super::{Plan, RunError, Simulated, SimulatedFrame, Taken};
 use crate::output::progress::Progress;
 
-pub use forecast::{Forecast, Quantity, Taken};
+pub use forecast::Forecast;
 pub use preview::{Glimpse, Preview};
 pub use signature::Signatures;
-pub use summary::SampledSummary;
 
 /// Every frame at a glance, and one of them whole.
 pub struct Scout {

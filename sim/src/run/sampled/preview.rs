@@ -7,7 +7,7 @@ use pipeline::{Settings, Viewport};
 use timing::Recorder;
 use workloads::SampleChoice;
 
-use super::super::{Plan, RunError, simulate};
+use super::super::{Plan, RunError, frame};
 use crate::timing::{FrameClock, Level};
 
 /// The preview is as many times smaller along each axis as leaves it so wide, and at most [`SMALLEST`] times.
@@ -72,7 +72,7 @@ impl Preview {
             background: scene.background(),
         };
         let draws = frame.draws(scene)?;
-        let recorder = Recorder::new(simulate::BIN_PS, BINS);
+        let recorder = Recorder::new(frame::BIN_PS, BINS);
         let mut clock = FrameClock::new(self.level, &plan.gpu, recorder)?;
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let rendered =

@@ -2,8 +2,6 @@
 
 mod write;
 
-use super::{ReadError, ReadOptions, Rows};
-use crate::trace::Trace;
 use std::path::{Path, PathBuf};
 pub use write::{save, save_as, write, write_sidecar, write_with};
 
@@ -30,15 +28,4 @@ pub(crate) fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
 pub(crate) fn delimiter(text: &[u8]) -> u8 {
     let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
     [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
-}
-
-/// Reads a CSV file, and its description if there is one at [`description_path`] or [`sidecar_path`].
-///
-/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if the
-/// description states the rate. Without a description the rate is that of the time stamps.
-///
-/// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
-pub fn read(path: &Path) -> Result<Trace, ReadError> {
-    Ok(crate::io::read::load(Rows::csv(path, &ReadOptions::default(), false)?)?.trace)
 }

@@ -1,7 +1,7 @@
 //! What can go wrong as a file is written.
 
 use super::ReadError;
-use crate::device::SampleError;
+use std::error::Error;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -49,9 +49,9 @@ pub enum WriteError {
         /// Its time, s.
         time_s: f64,
     },
-    /// What is to be written cannot be sampled from its trace.
+    /// What is to be written cannot be made.
     #[error(transparent)]
-    Sample(#[from] SampleError),
+    Source(Box<dyn Error + Send + Sync>),
     /// The samples to be written could not be read.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -61,6 +61,6 @@ pub enum WriteError {
         /// The file.
         path: PathBuf,
         /// What failed.
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Box<dyn Error + Send + Sync>,
     },
 }

@@ -18,7 +18,7 @@ pub use turned::turned_beams;
 #[cfg(test)]
 pub(in crate::caustics) mod tests {
     use glam::DVec3;
-    use pipeline::sampling::{mix, unit};
+    use pipeline::random::{mix, unit};
 
     use crate::caustics::{Beam, Hit};
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 
 use super::super::Beam;
 use super::super::optics::{refract, transmission};

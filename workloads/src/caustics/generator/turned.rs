@@ -1,7 +1,7 @@
 //! Beams that turn about their way, as they do next to a focus.
 
 use glam::DVec3;
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 
 use super::super::Beam;
 

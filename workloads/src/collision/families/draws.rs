@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use glam::{DMat3, DQuat, DVec3};
-use pipeline::sampling::{mix, unit};
+use pipeline::random::{mix, unit};
 
 use super::Case;
 use crate::collision::Object;

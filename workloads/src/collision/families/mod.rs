@@ -7,7 +7,7 @@ mod many;
 mod two;
 mod yardstick;
 
-use pipeline::sampling::mix;
+use pipeline::random::mix;
 
 use super::{Bounds, Object};
 use draws::Draws;

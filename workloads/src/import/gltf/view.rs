@@ -8,7 +8,8 @@ use gltf::json::validation::Checked;
 
 use super::document::Document;
 use super::nodes::Tree;
-use crate::scene::{Instant, Light, OwnCamera, Rig, SceneCamera, View, world_poses};
+use crate::material::Light;
+use crate::scene::{Instant, OwnCamera, Rig, SceneCamera, View, world_poses};
 
 /// The usable cameras of the default scene, of which the first sees it, and the first directional light or what stands in.
 pub(super) fn view(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> (Vec<OwnCamera>, Light) {

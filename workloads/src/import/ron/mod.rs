@@ -9,7 +9,8 @@ use activity::Warning;
 use glam::{DVec3, Vec3};
 
 use crate::error::{LoadError, Source};
-use crate::scene::{CameraSpec, Light, Parts, Rig, SceneCamera, Settings};
+use crate::material::Light;
+use crate::scene::{CameraSpec, Parts, Rig, SceneCamera, Settings};
 use spec::{LightSpec, SceneSpec, SettingsSpec};
 
 /// Reads the scene at `path`.

@@ -4,7 +4,7 @@
 
 use super::super::palette::{BACKGROUND, Colour};
 use super::super::picture::{Across, Picture, Point, Shape, Text};
-use super::text_width;
+use super::super::text::text_width;
 
 /// How far a circle's control points lie from its corners, of the radius: four Bezier curves within 0.03 %.
 const CIRCLE: f64 = 0.552_284_75;

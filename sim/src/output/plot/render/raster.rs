@@ -115,7 +115,8 @@ impl DrawingBackend for Raster {
             HPos::Center => (from.0 - to.0) / 2,
         };
         // The font draws its base line at half its size; half way up the capitals is 0.36 em above that.
-        let down = (style.size() / super::SIZE_OVER_EM * 0.36) as i32 - (style.size() as f32 / 2.0) as i32;
+        let down = (style.size() / super::super::text::SIZE_OVER_EM * 0.36) as i32
+            - (style.size() as f32 / 2.0) as i32;
         let turn = style.transform();
         style
             .draw(text, (0, 0), |x, y, colour| {

@@ -1,0 +1,284 @@
+//! Random scenes and a brute-force image to hold the pipeline against.
+
+pub mod case;
+pub mod meshes;
+mod probe;
+pub mod stage;
+
+use glam::{Affine3A, Vec3, Vec4};
+use pipeline::depth::DepthSpec;
+use pipeline::random::mix;
+use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::sampling::{Sample, TileSamples};
+use pipeline::setup::{Outcome, set_up};
+use pipeline::traversal::Box5;
+use pipeline::*;
+pub use probe::{Look, Probe, looks, repeated, weight};
+use proptest::prelude::*;
+
+/// Counter-based uniform numbers in [0, 1).
+pub struct Uniform(u64, u64);
+
+impl Uniform {
+    pub fn new(seed: u64) -> Self {
+        Self(mix(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1), 0)
+    }
+
+    pub fn next(&mut self) -> f32 {
+        self.1 += 1;
+        (mix(self.0.wrapping_add(self.1.wrapping_mul(0x9E37_79B9_7F4A_7C15))) >> 40) as f32 / 16_777_216.0
+    }
+
+    pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
+        lo + (hi - lo) * self.next()
+    }
+}
+
+/// A shader whose colour is a function of the normal, so that it does not matter which.
+pub struct Plain;
+
+impl Shader for Plain {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
+    }
+
+    fn shade(&self, at: &ShadingPoint, _texel: Vec4) -> Vec3 {
+        at.normal.abs()
+    }
+}
+
+/// Triangle soup at both ends of the shutter, in front of a camera at the origin that looks down +z.
+pub struct Soup {
+    pub open: Vec<Vec3>,
+    pub close: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// How wild a soup is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    Still,
+    Moving,
+    /// A third of the triangles reach behind the camera.
+    Crossing,
+    /// Slivers, and triangles that turn over.
+    Slivers,
+    /// Vertices on a coarse grid, shared and aligned with samples, so that ties abound.
+    Grid,
+    /// Large layers, each a hair nearer than the one before, so that depth culling decides.
+    Layers,
+}
+
+impl Kind {
+    pub const ALL: [Self; 6] =
+        [Self::Still, Self::Moving, Self::Crossing, Self::Slivers, Self::Grid, Self::Layers];
+}
+
+/// Every kind, each as likely.
+pub fn kinds() -> impl Strategy<Value = Kind> {
+    prop::sample::select(&Kind::ALL[..])
+}
+
+impl Soup {
+    pub fn new(kind: Kind, count: u32, seed: u64) -> Self {
+        let mut r = Uniform::new(seed);
+        let (mut open, mut close) = (Vec::new(), Vec::new());
+        for triangle in 0..count {
+            let behind = kind == Kind::Crossing && triangle % 3 == 0;
+            let middle = Vec3::new(
+                r.within(-4.0, 4.0),
+                r.within(-4.0, 4.0),
+                r.within(if behind { -3.0 } else { 2.0 }, 12.0),
+            );
+            let size = if behind { 4.0 } else { r.within(0.05, 2.0) };
+            let drift = Vec3::new(r.within(-2.0, 2.0), r.within(-2.0, 2.0), r.within(-1.0, 1.0));
+            for corner in 0..3 {
+                let mut offset =
+                    Vec3::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0), r.within(-1.0, 1.0)) * size;
+                if kind == Kind::Slivers && corner == 2 {
+                    offset = (open[open.len() - 1] - middle) * 0.999 + offset * 1e-4;
+                }
+                let p = middle + offset;
+                let wobble = Vec3::new(r.within(-0.5, 0.5), r.within(-0.5, 0.5), r.within(-0.5, 0.5));
+                open.push(p);
+                close.push(if kind == Kind::Still { p } else { p + drift + wobble * size });
+            }
+        }
+        if kind == Kind::Layers {
+            for end in [&mut open, &mut close] {
+                for (corner, p) in end.iter_mut().enumerate() {
+                    *p = Vec3::new(p.x * 5.0, p.y * 5.0, 6.0 - 1e-5 * (corner / 3) as f32);
+                }
+            }
+        }
+        if kind == Kind::Grid {
+            // With 50 rows and a half field of view of 0.7, this puts vertices on the corners of pixels at depth 4.
+            let px = |c: f32| (c * 10.0).round() * (4.0 * 0.7 / 25.0);
+            let snap = |p: &mut Vec3| *p = Vec3::new(px(p.x), px(p.y), 4.0);
+            open.iter_mut().for_each(snap);
+            close = open.iter().enumerate().map(|(i, p)| if i % 9 < 3 { *p + Vec3::X } else { *p }).collect();
+        }
+        Self { open, close, triangles: (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect() }
+    }
+
+    pub fn draw<'a>(&'a self, shader: &'a dyn Shader, cull: Cull) -> Draw<'a> {
+        let still = self.open == self.close;
+        let close = if still { &self.open } else { &self.close };
+        Draw { geometry: Geometry::new(&self.open, close, &self.triangles).unwrap(), shader, cull }
+    }
+}
+
+/// A table whose samples lie on the borders of pixels, shutter and lens and next to them, where tile tests round.
+pub fn border_table(seed: u64) -> SampleTable {
+    let below_one = 1.0 - f32::EPSILON / 2.0;
+    let mut r = Uniform::new(seed);
+    let mut pick = |choices: [f32; 4]| choices[(r.next() * 4.0) as usize];
+    let unit = [0.0, below_one, 0.5, f32::EPSILON];
+    let lens = [-1.0, 1.0, 0.0, below_one];
+    let samples = (0..64 * 64 * 4)
+        .map(|_| Sample { x: pick(unit), y: pick(unit), u: pick(lens), v: pick(lens), t: pick(unit) })
+        .collect();
+    SampleTable::programmed(4, seed, samples).unwrap()
+}
+
+/// How many ways there are to switch the tests on and off.
+pub const SWITCHES: u32 = 1 << 7;
+
+/// One of them.
+pub fn switched(switches: u32) -> Features {
+    let on = |bit: u32| switches & (1 << bit) != 0;
+    Features {
+        lens_lines: on(0),
+        side_planes: on(1),
+        facing: on(2),
+        edges: on(3),
+        coarse: on(4),
+        screen: on(5),
+        z_max: on(6),
+        ..Features::ALL
+    }
+}
+
+pub fn spec(features: Features) -> PipelineSpec {
+    let lines = CacheSpec::lru(256, 4);
+    PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 32,
+        batch_triangles: 100,
+        vertex_reuse: 16,
+        shading_cache: CacheSpec::lru(1024, 4),
+        shading: Shading::Cached,
+        memory: MemorySpec {
+            depth: lines,
+            colour: lines,
+            texture: lines,
+            l2: CacheSpec::lru(4096, 8),
+            compression: Default::default(),
+        },
+        features,
+        depth: DepthSpec::default(),
+    }
+}
+
+/// What kind of camera; `lens.into()` is one in perspective.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    pub lens: bool,
+    pub parallel: bool,
+}
+
+impl From<bool> for Optics {
+    fn from(lens: bool) -> Self {
+        Self { lens, parallel: false }
+    }
+}
+
+pub fn camera(optics: impl Into<Optics>) -> Camera {
+    let Optics { lens, parallel } = optics.into();
+    // Orthographic as large as the other is at depth 4, so that the grid lies on pixels in both.
+    let make = if parallel { Camera::orthographic } else { Camera::new };
+    let camera = make(Affine3A::IDENTITY, if parallel { 2.8 } else { 0.7 }, 0.25).unwrap();
+    camera.with_lens(lens.then(|| Lens::new(0.3, 6.0).unwrap()))
+}
+
+/// For every pixel and sample, pixel by pixel in rows: triangle (`u32::MAX` for none) and depth, from all triangles against all
+/// samples.
+pub fn brute_force(
+    soup: &Soup,
+    cull: Cull,
+    optics: impl Into<Optics>,
+    viewport: Viewport,
+    table: &SampleTable,
+) -> Vec<(u32, u32)> {
+    let optics = optics.into();
+    let camera = camera(optics);
+    let shear = if optics.lens {
+        let s = 0.5 * f64::from(viewport.height()) / f64::from(camera.half_height()) * f64::from(0.3_f32);
+        Shear::new([s as f32, -s as f32], [(s / 6.0) as f32, -(s / 6.0) as f32])
+    } else {
+        Shear::default()
+    };
+    let shear = Shear { parallel: optics.parallel, ..shear };
+    let image = |p: Vec3| {
+        let k = 0.5 * f64::from(viewport.height()) / f64::from(camera.half_height());
+        [(k * f64::from(p.x)) as f32, (-k * f64::from(p.y)) as f32, p.z]
+    };
+    let vertex =
+        |i: u32| MovingVertex { open: image(soup.open[i as usize]), close: image(soup.close[i as usize]) };
+    let per_pixel = table.per_pixel() as usize;
+    let mut seen = vec![(u32::MAX, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel];
+    let mut samples = TileSamples::default();
+    for py in (0..viewport.height()).step_by(8) {
+        for px in (0..viewport.width()).step_by(8) {
+            samples.fill(table, viewport, &shear, [px, py], 8);
+            let mut depth = vec![f32::INFINITY; samples.len];
+            let mut triangle = vec![u32::MAX; samples.len];
+            for (id, corners) in soup.triangles.iter().enumerate() {
+                let v = corners.map(vertex);
+                let half = [0.5 * viewport.width() as f32, 0.5 * viewport.height() as f32];
+                let Outcome::Ready(mut ready) =
+                    set_up(id as u32, [&v[0], &v[1], &v[2]], cull, &shear, 0.25, half)
+                else {
+                    continue;
+                };
+                // The full path for everything: no dimension dropped.
+                ready.moving = true;
+                let within = Box5::whole(true);
+                let mut target = Target { depth: &mut depth, triangle: &mut triangle };
+                test_run(&ready, &samples, &within, 0.25, &mut target, &mut Hits::default());
+            }
+            for slot in 0..samples.len {
+                let index = samples.in_image(slot, [px, py], 8, viewport, table.per_pixel());
+                seen[index] = (triangle[slot], depth[slot].to_bits());
+            }
+        }
+    }
+    seen
+}
+
+/// A shader of one colour.
+pub struct Flat(pub Vec3);
+
+impl Shader for Flat {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
+    }
+
+    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
+        self.0
+    }
+}
+
+/// A camera at the origin for which `(x, y, z)` appears at `(x / z, -y / z)` pixels from the centre of the image.
+pub fn pixel_camera(viewport: Viewport, near: f32) -> Camera {
+    Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, near).unwrap()
+}
+
+/// The triangles of one quad with corners `0, 1, 2, 3` in counter-clockwise order on the screen.
+pub const QUAD: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+/// A rectangle `x0..x1` by `y0..y1` in pixels from the centre of the image, `y` upwards, at depth `z`, for
+/// [`pixel_camera`] and [`QUAD`].
+pub fn rectangle(x: [f32; 2], y: [f32; 2], z: f32) -> [Vec3; 4] {
+    [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]].map(|[x, y]| Vec3::new(x * z, y * z, z))
+}

@@ -1,0 +1,359 @@
+//! Oracle: no tile that a triangle touches anywhere in lens and time is missed, and nothing lies outside the intervals.
+
+use std::collections::{HashMap, HashSet};
+
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
+use pipeline::random::{mix, unit};
+
+struct Numbers(u64);
+
+impl Numbers {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        mix(self.0)
+    }
+
+    fn within(&mut self, lo: f64, hi: f64) -> f64 {
+        lo + (hi - lo) * unit(self.bits())
+    }
+
+    /// Uniform, on a coarse binary grid, or an end.
+    fn odd(&mut self, lo: f64, hi: f64) -> f64 {
+        match self.bits() % 4 {
+            0 => lo,
+            1 => hi,
+            2 => lo + (hi - lo) * (self.bits() % 9) as f64 / 8.0,
+            _ => self.within(lo, hi),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Ordinary,
+    Tiny,
+    Huge,
+    Sliver,
+    Segment,
+    Point,
+    /// Vertices on the borders of tiles and in numbers of few bits, so that touching is decided exactly.
+    Grid,
+    /// Vertices behind the camera.
+    Behind,
+}
+
+const KINDS: [Kind; 8] = [
+    Kind::Ordinary,
+    Kind::Tiny,
+    Kind::Huge,
+    Kind::Sliver,
+    Kind::Segment,
+    Kind::Point,
+    Kind::Grid,
+    Kind::Behind,
+];
+
+const VIEWS: [View; 6] = [
+    View::Orthographic { s: [0.0; 2], a: [0.0; 2], near: f64::NEG_INFINITY },
+    View::Orthographic { s: [2.0, -2.0], a: [0.5, -0.5], near: 0.25 },
+    View::Orthographic { s: [3.0, -1.0], a: [2.0, -0.25], near: -1.0 },
+    View::Perspective { s: [0.0; 2], a: [0.0; 2], near: 0.25 },
+    View::Perspective { s: [2.0, -2.0], a: [0.5, -0.5], near: 0.25 },
+    View::Perspective { s: [3.0, -1.0], a: [2.0, -0.25], near: 0.0 },
+];
+
+const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
+
+fn triangle(kind: Kind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
+    let middle = [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(1.0, 8.0)];
+    let radius = match kind {
+        Kind::Tiny => 1e-6,
+        Kind::Huge => 1e6,
+        _ => r.within(0.2, 4.0),
+    };
+    let still = r.bits().is_multiple_of(4);
+    let mut end = |drift: f64| {
+        let mut p = [0, 1, 2].map(|_| {
+            let mut p = middle.map(|c| c + drift * r.within(-1.0, 1.0) + radius * r.within(-1.0, 1.0));
+            if kind != Kind::Behind {
+                p[2] = p[2].abs().max(0.3);
+            } else if r.bits().is_multiple_of(3) {
+                p[2] = r.within(-4.0, 1.0);
+            }
+            if kind == Kind::Grid {
+                p = p.map(|c| (4.0 * c).round() / 4.0);
+                p[2] = [0.5, 1.0, 2.0, 4.0][r.bits() as usize % 4];
+                p[0] = p[0].round();
+            }
+            if let View::Perspective { .. } = view { [p[0] * p[2], p[1] * p[2], p[2]] } else { p }
+        });
+        match kind {
+            Kind::Point => p = [p[0]; 3],
+            Kind::Segment => p[2] = p[1],
+            Kind::Sliver => p[2] = [0, 1, 2].map(|i| 0.5 * (p[0][i] + p[1][i]) + 1e-9 * r.within(-1.0, 1.0)),
+            _ => {}
+        }
+        p
+    };
+    let drift = if kind == Kind::Tiny { 1e-5 } else { 1.0 };
+    let open = end(drift);
+    [open, if still { open } else { end(drift) }]
+}
+
+/// The shear of the lens.
+fn lens(view: &View) -> [[f64; 2]; 2] {
+    let (View::Perspective { s, a, .. } | View::Orthographic { s, a, .. }) = view;
+    [*s, *a]
+}
+
+/// What a point at this depth is multiplied with to be moved by a tile.
+fn weight(view: &View, depth: f64) -> f64 {
+    if let View::Orthographic { .. } = view { 1.0 } else { depth }
+}
+
+/// A point of the triangle at a time and place on the lens: where it is seen and how deep.
+struct Point {
+    u: f64,
+    v: f64,
+    t: f64,
+    x: f64,
+    y: f64,
+    w: f64,
+    z: f64,
+}
+
+fn point(ends: &[[[f64; 3]; 3]; 2], view: &View, within: &Region, r: &mut Numbers) -> Point {
+    let (u, v) = (r.odd(within.u[0], within.u[1]), r.odd(within.v[0], within.v[1]));
+    let t = r.odd(within.t[0], within.t[1]);
+    let first = r.odd(0.0, 1.0);
+    let second = r.odd(0.0, 1.0) * (1.0 - first);
+    point_at(ends, view, [u, v, t], [first, second, 1.0 - first - second])
+}
+
+fn point_at(ends: &[[[f64; 3]; 3]; 2], view: &View, [u, v, t]: [f64; 3], weights: [f64; 3]) -> Point {
+    let p: [f64; 3] = [0, 1, 2].map(|axis| {
+        (0..3).map(|k| weights[k] * (ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]))).sum()
+    });
+    let ([s, a], w) = (lens(view), weight(view, p[2]));
+    let shear = |axis: usize, place: f64| p[axis] + place * (a[axis] * p[2] - s[axis]);
+    Point { u, v, t, x: shear(0, u), y: shear(1, v), w, z: p[2] }
+}
+
+/// The point of the triangle seen in the middle part of a random tile, at a random time and place on the lens, if it is there
+/// and well inside.
+fn aimed(
+    ends: &[[[f64; 3]; 3]; 2],
+    view: &View,
+    within: &Region,
+    grid: &Grid,
+    r: &mut Numbers,
+) -> Option<Point> {
+    let (u, v) = (r.odd(within.u[0], within.u[1]), r.odd(within.v[0], within.v[1]));
+    let t = r.odd(within.t[0], within.t[1]);
+    let mut place = |axis: usize, count: u32| {
+        grid.origin[axis] + grid.tile[axis] * ((r.bits() % u64::from(count)) as f64 + r.within(0.01, 0.99))
+    };
+    let at = [place(0, grid.columns), place(1, grid.rows)];
+    let [s, a] = lens(view);
+    let seen = [0, 1, 2].map(|k| {
+        let p = [0, 1, 2].map(|axis| ends[0][k][axis] + t * (ends[1][k][axis] - ends[0][k][axis]));
+        let w = weight(view, p[2]);
+        [0, 1]
+            .map(|axis| p[axis] + [u, v][axis] * (a[axis] * p[2] - s[axis]) - at[axis] * w)
+            .into_iter()
+            .chain([w, p[2]])
+            .collect::<Vec<_>>()
+    });
+    let e = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| seen[i][0] * seen[j][1] - seen[j][0] * seen[i][1]);
+    let sum: f64 = e.iter().sum();
+    let weights = e.map(|e| e / sum);
+    let mean = |part: usize| (0..3).map(|k| weights[k] * seen[k][part]).sum::<f64>();
+    let (w, z) = (mean(2), mean(3));
+    let inside = weights.iter().all(|&weight| weight > 1e-3) && w > 1e-3;
+    inside.then_some(Point { u, v, t, x: at[0] * w, y: at[1] * w, w, z })
+}
+
+/// The tiles, at most four, that hold a seen point; borders count.
+fn tiles(grid: &Grid, point: &Point) -> impl Iterator<Item = [u32; 2]> + use<> {
+    let along = |at: f64, w: f64, axis: usize, count: u32| {
+        let (tile, origin) = (grid.tile[axis], grid.origin[axis]);
+        let place = ((at / w - origin) / tile).floor();
+        [-1.0, 0.0, 1.0].map(|step| {
+            let index = place + step;
+            let [lo, hi] = [origin + index * tile, origin + (index + 1.0) * tile];
+            let holds = lo * w <= at && at <= hi * w && (0.0..f64::from(count)).contains(&index);
+            holds.then_some(index as u32)
+        })
+    };
+    let columns = along(point.x, point.w, 0, grid.columns);
+    let rows = along(point.y, point.w, 1, grid.rows);
+    columns.into_iter().flatten().flat_map(move |x| rows.into_iter().flatten().map(move |y| [x, y]))
+}
+
+fn near(view: &View) -> f64 {
+    match view {
+        View::Orthographic { near, .. } => *near,
+        View::Perspective { near, .. } => near.max(1e-3),
+    }
+}
+
+fn holds(touch: &Touch, p: &Point, lens: bool, off: f64) -> bool {
+    let inside = |[lo, hi]: [f64; 2], c: f64| (lo..=hi).contains(&c);
+    let depth = inside([touch.z[0] - off, touch.z[1] + off], p.z);
+    inside(touch.t, p.t) && depth && (!lens || inside(touch.u, p.u) && inside(touch.v, p.v))
+}
+
+#[derive(Debug, Default)]
+struct Found {
+    points: u64,
+    missed: u64,
+    outside: u64,
+    reported: u64,
+    touched: u64,
+}
+
+#[allow(clippy::too_many_arguments, reason = "one for each choice")]
+fn check(
+    found: &mut Found,
+    rasterizer: &Rasterizer,
+    view: &View,
+    clip: &Region,
+    grid: &Grid,
+    ends: &[[[f64; 3]; 3]; 2],
+    points: u32,
+    r: &mut Numbers,
+) {
+    let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
+    let mut reported = HashMap::new();
+    rasterizer.rasterize(&moving, grid, |tile, touch| assert!(reported.insert(tile, *touch).is_none()));
+    let mut touched = HashSet::new();
+    let size = ends.iter().flatten().map(|p| p[2].abs()).fold(0.0, f64::max);
+    for index in 0..points {
+        // A point that was aimed at knows its depth up to rounding only; one of given weights is what it is.
+        let (p, off) = if index % 4 == 3 {
+            (aimed(ends, view, clip, grid, r), 1e-11 * size)
+        } else {
+            (Some(point(ends, view, clip, r)), 0.0)
+        };
+        let Some(p) = p.filter(|p| p.z >= near(view)) else { continue };
+        for tile in tiles(grid, &p) {
+            found.points += 1;
+            touched.insert(tile);
+            match reported.get(&tile) {
+                None => found.missed += 1,
+                Some(touch) => found.outside += u64::from(!holds(touch, &p, view.has_lens(), off)),
+            }
+        }
+    }
+    found.reported += reported.len() as u64;
+    found.touched += touched.len() as u64;
+}
+
+#[test]
+fn no_tile_is_missed_and_nothing_lies_outside() {
+    for view in VIEWS {
+        for kind in KINDS {
+            let (mut found, mut r) = (Found::default(), Numbers(7));
+            for round in 0..150_u32 {
+                let clip = if round % 3 == 0 {
+                    Region { u: [-0.5, 0.25], v: [0.0, 0.0], t: [0.25, 0.75] }
+                } else {
+                    Region::WHOLE
+                };
+                let rasterizer = Rasterizer::new(view).clipped(clip).halving(round % 4);
+                let grid = match round % 5 {
+                    0 => Grid { tile: [0.25; 2], columns: 64, rows: 33, ..GRID },
+                    1 => Grid { tile: [5.0; 2], columns: 3, rows: 4, ..GRID },
+                    _ => GRID,
+                };
+                let ends = triangle(kind, &view, &mut r);
+                check(&mut found, &rasterizer, &view, &clip, &grid, &ends, 1500, &mut r);
+            }
+            println!("{kind:?} {view:?} {found:?}");
+            assert_eq!([found.missed, found.outside], [0, 0], "{kind:?} {view:?} {found:?}");
+            assert!(found.points > 1000, "{kind:?} {view:?} {found:?}");
+        }
+    }
+}
+
+/// Where rounding bites: far from the origin, a thin triangle that passes, at one time and from one place on the lens, through the
+/// corner of four tiles as near as `f64` can tell. The tiles that it is found in have to be among the reported ones.
+#[test]
+fn a_corner_cut_off_by_a_rounding_is_reported() {
+    let grid = Grid { origin: [1e6, -1e6], ..GRID };
+    for view in VIEWS {
+        let (mut r, mut checked, mut missed) = (Numbers(5), 0, 0);
+        for round in 0..3000_u32 {
+            let (u, v, t) = (r.odd(-1.0, 1.0), r.odd(-1.0, 1.0), r.odd(0.0, 1.0));
+            let corner = [0, 1].map(|axis| grid.origin[axis] + (1 + r.bits() % 15) as f64);
+            let way = [r.within(-1.0, 1.0), r.within(-1.0, 1.0)];
+            let speed = r.within(0.0, 1e3);
+            let mut ends = [[[0.0; 3]; 3]; 2];
+            for (k, along) in [-r.within(0.1, 2.0), r.within(0.1, 2.0), 0.0].into_iter().enumerate() {
+                let depth = r.within(1.0, 4.0);
+                let ([s, a], w) = (lens(&view), weight(&view, depth));
+                let at = [0, 1].map(|axis| {
+                    (corner[axis] + along * way[axis]) * w - [u, v][axis] * (a[axis] * depth - s[axis])
+                });
+                for axis in [0, 1] {
+                    let velocity = if round % 2 == 0 { 0.0 } else { speed * r.within(-1.0, 1.0) };
+                    ends[0][k][axis] = at[axis] - t * velocity;
+                    ends[1][k][axis] = at[axis] + (1.0 - t) * velocity;
+                }
+                (ends[0][k][2], ends[1][k][2]) = (depth, depth);
+            }
+            let p = point_at(&ends, &view, [u, v, t], [0.0, 0.0, 1.0]);
+            let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
+            let mut reported = HashSet::new();
+            Rasterizer::new(view).rasterize(&moving, &grid, |tile, _| assert!(reported.insert(tile)));
+            for tile in tiles(&grid, &p) {
+                checked += 1;
+                missed += u32::from(!reported.contains(&tile));
+            }
+        }
+        assert_eq!(missed, 0, "{missed} of {checked} {view:?}");
+        assert!(checked > 3000, "{checked} {view:?}");
+    }
+}
+
+/// Reported tiles over those that dense sampling shows to be touched; the fewer points find a touched tile, the larger.
+#[test]
+fn few_tiles_are_reported_in_vain() {
+    for (kind, most) in [(Kind::Ordinary, 1.05), (Kind::Sliver, 1.05), (Kind::Behind, 1.6)] {
+        for view in VIEWS {
+            let ratios = [0, 2, 4].map(|halvings| {
+                let (mut found, mut r) = (Found::default(), Numbers(11));
+                for _ in 0..16 {
+                    let ends = triangle(kind, &view, &mut r);
+                    let rasterizer = Rasterizer::new(view).halving(halvings);
+                    check(&mut found, &rasterizer, &view, &Region::WHOLE, &GRID, &ends, 100_000, &mut r);
+                }
+                assert_eq!([found.missed, found.outside], [0, 0]);
+                found.reported as f64 / found.touched as f64
+            });
+            println!("{kind:?} {view:?}: {ratios:.3?} reported for one touched, halved 0, 2, 4 times");
+            assert!(ratios[2] < most, "{kind:?} {view:?} {ratios:?}");
+        }
+    }
+}
+
+/// Walking tiles of one's own, from coarse to fine, finds no more than the grid does.
+#[test]
+fn tiles_can_be_walked_by_hand() {
+    let mut r = Numbers(3);
+    let rasterizer = Rasterizer::new(VIEWS[3]);
+    let ends = triangle(Kind::Ordinary, &VIEWS[3], &mut r);
+    let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
+    let prepared = rasterizer.prepare(&moving);
+    let mut reported = HashMap::new();
+    rasterizer.rasterize(&moving, &GRID, |tile, touch| {
+        reported.insert(tile, *touch);
+    });
+    let whole = Rect { x: [-8.0, 8.0], y: [-8.0, 8.0] };
+    let coarse = rasterizer.touch(&prepared, &whole, &Region::WHOLE).unwrap();
+    for ([column, row], touch) in &reported {
+        let rect = GRID.rect(&(*column..column + 1), &(*row..row + 1));
+        assert!(rasterizer.touch(&prepared, &rect, &coarse.region()).is_some());
+        assert!(coarse.t[0] <= touch.t[0] && touch.t[1] <= coarse.t[1], "{coarse:?} {touch:?}");
+    }
+}

@@ -1,0 +1,97 @@
+//! Heat maps: every event is counted once, and where it happens.
+
+use crate::common::stage::{RED, still};
+use crate::common::{Kind, Plain, Soup, camera, pixel_camera, rectangle, spec};
+use activity::{Counts, Event};
+use glam::Vec3;
+use pipeline::frame::{HeatMap, render_with_heat};
+use pipeline::*;
+
+fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera) -> (Vec<HeatMap>, Counts) {
+    let viewport = Viewport::new(size[0], size[1]).unwrap();
+    let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+    let settings = Settings { spec, viewport, samples: &table, background: Vec3::ZERO };
+    let (rendered, heat) = render_with_heat(camera, draws, &settings, &Event::ALL, |_, _| ()).unwrap();
+    let plain = render(camera, draws, &settings, |_| ()).unwrap();
+    assert_eq!((plain.image, plain.counts), (rendered.image, rendered.counts), "looking changes nothing");
+    (heat, rendered.counts)
+}
+
+#[test]
+fn every_event_is_somewhere_once() {
+    for (kind, tile_px, coarse_tile_px) in [(Kind::Moving, 8, 32), (Kind::Layers, 4, 16), (Kind::Still, 1, 8)]
+    {
+        let soup = Soup::new(kind, 250, 4);
+        let spec = PipelineSpec { tile_px, coarse_tile_px, ..spec(Features::ALL) };
+        let (heat, counts) = maps([75, 53], &spec, &[soup.draw(&Plain, Cull::None)], &camera(true));
+        for map in heat {
+            assert_eq!(map.total(), counts[map.event], "{:?} {kind:?}", map.event);
+            let pixels: f64 = map.pixels().iter().map(|&value| f64::from(value)).sum();
+            let placed = (map.total() - map.elsewhere) as f64;
+            assert!((pixels - placed).abs() <= 1e-4 * placed, "{:?}: {pixels} of {placed}", map.event);
+            assert!(HeatMap::is_of(map.event) || map.elsewhere == map.total(), "{:?}", map.event);
+        }
+    }
+}
+
+#[test]
+fn a_triangle_is_hot_where_it_is() {
+    // A rectangle over the pixels 16..24 by 8..16 of 64x32: one fine tile of 8 pixels.
+    let (viewport, corners) = (Viewport::new(64, 32).unwrap(), rectangle([-15.5, -8.5], [0.5, 7.5], 2.0));
+    let spec = spec(Features::ALL);
+    let (heat, counts) = maps([64, 32], &spec, &[still(&corners, &RED)], &pixel_camera(viewport, 0.25));
+    let map = |event| heat.iter().find(|map| map.event == event).unwrap();
+    for event in [Event::SamplesHit, Event::DepthWrites, Event::QuadsShaded, Event::TilesVisited] {
+        let hot: Vec<_> = map(event).tiles.iter().filter(|tile| tile.count > 0).collect();
+        assert_eq!(hot.len(), 1, "{event:?}");
+        assert_eq!((hot[0].origin, hot[0].count), ([16, 8], counts[event]), "{event:?}");
+    }
+    let coarse = map(Event::CoarseTilesVisited);
+    assert_eq!(coarse.coarse.iter().map(|tile| tile.count).collect::<Vec<_>>(), [2, 0]);
+    assert_eq!(map(Event::Indices).elsewhere, 6);
+}
+
+/// What happens to samples is known by pixel: a triangle over part of a tile is hit there and nowhere else.
+#[test]
+fn samples_are_hot_in_their_own_pixels() {
+    let (viewport, corners) = (Viewport::new(64, 32).unwrap(), rectangle([-15.5, -10.5], [0.5, 4.5], 2.0));
+    let (heat, counts) =
+        maps([64, 32], &spec(Features::ALL), &[still(&corners, &RED)], &pixel_camera(viewport, 0.25));
+    let map = |event| heat.iter().find(|map| map.event == event).unwrap();
+    let hit = map(Event::SamplesHit).pixels();
+    let covered: Vec<_> =
+        hit.iter().enumerate().filter(|(_, hits)| **hits > 0.0).map(|(at, _)| [at % 64, at / 64]).collect();
+    assert!(!covered.is_empty() && covered.len() <= 6 * 5, "{covered:?}");
+    let columns = covered.iter().map(|at| at[0]);
+    assert!(columns.clone().max().unwrap() - columns.min().unwrap() <= 5);
+    for event in [Event::SamplesTested, Event::SampleMadds, Event::SamplesHit, Event::DepthWrites] {
+        let sum: f64 = map(event).pixels().iter().map(|&count| f64::from(count)).sum();
+        assert_eq!(sum, counts[event] as f64, "{event:?}");
+    }
+    let tested = map(Event::SamplesTested).pixels();
+    assert!(hit.iter().zip(&tested).all(|(hit, tested)| hit <= tested));
+}
+
+#[test]
+fn tests_that_lead_to_no_packet_are_where_they_were_done() {
+    // A sliver along the diagonal: its box visits every tile, its edges cull those beside the diagonal.
+    let viewport = Viewport::new(32, 32).unwrap();
+    let corners = [[-15.0, -15.0], [15.0, 15.0], [15.0, 14.0]].map(|[x, y]| Vec3::new(x, y, 1.0));
+    let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
+    let draws = [Draw { geometry, shader: &RED, cull: Cull::None }];
+    let (heat, _) = maps([32, 32], &spec(Features::ALL), &draws, &pixel_camera(viewport, 0.25));
+    let counts = |event| -> Vec<u64> {
+        heat.iter().find(|map| map.event == event).unwrap().tiles.iter().map(|tile| tile.count).collect()
+    };
+    assert_eq!(counts(Event::TilesVisited), [1; 16]);
+    let culled = counts(Event::TilesCulledEdges);
+    for (index, count) in culled.iter().enumerate() {
+        let (column, row) = (index % 4, index / 4);
+        // The diagonal meets those of column + row = 3, and the neighbours of these at a corner.
+        match (column + row).abs_diff(3) {
+            0 => assert_eq!(*count, 0, "tile {column}, {row}"),
+            1 => (),
+            _ => assert_eq!(*count, 1, "tile {column}, {row}"),
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Tests of the whole crate, a subject in each file.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod accounting;
+mod analytic;
+mod by_hand;
+mod clipping;
+mod closed;
+mod common;
+mod conservative;
+mod conservative_by_hand;
+mod costs;
+mod culling;
+mod depth;
+mod depth_width;
+mod determinism;
+mod dimensions;
+mod dropped;
+mod engine_rounding;
+mod golden;
+mod heat;
+mod hidden;
+mod oracle;
+mod orthographic;
+mod per_sample;
+mod rounding;
+mod settings;
+mod slack;
+mod ties;
+mod views;
+mod visibility;
+mod watertight;
+mod widths;

@@ -1,0 +1,149 @@
+//! Shading every sample where it is, as the alternative to the shading cache.
+
+use crate::common::{Flat, Kind, Plain, QUAD, Soup, camera, pixel_camera, rectangle, spec};
+use activity::{Counts, Event};
+use glam::{Vec2, Vec3, Vec4};
+use pipeline::*;
+
+const SIDE: u32 = 16;
+
+/// Colours a point by where it is, with a texture of its own behind it.
+struct ByPlace<F: Fn(&ShadingPoint, Vec4) -> f32 + Sync>(F, Option<Texture>);
+
+impl<F: Fn(&ShadingPoint, Vec4) -> f32 + Sync> Shader for ByPlace<F> {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost { pixel_ops: 10, vertex_ops: 20 }
+    }
+
+    fn texture(&self) -> Option<&Texture> {
+        self.1.as_ref()
+    }
+
+    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
+        Vec3::splat((self.0)(at, texel))
+    }
+}
+
+fn render_with(shading: Shading, per_pixel: u32, draws: &[Draw<'_>]) -> Rendered {
+    let viewport = Viewport::new(SIDE, SIDE).unwrap();
+    let table = SampleTable::low_discrepancy(per_pixel, 3, LensShape::Disk).unwrap();
+    let spec = PipelineSpec { shading, ..spec(Features::ALL) };
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    render(&pixel_camera(viewport, 0.25), draws, &settings, |_| ()).unwrap()
+}
+
+fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a dyn Shader) -> Draw<'a> {
+    Draw { geometry: Geometry::new(open, close, &QUAD).unwrap(), shader, cull: Cull::None }
+}
+
+/// More than the image.
+fn all(z: f32) -> [Vec3; 4] {
+    rectangle([-40.0, 40.0], [-40.0, 40.0], z)
+}
+
+fn lanes(counts: &Counts) -> u64 {
+    counts[Event::PixelInvocations] - counts[Event::HelperInvocations]
+}
+
+#[test]
+fn where_the_colour_does_not_vary_so_does_the_image_not() {
+    let viewport = Viewport::new(40, 40).unwrap();
+    let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
+    for kind in [Kind::Still, Kind::Moving, Kind::Crossing] {
+        let soup = Soup::new(kind, 60, 5);
+        let images = [Shading::Cached, Shading::PerSample].map(|shading| {
+            let spec = PipelineSpec { shading, ..spec(Features::ALL) };
+            let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+            let shader = Flat(Vec3::new(0.25, 0.5, 1.0));
+            render(&camera(true), &[soup.draw(&shader, Cull::None)], &settings, |_| ()).unwrap().image
+        });
+        assert_eq!(images[0], images[1], "{kind:?}");
+    }
+}
+
+#[test]
+fn smooth_shading_converges_to_the_same_image() {
+    let corners = all(2.0);
+    let shader = ByPlace(|at, _| 0.5 + 0.02 * at.position.x + 0.01 * at.position.y, None);
+    let worst = |per_pixel| {
+        let image = |shading| render_with(shading, per_pixel, &[quad(&corners, &corners, &shader)]).image;
+        let [cached, own] = [image(Shading::Cached), image(Shading::PerSample)];
+        cached.iter().zip(&own).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max)
+    };
+    // A pixel spans 0.04 of the colour at depth 2; its mean is the colour of its middle.
+    let [few, some, many] = [4, 32, 256].map(worst);
+    assert!(few < 0.02 && some < 0.5 * few && many < 0.2 * some, "{few} {some} {many}");
+}
+
+#[test]
+fn a_sample_is_shaded_at_its_own_time() {
+    // The plane slides by 8 pixels while what colours it stays in the world: a step that its motion must not blur.
+    let (open, close) = (all(1.0), all(1.0).map(|p| p + Vec3::new(8.0, 0.0, 0.0)));
+    let shader = ByPlace(|at, _| f32::from(at.position.x > 0.0), None);
+    let row =
+        |shading| render_with(shading, 64, &[quad(&open, &close, &shader)]).image[..SIDE as usize].to_vec();
+    for (x, colour) in row(Shading::PerSample).iter().enumerate() {
+        assert_eq!(colour.x, if x < 8 { 0.0 } else { 1.0 }, "column {x}");
+    }
+    // At mid-shutter the points seen in a pixel lie up to 4 pixels to either side.
+    assert!((0.2..0.8).contains(&row(Shading::Cached)[8].x));
+}
+
+#[test]
+fn every_visible_sample_is_a_lane_and_nothing_is_looked_up() {
+    for kind in [Kind::Still, Kind::Moving, Kind::Layers] {
+        let soup = Soup::new(kind, 60, 8);
+        let counts = render_with(Shading::PerSample, 8, &[soup.draw(&Plain, Cull::None)]).counts;
+        assert!(counts[Event::DepthWrites] > 0);
+        assert_eq!(lanes(&counts), counts[Event::DepthWrites], "{kind:?}");
+        assert_eq!(counts[Event::PixelInvocations], 4 * counts[Event::QuadsShaded]);
+        assert_eq!(counts[Event::ShadingLookups] + counts[Event::ShadingHits], 0);
+    }
+}
+
+#[test]
+fn a_whole_quad_needs_no_helper_and_a_column_needs_half() {
+    let helpers = |x: [f32; 2]| {
+        // One triangle, so that no diagonal divides a quad: its corner is far outside.
+        let corners =
+            [Vec3::new(x[0], -400.0, 1.0), Vec3::new(x[1], -400.0, 1.0), Vec3::new(x[0], 400.0, 1.0)];
+        let shader = Flat(Vec3::ONE);
+        let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
+        let counts =
+            render_with(Shading::PerSample, 4, &[Draw { geometry, shader: &shader, cull: Cull::None }]);
+        (counts.counts[Event::HelperInvocations], counts.counts[Event::QuadsShaded])
+    };
+    let quads = u64::from(SIDE * SIDE / 4 * 4);
+    assert_eq!(helpers([-8.0, 800.0]), (0, quads));
+    // From the last column to the right edge: the left half of each quad there is not asked for.
+    assert_eq!(helpers([7.0, 800.0]), (2 * 4 * u64::from(SIDE / 2), 4 * u64::from(SIDE / 2)));
+}
+
+#[test]
+fn textures_are_fetched_by_every_lane() {
+    let texels = (0..64 * 64).map(|i| [(i % 64 * 4) as u8, (i / 64 * 4) as u8, 0, 255]).collect();
+    let texture = Texture::from_srgb8(64, 64, texels, [Wrap::Clamp; 2]).unwrap();
+    let shader = ByPlace(|_, texel| texel.x, Some(texture));
+    let corners = rectangle([-8.0, 8.0], [-8.0, 8.0], 1.0);
+    // A texel is two pixels wide: one bilinear fetch a lane.
+    let uvs = [[0.0, 0.0], [0.125, 0.0], [0.125, 0.125], [0.0, 0.125]].map(Vec2::from_array);
+    let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap().with_uvs(&uvs).unwrap();
+    let draws = [Draw { geometry, shader: &shader, cull: Cull::None }];
+    let [own, cached] = [Shading::PerSample, Shading::Cached].map(|shading| render_with(shading, 16, &draws));
+    assert_eq!(own.counts[Event::TextureFetches], own.counts[Event::PixelInvocations]);
+    assert!(own.counts[Event::TextureLines] >= own.counts[Event::QuadsShaded]);
+    assert!(own.counts[Event::TextureFetches] > 8 * cached.counts[Event::TextureFetches]);
+    let worst = own.image.iter().zip(&cached.image).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max);
+    assert!(worst < 0.01, "{worst}");
+}
+
+#[test]
+fn threads_change_nothing() {
+    let soup = Soup::new(Kind::Moving, 80, 11);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| render_with(Shading::PerSample, 8, &[soup.draw(&Plain, Cull::None)]))
+    };
+    let (one, three) = (with(1), with(3));
+    assert_eq!((one.image, one.counts), (three.image, three.counts));
+}

@@ -1,0 +1,90 @@
+//! Oracle: what set-up allows for the rounding of a vertex as a sample sees it, against the exact place, where one term alone is large.
+
+use crate::common::*;
+use pipeline::sample_test::exact::seen_in_tile;
+use pipeline::sampling::Sample;
+use pipeline::setup::Outcome;
+use pipeline::*;
+
+/// What is large: the place of the vertex, the place on the image, the lens at depth zero, the lens for each unit of depth.
+#[derive(Clone, Copy, Debug)]
+enum Large {
+    Vertex,
+    Image,
+    Base,
+    Slope,
+    All,
+}
+
+struct Setting {
+    probe: Probe,
+    triangle: [MovingVertex; 3],
+}
+
+fn setting(r: &mut Uniform, large: Large, moving: bool, parallel: bool, seed: u64) -> Setting {
+    let image = matches!(large, Large::Image | Large::All);
+    let side = if image { Viewport::MAX_PX } else { 8 };
+    let size = |asked: bool| if asked { 4096.0 } else { 1e-3 };
+    let [vertex, base, slope] = [
+        matches!(large, Large::Vertex | Large::All),
+        matches!(large, Large::Base | Large::All),
+        matches!(large, Large::Slope | Large::All),
+    ]
+    .map(size);
+    let mut end = || [r.within(-vertex, vertex), r.within(-vertex, vertex), r.within(0.5, 1.0)];
+    let triangle = [(); 3].map(|()| {
+        let open = end();
+        MovingVertex { open, close: if moving { end() } else { open } }
+    });
+    let [s, a] = [base, slope].map(|c| [(); 2].map(|()| r.within(-c, c)));
+    let shear = Shear { parallel, ..Shear::new(s, a) };
+    let samples: Vec<_> = (0..64)
+        .map(|_| Sample {
+            x: r.next(),
+            y: r.next(),
+            u: r.within(-1.0, 1.0),
+            v: r.within(-1.0, 1.0),
+            t: r.next(),
+        })
+        .collect();
+    let origin = [0, if seed.is_multiple_of(2) { side - 8 } else { 0 }];
+    let probe = Probe::new(&repeated(1, &samples), Viewport::new(side, side).unwrap(), shear, origin, 0.25);
+    Setting { probe, triangle }
+}
+
+/// The largest error of a vertex in shares of half the slack, which is what it is a bound on.
+fn worst(large: Large, moving: bool, parallel: bool) -> f64 {
+    let mut worst = 0.0_f64;
+    for seed in 0..400 {
+        let Setting { probe, triangle } = setting(&mut Uniform::new(seed), large, moving, parallel, seed);
+        let Outcome::Ready(ready) = probe.set_up(triangle, Cull::None) else { continue };
+        for slot in 0..probe.samples.len {
+            let look = probe.at(slot);
+            let seen = seen_in_tile(&ready.corners, &probe.samples, slot);
+            for (corner, seen) in ready.corners.iter().zip(seen) {
+                let at = |axis: usize| f64::from(corner.open[axis]) + look.t * f64::from(corner.delta[axis]);
+                let weight = weight(&probe.shear, at(2));
+                for (axis, place, lens) in [(0, look.x, look.u), (1, look.y, look.v)] {
+                    let [s, a] = [probe.shear.s, probe.shear.a].map(|c| f64::from(c[axis]));
+                    let exact = at(axis) + lens * (a * at(2) - s) - place * weight;
+                    let error = (f64::from(seen[axis]) - exact).abs();
+                    worst = worst.max(error / (0.5 * f64::from(ready.slack[axis])));
+                }
+            }
+        }
+    }
+    worst
+}
+
+/// No vertex is farther off than half the slack, and wherever it is dominated by one term there are some that need a good part of it.
+#[test]
+fn half_the_slack_is_enough_and_each_of_its_terms_is_needed() {
+    for large in [Large::Vertex, Large::Image, Large::Base, Large::Slope, Large::All] {
+        for [moving, parallel] in [[false, false], [false, true], [true, false], [true, true]] {
+            let worst = worst(large, moving, parallel);
+            println!("{large:?}, moving {moving}, parallel {parallel}: {worst}");
+            assert!(worst <= 1.0, "{large:?}, moving {moving}, parallel {parallel}: {worst}");
+            assert!(worst > 1.0 / 16.0, "{large:?}, moving {moving}, parallel {parallel}: {worst}");
+        }
+    }
+}

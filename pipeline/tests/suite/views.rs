@@ -1,0 +1,111 @@
+//! Several images out of one pass, and passes without any.
+
+use std::ops::Range;
+
+use crate::common::{Kind, Plain, Soup, camera, spec};
+use activity::{Counts, Event, Unit};
+use glam::Vec3;
+use pipeline::frame::{render_depth, render_views, visibility};
+use pipeline::sampling::{Sample, SampleSource};
+use pipeline::*;
+
+const PER_PIXEL: u32 = 8;
+
+/// A run of the samples of another source.
+#[derive(Debug)]
+struct Run<'a>(&'a SampleTable, Range<u32>);
+
+impl SampleSource for Run<'_> {
+    fn per_pixel(&self) -> u32 {
+        self.1.len() as u32
+    }
+
+    fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]) {
+        into.copy_from_slice(&self.0.pixel(px, py)[self.1.start as usize..self.1.end as usize]);
+    }
+}
+
+fn with<R>(kind: Kind, run: impl FnOnce(&Camera, &[Draw<'_>], &SampleTable, Viewport) -> R) -> R {
+    let soup = Soup::new(kind, 80, 11);
+    let table = SampleTable::low_discrepancy(PER_PIXEL, 3, LensShape::Disk).unwrap();
+    let geometry = Geometry::new(&soup.open, &soup.close, &soup.triangles).unwrap();
+    let draws = [Draw { geometry, shader: &Plain, cull: Cull::None }];
+    run(&camera(true), &draws, &table, Viewport::new(43, 37).unwrap())
+}
+
+fn settings<'a>(spec: &'a PipelineSpec, viewport: Viewport, samples: &'a dyn SampleSource) -> Settings<'a> {
+    Settings { spec, viewport, samples, background: Vec3::new(0.1, 0.2, 0.3) }
+}
+
+fn bits(image: &[Vec3]) -> Vec<[u32; 3]> {
+    image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
+}
+
+#[test]
+fn each_view_is_the_image_of_its_samples_alone() {
+    for kind in [Kind::Still, Kind::Moving, Kind::Crossing, Kind::Layers] {
+        with(kind, |camera, draws, table, viewport| {
+            let spec = spec(Features::ALL);
+            let views = [0..8, 0..4, 4..8, 2..5, 6..7];
+            let (images, counts) =
+                render_views(camera, draws, &settings(&spec, viewport, table), &views, |_, _| ()).unwrap();
+            for (view, image) in views.iter().zip(&images) {
+                let run = Run(table, view.clone());
+                let alone = render(camera, draws, &settings(&spec, viewport, &run), |_| ()).unwrap();
+                assert_eq!(bits(image), bits(&alone.image), "{kind:?} {view:?}");
+            }
+            assert_eq!(counts[Event::PixelsResolved], (viewport.pixels() * views.len()) as u64);
+        });
+    }
+}
+
+#[test]
+fn a_single_view_is_what_render_gives_packet_by_packet() {
+    with(Kind::Moving, |camera, draws, table, viewport| {
+        let spec = spec(Features::ALL);
+        let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+        let settings = settings(&spec, viewport, table);
+        let all: Vec<_> = std::iter::once(0..PER_PIXEL).collect();
+        let (images, _) = render_views(camera, draws, &settings, &all, |p, _| ours.push(*p)).unwrap();
+        let image = render(camera, draws, &settings, |p| theirs.push(*p)).unwrap().image;
+        assert_eq!(bits(&images[0]), bits(&image));
+        assert_eq!(ours, theirs);
+    });
+}
+
+#[test]
+fn runs_beyond_the_samples_are_cut_and_empty_ones_black() {
+    with(Kind::Still, |camera, draws, table, viewport| {
+        let spec = spec(Features::ALL);
+        let settings = settings(&spec, viewport, table);
+        let (images, _) = render_views(camera, draws, &settings, &[4..99, 4..8, 9..12], |_, _| ()).unwrap();
+        assert_eq!(bits(&images[0]), bits(&images[1]));
+        let touched = images[2].iter().filter(|pixel| **pixel == Vec3::ZERO).count();
+        assert!(touched > 0, "pixels that were drawn into have no samples in that view");
+    });
+}
+
+#[test]
+fn a_pass_without_an_image_sees_the_same_shades_nothing_and_keeps_its_depths() {
+    for kind in [Kind::Moving, Kind::Layers] {
+        with(kind, |camera, draws, table, viewport| {
+            let spec = spec(Features::ALL);
+            let settings = settings(&spec, viewport, table);
+            let mut sum = Counts::default();
+            let (seen, counts) =
+                render_depth(camera, draws, &settings, |packet, _| sum += &packet.counts).unwrap();
+            assert_eq!(sum, counts);
+            assert_eq!(seen, visibility(camera, draws, &settings).unwrap());
+            let drawn = render(camera, draws, &settings, |_| ()).unwrap().counts;
+            for unit in [Unit::ShadingCache, Unit::Texture, Unit::Colour] {
+                assert!(!counts.uses(unit), "{unit:?}");
+            }
+            for event in [Event::SamplesTested, Event::SamplesHit, Event::DepthWrites, Event::DepthLines] {
+                assert_eq!(counts[event], drawn[event], "{event:?}");
+            }
+            // Every line that a sample was written into goes to memory once at least.
+            let bytes = seen.iter().filter(|(triangle, _)| *triangle != u32::MAX).count() as u64 * 4;
+            assert!(counts[Event::DramWriteBytes] >= bytes, "{} {bytes}", counts[Event::DramWriteBytes]);
+        });
+    }
+}

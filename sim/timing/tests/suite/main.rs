@@ -1,0 +1,11 @@
+//! The ladder, level by level.
+
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod closed_forms;
+mod common;
+mod conservation;
+mod ladder;
+mod rates;
+mod sampled;
+mod waiting;

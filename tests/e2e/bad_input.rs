@@ -1,0 +1,284 @@
+//! Bad input: one clear message that names file, place and mend; exit code 2 for what was asked wrongly, 1 for what
+//! failed; no panic.
+
+use std::fs;
+
+use crate::support::{Glb, Inputs, Refusals, mts, quintile, real_scenes};
+use serde_json::json;
+
+#[test]
+fn flags() {
+    let mut refusals = Refusals::default();
+    let cases: [(&[&str], &[&str]); 31] = [
+        (&["--size", "0x48"], &["size", "0x48", "1 to 16384 pixels"]),
+        (&["--size", "64x0"], &["size", "64x0"]),
+        (&["--size", "99999x99999"], &["size", "99999x99999"]),
+        (&["--size", "1280"], &["--size", "1280x720"]),
+        (&["--size", "4294967297x1"], &["--size"]),
+        (&["--frames", "3..3"], &["frames", "3..3", "empty"]),
+        (&["--frames", "5..2"], &["frames", "5..2", "empty"]),
+        (&["--frames", "0-4"], &["--frames", "0..36"]),
+        (&["--frames", "0..4294967295"], &["frames", "10000000"]),
+        (&["--frames", "0..99999999999"], &["--frames"]),
+        (&["--samples", "0"], &["samples", "1 to 256"]),
+        (&["--samples", "257"], &["samples", "1 to 256"]),
+        (&["--samples", "many"], &["--samples", "many"]),
+        (&["--lens", "-1"], &["lens", "-1"]),
+        (&["--lens", "NaN"], &["lens", "NaN"]),
+        (&["--focus", "0"], &["focus", "above zero"]),
+        (&["--focus", "inf"], &["focus", "finite"]),
+        (&["--lens", "0", "--focus", "3"], &["focus", "no lens"]),
+        (&["--shutter", "1.5"], &["shutter", "0 to 1"]),
+        (&["--shutter", "-0.5"], &["shutter", "0 to 1"]),
+        (&["--threads", "0"], &["--threads", "1..=1024"]),
+        (&["--threads", "99999"], &["--threads", "1..=1024"]),
+        (&["--clip", "Run"], &["clip", "Run"]),
+        (&["--trace-rate", "-5"], &["--trace-rate", "`-5` is not a rate above 0"]),
+        (&["--trace-rate", "1mhz"], &["--trace-rate", "50kHz or 1MHz"]),
+        (&["--rate", "0"], &["--rate", "`0` is not a rate above 0"]),
+        (&["--lens=-1"], &["--lens", "finite number of at least 0"]),
+        (&["--lens", "2mm"], &["--lens", "in scene units"]),
+        (&["--trace-rate", "0.001"], &["trace rate"]),
+        (&["--nonsense"], &["--nonsense"]),
+        (&["--bound", "highest"], &["--bound", "low, nominal, high"]),
+    ];
+    for (flags, says) in cases {
+        refusals.call(&[&["tiny"], flags].concat(), 2, says);
+    }
+}
+
+#[test]
+fn flags_that_a_workload_has_no_use_for() {
+    let mut refusals = Refusals::default();
+    let cases: [(&[&str], &[&str]); 7] = [
+        (&["occlusion", "--lens", "0.3"], &["--lens", "`occlusion`", "--set lens="]),
+        (&["occlusion", "--timing", "sampled"], &["--timing sampled", "`occlusion`", "leave it out"]),
+        (&["ccd", "--samples", "8"], &["--samples", "`ccd`", "leave it out"]),
+        (&["ccd", "--size", "64x64"], &["--size", "--set resolution="]),
+        (&["ccd", "--heat", "samples_tested"], &["--heat", "leave it out"]),
+        (&["caustics", "--focus", "3"], &["--focus", "`caustics`"]),
+        (&["multiview", "--lens", "0.5"], &["--lens", "--set aperture="]),
+    ];
+    for (args, says) in cases {
+        refusals.call(args, 2, says);
+    }
+}
+
+#[test]
+fn files_that_hold_nothing_that_could_collide() {
+    let mut refusals = Refusals::default();
+    let inputs = Inputs::new();
+    let empty = inputs.put("empty.mts", mts(&[]));
+    refusals.call(&["ccd", "--set", &format!("file={empty}")], 2, &[&empty, "holds no objects"]);
+    for name in ["a.ply", "a.obj", "a.txt"] {
+        let file = inputs.put(name, "nothing");
+        refusals.call(&["ccd", "--set", &format!("file={file}")], 2, &[&file, "is no .mts file"]);
+    }
+}
+
+#[test]
+fn a_frame_rate_that_cannot_be() {
+    let mut refusals = Refusals::default();
+    for rate in ["-60", "0", "NaN", "1e9", "1e-9"] {
+        refusals.call(&["tiny", "--rate", rate], 2, &["rate"]);
+    }
+}
+
+#[test]
+fn names_of_nothing() {
+    let mut refusals = Refusals::default();
+    refusals.call(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
+    refusals.call(&["samplng"], 2, &["samplng", "did you mean `sampling`?", "workloads: caustics, ccd, "]);
+    refusals.call(&["wibble-wobble"], 2, &["built in: default, tiny; workloads: caustics, ccd, "]);
+    refusals.call(&["scene.blend"], 2, &["scene.blend", "convert it to glTF"]);
+    refusals.call(&[""], 2, &["SCENE|WORKLOAD|FILE"]);
+    refusals.call(&["."], 2, &[".: it is a folder; give a .ron, .gltf"]);
+    refusals.call(&["tiny", "--gpu", "referense"], 2, &["referense", "did you mean `reference`?"]);
+    refusals.call(&["tiny", "--platform", "referense"], 2, &["referense", "did you mean `reference`?"]);
+    refusals.call(&["tiny", "--energy", "28mm"], 2, &["28mm", "did you mean `28nm`?"]);
+    refusals.call(&["tiny", "--gpu", "nothing.like.it"], 2, &["nothing.like.it", "reference"]);
+}
+
+#[test]
+fn files_that_are_not_there() {
+    let mut refusals = Refusals::default();
+    for scene in ["gone.glb", "gone.gltf", "gone.ron", "gone.ply", "gone.ply.gz", "gone.obj"] {
+        refusals.call(&[scene], 1, &[scene, "No such file"]);
+    }
+    for flag in ["--gpu", "--platform", "--energy"] {
+        refusals.call(&["tiny", flag, "gone.ron"], 1, &["gone.ron", "No such file"]);
+    }
+    let inputs = Inputs::new();
+    let folder = inputs.path("folder.glb");
+    fs::create_dir(&folder).expect("a folder can be made");
+    refusals.call(&[&folder], 1, &[&folder, "directory"]);
+    let scene = inputs.put("s.ron", "(objects: [(file: \"gone.obj\")])");
+    refusals.call(&[&scene], 1, &["gone.obj", "No such file"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_no_text() {
+    let mut refusals = Refusals::default();
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let name = OsStr::from_bytes(b"sc\xffene.glb");
+    let ended = quintile().call([OsStr::new("run"), name]);
+    refusals.check(&ended, 1, &["ene.glb: cannot read it"]);
+}
+
+#[test]
+fn a_glb_cut_anywhere() {
+    let mut refusals = Refusals::default();
+    let whole = Glb::square().bytes();
+    for length in [4, 11, 12, 19, 40, whole.len() / 2, whole.len() - 60, whole.len() - 1] {
+        refusals.file("cut.glb", &whole[..length], 1, &["truncated", "get the file again"]);
+    }
+    refusals.file("empty.glb", b"", 1, &["empty.glb"]);
+    if let Some(fox) = real_scenes("Fox.glb") {
+        let bytes = fs::read(fox).expect("the fox is there");
+        refusals.file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated", "get the file again"]);
+    }
+}
+
+#[test]
+fn indices_out_of_range() {
+    let mut refusals = Refusals::default();
+    let mut glb = Glb::square();
+    let indices = glb.binary.len() - 2;
+    glb.binary[indices] = 77;
+    refusals.file("index.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "77"]);
+    let mut glb = Glb::square();
+    glb.primitive()["indices"] = json!(9);
+    refusals.file("accessor.glb", glb.bytes(), 1, &["meshes[0].primitives[0].indices", "out of range"]);
+    let mut glb = Glb::square();
+    glb.json["accessors"][0]["count"] = json!(4_000_000_000u32);
+    refusals.file("count.glb", glb.bytes(), 1, &["accessor 0", "4000000000"]);
+    let mut glb = Glb::square();
+    glb.json["bufferViews"][0]["byteLength"] = json!(u64::from(u32::MAX));
+    refusals.file("view.glb", glb.bytes(), 1, &["buffer view 0"]);
+    refusals.file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", 1, &[]);
+    refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), 1, &["triangle 0", "vertex 9"]);
+}
+
+/// An ASCII PLY of so many vertices and one face.
+fn ply(vertices: &str, body: &str) -> String {
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 1\nproperty list uchar int vertex_indices\nend_header\n{body}"
+    )
+}
+
+#[test]
+fn vertices_that_are_no_numbers() {
+    let mut refusals = Refusals::default();
+    for (bad, word) in [(f32::NAN, "NaN"), (f32::INFINITY, "infinite")] {
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, bad, 0.0], [0.0, 1.0, 0.0]];
+        let glb = Glb::with_positions(&corners);
+        refusals.file("nan.glb", glb.bytes(), 1, &["meshes[0].primitives[0]", "vertex 2", word]);
+    }
+    refusals.file("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", 1, &["NaN"]);
+    refusals.file("nan.ply", ply("3", "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"), 1, &["element vertex"]);
+    for bad in ["nan", "-inf"] {
+        let body = format!("0 0 0\n1 {bad} 0\n0 1 0\n3 0 1 2\n");
+        refusals.file("nan.ply", ply("3", &body), 1, &["line 11: the coordinate `y`", bad, "not finite"]);
+    }
+}
+
+#[test]
+fn geometry_files_that_are_something_else() {
+    let mut refusals = Refusals::default();
+    for name in ["a.glb", "a.gltf", "a.ply", "a.obj", "a.ply.gz", "a.obj.gz"] {
+        refusals.file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 1, &[]);
+        refusals.file(name, b"", 1, &[]);
+    }
+    refusals.file("a.ply", ply("4000000000", ""), 1, &["header", "4000000000"]);
+    refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n"), 1, &["truncated"]);
+    let mut glb = Glb::square();
+    glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+    refusals.file("draco.glb", glb.bytes(), 1, &["KHR_draco_mesh_compression", "export it without"]);
+}
+
+#[test]
+fn scenes_with_nothing_in_them() {
+    let mut refusals = Refusals::default();
+    refusals.file("a.ron", "(objects: [])", 2, &["objects", "add a `file` or a `shape`"]);
+    refusals.file("a.obj", "v 0 0 0\n", 1, &[]);
+    let mut glb = Glb::square();
+    glb.json["nodes"] = json!([{}]);
+    refusals.file("a.glb", glb.bytes(), 1, &["no triangles"]);
+}
+
+#[test]
+fn scene_files_with_mistakes() {
+    let mut refusals = Refusals::default();
+    let sphere = "objects: [(shape: Sphere(radius: 1))]";
+    let cases = [
+        (format!("(\n  settings: (widht: 640),\n  {sphere})"), ":2:", "did you mean `width`?"),
+        (format!("(\n\n  settings: (width: 0), {sphere})"), ":3:", "1 to 16384"),
+        (format!("(settings: (frame_rate_hz: -60), {sphere})"), ":1:28:", "0.1 to 100000 frames per second"),
+        (format!("(settings: (shutter: -1), {sphere})"), ":1:", "0 to 1"),
+        (format!("(settings: (samples: 0), {sphere})"), ":1:", "1 to 256"),
+        (format!("(settings: (frames: (4, 4)), {sphere})"), ":1:", "range of frames"),
+        ("(objects: [(shape: Spere(radius: 1))])".to_owned(), ":1:", "did you mean `Sphere`?"),
+        ("(objects: [(shape: Sphere(radius: NaN))])".to_owned(), ":1:35:", "a length above 0"),
+        (format!("(camera: (position: (0, 0, 0), target: (0, 0, 0)), {sphere})"), "camera", "move one"),
+        ("(".to_owned(), ":1:", "end of RON"),
+        (String::new(), ":1:", "Expected opening `(`"),
+    ];
+    for (text, place, mend) in cases {
+        refusals.file("scene.ron", text, 2, &[place, mend]);
+    }
+    refusals.file("scene.ron", b"(\xff\xfe)", 1, &["UTF-8"]);
+}
+
+#[test]
+fn gpu_and_platform_files_with_mistakes() {
+    let mut refusals = Refusals::default();
+    let source =
+        |path: &str| fs::read_to_string(crate::support::root().join(path)).expect("a file of the repository");
+    let gpu = source("sim/gpus/reference.ron");
+    let platform = source("power-model/platforms/reference.ron");
+    let table = source("power-model/tables/28nm.ron");
+    let cases = [
+        ("--gpu", gpu.replace("tile_px: 8", "tile_sise: 8"), "did you mean `tile_px`?"),
+        ("--gpu", gpu.replace("core_hz: 400e6", "core_hz: -400e6"), "core_hz"),
+        ("--gpu", gpu.replace("core_hz: 400e6", "core_hz: NaN"), "core_hz"),
+        ("--gpu", gpu.replace("queue: 32", "queue: 0"), "1 to 65536"),
+        ("--platform", platform.replace("idle_w:", "idel_w:"), "did you mean `idle_w`?"),
+        ("--platform", platform.replace("constant_w: Assumed(0.80", "constant_w: Assumed(-0.80"), "-0.8"),
+        ("--energy", table.replace("low_pj: 100,", "low_pj: -100,"), "-100"),
+        ("--energy", table.replace("node_nm: 28", "node_mn: 28"), "did you mean `node_nm`?"),
+    ];
+    for (flag, text, says) in cases {
+        let inputs = Inputs::new();
+        let file = inputs.put("bad.ron", &text);
+        assert!(text != gpu && text != platform && text != table, "{flag}: nothing was broken");
+        refusals.call(&["tiny", flag, &file], 2, &[&file, says]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn paths_that_are_no_utf8_are_read() {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt;
+    use std::path::Path;
+    let inputs = Inputs::new();
+    let named = |name: &[u8]| Path::new(&inputs.path("")).join(OsString::from_vec(name.to_vec()));
+    let copies = [
+        (named(b"sc\xe9ne.ron"), "workloads/scenes/pendulum.ron"),
+        (named(b"g\xe9ant.ron"), "sim/gpus/mobile.ron"),
+    ];
+    for (path, source) in &copies {
+        fs::copy(crate::support::root().join(source), path).expect("a copy");
+    }
+    let out = named(b"\xe9t\xe9");
+    let options = ["--size", "32x18", "--samples", "1", "--frames", "0..1", "--gpu"].map(OsString::from);
+    let mut args = vec![OsString::from("run"), copies[0].0.clone().into()];
+    args.extend(options);
+    args.extend([copies[1].0.clone().into(), OsString::from("--out"), out.clone().into()]);
+    let ended = quintile().call(args);
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert!(out.join("summary.json").is_file());
+}

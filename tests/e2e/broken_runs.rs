@@ -1,0 +1,95 @@
+//! Failure modes: however a run dies, nothing it leaves looks like a whole result, and the results of the run before stay whole.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{Inputs, Refusals, quintile};
+
+/// The tests may run as root, whom no permission stops: a file stands where the folder should be.
+#[test]
+fn results_that_cannot_be_written() {
+    let mut refusals = Refusals::default();
+    let inputs = Inputs::new();
+    let file = inputs.put("taken", "not a folder");
+    for out in [file.clone(), inputs.path("taken/below")] {
+        let ended = quintile().call(["run", "tiny", "--out", &out]);
+        refusals.check(&ended, 1, &[&out, "--out"]);
+    }
+    assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
+}
+
+/// What no run can write over is found before any work, and the results of the run before stay as they are.
+#[test]
+fn what_stands_in_the_way_leaves_old_results_alone() {
+    let mut refusals = Refusals::default();
+    for (name, is_folder) in [
+        ("images", false),
+        ("plots", false),
+        ("trace.parquet", true),
+        ("frames.csv", true),
+        ("report.html", true),
+        ("manifest.json", true),
+    ] {
+        let inputs = Inputs::new();
+        let out = inputs.path("out");
+        let results = quintile().run_in(Path::new(&out), "tiny", &[]);
+        block(&results.path(name), is_folder);
+        let before = results.files();
+        assert!(before.contains_key(Path::new("summary.json")));
+        for force in [&[][..], &["--force"]] {
+            let ended = quintile().call(["run", "tiny", "--out", &out].iter().chain(force));
+            refusals.check(&ended, 2, &[&format!("out/{name}: "), "--out", "move it away"]);
+            assert!(before == results.files(), "{name}: something was changed");
+        }
+    }
+}
+
+/// Puts something into the place of `path` that no run can write over.
+fn block(path: &Path, with_folder: bool) {
+    if path.is_dir() {
+        fs::remove_dir_all(path).expect("results can be removed");
+    } else {
+        fs::remove_file(path).expect("results can be removed");
+    }
+    if with_folder {
+        fs::create_dir_all(path.join("taken")).expect("a folder can be made");
+    } else {
+        fs::write(path, "taken").expect("a file can be written");
+    }
+}
+
+/// A mistake that is noticed before anything is written leaves the results of the run before whole.
+#[test]
+fn a_mistake_in_the_call_leaves_old_results_alone() {
+    let mut refusals = Refusals::default();
+    let results = quintile().run("tiny", &[]);
+    let out = results.folder().display().to_string();
+    let before = results.files();
+    let ended = quintile().call(["run", "tiny", "--samples", "0", "--out", &out]);
+    refusals.check(&ended, 2, &["samples"]);
+    assert!(before == results.files());
+}
+
+/// Runs that no machine holds in memory are refused at once instead of ending in an abort. The limits are those of a
+/// small machine: 4 GB and 20 s.
+#[cfg(target_os = "linux")]
+#[test]
+fn runs_beyond_all_memory() {
+    let mut refusals = Refusals::default();
+    let inputs = Inputs::new();
+    let still =
+        inputs.put("still.ron", "(settings: (width: 16, height: 16), objects: [(shape: Sphere(radius: 1))])");
+    let cases: [(&[&str], &str); 3] = [
+        (&[&still, "--frames", "0..10000000"], "frames"),
+        (&[&still, "--size", "16384x16384", "--samples", "256"], "size"),
+        (&["tiny", "--rate", "0.2", "--trace-rate", "1e7"], "--trace-rate"),
+    ];
+    for (args, says) in cases {
+        let out = inputs.path("out");
+        let program = env!("CARGO_BIN_EXE_quintile");
+        let limited = ["-c", "ulimit -v 4000000; exec timeout 20 \"$0\" run \"$@\"", program];
+        let ended =
+            crate::support::Quintile::new("sh").call(limited.iter().chain(args).chain(&["--out", &out]));
+        refusals.check(&ended, 2, &[says]);
+    }
+}

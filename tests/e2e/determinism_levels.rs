@@ -1,0 +1,129 @@
+//! Same input, same bytes at every level of timing: for any number of threads, whatever else is written, whatever a joule costs.
+//! And counters that do not depend on the level at all.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use crate::support::{Results, quintile, without_host};
+use serde_json::Value;
+
+const LEVELS: [&str; 4] = ["stepped", "packet", "bound", "sampled"];
+/// Twelve frames, of which `sampled` simulates six.
+const SMALL: [&str; 6] = ["--size", "96x54", "--samples", "2", "--frames", "0..12"];
+
+fn run(level: &str, args: &[&str]) -> Results {
+    quintile().run("default", &[&SMALL[..], &["--timing", level], args].concat())
+}
+
+fn assert_same(one: &Results, other: &BTreeMap<PathBuf, Vec<u8>>, what: &str) {
+    let (one, other) = (without_host(one.files()), without_host(other.clone()));
+    assert!(one.len() > 10, "{what}: too few files to compare");
+    assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "{what}: other files");
+    for (name, bytes) in &one {
+        assert!(bytes == &other[name], "{what}: {} differs", name.display());
+    }
+}
+
+fn frames(results: &Results) -> Vec<Value> {
+    results.summary()["frames"].as_array().cloned().expect("frames")
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes_at_every_level() {
+    for level in LEVELS {
+        let one = run(level, &["--threads", "1"]);
+        for threads in ["2", "16"] {
+            assert_same(
+                &one,
+                &run(level, &["--threads", threads]).files(),
+                &format!("{level}, {threads} threads"),
+            );
+        }
+    }
+}
+
+/// A probe times nothing that its choice depends on, where no budget is given.
+#[test]
+fn a_choice_by_accuracy_does_not_depend_on_threads() {
+    let choose = |threads: &str| {
+        let args = ["--accuracy", "5%", "--verify", "--threads", threads];
+        quintile().run("default", &[&SMALL[..], &args].concat())
+    };
+    assert_same(&choose("1"), &choose("16").files(), "--accuracy with 16 threads");
+}
+
+/// More files change nothing in the others, but for what is asked for and the report and the manifest, which list them.
+#[test]
+fn any_subset_of_outputs_leaves_the_others_as_they_are() {
+    for level in LEVELS {
+        let files = |results: &Results| {
+            let mut files = without_host(results.files());
+            let mut summary = results.summary();
+            ["request", "host"].iter().for_each(|key| drop(summary[key].take()));
+            files.insert("summary.json".into(), summary.to_string().into_bytes());
+            files.retain(|name, _| !name.ends_with("report.html") && !name.ends_with("manifest.json"));
+            files
+        };
+        let plain = files(&run(level, &[]));
+        for extra in [&["--exr"][..], &["--heat", "samples_tested"], &["--json"]] {
+            let more = files(&run(level, extra));
+            assert!(more.len() >= plain.len());
+            for (name, bytes) in &plain {
+                assert!(bytes == &more[name], "{level} with {extra:?}: {} differs", name.display());
+            }
+        }
+    }
+}
+
+/// Watts are made from time, never the other way round: other joules leave cycles, counters and images alone.
+#[test]
+fn power_does_not_change_what_is_timed() {
+    for level in ["stepped", "packet", "bound"] {
+        let [low, high] = ["low", "high"].map(|bound| run(level, &["--bound", bound]));
+        let of = |results: &Results| {
+            let cycles: Vec<Value> = frames(results).iter().map(|row| row["cycles"].clone()).collect();
+            (cycles, results.summary()["counts"].clone(), results.summary()["counts_hash"].clone())
+        };
+        assert_eq!(of(&low), of(&high), "{level}");
+        assert_ne!(
+            low.summary()["energy_by_part_j"],
+            high.summary()["energy_by_part_j"],
+            "{level}: nothing was changed"
+        );
+        assert!(low.bytes("images/frame_0003.png") == high.bytes("images/frame_0003.png"), "{level}");
+    }
+}
+
+/// What happens is decided before it is timed.
+#[test]
+fn counters_and_their_hash_agree_at_all_levels() {
+    let [stepped, packet, bound, sampled] = LEVELS.map(|level| run(level, &[]));
+    let of = |results: &Results| {
+        let summary = results.summary();
+        (summary["counts"].clone(), summary["counts_hash"].clone())
+    };
+    assert_eq!(of(&stepped), of(&packet));
+    assert_eq!(of(&packet), of(&bound));
+    let hash = |row: &Value| row["counts_hash"].as_str().map(str::to_owned);
+    let whole: Vec<_> = frames(&packet).iter().map(hash).collect();
+    assert!(whole.iter().all(Option::is_some));
+    assert_ne!(whole[0], whole[6], "frames that differ have equal hashes");
+    // Frames that `sampled` simulated are those of `packet`, to the last counter and cycle; the others have none.
+    let pairs = frames(&sampled);
+    let known: Vec<_> =
+        pairs.iter().zip(frames(&packet)).filter(|(row, _)| row["predicted"] == false).collect();
+    assert_eq!(known.len(), 6);
+    for (row, other) in known {
+        assert_eq!(row["counts_hash"], other["counts_hash"]);
+        assert_eq!(row["cycles"], other["cycles"]);
+    }
+    assert!(pairs.iter().all(|row| hash(row).is_some() == (row["predicted"] == false)));
+}
+
+/// A test that cannot fail is none: another seed gives other samples, and so other counters.
+#[test]
+fn another_seed_has_another_hash() {
+    let [one, other] =
+        ["1", "2"].map(|seed| run("bound", &["--seed", seed]).summary()["counts_hash"].clone());
+    assert_ne!(one, other);
+}

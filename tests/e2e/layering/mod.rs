@@ -1,0 +1,152 @@
+//! The arrows between the crates and between the modules of each, and the rules every crate keeps.
+
+mod modules;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::support::{Inputs, root};
+use cargo_metadata::{Metadata, MetadataCommand};
+
+/// Which crates of the house each may use, in builds and in tests.
+const ARROWS: [(&str, &[&str]); 7] = [
+    ("activity", &[]),
+    ("pipeline", &["activity"]),
+    ("workloads", &["activity", "pipeline"]),
+    ("traces", &[]),
+    ("power-model", &["activity", "traces"]),
+    ("timing", &["activity"]),
+    ("sim", &["activity", "pipeline", "power-model", "timing", "traces", "workloads"]),
+];
+
+fn workspace() -> Metadata {
+    let mut command = MetadataCommand::new();
+    command.manifest_path(root().join("Cargo.toml")).no_deps().exec().expect("cargo metadata answers")
+}
+
+/// What each crate of the house uses of the house.
+fn arrows() -> BTreeMap<String, BTreeSet<String>> {
+    let metadata = workspace();
+    let packages = metadata.workspace_packages();
+    let names: BTreeSet<String> = packages.iter().map(|package| package.name.to_string()).collect();
+    let uses = |package: &cargo_metadata::Package| {
+        let used = package.dependencies.iter().map(|dependency| dependency.name.clone());
+        used.filter(|name| names.contains(name)).collect()
+    };
+    packages.iter().map(|package| (package.name.to_string(), uses(package))).collect()
+}
+
+#[test]
+fn no_crate_uses_another_against_the_arrows() {
+    let arrows = arrows();
+    for (name, allowed) in ARROWS {
+        let allowed: BTreeSet<String> = allowed.iter().map(|name| (*name).to_owned()).collect();
+        let against: Vec<_> = arrows[name].difference(&allowed).collect();
+        assert!(against.is_empty(), "{name} must not use {against:?}");
+    }
+    let known: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
+    let found: BTreeSet<&str> = arrows.keys().map(String::as_str).collect();
+    assert_eq!(found, known, "a new crate needs its place in the arrows");
+}
+
+#[test]
+fn the_arrows_that_the_design_draws_are_there() {
+    let arrows = arrows();
+    let drawn = [
+        ("workloads", "pipeline"),
+        ("pipeline", "activity"),
+        ("power-model", "activity"),
+        ("power-model", "traces"),
+    ];
+    let of_sim = ARROWS[6].1.iter().map(|used| ("sim", *used));
+    for (name, used) in drawn.into_iter().chain(of_sim) {
+        assert!(arrows[name].contains(used), "{name} is to use {used}");
+    }
+}
+
+#[test]
+fn no_modules_use_each_other_in_a_circle() {
+    let mut circles = Vec::new();
+    for package in workspace().workspace_packages() {
+        let found = modules::circles(&package.manifest_path.as_std_path().with_file_name("src"));
+        circles.extend(found.into_iter().map(|circle| format!("{}: {circle}", package.name)));
+    }
+    assert!(circles.is_empty(), "{}", circles.join("\n"));
+}
+
+#[test]
+fn a_circle_of_modules_is_seen_through_imports_paths_and_parents() {
+    let crate_of = |files: &[(&str, &str)]| {
+        let inputs = Inputs::new();
+        for (name, text) in files {
+            inputs.put(name, text);
+        }
+        modules::circles(Path::new(&inputs.path("")))
+    };
+    let root = ("lib.rs", "mod a;\nmod b;\nmod c;\npub use b::Two;\n");
+    let [two, three] = [("b.rs", "pub struct Two;"), ("c.rs", "use crate::Two;\npub fn three(_: Two) {}")];
+    assert!(crate_of(&[root, ("a.rs", "use crate::c::three;"), two, three]).is_empty());
+    let tests = "#[cfg(test)]\nmod tests { use crate::c::three; }\npub struct Two;";
+    assert!(crate_of(&[root, ("a.rs", ""), ("b.rs", tests), three]).is_empty());
+    for back in ["use crate::c::three;\npub struct Two;", "pub struct Two;\nfn f() { super::c::three(Two) }"]
+    {
+        assert_eq!(crate_of(&[root, ("a.rs", ""), ("b.rs", back), three]), ["::{b, c}"]);
+    }
+}
+
+#[test]
+fn every_crate_takes_the_lints_of_the_workspace() {
+    for package in workspace().workspace_packages() {
+        let manifest = fs::read_to_string(&package.manifest_path).expect("a manifest");
+        let table = manifest.split("\n[").find(|table| table.starts_with("lints]"));
+        let shared = table.is_some_and(|table| table.lines().any(|line| line.trim() == "workspace = true"));
+        assert!(shared, "{}: `[lints] workspace = true` is missing", package.manifest_path);
+    }
+}
+
+#[test]
+fn only_sim_ends_the_process() {
+    let ways = ["process::exit", "process::abort", "ExitCode"];
+    for package in
+        workspace().workspace_packages().into_iter().filter(|package| package.name.as_str() != "sim")
+    {
+        let sources = package.manifest_path.as_std_path().with_file_name("src");
+        for file in rust_files(&sources) {
+            let text = fs::read_to_string(&file).expect("a source file");
+            for way in ways {
+                assert!(!text.contains(way), "{}: {way} belongs in `sim`", file.display());
+            }
+        }
+    }
+}
+
+/// What a run is made from is recorded where it is opened: nothing else opens files there.
+#[test]
+fn inputs_are_opened_in_one_place() {
+    let ways = ["fs::read", "File::open", "OpenOptions"];
+    let opener = Path::new("pipeline/activity/src/inputs.rs");
+    for name in ["pipeline/activity", "pipeline", "workloads", "power-model"] {
+        for file in rust_files(&root().join(name).join("src")).iter().filter(|file| !file.ends_with(opener)) {
+            let text = fs::read_to_string(file).expect("a source file");
+            // Unit tests come last in a file.
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            for way in ways {
+                assert!(!code.contains(way), "{}: {way}: use activity::inputs", file.display());
+            }
+        }
+    }
+}
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.expect("an entry of a source folder").path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}

@@ -1,0 +1,17 @@
+//! A run of one frame: nothing else is there to be found.
+
+use crate::support::quintile;
+use serde_json::Value;
+
+#[test]
+fn a_lone_frame_is_found_once_however_long_it_is() {
+    for samples in ["4", "64"] {
+        let args = ["--size", "320x180", "--frames", "18..19", "--samples", samples];
+        let summary: Value = serde_json::from_slice(&quintile().run("default", &args).bytes("summary.json"))
+            .expect("the summary is JSON");
+        assert_eq!(summary["detection"]["found_frames"], 1, "{samples} samples");
+        let codes: Vec<_> =
+            summary["warnings"].as_array().into_iter().flatten().map(|w| &w["code"]).collect();
+        assert!(!codes.iter().any(|code| **code == "frames-missed" || **code == "only-mark"), "{codes:?}");
+    }
+}

@@ -1,0 +1,444 @@
+//! `quintile reproduce` as a user meets it: fields, files, exit codes, and the same bytes for any number of threads.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use crate::support::{Ended, Inputs, quintile, real_scenes, root};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use tempfile::TempDir;
+
+const FIELDS: [&str; 12] = [
+    "id",
+    "kind",
+    "claim",
+    "paper",
+    "holds_when",
+    "limits",
+    "ours",
+    "verdict",
+    "band",
+    "ran",
+    "settings",
+    "figure",
+];
+
+fn reproduce(paper: &str, out: &Path, args: &[&str]) -> (Ended, Value) {
+    let out = out.display().to_string();
+    let ended = quintile().call(["reproduce", paper, "--quick", "--json", "--out", &out].iter().chain(args));
+    let json =
+        serde_json::from_str(&ended.stdout).unwrap_or_else(|error| panic!("{error}: {}", ended.stderr));
+    (ended, json)
+}
+
+/// The committed settings of a paper.
+fn committed(number: u32) -> String {
+    fs::read_to_string(root().join(format!("sim/data/reproduce/paper{number}.ron")))
+        .expect("a file of settings")
+}
+
+fn sha256(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// One row of Paper VI or III, computed with the committed settings after `changes`, each of which has to change something.
+fn planted(id: &str, changes: &[(&str, &str)]) -> (Ended, Value) {
+    let (paper, number) = if id.starts_with("VI") { ("VI", 6) } else { ("III", 3) };
+    let text = changes.iter().fold(committed(number), |text, (from, to)| {
+        assert!(text.contains(from), "`{from}` is not in the settings");
+        text.replace(from, to)
+    });
+    let inputs = Inputs::new();
+    let file = inputs.put("settings.ron", &text);
+    let temporary = TempDir::new().expect("a folder");
+    let (ended, json) = reproduce(paper, temporary.path(), &["--row", id, "--settings", &file]);
+    assert_eq!(json["settings"]["committed"], changes.is_empty());
+    assert_eq!(json["settings"]["sha256"], sha256(&text), "{id}");
+    assert_eq!(json["rows"].as_array().map(Vec::len), Some(1));
+    (ended, row(&json, id).clone())
+}
+
+fn row<'a>(json: &'a Value, id: &str) -> &'a Value {
+    let rows = json["rows"].as_array().expect("a list");
+    rows.iter().find(|row| row["id"] == id).unwrap_or_else(|| panic!("no row {id}"))
+}
+
+fn number(row: &Value, name: &str) -> f64 {
+    let numbers = row["numbers"].as_array().expect("a list");
+    let found = numbers.iter().find(|number| number["name"] == name);
+    found.and_then(|number| number["value"].as_f64()).unwrap_or_else(|| panic!("no number {name} in {row}"))
+}
+
+/// Every file below a folder, in order.
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut list = Vec::new();
+    for sub in ["", "plots"] {
+        for entry in
+            fs::read_dir(folder.join(sub)).expect("a folder").flatten().filter(|e| e.path().is_file())
+        {
+            let name = format!("{sub}/{}", entry.file_name().to_string_lossy());
+            list.push((name, fs::read(entry.path()).expect("a file")));
+        }
+    }
+    list.sort();
+    list
+}
+
+fn rows_are_whole(json: &Value, (ids, number): (&[&str], u32), folder: &Path) {
+    assert_eq!(json["settings"]["sha256"], sha256(&committed(number)));
+    assert_eq!(json["settings"]["committed"], true);
+    let rows = json["rows"].as_array().expect("a list");
+    assert_eq!(rows.iter().map(|row| row["id"].as_str().unwrap_or_default()).collect::<Vec<_>>(), ids);
+    for row in rows {
+        for field in FIELDS {
+            assert!(row.get(field).is_some(), "{field} is missing in {row}");
+        }
+        let verdict = row["verdict"].as_str().unwrap_or_default();
+        assert!(["holds", "differs", "depends", "not yet"].contains(&verdict), "{verdict}");
+        assert_eq!(row["settings_sha256"], json["settings"]["sha256"]);
+        ran_something(row);
+        verdict_follows_from_band(row);
+        assert!(!row["ours"].as_str().unwrap_or_default().is_empty());
+        assert!(
+            row["numbers"].as_array().is_some_and(|list| list.iter().all(|n| n["value"].is_f64())),
+            "{row}"
+        );
+        for figure in row["figures"].as_array().expect("a list") {
+            let path = folder.join(figure.as_str().expect("a path"));
+            let svg = fs::read_to_string(&path).expect("an SVG");
+            assert!(svg.contains("<svg") && !svg.contains("nothing to show"), "{}", path.display());
+            assert!(fs::read(path.with_extension("png")).expect("a PNG").starts_with(b"\x89PNG"));
+        }
+    }
+}
+
+/// A row prints how much was run, and that is something.
+fn ran_something(row: &Value) {
+    let ran = row["ran"].as_array().expect("a list");
+    let counts = ran.iter().map(|number| number["value"].as_f64().unwrap_or(0.0));
+    assert!(!ran.is_empty() && counts.min_by(f64::total_cmp).is_some_and(|least| least > 0.0), "{row}");
+}
+
+/// Holds at every value tried, differs at all of them, or depends, with the least and the greatest number.
+fn verdict_follows_from_band(row: &Value) {
+    let Some(cases) = row["band"]["cases"].as_array() else {
+        assert!(row["verdict"] != "depends", "without a band: {row}");
+        return;
+    };
+    let held = cases.iter().filter(|case| case["holds"] == true).count();
+    let expected = match held {
+        0 => "differs",
+        held if held == cases.len() => "holds",
+        _ => "depends",
+    };
+    assert_eq!(row["verdict"], expected, "{row}");
+    let numbers: Vec<f64> = cases.iter().filter_map(|case| case["number"].as_f64()).collect();
+    assert_eq!(numbers.len(), cases.len());
+    let ends = [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| numbers.iter().copied().reduce(pick));
+    assert_eq!(ends, [row["band"]["min"].as_f64(), row["band"]["max"].as_f64()]);
+    for case in cases {
+        let number = case["number"].as_f64().expect("a number");
+        condition_is_about_the_number(row["id"].as_str().unwrap_or_default(), number, case);
+    }
+}
+
+/// Whether a condition is met is no opinion either.
+fn condition_is_about_the_number(id: &str, number: f64, case: &Value) {
+    let holds = case["holds"] == true;
+    let exactly = match id {
+        "VI-1" | "VI-7" => Some(number == 0.0),
+        "VI-5" => Some(number > 2.0),
+        "VI-6" | "III-5" => Some(number < 1.0),
+        "VI-8" => Some(number <= 3.0),
+        "VI-10" => Some((0.01..=0.99).contains(&number)),
+        "VI-13" => Some((number - 10.0).abs() <= 5.0),
+        "VI-14" => Some((number - 15.0).abs() <= 7.0),
+        "III-3" => Some(number <= 2.0),
+        "III-4" => Some(number > 0.0 && number < 1.0),
+        _ => None,
+    };
+    assert!(exactly.is_none_or(|expected| expected == holds), "{id}: {case}");
+    // Of conditions in several parts the number is one of them.
+    let collides = case["setting"].as_str().is_some_and(|setting| setting.contains("that collide"));
+    let necessary = match id {
+        "VI-2" => (number > 0.0) == collides,
+        "VI-4" => number > 0.0,
+        "VI-11" | "VI-15" => number < 1.0,
+        "III-6" => number == 1.0,
+        _ => true,
+    };
+    assert!(!holds || necessary, "{id}: {case}");
+}
+
+#[test]
+fn paper_three_is_whole_and_the_same_for_any_number_of_threads() {
+    let temporary = TempDir::new().expect("a folder");
+    let folders = ["1", "4"].map(|threads| (threads, temporary.path().join(threads)));
+    let runs = folders.each_ref().map(|(threads, out)| reproduce("III", out, &["--threads", threads]));
+    let ids = ["III-1", "III-2", "III-3", "III-4", "III-5", "III-6"];
+    let (ended, json) = &runs[0];
+    rows_are_whole(json, (&ids, 3), &folders[0].1);
+    assert_eq!(ended.stdout, runs[1].0.stdout);
+    assert_eq!(files(&folders[0].1), files(&folders[1].1));
+    let written = fs::read_to_string(folders[0].1.join("reproduce_III.json")).expect("the JSON");
+    assert_eq!(written.trim(), ended.stdout.trim());
+    // The exit code says whether the one equality holds.
+    assert_eq!(row(json, "III-2")["kind"], "E");
+    assert_eq!(ended.code == Some(0), row(json, "III-2")["verdict"] == "holds");
+    verdicts_follow_from_numbers(json);
+}
+
+/// A verdict is no opinion.
+fn verdicts_follow_from_numbers(json: &Value) {
+    let sums = row(json, "III-2");
+    let whole = number(sums, "whole_J");
+    assert!(
+        (number(sums, "start_to_start_J") / whole - 1.0).abs() < 1e-9
+            && number(sums, "begin_to_finish_J") < whole
+    );
+    let found = row(json, "III-1");
+    let enough = number(found, "vsync_f1") >= 0.99 && number(found, "free_f1") >= 0.9;
+    assert_eq!(found["verdict"] == "holds", enough);
+    // 48 frames are found where 48 were planted.
+    let launch = row(json, "III-3");
+    assert_eq!(number(launch, "planted_frames"), 48.0);
+    let methods = row(json, "III-4");
+    assert!(number(methods, "longest_work_ms") < 1e3 / 30.0, "the phone does not keep up: {methods}");
+    // Without a waiting processor the old method never gives more; with both cores it does.
+    assert_eq!(methods["verdict"], "depends", "{methods}");
+    let pc = row(json, "III-5");
+    let difference = (number(pc, "with_mean_J") - number(pc, "without_mean_J")).abs();
+    assert!((difference - number(pc, "difference_J")).abs() < 1e-12);
+    assert_eq!(pc["verdict"], "depends", "a core that spins at 15 W changes a lot: {pc}");
+    assert!(number(row(json, "III-6"), "touched_frames") > 0.0);
+}
+
+const ROWS_OF_SIX: [&str; 16] = [
+    "VI-1", "VI-2", "VI-3", "VI-4", "VI-5", "VI-6", "VI-7", "VI-8", "VI-9", "VI-10", "VI-11", "VI-12",
+    "VI-13", "VI-14", "VI-15", "VI-16",
+];
+
+#[test]
+fn paper_six_is_whole_in_its_quick_form() {
+    let temporary = TempDir::new().expect("a folder");
+    let (ended, json) = reproduce("VI", temporary.path(), &[]);
+    rows_are_whole(&json, (&ROWS_OF_SIX, 6), temporary.path());
+    assert_eq!(json["form"], "quick");
+    let rows = json["rows"].as_array().expect("a list");
+    let equalities = rows.iter().filter(|row| row["kind"] == "E");
+    let held = equalities.clone().all(|row| row["verdict"] == "holds");
+    assert_eq!((ended.code == Some(0), json["equalities_hold"] == true), (held, held), "{}", ended.stderr);
+    // Light, collisions and visibility are not lost.
+    for id in ["VI-1", "VI-7", "VI-12", "VI-16"] {
+        assert_eq!(row(&json, id)["verdict"], "holds", "{}", row(&json, id));
+    }
+    assert!(row(&json, "VI-1")["ours"].as_str().is_some_and(|ours| ours.contains("no public case")));
+    let worse =
+        number(row(&json, "VI-3"), "cases_more") > 0.0 || number(row(&json, "VI-3"), "cases_fewer") == 0.0;
+    assert_eq!(row(&json, "VI-3")["verdict"] == "differs", worse);
+    // Settings that the paper leaves open are listed with what was tried and why.
+    let settings = row(&json, "VI-13")["settings"].as_array().expect("a list");
+    let of = |name: &str| settings.iter().find(|setting| setting["name"] == name).expect("a setting");
+    assert_eq!((&of("entries")["basis"], &of("entries")["value"]), (&"stated".into(), &1024.into()));
+    assert!(of("entries")["source"].as_str().is_some_and(|source| source.contains("1024 entries")));
+    assert_eq!(of("eyes")["basis"], "open");
+    assert!(of("eyes")["tried"].as_array().is_some_and(|tried| tried.len() > 1));
+    let markdown = fs::read_to_string(temporary.path().join("reproduce_VI.md")).expect("the table");
+    assert!(markdown.contains(&sha256(&committed(6))) && markdown.contains("| `eyes` | open |"));
+}
+
+/// Where objects really meet, three passes that keep them are right, and a claim that they do not is refuted.
+#[test]
+fn planted_a_plate_on_the_bar_is_not_cleared() {
+    let (ended, row) =
+        planted("VI-2", &[("from: (-2.5, 1, 0), to: (0.5, 1, 0)", "from: (-0.5, 1, 0), to: (2.5, 1, 0)")]);
+    assert_eq!((ended.code, &row["verdict"]), (Some(0), &"depends".into()), "{row}");
+    let cases = row["band"]["cases"].as_array().expect("a list");
+    for case in cases {
+        let kept = case["setting"].as_str().is_some_and(|setting| setting.contains("(bar and plate,"));
+        assert_eq!(case["holds"] == true, !kept, "{case}");
+    }
+}
+
+/// The same number against another report, and with another tolerance.
+#[test]
+fn planted_numbers_of_the_paper_flip_the_verdict_of_views() {
+    let small = (
+        "over: [(320, 180), (640, 360), (1280, 720)], quick: [(320, 180)]",
+        "over: [(64, 36), (640, 360)], quick: [(64, 36)]",
+    );
+    let (_, far) = planted(
+        "VI-13",
+        &[small, ("increase_percent: Stated(value: 10.0", "increase_percent: Stated(value: 900.0")],
+    );
+    assert_eq!(far["verdict"], "differs", "{far}");
+    let (_, wide) =
+        planted("VI-13", &[small, ("within_points: Ours(value: 5.0", "within_points: Ours(value: 5000.0")]);
+    assert_eq!(wide["verdict"], "holds", "{wide}");
+    assert_eq!(far["band"]["min"], wide["band"]["min"], "the number itself is computed");
+}
+
+/// A row whose passes cull nothing has not shown that culling changes nothing.
+#[test]
+fn planted_hardware_that_culls_nothing_fails() {
+    let (ended, row) = planted("VI-16", &[("z_min: true", "z_min: false")]);
+    assert_eq!((ended.code, &row["verdict"]), (Some(1), &"differs".into()), "{row}");
+    let note = row["note"].as_str().unwrap_or_default();
+    assert!(note.starts_with("nothing was run (depth_reads_spared_by_z_min)"), "{note}");
+    assert!(ended.stderr.contains("ran nothing: VI-16"), "{}", ended.stderr);
+}
+
+/// Waves that no bounding volume could follow, a query that has to be a million times cheaper: settings are what is computed with.
+#[test]
+fn planted_conditions_flip_rows() {
+    let (_, cheap) = planted("VI-5", &[("far_fewer: Ours(value: 2.0", "far_fewer: Ours(value: 1e6")]);
+    assert_eq!(cheap["verdict"], "differs", "{cheap}");
+    let (_, seeds) =
+        planted("VI-8", &[("standard_errors: Ours(value: 3.0", "standard_errors: Ours(value: 0.0")]);
+    assert_eq!(seeds["verdict"], "differs", "{seeds}");
+    let asleep = "quick: [0.2, 0.0, 0.05, 0.5], why: \"W that the waiting";
+    let (_, phone) = planted("III-4", &[(asleep, "quick: [0.0], why: \"W that the waiting")]);
+    assert_eq!(phone["verdict"], "differs", "{phone}");
+}
+
+/// A query file like the public ones: one point that meets a face, and one that stays above it.
+#[test]
+fn public_cases_are_run_where_their_folder_is_given() {
+    let point = |z: i32, truth: u32| format!("1,4,1,4,{z},1,{truth}\n");
+    let face = |truth: u32| {
+        ["0,1,0,1,0,1", "1,1,0,1,0,1", "0,1,1,1,0,1"].map(|at| format!("{at},{truth}\n")).concat()
+    };
+    let query = |to: i32, truth: u32| {
+        format!("{}{}{}{}", point(1, truth), face(truth), point(to, truth), face(truth))
+    };
+    let folder = TempDir::new().expect("a folder");
+    let kind = folder.path().join("queries/made/vertex-face");
+    fs::create_dir_all(&kind).expect("folders");
+    let write = |text: &str| {
+        let file = fs::File::create(kind.join("data_0_0.csv.gz")).expect("a file");
+        let mut out = GzEncoder::new(file, Compression::fast());
+        out.write_all(text.as_bytes()).and_then(|()| out.finish().map(|_| ())).expect("rows");
+    };
+    write(&format!("{}{}", query(-1, 1), query(2, 0)));
+    let out = TempDir::new().expect("a folder");
+    let data = folder.path().display().to_string();
+    let (ended, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
+    let row = row(&json, "VI-1");
+    assert_eq!((ended.code, &row["verdict"]), (Some(0), &"holds".into()), "{row}");
+    assert_eq!([number(row, "public_queries"), number(row, "public_cases_that_collide_drawn")], [2.0, 1.0]);
+    assert!(
+        row["ours"]
+            .as_str()
+            .is_some_and(|ours| ours.contains("2 public queries in 1 files, of which 1 collide"))
+    );
+    // A truth that is wrong shows: the point that stays above does not collide, so it is missed.
+    write(&query(2, 1));
+    let (ended, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
+    assert_eq!((ended.code, &self::row(&json, "VI-1")["verdict"]), (Some(1), &"differs".into()));
+    write("1,2,3\n");
+    let out = out.path().display().to_string();
+    let broken =
+        quintile().call(["reproduce", "VI", "--row", "VI-1", "--collision-data", &data, "--out", &out]);
+    assert_eq!(broken.code, Some(2));
+    assert!(broken.stderr.contains("data_0_0.csv.gz:1: seven numbers are expected"), "{}", broken.stderr);
+}
+
+/// The public data that the book's row is made with, where they are: beside the real scenes.
+#[test]
+fn no_public_case_is_missed() {
+    let Some(scenes) = real_scenes("") else { return };
+    let data = Path::new(&scenes).parent().map(|folder| folder.join("ccd")).filter(|folder| folder.is_dir());
+    let Some(data) = data else {
+        eprintln!("skipped: no folder ccd beside the real scenes");
+        return;
+    };
+    let out = TempDir::new().expect("a folder");
+    let (ended, json) =
+        reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data.display().to_string()]);
+    let row = row(&json, "VI-1");
+    assert_eq!((ended.code, &row["verdict"]), (Some(0), &"holds".into()), "{row}");
+    assert_eq!([number(row, "public_scenes"), number(row, "public_query_files")], [5.0, 42.0]);
+    // 132 pairs of scenes that are identified, and 435 queries.
+    assert_eq!(number(row, "public_cases_that_collide_drawn"), 567.0);
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused_with_their_place() {
+    let inputs = Inputs::new();
+    let out = inputs.path("out");
+    let refused = |text: &str, parts: &[&str]| {
+        let file = inputs.put("settings.ron", text);
+        let ended = quintile().call(["reproduce", "VI", "--settings", &file, "--out", &out]);
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        for part in parts {
+            assert!(ended.stderr.contains(part), "{part}: {}", ended.stderr);
+        }
+    };
+    let text = committed(6);
+    let eyes = "eyes: Open(value: 0.065, over: [0.02, 0.065, 0.14, 0.28]";
+    refused(
+        &text.replace(eyes, "eyes: Open(value: -1.0, over: [-1.0, 0.065]"),
+        &["settings.ron: `vi_13.eyes` is -1.0"],
+    );
+    refused(
+        &text.replace(eyes, "eyes: Open(value: 0.5, over: [0.02, 0.065]"),
+        &["`vi_13.eyes` is open", "among them"],
+    );
+    refused(
+        &text.replace("vi_16: (", "vi_61: ("),
+        &["settings.ron:", "unknown field `vi_61`, did you mean `vi_1`?"],
+    );
+    let missing = quintile().call(["reproduce", "VI", "--settings", &inputs.path("none.ron"), "--out", &out]);
+    assert_eq!(missing.code, Some(1));
+    let row = quintile().call(["reproduce", "VI", "--row", "VI-99", "--out", &out]);
+    assert_eq!(row.code, Some(2));
+    assert!(row.stderr.contains("no row `VI-99` in Paper VI; its rows: VI-1, VI-2"), "{}", row.stderr);
+    let folder =
+        quintile().call(["reproduce", "VI", "--collision-data", &inputs.path("none"), "--out", &out]);
+    assert_eq!(folder.code, Some(2));
+    assert!(
+        folder.stderr.contains("--collision-data") && folder.stderr.contains("name a folder"),
+        "{}",
+        folder.stderr
+    );
+}
+
+#[test]
+fn paper_two_waits_for_its_passes_and_says_so() {
+    let temporary = TempDir::new().expect("a folder");
+    let out = temporary.path().join("out");
+    let (ended, json) = reproduce("ii", &out, &[]);
+    rows_are_whole(&json, (&["II-1", "II-2"], 2), &out);
+    let passes = row(&json, "II-1");
+    assert_eq!(passes["verdict"], "not yet");
+    assert!(passes["note"].as_str().is_some_and(|note| note.contains("deferred renderer")));
+    let sum = number(passes, "pass_nJ_per_pixel") + number(passes, "rest_nJ_per_pixel");
+    assert!((sum / number(passes, "frame_nJ_per_pixel") - 1.0).abs() < 1e-9);
+    let inverses = row(&json, "II-2");
+    assert_eq!(inverses["verdict"], "holds");
+    assert!(inverses["ours"].as_str().is_some_and(|ours| ours.contains("WRONG")));
+    let [wrong, right, whole] = ["mean_of_inverses", "inverse_of_mean", "whole_animation"]
+        .map(|name| number(inverses, &format!("{name}_pixels_per_J")));
+    assert!(wrong > right && (right / whole - 1.0).abs() < 1e-9);
+    assert_eq!((ended.code, json["equalities_hold"].as_bool()), (Some(1), Some(false)));
+    assert!(ended.stderr.contains("II-1") && !ended.stderr.contains("II-2"), "{}", ended.stderr);
+}
+
+#[test]
+fn what_makes_no_sense_is_told_before_any_work() {
+    let unknown = quintile().call(["reproduce", "VII"]);
+    assert_eq!(unknown.code, Some(2));
+    assert!(unknown.stderr.contains("VII") && unknown.stderr.contains("II, III"), "{}", unknown.stderr);
+    assert_eq!(quintile().call(["reproduce"]).code, Some(2));
+    let temporary = TempDir::new().expect("a folder");
+    let file = temporary.path().join("file");
+    fs::write(&file, "not a folder").expect("a file");
+    let blocked = quintile().call(["reproduce", "II", "--quick", "--out", &file.display().to_string()]);
+    assert_eq!(blocked.code, Some(1));
+    assert!(blocked.stderr.contains("cannot use it as the folder for results"), "{}", blocked.stderr);
+    let help = quintile().call(["help", "reproduce"]);
+    assert!(help.stdout.contains("quintile reproduce III --quick --out claims"), "{}", help.stdout);
+}

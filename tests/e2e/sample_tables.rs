@@ -1,0 +1,111 @@
+//! Sample tables as they are asked for: by name, described, in a file; and heat maps, as they are written.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::quintile;
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+#[test]
+fn a_table_written_to_a_file_gives_the_image_it_came_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("mine.smp"));
+    for table in ["owen", "jittered"] {
+        let ended = quintile().call([
+            "samples",
+            table,
+            "--samples",
+            "4",
+            "--size",
+            "64x48",
+            "--out",
+            &file,
+            "--json",
+        ]);
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        let written: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(written["samples"], 64 * 48 * 4);
+        let image = |table: &str| {
+            let results = quintile().run("tiny", &["--frames", "1..2", "--table", table]);
+            fs::read(results.path("images/frame_0001.png")).unwrap()
+        };
+        assert!(image(table) == image(&file), "{table}: the file draws another image");
+        assert!(image(table) != image("random"), "{table} draws what random draws");
+    }
+}
+
+#[test]
+fn a_file_decides_how_many_samples_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("nine.smp"));
+    let ended = quintile().call(["samples", "random", "--samples", "9", "--out", &file]);
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let results = quintile().run("tiny", &["--frames", "0..1", "--table", &file]);
+    assert_eq!(results.summary()["settings"]["samples"], 9);
+    let out = text(&folder.path().join("out"));
+    let ended = quintile().call(["run", "tiny", "--table", &file, "--samples", "8", "--out", &out]);
+    assert_eq!(ended.code, Some(2));
+    assert!(ended.stderr.contains("9 samples per pixel, not 8"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_scene_names_a_table_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("s.ron");
+    let body = "settings: (width: 32, height: 16, samples: 4, lens_radius: 0.2, frames: (0, 1), table: \"t.ron\"), \
+                objects: [(shape: Sphere(radius: 1))]";
+    fs::write(&scene, format!("({body})")).unwrap();
+    let out = text(&folder.path().join("out"));
+    let call = |table: &str| {
+        fs::write(folder.path().join("t.ron"), table).unwrap();
+        quintile().call(["run", &text(&scene), "--out", &out])
+    };
+    assert_eq!(call("(pattern: Jittered, lens: Polygon(blades: 5))").code, Some(0));
+    let ended = call("(\n  pattern: Jitterd,\n)");
+    assert_eq!(ended.code, Some(2));
+    assert!(ended.stderr.contains("t.ron:2:") && ended.stderr.contains("`Jittered`"), "{}", ended.stderr);
+    let ended = call("(regions: Across(3))");
+    assert_eq!(ended.code, Some(2));
+    assert!(ended.stderr.contains("take a multiple of 3"), "{}", ended.stderr);
+}
+
+#[test]
+fn heat_maps_add_up_to_the_counters() {
+    let events = ["samples_tested", "tiles_visited", "dram_write_bytes"];
+    let args: Vec<&str> = events.iter().flat_map(|event| ["--heat", event]).collect();
+    let results = quintile().run("tiny", &[&["--frames", "0..2"], &args[..]].concat());
+    let (mut report, summary) = (0, results.summary());
+    for event in events {
+        let mut placed = 0;
+        for frame in 0..2 {
+            let file = |end: &str| results.path(&format!("heat/{event}_{frame:04}.{end}"));
+            let csv = fs::read_to_string(file("csv")).unwrap();
+            let count = |row: &str| row.rsplit(',').next().unwrap().parse::<u64>().unwrap();
+            placed += csv.lines().skip(1).map(count).sum::<u64>();
+            assert_eq!(image::open(file("exr")).unwrap().width(), 64);
+            assert!(image::open(file("png")).unwrap().width() >= 760);
+        }
+        let counted = summary["counts"][event].as_u64().unwrap();
+        // The image leaves the caches at the end, nowhere in particular.
+        let all_placed = event != "dram_write_bytes";
+        assert!(
+            if all_placed { placed == counted } else { placed < counted },
+            "{event}: {placed} of {counted}"
+        );
+        let page = fs::read_to_string(results.path("report.html")).unwrap();
+        report += usize::from(page.contains(&format!("{event}_0001.png")));
+    }
+    assert_eq!(report, events.len(), "the report shows the frame in the middle");
+}
+
+#[test]
+fn counters_without_a_place_are_refused() {
+    for (counter, message) in [("draws", "before it is known where"), ("samples_testd", "`samples_tested`")] {
+        let ended = quintile().call(["run", "tiny", "--heat", counter]);
+        assert_eq!(ended.code, Some(2));
+        assert!(ended.stderr.contains(message), "{}", ended.stderr);
+    }
+}

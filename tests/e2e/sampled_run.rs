@@ -1,0 +1,147 @@
+//! `--timing sampled`, `--accuracy`, `--budget` and `--verify` as a user meets them.
+
+use crate::support::{Inputs, Results, number, quintile};
+use serde_json::Value;
+
+const SMALL: [&str; 4] = ["--size", "160x90", "--samples", "2"];
+
+fn run(args: &[&str]) -> Results {
+    quintile().run("default", &[&SMALL, args].concat())
+}
+
+fn rows(results: &Results) -> Vec<Value> {
+    results.summary()["frames"].as_array().cloned().expect("frames")
+}
+
+#[test]
+fn predicted_frames_are_marked_wherever_they_stand() {
+    let results = run(&["--timing", "sampled", "--frames", "0..30"]);
+    let (summary, rows) = (results.summary(), rows(&results));
+    let simulated = summary["sampled"]["simulated_frames"].as_array().cloned().expect("a list");
+    assert_eq!(simulated.len(), 6);
+    assert_eq!(rows.len(), 30);
+    for row in &rows {
+        let known = simulated.contains(&row["frame"]);
+        assert_eq!(row["predicted"] == false, known);
+        // Images, hashes and intervals: each where it belongs.
+        let image = format!("images/frame_{:04}.png", row["frame"].as_u64().unwrap_or_default());
+        assert_eq!(results.path(&image).exists(), known, "{image}");
+        assert_eq!(row["image"].as_str(), known.then_some(image.as_str()));
+        assert_eq!(row["counts_hash"].is_null(), !known);
+        assert_eq!(row["cycles_interval"].is_null(), known);
+        if !known {
+            let [low, high] = [0, 1].map(|end| number(row, &format!("/energy_interval_j/{end}")));
+            let energy = number(row, "/energy_j");
+            assert!(low <= energy && energy <= high && number(row, "/cycles") > 0.0);
+        }
+    }
+    assert_eq!(number(&summary, "/modelled/distinct_frames"), 6.0);
+    assert_eq!(number(&summary, "/modelled/predicted_frames"), 24.0);
+    let table = results.text("frames.csv");
+    let header = table.lines().next().unwrap_or_default();
+    assert!(header.ends_with("outlier,predicted,predicted_energy_low_J,predicted_energy_high_J"), "{header}");
+    // A frame that was not found in the trace has no row.
+    let rows = |end: &str, mark: &str| {
+        table.lines().skip(1).filter(|line| line.contains(mark) && line.ends_with(end)).count()
+    };
+    assert!((1..=6).contains(&rows(",0,,", "")), "{table}");
+    assert!((1..=24).contains(&rows("", ",1,0.")), "{table}");
+    assert!(results.text("report.html").contains("predicted"));
+    assert!(results.ended.stdout.contains("predicted: from 6 frames"), "{}", results.ended.stdout);
+}
+
+/// Where all is simulated, nothing is predicted and no column is added.
+#[test]
+fn other_levels_predict_nothing() {
+    let results = run(&["--frames", "0..4"]);
+    assert!(results.summary()["sampled"].is_null() && results.summary()["choice"].is_null());
+    assert!(rows(&results).iter().all(|row| row["predicted"] == false && row["image"].is_string()));
+    assert!(results.text("frames.csv").lines().next().is_some_and(|header| header.ends_with("outlier")));
+}
+
+/// The totals of a run from a few of its frames, against all of them.
+#[test]
+fn totals_are_near_the_truth_and_sums_agree() {
+    let [sampled, whole] =
+        ["sampled", "packet"].map(|level| run(&["--timing", level, "--frames", "0..60", "--pacing", "free"]));
+    let cycles =
+        |results: &Results| rows(results).iter().map(|row| number(row, "/cycles")).sum::<f64>() / 60.0;
+    let predicted = number(&sampled.summary(), "/sampled/cycles_per_frame/value");
+    // Rounded to whole cycles, frames add up to what was estimated.
+    assert!((cycles(&sampled) - predicted).abs() <= 1.0);
+    let error = predicted / cycles(&whole) - 1.0;
+    assert!(error.abs() < 0.05, "{error}");
+    for check in ["frames_against_integral_relative", "parts_against_curve_relative"] {
+        assert!(number(&sampled.summary(), &format!("/checks/{check}")) < 1e-6, "{check}");
+    }
+}
+
+#[test]
+fn a_still_scene_and_a_short_one_need_no_prediction() {
+    let inputs = Inputs::new();
+    let scene = "(settings: (width: 48, height: 32, samples: 2, frames: (0, 30)), \
+                 camera: (position: (0, 0, 5), target: (0, 0, 0)), objects: [(shape: Sphere(radius: 1, segments: 12))])";
+    let still = quintile().run(&inputs.put("still.ron", scene), &["--timing", "sampled"]);
+    assert!(still.summary()["sampled"].is_null());
+    let short = run(&["--timing", "sampled", "--frames", "0..4"]);
+    assert_eq!(number(&short.summary(), "/modelled/predicted_frames"), 0.0);
+    assert_eq!(number(&short.summary(), "/sampled/cycles_per_frame/relative_half_width"), 0.0);
+}
+
+/// The promise of `--accuracy`: the actual error is within what was asked for, whether or not frames are predicted.
+#[test]
+fn the_accuracy_asked_for_is_kept() {
+    for (frames, accuracy) in [("0..3", "2%"), ("0..3", "30%"), ("0..36", "3%")] {
+        let results = run(&["--frames", frames, "--accuracy", accuracy, "--verify"]);
+        let summary = results.summary();
+        let asked = number(&summary, "/choice/accuracy");
+        let [expected, actual] = ["/choice/expected_error", "/verified/error"].map(|at| number(&summary, at));
+        assert!(expected <= asked, "{frames} {accuracy}: expected {expected}");
+        assert!(actual <= asked, "{frames} {accuracy}: actual {actual}, expected {expected}");
+        assert_eq!(summary["choice"]["meets_accuracy"], true);
+        for text in ["chosen: ", "actual error: "] {
+            assert!(results.ended.stdout.contains(text), "{}", results.ended.stdout);
+        }
+        assert!(results.text("report.html").contains("actual error"));
+    }
+}
+
+/// The reference is right by definition, and has to be chosen where nothing else is good enough.
+#[test]
+fn what_cannot_be_had_cheaper_is_stepped() {
+    let results = run(&["--frames", "0..2", "--accuracy", "0.0001%", "--verify"]);
+    assert_eq!(results.summary()["choice"]["level"], "stepped");
+    assert_eq!(number(&results.summary(), "/verified/error"), 0.0);
+    assert_eq!(number(&results.summary(), "/verified/worst_frame_error"), 0.0);
+}
+
+#[test]
+fn a_budget_takes_what_fits() {
+    let ample = run(&["--frames", "0..2", "--budget", "10h"]).summary();
+    assert_eq!(ample["choice"]["level"], "stepped");
+    assert!(number(&ample, "/choice/expected_host_s") < 36e3);
+    let none = run(&["--frames", "0..30", "--budget", "0.01ms"]).summary();
+    assert_eq!(none["choice"]["level"], "bound");
+    assert!(none["choice"]["sampling"]["count"].is_u64());
+}
+
+#[test]
+fn what_makes_no_sense_is_told() {
+    let cases = [
+        (["--accuracy", "2"], "write it as 2%"),
+        (["--accuracy", "0%"], "more than 0%"),
+        (["--accuracy", "200%"], "at most 100%"),
+        (["--budget", "30"], "write it as 30s"),
+        (["--budget", "-3s"], "write it as 30s"),
+    ];
+    for (args, says) in cases {
+        let ended = quintile().call(["run", "tiny"].iter().chain(&args));
+        assert_eq!(ended.code, Some(2), "{args:?}");
+        assert!(ended.stderr.contains(says), "{args:?}: {}", ended.stderr);
+    }
+    let both = quintile().call(["run", "tiny", "--timing", "packet", "--accuracy", "2%"]);
+    assert_eq!(both.code, Some(2));
+    assert!(both.stderr.contains("--accuracy") && both.stderr.contains("--timing"), "{}", both.stderr);
+    let help = quintile().call(["help", "run"]);
+    assert!(help.stdout.contains("--accuracy 2% --verify"), "{}", help.stdout);
+}

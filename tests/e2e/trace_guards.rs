@@ -1,0 +1,252 @@
+//! What `quintile trace` keeps from being lost or mistaken: inputs, descriptions, units, the end of a recording.
+
+use crate::support::{Inputs, quintile};
+use serde_json::Value;
+
+/// Frames of 10 ms at 5 kHz from 0.1 s on: 4 ms at 20 W, then 2 W. After the last there is rest for as long as seven.
+fn recording() -> String {
+    let row = |i: u32| {
+        let busy = (500..2000).contains(&i) && (i - 500) % 50 < 20;
+        let watts = if busy { 20.0 - 0.4 * f64::from((i - 500) % 50) } else { 2.0 };
+        let noise = 0.02 * (f64::from(i * 7919 % 101) / 101.0 - 0.5);
+        format!("{},{}\n", f64::from(i) / 5000.0, watts + noise)
+    };
+    "time_s,power_W\n".to_owned() + &(0..2350).map(row).collect::<String>()
+}
+
+fn read(path: &str) -> Vec<u8> {
+    std::fs::read(path).unwrap_or_default()
+}
+
+#[test]
+fn what_is_read_is_not_written_over() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let (marks, stamps) = (inputs.put("marks.txt", "0.2\n"), inputs.put("stamps.txt", "1\n2\n3\n4\n"));
+    let table = inputs.put("table.csv", "time_ms,energy_mJ\n1,2\n");
+    for args in [
+        vec!["trace", "frames", &trace, "--mark", "0.2", "--out", &trace],
+        vec!["trace", "frames", &trace, "--mark-file", &marks, "--out", &marks],
+        vec!["trace", "sample", &trace, "--device-rate", "100", "--out", &trace],
+        vec!["trace", "convert", &trace, &trace],
+        vec!["trace", "align", &trace, &stamps, "--anchor", "1=1", "--anchor", "2=2", "--out", &stamps],
+        vec!["trace", "pareto", &table, "--out", &table],
+    ] {
+        let before: Vec<Vec<u8>> = [&trace, &marks, &stamps, &table].map(|path| read(path)).into();
+        let ended = quintile().call(&args);
+        assert_eq!(ended.code, Some(2), "{args:?}: {}", ended.stderr);
+        assert!(ended.stderr.contains("is what is read"), "{args:?}: {}", ended.stderr);
+        assert_eq!(before, [&trace, &marks, &stamps, &table].map(|path| read(path)), "{args:?}");
+    }
+}
+
+#[test]
+fn a_description_of_something_else_stays() {
+    let inputs = Inputs::new();
+    let (trace, beside) = (inputs.put("t.csv", recording()), inputs.put("u.csv.json", "{\"my\": 1}"));
+    let out = inputs.path("u.csv");
+    let ended = quintile().call(["trace", "convert", &trace, &out]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("u.csv.json is there already"), "{}", ended.stderr);
+    assert_eq!(read(&beside), b"{\"my\": 1}");
+    let (out, again) = (inputs.path("v.csv"), ["trace", "convert", &trace, &inputs.path("v.csv")]);
+    assert_eq!(quintile().call(again).code, Some(0));
+    assert_eq!(quintile().call(again).code, Some(0), "{out} and its own description are replaced");
+}
+
+/// Files of one name with different endings have descriptions of their own.
+#[test]
+fn conversions_beside_each_other_keep_their_descriptions() {
+    let inputs = Inputs::new();
+    let files = [("c.csv.gz", 2350), ("c.tsv", 2000)];
+    for (name, samples) in files {
+        let rows: String = recording().lines().take(1 + samples).map(|row| format!("{row}\n")).collect();
+        let trace = inputs.put("t.csv", rows);
+        let ended = quintile().call(["trace", "convert", &trace, &inputs.path(name)]);
+        assert_eq!(ended.code, Some(0), "{name}: {}", ended.stderr);
+    }
+    for (name, samples) in files {
+        let text = String::from_utf8(read(&inputs.path(&format!("{name}.json")))).unwrap_or_default();
+        assert!(text.contains(&format!("\"samples\": {samples}")), "{name}: {text}");
+        let back = inputs.path(&format!("{name}.parquet"));
+        assert_eq!(quintile().call(["trace", "convert", &inputs.path(name), &back]).code, Some(0), "{name}");
+    }
+}
+
+/// Drawing makes the plot and nothing else, unless asked to.
+#[test]
+fn plots_leave_nothing_beside_the_trace() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let svg = inputs.path("o.svg");
+    let pyramid = inputs.path("t.csv.pyramid");
+    for (flags, kept) in [(&[][..], false), (&["--keep-pyramid"], true)] {
+        let ended = quintile().call(["trace", "plot", &trace, "--out", &svg].iter().chain(flags));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        assert_eq!(std::path::Path::new(&pyramid).exists(), kept);
+    }
+}
+
+#[test]
+fn frames_are_csv_and_say_so() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let out = inputs.path("f.parquet");
+    let ended = quintile().call(["trace", "frames", &trace, "--mark", "0.2", "--out", &out]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("which is no .parquet"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_last_frame_that_runs_to_the_end_of_the_trace_is_no_frame_to_average() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let ended = quintile().call(["trace", "frames", &trace, "--mark", "0.2", "--json"]);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap_or_default();
+    let summary = &report["summary"];
+    assert_eq!(
+        (&report["frames"][29]["flags"], &summary["frames"]),
+        (&"last+long".into(), &29.into()),
+        "{ended:?}"
+    );
+    let number = |key: &str| summary[key]["mean"].as_f64().unwrap_or(f64::NAN);
+    let power_w = summary["overall_power_w"].as_f64().unwrap_or(f64::NAN);
+    assert!((number("duration_s") - 0.01).abs() < 1e-5, "{summary}");
+    assert!((power_w - number("energy_j") / number("duration_s")).abs() < 1e-9, "{summary}");
+}
+
+#[test]
+fn an_idle_recording_that_is_too_short_is_refused_by_instant() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    let rows: String = (0..500).map(|i| format!("{},2\n", f64::from(i) / 5000.0)).collect();
+    let idle = inputs.put("idle.csv", "time_s,power_W\n".to_owned() + &rows);
+    let stretch =
+        ["trace", "energy", &trace, "--from", "0.1", "--to", "0.2", "--idle-trace", &idle, "--idle-by"];
+    let ended = quintile().call(stretch.into_iter().chain(["instant"]));
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("the idle recording lasts 0.1 s, the trace 0.47 s"), "{}", ended.stderr);
+    assert_eq!(quintile().call(stretch.into_iter().chain(["mean"])).code, Some(0));
+}
+
+#[test]
+fn pareto_reads_units_or_says_that_it_cannot() {
+    let inputs = Inputs::new();
+    let table = inputs.put("table.csv", "Time [ms],energy_kWh,power_W\n10,1,3\n");
+    let asked = |time: &str, energy: &str| {
+        quintile().call(["trace", "pareto", &table, "--time", time, "--energy", energy, "--json"])
+    };
+    let told: Value = serde_json::from_str(&asked("Time [ms]", "energy_kWh").stdout).unwrap_or_default();
+    let text = told.to_string();
+    assert!(text.contains("0.01") && text.contains("3600000"), "{text}");
+    for (time, energy) in [("power_W", "energy_kWh"), ("energy_kWh", "Time [ms]"), ("Time [ms]", "power_W")] {
+        assert_eq!(asked(time, energy).code, Some(2), "{time} {energy}");
+    }
+}
+
+/// 0.1 s at 5 kHz of 12 V and about 0.2 A, as CSV.
+fn small_currents(inputs: &Inputs) -> String {
+    let row = |i: u32| format!("{},12,{}\n", f64::from(i) / 5000.0, 0.15 + 0.05 * f64::from(i % 25) / 25.0);
+    let rows: String = (0..500).map(row).collect();
+    inputs.put("small.csv", format!("time_s,voltage_V,current_A\n{rows}"))
+}
+
+#[test]
+fn the_recorder_of_a_small_trace_has_a_range_that_fits_it() {
+    let inputs = Inputs::new();
+    let (trace, out) = (small_currents(&inputs), inputs.path("coarse.csv"));
+    let sample = |args: &[&str]| {
+        let call = ["trace", "sample", &trace, "--out", &out, "--json"];
+        let ended = quintile().call(call.iter().chain(args));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        let found: Value = serde_json::from_str(&ended.stdout).expect("JSON");
+        (found, ended.stderr)
+    };
+    let (found, warnings) = sample(&["--bits", "8", "--device-rate", "1kHz"]);
+    assert_eq!(found["device"]["current_range_a"], serde_json::json!([-0.3, 0.3]));
+    assert_eq!(found["device"]["name"], "daq-1khz-8bit");
+    let error = found["relative_error"].as_f64().expect("a number");
+    // At most half a code of 12 V in 36 V and half a code of 0.17 A in 0.6 A, each of 255.
+    let bound = 0.5 * (36.0 / 12.0 + 0.6 / 0.17) / 255.0;
+    assert!(error.abs() < bound && warnings.is_empty(), "{error}: {warnings}");
+    let (_, warnings) = sample(&["--bits", "8", "--current-range", "30A"]);
+    assert!(warnings.contains("[range-unused]") && warnings.contains("--current-range"), "{warnings}");
+    let (_, warnings) = sample(&["--current-range", "100mA"]);
+    assert!(warnings.contains("[clipped]"), "{warnings}");
+}
+
+#[test]
+fn binary_files_are_refused_without_their_bytes() {
+    let inputs = Inputs::new();
+    let files: [(&str, &[u8], &str); 3] = [
+        ("a.png", b"\x89PNG\r\n\x1a\n\x00\x00\x00\x0dIHDR", "a PNG image"),
+        ("a.jpg", b"\xff\xd8\xff\xe0\x00\x10JFIF", "a JPEG image"),
+        ("a.dat", b"\x00\x01\x02\x03\x04\x05\x06\x07\n", "a binary file"),
+    ];
+    for (name, bytes, says) in files {
+        let trace = inputs.put(name, bytes);
+        let ended = quintile().call(["trace", "frames", &trace, "--mark", "1"]);
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        assert!(
+            ended.stderr.contains(says) && ended.stderr.contains("Parquet, JLS, CSV"),
+            "{}",
+            ended.stderr
+        );
+        assert!(
+            !ended.stderr.contains('\u{fffd}') && ended.stderr.lines().count() == 1,
+            "{:?}",
+            ended.stderr
+        );
+    }
+}
+
+/// Calls the command with `input` on its standard input.
+fn piped(args: &[&str], input: &[u8]) -> std::process::Output {
+    use std::io::Write;
+    use std::process::{Command, Stdio};
+    let mut command = Command::new(env!("CARGO_BIN_EXE_quintile"));
+    let command = command.args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    let mut stdin = child.stdin.take().expect("a pipe");
+    // A command that refuses its arguments reads nothing.
+    let _ = stdin.write_all(input);
+    drop(stdin);
+    child.wait_with_output().expect("it ends")
+}
+
+#[test]
+fn a_dash_is_standard_input_and_standard_output() {
+    let inputs = Inputs::new();
+    let (trace, file) = (inputs.put("t.csv", recording()), inputs.path("o.parquet"));
+    let direct = quintile().call(["trace", "convert", &trace, &file]);
+    assert_eq!(direct.code, Some(0), "{}", direct.stderr);
+    let bytes = recording().into_bytes();
+    let through = piped(&["trace", "convert", "-", "-", "--format", "parquet"], &bytes);
+    assert_eq!(String::from_utf8_lossy(&through.stderr), "");
+    assert!(through.stdout == read(&file), "other bytes through pipes");
+    let back = piped(&["trace", "convert", "-", "-"], &through.stdout);
+    assert!(back.stdout.starts_with(b"time_s,"), "{}", String::from_utf8_lossy(&back.stderr));
+    let frames = piped(&["trace", "frames", "-", "--mark", "0.2", "--out", "-"], &bytes);
+    assert!(frames.stdout.starts_with(b"frame,"), "{}", String::from_utf8_lossy(&frames.stdout));
+    let plot = piped(&["trace", "plot", "-", "--out", "-"], &bytes);
+    let svg = String::from_utf8_lossy(&plot.stdout);
+    assert!(
+        svg.starts_with("<svg") && svg.contains("standard input"),
+        "{}",
+        String::from_utf8_lossy(&plot.stderr)
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_pipe_is_said_of_standard_input() {
+    let refused = |args: &[&str], input: &[u8], says: &str| {
+        let ended = piped(args, input);
+        let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(matches!(ended.status.code(), Some(1 | 2)) && message.contains(says), "{args:?}: {message}");
+        assert!(!message.contains(".tmp") && ended.stdout.is_empty(), "{args:?}: {message}");
+    };
+    refused(&["trace", "frames", "-", "--mark", "1"], b"a,b\n1,2\n", "standard input: ");
+    refused(&["trace", "frames", "-", "--mark", "1"], b"", "standard input: ");
+    refused(&["trace", "convert", "-", "-", "--json"], b"", "or --json, not both");
+    refused(&["trace", "convert", "-", "o.csv", "--format", "jls"], b"", "--format jls goes with `-`");
+}

@@ -1,0 +1,582 @@
+//! Every coded warning that a run can be brought to give is given: in `summary.json`, on the terminal and in the report.
+//! A list of all codes, read from the sources, keeps this complete.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use crate::support::{Glb, Inputs, Results, number, quintile, root};
+use serde_json::json;
+
+/// Why a warning of a workload is not brought about here.
+const TESTED: &str = "tests of the workload bring it about, each in a run of its own";
+
+/// Codes that no test here brings about, and why.
+const NOT_PROVOKED: [(&str, &str); 12] = [
+    (
+        "collision-near-everywhere",
+        "it takes surfaces that slide along each other; a unit test in `workloads` makes it up",
+    ),
+    (
+        "flat-mark",
+        "a run marks starts of its frames, where power rises; a unit test in `traces` has marks in noise",
+    ),
+    ("lens-wider-than-receiver", TESTED),
+    ("shading-cache-small", TESTED),
+    ("shadow-banding", TESTED),
+    ("shadow-bias", TESTED),
+    ("view-dependent-shading", TESTED),
+    (
+        "clipped-samples",
+        "the recorder of a run is chosen so that its range holds the peak; only a recorder set by hand could clip",
+    ),
+    (
+        "prediction-unsure",
+        "it takes an animation whose previews mislead by more than a few percent; a unit test in `sim` makes it up",
+    ),
+    (
+        "short-packets",
+        "it takes a larger GPU than those that come with the program; a unit test in `sim` has a stream of such packets",
+    ),
+    ("unsure-frames", "it takes a trace in which frames go astray; tests in `traces` have some"),
+    (
+        "uncovered",
+        "it takes a trace whose frames change until they are not followed; a unit test in `traces` has one",
+    ),
+];
+
+/// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
+const PROVOKED: [&str; 49] = [
+    "accuracy-missed",
+    "alpha-ignored",
+    "behind-camera",
+    "blur-beyond-image",
+    "budget-missed",
+    "camera-ignored",
+    "camera-inside",
+    "caustics-coarse",
+    "caustics-crossed",
+    "coordinates-far-from-origin",
+    "coordinates-out-of-range",
+    "coordinates-recentred",
+    "degenerate-triangle",
+    "emissive-ignored",
+    "empty-frame",
+    "extension-ignored",
+    "face-colors-ignored",
+    "fast-motion",
+    "few-samples",
+    "focus-of-fitted-camera",
+    "frames-missed",
+    "idle-above-busy",
+    "irregular-spacing",
+    "leaves-fitted-view",
+    "lens-leaves-view",
+    "light-ignored",
+    "memory-rows",
+    "metallic-ignored",
+    "missed-vsync",
+    "missing-image",
+    "missing-material",
+    "missing-texcoord",
+    "normal-map-ignored",
+    "occlusion-map-ignored",
+    "occlusion-small-occluders",
+    "only-mark",
+    "orthographic-view",
+    "packets-lost",
+    "platform-mismatch",
+    "points-thin-voids",
+    "primitive-dropped",
+    "short-frame",
+    "sliver-triangles",
+    "sub-sample-triangles",
+    "texture-filter-ignored",
+    "texture-ignored",
+    "weak-separation",
+    "window-cut",
+    "window-longer-than-frame",
+];
+
+/// Asserts that the run warns with `code` in all three places, in the same words.
+fn assert_warns(results: &Results, code: &str) {
+    assert!(PROVOKED.contains(&code), "{code} is missing in the list");
+    let summary = results.summary();
+    let mut warnings = summary["warnings"].as_array().into_iter().flatten();
+    let warning = warnings.find(|warning| warning["code"] == code);
+    let warning = warning.unwrap_or_else(|| panic!("no {code} in {:?}", results.warning_codes()));
+    let message = warning["message"].as_str().unwrap_or_default();
+    assert!(message.len() > 20, "{code} says too little: {message}");
+    let line = format!("warning: [{code}] {message}");
+    assert!(
+        results.ended.stderr.lines().any(|printed| printed.starts_with(&line)),
+        "{}",
+        results.ended.stderr
+    );
+    let report = results.text("report.html");
+    assert!(report.contains(code), "{code} is not in the report");
+    let word = message.split_whitespace().max_by_key(|word| word.len()).unwrap_or_default();
+    assert!(report.contains(escaped(word).as_str()), "`{word}` of {code} is not in the report");
+}
+
+/// Text as the report has it.
+fn escaped(text: &str) -> String {
+    let pairs =
+        [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;"), ('\'', "&#x27;"), ('/', "&#x2f;")];
+    let escape = |letter: char| {
+        pairs
+            .iter()
+            .find(|(raw, _)| *raw == letter)
+            .map_or(letter.to_string(), |(_, text)| (*text).to_owned())
+    };
+    text.chars().map(escape).collect()
+}
+
+fn run_file(name: &str, bytes: impl AsRef<[u8]>, args: &[&str]) -> Results {
+    let inputs = Inputs::new();
+    let small = ["--size", "48x32", "--frames", "0..2", "--samples", "2"];
+    quintile().run(&inputs.put(name, bytes), &[&small, args].concat())
+}
+
+const SPHERE: &str = "(shape: Sphere(radius: 1, segments: 12))";
+
+#[test]
+fn frames_too_short_for_the_recorder() {
+    let results = quintile().run("tiny", &["--trace-rate", "50000"]);
+    assert_warns(&results, "short-frame");
+    // One message says it all, and nothing that was not measured looks as if it had been.
+    assert_eq!(results.warning_codes(), ["short-frame"]);
+    let summary = results.summary();
+    assert!(summary["measured"].is_null() && summary["truth"].is_object());
+    let rows = summary["frames"].as_array().into_iter().flatten();
+    assert!(rows.into_iter().all(|row| row.get("measured_energy_j") == Some(&json!(null))));
+    let printed = &results.ended.stdout;
+    let row = printed.lines().find(|line| line.starts_with("time per frame")).unwrap_or_default();
+    assert_eq!(row.split_whitespace().nth(3), Some("-"), "{printed}");
+    assert!(printed.contains("no frame but the marked one was found"), "{printed}");
+    assert!(summary["warnings"].to_string().contains("--trace-rate 200000"), "{}", summary["warnings"]);
+}
+
+/// Without a rate of the recorder, the frames decide: those of `tiny` are measured as they are.
+#[test]
+fn the_recorder_follows_short_frames() {
+    let results = quintile().run("tiny", &[]);
+    let summary = results.summary();
+    assert_eq!(number(&summary, "/recorder/rate_hz"), 200e3);
+    assert_eq!(number(&summary, "/settings/trace_rate_hz"), 200e3);
+    assert!(
+        results.ended.stdout.contains("recorder: 200 kHz, raised from 50.0 kHz"),
+        "{}",
+        results.ended.stdout
+    );
+    for pointer in ["duration_s", "energy_j", "power_w"] {
+        let [measured, truth] =
+            ["measured", "truth"].map(|of| number(&summary, &format!("/{of}/{pointer}/mean")));
+        assert!((measured / truth - 1.0).abs() < 0.001, "{pointer}: {measured} for {truth}");
+    }
+    let larger = quintile().run("tiny", &["--size", "320x180"]).summary();
+    assert_eq!((number(&larger, "/recorder/rate_hz"), &larger["recorder"]["raised"]), (50e3, &json!(false)));
+}
+
+/// The page of the book on warnings says what some commands warn of. They do.
+#[test]
+fn the_page_says_what_a_fresh_checkout_warns_of() {
+    let page = fs::read_to_string(root().join("docs/warnings.md")).expect("the book's chapter on warnings");
+    let section = page.split("## In a fresh checkout").nth(1).unwrap_or_default();
+    let promises: Vec<(&str, &str)> = section.lines().filter_map(promise).collect();
+    assert!(promises.len() >= 5, "{section}");
+    for (command, promised) in promises {
+        let args: Vec<&str> = command.split_whitespace().skip(2).collect();
+        // The whole default run takes too long for a test, so a part of it stands for it.
+        let (scene, args) = match args.split_first() {
+            Some((scene, args)) => (*scene, args.to_vec()),
+            None => ("default", vec!["--frames", "17..19", "--timing", "bound"]),
+        };
+        let codes = quintile().run(scene, &args).warning_codes();
+        assert_eq!(codes.join(" "), promised, "{command}");
+    }
+}
+
+/// The command of a line, and the code that it warns of; no code where it warns of nothing.
+fn promise(line: &str) -> Option<(&str, &str)> {
+    let (command, rest) = line.strip_prefix("- `")?.split_once("` warns of ")?;
+    let code = if rest.starts_with("nothing") { "" } else { rest.strip_prefix('`')?.split('`').next()? };
+    Some((command, code))
+}
+
+#[test]
+fn a_gpu_on_a_platform_of_another() {
+    let warned = |args: &[&str]| quintile().run("tiny", args);
+    assert_warns(&warned(&["--gpu", "discrete"]), "platform-mismatch");
+    assert_warns(&warned(&["--gpu", "mobile", "--platform", "hd_4000"]), "platform-mismatch");
+}
+
+#[test]
+fn a_platform_that_rests_at_more_than_it_works() {
+    let inputs = Inputs::new();
+    let path = root().join("power-model/platforms/reference.ron");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let idle = text.replace("idle_w: Assumed(0.95", "idle_w: Assumed(9.5");
+    assert_ne!(text, idle, "the platform idles at other watts now");
+    let results = quintile().run("tiny", &["--platform", &inputs.put("idle.ron", idle)]);
+    assert_warns(&results, "idle-above-busy");
+    assert_eq!(
+        results.warning_codes().iter().filter(|code| *code == "platform-mismatch").count(),
+        0,
+        "its name is still `reference`"
+    );
+}
+
+#[test]
+fn packets_that_the_recorder_lost_are_gaps_in_its_file() {
+    let lossy = ["--packet-loss", "0.2", "--packet-samples", "64"];
+    let results = quintile().run("tiny", &lossy);
+    assert_warns(&results, "packets-lost");
+    let trace = results.path("trace.parquet");
+    let refused = traces::io::read(&trace, &traces::io::ReadOptions::default()).unwrap_err();
+    assert!(matches!(refused, traces::io::ReadError::Uneven { .. }), "{refused}");
+    let mended = traces::io::ReadOptions { repair: true, ..Default::default() };
+    assert!(!traces::io::read(&trace, &mended).unwrap().repairs.is_empty());
+    let ended = quintile().call(["run", "tiny", "--packet-loss", "1"]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("--packet-loss"), "{}", ended.stderr);
+}
+
+#[test]
+fn an_accuracy_that_no_time_is_left_for() {
+    let args = ["--size", "96x54", "--frames", "0..2", "--accuracy", "0.0001%", "--budget", "0.001ms"];
+    let results = quintile().run("default", &args);
+    assert_warns(&results, "budget-missed");
+    assert_warns(&results, "accuracy-missed");
+}
+
+#[test]
+fn frames_that_are_not_found() {
+    let results = quintile().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "6000"]);
+    assert_warns(&results, "frames-missed");
+    assert_warns(&results, "few-samples");
+}
+
+/// A torus that is there for some frames and far away for the others; `keys` say when.
+fn flashing(frames: u32, keys: &str) -> String {
+    format!(
+        "(settings: (width: 320, height: 180, samples: 16, frames: (0, {frames}), shutter: 0), \
+         camera: (position: (0, 0, 5), target: (0, 0, 0)), \
+         objects: [(shape: Sphere(radius: 0.02, segments: 8)), \
+         (shape: Torus(ring: 1, tube: 0.5, segments: 256), interpolation: Step, repeat: true, keyframes: [{keys}])])"
+    )
+}
+
+#[test]
+fn a_marked_frame_like_no_other() {
+    let once = "(time_s: 0, position: (0, 0, 99)), (time_s: 0.0666, position: (0, 0, 0)), \
+                (time_s: 0.0832, position: (0, 0, 99)), (time_s: 9, position: (0, 0, 99))";
+    let inputs = Inputs::new();
+    let results = quintile().run(&inputs.put("once.ron", flashing(9, once)), &[]);
+    assert_warns(&results, "only-mark");
+    assert_warns(&results, "frames-missed");
+}
+
+#[test]
+fn starts_of_frames_no_longer_than_a_sample() {
+    let results = quintile().run("tiny", &["--pacing", "free", "--frames", "0..20", "--trace-rate", "5000"]);
+    assert_warns(&results, "irregular-spacing");
+}
+
+/// Whether chance makes starts and noise look alike depends on the frames' length: one of these has to be such a case.
+#[test]
+fn starts_that_drown_in_noise() {
+    let runs = [("0..1", "100"), ("0..3", "200"), ("0..12", "200"), ("0..3", "300"), ("0..20", "500")];
+    let run = |(frames, rate)| quintile().run("tiny", &["--frames", frames, "--trace-rate", rate]);
+    let found =
+        runs.into_iter().map(run).find(|run| run.warning_codes().contains(&"weak-separation".to_owned()));
+    assert_warns(&found.expect("no run of these warns of weak separation"), "weak-separation");
+}
+
+/// Frames that grow from almost nothing, free-running: the window is as long as the rate of the recorder allows, and
+/// longer than most of them.
+#[test]
+fn a_window_longer_than_most_frames() {
+    let zoom = "(settings: (width: 320, height: 180, samples: 16, frames: (0, 24)), \
+                camera: (position: (0, 0, 25), target: (0, 0, 0), end_position: (0, 0, 2)), \
+                objects: [(shape: Torus(ring: 1, tube: 0.5, segments: 128))])";
+    let inputs = Inputs::new();
+    let args = ["--pacing", "free", "--trace-rate", "2000"];
+    let results = quintile().run(&inputs.put("zoom.ron", zoom), &args);
+    assert_warns(&results, "window-longer-than-frame");
+}
+
+#[test]
+fn frames_longer_than_the_display_waits() {
+    let results = quintile().run("tiny", &["--rate", "100000"]);
+    assert_warns(&results, "missed-vsync");
+}
+
+#[test]
+fn a_triangle_without_area() {
+    let flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\nf 1 2 4\n";
+    assert_warns(&run_file("flat.obj", flat, &[]), "degenerate-triangle");
+}
+
+#[test]
+fn a_camera_that_sees_nothing() {
+    let away = format!("(camera: (position: (0, 0, 5), target: (0, 0, 9)), objects: [{SPHERE}])");
+    assert_warns(&run_file("away.ron", away, &[]), "empty-frame");
+}
+
+#[test]
+fn images_that_are_not_there() {
+    let object = "(shape: Plane(size: 2), material: (texture: Image(file: \"gone.png\")))";
+    assert_warns(&run_file("a.ron", format!("(objects: [{object}])"), &[]), "missing-image");
+    let mut glb = Glb::square();
+    glb.texture_coordinates();
+    glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    glb.json["textures"] = json!([{"source": 0}]);
+    glb.json["images"] = json!([{"uri": "gone.png"}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "missing-image");
+}
+
+#[test]
+fn materials_that_are_not_drawn_as_they_ask() {
+    let mut glb = Glb::square();
+    let see_through = json!({"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 1});
+    let map = json!({"index": 0});
+    glb.material(json!({"alphaMode": "BLEND", "pbrMetallicRoughness": see_through, "normalTexture": map,
+                        "occlusionTexture": map, "emissiveFactor": [1, 0, 0]}));
+    glb.json["textures"] = json!([{"source": 0}]);
+    glb.json["images"] = json!([{"uri": "not read"}]);
+    glb.json["extensionsUsed"] = json!(["KHR_materials_sheen"]);
+    let results = run_file("a.glb", glb.bytes(), &[]);
+    let ignored = ["alpha", "metallic", "normal-map", "occlusion-map", "emissive", "extension"];
+    ignored.iter().for_each(|what| assert_warns(&results, &format!("{what}-ignored")));
+    let mut glb = Glb::square();
+    glb.texture_coordinates();
+    glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    glb.json["textures"] = json!([{"source": 0, "sampler": 0}]);
+    glb.json["samplers"] = json!([{"magFilter": 9728}]);
+    glb.json["images"] = json!([{"uri": format!("data:image/png;base64,{PIXEL}")}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "texture-filter-ignored");
+    let mut glb = Glb::square();
+    glb.material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    glb.json["textures"] = json!([{"source": 0}]);
+    glb.json["images"] = json!([{"uri": format!("data:image/png;base64,{PIXEL}")}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "missing-texcoord");
+    let obj = "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    assert_warns(&run_file("a.obj", obj, &[]), "missing-material");
+    let properties = "property float x\nproperty float y\nproperty float z\n";
+    let face = "property list uchar int vertex_indices\nproperty uchar red\n";
+    let ply = format!(
+        "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\n{properties}element face 1\n{face}end_header\n\
+         0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n"
+    );
+    let results = run_file("a.ply", ply, &[]);
+    assert_warns(&results, "face-colors-ignored");
+    assert_warns(&results, "texture-ignored");
+}
+
+#[test]
+fn coordinates_far_from_the_origin() {
+    let far = "v 4000000 0 0\nv 4000001 0 0\nv 4000000 1 0\nf 1 2 3\n";
+    assert_warns(&run_file("far.obj", far, &[]), "coordinates-recentred");
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]: [f32; 2]| [x + 4e6, y, 0.0]);
+    let results = run_file("far.glb", Glb::with_positions(&corners).bytes(), &[]);
+    assert_warns(&results, "coordinates-far-from-origin");
+}
+
+/// A PNG of one grey pixel.
+const PIXEL: &str =
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNoAAAAggCBd81ytgAAAABJRU5ErkJggg==";
+
+#[test]
+fn parts_of_a_gltf_scene_that_are_left_out() {
+    let mut glb = Glb::square();
+    let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
+    glb.json["meshes"][0]["primitives"] = json!([glb.json["meshes"][0]["primitives"][0], points]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "primitive-dropped");
+    let mut glb = Glb::square();
+    let lens = json!({"xmag": 1.0, "ymag": 0.0, "zfar": 10.0, "znear": 0.1});
+    glb.json["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
+    glb.json["nodes"] = json!([{"mesh": 0, "children": [1]}, {"camera": 0, "translation": [0.5, 0.5, 3.0]}]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "camera-ignored");
+    let mut glb = Glb::square();
+    glb.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    glb.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point"}]}});
+    let lamp = json!({"extensions": {"KHR_lights_punctual": {"light": 0}}});
+    glb.json["nodes"] = json!([{"mesh": 0, "children": [1]}, lamp]);
+    assert_warns(&run_file("a.glb", glb.bytes(), &[]), "light-ignored");
+}
+
+/// A box whose faces are seen from inside.
+const ROOM: &str = "v 0 0 0\nv 9 0 0\nv 0 3 0\nv 9 3 0\nv 0 0 4\nv 9 0 4\nv 0 3 4\nv 9 3 4\n\
+                    f 3 7 5 1\nf 6 8 4 2\nf 5 6 2 1\nf 4 8 7 3\nf 2 4 3 1\nf 7 8 6 5\n";
+
+#[test]
+fn a_camera_inside_a_room() {
+    assert_warns(&run_file("a.obj", ROOM, &[]), "camera-inside");
+    let outside = run_file("a.obj", ROOM, &["--camera", "outside"]);
+    assert!(!outside.warning_codes().iter().any(|code| code == "camera-inside"));
+}
+
+#[test]
+fn a_lens_for_a_camera_placed_by_itself() {
+    let focus = format!("(settings: (lens_radius: 0.1, focus: 3), objects: [{SPHERE}])");
+    assert_warns(&run_file("a.ron", focus, &[]), "focus-of-fitted-camera");
+    let wide = format!("(objects: [{SPHERE}])");
+    assert_warns(&run_file("a.ron", wide, &["--lens", "1", "--focus", "1"]), "lens-leaves-view");
+    let leaves = "(settings: (frames: (0, 1)), objects: [(shape: Sphere(radius: 1, segments: 12), velocity: (900, 0, 0))])";
+    assert_warns(&run_file("a.ron", leaves, &[]), "leaves-fitted-view");
+}
+
+/// A code, a scene that provokes it with its flags, and one that does not with its flags.
+type Regime<'a> = (&'a str, String, &'a [&'a str], String, &'a [&'a str]);
+
+/// Scenes in the regimes of the failure catalogue, and next to each a harmless one of the same kind that is not warned of.
+#[test]
+fn regimes_in_which_tile_tests_pay_little() {
+    let camera = "camera: (position: (0, 0, 5), target: (0, 0, 0))";
+    let scene = |camera: &str, object: &str| format!("({camera}, objects: [{object}])");
+    let floor = |y: &str| format!("(shape: Plane(size: 100), position: (0, {y}, 0))");
+    let moving = |speed: &str| format!("(shape: Sphere(radius: 1, segments: 12), velocity: ({speed}, 0, 0))");
+    let sphere = |segments: &str| format!("(shape: Sphere(radius: 1, segments: {segments}))");
+    let thin = |height: &str| format!("(shape: Box(size: (2, {height}, 2)))");
+    let boxed = |scale: &str| {
+        let camera = format!("camera: (position: (0, 0, 5{scale}), target: (0, 0, 0))");
+        scene(&camera, &format!("(shape: Box(size: (1{scale}, 1{scale}, 1{scale})))"))
+    };
+    let sphere = |segments: &str| scene(camera, &sphere(segments));
+    let (sharp, soft) = (["--lens", "0.1", "--focus", "1"], ["--lens", "100", "--focus", "1"]);
+    let cases: [Regime<'_>; 6] = [
+        ("behind-camera", scene(camera, &floor("-1")), &[], sphere("12"), &[]),
+        ("sub-sample-triangles", sphere("1000"), &[], sphere("12"), &[]),
+        ("sliver-triangles", scene(camera, &thin("0.001")), &[], scene(camera, &thin("1")), &[]),
+        ("fast-motion", scene(camera, &moving("2000")), &[], scene(camera, &moving("1")), &[]),
+        ("blur-beyond-image", sphere("12"), &soft, sphere("12"), &sharp),
+        ("coordinates-out-of-range", boxed("e13"), &[], boxed("e3"), &[]),
+    ];
+    let small = ["--size", "160x90", "--frames", "0..2", "--samples", "2"];
+    let run = |scene: &str, args: &[&str]| {
+        let inputs = Inputs::new();
+        quintile().run(&inputs.put("a.ron", scene), &[&small, args].concat())
+    };
+    for (code, hopeless, args, harmless, quiet) in cases {
+        assert_warns(&run(&hopeless, args), code);
+        let codes = run(&harmless, quiet).warning_codes();
+        assert!(!codes.contains(&code.to_owned()), "{code} without need: {codes:?}");
+    }
+}
+
+/// The reference GPU with memory that opens a row for every line, slowly.
+#[test]
+fn rows_of_memory_that_decide() {
+    let inputs = Inputs::new();
+    let path = root().join("sim/gpus/reference.ron");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let slow = text
+        .replace("activate_cycles: 7, precharge_cycles: 7", "activate_cycles: 100, precharge_cycles: 100")
+        .replace("row_bytes: 4096, interleave_bytes: 256", "row_bytes: 64, interleave_bytes: 64")
+        .replace("l2: (entries: 4096, ways: 8)", "l2: (entries: 64, ways: 8)");
+    assert_ne!(text, slow, "the GPU has another memory now");
+    let gpu = inputs.put("slow.ron", slow);
+    let run = |gpu: &str, level: &str| {
+        let args = ["--size", "160x90", "--frames", "0..1", "--gpu", gpu, "--timing", level];
+        quintile().run("default", &args)
+    };
+    assert_warns(&run(&gpu, "packet"), "memory-rows");
+    assert_warns(&run(&gpu, "bound"), "memory-rows");
+    for (gpu, level) in [(gpu.as_str(), "stepped"), ("reference", "packet")] {
+        assert!(!run(gpu, level).warning_codes().contains(&"memory-rows".to_owned()), "{gpu} {level}");
+    }
+}
+
+/// The reference platform with less time recorded before the first frame and after the last.
+fn without_margins(inputs: &Inputs) -> String {
+    let path = root().join("power-model/platforms/reference.ron");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let short = text
+        .replace("lead_in_s: Assumed(0.25", "lead_in_s: Assumed(0")
+        .replace("tail_s: Assumed(0.25", "tail_s: Assumed(0");
+    assert_ne!(text, short, "the platform has other margins now");
+    inputs.put("short.ron", short)
+}
+
+#[test]
+fn a_mark_at_the_edge_of_the_recording() {
+    let inputs = Inputs::new();
+    let platform = without_margins(&inputs);
+    let args = ["--size", "160x90", "--frames", "0..1", "--platform", &platform];
+    assert_warns(&quintile().run("default", &args), "window-cut");
+}
+
+/// Every code in the sources is in one of the two lists here and in the book, and no code here is made up.
+#[test]
+fn every_code_is_accounted_for() {
+    let mut found = BTreeSet::new();
+    for folder in ["pipeline", "pipeline/activity", "workloads", "power-model", "traces", "sim"] {
+        collect_codes(&root().join(folder).join("src"), &mut found);
+    }
+    let listed = PROVOKED.into_iter().chain(NOT_PROVOKED.map(|(code, _)| code));
+    let listed: BTreeSet<String> = listed.map(str::to_owned).collect();
+    assert_eq!(found, listed);
+    let chapter =
+        fs::read_to_string(root().join("docs/warnings.md")).expect("the book's chapter on warnings");
+    let unexplained: Vec<_> = found.iter().filter(|code| !chapter.contains(&format!("`{code}`"))).collect();
+    assert!(unexplained.is_empty(), "the book does not explain {unexplained:?}");
+}
+
+/// The codes that are the first argument of what makes warnings, or a constant of the same file that stands there.
+fn collect_codes(folder: &Path, codes: &mut BTreeSet<String>) {
+    for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.expect("an entry of a source folder").path();
+        if path.is_dir() {
+            collect_codes(&path, codes);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(&path).expect("a source file");
+            let product = text.split("#[cfg(test)]").next().unwrap_or_default();
+            for maker in ["Warning::new(", "Warning::about(", "about_material("] {
+                let made = product.split(maker).skip(1);
+                codes.extend(made.filter_map(|rest| code_of(rest.trim_start(), product)));
+            }
+        }
+    }
+}
+
+fn code_of(argument: &str, file: &str) -> Option<String> {
+    let quoted = |text: &str| text.split('"').nth(1).map(str::to_owned);
+    if argument.starts_with('"') {
+        return quoted(argument);
+    }
+    let name = argument.split(',').next()?;
+    let constant = format!("const {name}: &str =");
+    let (_, rest) = file.split_once(&constant)?;
+    quoted(rest)
+}
+
+#[test]
+fn beams_whose_sides_cross() {
+    let set = ["cells=24", "slope=0.3", "depth_m=10", "pleat=0.6"].map(|option| ["--set", option]);
+    let args = [&["--size", "64x36"][..], set.as_flattened()].concat();
+    let results = quintile().run("caustics", &args);
+    assert_warns(&results, "caustics-crossed");
+    assert_warns(&results, "caustics-coarse");
+}
+
+/// No run samples points in single precision: the warning is that of `quintile sample`.
+#[test]
+fn points_on_numbers_that_are_too_coarse() {
+    let warnings = |single: &[&str]| {
+        let args = [&["sample", "poisson", "--dim", "1", "--r", "1e-5", "--json"], single].concat();
+        let ended = quintile().call(&args);
+        let told: serde_json::Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
+        told["warnings"].clone()
+    };
+    assert_eq!(warnings(&["--single"])[0]["code"], "points-thin-voids");
+    assert_eq!(warnings(&[]), json!([]));
+}
+
+#[test]
+fn occluders_smaller_than_tiles() {
+    let args = ["--size", "96x54", "--set", "slats=24", "--set", "gaps=0.02", "--set", "walls=40"];
+    assert_warns(&quintile().run("occlusion", &args), "occlusion-small-occluders");
+    let nothing_asked = [&args[..], &["--set", "objects=0"]].concat();
+    let codes = quintile().run("occlusion", &nothing_asked).warning_codes();
+    assert!(!codes.contains(&"occlusion-small-occluders".to_owned()), "{codes:?}");
+}

@@ -1,0 +1,223 @@
+//! Sampling a trace again, piece by piece.
+
+use super::sample::{Channels, LowPass, SampleError};
+use super::{Device, gaps::Gaps};
+use crate::curve::CurveError;
+use crate::energy::Sums;
+use crate::io::{Heading, Sink, Source, Stretch, WriteError};
+use crate::sum::PairSum;
+use crate::trace::{check_times, losses, lost_at_end, lost_samples};
+use core::ops::Range;
+use rayon::prelude::*;
+
+/// Mean powers that are turned into samples at once, and by a thread.
+const PIECE: usize = 1 << 16;
+const TASK: usize = 1 << 12;
+/// The most samples: none is held, but somebody has to wait for them.
+const MOST: f64 = (1_u64 << 36) as f64;
+
+/// What a coarser device would have recorded of a trace: the trace is read again whenever samples are asked for, and
+/// neither is in memory. The samples are those of [`Device::resample`], to the last bit.
+pub struct Resampled<'a> {
+    device: &'a Device,
+    trace: &'a dyn Source,
+    heading: Heading,
+    lost: Vec<Range<usize>>,
+    /// Energy of all samples, J.
+    pub energy_j: f64,
+    /// Samples whose current was clipped to the range; above 0 is worth a warning.
+    pub clipped_currents: usize,
+    /// Samples whose voltage was clipped to the range.
+    pub clipped_voltages: usize,
+}
+
+impl Device {
+    /// Samples a trace as if its power were drawn from the device's rail. It is gone through once, so that whatever is
+    /// wrong is known before a sample is asked for.
+    ///
+    /// # Errors
+    /// [`WriteError::Source`] as [`Device::resample`], and [`WriteError::Read`] if the trace cannot be read.
+    pub fn resample_in_pieces<'a>(&'a self, trace: &'a dyn Source) -> Result<Resampled<'a>, WriteError> {
+        let Heading { start_s, metadata, .. } = trace.heading();
+        let end_s = trace.heading().end_s();
+        let count = self.periods([start_s, end_s], [start_s, end_s], MOST);
+        let samples = count.as_ref().map_or(0, |count| *count);
+        let lost = self.lost(samples);
+        let heading = Heading {
+            start_s,
+            rate_hz: self.spec.rate_hz,
+            samples: samples as u64,
+            lost_samples: lost_samples(&lost) as u64,
+            lost_at_end: lost_at_end(&lost, samples),
+            metadata: self.metadata(metadata),
+        };
+        let (energy_j, clipped_currents, clipped_voltages) = (0.0, 0, 0);
+        let mut made =
+            Resampled { device: self, trace, heading, lost, energy_j, clipped_currents, clipped_voltages };
+        let mut sums = Sums::up_to(&made.heading, [start_s, made.heading.end_s()].into_iter());
+        let pass = made.pass(&mut sums)?;
+        pass.check(count.err())?;
+        (made.clipped_currents, made.clipped_voltages) = (pass.clipped_currents, pass.clipped_voltages);
+        check_times(made.heading.samples, self.spec.rate_hz, start_s).map_err(SampleError::Trace)?;
+        made.energy_j = sums.energies_j(self.spec.rate_hz).next().unwrap_or(0.0);
+        Ok(made)
+    }
+}
+
+impl Resampled<'_> {
+    /// What the device lost and from when on, in words; `None` if nothing.
+    pub fn losses(&self) -> Option<String> {
+        losses(&self.lost, |index| self.heading.time_s(index as u64))
+    }
+
+    fn pass<'a>(&'a self, into: &'a mut dyn Sink) -> Result<Pass<'a>, WriteError> {
+        let mut pass = Pass::new(self, into);
+        self.trace.pour(&mut pass)?;
+        pass.finish()?;
+        Ok(pass)
+    }
+}
+
+impl Source for Resampled<'_> {
+    fn heading(&self) -> Heading {
+        self.heading.clone()
+    }
+
+    fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
+        Ok(self.pass(sink)?.check(None)?)
+    }
+}
+
+/// One way through the trace.
+struct Pass<'a> {
+    device: &'a Device,
+    of: Heading,
+    made: &'a Heading,
+    /// Energy before the sample at hand, and before the mean that comes next, J.
+    energy: PairSum,
+    before: PairSum,
+    /// Means so far, and those not yet turned into samples, W.
+    means: u64,
+    means_w: Vec<f64>,
+    low_pass: Option<LowPass>,
+    gaps: Gaps<'a>,
+    clipped_currents: usize,
+    clipped_voltages: usize,
+    edge: Option<CurveError>,
+    power: Option<CurveError>,
+    overload: Option<SampleError>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(resampled: &'a Resampled<'_>, into: &'a mut dyn Sink) -> Self {
+        let Resampled { device, trace, heading, lost, .. } = resampled;
+        Self {
+            device,
+            of: trace.heading(),
+            made: heading,
+            energy: PairSum::default(),
+            before: PairSum::default(),
+            means: 0,
+            means_w: Vec::with_capacity(PIECE),
+            low_pass: device.low_pass(),
+            gaps: Gaps::new(lost, into),
+            clipped_currents: 0,
+            clipped_voltages: 0,
+            edge: None,
+            power: None,
+            overload: None,
+        }
+    }
+
+    /// Takes one sample of the trace: the means of all periods that end in it.
+    fn step(&mut self, index: u64, power_w: f64) -> Result<(), WriteError> {
+        let (begin_s, end_s) = (self.of.time_s(index), self.of.time_s(index + 1));
+        self.check_sample(index, [begin_s, end_s], power_w);
+        if index == 0 {
+            self.before = self.energy.plus_span(begin_s, begin_s, power_w);
+        }
+        let (last, rate_hz) = (index + 1 == self.of.samples, self.made.rate_hz);
+        while self.means < self.made.samples {
+            let limit_s = [self.of.start_s, self.of.end_s()];
+            let time_s =
+                (self.made.start_s + (self.means + 1) as f64 / rate_hz).clamp(limit_s[0], limit_s[1]);
+            if time_s >= end_s && !last {
+                break;
+            }
+            let energy = self.energy.plus_span(begin_s, time_s, power_w);
+            self.means_w.push(energy.minus(self.before) * rate_hz);
+            (self.before, self.means) = (energy, self.means + 1);
+            if self.means_w.len() == PIECE {
+                self.convert()?;
+            }
+        }
+        self.energy = self.energy.plus_span(begin_s, end_s, power_w);
+        Ok(())
+    }
+
+    /// As a [`Curve`](crate::Curve) is checked.
+    fn check_sample(&mut self, index: u64, [begin_s, end_s]: [f64; 2], power_w: f64) {
+        let index = index as usize;
+        if !(end_s.is_finite() && end_s > begin_s) {
+            self.edge.get_or_insert(CurveError::Edge { index: index + 1, time_s: end_s });
+        }
+        if !power_w.is_finite() {
+            self.power.get_or_insert(CurveError::Power { index, power_w });
+        }
+    }
+
+    /// Turns the means at hand into samples, side by side, and hands them on.
+    fn convert(&mut self) -> Result<(), WriteError> {
+        let mut means_w = std::mem::take(&mut self.means_w);
+        if self.edge.is_none() && self.power.is_none() && self.overload.is_none() {
+            if let Some(low_pass) = &mut self.low_pass {
+                low_pass.apply(&mut means_w);
+            }
+            let (device, start_s, first) =
+                (self.device, self.made.start_s, self.means - means_w.len() as u64);
+            let tasks = means_w.par_chunks(TASK).enumerate();
+            let made: Vec<_> = tasks
+                .map(|(task, means_w)| device.convert(first + (task * TASK) as u64, means_w, start_s))
+                .collect();
+            for (task, channels) in made.into_iter().enumerate() {
+                match channels {
+                    Ok(channels) => self.hand_on(first + (task * TASK) as u64, &channels)?,
+                    Err(error) => {
+                        self.overload = Some(error);
+                        break;
+                    }
+                }
+            }
+        }
+        means_w.clear();
+        self.means_w = means_w;
+        Ok(())
+    }
+
+    fn hand_on(&mut self, first: u64, channels: &Channels) -> Result<(), WriteError> {
+        self.clipped_currents += channels.clipped_currents;
+        self.clipped_voltages += channels.clipped_voltages;
+        let (voltage_v, current_a) = (&channels.voltage_v[..], &channels.current_a[..]);
+        self.gaps.take(&Stretch { first, voltage_v, current_a, lost: false })
+    }
+
+    fn finish(&mut self) -> Result<(), WriteError> {
+        self.convert()?;
+        self.gaps.finish()
+    }
+
+    /// What was wrong, in the order in which a trace in memory is checked.
+    fn check(&self, periods: Option<SampleError>) -> Result<(), SampleError> {
+        let curve = self.edge.clone().or(self.power.clone()).map(SampleError::Curve);
+        curve.or(periods).or(self.overload.clone()).map_or(Ok(()), Err)
+    }
+}
+
+impl Sink for Pass<'_> {
+    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+        (stretch.first..).zip(stretch.powers_w()).try_for_each(|(index, power_w)| self.step(index, power_w))
+    }
+}
+
+#[cfg(test)]
+mod tests;

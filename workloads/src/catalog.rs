@@ -1,0 +1,91 @@
+//! Every job by name.
+
+use crate::error::LoadError;
+use crate::job::{Flags, Job, OptionSource, Request};
+
+type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
+
+/// A job that can be asked for.
+struct Known {
+    name: &'static str,
+    /// What it is.
+    what: &'static str,
+    /// What it makes of flags.
+    flags: Flags,
+    make: Maker,
+}
+
+/// Every job.
+const JOBS: &[Known] = &[
+    Known {
+        name: "caustics",
+        what: "light refracted by waves: beams drawn as moving triangles, or in the bodies that others put around them",
+        flags: crate::caustics::FLAGS,
+        make: crate::caustics::job,
+    },
+    Known {
+        name: "ccd",
+        what: "continuous collision detection: moving objects drawn along three axes into boxes of time and depth",
+        flags: crate::collision::FLAGS,
+        make: crate::collision::job,
+    },
+    Known {
+        name: "glossy",
+        what: "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
+        flags: crate::glossy::FLAGS,
+        make: crate::glossy::job,
+    },
+    Known {
+        name: "multiview",
+        what: "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
+        flags: crate::multiview::FLAGS,
+        make: crate::multiview::job,
+    },
+    Known {
+        name: "occlusion",
+        what: "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
+        flags: crate::occlusion::FLAGS,
+        make: crate::occlusion::job,
+    },
+    Known {
+        name: "sampling",
+        what: "dart throwing over voids that are drawn, until no point fits",
+        flags: crate::points::job::FLAGS,
+        make: crate::points::job::job,
+    },
+    Known {
+        name: "soft-shadows",
+        what: "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
+        flags: crate::soft_shadows::FLAGS,
+        make: crate::soft_shadows::job,
+    },
+];
+
+/// Names of the jobs, each with a line that says what it is.
+pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+    JOBS.iter().map(|job| (job.name, job.what))
+}
+
+/// What to say of a name that is neither a scene nor a job, where either could have been meant; other errors stay as they are.
+#[must_use]
+pub fn or_job(error: LoadError) -> LoadError {
+    match error {
+        LoadError::Unknown { name, .. } => {
+            crate::load::unknown(&name, &names().map(|(name, _)| name).collect::<Vec<_>>())
+        }
+        error => error,
+    }
+}
+
+/// The job called `name`, if there is one.
+///
+/// # Errors
+/// [`LoadError`] when its options or settings make no sense, or it has no use for one of them.
+pub fn find(
+    name: &str,
+    options: &OptionSource,
+    request: &Request<'_>,
+) -> Option<Result<Box<dyn Job>, LoadError>> {
+    let job = JOBS.iter().find(|job| job.name == name)?;
+    Some(job.flags.check(name, request.overrides).and_then(|()| (job.make)(options, request)))
+}

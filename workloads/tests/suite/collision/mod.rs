@@ -1,0 +1,36 @@
+//! Collision detection: public queries, an oracle, and the ways a pair can be missed. No collision may be, ever.
+
+mod contacts;
+mod exact;
+mod oracle;
+mod public;
+mod yardsticks;
+
+use pipeline::random::{mix, unit};
+use workloads::collision::{Method, Object, Search, detect};
+
+type Ends = [[[f64; 3]; 3]; 2];
+
+/// Searches from the simplest to the closest; none may miss anything.
+const SEARCHES: [Search; 7] = [
+    Search { resolution: 1, bins: 1, method: Method::FragmentBox, zoom: false },
+    Search { resolution: 8, bins: 1, method: Method::BoxBox, zoom: false },
+    Search { resolution: 8, bins: 4, method: Method::FragmentBox, zoom: false },
+    Search { resolution: 32, bins: 16, method: Method::BoxBox, zoom: false },
+    Search { resolution: 16, bins: 1, method: Method::DepthOnly, zoom: false },
+    Search { resolution: 32, bins: 8, method: Method::BoxBox, zoom: true },
+    Search { resolution: 64, bins: 16, method: Method::FragmentBox, zoom: true },
+];
+
+fn may_collide(a: Ends, b: Ends, search: &Search) -> bool {
+    objects_may_collide(&[a, b].map(|ends| Object::from_ends(vec![ends], 0.0).unwrap()), search)
+}
+
+fn objects_may_collide(objects: &[Object; 2], search: &Search) -> bool {
+    detect(objects, search).first().is_some_and(|answer| answer.verdict.may_collide())
+}
+
+/// A corner in a hash's unit cube.
+fn random(seed: u64, n: u64) -> f64 {
+    unit(mix(seed.wrapping_mul(1000) + n))
+}

@@ -1,0 +1,189 @@
+//! Small files made for tests.
+
+pub mod meshes;
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use workloads::LoadError;
+
+/// A `.glb` of JSON and a binary chunk.
+pub fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut body = binary.to_vec();
+    body.resize(body.len().next_multiple_of(4), 0);
+    let mut file = b"glTF\x02\0\0\0".to_vec();
+    file.extend((12 + 8 + text.len() as u32 + 8 + body.len() as u32).to_le_bytes());
+    file.extend((text.len() as u32).to_le_bytes());
+    file.extend(b"JSON");
+    file.extend(text);
+    file.extend((body.len() as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend(body);
+    file
+}
+
+/// A glTF being put together: numbers go to one buffer, each list with an accessor of its own.
+pub struct Builder {
+    pub json: Value,
+    pub binary: Vec<u8>,
+}
+
+impl Builder {
+    pub fn new() -> Self {
+        let json = json!({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+            "nodes": [], "meshes": [], "accessors": [], "bufferViews": [], "buffers": [{"byteLength": 0}]
+        });
+        Self { json, binary: Vec::new() }
+    }
+
+    /// Adds bytes as an accessor and gives its index.
+    pub fn accessor(&mut self, bytes: &[u8], count: usize, kind: &str, component: u32) -> usize {
+        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        let view = self.list("bufferViews").len();
+        let offset = self.binary.len();
+        self.list("bufferViews").push(json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}));
+        self.binary.extend(bytes);
+        self.json["buffers"][0]["byteLength"] = json!(self.binary.len());
+        let accessors = self.list("accessors");
+        accessors.push(json!({"bufferView": view, "componentType": component, "count": count, "type": kind}));
+        accessors.len() - 1
+    }
+
+    pub fn floats(&mut self, numbers: &[f32], kind: &str) -> usize {
+        let width = match kind {
+            "SCALAR" => 1,
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 16,
+        };
+        let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+        self.accessor(&bytes, numbers.len() / width, kind, 5126)
+    }
+
+    pub fn shorts(&mut self, numbers: &[u16]) -> usize {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+        self.accessor(&bytes, numbers.len(), "SCALAR", 5123)
+    }
+
+    pub fn list(&mut self, name: &str) -> &mut Vec<Value> {
+        if self.json[name].is_null() {
+            self.json[name] = json!([]);
+        }
+        self.json[name].as_array_mut().unwrap()
+    }
+
+    /// One right-angled triangle in the xy plane as mesh 0; positions are accessor 0, indices 1.
+    pub fn triangle() -> Self {
+        let mut builder = Self::new();
+        builder.floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "VEC3");
+        builder.shorts(&[0, 1, 2]);
+        builder.list("meshes").push(json!({"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}));
+        builder.list("nodes").push(json!({"mesh": 0}));
+        builder
+    }
+
+    /// Adds a channel of clip 0 that drives node 0.
+    pub fn animate(&mut self, path: &str, times: &[f32], values: (&[f32], &str), interpolation: &str) {
+        let input = self.floats(times, "SCALAR");
+        let output = self.floats(values.0, values.1);
+        if self.json["animations"].is_null() {
+            self.json["animations"] = json!([{"channels": [], "samplers": []}]);
+        }
+        let clip = &mut self.json["animations"][0];
+        let sampler = clip["samplers"].as_array().unwrap().len();
+        let described = json!({"input": input, "output": output, "interpolation": interpolation});
+        clip["samplers"].as_array_mut().unwrap().push(described);
+        let channel = json!({"sampler": sampler, "target": {"node": 0, "path": path}});
+        clip["channels"].as_array_mut().unwrap().push(channel);
+    }
+
+    pub fn bytes(&self) -> Vec<u8> {
+        glb(&self.json, &self.binary)
+    }
+}
+
+/// A file in a folder that goes away with the test.
+pub struct Files(tempfile::TempDir);
+
+impl Files {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path.display().to_string()
+    }
+}
+
+/// Loads bytes as a `.glb`.
+pub fn load_glb(bytes: &[u8]) -> Result<workloads::Scene, LoadError> {
+    workloads::load(Files::new().put("scene.glb", bytes))
+}
+
+/// The folder of real scenes, or nothing, saying so.
+pub fn real_scenes() -> Option<PathBuf> {
+    let folder = std::env::var_os("QUINTILE_SCENES").map(PathBuf::from);
+    if folder.is_none() {
+        eprintln!("skipped: QUINTILE_SCENES is not set, so the real scenes are not there to be read");
+    }
+    folder
+}
+
+/// The message of an error that has to be a failure, not a mistake of usage.
+pub fn failure(error: LoadError) -> String {
+    assert!(!error.is_usage(), "{error}");
+    error.to_string()
+}
+
+/// That `text` holds every part.
+pub fn expect(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "`{part}` is not in: {text}");
+    }
+}
+
+/// Hardware for tests: everything switched on, caches as those of the reference GPU.
+pub fn spec() -> pipeline::PipelineSpec {
+    let lines = pipeline::CacheSpec::lru(256, 4);
+    pipeline::PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 64,
+        batch_triangles: 65_536,
+        vertex_reuse: 32,
+        shading: pipeline::Shading::Cached,
+        shading_cache: pipeline::CacheSpec::lru(1024, 8),
+        memory: pipeline::MemorySpec {
+            depth: lines,
+            colour: lines,
+            texture: lines,
+            l2: pipeline::CacheSpec::lru(4096, 16),
+            compression: Default::default(),
+        },
+        features: pipeline::Features::ALL,
+        depth: Default::default(),
+    }
+}
+
+/// An image to the bit.
+pub fn bits(image: &[glam::Vec3]) -> Vec<[u32; 3]> {
+    image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
+}
+
+/// White, whoever looks.
+pub struct White;
+
+impl pipeline::Shader for White {
+    fn cost(&self) -> pipeline::ShaderCost {
+        pipeline::ShaderCost::default()
+    }
+
+    fn shade(&self, _at: &pipeline::ShadingPoint, _texel: glam::Vec4) -> glam::Vec3 {
+        glam::Vec3::ONE
+    }
+}

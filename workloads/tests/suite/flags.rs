@@ -1,0 +1,114 @@
+//! Flags of scenes given to workloads: what is taken changes what is drawn, and the rest is refused.
+
+use crate::common::{expect, spec};
+use workloads::catalog::find;
+use workloads::job::{Drawn, OptionSource, Request};
+use workloads::{LoadError, Overrides};
+
+type Change = fn(&mut Overrides);
+
+/// Flags by name, each with a value that no workload has by default.
+const FLAGS: [(&str, Change); 7] = [
+    ("--size", |overrides| overrides.size = Some((24, 24))),
+    ("--samples", |overrides| overrides.samples = Some(5)),
+    ("--shutter", |overrides| overrides.shutter = Some(0.125)),
+    ("--lens", |overrides| overrides.lens_radius = Some(0.5)),
+    ("--focus", |overrides| overrides.focus = Some(2.5)),
+    ("--table", |overrides| overrides.table = Some("sobol".to_owned())),
+    ("--clip", |overrides| overrides.clip = Some("Run".to_owned())),
+];
+
+/// Options that make it quick.
+fn options(job: &str) -> OptionSource {
+    let set: &[(&str, &str)] = match job {
+        "ccd" => &[("balls", "3"), ("resolution", "8")],
+        "caustics" => &[("cells", "8")],
+        "sampling" => &[("radius", "0.1")],
+        // Its own scene is still, and this one is not.
+        "glossy" => &[("texels", "16"), ("scene", "default"), ("centre", "[0, 0.01, 0]"), ("half", "[3, 2]")],
+        "soft-shadows" => &[("map_px", "32")],
+        "multiview" => &[("check_cache", "false")],
+        _ => &[],
+    };
+    let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+    OptionSource { file: None, set }
+}
+
+/// Frame 1, in which what moves does.
+fn drawn(job: &str, overrides: &Overrides) -> Result<Drawn, LoadError> {
+    let job = find(job, &options(job), &Request { overrides, seed: 1 }).unwrap()?;
+    Ok(job.frame(1, &spec(), &mut |_, _| ()).unwrap())
+}
+
+/// A small image, with a lens where there has to be one to be focused.
+fn usual(job: &str, flag: &str) -> Overrides {
+    let size = (job != "ccd").then_some((32, 32));
+    let lens_radius = (job == "glossy" && flag == "--focus").then_some(0.25);
+    Overrides { size, lens_radius, ..Overrides::default() }
+}
+
+#[test]
+fn flags_that_are_taken_change_what_is_drawn() {
+    for (job, taken) in [
+        ("caustics", &["--size"][..]),
+        ("ccd", &[]),
+        ("glossy", &["--size", "--samples", "--shutter", "--lens", "--focus"]),
+        ("multiview", &["--size", "--samples", "--shutter", "--focus"]),
+        ("occlusion", &["--size", "--samples", "--table"]),
+        ("sampling", &["--size", "--samples"]),
+        ("soft-shadows", &["--size", "--samples", "--shutter"]),
+    ] {
+        for (flag, change) in FLAGS {
+            let mut changed = usual(job, flag);
+            change(&mut changed);
+            match drawn(job, &changed) {
+                Ok(drawn_so) => {
+                    assert!(taken.contains(&flag), "{job} takes {flag}");
+                    let usual = drawn(job, &usual(job, flag)).unwrap();
+                    let same = (&drawn_so.image, &drawn_so.counts) == (&usual.image, &usual.counts);
+                    assert!(!same, "{job} ignores {flag}");
+                }
+                Err(error) => {
+                    assert!(!taken.contains(&flag) && error.is_usage(), "{job} {flag}: {error}");
+                    // The scenes in which there is something to choose are those of glTF files.
+                    let name = flag.trim_start_matches("--");
+                    expect(&error.to_string(), &[if flag == "--clip" { name } else { flag }]);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn options_that_do_the_same_are_named() {
+    for (job, flag, option) in [
+        ("ccd", "--size", "--set resolution="),
+        ("ccd", "--samples", "leave it out"),
+        ("caustics", "--samples", "leave it out"),
+        ("multiview", "--lens", "--set aperture="),
+        ("occlusion", "--lens", "--set lens="),
+        ("occlusion", "--shutter", "--set motion="),
+        ("soft-shadows", "--table", "--set points="),
+        ("soft-shadows", "--lens", "leave it out"),
+    ] {
+        let mut overrides = Overrides::default();
+        FLAGS.iter().find(|(name, _)| *name == flag).unwrap().1(&mut overrides);
+        let error = drawn(job, &overrides).unwrap_err();
+        expect(&error.to_string(), &[flag, job, option]);
+    }
+}
+
+/// Views agree at a depth, and there need not be a lens for that.
+#[test]
+fn views_of_a_scene_without_a_lens_are_focused() {
+    let files = crate::common::Files::new();
+    let scene = files.put("s.ron", "(objects: [(shape: Sphere(radius: 1))])");
+    let mut options = options("multiview");
+    options.set.push(("scene".to_owned(), scene));
+    let made = |focus| {
+        let overrides = Overrides { focus, ..usual("multiview", "--focus") };
+        find("multiview", &options, &Request { overrides: &overrides, seed: 1 }).unwrap()
+    };
+    assert!(made(Some(2.5)).is_ok());
+    expect(&made(None).err().unwrap().to_string(), &["focus", "no lens"]);
+}

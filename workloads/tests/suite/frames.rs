@@ -1,0 +1,205 @@
+//! Which frames are drawn from the same input, and that a frame does not depend on those rendered with it.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use crate::common::{Builder, Files};
+use glam::{Vec2, Vec3, Vec4};
+use pipeline::{Lens, ShadingPoint};
+use serde_json::json;
+use workloads::catalog::find;
+use workloads::job::{Job, OptionSource, Request};
+use workloads::{Fingerprint, Frame, Overrides, Scene, load};
+
+const OBJECTS: &str =
+    "objects: [(shape: Sphere(radius: 1, segments: 8)), (shape: Plane(size: 6), position: (0, -1, 0))]";
+
+/// A scene of still objects with this camera.
+fn seen_by(files: &Files, camera: &str, settings: &str) -> String {
+    let text = format!(
+        "(settings: (width: 32, height: 18, samples: 1, frames: (0, 6){settings}), camera: ({camera}), {OBJECTS})"
+    );
+    files.put(&format!("{}.ron", Fingerprint::of(&text).map(|f| format!("{f:?}")).unwrap()), text)
+}
+
+const STILL: &str = "position: (-4, 1, 5), target: (0, 0, 0)";
+const PATHS: [&str; 4] = [
+    "position: (-4, 1, 5), target: (0, 0, 0), end_position: (4, 1, 5)",
+    "position: (-4, 1, 5), target: (0, 0, 0), end_target: (1, 0, 0)",
+    "position: (-4, 1, 5), target: (0, 0, 0), keyframes: [(time_s: 0, position: (-4, 1, 5)), (time_s: 1, position: (4, 1, 5))]",
+    "position: (-4, 1, 5), target: (0, 0, 0), keyframes: [(time_s: 0, target: (0, 0, 0)), (time_s: 1, target: (0, 0, 1))]",
+];
+
+/// A still triangle seen from a camera on a node that moves.
+fn camera_node() -> Vec<u8> {
+    let mut file = Builder::triangle();
+    file.animate("translation", &[0.0, 1.0], (&[0.0, 0.0, 3.0, 0.0, 1.0, 4.0], "VEC3"), "LINEAR");
+    file.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.25}}]);
+    file.json["nodes"] = json!([{"camera": 0, "translation": [0, 0, 3]}, {"mesh": 0}]);
+    file.json["scenes"][0]["nodes"] = json!([0, 1]);
+    file.bytes()
+}
+
+fn print(frame: &Frame) -> Fingerprint {
+    Fingerprint::of(frame).unwrap()
+}
+
+/// How many frames of a scene differ, and how many there are.
+fn differ(scene: &Scene) -> (usize, usize) {
+    let frames = scene.settings().frames.clone();
+    let prints: HashSet<_> = frames.clone().map(|number| print(&scene.frame(number).unwrap())).collect();
+    (prints.len(), frames.len())
+}
+
+#[test]
+fn a_camera_that_moves_makes_every_frame_another() {
+    let files = Files::new();
+    for path in PATHS {
+        for settings in ["", ", shutter: 0"] {
+            let scene = load(seen_by(&files, path, settings)).unwrap();
+            assert_eq!(differ(&scene), (6, 6), "{path}{settings}");
+        }
+    }
+    let flight = load(files.put("flight.glb", camera_node())).unwrap();
+    assert_eq!(differ(&flight), (36, 36));
+}
+
+#[test]
+fn still_frames_are_equal() {
+    let files = Files::new();
+    let scene = load(seen_by(&files, STILL, "")).unwrap();
+    assert_eq!(differ(&scene), (1, 6));
+    assert!(!scene.frame(0).unwrap().is_moving());
+}
+
+/// A clip that starts over exactly at a frame gives the frames of its first loop again.
+#[test]
+fn frames_of_a_loop_come_again() {
+    let mut file = Builder::triangle();
+    file.animate("translation", &[0.0, 0.5], (&[0.0, 0.0, 0.0, 0.0, 1.0, 0.0], "VEC3"), "LINEAR");
+    let frames = Overrides { frames: Some(0..12), frame_rate_hz: Some(8.0), ..Overrides::default() };
+    let scene = crate::common::load_glb(&file.bytes()).unwrap().with_overrides(&frames).unwrap();
+    assert_eq!(differ(&scene), (4, 12));
+    assert_eq!(print(&scene.frame(1).unwrap()), print(&scene.frame(9).unwrap()));
+}
+
+/// One change to a frame.
+type Change = fn(&mut Frame);
+
+#[test]
+fn everything_that_is_drawn_counts() {
+    let frame = load("tiny").unwrap().frame(1).unwrap();
+    let moved = |points: &Arc<[Vec3]>| -> Arc<[Vec3]> {
+        let mut points = points.to_vec();
+        points[0].x = points[0].x.next_up();
+        points.into()
+    };
+    let changes: [Change; 6] = [
+        |frame| frame.camera = frame.camera.with_lens(None),
+        |frame| frame.camera = frame.camera.with_lens(Some(Lens::new(0.08, 3.0).unwrap())),
+        |frame| {
+            frame.camera =
+                frame.camera.moving(frame.camera.open(), frame.camera.open()).unwrap().with_lens(None)
+        },
+        |frame| frame.meshes[0].triangles = frame.meshes[0].triangles[1..].into(),
+        |frame| frame.meshes[0].uvs = frame.meshes[0].uvs.iter().map(|uv| *uv + Vec2::X).collect(),
+        |frame| frame.meshes[0].material += 1,
+    ];
+    let mut prints = HashSet::from([print(&frame)]);
+    for change in changes {
+        let mut changed = frame.clone();
+        change(&mut changed);
+        prints.insert(print(&changed));
+    }
+    for mesh in 0..frame.meshes.len() {
+        let mut changed = [frame.clone(), frame.clone(), frame.clone()];
+        changed[0].meshes[mesh].open = moved(&frame.meshes[mesh].open);
+        changed[1].meshes[mesh].close = moved(&frame.meshes[mesh].close);
+        changed[2].meshes[mesh].name.push('!');
+        prints.extend(changed.iter().map(print));
+    }
+    // Still cameras that only lose their lens are the same camera.
+    assert_eq!(prints.len(), 1 + 5 + 3 * frame.meshes.len());
+    assert_eq!(print(&frame), print(&frame.clone()));
+}
+
+/// What a surface looks like at one point, for its lamp.
+fn shade(scene: &Scene, frame: &Frame) -> Vec3 {
+    let at = ShadingPoint {
+        position: Vec3::ZERO,
+        normal: Vec3::new(0.6, 0.64, 0.48),
+        to_camera: Vec3::Z,
+        uv: Vec2::ZERO,
+        color: Vec3::ONE,
+    };
+    frame.draws(scene).unwrap()[0].shader.shade(&at, Vec4::ONE)
+}
+
+/// Frame 3 alone has to be frame 3 of all: camera, focus and lamp are placed for the scene, not for the frames asked for.
+#[test]
+fn a_frame_does_not_depend_on_those_rendered_with_it() {
+    let files = Files::new();
+    let fitted = format!(
+        "(settings: (width: 32, height: 18, frames: (0, 6), lens_radius: 0.01), {})",
+        OBJECTS.replace("position", "velocity")
+    );
+    let mut names: Vec<String> =
+        PATHS.iter().map(|path| seen_by(&files, path, ", lens_radius: 0.05")).collect();
+    names.push(files.put("fitted.ron", fitted));
+    names.push(files.put("flight.glb", camera_node()));
+    names.extend(["default", "tiny"].map(str::to_owned));
+    for name in names {
+        let all = load(&name).unwrap();
+        let asked = |frames| Overrides { frames: Some(frames), ..Overrides::default() };
+        let alone = load(&name).unwrap().with_overrides(&asked(3..4)).unwrap();
+        let (one, of_all) = (alone.frame(3).unwrap(), all.frame(3).unwrap());
+        assert_eq!(print(&one), print(&of_all), "{name}");
+        assert_eq!(shade(&alone, &one), shade(&all, &of_all), "{name}: the lamp");
+        assert!(alone.warnings().is_empty(), "{name}: {:?}", alone.warnings());
+    }
+}
+
+#[test]
+fn what_leaves_a_fitted_view_is_reported() {
+    let files = Files::new();
+    let text = "(settings: (width: 32, height: 18, frames: (0, 4)), objects: [(shape: Sphere(radius: 1, segments: 8), \
+                velocity: (9, 0, 0)), (shape: Sphere(radius: 1, segments: 8))])";
+    let name = files.put("leaves.ron", text);
+    let codes = |frames| {
+        let asked = Overrides { frames: Some(frames), ..Overrides::default() };
+        let scene = load(&name).unwrap().with_overrides(&asked).unwrap();
+        scene.warnings().iter().map(|warning| warning.code).collect::<Vec<_>>()
+    };
+    assert!(codes(0..4).is_empty() && codes(3..4).is_empty());
+    assert_eq!(codes(0..60), ["leaves-fitted-view"]);
+    assert_eq!(codes(59..60), ["leaves-fitted-view"]);
+}
+
+fn job(name: &str, set: &[(&str, &str)]) -> Box<dyn Job> {
+    let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+    let overrides = Overrides::default();
+    find(name, &OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 })
+        .unwrap()
+        .unwrap()
+}
+
+fn inputs(job: &dyn Job) -> usize {
+    (0..6).map(|number| job.fingerprint(number).unwrap()).collect::<HashSet<_>>().len()
+}
+
+#[test]
+fn workloads_follow_the_camera_of_their_scene() {
+    let files = Files::new();
+    let [still, path] = [STILL, PATHS[0]].map(|camera| seen_by(&files, camera, ", lens_radius: 0.05"));
+    for name in ["glossy", "soft-shadows", "multiview"] {
+        let of = |scene: &str| inputs(&*job(name, &[("scene", scene)]));
+        assert_eq!((of(&still), of(&path)), (1, 6), "{name}");
+    }
+}
+
+#[test]
+fn workloads_without_a_scene_say_what_changes() {
+    for (name, differ) in [("ccd", 1), ("occlusion", 1), ("caustics", 6), ("sampling", 6)] {
+        assert_eq!(inputs(&*job(name, &[])), differ, "{name}");
+    }
+}

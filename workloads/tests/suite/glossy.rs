@@ -1,0 +1,190 @@
+//! Glossy reflection and refraction on planar receivers.
+
+use glam::{DVec3, Vec3};
+use pipeline::sampling::SampleSource;
+use pipeline::{Cull, Draw, Geometry, LensShape, SampleSpec, SampleTable};
+use workloads::Overrides;
+use workloads::accumulation::{Rays, SharedSamples};
+use workloads::glossy::{Effect, Glossy, Lobe, Map, Options, Receiver, receiver, stage};
+use workloads::job::Job;
+
+use crate::common::{White, spec};
+
+const EYE: (DVec3, DVec3) = (DVec3::new(0.3, 2.0, 0.4), DVec3::new(-0.1, -1.0, -0.2));
+
+fn table(samples: u32, shape: LensShape) -> SampleTable {
+    SampleTable::new(&SampleSpec { lens: shape, ..SampleSpec::default() }, samples, 7).unwrap()
+}
+
+fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((*a - *b).length_squared())).sum();
+    (sum / (3.0 * a.len() as f64)).sqrt()
+}
+
+/// The map of a half plane of white at a height, its edge across the receiver; the brightness of each column.
+fn edge(height: f64, radius: f64, effect: Effect) -> (Map, Vec<f64>) {
+    let map = Map::new(&Receiver::lying(DVec3::ZERO, [1.0, 0.5]), EYE, effect, radius, 64).unwrap();
+    let side = if effect == Effect::Reflection { 1.0 } else { -1.0 };
+    let y = (side * height) as f32;
+    let corners = [[0.0, -99.0], [99.0, -99.0], [99.0, 99.0], [0.0, 99.0]].map(|[x, z]| Vec3::new(x, y, z));
+    let triangles = [[0, 1, 2], [0, 2, 3]];
+    let geometry = Geometry::new(&corners, &corners, &triangles).unwrap();
+    let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+    let samples = table(64, LensShape::Square);
+    let image = map.one_pass(&draws, &samples, (&spec(), Vec3::ZERO), &mut |_, _| ()).unwrap().0;
+    let width = map.viewport.width() as usize;
+    let column = |x: usize| {
+        image.iter().skip(x).step_by(width).map(|p| f64::from(p.x)).sum::<f64>()
+            / f64::from(map.viewport.height())
+    };
+    (map, (0..width).map(column).collect())
+}
+
+/// The width of a straight ramp, from the variance of its slope; the boxes of a texel and of a difference add their own.
+fn ramp(columns: &[f64]) -> f64 {
+    let slopes: Vec<f64> = columns.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let total: f64 = slopes.iter().sum();
+    let moment =
+        |power: i32| slopes.iter().enumerate().map(|(x, s)| s * (x as f64).powi(power)).sum::<f64>() / total;
+    (12.0 * (moment(2) - moment(1).powi(2)) - 2.0).max(0.0).sqrt()
+}
+
+/// Contact hardens: the blur is 2 R h / (d + h) wide on the plane, through a square lens a straight ramp.
+#[test]
+fn the_blur_widens_with_the_distance_from_the_plane_as_geometry_says() {
+    for effect in [Effect::Reflection, Effect::Refraction(1.4)] {
+        let mut last = 0.0;
+        for height in [0.05, 0.3, 1.0, 2.0] {
+            let (map, columns) = edge(height, 0.2, effect);
+            let (found, expected) = (ramp(&columns) * map.texel(), map.blur(height));
+            assert!(
+                (found - expected).abs() < 0.03 * expected + 0.6 * map.texel(),
+                "{height}: {found} {expected}"
+            );
+            assert!(found > last - 1e-9, "{height}");
+            last = found;
+        }
+    }
+    let (_, mirror) = edge(1.0, 0.0, Effect::Reflection);
+    assert!(
+        mirror.iter().filter(|c| (0.01..0.99).contains(*c)).count() <= 2,
+        "without a lens the edge is sharp"
+    );
+}
+
+/// What a texel sees is what a ray from the mirrored eye through it hits, texel by texel.
+#[test]
+fn one_pass_accumulation_and_rays_agree() {
+    for (effect, below) in [(Effect::Reflection, false), (Effect::Refraction(1.33), true)] {
+        let scene = stage(below).unwrap();
+        let frame = scene.frame(0).unwrap();
+        let draws: Vec<_> =
+            frame.draws(&scene).unwrap().into_iter().map(|d| Draw { cull: Cull::None, ..d }).collect();
+        let world = frame.camera.open().inverse();
+        let eye = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
+        let map = Map::new(&receiver(), eye, effect, 0.3, 24).unwrap();
+        let colours: Vec<_> =
+            frame.meshes.iter().map(|mesh| scene.materials()[mesh.material].base_color).collect();
+        let rays = Rays::new(&draws);
+        let samples = table(64, LensShape::Disk);
+        let sky = scene.background();
+        let traced = map.by_rays((&rays, &colours), &[&samples as &dyn SampleSource], sky, Lobe::Lens);
+        let drawn = map.one_pass(&draws, &samples, (&spec(), sky), &mut |_, _| ()).unwrap().0;
+        // The same samples, so all that may differ is what lies on an edge to rounding.
+        assert!(rmse(&drawn, &traced) < 2e-3, "{effect:?}: {}", rmse(&drawn, &traced));
+        assert!(rmse(&drawn, &vec![sky; drawn.len()]) > 0.05, "there is something to see");
+        let set = SharedSamples::interleaved(&SampleSpec::default(), 64, 3).unwrap();
+        let added = map.accumulated(&draws, &set, (&spec(), sky), &mut |_, _| ()).unwrap().0;
+        assert!(rmse(&added, &traced) < 0.04, "{}", rmse(&added, &traced));
+        let one = map.one_pass(&draws, &set, (&spec(), sky), &mut |_, _| ()).unwrap().0;
+        assert!(rmse(&added, &one) < 2e-3, "the same set: {}", rmse(&added, &one));
+    }
+}
+
+#[test]
+fn more_samples_err_less() {
+    let scene = stage(false).unwrap();
+    let frame = scene.frame(0).unwrap();
+    let draws = frame.draws(&scene).unwrap();
+    let world = frame.camera.open().inverse();
+    let eye = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
+    let map = Map::new(&receiver(), eye, Effect::Reflection, 0.3, 16).unwrap();
+    let image = |seed, samples| {
+        let table = SampleTable::new(&SampleSpec::default(), samples, seed).unwrap();
+        map.one_pass(&draws, &table, (&spec(), scene.background()), &mut |_, _| ()).unwrap().0
+    };
+    let truth = image(99, 256);
+    let [few, more, most] = [4, 16, 64].map(|samples| rmse(&image(1, samples), &truth));
+    assert!(more < 0.75 * few && most < 0.75 * more, "{few} {more} {most}");
+}
+
+fn drawn(options: Options) -> (Vec<Vec3>, Vec<&'static str>) {
+    let overrides = Overrides { size: Some((48, 27)), samples: Some(4), ..Overrides::default() };
+    let job = Glossy::new(Options { texels: 16, ..options }, &overrides, 1).unwrap();
+    let mut sum = activity::Counts::default();
+    let drawn = job.frame(0, &spec(), &mut |packet, _| sum += &packet.counts).unwrap();
+    assert_eq!(sum, drawn.counts);
+    (drawn.image, drawn.warnings.iter().map(|warning| warning.code).collect())
+}
+
+#[test]
+fn the_job_shows_the_map_on_its_receiver() {
+    let (image, codes) = drawn(Options::default());
+    assert_eq!((image.len(), codes), (48 * 27, vec![]));
+    let (dull, _) = drawn(Options { fresnel: 0.0, ..Options::default() });
+    assert!(rmse(&image, &dull) > 0.02, "what is reflected is seen");
+    let (refracted, _) = drawn(Options { index: Some(1.3), ..Options::default() });
+    assert!(rmse(&image, &refracted) > 0.02);
+}
+
+/// A mirror without roughness: the pixel that sees a point of the receiver shows what is mirrored there.
+#[test]
+fn a_mirror_shows_what_is_mirrored() {
+    // Fine enough that the texture is hardly filtered: a pixel is a texel or two.
+    const WIDE: usize = 384;
+    let options = Options { roughness: 0.0, fresnel: 1.0, texels: 256, map_samples: 4, ..Options::default() };
+    let overrides = Overrides { size: Some((WIDE as u32, 216)), samples: Some(4), ..Overrides::default() };
+    let job = Glossy::new(options, &overrides, 1).unwrap();
+    let image = job.frame(0, &spec(), &mut |_, _| ()).unwrap().image;
+    let scene = stage(false).unwrap().with_overrides(&overrides).unwrap();
+    let frame = scene.frame(0).unwrap();
+    let draws = frame.draws(&scene).unwrap();
+    let (rays, camera) = (Rays::new(&draws), frame.camera);
+    let world = camera.open().inverse();
+    let (mut right, mut all) = (0, 0);
+    for (x, y) in (0..WIDE).flat_map(|x| (0..216).map(move |y| (x, y))) {
+        let tan = camera.half_height();
+        let at = Vec3::new((x as f32 - 191.5) / 108.0 * tan, -(y as f32 - 107.5) / 108.0 * tan, 1.0);
+        let (from, along) = (world.translation.as_dvec3(), (world.matrix3 * at).as_dvec3());
+        let met = from - along * (from.y / along.y);
+        let hidden = rays.first(from, along, 0.0, 0.0).is_some_and(|(_, s)| s < -from.y / along.y);
+        if along.y > -1e-3 || met.x.abs() > 1.7 || met.z.abs() > 1.1 || hidden {
+            continue;
+        }
+        let seen = rays.first(met, along * DVec3::new(1.0, -1.0, 1.0), 0.0, 1e-6);
+        let colour = |(face, _): (usize, f64)| {
+            scene.materials()[frame.meshes[rays.faces()[face].draw].material].base_color
+        };
+        let expected = seen.map_or(scene.background(), colour);
+        all += 1;
+        right += u32::from((image[y * WIDE + x] - expected).length() < 0.05);
+    }
+    assert!(all > 8000 && right * 100 > all * 85, "{right} of {all}: the rest lies on edges");
+}
+
+#[test]
+fn bad_regimes_and_options_are_told() {
+    assert_eq!(drawn(Options { roughness: 1.5, ..Options::default() }).1, ["lens-wider-than-receiver"]);
+    for bad in [
+        Options { roughness: -1.0, ..Options::default() },
+        Options { half: [0.0, 1.0], ..Options::default() },
+        Options { centre: [0.0, 50.0, 0.0], ..Options::default() },
+        Options { map_samples: 0, ..Options::default() },
+        Options { fresnel: 2.0, ..Options::default() },
+        Options { index: Some(-1.0), ..Options::default() },
+        Options { texels: 0, ..Options::default() },
+    ] {
+        let error = Glossy::new(bad.clone(), &Overrides::default(), 1).err().unwrap();
+        assert!(error.is_usage(), "{bad:?}: {error}");
+    }
+}

@@ -1,0 +1,129 @@
+//! A fitted camera is a camera whatever the lens: it can be built, and something is seen.
+
+use crate::common::Files;
+use glam::Vec3;
+use pipeline::{
+    CacheSpec, Features, LensShape, MemorySpec, PipelineSpec, SampleTable, Shading, Viewport, render,
+};
+use workloads::{Overrides, Scene, load};
+
+const SIZE: (u32, u32) = (96, 54);
+
+/// Lens radius and focus depth.
+type Optics = (f32, Option<f32>);
+
+/// A sphere of radius 1 around the origin, without a camera of its own.
+fn sphere((radius, focus): Optics) -> Scene {
+    let files = Files::new();
+    let scene = load(files.put("s.ron", "(objects: [(shape: Sphere(radius: 1))])")).unwrap();
+    let overrides = Overrides { size: Some(SIZE), lens_radius: Some(radius), focus, ..Overrides::default() };
+    scene.with_overrides(&overrides).unwrap()
+}
+
+fn warns(scene: &Scene) -> bool {
+    scene.warnings().iter().any(|warning| warning.code == "lens-leaves-view")
+}
+
+/// Every vertex as a pinhole in the middle of the lens sees it: `|x|` and `|y|` in halves of the image, and depth.
+fn through_the_centre(scene: &Scene) -> Vec<Vec3> {
+    let frame = scene.frame(0).unwrap();
+    let tan = frame.camera.half_height();
+    let aspect = SIZE.0 as f32 / SIZE.1 as f32;
+    let points = frame.meshes.iter().flat_map(|mesh| mesh.open.iter());
+    let seen = points.map(|point| {
+        let p = frame.camera.open().transform_point3(*point);
+        Vec3::new((p.x / p.z / (tan * aspect)).abs(), (p.y / p.z / tan).abs(), p.z)
+    });
+    seen.collect()
+}
+
+#[test]
+fn every_lens_and_focus_gives_a_camera_with_everything_in_view_of_its_centre() {
+    let radii = [0.001, 0.01, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 1e4, 1e30];
+    let depths = [1e-20, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 30.0, 100.0, 1e30];
+    for radius in radii {
+        for focus in [None].into_iter().chain(depths.map(Some)) {
+            let optics = (radius, focus);
+            let scene = sphere(optics);
+            let camera = scene.frame(0).unwrap().camera;
+            assert_eq!(camera.lens().unwrap().radius(), radius);
+            assert!(camera.near().is_finite() && camera.near() > 0.0, "{optics:?}: {}", camera.near());
+            let centre = camera.open().transform_point3(Vec3::ZERO);
+            // Not only in front of the camera, but near enough to be more than a dot.
+            assert!(centre.z > camera.near() && centre.z < 150.0, "{optics:?}: {centre}");
+            for seen in through_the_centre(&scene) {
+                assert!(seen.x <= 1.0 && seen.y <= 1.0 && seen.z > camera.near(), "{optics:?}: {seen}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lens_too_large_for_its_focus_is_warned_of_and_leaves_the_camera_where_a_pinhole_has_it() {
+    let pinhole = sphere((0.0, None)).frame(0).unwrap().camera;
+    for optics in [(1.0, 0.5), (1.0, 1.0), (0.5, 1.0), (2.0, 3.0), (10.0, 0.1), (1e30, 1e-20)] {
+        let scene = sphere((optics.0, Some(optics.1)));
+        assert!(warns(&scene), "{optics:?}");
+        let camera = scene.frame(0).unwrap().camera;
+        assert_eq!((camera.open(), camera.near()), (pinhole.open(), pinhole.near()), "{optics:?}");
+    }
+}
+
+#[test]
+fn a_lens_that_can_be_held_is_held_close_to_the_limit() {
+    // The view is 0.92 tan(20 deg) = 0.335 high for each unit of depth: a lens of that part of its focus depth is too
+    // large from however far away, and every smaller one is held from somewhere.
+    for (part, holds) in [(0.1, true), (0.2, true), (0.28, true), (0.34, false), (0.5, false)] {
+        for focus in [0.7, 1.0, 3.0] {
+            let scene = sphere((part * focus, Some(focus)));
+            assert_eq!(!warns(&scene), holds, "{part} of {focus}");
+        }
+    }
+}
+
+/// Pixels of the first frame in which something is seen.
+fn pixels_hit(scene: &Scene) -> usize {
+    let cache = CacheSpec::lru(256, 4);
+    let spec = PipelineSpec {
+        tile_px: 8,
+        coarse_tile_px: 32,
+        batch_triangles: 4096,
+        vertex_reuse: 16,
+        shading_cache: cache,
+        shading: Shading::Cached,
+        memory: MemorySpec {
+            depth: cache,
+            colour: cache,
+            texture: cache,
+            l2: cache,
+            compression: Default::default(),
+        },
+        features: Features::ALL,
+        depth: pipeline::depth::DepthSpec::default(),
+    };
+    let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk).unwrap();
+    let background = Vec3::ZERO;
+    let viewport = Viewport::new(SIZE.0, SIZE.1).unwrap();
+    let settings = pipeline::Settings { spec: &spec, viewport, samples: &samples, background };
+    let frame = scene.frame(0).unwrap();
+    let draws = frame.draws(scene).unwrap();
+    let image = render(&frame.camera, &draws, &settings, |_| ()).unwrap().image;
+    image.iter().filter(|pixel| **pixel != background).count()
+}
+
+#[test]
+fn something_is_seen_through_a_very_large_lens() {
+    for optics in [
+        (0.0, None),
+        (1.0, None),
+        (10.0, None),
+        (0.5, Some(1.0)),
+        (1.0, Some(0.5)),
+        (1.0, Some(1.0)),
+        (2.0, Some(3.0)),
+        (0.3, Some(1.0)),
+    ] {
+        let hit = pixels_hit(&sphere(optics));
+        assert!(hit > 50, "{optics:?}: {hit} pixels");
+    }
+}

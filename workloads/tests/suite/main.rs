@@ -1,0 +1,22 @@
+//! Tests of the whole crate, a subject in each file.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod analytic;
+mod builtin;
+mod caustics;
+mod collision;
+mod common;
+mod failure;
+mod flags;
+mod frames;
+mod glossy;
+mod hostile;
+mod lens;
+mod messages;
+mod multiview;
+mod occlusion;
+mod property;
+mod real_scenes;
+mod soft_shadows;
+mod stress;
+mod visibility;

@@ -1,0 +1,201 @@
+//! Views of a camera line in one pass.
+
+use activity::Event;
+use glam::{Affine3A, Vec3};
+use pipeline::{CacheSpec, Camera, Cull, Draw, Geometry, PipelineSpec, Shading, Viewport};
+use workloads::job::Job;
+use workloads::multiview::{Layout, MultiView, Options, Rig, Show, Target, Views};
+use workloads::{Overrides, Scene};
+
+use crate::common::{White, bits, spec};
+
+const LAYOUTS: [(Layout, u32); 4] = [
+    (Layout::stereo(0.28, 0.11), 8),
+    (Layout { views: 1, spacing: 0.1, aperture: 0.1, overlap: 0 }, 8),
+    (Layout { views: 7, spacing: 0.06, aperture: 0.1, overlap: 2 }, 4),
+    (Layout { views: 64, spacing: 0.01, aperture: 0.1, overlap: 1 }, 4),
+];
+
+fn scene() -> Scene {
+    workloads::load("tiny").unwrap()
+}
+
+/// Hands the rig, what draws its frame, and a target to `run`.
+fn with<R>(
+    scene: &Scene,
+    (layout, samples): (Layout, u32),
+    spec: &PipelineSpec,
+    run: impl FnOnce(&Rig, &[Draw<'_>], &Target<'_>) -> R,
+) -> R {
+    let frame = scene.frame(1).unwrap();
+    let draws = frame.draws(scene).unwrap();
+    let rig = Rig::new(&frame.camera, 4.0, &layout, samples, 3).unwrap();
+    let viewport = Viewport::new(64, 48).unwrap();
+    run(&rig, &draws, &Target { viewport, spec, background: scene.background() })
+}
+
+fn one_pass(scene: &Scene, layout: (Layout, u32), spec: &PipelineSpec) -> Views {
+    with(scene, layout, spec, |rig, draws, to| rig.one_pass(draws, to, &mut |_, _| ()).unwrap())
+}
+
+fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((*a - *b).length_squared())).sum();
+    (sum / (3.0 * a.len() as f64)).sqrt()
+}
+
+#[test]
+fn one_pass_equals_view_by_view_bit_for_bit() {
+    let scene = scene();
+    for layout in LAYOUTS {
+        with(&scene, layout, &spec(), |rig, draws, to| {
+            let one = rig.one_pass(draws, to, &mut |_, _| ()).unwrap();
+            let each = rig.view_by_view(draws, to, &mut |_, _| ()).unwrap();
+            assert_eq!((one.passes, each.passes), (1, layout.0.views));
+            assert_eq!(one.images.len(), layout.0.views as usize);
+            for (view, (a, b)) in one.images.iter().zip(&each.images).enumerate() {
+                assert_eq!(bits(a), bits(b), "view {view} of {layout:?}");
+            }
+        });
+    }
+}
+
+#[test]
+fn views_see_depth_from_their_own_places() {
+    // The thrown box stands before what is in focus, so it moves the other way than the viewer.
+    let views = one_pass(&scene(), LAYOUTS[0], &spec());
+    assert!(rmse(&views.images[0], &views.images[1]) > 0.01);
+}
+
+/// With every sample shaded where it is, a view of the wide lens differs from one through a lens of its own by the place that shading takes
+/// the eye to be at and by rounding, and by nothing where shading does not depend on the eye.
+#[test]
+fn a_region_of_the_lens_is_a_lens_of_its_own() {
+    let scene = scene();
+    let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
+    with(&scene, LAYOUTS[0], &spec, |rig, draws, to| {
+        let one = rig.one_pass(draws, to, &mut |_, _| ()).unwrap();
+        let own = rig.own_cameras(draws, to).unwrap();
+        for (a, b) in one.images.iter().zip(&own) {
+            assert!(rmse(a, b) < 0.01, "{}", rmse(a, b));
+        }
+        assert!(rmse(&one.images[0], &own[1]) > 0.01, "the other eye's view is another");
+    });
+}
+
+#[test]
+fn accumulation_converges_to_the_same_views() {
+    let scene = scene();
+    let layout = (Layout::stereo(0.28, 0.11), 64);
+    let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
+    with(&scene, layout, &spec, |rig, draws, to| {
+        let one = rig.one_pass(draws, to, &mut |_, _| ()).unwrap();
+        let many = rig.accumulated(draws, to, &mut |_, _| ()).unwrap();
+        assert_eq!(many.passes, 128);
+        for (a, b) in one.images.iter().zip(&many.images) {
+            assert!(rmse(a, b) < 0.03, "{}", rmse(a, b));
+        }
+        assert!(rmse(&one.images[0], &many.images[1]) > 0.03);
+        assert!(many.counts[Event::VertexInvocations] > 60 * one.counts[Event::VertexInvocations]);
+    });
+}
+
+/// A white strip that crosses the image, before a still camera and still before one that turns.
+#[test]
+fn accumulation_blurs_what_moves_and_what_a_moving_camera_sees() {
+    let strip =
+        |x: f32| [[x, -9.0], [x + 0.8, -9.0], [x + 0.8, 9.0], [x, 9.0]].map(|[x, y]| Vec3::new(x, y, 4.0));
+    let still = Camera::new(Affine3A::IDENTITY, 0.5, 0.1).unwrap();
+    let turns = still.moving(Affine3A::IDENTITY, Affine3A::from_translation(Vec3::X)).unwrap();
+    let viewport = Viewport::new(64, 48).unwrap();
+    for (camera, by) in [(still, 1.0), (turns, 0.0)] {
+        let views = |by: f32, camera: &Camera, many: bool| {
+            let (open, close, spec) = (strip(-0.9), strip(-0.9 + by), spec());
+            let geometry = Geometry::new(&open, &close, &[[0, 1, 2], [0, 2, 3]]).unwrap();
+            let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
+            let rig = Rig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
+            let to = Target { viewport, spec: &spec, background: Vec3::ZERO };
+            let views = if many { Rig::accumulated } else { Rig::one_pass };
+            views(&rig, &draws, &to, &mut |_, _| ()).unwrap().images
+        };
+        let (one, many, frozen) =
+            (views(by, &camera, false), views(by, &camera, true), views(0.0, &still, false));
+        for eye in 0..2 {
+            let found = rmse(&one[eye], &many[eye]);
+            assert!(found < 0.04, "{by} {found}");
+            assert!(rmse(&one[eye], &frozen[eye]) > 0.15, "it is blurred");
+        }
+    }
+}
+
+/// What is shaded for a view serves the next: two views cost less than two, and with a cache that holds everything no more than what
+/// only one of them sees; with a cache of nothing they cost as much as they are.
+#[test]
+fn shading_is_reused_between_views_as_far_as_the_cache_goes() {
+    let scene = scene();
+    let with_cache = |entries, layout| {
+        let spec = PipelineSpec { shading_cache: CacheSpec::lru(entries, 4.min(entries)), ..spec() };
+        one_pass(&scene, layout, &spec).counts[Event::PixelInvocations] as f64
+    };
+    let one = (Layout { views: 1, ..Layout::stereo(0.28, 0.11) }, 8);
+    let (all, small) = (1 << 20, 4);
+    let ratio = with_cache(all, LAYOUTS[0]) / with_cache(all, one);
+    assert!((1.0..1.4).contains(&ratio), "{ratio}");
+    assert!(with_cache(small, LAYOUTS[0]) > 1.5 * with_cache(all, LAYOUTS[0]));
+    let sizes = [16, 64, 256, 1024, 16_384].map(|entries| with_cache(entries, LAYOUTS[2]));
+    assert!(sizes.windows(2).all(|pair| pair[1] <= pair[0] * 1.02), "{sizes:?}");
+}
+
+fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>, u32) {
+    let overrides = Overrides { size: Some((64, 48)), ..Overrides::default() };
+    let options = Options { scene: "tiny".to_owned(), ..options };
+    let job = MultiView::new(options, &overrides, 1).unwrap();
+    let mut sum = activity::Counts::default();
+    let drawn = job.frame(0, spec, &mut |packet, _| sum += &packet.counts).unwrap();
+    assert_eq!(sum, drawn.counts);
+    let codes = drawn.warnings.iter().map(|warning| warning.code).collect();
+    (drawn.image, codes, job.settings().width)
+}
+
+#[test]
+fn the_job_shows_views_side_by_side_interlaced_or_alone() {
+    let spec = spec();
+    let (pair, _, width) = drawn(Options::default(), &spec);
+    assert_eq!((pair.len(), width), (128 * 48, 128));
+    let (left, ..) = drawn(Options { show: Show::One, ..Options::default() }, &spec);
+    assert_eq!(bits(&left[64..128]), bits(&pair[128..192]), "the left half of the second row");
+    let options =
+        Options { views: 7, spacing: 0.05, overlap: 2, show: Show::Interlaced, ..Options::default() };
+    let (panel, _, width) = drawn(options, &spec);
+    assert_eq!((panel.len(), width), (64 * 48, 64));
+}
+
+#[test]
+fn each_bad_regime_is_told() {
+    let big = PipelineSpec { shading_cache: CacheSpec::lru(16_384, 4), ..spec() };
+    let near = Options { spacing: 0.15, aperture: 0.05, ..Options::default() };
+    assert_eq!(drawn(near.clone(), &big).1, Vec::<&str>::new());
+    let small = PipelineSpec { shading_cache: CacheSpec::lru(1, 1), ..spec() };
+    assert_eq!(drawn(near, &small).1, ["shading-cache-small"]);
+    let wide = Options { spacing: 1.5, ..Options::default() };
+    assert!(drawn(wide, &big).1.contains(&"view-dependent-shading"));
+    // The outermost rays meet at 5.7 and at 6.3 degrees: 0.2 and 0.22 to either side of the middle, 4 away.
+    for (spacing, codes) in [(0.3, &[][..]), (0.34, &["view-dependent-shading"])] {
+        let at = Options { focus: Some(4.0), aperture: 0.05, spacing, ..Options::default() };
+        assert_eq!(drawn(at, &big).1, codes);
+    }
+}
+
+#[test]
+fn bad_options_are_the_callers_mistake() {
+    let none = Overrides::default();
+    for bad in [
+        Options { views: 0, ..Options::default() },
+        Options { overlap: 3, ..Options::default() },
+        Options { views: 64, spacing: 0.5, ..Options::default() },
+        Options { focus: Some(-1.0), ..Options::default() },
+        Options { scene: "no such scene".to_owned(), ..Options::default() },
+    ] {
+        let error = MultiView::new(bad.clone(), &none, 1).err().unwrap();
+        assert!(error.is_usage(), "{bad:?}: {error}");
+    }
+}

@@ -1,0 +1,253 @@
+//! Soft shadows from a five-dimensional shadow map.
+
+use activity::{Event, Unit};
+use glam::{DVec3, Vec3};
+use pipeline::sampling::{Pattern, Sample, SampleSpec};
+use pipeline::{Cull, Draw, Geometry, Viewport};
+use proptest::prelude::*;
+use workloads::Overrides;
+use workloads::accumulation::SharedSamples;
+use workloads::job::Job;
+use workloads::soft_shadows::{
+    AreaLight, LightSpec, Method, Options, ShadowMap, Shadows, SoftShadows, World, see,
+};
+use workloads::visibility::Unshaded;
+
+use crate::common::{bits, spec};
+
+/// Samples at one place are one step of a penumbra, however many they are.
+#[test]
+fn places_that_differ_are_counted_for_the_bands() {
+    let many: Vec<_> = (0..16_u8).map(|n| (f32::from(n) / 16.0, 0.0, 0.0)).collect();
+    let warned = |points: Option<Vec<(f32, f32, f32)>>, samples: u32| {
+        let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
+        let options = Options { points, map_px: 16, ..Options::default() };
+        let job = SoftShadows::new(options, &overrides, 1).unwrap();
+        let first = job.settings().frames.start;
+        let warnings = job.frame(first, &spec(), &mut |_, _| ()).unwrap().warnings;
+        warnings.into_iter().find(|warning| warning.code == "shadow-banding").map(|warning| warning.message)
+    };
+    let one = warned(Some(vec![(0.0, 0.0, 0.0)]), 64).unwrap();
+    assert!(
+        one.starts_with("1 places on the light") && one.contains("16 or more `points` that differ"),
+        "{one}"
+    );
+    assert!(warned(Some(many.clone()), 8).unwrap().starts_with("8 places"));
+    assert!(
+        warned(Some([[(0.0, 0.0, 0.0), (-0.0, 0.0, 0.0)]; 8].concat()), 16).unwrap().starts_with("1 places")
+    );
+    assert_eq!((warned(Some(many), 64), warned(None, 16)), (None, None));
+    assert!(warned(None, 8).is_some());
+}
+
+fn set(count: u32, seed: u64) -> SharedSamples {
+    SharedSamples::interleaved(&SampleSpec::default(), count, seed).unwrap()
+}
+
+fn quad(height: f32, x: [f32; 2], z: [f32; 2]) -> [Vec3; 4] {
+    [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]].map(|[x, z]| Vec3::new(x, height, z))
+}
+
+const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+fn draw<'a>(open: &'a [Vec3], close: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Draw<'a> {
+    Draw { geometry: Geometry::new(open, close, triangles).unwrap(), shader: &Unshaded, cull: Cull::None }
+}
+
+/// A light straight above, 4 units high.
+fn above(radius: f64) -> AreaLight {
+    let spec = LightSpec { position: [0.0, 4.0, 0.0], target: [0.0; 3], radius, fov_deg: 80.0, near: 0.1 };
+    AreaLight::new(&spec).unwrap()
+}
+
+fn map(light: &AreaLight, draws: &[Draw<'_>], side: u32, set: &SharedSamples, method: Method) -> ShadowMap {
+    ShadowMap::new((light, draws), side, set, (method, &spec()), &mut |_, _| ()).unwrap()
+}
+
+#[test]
+fn one_pass_equals_accumulation_bit_for_bit() {
+    let image = |accumulate: bool| {
+        let overrides = Overrides { size: Some((64, 36)), ..Overrides::default() };
+        let options = Options { accumulate, map_px: 64, ..Options::default() };
+        let job = SoftShadows::new(options, &overrides, 1).unwrap();
+        assert_eq!(job.settings().samples, 64);
+        let mut packets = activity::Counts::default();
+        let drawn = job.frame(1, &spec(), &mut |packet, _| packets += &packet.counts).unwrap();
+        assert_eq!(packets, drawn.counts);
+        drawn
+    };
+    let (one, many) = (image(false), image(true));
+    assert_eq!(bits(&one.image), bits(&many.image));
+    assert!(one.image.iter().any(|pixel| *pixel != one.image[0]));
+    assert_eq!(
+        (many.triangles, many.counts[Event::Draws]),
+        (64 * one.triangles, 64 * one.counts[Event::Draws])
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// Random soup, turned light, any set: every depth of every texel has the same bits.
+    #[test]
+    fn maps_are_equal_for_any_soup(seed in 0_u64..1 << 32, count in 1_u32..20, radius in 0.01_f64..2.0) {
+        let mut state = seed;
+        let mut number = || {
+            state = pipeline::random::mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
+            (state >> 40) as f32 / 8_388_608.0 - 1.0
+        };
+        let mut points = |spread: f32| -> Vec<Vec3> {
+            (0..36).map(|_| Vec3::new(number(), number(), number()) * spread).collect()
+        };
+        let (open, by) = (points(3.0), points(1.5));
+        let close: Vec<Vec3> = open.iter().zip(&by).map(|(a, b)| *a + *b).collect();
+        let triangles: Vec<[u32; 3]> = (0..12).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let draws = [draw(&open, &close, &triangles)];
+        let light = LightSpec { position: [1.0, 4.0, -2.0], target: [0.3, 0.1, 0.0], radius, fov_deg: 80.0, near: 0.1 };
+        let light = AreaLight::new(&light).unwrap();
+        let set = set(count, seed);
+        let [one, many] = [Method::OnePass, Method::Accumulation]
+            .map(|method| map(&light, &draws, 32, &set, method));
+        let of = |map: &ShadowMap| map.depths().iter().map(|d| d.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(of(&one), of(&many));
+        prop_assert!(one.depths().iter().any(|depth| depth.is_finite()));
+    }
+}
+
+/// A half plane at height h over a floor, a square light of radius R at height H: the penumbra on the floor is 2 R h / (H - h) wide and the
+/// lit share falls across it in a straight line.
+#[test]
+fn the_penumbra_is_as_wide_as_geometry_says() {
+    let (edge, floor) = (quad(1.0, [0.0, 9.0], [-9.0, 9.0]), quad(0.0, [-9.0, 9.0], [-9.0, 9.0]));
+    let draws = [draw(&floor, &floor, &TRIANGLES), draw(&edge, &edge, &TRIANGLES)];
+    let light = above(0.6);
+    let square = SampleSpec { lens: pipeline::LensShape::Square, ..SampleSpec::default() };
+    let set = SharedSamples::interleaved(&square, 256, 3).unwrap();
+    let map = map(&light, &draws, 512, &set, Method::OnePass);
+    let lit = |x: f32| {
+        let point = Vec3::new(x, 0.0, 0.3);
+        (0..256).filter(|&index| map.is_lit(&light, point, index, 0.02)).count() as f64 / 256.0
+    };
+    // Place u of the light sees the edge on the floor at -u R h / (H - h): here from -0.2 to 0.2.
+    for x in [-0.18, -0.1, -0.05, 0.0, 0.07, 0.15, 0.19] {
+        let expected = 0.5 - f64::from(x) / 0.4;
+        assert!((lit(x) - expected).abs() < 0.05, "{x}: {} {expected}", lit(x));
+    }
+    assert_eq!((lit(-0.24), lit(0.24)), (1.0, 0.0));
+}
+
+/// A strip that crosses the light's only ray to a point is there for a share of the time.
+#[test]
+fn motion_blurs_the_shadow_by_the_share_of_time() {
+    let floor = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
+    let strip = |x: f32| quad(2.0, [x, x + 1.0], [-9.0, 9.0]);
+    let (open, close) = (strip(-1.5), strip(2.5));
+    let draws = [draw(&floor, &floor, &TRIANGLES), draw(&open, &close, &TRIANGLES)];
+    let light = above(1e-4);
+    let set = set(256, 9);
+    let map = map(&light, &draws, 256, &set, Method::OnePass);
+    let lit = (0..256).filter(|&index| map.is_lit(&light, Vec3::ZERO, index, 0.05)).count();
+    // The strip is 1 wide and moves by 4: over the point for a quarter of the time.
+    assert!((lit as f64 / 256.0 - 0.75).abs() < 0.01, "{lit}");
+}
+
+/// Lambert's law: a floor seen from where the light is has the cosine of the angle it is seen under at the time of the sample, and what
+/// comes from everywhere; whichever way its triangles are wound.
+#[test]
+fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
+    let light = above(1e-4);
+    let (camera, viewport) = (light.camera().with_lens(None), Viewport::new(8, 8).unwrap());
+    let from = light.point([0.0; 2]);
+    let [right, up] = [[1.0, 0.0], [0.0, 1.0]].map(|at| (light.point(at) - from).normalize());
+    let open = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
+    let close = open.map(|corner| Vec3::new(corner.x, corner.x, corner.z));
+    let albedo = Vec3::new(0.5, 0.25, 1.0);
+    for (t, triangles) in [(0.0, TRIANGLES), (0.5, TRIANGLES), (0.5, TRIANGLES.map(|[a, b, c]| [a, c, b]))] {
+        let sample = Sample { x: 0.5, y: 0.5, t, ..Sample::default() };
+        let set = SharedSamples::new(vec![sample; 3]).unwrap();
+        let draws = [draw(&open, &close, &triangles)];
+        let seen =
+            see((&camera, &draws), viewport, &set, (Method::OnePass, &spec()), &mut |_, _| ()).unwrap();
+        let world =
+            World::new((&camera, &draws), viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
+        let image = world.image(&set, &seen.samples, Shadows::None);
+        let normal = DVec3::new(-f64::from(t), 1.0, 0.0).normalize();
+        for (place, pixel) in image.iter().enumerate() {
+            let at = [place % 8, place / 8].map(|k| (k as f64 - 3.5) / 4.0 * 40.0_f64.to_radians().tan());
+            let along = (at[0] * right - at[1] * up - DVec3::Y).normalize();
+            let expected = albedo * (0.18 - normal.dot(along) as f32);
+            assert!((*pixel - expected).length() < 1e-3, "{t} {place}: {pixel} {expected}");
+        }
+    }
+}
+
+#[test]
+fn rays_and_a_fine_map_agree() {
+    let scene = workloads::soft_shadows::stage().unwrap();
+    let frame = scene.frame(1).unwrap();
+    let draws: Vec<_> =
+        frame.draws(&scene).unwrap().into_iter().map(|d| Draw { cull: Cull::None, ..d }).collect();
+    let light = AreaLight::new(&LightSpec::default()).unwrap();
+    let viewport = Viewport::new(48, 27).unwrap();
+    let (camera, set) = (frame.camera.with_lens(None), set(16, 5));
+    let seen = see((&camera, &draws), viewport, &set, (Method::OnePass, &spec()), &mut |_, _| ()).unwrap();
+    let world = World::new((&camera, &draws), viewport, &light, &[], Vec3::ZERO);
+    let map = map(&light, &draws, 512, &set, Method::OnePass);
+    let of = |shadows| world.lit_and_unlit(&set, &seen.samples, shadows);
+    let (by_map, by_rays) = (of(Shadows::Map { map: &map, bias: 0.02 }), of(Shadows::Rays));
+    let facing = by_rays.iter().flatten().count();
+    let wrong = by_map.iter().zip(&by_rays).filter(|(a, b)| a != b).count();
+    let dark = by_rays.iter().flatten().filter(|lit| !**lit).count();
+    assert!(facing > 10_000 && dark > 300, "{facing} {dark}");
+    assert!(wrong * 100 < facing, "{wrong} of {facing} differ");
+    // Bias decides: without any, surfaces shade themselves; with far too much, shadows vanish.
+    let wrong = |bias| {
+        let by_map = of(Shadows::Map { map: &map, bias });
+        by_map.iter().zip(&by_rays).filter(|(a, b)| a != b).count()
+    };
+    assert!(wrong(0.0) * 5 > facing, "acne: {} of {facing}", wrong(0.0));
+    assert!(wrong(5.0) * 2 > dark, "shadows lost: {} of {dark}", wrong(5.0));
+}
+
+#[test]
+fn depths_are_all_that_the_passes_of_depth_write() {
+    let floor = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
+    let (light, set) = (above(0.5), set(4, 1));
+    let draws = [draw(&floor, &floor, &TRIANGLES)];
+    let map = map(&light, &draws, 64, &set, Method::OnePass);
+    assert!(!map.counts.uses(Unit::Colour) && !map.counts.uses(Unit::ShadingCache));
+    assert_eq!(map.counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
+}
+
+fn warned(options: Options, samples: u32) -> Vec<&'static str> {
+    let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
+    let job = SoftShadows::new(options, &overrides, 1).unwrap();
+    job.frame(0, &spec(), &mut |_, _| ()).unwrap().warnings.iter().map(|w| w.code).collect()
+}
+
+#[test]
+fn each_bad_regime_is_told() {
+    let small = Options { map_px: 64, bias: 0.2, ..Options::default() };
+    assert_eq!(warned(small.clone(), 16), Vec::<&str>::new());
+    assert_eq!(warned(small.clone(), 4), ["shadow-banding"]);
+    assert_eq!(warned(Options { bias: 0.0, ..small.clone() }, 16), ["shadow-bias"]);
+    assert_eq!(warned(Options { bias: 3.0, ..small }, 16), ["shadow-bias"]);
+}
+
+#[test]
+fn points_of_ones_own_are_the_set() {
+    let points = vec![(0.5, -0.25, 0.0), (-1.0, 1.0, 0.5)];
+    let spec = SampleSpec { pattern: Pattern::Given { points: points.clone() }, ..SampleSpec::default() };
+    let set = SharedSamples::from_spec(&spec, 2, 1).unwrap();
+    let found: Vec<_> = set.samples().iter().map(|s| (s.u, s.v, s.t)).collect();
+    assert_eq!(found, points);
+    for bad in [
+        Options { points: Some(vec![(2.0, 0.0, 0.0)]), ..Options::default() },
+        Options { points: Some(Vec::new()), ..Options::default() },
+        Options { map_px: 33, ..Options::default() },
+        Options { bias: f64::NAN, ..Options::default() },
+        Options { scene: Some("no such scene".to_owned()), ..Options::default() },
+    ] {
+        assert!(SoftShadows::new(bad, &Overrides::default(), 1).err().unwrap().is_usage());
+    }
+}
