@@ -6,7 +6,7 @@ use std::process::Command;
 
 /// What the program is made of, from the root of the repository. A change of these builds the program anew anyway, so that asking git
 /// costs nothing more.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 18] = [
     "Cargo.toml",
     "Cargo.lock",
     "pipeline/src",
@@ -14,8 +14,12 @@ const SOURCES: [&str; 14] = [
     "power-model/platforms",
     "power-model/src",
     "power-model/tables",
-    "sim/assets",
-    "sim/gpus",
+    "sim/experiments/papers",
+    "sim/experiments/src",
+    "sim/output/assets",
+    "sim/output/src",
+    "sim/run/gpus",
+    "sim/run/src",
     "sim/src",
     "sim/timing/src",
     "traces/src",

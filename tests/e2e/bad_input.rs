@@ -237,7 +237,7 @@ fn gpu_and_platform_files_with_mistakes() {
     let mut refusals = Refusals::default();
     let source =
         |path: &str| fs::read_to_string(crate::support::root().join(path)).expect("a file of the repository");
-    let gpu = source("sim/gpus/reference.ron");
+    let gpu = source("sim/run/gpus/reference.ron");
     let platform = source("power-model/platforms/reference.ron");
     let table = source("power-model/tables/28nm.ron");
     let cases = [
@@ -268,7 +268,7 @@ fn paths_that_are_no_utf8_are_read() {
     let named = |name: &[u8]| Path::new(&inputs.path("")).join(OsString::from_vec(name.to_vec()));
     let copies = [
         (named(b"sc\xe9ne.ron"), "workloads/scenes/pendulum.ron"),
-        (named(b"g\xe9ant.ron"), "sim/gpus/mobile.ron"),
+        (named(b"g\xe9ant.ron"), "sim/run/gpus/mobile.ron"),
     ];
     for (path, source) in &copies {
         fs::copy(crate::support::root().join(source), path).expect("a copy");

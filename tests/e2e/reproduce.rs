@@ -36,7 +36,7 @@ fn reproduce(paper: &str, out: &Path, args: &[&str]) -> (Ended, Value) {
 
 /// The committed settings of a paper.
 fn committed(number: u32) -> String {
-    fs::read_to_string(root().join(format!("sim/data/reproduce/paper{number}.ron")))
+    fs::read_to_string(root().join(format!("sim/experiments/papers/paper{number}.ron")))
         .expect("a file of settings")
 }
 

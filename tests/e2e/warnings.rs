@@ -468,7 +468,7 @@ fn regimes_in_which_tile_tests_pay_little() {
 #[test]
 fn rows_of_memory_that_decide() {
     let inputs = Inputs::new();
-    let path = root().join("sim/gpus/reference.ron");
+    let path = root().join("sim/run/gpus/reference.ron");
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let slow = text
         .replace("activate_cycles: 7, precharge_cycles: 7", "activate_cycles: 100, precharge_cycles: 100")

@@ -10,8 +10,8 @@ use workloads::points::poisson::{
 
 use super::file::Points;
 use super::{Common, Failure, usage};
-use crate::output::progress::Progress;
-use crate::output::terminal::Terminal;
+use output::progress::Progress;
+use output::terminal::Terminal;
 
 /// Arguments of `sample poisson`.
 #[derive(Debug, Args)]

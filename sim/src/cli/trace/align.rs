@@ -15,7 +15,7 @@ use crate::cli::Failure;
 use crate::cli::args::trace::AlignArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::terminal::Terminal;
+use output::terminal::Terminal;
 
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {

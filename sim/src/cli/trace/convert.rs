@@ -11,8 +11,8 @@ use crate::cli::Failure;
 use crate::cli::args::trace::ConvertArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
-use crate::output::terminal::Terminal;
+use output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
+use output::terminal::Terminal;
 
 /// Bytes of a row of CSV, about; larger files than this many are announced.
 const ROW_BYTES: u64 = 50;
@@ -100,11 +100,11 @@ pub(super) fn save(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Resu
 /// A counter track of the power, thinned out to what the viewer holds.
 fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let heading = trace.heading();
-    let mut thinner = Thinner::new(heading.samples, MAX_POINTS);
-    trace.pour(&mut thinner)?;
+    let mut extremes = PowerExtremes(Thinner::new(heading.samples, MAX_POINTS));
+    trace.pour(&mut extremes)?;
     let start_ns = heading.time_ns(0);
     let place = |(index, watts): (u64, f64)| ((heading.time_ns(index) - start_ns).unsigned_abs(), watts);
-    let points: Vec<(u64, f64)> = thinner.kept().into_iter().map(place).collect();
+    let points: Vec<(u64, f64)> = extremes.0.kept().into_iter().map(place).collect();
     let (kept, samples) = (points.len() as u64, heading.samples);
     if kept < samples {
         terminal.note(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
@@ -114,10 +114,12 @@ fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), 
     Ok(atomic::write_file(path, |out| perfetto::write(&timeline, out))?)
 }
 
-/// Of the samples, their power.
-impl Sink for Thinner {
+/// Keeps the extremes of the power of a trace.
+struct PowerExtremes(Thinner);
+
+impl Sink for PowerExtremes {
     fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
-        stretch.powers_w().for_each(|watts| self.push(watts));
+        stretch.powers_w().for_each(|watts| self.0.push(watts));
         Ok(())
     }
 }

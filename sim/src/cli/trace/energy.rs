@@ -14,8 +14,8 @@ use super::failure::wrong;
 use crate::cli::Failure;
 use crate::cli::args::trace::{Discard, EnergyArgs, IdleBy};
 use crate::cli::terminal::{print, print_json};
-use crate::output::table::counted;
-use crate::output::terminal::Terminal;
+use output::table::counted;
+use output::terminal::Terminal;
 
 /// Samples from which the lowest power is taken, about.
 const LEVELS: u64 = 65_536;

@@ -14,8 +14,8 @@ use crate::cli::args::trace::FramesArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::cli::{Failure, threads};
-use crate::output::table::{Table, counted, si, si_digits};
-use crate::output::terminal::Terminal;
+use output::table::{Table, counted, si, si_digits};
+use output::terminal::Terminal;
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;

@@ -15,7 +15,7 @@ use super::pipes::shown;
 use super::times::times;
 use crate::cli::Failure;
 use crate::cli::args::trace::{FindArgs, InputArgs};
-use crate::output::terminal::Terminal;
+use output::terminal::Terminal;
 
 /// Traces of more samples are read in pieces.
 const LONG: u64 = 1 << 24;

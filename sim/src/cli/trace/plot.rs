@@ -16,9 +16,9 @@ use crate::cli::Failure;
 use crate::cli::args::trace::{PlotArgs, PlotKind};
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};
-use crate::output::table::{counted, si};
-use crate::output::terminal::Terminal;
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};
+use output::table::{counted, si};
+use output::terminal::Terminal;
 
 /// Columns of the curve.
 const COLUMNS: usize = 1050;

@@ -11,8 +11,8 @@ use super::report;
 use crate::cli::Failure;
 use crate::cli::args::trace::SampleArgs;
 use crate::cli::terminal::print_json;
-use crate::output::table::si;
-use crate::output::terminal::Terminal;
+use output::table::si;
+use output::terminal::Terminal;
 
 /// A recorder whose codes are used to a smaller share loses energy to rounding.
 const FEW_CODES: f64 = 0.05;
