@@ -2,8 +2,8 @@
 
 use std::io::{IsTerminal, stderr};
 
-use activity::Warning;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use warnings::Warning;
 
 use super::terminal::{Terminal, Verbosity};
 

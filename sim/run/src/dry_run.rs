@@ -1,7 +1,7 @@
 //! What a run would do, for `--dry-run`.
 
-use activity::Warning;
 use serde::Serialize;
+use warnings::Warning;
 
 use super::{Expected, PacingChoice, Prepared, RunError, pairing};
 use crate::Sampling;

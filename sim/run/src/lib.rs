@@ -29,7 +29,6 @@ mod plan;
 mod provenance;
 mod recorder;
 mod regime;
-mod regime_warnings;
 mod report;
 mod sampled;
 mod sampling;
@@ -39,7 +38,7 @@ mod stalls;
 mod summary;
 mod timeline;
 pub mod visibility;
-mod warnings;
+mod warn;
 mod work;
 mod write;
 

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use activity::Warning;
 use power_model::{EnergyTable, Platform};
+use warnings::{Code, Warning};
 
 use super::options::RunOptions;
 use crate::gpu::{GpuSpec, PowerFiles};
@@ -30,7 +30,7 @@ pub(super) fn check(
             gpu.name, own.platform, own.energy
         ),
     };
-    Some(Warning::new("platform-mismatch", message))
+    Some(Warning::new(Code::PlatformMismatch, message))
 }
 
 /// By the names in the files, or by what was asked for where that is a file itself.

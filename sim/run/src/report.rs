@@ -37,8 +37,8 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
 }
 
 fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
-    let row = |w: &activity::Warning| WarningRow {
-        code: w.code.to_owned(),
+    let row = |w: &warnings::Warning| WarningRow {
+        code: w.code.name().to_owned(),
         message: w.message.clone(),
         details: w.details.clone(),
     };

@@ -1,11 +1,12 @@
 //! What the simulator knows of the frames of a run.
 
-use activity::{Counts, Unit, Warning};
+use activity::{Counts, Unit};
 use glam::Vec3;
 use power_model::FramePower;
 use serde::Serialize;
 use timing::Stalls;
 use timing::sampled::Interval;
+use warnings::Warning;
 use workloads::job::Fact;
 
 use super::heat::HeatPicture;

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Unit, Warning};
+use activity::{Counts, Unit};
 use power_model::Energy;
 use serde::Serialize;
 use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
+use warnings::Warning;
 use workloads::scene::CameraUsed;
 
 use super::checks::Checks;
@@ -15,7 +16,7 @@ use super::modelled::Modelled;
 use super::stalls::{self, StallShares};
 use super::{
     Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated,
-    Verified, warnings,
+    Verified, warn,
 };
 use output::MeanSd;
 use output::report::Headline;
@@ -189,7 +190,7 @@ impl Summary {
 
     /// With a warning where what was asked for is not met.
     pub(super) fn warned(mut self) -> Self {
-        self.warnings.extend(self.choice.iter().flat_map(warnings::missed));
+        self.warnings.extend(self.choice.iter().flat_map(warn::missed));
         self.warnings = Warning::fold(self.warnings);
         self
     }
@@ -217,7 +218,7 @@ impl Summary {
             settings: settings(plan, simulated, measurement),
             camera,
             modelled: Modelled::new(plan, simulated),
-            warnings: warnings::gather(plan, simulated, measurement),
+            warnings: warn::gather(plan, simulated, measurement),
             measured: Figures::of(&measurement.frames, pixels).filter(|_| !measurement.is_mark_alone()),
             truth: Figures::of(&truth, pixels),
             recorder: measurement.resolution,

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use activity::Warning;
 use cpu_time::ProcessTime;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::{SampleLayout, Sighting, Visibility, resolve};
 use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, Settings, frame};
 use serde::Serialize;
+use warnings::{Code, Warning};
 use workloads::visibility::{Unshaded, VisibilityScene};
 
 use crate::Regime;
@@ -77,8 +77,8 @@ pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
     let empty =
         "no triangle is in view, so no sample can see one; look at the mesh and where the camera points";
     let found = [
-        (regime.extreme > 0).then(|| Warning::new("coordinates-out-of-range", extreme)),
-        (regime.in_view == 0).then(|| Warning::new("empty-frame", empty)),
+        (regime.extreme > 0).then(|| Warning::new(Code::CoordinatesOutOfRange, extreme)),
+        (regime.in_view == 0).then(|| Warning::new(Code::EmptyFrame, empty)),
     ];
     found.into_iter().flatten().collect()
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use activity::Warning;
+use warnings::Warning;
 use workloads::catalog;
 use workloads::job::{Job, JobError, OptionSource, Request};
 use workloads::{Fingerprint, LoadError, Overrides, Scene};

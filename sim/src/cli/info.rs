@@ -73,7 +73,7 @@ struct MeshFile<'a> {
     near: f32,
     /// The camera, where the file does not carry one.
     camera: Option<String>,
-    warnings: &'a [activity::Warning],
+    warnings: &'a [warnings::Warning],
 }
 
 fn print_mesh(name: &str, json: bool, scene: &VisibilityScene) -> Result<(), Failure> {
@@ -307,6 +307,6 @@ fn camera_text(info: &SceneInfo) -> String {
     text + &format!("  --camera '{ron}'\n")
 }
 
-fn warnings_text(warnings: &[activity::Warning]) -> Vec<String> {
+fn warnings_text(warnings: &[warnings::Warning]) -> Vec<String> {
     warnings.iter().map(|warning| format!("warning: {warning}")).collect()
 }

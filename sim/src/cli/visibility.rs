@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use activity::Warning;
 use pipeline::SampleTable;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::Sighting;
 use serde::Serialize;
+use warnings::{Code, Warning};
 use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, write_hits};
 
 use super::Failure;
@@ -109,7 +109,7 @@ fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> 
 fn slow_view() -> Warning {
     let message = "the engine that is fast takes no orthographic camera, so all tile tests were modelled: the samples see what they \
                    would, but the rates are those of the model";
-    Warning::new("orthographic-view", message)
+    Warning::new(Code::OrthographicView, message)
 }
 
 fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[Sighting]) -> Result<(), Failure> {

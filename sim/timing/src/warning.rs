@@ -1,7 +1,7 @@
 //! What a level is known to be bad at, seen in its own result.
 
 use crate::{Level, Timed};
-use activity::Warning;
+use warnings::{Code, Warning};
 
 /// A reason why the time of a frame may be inaccurate at its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,9 +12,6 @@ pub enum AccuracyWarning {
     /// A packet comes every so many cycles: at `bound`, short ones wait for a unit each, where no unit is busy for long.
     ShortPackets(f64),
 }
-
-const MEMORY_ROWS: &str = "memory-rows";
-const SHORT_PACKETS: &str = "short-packets";
 
 /// The time of rows, over that of the busiest unit, from which they decide.
 const ROWS: f64 = 0.2;
@@ -31,10 +28,10 @@ impl AccuracyWarning {
     }
 
     /// Its code among the warnings.
-    pub const fn code(self) -> &'static str {
+    pub const fn code(self) -> Code {
         match self {
-            Self::MemoryRows(_) => MEMORY_ROWS,
-            Self::ShortPackets(_) => SHORT_PACKETS,
+            Self::MemoryRows(_) => Code::MemoryRows,
+            Self::ShortPackets(_) => Code::ShortPackets,
         }
     }
 
@@ -51,7 +48,7 @@ impl AccuracyWarning {
         let name = level.name();
         match self {
             Self::MemoryRows(share) => Warning::new(
-                MEMORY_ROWS,
+                Code::MemoryRows,
                 format!(
                     "a bank of memory opens and closes rows for {share:.1} times as long as any unit works in frame {frame}: \
                      times at `{name}` may be far off, as what counts is which lines wait side by side; use --timing \
@@ -59,7 +56,7 @@ impl AccuracyWarning {
                 ),
             ),
             Self::ShortPackets(cycles) => Warning::new(
-                SHORT_PACKETS,
+                Code::ShortPackets,
                 format!(
                     "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a \
                      quarter too short; use --timing packet, or let --accuracy choose"

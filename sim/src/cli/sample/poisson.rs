@@ -1,8 +1,8 @@
 //! `quintile sample poisson`.
 
-use activity::Warning;
 use clap::{ArgGroup, Args};
 use serde::Serialize;
+use warnings::Warning;
 use workloads::points::doubt;
 use workloads::points::poisson::{
     Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_telling, radius_for, saturation, span,

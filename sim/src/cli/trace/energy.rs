@@ -16,6 +16,7 @@ use crate::cli::args::trace::{Discard, EnergyArgs, IdleBy};
 use crate::cli::terminal::{print, print_json};
 use output::table::counted;
 use output::terminal::Terminal;
+use warnings::Code;
 
 /// Samples from which the lowest power is taken, about.
 const LEVELS: u64 = 65_536;
@@ -283,7 +284,7 @@ fn within_frames(
             "{beyond} of {frames} frames end before pass {name} begins, {} ms after their start: it has no energy there",
             begins_s * 1e3
         );
-        terminal.warn_of("pass-beyond", &message);
+        terminal.warn_of(Code::PassBeyond, &message);
     }
     Ok(())
 }

@@ -16,6 +16,7 @@ use crate::cli::terminal::print_json;
 use crate::cli::{Failure, threads};
 use output::table::{Table, counted, si, si_digits};
 use output::terminal::Terminal;
+use warnings::Code;
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;
@@ -191,7 +192,7 @@ fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
 fn inverse_text(table: &FrameTable, pixels: Option<u64>, terminal: &Terminal) -> String {
     let units = inverse_units(table, pixels);
     terminal.warn_of(
-        "inverse-units",
+        Code::InverseUnits,
         "inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
     );
     let number = |key: &str| units[key].as_f64().unwrap_or(f64::NAN);

@@ -16,6 +16,7 @@ use super::times::times;
 use crate::cli::Failure;
 use crate::cli::args::trace::{FindArgs, InputArgs};
 use output::terminal::Terminal;
+use warnings::Code;
 
 /// Traces of more samples are read in pieces.
 const LONG: u64 = 1 << 24;
@@ -97,7 +98,7 @@ impl InputArgs {
         if let Some(sum) = rail_of_sums(path, &self.options()?)? {
             let others: Vec<String> = sum.others.iter().map(|rail| format!("--rail {rail}")).collect();
             let alone = if sum.rail.is_empty() { String::new() } else { format!("--rail {}, or ", sum.rail) };
-            terminal.warn_of("rail-counted-twice", &format!("{sum}: give {alone}{}", others.join(" ")));
+            terminal.warn_of(Code::RailCountedTwice, &format!("{sum}: give {alone}{}", others.join(" ")));
         }
         Ok(())
     }

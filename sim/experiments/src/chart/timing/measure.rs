@@ -115,7 +115,10 @@ pub(super) fn rows(
             power_shape_error_percent: shape_error(&found_power, &true_power, 20e-6),
             power_shape_error_1us_percent: shape_error(&found_power, &true_power, 1e-6),
             busiest: busiest(&truth.timeline),
-            warns: AccuracyWarning::all(level, &found).into_iter().map(AccuracyWarning::code).collect(),
+            warns: AccuracyWarning::all(level, &found)
+                .into_iter()
+                .map(|warning| warning.code().name())
+                .collect(),
             host_s,
             written_s: written.host_s,
             speedup_over_stepped: stepped_s / host_s,

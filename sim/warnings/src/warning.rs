@@ -1,16 +1,17 @@
-//! Coded warnings about a run.
+//! A warning, and how many become one.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
 
+use crate::Code;
+
 /// A run has entered a regime its methods are known to be bad at, or has gone on without something its input asks for.
-/// Codes are stable and listed in the book's chapter on warnings.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Warning {
-    /// A stable code in kebab case, for example `missing-image`.
-    pub code: &'static str,
+    /// What it is about.
+    pub code: Code,
     /// What happened, to how many things, and what it means for the results; one line.
     pub message: String,
     /// How many things it concerns (materials, primitives, frames); 1 where it is about the run as a whole.
@@ -33,18 +34,13 @@ impl Warning {
     pub const MAX_DETAILS: usize = 256;
 
     /// A warning about the run as a whole, or one whose message has all numbers.
-    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
+    pub fn new(code: Code, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), count: 1, details: Vec::new(), kind: None }
     }
 
     /// A warning about one `thing`, a noun whose plural ends in `s`; `what` goes on after the noun, and `detail` says which
     /// thing it is. [`Warning::fold`] makes one warning of all that are about the same kind of thing.
-    pub fn about(
-        code: &'static str,
-        thing: &'static str,
-        what: &'static str,
-        detail: impl Into<String>,
-    ) -> Self {
+    pub fn about(code: Code, thing: &'static str, what: &'static str, detail: impl Into<String>) -> Self {
         let kind = Kind { thing, what };
         Self { code, message: kind.message(1), count: 1, details: vec![detail.into()], kind: Some(kind) }
     }
@@ -59,7 +55,7 @@ impl Warning {
 
     /// The warnings in order of their codes, those about the same kind of thing as one with a count, and equal ones once.
     pub fn fold(all: impl IntoIterator<Item = Self>) -> Vec<Self> {
-        let mut counted: BTreeMap<(&str, Kind), Self> = BTreeMap::new();
+        let mut counted: BTreeMap<(Code, Kind), Self> = BTreeMap::new();
         let mut folded = Vec::new();
         for warning in all {
             match warning.kind {
@@ -118,12 +114,12 @@ mod tests {
 
     fn light(node: usize) -> Warning {
         let what = "ignored: only one directional light is used";
-        Warning::about("light-ignored", "point light", what, format!("node {node}"))
+        Warning::about(Code::LightIgnored, "point light", what, format!("node {node}"))
     }
 
     #[test]
     fn warnings_about_one_kind_of_thing_become_one_with_a_count() {
-        let whole = Warning::new("empty-frame", "nothing is seen");
+        let whole = Warning::new(Code::EmptyFrame, "nothing is seen");
         let folded = Warning::fold([light(4), whole.clone(), light(7), whole.clone(), light(9)]);
         assert_eq!(folded.len(), 2);
         assert_eq!(folded[0], whole);

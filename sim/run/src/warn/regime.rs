@@ -1,8 +1,8 @@
 //! Warnings of scenes that enter the regimes of the failure catalogue: results stay right, but the tests that save work do not.
 
-use activity::Warning;
+use warnings::{Code, Warning};
 
-use super::{Regime, Simulated};
+use crate::{Regime, Simulated};
 
 /// Shares of triangles in view from which a regime is worth a word.
 const MOST: f64 = 0.5;
@@ -36,7 +36,7 @@ fn worst(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<St
 fn behind(simulated: &Simulated) -> Option<Warning> {
     let which = worst(simulated, SOME, |regime| regime.behind)?;
     Some(Warning::new(
-        "behind-camera",
+        Code::BehindCamera,
         format!(
             "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
              or cut large triangles into smaller ones"
@@ -47,7 +47,7 @@ fn behind(simulated: &Simulated) -> Option<Warning> {
 fn tiny(simulated: &Simulated) -> Option<Warning> {
     let which = worst(simulated, MOST, |regime| regime.tiny)?;
     Some(Warning::new(
-        "sub-sample-triangles",
+        Code::SubSampleTriangles,
         format!(
             "{which} are smaller than the spacing of samples: most are hit by none, and tile tests cannot help; use a \
              coarser mesh, a larger image or more samples"
@@ -58,7 +58,7 @@ fn tiny(simulated: &Simulated) -> Option<Warning> {
 fn slivers(simulated: &Simulated) -> Option<Warning> {
     let which = worst(simulated, MANY, |regime| regime.slivers)?;
     Some(Warning::new(
-        "sliver-triangles",
+        Code::SliverTriangles,
         format!(
             "{which} are more than a hundred times as long as high: they touch many tiles and few samples; mend the mesh \
              where it was made"
@@ -69,7 +69,7 @@ fn slivers(simulated: &Simulated) -> Option<Warning> {
 fn fast(simulated: &Simulated) -> Option<Warning> {
     let which = worst(simulated, SOME, |regime| regime.fast)?;
     Some(Warning::new(
-        "fast-motion",
+        Code::FastMotion,
         format!(
             "{which} move by more than an image while the shutter is open: few samples see them, the image is noisy, and \
              a straight way may be far from the true one; use a shorter shutter, a higher frame rate or more samples"
@@ -80,7 +80,7 @@ fn fast(simulated: &Simulated) -> Option<Warning> {
 fn blurred(simulated: &Simulated) -> Option<Warning> {
     let which = worst(simulated, MANY, |regime| regime.blurred)?;
     Some(Warning::new(
-        "blur-beyond-image",
+        Code::BlurBeyondImage,
         format!(
             "{which} are out of focus by more than an image: the lens is too large for this scene; use a smaller --lens \
              or another --focus"
@@ -91,7 +91,7 @@ fn blurred(simulated: &Simulated) -> Option<Warning> {
 fn extreme(simulated: &Simulated) -> Option<Warning> {
     let which = worst(simulated, 0.0, |regime| regime.extreme)?;
     Some(Warning::new(
-        "coordinates-out-of-range",
+        Code::CoordinatesOutOfRange,
         format!(
             "{which} have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at wrong \
              depths; scale the scene to ordinary lengths"

@@ -2,17 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Event, Warning};
+use activity::{Counts, Event};
 use power_model::PacedFrame;
 use traces::frames::Flag;
+use warnings::{Code, Warning};
 
-use super::recorder::MIN_BUSY_SAMPLES;
-use super::{Choice, Measurement, Plan, Simulated, SimulatedFrame, pairing, regime_warnings};
+use crate::recorder::MIN_BUSY_SAMPLES;
+mod regime;
+
+use crate::{Choice, Measurement, Plan, Simulated, SimulatedFrame, pairing};
 use output::table::si;
 use timing::AccuracyWarning;
 
 /// Every warning of a run, sorted and each once.
-pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
+pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.work.warnings().to_vec();
     all.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
     all.extend(of_frames(simulated.distinct.iter().map(|frame| (frame.index, &frame.warnings[..]))));
@@ -22,7 +25,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     let unseen = short.is_some() && measurement.is_mark_alone();
     let explained = simulated.frames.len() == 1 || unseen;
     let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
-    all.extend(of_trace.map(|w| Warning::new(w.code, w.message.clone())));
+    all.extend(of_trace.filter_map(|w| Some(Warning::new(Code::named(w.code)?, w.message.clone()))));
     all.extend(doubted(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
@@ -32,7 +35,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(clipped(measurement));
     all.extend(lost(measurement));
     all.extend(unsure(simulated));
-    all.extend(regime_warnings::gather(simulated));
+    all.extend(regime::gather(simulated));
     Warning::fold(all)
 }
 
@@ -40,7 +43,7 @@ pub(super) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
 /// differ.
 fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) -> Vec<Warning> {
     let of = frames.len();
-    let mut by_code: BTreeMap<&str, Vec<(u32, &Warning)>> = BTreeMap::new();
+    let mut by_code: BTreeMap<Code, Vec<(u32, &Warning)>> = BTreeMap::new();
     for (frame, warning) in frames.flat_map(|(frame, warnings)| warnings.iter().map(move |w| (frame, w))) {
         by_code.entry(warning.code).or_default().push((frame, warning));
     }
@@ -80,7 +83,7 @@ fn degenerate(simulated: &Simulated) -> Option<Warning> {
     (dropped + flat > 0).then(|| {
         let (all, of, frame) = (dropped + flat, worst.counts[Event::TrianglesIn], worst.index);
         Warning::new(
-            "degenerate-triangle",
+            Code::DegenerateTriangle,
             format!(
                 "{all} of {of} triangles have no area at any time (frame {frame}): {dropped} with two equal corners were \
                  dropped, {flat} with their corners on one line were kept, so that closed surfaces stay closed; clean the \
@@ -94,25 +97,25 @@ fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
     let empty = simulated.known().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
     (empty > 0).then(|| {
         Warning::new(
-            "empty-frame",
+            Code::EmptyFrame,
             format!("{empty} of {} frames show nothing: check the camera", simulated.known().count()),
         )
     })
 }
 
 /// A choice that is not as good, or not as fast, as was asked for.
-pub(super) fn missed(choice: &Choice) -> Vec<Warning> {
+pub(crate) fn missed(choice: &Choice) -> Vec<Warning> {
     let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
     let late = late.map(|(budget_s, expected_s)| {
         let message = format!(
             "simulating was expected to take {expected_s:.1} s, more than the {budget_s} s of --budget, at the cheapest \
              there is; give more time, or fewer frames, samples or pixels"
         );
-        Warning::new("budget-missed", message)
+        Warning::new(Code::BudgetMissed, message)
     });
     let inexact = (choice.meets_accuracy == Some(false)).then(|| {
         Warning::new(
-            "accuracy-missed",
+            Code::AccuracyMissed,
             format!(
                 "the error is expected to be {:.2} %, more than the {} % of --accuracy: --budget allows no more, or all \
                  frames would have to be simulated; give more time, or less accuracy",
@@ -132,7 +135,7 @@ fn unsure(simulated: &Simulated) -> Option<Warning> {
     let worst = sampled.worst() * 100.0;
     (worst > WIDE_PERCENT).then(|| {
         Warning::new(
-            "prediction-unsure",
+            Code::PredictionUnsure,
             format!(
                 "{} of {} frames were simulated, and totals predicted from them are good to {worst:.1} % only: frames differ in \
                  ways that their previews do not show; give --accuracy, or simulate all",
@@ -158,7 +161,7 @@ fn short_frames(measurement: &Measurement) -> Option<Warning> {
         };
         let faster = resolution.needed_hz().map_or(String::new(), |rate_hz| format!("--trace-rate {rate_hz}, or "));
         Warning::new(
-            "short-frame",
+            Code::ShortFrame,
             format!(
                 "{short} of {} frames are too short for the recorder: at {} it takes {:.1} samples while the shortest is busy, and \
                  {found}; {faster}a larger image",
@@ -175,7 +178,7 @@ fn detection(measurement: &Measurement) -> Option<Warning> {
     let unsure = measurement.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
     (score.matched < score.truth || score.found > score.matched).then(|| {
         Warning::new(
-            "frames-missed",
+            Code::FramesMissed,
             format!(
                 "{} of {} frame starts were found in the trace, with {} false ones ({unsure} flagged unsure): energies \
                  of the frames beside them are wrong",
@@ -200,40 +203,40 @@ fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
             si(idle_w, "W"),
             si(lowest_w, "W")
         );
-        Warning::new("idle-above-busy", message)
+        Warning::new(Code::IdleAboveBusy, message)
     })
 }
 
 fn clipped(measurement: &Measurement) -> Option<Warning> {
     (measurement.clipped > 0).then(|| {
         Warning::new(
-            "clipped-samples",
+            Code::ClippedSamples,
             format!("{} samples are beyond the recorder's range", measurement.clipped),
         )
     })
 }
 
 fn lost(measurement: &Measurement) -> Option<Warning> {
-    measurement.trace.losses().map(|losses| Warning::new("packets-lost", losses))
+    measurement.trace.losses().map(|losses| Warning::new(Code::PacketsLost, losses))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Quantity, SampledSummary};
     use super::*;
     use crate::GpuSpec;
+    use crate::{Quantity, SampledSummary};
     use timing::streams::failures;
     use timing::{FrameClock, Level, Recorder};
 
     #[test]
     fn a_warning_of_many_frames_is_one_line() {
         let of = |frames: &[u32]| -> Vec<(u32, Vec<Warning>)> {
-            let warned = |frame| Warning::new("caustics-coarse", format!("waves of {frame} squares"));
+            let warned = |frame| Warning::new(Code::CausticsCoarse, format!("waves of {frame} squares"));
             (0..5).map(|f| (f, if frames.contains(&f) { vec![warned(f)] } else { vec![] })).collect()
         };
         let fold = |all: &[(u32, Vec<Warning>)]| of_frames(all.iter().map(|(f, w)| (*f, &w[..])));
         let one = fold(&of(&[3]));
-        assert_eq!(one, [Warning::new("caustics-coarse", "waves of 3 squares")]);
+        assert_eq!(one, [Warning::new(Code::CausticsCoarse, "waves of 3 squares")]);
         let three = fold(&of(&[1, 2, 4]));
         assert_eq!(three.len(), 1);
         assert_eq!(three[0].message, "waves of 1 squares (frame 1; the same in 3 of 5 frames)");
@@ -266,7 +269,7 @@ mod tests {
     }
 
     /// The codes of every stream that breaks a level, where there are any.
-    fn codes(level: Level) -> Vec<(String, &'static str)> {
+    fn codes(level: Level) -> Vec<(String, Code)> {
         let mut found = Vec::new();
         for name in ["mobile", "reference", "discrete"] {
             let mut gpu = GpuSpec::load(name).unwrap();
@@ -287,11 +290,11 @@ mod tests {
 
     #[test]
     fn streams_that_break_a_level_are_warned_about_and_others_are_not() {
-        let rows =
-            ["discrete", "mobile", "reference"].map(|gpu| (format!("row after row on {gpu}"), "memory-rows"));
+        let rows = ["discrete", "mobile", "reference"]
+            .map(|gpu| (format!("row after row on {gpu}"), Code::MemoryRows));
         assert_eq!(codes(Level::Packet), rows);
         assert_eq!(codes(Level::Stepped), []);
-        let tiny = ("tiny triangles on discrete".to_owned(), "short-packets");
+        let tiny = ("tiny triangles on discrete".to_owned(), Code::ShortPackets);
         let bound = codes(Level::Bound);
         assert!(rows.iter().chain([&tiny]).all(|case| bound.contains(case)), "{bound:?}");
         assert!(bound.len() <= 5, "{bound:?}");
