@@ -5,7 +5,8 @@
 //! another time in each frame, so there neighbours differ, and the energy from start to start changes with them. What is common to
 //! all begins at the right place: so a start is moved on to the first sample from which on neighbours agree about as well as anywhere
 //! near. Where they agree already, as in a rest or in a steady beat, nothing moves; nor at an edge, of which each frame is sampled at
-//! another phase, nor up into more power, as the way out of a frame leads down.
+//! another phase, nor up into more power, as the way out of a frame leads down, nor past most of the work in the window: a frame that is
+//! busy for a few samples differs from its neighbours while it works, and they agree in the idle gap after it.
 
 use super::refine::between;
 use super::split::moments;
@@ -44,7 +45,9 @@ pub(super) fn settle(
         .map(|frame| {
             let near = frame.saturating_sub(FRAMES)..(frame + FRAMES).min(differences.len());
             let by = first_alike(&mean_of_each(&differences[near.clone()], reach + 1), alike_w2);
-            if level(power, &starts[near.clone()], by) < level(power, &starts[near], 0.0) { by } else { 0.0 }
+            let starts = &starts[near];
+            let is_down = level(power, starts, by) < level(power, starts, 0.0);
+            if by > 0.0 && is_down && has_work_ahead(power, starts, by, width as f64 - anchor) { by } else { 0.0 }
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, median), |near| mean(near));
@@ -80,6 +83,16 @@ fn first_alike(differ: &[f64], alike_w2: f64) -> f64 {
     let least = differ.iter().copied().fold(f64::INFINITY, f64::min);
     let limit = alike_w2.max(AGREE * least);
     differ.iter().position(|value| *value <= limit).filter(|first| *first > EDGE).unwrap_or(0) as f64
+}
+
+/// Whether more of the work in a window lies after the first `by` of its `length` samples than in them: energy above the power there.
+fn has_work_ahead(power: &[f64], starts: &[f64], by: f64, length: f64) -> bool {
+    let base = level(power, starts, by);
+    let work = |samples: std::ops::Range<usize>| -> f64 {
+        samples.map(|sample| (level(power, starts, sample as f64) - base).max(0.0)).sum()
+    };
+    let split = by as usize;
+    work(0..split) < work(split..length as usize)
 }
 
 /// Mean power so many samples after some starts, W.
@@ -156,6 +169,21 @@ mod tests {
         let (power, right) = frames(20, |_| 4);
         let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
         assert_eq!(settle(&power, early.clone(), &[false; 20], 0.0, 8), early);
+    }
+
+    #[test]
+    fn a_start_is_not_moved_past_a_frame_of_a_few_samples() {
+        // Each frame works for seven samples, another amount each time, and is idle for long after it.
+        let power: Vec<f64> = (0..40 * 600)
+            .map(|i| {
+                let work = if i % 600 < 7 { 2.0 + 0.3 * f64::from(i / 600 * 7 % 5) } else { 0.0 };
+                0.5 + work + 1e-3 * f64::from(i * 79 % 97) / 97.0
+            })
+            .collect();
+        let starts: Vec<f64> = (0..40).map(|frame| f64::from(600 * frame)).collect();
+        assert_eq!(settle(&power, starts.clone(), &[false; 40], 50.0, WIDTH), starts);
+        let early: Vec<f64> = starts.iter().skip(1).map(|start| start - 50.0).collect();
+        assert_eq!(settle(&power, early.clone(), &[false; 39], 50.0, WIDTH), early);
     }
 
     proptest! {
