@@ -78,6 +78,8 @@ codes! {
     FramesMissed = "frames-missed" in Simulator,
     /// The GPU file names another platform or energy table than those in use, or none.
     PlatformMismatch = "platform-mismatch" in Simulator,
+    /// A found frame start is off by more than half of the time that its frame is busy for.
+    StartError = "start-error" in Simulator,
     /// A platform draws more power idle than busy.
     IdleAboveBusy = "idle-above-busy" in Simulator,
     /// Power exceeds the recorder's range.

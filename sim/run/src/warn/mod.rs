@@ -29,6 +29,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(doubted(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
+    all.extend(start_errors(measurement).filter(|_| short.is_none()));
     all.extend(short);
     all.extend(detection(measurement).filter(|_| !unseen));
     all.extend(idle_above_busy(plan, simulated));
@@ -188,6 +189,27 @@ fn detection(measurement: &Measurement) -> Option<Warning> {
             ),
         )
     })
+}
+
+/// Starts that count as found and yet are so far off that energy moves from frame to frame.
+fn start_errors(measurement: &Measurement) -> Option<Warning> {
+    let found = measurement.by_true_frame();
+    let off = measurement.run.frames.iter().zip(found).filter_map(|(frame, found)| {
+        let (error_s, busy_s) = ((found?.start_s - frame.start_s).abs(), frame.busy_end_s - frame.start_s);
+        (error_s > 0.5 * busy_s).then_some((error_s, busy_s))
+    });
+    let off: Vec<(f64, f64)> = off.collect();
+    let (error_s, busy_s) = off.iter().copied().max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+    let message = format!(
+        "{} of {} frame starts were found more than half of their frame's busy time off, the worst by {} where the frame is busy \
+         for {}: part of its energy counts to its neighbour; raise --trace-rate, draw larger images, or find frames with a \
+         shorter --window of `quintile trace frames`",
+        off.len(),
+        measurement.truth.len(),
+        si(error_s, "s"),
+        si(busy_s, "s")
+    );
+    Some(Warning::new(Code::StartError, message))
 }
 
 /// A platform that draws more between frames than while the GPU works.
