@@ -1,5 +1,4 @@
-//! Tells the program the git revision it is built from: in release builds within a clone. Without git, or in an archive of the sources,
-//! it has none.
+//! The git revision that the program is built from, in release builds within a clone; and whether there are real scenes to test with.
 
 use std::path::Path;
 use std::process::Command;
@@ -28,6 +27,15 @@ const SOURCES: [&str; 18] = [
 ];
 
 fn main() {
+    // Tests on real scenes count as ignored where there are none.
+    println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
+    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data)");
+    if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
+        println!("cargo:rustc-cfg=real_scenes");
+        if Path::new(&scenes).join("../ccd").is_dir() {
+            println!("cargo:rustc-cfg=collision_data");
+        }
+    }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         SOURCES.iter().for_each(|source| println!("cargo:rerun-if-changed={}", root.join(source).display()));

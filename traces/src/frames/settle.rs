@@ -47,7 +47,11 @@ pub(super) fn settle(
             let by = first_alike(&mean_of_each(&differences[near.clone()], reach + 1), alike_w2);
             let starts = &starts[near];
             let is_down = level(power, starts, by) < level(power, starts, 0.0);
-            if by > 0.0 && is_down && has_work_ahead(power, starts, by, width as f64 - anchor) { by } else { 0.0 }
+            if by > 0.0 && is_down && has_work_ahead(power, starts, by, width as f64 - anchor) {
+                by
+            } else {
+                0.0
+            }
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, median), |near| mean(near));

@@ -1,6 +1,6 @@
 //! Maximal Poisson-disk points per second of one thread's CPU time, beside the `poisson` crate and, where it is there, scipy.
 //!
-//! `cargo bench -p workloads --bench points`. With `QUINTILE_SCIPY=PYTHON` (a Python that has scipy) its engine runs in the same
+//! `cargo run --release --manifest-path tests/rivals/Cargo.toml`. With `QUINTILE_SCIPY=PYTHON` (a Python that has scipy) its engine runs in the same
 //! minutes. Medians of five runs; packing density and largest hole say how good the points are. With `space` after `--` only
 //! points in space and ever more of them, a line as soon as it is known: of six runs at the distances below the crate saw no end.
 
@@ -31,7 +31,7 @@ fn measured<const D: usize>(mut make: impl FnMut(u64) -> Vec<[f64; D]>) -> (f64,
     (rates[rates.len() / 2], last)
 }
 
-fn tell<const D: usize>(
+fn print<const D: usize>(
     name: &str,
     radius: f64,
     (rate, points): (f64, Vec<[f64; D]>),
@@ -53,7 +53,7 @@ fn ours<const D: usize>(radius: f64, domain: Domain) -> f64 {
     };
     let found = measured(make);
     let rate = found.0;
-    tell("voids", radius, found, domain, rate);
+    print("voids", radius, found, domain, rate);
     rate
 }
 
@@ -69,7 +69,7 @@ fn flat(radius: f64, domain: Domain) {
         let made = builder.build(SmallRng::seed_from_u64(seed), Ebeida).generate();
         made.into_iter().map(|p| [p.x, p.y]).collect()
     };
-    tell("crate", radius, measured(make), domain, own);
+    print("crate", radius, measured(make), domain, own);
     scipy(2, radius, own);
 }
 
@@ -80,7 +80,7 @@ fn deep(radius: f64, domain: Domain) {
         let made = builder.build(SmallRng::seed_from_u64(seed), Ebeida).generate();
         made.into_iter().map(|p| [p.x, p.y, p.z]).collect()
     };
-    tell("crate", radius, measured(make), domain, own);
+    print("crate", radius, measured(make), domain, own);
     scipy(3, radius, own);
 }
 
