@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use timing::Recorder;
 
 use super::heat::{self, HeatPicture};
-use super::{Distinct, Plan, RunError, SimulatedFrame, draw};
+use super::{Distinct, Observed, Origin, Plan, RunError, RunFrame, draw};
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
@@ -32,7 +32,7 @@ pub(super) fn bins_of_each(frames: usize) -> usize {
 ///
 /// # Errors
 /// When a frame cannot be made or timed.
-pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Vec<SimulatedFrame>, RunError> {
+pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Vec<RunFrame>, RunError> {
     let most_bins = bins_of_each(numbers.len());
     let bar = progress.bar("frames", numbers.len() as u64);
     let simulate = |&number: &u32| {
@@ -72,7 +72,7 @@ pub(super) struct Stage<'a> {
 
 /// A frame simulated whole.
 pub(super) struct Whole {
-    pub frame: SimulatedFrame,
+    pub frame: RunFrame,
     /// Its linear image, where it is wanted.
     pub picture: Option<Vec<Vec3>>,
     pub heat: Vec<HeatPicture>,
@@ -103,31 +103,32 @@ fn simulate_frame(
     plan: &Plan,
     number: u32,
     most_bins: usize,
-) -> Result<(SimulatedFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
+) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
         FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, most_bins));
     let draw::Drawing { drawn, regime, heat } =
         draw::draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
     let timed = clock.finish()?;
-    let doubts = AccuracyWarning::all(plan.options.timing, &timed);
+    let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
     let power = plan.model.frame(&timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
-    let simulated = SimulatedFrame {
+    let simulated = RunFrame {
         index: number,
         triangles: drawn.triangles,
         moving: drawn.moving,
         lens: drawn.lens,
-        counts: drawn.counts,
-        regime,
-        facts: drawn.facts,
-        warnings: drawn.warnings,
         power,
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
         cycles: timed.cycles,
-        doubts,
-        stalls: timed.stalls,
-        predicted: None,
+        origin: Origin::Simulated(Observed {
+            counts: drawn.counts,
+            facts: drawn.facts,
+            warnings: drawn.warnings,
+            regime,
+            stalls: timed.stalls,
+            accuracy,
+        }),
     };
     Ok((simulated, drawn.image, heat))
 }

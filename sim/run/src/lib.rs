@@ -67,7 +67,7 @@ pub use recorder::Resolution;
 pub use regime::Regime;
 pub use sampled::{Forecast, Glimpse, Preview, Scout, Signatures, taken};
 pub use sampling::{Method, Sampling};
-pub use simulated::{Quantity, SampledSummary, Simulated, SimulatedFrame, Taken};
+pub use simulated::{Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated, Taken};
 pub use stalls::StallShares;
 pub use summary::{Detection, Figures, Summary};
 pub use work::Work;

@@ -35,7 +35,7 @@ impl Modelled {
         let lens = simulated.distinct.iter().any(|frame| frame.lens);
         let (used, unused): (Vec<Unit>, Vec<Unit>) =
             Unit::ALL.into_iter().partition(|&unit| total.uses(unit));
-        let predicted = simulated.distinct.iter().filter(|frame| frame.predicted.is_some()).count();
+        let predicted = simulated.distinct.iter().filter(|frame| frame.half_widths().is_some()).count();
         let mut limits = vec![
             "one opaque pass; no blending",
             "one voltage and clock state; no governor, no temperature change",

@@ -3,7 +3,7 @@
 use activity::Unit;
 use power_model::Part;
 
-use super::{Outcome, SimulatedFrame, stalls};
+use super::{Outcome, RunFrame, stalls};
 use output::MeanSd;
 use output::plot::{
     FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitBusy, UnitLane,
@@ -56,9 +56,9 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
 }
 
 /// The frame shown in detail, the marked one or the one next to it that was simulated: its place in the run and what is known of it.
-fn shown_frame(outcome: &Outcome) -> (usize, &SimulatedFrame) {
+fn shown_frame(outcome: &Outcome) -> (usize, &RunFrame) {
     let middle = outcome.simulated.frames.len() / 2;
-    let known = outcome.simulated.in_order().enumerate().filter(|(_, frame)| frame.predicted.is_none());
+    let known = outcome.simulated.in_order().enumerate().filter(|(_, frame)| frame.observed().is_some());
     let (place, frame) =
         known.min_by_key(|(place, _)| place.abs_diff(middle)).unwrap_or((0, &outcome.simulated.distinct[0]));
     (place, frame)
@@ -92,7 +92,7 @@ pub(super) fn parts_in_use(outcome: &Outcome) -> Vec<Part> {
     overhead.into_iter().chain(units).collect()
 }
 
-fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &SimulatedFrame)) -> Picture {
+fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &RunFrame)) -> Picture {
     let trace = &outcome.measurement.trace;
     let paced = &outcome.measurement.run.frames[place];
     let samples: Vec<(f64, f64)> = (0..trace.samples())
@@ -114,7 +114,7 @@ fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &Simula
     .picture(&outcome.plan.options.look)
 }
 
-fn unit_busy(outcome: &Outcome, subject: &str, frame: &SimulatedFrame) -> Picture {
+fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
     let total = outcome.simulated.total();
     let lane = |unit: Unit| UnitLane {
         name: unit.name(),

@@ -13,8 +13,8 @@ use super::heat::HeatPicture;
 use super::regime::Regime;
 use timing::AccuracyWarning;
 
-/// One frame as the simulator knows it.
-pub struct SimulatedFrame {
+/// A frame of a run with its power over time, simulated or predicted.
+pub struct RunFrame {
     /// Its number in the scene.
     pub index: u32,
     /// Triangles drawn.
@@ -23,14 +23,6 @@ pub struct SimulatedFrame {
     pub moving: bool,
     /// Whether the camera has a lens.
     pub lens: bool,
-    /// How often each event happened.
-    pub counts: Counts,
-    /// What a job found out in it.
-    pub facts: Vec<Fact>,
-    /// What a job warned of in it.
-    pub warnings: Vec<Warning>,
-    /// Triangles that tile tests are known to be bad at.
-    pub regime: Regime,
     /// Watts over time and joules by part.
     pub power: FramePower,
     /// For how long each unit was busy, in picoseconds.
@@ -39,38 +31,80 @@ pub struct SimulatedFrame {
     pub busy: Vec<[f32; Unit::COUNT]>,
     /// Cycles of the core clock.
     pub cycles: u64,
-    /// Why units did not work, where the level of timing knows.
+    /// How it came about, with what is known of such frames alone.
+    pub origin: Origin,
+}
+
+/// How a frame of a run came about.
+pub enum Origin {
+    /// It was simulated whole.
+    Simulated(Observed),
+    /// It was predicted from others: half the widths of the intervals of its cycles and its energy.
+    Predicted(Taken),
+}
+
+/// What is known of a frame that was simulated, and of no other.
+pub struct Observed {
+    /// How often each event happened.
+    pub counts: Counts,
+    /// Results of a workload.
+    pub facts: Vec<Fact>,
+    /// Warnings of a workload.
+    pub warnings: Vec<Warning>,
+    /// Triangles that tile tests are weak for.
+    pub regime: Regime,
+    /// Why units did not work, where the timing level records it.
     pub stalls: Option<Stalls>,
-    /// Why its time is not to be trusted.
-    pub doubts: Vec<AccuracyWarning>,
-    /// For a frame that was predicted from others: half the widths of the intervals in which its cycles and its energy lie. Its
-    /// power, its busy times and its cycles are then predicted, and nothing is known of its counts.
-    pub predicted: Option<Taken>,
+    /// Why the timing level may be inaccurate.
+    pub accuracy: Vec<AccuracyWarning>,
+}
+
+impl RunFrame {
+    /// What is known of it, if it was simulated.
+    pub fn observed(&self) -> Option<&Observed> {
+        match &self.origin {
+            Origin::Simulated(observed) => Some(observed),
+            Origin::Predicted(_) => None,
+        }
+    }
+
+    /// Half the widths of its intervals, if it was predicted.
+    pub fn half_widths(&self) -> Option<Taken> {
+        match self.origin {
+            Origin::Simulated(_) => None,
+            Origin::Predicted(half) => Some(half),
+        }
+    }
 }
 
 /// All frames of a run.
 pub struct Simulated {
     /// Frames that differ.
-    pub distinct: Vec<SimulatedFrame>,
+    pub distinct: Vec<RunFrame>,
     /// For each frame of the run, its place in `distinct`: frames with the same input share one.
     pub frames: Vec<usize>,
     /// Pictures for the report: frame number and the linear image.
     pub pictures: Vec<(u32, Vec<Vec3>)>,
     /// The heat maps of the frame in the middle.
     pub heat: Vec<HeatPicture>,
-    /// Which frames were predicted, and how sure that is.
+    /// Which frames were predicted, and with which confidence.
     pub sampled: Option<SampledSummary>,
 }
 
 impl Simulated {
     /// The frames of the run in order.
-    pub fn in_order(&self) -> impl Iterator<Item = &SimulatedFrame> {
+    pub fn in_order(&self) -> impl Iterator<Item = &RunFrame> {
         self.frames.iter().map(|&place| &self.distinct[place])
     }
 
-    /// Those that were simulated rather than predicted.
-    pub fn known(&self) -> impl Iterator<Item = &SimulatedFrame> {
-        self.in_order().filter(|frame| frame.predicted.is_none())
+    /// The simulated frames among those that differ.
+    pub fn observed(&self) -> impl Iterator<Item = (&RunFrame, &Observed)> {
+        self.distinct.iter().filter_map(|frame| Some((frame, frame.observed()?)))
+    }
+
+    /// What is known of the simulated frames of the run, in order.
+    pub fn known(&self) -> impl Iterator<Item = &Observed> {
+        self.in_order().filter_map(RunFrame::observed)
     }
 
     /// The counts of the frames of the run that were simulated.

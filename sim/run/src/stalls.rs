@@ -6,7 +6,7 @@ use activity::Unit;
 use serde::Serialize;
 use timing::{Stalls, UnitTime};
 
-use super::{Simulated, SimulatedFrame};
+use super::{RunFrame, Simulated};
 use output::perfetto::CounterTrack;
 use output::plot::{Look, Picture, StallLane, StallLanes};
 
@@ -30,7 +30,7 @@ pub struct StallShares {
 pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShares> {
     let used = simulated.total();
     let of = |unit: Unit| {
-        let frames = simulated.distinct.iter().filter_map(|frame| frame.stalls.as_ref());
+        let frames = simulated.observed().filter_map(|(_, frame)| frame.stalls.as_ref());
         let times: Vec<UnitTime> = frames.map(|stalls| stalls.of(unit)).collect();
         let total = times.iter().map(UnitTime::total).sum::<u64>().max(1) as f64;
         let share = |pick: &dyn Fn(&UnitTime) -> u64| times.iter().map(pick).sum::<u64>() as f64 / total;
@@ -41,7 +41,7 @@ pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShare
         let (starved, blocked) = (by(|time, by| time.starved[by]), by(|time, by| time.blocked[by]));
         StallShares { busy: share(&|time| time.busy), idle: share(&|time| time.idle), starved, blocked }
     };
-    if simulated.distinct.iter().all(|frame| frame.stalls.is_none()) {
+    if simulated.observed().all(|(_, frame)| frame.stalls.is_none()) {
         return BTreeMap::new();
     }
     Unit::ALL.into_iter().filter(|&unit| used.uses(unit)).map(|unit| (unit.name(), of(unit))).collect()
@@ -57,8 +57,9 @@ fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
 }
 
 /// What the units waited for in a frame.
-pub(super) fn picture(frame: &SimulatedFrame, subject: &str, look: &Look) -> Option<Picture> {
-    let stalls = frame.stalls.as_ref()?;
+pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Picture> {
+    let observed = frame.observed()?;
+    let stalls = observed.stalls.as_ref()?;
     let group = stalls.intervals().len().div_ceil(COLUMNS).max(1);
     let bottlenecks = stalls.bottlenecks();
     let of = |unit: Unit| {
@@ -72,7 +73,7 @@ pub(super) fn picture(frame: &SimulatedFrame, subject: &str, look: &Look) -> Opt
         let bottleneck = bottlenecks.chunks(group).map(most).collect();
         StallLane { name: unit.name(), shares: shares.chunks(group).map(mean).collect(), bottleneck }
     };
-    let units = Unit::ALL.into_iter().filter(|&unit| frame.counts.uses(unit)).map(of).collect();
+    let units = Unit::ALL.into_iter().filter(|&unit| observed.counts.uses(unit)).map(of).collect();
     let interval_s = stalls.interval_ps() as f64 * 1e-12 * group as f64;
     Some(StallLanes { subject, frame: u64::from(frame.index), interval_s, units }.picture(look))
 }
@@ -101,7 +102,9 @@ pub(super) fn tracks(simulated: &Simulated, starts: &[u64]) -> Vec<CounterTrack<
         for (kind, name) in names.into_iter().enumerate() {
             let mut points = Vec::new();
             for (frame, &start) in simulated.in_order().zip(starts) {
-                let Some(stalls) = &frame.stalls else { continue };
+                let Some(stalls) = frame.observed().and_then(|observed| observed.stalls.as_ref()) else {
+                    continue;
+                };
                 let interval_ns = stalls.interval_ps() as f64 * 1e-3;
                 let at = |place: usize| start + (place as f64 * interval_ns) as u64;
                 points.extend(

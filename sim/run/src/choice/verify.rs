@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::super::{Plan, RunError, Simulated, SimulatedFrame, Taken, Wish, frames_of, taken};
+use super::super::{Plan, RunError, RunFrame, Simulated, Taken, Wish, frames_of, taken};
 use crate::Sampling;
 use output::progress::Progress;
 use timing::Level;
@@ -51,8 +51,8 @@ pub(in super::super) fn verify(
 }
 
 /// Compares frames found with true ones; `frames` holds for each frame of the run its index in both.
-fn compare(found: &[SimulatedFrame], truth: &[SimulatedFrame], frames: &[usize]) -> Verified {
-    let total = |distinct: &[SimulatedFrame]| {
+fn compare(found: &[RunFrame], truth: &[RunFrame], frames: &[usize]) -> Verified {
+    let total = |distinct: &[RunFrame]| {
         let taken = frames.iter().map(|&index| taken(&distinct[index]));
         taken.fold(Taken { cycles: 0.0, energy_j: 0.0 }, |sum, frame| Taken {
             cycles: sum.cycles + frame.cycles,

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Unit};
+use activity::Unit;
 
 use super::super::frame::Whole;
-use super::super::{Distinct, Plan, Regime, Simulated, SimulatedFrame, Taken};
+use super::super::{Distinct, Origin, Plan, RunFrame, Simulated};
 use super::summary::summary;
 use super::{Forecast, Scout};
 
@@ -21,7 +21,7 @@ pub(super) fn all(
     mut whole: BTreeMap<usize, Whole>,
 ) -> Simulated {
     let (numbers, groups) = (frames.numbers(), frames.groups());
-    let mut distinct: BTreeMap<usize, SimulatedFrame> = BTreeMap::new();
+    let mut distinct: BTreeMap<usize, RunFrame> = BTreeMap::new();
     for (place, &group) in groups.iter().enumerate().filter(|(_, group)| !whole.contains_key(group)) {
         distinct.entry(group).or_insert_with(|| {
             let like = &whole[&groups[nearest(scout, forecast, place)]].frame;
@@ -52,33 +52,21 @@ fn nearest(scout: &Scout, forecast: &Forecast, place: usize) -> usize {
 }
 
 /// The power curve of `like`, stretched to the time and the energy that are predicted.
-fn predict(
-    number: u32,
-    scout: &Scout,
-    forecast: &Forecast,
-    place: usize,
-    like: &SimulatedFrame,
-) -> SimulatedFrame {
+fn predict(number: u32, scout: &Scout, forecast: &Forecast, place: usize, like: &RunFrame) -> RunFrame {
     let [value, half] = forecast.frame(place);
     let share = |predicted: f64, known: f64| (predicted / known.max(f64::MIN_POSITIVE)).max(LEAST_SHARE);
     let time = share(value.cycles, like.cycles as f64);
     let energy_j = share(value.energy_j, like.power.energy().total_j()) * like.power.energy().total_j();
     let glimpse = &scout.glimpses[place];
-    SimulatedFrame {
+    RunFrame {
         index: number,
         triangles: glimpse.triangles,
         moving: glimpse.moving,
         lens: glimpse.lens,
-        counts: Counts::default(),
-        facts: Vec::new(),
-        warnings: Vec::new(),
-        regime: Regime::default(),
         power: like.power.reshaped((like.power.duration_ps() as f64 * time).round() as u64, energy_j),
         busy_ps: Unit::ALL.map(|unit| (like.busy_ps[unit as usize] as f64 * time).round() as u64),
         busy: like.busy.clone(),
         cycles: (like.cycles as f64 * time).round() as u64,
-        stalls: None,
-        doubts: Vec::new(),
-        predicted: Some(Taken { cycles: half.cycles, energy_j: half.energy_j }),
+        origin: Origin::Predicted(half),
     }
 }

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use timing::sampled::Design;
 
 use super::frame::{Stage, Whole};
-use super::{Plan, RunError, Simulated, SimulatedFrame, Taken};
+use super::{Plan, RunError, RunFrame, Simulated, Taken};
 use output::progress::Progress;
 
 pub use forecast::Forecast;
@@ -84,7 +84,7 @@ pub(super) fn simulate(stage: &Stage<'_>, progress: &Progress) -> Result<Simulat
 }
 
 /// What a frame took, as estimates have it.
-pub fn taken(frame: &SimulatedFrame) -> Taken {
+pub fn taken(frame: &RunFrame) -> Taken {
     Taken { cycles: frame.cycles as f64, energy_j: frame.power.energy().total_j() }
 }
 

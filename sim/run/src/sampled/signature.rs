@@ -1,9 +1,9 @@
 //! The signature of a frame: its preview, scaled to the size of the run by one frame that was seen at both.
 
-use activity::{Event, Unit};
+use activity::{Counts, Event, Unit};
 use power_model::PowerModel;
 
-use super::super::SimulatedFrame;
+use super::super::RunFrame;
 use super::Glimpse;
 
 /// About what each frame takes. Only differences between frames matter.
@@ -21,11 +21,12 @@ impl Signatures {
     /// At a small size other units are the bottleneck, and triangles weigh more beside pixels. So each unit's busy time and each
     /// event's count is scaled by what it is for the pilot over what it is in the pilot's preview; then the slowest unit decides
     /// over time (fourth powers are summed, as units overlap without quite hiding each other), and energies add up.
-    pub fn new(glimpses: &[Glimpse], at: usize, pilot: &SimulatedFrame, model: &PowerModel) -> Self {
+    pub fn new(glimpses: &[Glimpse], at: usize, pilot: &RunFrame, model: &PowerModel) -> Self {
+        let counts = pilot.observed().map_or_else(Counts::default, |observed| observed.counts);
         let seen = &glimpses[at];
         let by_unit = Unit::ALL.map(|unit| ratio(pilot.busy_ps[unit as usize], seen.busy_ps[unit as usize]));
         let by_event =
-            Event::ALL.map(|event| ratio(pilot.counts[event], seen.counts[event]) * model.event_j(event));
+            Event::ALL.map(|event| ratio(counts[event], seen.counts[event]) * model.event_j(event));
         let slowest = |glimpse: &Glimpse| {
             let busy = glimpse.busy_ps.iter().zip(by_unit).map(|(&busy, scale)| busy as f64 * scale);
             busy.map(|busy| (busy * busy) * (busy * busy)).sum::<f64>().sqrt().sqrt()
@@ -34,7 +35,7 @@ impl Signatures {
             Event::ALL.iter().zip(by_event).map(|(&event, scale)| glimpse.counts[event] as f64 * scale).sum()
         };
         let cycles: Vec<f64> = glimpses.iter().map(slowest).collect();
-        let with_time = pilot.power.energy().total_j() - model.counts_energy(&pilot.counts).total_j();
+        let with_time = pilot.power.energy().total_j() - model.counts_energy(&counts).total_j();
         let per_time = if cycles[at] > 0.0 { with_time / cycles[at] } else { 0.0 };
         let energy_j = glimpses.iter().zip(&cycles).map(|(glimpse, time)| events(glimpse) + per_time * time);
         Self { energy_j: energy_j.collect(), cycles }

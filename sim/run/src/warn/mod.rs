@@ -10,7 +10,7 @@ use warnings::{Code, Warning};
 use crate::recorder::MIN_BUSY_SAMPLES;
 mod regime;
 
-use crate::{Choice, Measurement, Plan, Simulated, SimulatedFrame, pairing};
+use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, pairing};
 use output::table::si;
 use timing::AccuracyWarning;
 
@@ -18,7 +18,12 @@ use timing::AccuracyWarning;
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.work.warnings().to_vec();
     all.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
-    all.extend(of_frames(simulated.distinct.iter().map(|frame| (frame.index, &frame.warnings[..]))));
+    all.extend(of_frames(
+        simulated
+            .distinct
+            .iter()
+            .map(|frame| (frame.index, frame.observed().map_or(&[][..], |of| &of.warnings))),
+    ));
     all.extend(measurement.run.warnings.iter().cloned());
     let short = short_frames(measurement);
     // A run of one frame has no other that could resemble it, and frames too short to be seen resemble nothing.
@@ -26,7 +31,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     let explained = simulated.frames.len() == 1 || unseen;
     let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
     all.extend(of_trace.filter_map(|w| Some(Warning::new(Code::named(w.code)?, w.message.clone()))));
-    all.extend(doubted(plan, simulated));
+    all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
     all.extend(start_errors(measurement).filter(|_| short.is_none()));
@@ -61,28 +66,29 @@ fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) ->
     by_code.into_values().map(joined).collect()
 }
 
-/// Of each reason not to trust times, the frame that gives most of it.
-fn doubted(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
+/// Accuracy warnings of the timing level: of each code, the frame with the largest extent.
+fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
     let mut worst: Vec<(u32, AccuracyWarning)> = Vec::new();
-    for (frame, &doubt) in
-        simulated.distinct.iter().flat_map(|f| f.doubts.iter().map(|doubt| (f.index, doubt)))
-    {
-        match worst.iter_mut().find(|(_, known)| known.code() == doubt.code()) {
-            Some(known) if known.1.extent() < doubt.extent() => *known = (frame, doubt),
+    let all =
+        simulated.observed().flat_map(|(f, observed)| observed.accuracy.iter().map(|of| (f.index, *of)));
+    for (frame, warning) in all {
+        match worst.iter_mut().find(|(_, known)| known.code() == warning.code()) {
+            Some(known) if known.1.extent() < warning.extent() => *known = (frame, warning),
             Some(_) => {}
-            None => worst.push((frame, doubt)),
+            None => worst.push((frame, warning)),
         }
     }
     let level = plan.options.timing;
-    worst.iter().map(|(frame, doubt)| doubt.warning(*frame, level)).collect()
+    worst.iter().map(|(frame, warning)| warning.warning(*frame, level)).collect()
 }
 
 fn degenerate(simulated: &Simulated) -> Option<Warning> {
     let without_area = |counts: &Counts| counts[Event::TrianglesDegenerate] + counts[Event::TrianglesFlat];
-    let worst = simulated.distinct.iter().max_by_key(|frame| without_area(&frame.counts))?;
-    let (dropped, flat) = (worst.counts[Event::TrianglesDegenerate], worst.counts[Event::TrianglesFlat]);
+    let (worst, Observed { counts, .. }) =
+        simulated.observed().max_by_key(|(_, observed)| without_area(&observed.counts))?;
+    let (dropped, flat) = (counts[Event::TrianglesDegenerate], counts[Event::TrianglesFlat]);
     (dropped + flat > 0).then(|| {
-        let (all, of, frame) = (dropped + flat, worst.counts[Event::TrianglesIn], worst.index);
+        let (all, of, frame) = (dropped + flat, counts[Event::TrianglesIn], worst.index);
         Warning::new(
             Code::DegenerateTriangle,
             format!(
@@ -215,7 +221,7 @@ fn start_errors(measurement: &Measurement) -> Option<Warning> {
 /// A platform that draws more between frames than while the GPU works.
 fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
     let idle_w = plan.platform.idle_w.value();
-    let busy_w = |frame: &SimulatedFrame| frame.power.energy().total_j() / frame.power.duration_s();
+    let busy_w = |frame: &RunFrame| frame.power.energy().total_j() / frame.power.duration_s();
     let lowest_w = simulated.distinct.iter().map(busy_w).fold(f64::INFINITY, f64::min);
     (idle_w > lowest_w).then(|| {
         let message = format!(

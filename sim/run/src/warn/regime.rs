@@ -27,8 +27,8 @@ pub(super) fn gather(simulated: &Simulated) -> Vec<Warning> {
 /// The frame in which most triangles are in a regime, where these are at least `share` of those in view: `of` which, for
 /// example, `12 of 40 triangles in view (frame 3)`.
 fn worst(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
-    let frame = simulated.distinct.iter().max_by_key(|frame| of(&frame.regime))?;
-    let (count, all) = (of(&frame.regime), frame.regime.in_view);
+    let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
+    let (count, all) = (of(&observed.regime), observed.regime.in_view);
     (count > 0 && count as f64 >= share * all as f64)
         .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
 }

@@ -9,8 +9,7 @@ use super::{Cost, Effort, QUANTITIES, Trial};
 use output::progress::Progress;
 use run::Sampling;
 use run::{
-    Distinct, Forecast, Plan, Quantity, RunError, RunOptions, Scout, Signatures, SimulatedFrame, frames_of,
-    taken,
+    Distinct, Forecast, Plan, Quantity, RunError, RunFrame, RunOptions, Scout, Signatures, frames_of, taken,
 };
 
 /// What it cost, and every trial.
@@ -82,7 +81,7 @@ fn plan(scene: &str, effort: Effort) -> Result<Plan, RunError> {
 }
 
 /// What all frames come to: cycles a frame, joules a frame while busy, watts while busy.
-fn truth(frames: &[SimulatedFrame], core_hz: f64) -> [f64; 3] {
+fn truth(frames: &[RunFrame], core_hz: f64) -> [f64; 3] {
     let count = frames.len() as f64;
     let cycles: f64 = frames.iter().map(|frame| taken(frame).cycles).sum();
     let energy_j: f64 = frames.iter().map(|frame| taken(frame).energy_j).sum();

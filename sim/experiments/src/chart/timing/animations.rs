@@ -9,9 +9,7 @@ use workloads::Overrides;
 use output::progress::Progress;
 use run::GpuSpec;
 use run::Sampling;
-use run::{
-    Distinct, Forecast, Plan, RunError, RunOptions, Scout, Signatures, SimulatedFrame, frames_of, taken,
-};
+use run::{Distinct, Forecast, Plan, RunError, RunFrame, RunOptions, Scout, Signatures, frames_of, taken};
 use timing::Level;
 
 /// The name of the level that simulates few frames and predicts the others.
@@ -62,7 +60,7 @@ pub struct AnimationRow {
 /// All frames at one level.
 struct Simulated {
     plan: Plan,
-    frames: Vec<SimulatedFrame>,
+    frames: Vec<RunFrame>,
     host_s: f64,
 }
 
