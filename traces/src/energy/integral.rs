@@ -1,6 +1,11 @@
 //! The one rule by which a trace's energy is taken.
+//!
+//! Energy of each frame, start to start.
+//!
+//! Idle power: measured, and taken off.
 
-use crate::sum::PairSum;
+use crate::frames::{Flags, Found};
+use crate::stats::PairSum;
 use crate::trace::Trace;
 
 /// Samples per stored prefix sum: 16 bytes per 256 samples, and at most 256 additions per look-up.
@@ -62,10 +67,103 @@ impl<'a> PowerIntegral<'a> {
     }
 }
 
+/// One measured frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameEnergy {
+    /// Start, s.
+    pub start_s: f64,
+    /// End: the next start, or the end mark, s.
+    pub end_s: f64,
+    /// Energy by the rule of [`PowerIntegral`], J.
+    pub energy_j: f64,
+    /// Confidence of its ends, 0 to 1.
+    pub confidence: f64,
+    /// What is remarkable about it.
+    pub flags: Flags,
+}
+
+/// One frame as the one who made the trace knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueFrame {
+    /// Start, s.
+    pub start_s: f64,
+    /// Exact energy to the next start, J.
+    pub energy_j: f64,
+}
+
+impl FrameEnergy {
+    /// Duration, s.
+    pub fn duration_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
+
+    /// Mean power, W; 0 for a frame of no duration.
+    pub fn power_w(&self) -> f64 {
+        if self.duration_s() > 0.0 { self.energy_j / self.duration_s() } else { 0.0 }
+    }
+
+    /// Energy per pixel, J; `None` for no pixels.
+    pub fn energy_per_pixel_j(&self, pixels: u64) -> Option<f64> {
+        (pixels > 0).then(|| self.energy_j / pixels as f64)
+    }
+}
+
+impl PowerIntegral<'_> {
+    /// Energy of every found frame. They add up to the energy from the first start to the end mark.
+    pub fn frames(&self, found: &Found) -> Vec<FrameEnergy> {
+        let measure = |span: &crate::frames::FrameSpan| FrameEnergy {
+            start_s: span.start_s,
+            end_s: span.end_s,
+            energy_j: self.energy_j(span.start_s, span.end_s),
+            confidence: span.confidence,
+            flags: span.flags,
+        };
+        found.frames.iter().map(measure).collect()
+    }
+}
+
+/// Idle power to take off.
+#[derive(Clone, Debug)]
+pub enum Idle<'a> {
+    /// The same at all times, W: the mean over a stretch or a recording. Less noisy.
+    Mean(f64),
+    /// Instant by instant: what an idle recording shows as long after its start (repeated where it is shorter); it takes
+    /// periodic patterns off, and adds the noise of both.
+    Instant(PowerIntegral<'a>),
+}
+
+impl Idle<'_> {
+    /// Energy of idling from `a_s` to `b_s` of a trace that starts at `start_s`, J.
+    pub fn energy_j(&self, start_s: f64, a_s: f64, b_s: f64) -> f64 {
+        match self {
+            Self::Mean(watts) => watts * (b_s - a_s),
+            Self::Instant(recording) => since(recording, b_s - start_s) - since(recording, a_s - start_s),
+        }
+    }
+
+    /// Takes the idle energy off every frame.
+    pub fn take_off(&self, start_s: f64, frames: &mut [FrameEnergy]) {
+        for frame in frames {
+            frame.energy_j -= self.energy_j(start_s, frame.start_s, frame.end_s);
+        }
+    }
+}
+
+/// Energy of the recording, repeated, from its start on, J.
+fn since(integral: &PowerIntegral<'_>, time_s: f64) -> f64 {
+    let trace = integral.trace();
+    let length_s = trace.end_s() - trace.start_s();
+    let whole = libm::floor(time_s / length_s);
+    let rest_s = time_s - whole * length_s;
+    whole * integral.total_j() + integral.energy_j(trace.start_s(), trace.start_s() + rest_s)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::Flags;
     use crate::metadata::Metadata;
+    use crate::trace::Trace;
 
     fn ramp(samples: u16) -> Trace {
         let current = (0..samples).map(f32::from).collect();
@@ -96,5 +194,29 @@ mod tests {
                 .sum();
             assert!((integral.energy_j(a_s, b_s) / by_rule - 1.0).abs() < 1e-12);
         }
+    }
+
+    fn trace(power: Vec<f32>) -> Trace {
+        Trace::new(vec![1.0; power.len()], power, 10.0, 0.0, Metadata::default()).unwrap()
+    }
+
+    fn frame(start_s: f64, end_s: f64, energy_j: f64) -> FrameEnergy {
+        FrameEnergy { start_s, end_s, energy_j, confidence: 1.0, flags: Flags::default() }
+    }
+
+    #[test]
+    fn a_constant_idle_is_the_same_by_mean_and_by_instant_also_beyond_its_recording() {
+        let recording = trace(vec![2.0; 7]);
+        for (a_s, b_s) in [(0.0, 0.3), (0.55, 3.21)] {
+            let by_instant = Idle::Instant(PowerIntegral::new(&recording)).energy_j(0.0, a_s, b_s);
+            assert!((by_instant - Idle::Mean(2.0).energy_j(0.0, a_s, b_s)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn taken_off_every_frame() {
+        let mut frames = [frame(0.0, 0.5, 3.0)];
+        Idle::Mean(2.0).take_off(0.0, &mut frames);
+        assert_eq!(frames[0].energy_j, 2.0);
     }
 }

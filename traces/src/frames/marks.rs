@@ -1,10 +1,14 @@
 //! What the user points at.
+//!
+//! A mark where there is nothing to see: whatever is as flat resembles it.
 
+use super::threshold::moments;
 use crate::trace::Trace;
+use crate::warning::Warning;
 use thiserror::Error;
 
-/// The fewest samples a window may have: fewer tell nothing apart.
-const LEAST_SAMPLES: usize = 4;
+/// Fewest samples of a window.
+const MIN_WINDOW_SAMPLES: usize = 4;
 
 /// A mark or window that cannot be used on this trace.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -125,7 +129,7 @@ impl Marks {
         let room_after = room.samples - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
         let pre = wanted[0].min(room_before);
         let post = wanted[1].min(room_after);
-        if pre + post < LEAST_SAMPLES as f64 {
+        if pre + post < MIN_WINDOW_SAMPLES as f64 {
             return Err(self.no_room(&room, wanted[0] + wanted[1]));
         }
         let place = |&mark_s: &f64| {
@@ -141,7 +145,7 @@ impl Marks {
     }
 
     fn no_room(&self, room: &Room, wanted_samples: f64) -> MarkError {
-        if wanted_samples < LEAST_SAMPLES as f64 {
+        if wanted_samples < MIN_WINDOW_SAMPLES as f64 {
             let window_s = self.window.pre_s + self.window.post_s;
             return MarkError::TooShort { window_s, rate_hz: room.rate_hz };
         }
@@ -192,10 +196,46 @@ impl Room {
     }
 }
 
+/// Standard errors above the deviation of the noise from which a window is more than noise.
+const MIN_STANDARD_ERRORS: f64 = 3.0;
+
+/// Whether a window varies by no more than the noise of a sample, `sigma`: the deviation of `n` samples of noise is known to
+/// one part in `sqrt(2 n)`.
+fn is_flat(window: &[f64], sigma: f64) -> bool {
+    let most = sigma * (1.0 + MIN_STANDARD_ERRORS / libm::sqrt(2.0 * window.len() as f64));
+    moments(window).deviation <= most
+}
+
+/// The warning, where one of some marked windows, each with where its mark is (s), is flat in noise of deviation `sigma`.
+pub(crate) fn flat_mark<'a>(
+    windows: impl IntoIterator<Item = (f64, &'a [f64])>,
+    sigma: f64,
+) -> Option<Warning> {
+    let (mark_s, _) = windows.into_iter().find(|(_, window)| is_flat(window, sigma))?;
+    Some(Warning::new(
+        "flat-mark",
+        format!(
+            "around the mark at {mark_s} s power varies by no more than noise, so that any rest resembles it: what is found may be no \
+             frames; mark where one begins"
+        ),
+    ))
+}
+
+/// [`flat_mark`] of a trace that is all at hand.
+pub(super) fn flat_mark_of(power: &[f64], placement: &Placement, sigma: f64) -> Option<Warning> {
+    let windows = placement
+        .marks
+        .iter()
+        .filter_map(|mark| Some((mark.mark_s, power.get(mark.first..mark.first + placement.samples)?)));
+    flat_mark(windows, sigma)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::matched::noise_variance;
     use crate::metadata::Metadata;
+    use crate::random::Random;
 
     const WINDOW: Window = Window { pre_s: 0.1, post_s: 0.4 };
 
@@ -245,5 +285,18 @@ mod tests {
             message(Marks::one(2.999, Window { pre_s: 0.0, post_s: 0.5 }, 3.0))
                 .contains("mark a frame further inside")
         );
+    }
+
+    #[test]
+    fn noise_is_flat_and_an_edge_in_as_much_noise_is_not() {
+        let random = Random::new(5, 0);
+        let noise: Vec<f64> = (0..5000).map(|at| random.normals(at).0).collect();
+        let sigma = libm::sqrt(noise_variance(&noise));
+        let flat = noise.chunks_exact(250).filter(|window| is_flat(window, sigma)).count();
+        assert_eq!(flat, 20);
+        let edge = |window: &[f64]| -> Vec<f64> {
+            window.iter().enumerate().map(|(at, watts)| watts + if at < 50 { 0.0 } else { 3.0 }).collect()
+        };
+        assert!(noise.chunks_exact(250).all(|window| !is_flat(&edge(window), sigma)));
     }
 }

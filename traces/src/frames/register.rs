@@ -6,39 +6,42 @@
 //! `c_i` the position by template and marks held fixed. It is solved by Gauss-Seidel sweeps. An edge just where the compared stretch
 //! ends enters at some shifts only and pulls the result by up to a quarter of a sample (a test shows it).
 
-use super::refine::{nearest, vertex};
-use super::stretch::Pair;
+use super::refine::{ScaledPair, nearest, vertex};
 use rayon::prelude::*;
 
-/// How many frames on are those that each is aligned with. The near ones are most alike; the far ones keep errors from adding up
-/// along the trace.
+/// Distances, in frames, of the frames that each is aligned with. Near ones are most similar; far ones keep
+/// errors from adding up along the trace.
 const LAGS: [usize; 8] = [1, 2, 3, 4, 8, 16, 32, 64];
-/// Greatest shift tried, as a share of the window, and at least so many samples: where the clock has stepped, a template fits best
-/// up to a sixth of its length after the start off.
-const SHIFT: f64 = 0.12;
-const LEAST_SHIFT: usize = 6;
-/// At most about so many shifts are tried, and then all those between the best one's neighbours.
-const TRIED: usize = 64;
+/// Largest shift tried, as a share of the window: at a clock step, a template fits best up to a sixth of its
+/// length behind the start.
+const MAX_SHIFT_SHARE: f64 = 0.12;
+/// Lower limit of the largest shift, in samples.
+const MIN_MAX_SHIFT_SAMPLES: usize = 6;
+/// About the most shifts tried coarsely; then all those between the neighbours of the best one.
+const MAX_COARSE_SHIFTS: usize = 64;
 /// Shares of the window before and after the start that are compared.
-const SHARES: [f64; 2] = [0.02, 0.2];
-/// Least number of samples compared after the start, and half as many before, as the offset to be mended may put the edge there.
-const LEAST: usize = 8;
+const COMPARED_SHARES: [f64; 2] = [0.02, 0.2];
+/// Fewest samples compared after the start, and half as many before, since the offset to be corrected may put
+/// the edge there.
+const MIN_COMPARED_SAMPLES: usize = 8;
 /// Weight of a position by template, per squared sample.
-const TEMPLATE: f64 = 0.05;
+const TEMPLATE_WEIGHT: f64 = 0.05;
 /// A shift that leaves more than this share of the variance unexplained is not used.
-const UNLIKE: f64 = 0.7;
+const MAX_UNEXPLAINED: f64 = 0.7;
+/// Gauss-Seidel sweeps.
 const SWEEPS: usize = 200;
 
-/// Lags up to which frames of unlike clocks are aligned.
-const NEAR: usize = 8;
-/// Frames that leave more than this share of the variance unexplained may be of unlike clocks,
-const POOR: f64 = 0.15;
-/// and are if drawing one out in time leaves less than this share of that,
-const BETTER: f64 = 0.5;
-/// by a ratio farther from 1 than this.
-const UNLIKE_CLOCKS: f64 = 0.05;
-/// Shares of the window before and after the start that are compared then, and the greatest shift.
-const STRETCHED: [f64; 3] = [0.04, 0.4, 0.24];
+/// Largest lag, in frames, at which frames of different clocks are aligned.
+const MAX_CLOCK_LAG: usize = 8;
+/// Frames that leave more than this share of the variance unexplained may be at different clocks.
+const POOR_UNEXPLAINED: f64 = 0.15;
+/// They are, if scaling one in time leaves less than this share of that variance.
+const MAX_SCALED_RATIO: f64 = 0.5;
+/// The ratio of the clocks must differ from 1 by more than this.
+const MIN_CLOCK_DEVIATION: f64 = 0.05;
+/// Shares of the window before and after the start that are compared at different clocks, and the largest
+/// shift.
+const SCALED_SHARES: [f64; 3] = [0.04, 0.4, 0.24];
 
 /// A measured shift of a later frame against an earlier one: with `m` the moves from their offsets,
 /// `m_later = ratio m_earlier + shift`.
@@ -62,35 +65,38 @@ pub(super) fn register(
     anchor: usize,
     width: usize,
 ) -> Vec<f64> {
-    let before = ((SHARES[0] * width as f64) as usize).max(LEAST / 2).min(anchor);
-    let after = ((SHARES[1] * width as f64) as usize).max(LEAST).min(width - anchor.min(width - 1));
+    let before = ((COMPARED_SHARES[0] * width as f64) as usize).max(MIN_COMPARED_SAMPLES / 2).min(anchor);
+    let after = ((COMPARED_SHARES[1] * width as f64) as usize)
+        .max(MIN_COMPARED_SAMPLES)
+        .min(width - anchor.min(width - 1));
     let (skip, length) = (anchor - before, before + after);
-    let reach = ((SHIFT * width as f64) as usize).max(LEAST_SHIFT);
+    let reach = ((MAX_SHIFT_SHARE * width as f64) as usize).max(MIN_MAX_SHIFT_SAMPLES);
     let of_frame = |earlier: usize| {
         let later = LAGS.into_iter().map(move |lag| earlier + lag).filter(|later| *later < offsets.len());
         later.filter_map(move |later| {
-            let (ratio, shift, weight) = (later - earlier <= NEAR)
-                .then(|| stretched(power, [offsets[earlier], offsets[later]], anchor, width))
+            let (ratio, shift, weight) = (later - earlier <= MAX_CLOCK_LAG)
+                .then(|| scaled(power, [offsets[earlier], offsets[later]], anchor, width))
                 .flatten()
                 .or_else(|| shift(power, [offsets[earlier] + skip, offsets[later] + skip], length, reach))?;
             Some(Link { earlier, later, ratio, shift, weight })
         })
     };
     let links: Vec<Link> = (0..offsets.len()).into_par_iter().flat_map_iter(of_frame).collect();
-    let most = (STRETCHED[2] * width as f64).max(reach as f64);
+    let most = (SCALED_SHARES[2] * width as f64).max(reach as f64);
     let moves = reconcile(&links, fixed, most);
     offsets.iter().zip(moves).map(|(&offset, by)| offset as f64 + by).collect()
 }
 
-/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly of unlike clocks.
-fn stretched(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
-    let [before, after, reach] = STRETCHED.map(|share| (share * width as f64) as usize);
+/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly at different clocks.
+fn scaled(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
+    let [before, after, reach] = SCALED_SHARES.map(|share| (share * width as f64) as usize);
     let starts = offsets.map(|offset| offset + anchor);
-    let pair = Pair { power, starts, before, after, reach: reach.max(LEAST_SHIFT) };
-    let plain = pair.plain()?;
-    let fit = (plain.unlike > POOR).then(|| pair.best()).flatten()?;
-    let clear = fit.unlike < BETTER * plain.unlike && (fit.ratio - 1.0).abs() > UNLIKE_CLOCKS;
-    let variance = 2.0 * fit.unlike / (before + after) as f64 / fit.curvature + 1.0;
+    let pair = ScaledPair { power, starts, before, after, reach: reach.max(MIN_MAX_SHIFT_SAMPLES) };
+    let plain = pair.unscaled()?;
+    let fit = (plain.unexplained > POOR_UNEXPLAINED).then(|| pair.best()).flatten()?;
+    let clear = fit.unexplained < MAX_SCALED_RATIO * plain.unexplained
+        && (fit.ratio - 1.0).abs() > MIN_CLOCK_DEVIATION;
+    let variance = 2.0 * fit.unexplained / (before + after) as f64 / fit.curvature + 1.0;
     clear.then_some((fit.ratio, fit.shift, 1.0 / variance))
 }
 
@@ -99,12 +105,14 @@ fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Opti
     let template = power.get(a..a + length)?;
     let from = b.checked_sub(reach)?;
     let stretch = power.get(from..b + reach + length)?;
-    let residual = |shift: usize| unlike(&stretch[shift..shift + length], template);
+    let residual = |shift: usize| unexplained(&stretch[shift..shift + length], template);
     let last = 2 * reach - 1;
-    let at = nearest(1..=last, (last - 1).div_ceil(TRIED).max(1), residual);
+    let at = nearest(1..=last, (last - 1).div_ceil(MAX_COARSE_SHIFTS).max(1), residual);
     let [left, middle, right] = [at - 1, at, at + 1].map(residual);
     let curvature = left - 2.0 * middle + right;
-    if middle > left.min(right) || curvature <= 0.0 || middle > UNLIKE * unlike(template, &vec![0.0; length])
+    if middle > left.min(right)
+        || curvature <= 0.0
+        || middle > MAX_UNEXPLAINED * unexplained(template, &vec![0.0; length])
     {
         return None;
     }
@@ -115,7 +123,7 @@ fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Opti
 }
 
 /// Summed squared difference of two stretches beyond their difference in mean.
-fn unlike(a: &[f64], b: &[f64]) -> f64 {
+fn unexplained(a: &[f64], b: &[f64]) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
     for (x, y) in a.iter().zip(b) {
         sum += x - y;
@@ -136,7 +144,7 @@ fn reconcile(links: &[Link], fixed: &[bool], reach: f64) -> Vec<f64> {
     for _ in 0..SWEEPS {
         let mut largest = 0.0_f64;
         for node in (0..fixed.len()).filter(|&node| !fixed[node]) {
-            let (mut sum, mut weights) = (0.0, TEMPLATE);
+            let (mut sum, mut weights) = (0.0, TEMPLATE_WEIGHT);
             for &(other, ratio, shift, weight) in &of[node] {
                 sum += weight * (ratio * moves[other] + shift);
                 weights += weight;

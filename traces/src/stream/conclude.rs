@@ -7,9 +7,8 @@ use crate::frames::{
     FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, flat_mark, misalignment_w2,
     noise_deviation, regularity, start_after_idle,
 };
-use crate::median::median;
 use crate::metadata::Metadata;
-use crate::sum::PairSum;
+use crate::stats::{PairSum, median};
 use crate::trace::Trace;
 use rayon::prelude::*;
 

@@ -1,19 +1,19 @@
 //! The one pass over the file.
+//!
+//! What threads work in, from the first piece of a file to the last.
 
 use super::StreamError;
 use super::clock::Clock;
-use super::minima::minima;
-use super::piece::Piece;
-use super::screen::Screen;
-use super::template::{difference, powers, templates};
-use super::workspace::{Workspace, Workspaces};
+use super::piece::{Piece, difference, powers, templates};
+use super::screen::{Buffers, Screen, minima};
 use crate::frames::{Marks, Placed, Placement, vertex};
 use crate::io::{Chunk, ReadError, ReadOptions, Rows};
-use crate::sum::PairSum;
+use crate::stats::PairSum;
 use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// Rows read at once.
 const ROWS: usize = 1 << 20;
@@ -278,4 +278,29 @@ fn check_finite(rows: &Rows, piece: &Piece) -> Result<(), ReadError> {
         return Ok(());
     }
     rows.check_finite(&piece.voltage_v, &piece.current_a, piece.base)
+}
+
+/// What a thread works in: the signal and the profile of one task.
+#[derive(Default)]
+pub(super) struct Workspace {
+    pub signal: Vec<f32>,
+    pub profile: Vec<f32>,
+    /// Powers about one offset, W.
+    pub power_w: Vec<f64>,
+    pub buffers: Buffers,
+}
+
+/// One for each thread, not made anew for each piece.
+pub(super) struct Workspaces(Vec<Mutex<Workspace>>);
+
+impl Workspaces {
+    pub fn new() -> Self {
+        Self((0..rayon::current_num_threads()).map(|_| Mutex::default()).collect())
+    }
+
+    /// Does something in that of the thread it is called by.
+    pub fn with<T>(&self, work: impl FnOnce(&mut Workspace) -> T) -> T {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        work(&mut self.0[thread % self.0.len()].lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }

@@ -1,34 +1,35 @@
 //! A first guess of the period and of some starts, from the distances to the marked windows alone.
 
-use super::bank::Bank;
-use crate::frames::minima::spaced_minima;
-use crate::frames::regularity::regularity;
-use crate::frames::split::{Split, otsu_tree};
-use crate::median::median;
+use super::templates::Templates;
+use crate::frames::periodicity::regularity;
+use crate::frames::profile::spaced_minima;
+use crate::frames::threshold::{Split, otsu_tree};
+use crate::stats::median;
 
-/// How far around a mark, in windows.
+/// How far around a mark the first guess looks, in windows.
 const REACH_WINDOWS: usize = 200;
-/// Minima are evenly spaced by construction; starts must be farther apart than that, by this factor.
-const SPARSER: f64 = 1.3;
-/// What is nearer than this share of the median minimum may be told apart after all: at coarse rates half a sample is much.
-const FAR_BELOW: f64 = 0.1;
-/// A gap of the first guess is looked at for up to so many frames.
-const MOST_BETWEEN: usize = 5;
-/// How much a separation, capped at 5, counts beside regularity.
-const SEPARATION_SHARE: f64 = 0.1;
+/// Minima are evenly spaced by construction; starts must be farther apart by at least this factor.
+const MIN_SPARSENESS: f64 = 1.3;
+/// Minima below this share of the median minimum may be starts after all: at coarse rates half a sample is
+/// much.
+const MAX_NEAR_SHARE: f64 = 0.1;
+/// Most frames that a gap of the first guess may hold.
+const MAX_FRAMES_PER_GAP: usize = 5;
+/// Weight of a separation, capped at 5, beside regularity.
+const SEPARATION_WEIGHT: f64 = 0.1;
 
 /// The period in samples and the starts of that split of the minima, by either measure, that leaves the most even beat.
-pub(super) fn first(bank: &Bank, spacing: usize, marks: &[usize]) -> (usize, Vec<usize>) {
+pub(super) fn first(templates: &Templates, spacing: usize, marks: &[usize]) -> (usize, Vec<usize>) {
     let mut best = (f64::NEG_INFINITY, 2 * spacing, marks.to_vec());
-    let mut by = &bank.shape;
-    for profile in [&bank.shape, &bank.squares_w2] {
+    let mut by = &templates.shape;
+    for profile in [&templates.shape, &templates.squares_w2] {
         let reach = 2 * spacing * REACH_WINDOWS;
         let mut minima = spaced_minima(profile, spacing);
         minima.retain(|offset| marks.iter().any(|mark| mark.abs_diff(*offset) <= reach));
         let usual = median_gap(&minima).unwrap_or(spacing) as f64;
         let span = minima.last().zip(minima.first()).map_or(0, |(last, first)| last - first);
         let mut among: Vec<f64> = minima.iter().map(|&offset| profile[offset]).collect();
-        let least = half_a_sample(profile, marks).min(FAR_BELOW * median(&mut among)).max(1e-12);
+        let least = half_a_sample(profile, marks).min(MAX_NEAR_SHARE * median(&mut among)).max(1e-12);
         let mut logs: Vec<f64> = minima
             .iter()
             .filter(|offset| !marks.contains(offset))
@@ -41,15 +42,18 @@ pub(super) fn first(bank: &Bank, spacing: usize, marks: &[usize]) -> (usize, Vec
                 minima.iter().copied().filter(|&offset| profile[offset] < threshold).collect();
             let Some(gap) = median_gap(&starts) else { continue };
             // As dense as minima are anyway: only if there is nothing else, as where frames are shorter than the window.
-            let dense = if (gap as f64) < SPARSER * usual { 10.0 } else { 0.0 };
-            let value = regularity(&starts, span) + SEPARATION_SHARE * separation(&split).min(5.0) - dense;
+            let dense = if (gap as f64) < MIN_SPARSENESS * usual { 10.0 } else { 0.0 };
+            let value = regularity(&starts, span) + SEPARATION_WEIGHT * separation(&split).min(5.0) - dense;
             if value > best.0 {
                 (best, by) = ((value, gap, starts), profile);
             }
         }
     }
     let (_, period, starts) = best;
-    match (2..=MOST_BETWEEN).rev().find_map(|parts| between(by, &starts, [period, spacing], parts, marks)) {
+    match (2..=MAX_FRAMES_PER_GAP)
+        .rev()
+        .find_map(|parts| between(by, &starts, [period, spacing], parts, marks))
+    {
         Some(starts) => (median_gap(&starts).unwrap_or(period), starts),
         None => (period, starts),
     }

@@ -3,7 +3,8 @@
 use super::{BLOCK, ENTRY_BYTES, Entry, FAN, Pyramid, Store};
 use crate::io::{ReadOptions, WriteError, atomic, crc32c};
 use crate::stream::Clock;
-use std::fs::{self, File};
+use std::fs;
+use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;

@@ -1,4 +1,25 @@
+//! The middle of many values.
+//!
+//! What spreads are made of.
+//!
 //! Sums carried in two f64, so that differences of long running totals keep full precision.
+
+/// The (upper) median; 0 for no values. They are left in another order.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// The mean of some values; no values have none.
+pub(crate) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The mean of some values and the sum of their squared differences from it; no values have no mean.
+pub(crate) fn about_mean(values: &[f64]) -> (f64, f64) {
+    let mean = mean(values);
+    (mean, values.iter().map(|value| (value - mean) * (value - mean)).sum())
+}
 
 /// A running sum as an unevaluated pair `hi + lo` (double-double; two-sum: Knuth 1969, TAOCP vol. 2, 4.2.2;
 /// Dekker 1971 for the renormalization).
@@ -59,6 +80,18 @@ impl PairSum {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_upper_of_two_middles_and_nothing_of_nothing() {
+        assert_eq!((median(&mut [3.0, 1.0, 2.0, 9.0]), median(&mut [])), (3.0, 0.0));
+    }
+
+    #[test]
+    fn of_known_numbers_and_of_none() {
+        assert_eq!(about_mean(&[1.0, 2.0, 6.0]), (3.0, 14.0));
+        let (mean, squares) = about_mean(&[]);
+        assert!(mean.is_nan() && squares == 0.0);
+    }
 
     #[test]
     fn ten_million_tenths_keep_the_last_one() {

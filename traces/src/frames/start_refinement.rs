@@ -8,60 +8,62 @@
 //! another phase, nor up into more power, as the way out of a frame leads down.
 
 use super::refine::between;
-use super::split::moments;
-use crate::median::median;
-use crate::squares::mean;
+use super::threshold::moments;
+use crate::stats::{mean, median};
 use rayon::prelude::*;
 
-/// How far a start may move, as a share of the window.
-const REACH: f64 = 0.12;
-/// Differences of so many neighbours on either side are averaged, and those of this many samples on either side.
-const FRAMES: usize = 16;
-const SAMPLES: usize = 1;
-/// A start no more than so many samples before those that agree is at their edge: neighbours differ in the edge itself.
-const EDGE: usize = 3;
+/// Largest move of a start, as a share of the window.
+const MAX_MOVE_SHARE: f64 = 0.12;
+/// Neighbours on either side whose differences are averaged.
+const NEIGHBOURS: usize = 16;
+/// Samples on either side whose differences are averaged.
+const SMOOTHED_SAMPLES: usize = 1;
+/// A start at most this many samples before the agreeing ones lies at their edge: neighbours differ in the
+/// edge itself.
+const MAX_EDGE_SAMPLES: usize = 3;
 /// Neighbours agree where their squared difference is below this many times the least within reach.
-const AGREE: f64 = 6.0;
-/// and wherever it is below this share of the variance of the trace: steps of a coarse recorder may hide all noise.
-const ALIKE: f64 = 1e-4;
-/// Moves are smoothed over so many neighbours on either side, as content changes slowly.
-const SMOOTH: usize = 8;
+const MAX_AGREEMENT_RATIO: f64 = 6.0;
+/// They agree also below this share of the variance of the trace: the steps of a coarse recorder may hide all
+/// noise.
+const MAX_AGREEMENT_SHARE: f64 = 1e-4;
+/// Neighbours on either side over which moves are smoothed, as content changes slowly.
+const SMOOTHED_MOVES: usize = 8;
 
 /// Positions of windows, samples, moved on; `anchor` is the place of the start in a window of `width` samples. What is `fixed` stays.
-pub(super) fn settle(
+pub(super) fn refine_starts(
     power: &[f64],
     positions: Vec<f64>,
     fixed: &[bool],
     anchor: f64,
     width: usize,
 ) -> Vec<f64> {
-    let reach = (REACH * width as f64) as usize;
+    let reach = (MAX_MOVE_SHARE * width as f64) as usize;
     let starts: Vec<f64> = positions.iter().map(|position| position + anchor).collect();
     let differences = differences(power, &starts, reach + 1);
     let deviation_w = moments(power).deviation;
-    let alike_w2 = ALIKE * deviation_w * deviation_w;
+    let agreement_w2 = MAX_AGREEMENT_SHARE * deviation_w * deviation_w;
     let moves: Vec<f64> = (0..positions.len())
         .map(|frame| {
-            let near = frame.saturating_sub(FRAMES)..(frame + FRAMES).min(differences.len());
-            let by = first_alike(&mean_of_each(&differences[near.clone()], reach + 1), alike_w2);
+            let near = frame.saturating_sub(NEIGHBOURS)..(frame + NEIGHBOURS).min(differences.len());
+            let by = first_agreeing(&mean_of_each(&differences[near.clone()], reach + 1), agreement_w2);
             if level(power, &starts[near.clone()], by) < level(power, &starts[near], 0.0) { by } else { 0.0 }
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, median), |near| mean(near));
-    let settled = positions.iter().zip(moves).zip(fixed);
-    settled.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
+    let refined = positions.iter().zip(moves).zip(fixed);
+    refined.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
 }
 
 /// How much each frame and the next differ at each of `length` samples from their starts on, W^2.
 fn differences(power: &[f64], starts: &[f64], length: usize) -> Vec<Vec<f64>> {
-    let sample = |start: f64, index: usize| between(power, start + index as f64 - SAMPLES as f64);
+    let sample = |start: f64, index: usize| between(power, start + index as f64 - SMOOTHED_SAMPLES as f64);
     let square = |pair: &[f64], index: usize| match [pair[0], pair[1]].map(|start| sample(start, index)) {
         [Some(a), Some(b)] => (a - b) * (a - b),
         _ => 0.0,
     };
     let of_pair = |pair: &[f64]| -> Vec<f64> {
-        let squares: Vec<f64> = (0..length + 2 * SAMPLES).map(|index| square(pair, index)).collect();
-        squares.windows(1 + 2 * SAMPLES).map(mean).collect()
+        let squares: Vec<f64> = (0..length + 2 * SMOOTHED_SAMPLES).map(|index| square(pair, index)).collect();
+        squares.windows(1 + 2 * SMOOTHED_SAMPLES).map(mean).collect()
     };
     starts.par_windows(2).map(of_pair).collect()
 }
@@ -76,10 +78,11 @@ fn mean_of_each(rows: &[Vec<f64>], columns: usize) -> Vec<f64> {
 }
 
 /// The first sample at which neighbours agree, in samples from the start.
-fn first_alike(differ: &[f64], alike_w2: f64) -> f64 {
+fn first_agreeing(differ: &[f64], agreement_w2: f64) -> f64 {
     let least = differ.iter().copied().fold(f64::INFINITY, f64::min);
-    let limit = alike_w2.max(AGREE * least);
-    differ.iter().position(|value| *value <= limit).filter(|first| *first > EDGE).unwrap_or(0) as f64
+    let limit = agreement_w2.max(MAX_AGREEMENT_RATIO * least);
+    differ.iter().position(|value| *value <= limit).filter(|first| *first > MAX_EDGE_SAMPLES).unwrap_or(0)
+        as f64
 }
 
 /// Mean power so many samples after some starts, W.
@@ -90,7 +93,8 @@ fn level(power: &[f64], starts: &[f64], after: f64) -> f64 {
 
 /// Each value by its neighbours.
 fn smoothed(values: &[f64], by: impl Fn(&mut [f64]) -> f64) -> Vec<f64> {
-    let near = |index: usize| index.saturating_sub(SMOOTH)..(index + SMOOTH + 1).min(values.len());
+    let near =
+        |index: usize| index.saturating_sub(SMOOTHED_MOVES)..(index + SMOOTHED_MOVES + 1).min(values.len());
     (0..values.len()).map(|index| by(&mut values[near(index)].to_vec())).collect()
 }
 
@@ -120,7 +124,7 @@ mod tests {
         // The front end was 20 samples at the mark and is 4 now: starts are 16 early, before the rest.
         let (power, right) = frames(60, |_| 4);
         let early: Vec<f64> = right.iter().map(|start| start - 16.0).collect();
-        for (found, right) in settle(&power, early, &[false; 60], 0.0, WIDTH).iter().zip(&right) {
+        for (found, right) in refine_starts(&power, early, &[false; 60], 0.0, WIDTH).iter().zip(&right) {
             // Into the rest, of which all have the last 8 samples.
             assert!((-8.0..=0.0).contains(&(found - right)), "{found} for {right}");
         }
@@ -129,9 +133,9 @@ mod tests {
     #[test]
     fn where_neighbours_agree_nothing_moves_and_marks_never_do() {
         let (power, right) = frames(40, |_| 20);
-        assert_eq!(settle(&power, right.clone(), &[false; 40], 0.0, WIDTH), right);
+        assert_eq!(refine_starts(&power, right.clone(), &[false; 40], 0.0, WIDTH), right);
         let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
-        assert_eq!(settle(&power, early.clone(), &[true; 40], 0.0, WIDTH), early);
+        assert_eq!(refine_starts(&power, early.clone(), &[true; 40], 0.0, WIDTH), early);
     }
 
     #[test]
@@ -145,17 +149,17 @@ mod tests {
             })
             .collect();
         let starts: Vec<f64> = (0..19).map(|i| f64::from(300 * i + 2)).collect();
-        assert_eq!(settle(&power, starts.clone(), &[false; 19], 0.0, WIDTH), starts);
+        assert_eq!(refine_starts(&power, starts.clone(), &[false; 19], 0.0, WIDTH), starts);
     }
 
     #[test]
     fn few_starts_and_coarse_windows_are_left_alone() {
         let (power, right) = frames(1, |_| 20);
-        assert_eq!(settle(&power, right.clone(), &[false], 0.0, WIDTH), right);
-        assert!(settle(&power, Vec::new(), &[], 0.0, WIDTH).is_empty());
+        assert_eq!(refine_starts(&power, right.clone(), &[false], 0.0, WIDTH), right);
+        assert!(refine_starts(&power, Vec::new(), &[], 0.0, WIDTH).is_empty());
         let (power, right) = frames(20, |_| 4);
         let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
-        assert_eq!(settle(&power, early.clone(), &[false; 20], 0.0, 8), early);
+        assert_eq!(refine_starts(&power, early.clone(), &[false; 20], 0.0, 8), early);
     }
 
     proptest! {
@@ -165,7 +169,7 @@ mod tests {
             gaps in proptest::collection::vec(5.0..40.0_f64, 1..20),
         ) {
             let starts: Vec<f64> = gaps.iter().scan(0.0, |at, gap| { *at += gap; Some(*at) }).collect();
-            let found = settle(&power, starts.clone(), &vec![false; starts.len()], 3.0, 100);
+            let found = refine_starts(&power, starts.clone(), &vec![false; starts.len()], 3.0, 100);
             for (found, start) in found.iter().zip(&starts) {
                 prop_assert!((0.0..=12.0).contains(&(found - start)));
             }

@@ -4,74 +4,78 @@
 //! the start. A sequence then wanders about, though the frames it follows do not. If nearly all gaps are whole numbers of one period the
 //! display gives the beat, and where the starts of such a trace are spread all the same, the mark and the period say where they lie.
 
-use crate::median::median;
+use crate::stats::median;
 
-/// A gap is a whole number of periods if it is off by less than this share of one,
-const WHOLE: f64 = 2e-3;
-/// and a trace waits for the display if this share of its gaps are,
-const MOSTLY: f64 = 0.5;
-/// and this share of its starts lie within so many periods of a tick.
-const ON_TICKS: [f64; 2] = [0.8, 0.1];
-/// Ticks are used only if this share of the starts lie farther than this share of the window from theirs: more than a few by chance.
-const SPREAD: [f64; 2] = [0.02, 0.06];
-/// Fewest gaps that tell.
-const LEAST: usize = 16;
-/// In noise no gap is whole. Starts that are scattered about ticks lie about as far from them as gaps are from whole periods, however many
-/// there are; starts that walk away a quarter as far as that for each root of their number. Scattered are those below this share for each
-/// root, and at most so many times as far.
-const SCATTERED: [f64; 2] = [0.1, 1.5];
+/// A gap is a whole number of periods if it is off by less than this share of one.
+const MAX_PERIOD_RESIDUE: f64 = 2e-3;
+/// Least share of such gaps in a trace that waits for the display.
+const MIN_WHOLE_SHARE: f64 = 0.5;
+/// Least share of starts near a tick, and the largest distance of those, in periods.
+const TICK_SHARE_AND_DISTANCE: [f64; 2] = [0.8, 0.1];
+/// Starts snap to the ticks only if at least this share of them lies farther from its tick than this share of
+/// the window: more than a few by chance.
+const SPREAD_SHARE_AND_DISTANCE: [f64; 2] = [0.02, 0.06];
+/// Fewest gaps that give a period.
+const MIN_GAPS: usize = 16;
+/// Largest distance of scattered starts from their ticks: the first, for each root of their number, or the
+/// second, as a ratio to the residues of the gaps. Starts scattered about ticks lie about as far from them as
+/// gaps from whole periods, however many there are; starts that drift lie a quarter as far as that for each
+/// root of their number.
+const SCATTER_LIMITS: [f64; 2] = [0.1, 1.5];
 /// Rounds of reweighting.
-const ROUNDS: usize = 60;
+const MAX_ROUNDS: usize = 60;
 
 /// What the display says of starts.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Ticks {
+pub(super) struct Snapped {
     /// Positions, samples: on the ticks where the starts were spread about, else as they were.
     pub positions: Vec<f64>,
     /// Whether each lies far from every tick: no frame begins there.
-    pub between: Vec<bool>,
+    pub off_tick: Vec<bool>,
 }
 
 /// Holds the starts at `positions` (samples, in order) against the ticks of the display, if they wait for it; `fixed` is the number of
 /// one that is right.
-pub(super) fn ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Ticks> {
-    let (off, period) = beat(positions, fixed)?;
+pub(super) fn snap_to_ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Snapped> {
+    let (off, period) = tick_distances(positions, fixed)?;
     let share =
         |far: &dyn Fn(f64) -> bool| off.iter().filter(|off| far(**off)).count() as f64 / off.len() as f64;
-    let near = |off: f64| off.abs() < ON_TICKS[1] * period;
-    let spread = share(&|off| off.abs() > SPREAD[1] * width as f64) > SPREAD[0];
+    let near = |off: f64| off.abs() < TICK_SHARE_AND_DISTANCE[1] * period;
+    let spread =
+        share(&|off| off.abs() > SPREAD_SHARE_AND_DISTANCE[1] * width as f64) > SPREAD_SHARE_AND_DISTANCE[0];
     let put = |(x, off): (&f64, &f64)| if spread && near(*off) { x - off } else { *x };
-    (share(&near) > ON_TICKS[0]).then(|| Ticks {
+    (share(&near) > TICK_SHARE_AND_DISTANCE[0]).then(|| Snapped {
         positions: positions.iter().zip(&off).map(put).collect(),
-        between: off.iter().map(|off| !near(*off)).collect(),
+        off_tick: off.iter().map(|off| !near(*off)).collect(),
     })
 }
 
 /// How far each start lies from the nearest tick of the period that goes through the `fixed` one, and that period, samples; `None` where
 /// gaps are no whole numbers of it.
-fn beat(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
+fn tick_distances(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
     let gaps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
-    if gaps.len() < LEAST {
+    if gaps.len() < MIN_GAPS {
         return None;
     }
     let usual = median(&mut gaps.clone());
     let periods = whole_periods(&gaps, usual);
-    let beside: Vec<f64> =
+    let residues: Vec<f64> =
         gaps.iter().zip(&periods).map(|(gap, count)| (gap - count * usual).abs()).collect();
-    let whole = |(beside, count): &(&f64, &f64)| **count > 0.0 && **beside < WHOLE * usual;
-    let mostly = beside.iter().zip(&periods).filter(whole).count() as f64 >= MOSTLY * gaps.len() as f64;
+    let whole = |(residues, count): &(&f64, &f64)| **count > 0.0 && **residues < MAX_PERIOD_RESIDUE * usual;
+    let mostly =
+        residues.iter().zip(&periods).filter(whole).count() as f64 >= MIN_WHOLE_SHARE * gaps.len() as f64;
     let period = slope(positions, &periods);
     let tick = |position: f64| libm::round((position - positions[fixed]) / period);
     let off: Vec<f64> = positions.iter().map(|x| x - positions[fixed] - tick(*x) * period).collect();
-    (mostly || scattered(&off, beside)).then_some((off, period))
+    (mostly || scattered(&off, residues)).then_some((off, period))
 }
 
-/// Whether starts that lie so far `off` the ticks are scattered about them; gaps lie so far `beside` whole periods.
-fn scattered(off: &[f64], mut beside: Vec<f64>) -> bool {
+/// Whether starts that lie so far `off` the ticks are scattered about them; gaps lie so far `residues` whole periods.
+fn scattered(off: &[f64], mut residues: Vec<f64>) -> bool {
     let middle = median(&mut off.to_vec());
     let mut far: Vec<f64> = off.iter().map(|off| (off - middle).abs()).collect();
-    let most = (SCATTERED[0] * libm::sqrt(beside.len() as f64)).min(SCATTERED[1]);
-    median(&mut far) < most * median(&mut beside)
+    let most = (SCATTER_LIMITS[0] * libm::sqrt(residues.len() as f64)).min(SCATTER_LIMITS[1]);
+    median(&mut far) < most * median(&mut residues)
 }
 
 /// How many periods each gap is, as whole numbers: what a start between two ticks leaves over is counted with the next gap.
@@ -80,7 +84,7 @@ fn whole_periods(gaps: &[f64], period: f64) -> Vec<f64> {
     let whole = |gap: &f64| {
         let periods = libm::round((gap + over) / period);
         over += gap - periods * period;
-        if over.abs() < ON_TICKS[1] * period {
+        if over.abs() < TICK_SHARE_AND_DISTANCE[1] * period {
             over = 0.0;
         }
         periods
@@ -98,7 +102,7 @@ fn slope(positions: &[f64], periods: &[f64]) -> f64 {
     }));
     let mut weights = vec![1.0; ticks.len()];
     let mut period = 0.0;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let total: f64 = weights.iter().sum();
         let mean = |of: &[f64]| of.iter().zip(&weights).map(|(x, w)| x * w).sum::<f64>() / total;
         let (n, x) = (mean(&ticks), mean(positions));
@@ -134,7 +138,7 @@ mod tests {
             3 => 9.0,
             _ => -25.0,
         };
-        let found = ticks(&starts(wander), 60, 250).unwrap().positions;
+        let found = snap_to_ticks(&starts(wander), 60, 250).unwrap().positions;
         let worst = found.iter().zip(starts(|_| 0.0)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 8.0, "{worst}");
     }
@@ -142,10 +146,10 @@ mod tests {
     #[test]
     fn what_lies_on_ticks_or_does_not_wait_is_left_alone() {
         let even = starts(|i| (i % 3) as f64);
-        assert_eq!(ticks(&even, 60, 250), Some(Ticks { positions: even, between: vec![false; 200] }));
+        assert_eq!(snap_to_ticks(&even, 60, 250), Some(Snapped { positions: even, off_tick: vec![false; 200] }));
         let free = |i: usize| 15.0 * libm::sin(i as f64) + 40.0 * libm::sin(0.1 * i as f64);
-        assert_eq!(ticks(&starts(free), 60, 250), None);
-        assert_eq!(ticks(&starts(|_| 0.0)[..10], 3, 250), None);
+        assert_eq!(snap_to_ticks(&starts(free), 60, 250), None);
+        assert_eq!(snap_to_ticks(&starts(|_| 0.0)[..10], 3, 250), None);
     }
 
     #[test]
@@ -167,20 +171,20 @@ mod tests {
                 0.0
             }
         };
-        let found = ticks(&starts(late), 60, 250).unwrap();
+        let found = snap_to_ticks(&starts(late), 60, 250).unwrap();
         assert_eq!(found.positions[90], starts(late)[90]);
-        assert_eq!(found.between.iter().filter(|between| **between).count(), 1);
-        assert!(found.between[90]);
+        assert_eq!(found.off_tick.iter().filter(|between| **between).count(), 1);
+        assert!(found.off_tick[90]);
     }
 
     #[test]
     fn starts_that_noise_scatters_about_ticks_are_put_on_them_and_those_that_walk_are_not() {
         let random = Random::new(11, 0);
         let noise = |i: usize| if i == 60 { 0.0 } else { 9.0 * random.normals(i as u64).0 };
-        let found = ticks(&starts(noise), 60, 250).unwrap().positions;
+        let found = snap_to_ticks(&starts(noise), 60, 250).unwrap().positions;
         let worst = found.iter().zip(starts(|_| 0.0)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 6.0, "{worst}");
         let walk = |i: usize| (0..i).map(|step| 2.0 * random.normals(step as u64).0).sum::<f64>();
-        assert_eq!(ticks(&starts(walk), 60, 250), None);
+        assert_eq!(snap_to_ticks(&starts(walk), 60, 250), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::FrameEnergy;
 use crate::io::{Heading, Sink, Source, Stretch, WriteError};
-use crate::sum::PairSum;
+use crate::stats::PairSum;
 
 /// Energy of each of some spans of time, from one time (s) to another, J; negative where they are the other way round.
 /// All samples are asked for once.

@@ -5,71 +5,73 @@
 //! Frames that take turns by themselves (a shadow map drawn every other time) do so at the mark, too. A frame begins in its rest: of starts
 //! that take turns, those that go down clearly less are cuts.
 
-use super::rest::{LEFT, about, near};
-use super::unrested::lowest_w;
-use crate::median::median;
-use crate::squares::{about_mean, mean};
+use super::idle_gap::{SUSPECT_CONFIDENCE, lowest_w, neighbours, window_around};
+use crate::stats::{about_mean, mean, median};
 use core::ops::Range;
 use rayon::prelude::*;
 
-/// The shares of the window before and after a start that are compared.
-const COMPARED: [f64; 2] = [0.2, 0.8];
-/// So many starts on either side are looked at, and no fewer comparisons than this are enough.
-const FRAMES: usize = 4;
-const LEAST: usize = 4;
-/// Neighbours differ so many times as much as every other start does, and as they do at the mark.
-const MORE: f64 = 3.0;
-/// The share of the window that is a rest.
-const BRIEF: f64 = 0.06;
-/// Cuts go down by less than this share of what starts do, and that is so many standard errors.
-const LESS: f64 = 0.85;
-const CLEAR: f64 = 4.0;
+/// Shares of the window before and after a start that are compared.
+const COMPARED_SHARES: [f64; 2] = [0.2, 0.8];
+/// Starts compared on either side of each.
+const NEIGHBOURS: usize = 4;
+/// Fewest comparisons that give a mean.
+const MIN_COMPARISONS: usize = 4;
+/// Direct neighbours must differ by at least this many times what every other start does, and what they do at
+/// the mark.
+const MIN_CONTRAST: f64 = 3.0;
+/// Length of an idle gap, as a share of the window.
+const IDLE_SHARE: f64 = 0.06;
+/// At a false start in the middle of a frame, power dips by less than this share of its dip at a true one.
+const MAX_DIP_RATIO: f64 = 0.85;
+/// Fewest standard errors between the two dips.
+const MIN_STANDARD_ERRORS: f64 = 4.0;
 /// Fewest starts of either kind.
-const FEW: usize = 4;
-/// So many starts of either kind may lie beyond either end of what is seen to take turns.
-const BEYOND: usize = 2;
+const MIN_STARTS: usize = 4;
+/// Starts of either kind that may lie beyond either end of the alternating segment.
+const MARGIN_STARTS: usize = 2;
 
 /// What is said of each start.
-pub(super) struct Turns {
+pub(super) struct SplitFrames {
     /// What is left of its confidence.
-    pub left: Vec<f64>,
+    pub confidence_factors: Vec<f64>,
     /// Whether it cuts a frame in two.
-    pub cut: Vec<bool>,
+    pub splits_frame: Vec<bool>,
 }
 
-impl Turns {
+impl SplitFrames {
     /// From the places of all starts (samples, in order), which of them are marked, and the width of the window.
     pub fn new(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Self {
-        let left = left(power, starts, marked, width);
-        let rests = Rests { power, starts, width };
+        let confidence_factors = alternation_confidence(power, starts, marked, width);
+        let dips = Dips { power, starts, width };
         let mut cut = vec![false; starts.len()];
-        for stretch in stretches(&left) {
-            for start in rests.cuts(stretch).into_iter().filter(|start| !marked[*start]) {
+        for segment in segments(&confidence_factors) {
+            for start in dips.false_starts(segment).into_iter().filter(|start| !marked[*start]) {
                 cut[start] = true;
             }
         }
-        Self { left, cut }
+        Self { confidence_factors, splits_frame: cut }
     }
 }
 
 /// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
-fn left(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
+fn alternation_confidence(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
     let [next, after_next] = [1, 2].map(|apart| differences(power, starts, width, apart));
-    let turns: Vec<f64> = (0..starts.len()).map(|start| turns(&next, &after_next, start)).collect();
+    let alternations: Vec<f64> =
+        (0..starts.len()).map(|start| alternation(&next, &after_next, start)).collect();
     let marks: Vec<usize> = (0..starts.len()).filter(|&start| marked[start]).collect();
     let of_start = |start: usize| {
         let mark = marks.iter().copied().min_by_key(|mark| mark.abs_diff(start));
-        let usual = mark.map_or(1.0, |mark| turns[mark].max(1.0));
-        if turns[start] > MORE * usual { LEFT } else { 1.0 }
+        let usual = mark.map_or(1.0, |mark| alternations[mark].max(1.0));
+        if alternations[start] > MIN_CONTRAST * usual { SUSPECT_CONFIDENCE } else { 1.0 }
     };
     (0..starts.len()).map(of_start).collect()
 }
 
 /// How many times as much as every other start neighbours near one differ; 1 where too few are near.
-fn turns(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -> f64 {
-    let [next, after_next] =
-        [next, after_next].map(|of| near(of, start, FRAMES).iter().flatten().copied().collect::<Vec<f64>>());
-    if after_next.len() < LEAST {
+fn alternation(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -> f64 {
+    let [next, after_next] = [next, after_next]
+        .map(|of| neighbours(of, start, NEIGHBOURS).iter().flatten().copied().collect::<Vec<f64>>());
+    if after_next.len() < MIN_COMPARISONS {
         return 1.0;
     }
     let [next, after_next] = [next, after_next].map(|mut of| median(&mut of));
@@ -79,7 +81,7 @@ fn turns(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -> f64 
 /// The mean squared difference, W^2, of each start from the one so many after it; `None` where there is none, or not all of it.
 fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec<Option<f64>> {
     let of_start = |start: usize| {
-        let window = |start: f64| about(power, start, COMPARED, width);
+        let window = |start: f64| window_around(power, start, COMPARED_SHARES, width);
         let (a, b) = (window(starts[start])?, window(*starts.get(start + apart)?)?);
         Some(mean(&a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).collect::<Vec<_>>()))
     };
@@ -87,57 +89,59 @@ fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec
 }
 
 /// The stretches of starts in doubt.
-fn stretches(left: &[f64]) -> Vec<Range<usize>> {
+fn segments(left: &[f64]) -> Vec<Range<usize>> {
     let ends = |place: usize| place == 0 || (left[place] < 1.0) != (left[place - 1] < 1.0);
     let mut bounds: Vec<usize> = (0..left.len()).filter(|place| ends(*place)).collect();
     bounds.push(left.len());
     bounds
         .windows(2)
         .map(|two| two[0]..two[1])
-        .filter(|stretch| left.get(stretch.start) < Some(&1.0))
+        .filter(|segment| left.get(segment.start) < Some(&1.0))
         .collect()
 }
 
 /// How far power goes down at starts.
-struct Rests<'a> {
+struct Dips<'a> {
     power: &'a [f64],
     starts: &'a [f64],
     width: usize,
 }
 
-impl Rests<'_> {
-    /// Least mean of a brief stretch at a start, W.
+impl Dips<'_> {
+    /// Least mean of a gap_samples segment at a start, W.
     fn lowest_w(&self, start: usize) -> Option<f64> {
-        let brief = ((BRIEF * self.width as f64) as usize).max(1);
-        lowest_w(self.power, self.starts[start], self.width, brief)
+        let gap_samples = ((IDLE_SHARE * self.width as f64) as usize).max(1);
+        lowest_w(self.power, self.starts[start], self.width, gap_samples)
     }
 
     /// Median of the power around a start, W.
     fn usual_w(&self, start: usize) -> Option<f64> {
-        Some(median(&mut about(self.power, self.starts[start], COMPARED, self.width)?.to_vec()))
+        Some(median(
+            &mut window_around(self.power, self.starts[start], COMPARED_SHARES, self.width)?.to_vec(),
+        ))
     }
 
-    /// Every other start of a stretch, and beyond as long as starts go down as little, if those clearly go down less than the others.
-    fn cuts(&self, stretch: Range<usize>) -> Vec<usize> {
-        let every_other = |from: usize| (stretch.start + from..stretch.end).step_by(2);
+    /// Every other start of a segment, and beyond as long as starts go down as little, if those clearly go down less than the others.
+    fn false_starts(&self, segment: Range<usize>) -> Vec<usize> {
+        let every_other = |from: usize| (segment.start + from..segment.end).step_by(2);
         let lowest = [0, 1].map(|from| every_other(from).filter_map(|start| self.lowest_w(start)).collect());
         let [a, b]: [Vec<f64>; 2] = lowest;
-        if a.len().min(b.len()) < FEW {
+        if a.len().min(b.len()) < MIN_STARTS {
             return Vec::new();
         }
         let usual_w =
-            median(&mut stretch.clone().filter_map(|start| self.usual_w(start)).collect::<Vec<_>>());
+            median(&mut segment.clone().filter_map(|start| self.usual_w(start)).collect::<Vec<_>>());
         let ([a_w, a_error], [b_w, b_error]) = (mean_and_error(&a), mean_and_error(&b));
         let (from, low_w, high_w) = if a_w > b_w { (0, b_w, a_w) } else { (1, a_w, b_w) };
-        let clear = high_w - low_w > CLEAR * libm::hypot(a_error, b_error);
-        if !clear || usual_w - high_w > LESS * (usual_w - low_w) {
+        let clear = high_w - low_w > MIN_STANDARD_ERRORS * libm::hypot(a_error, b_error);
+        if !clear || usual_w - high_w > MAX_DIP_RATIO * (usual_w - low_w) {
             return Vec::new();
         }
         let cut = |start: &usize| self.lowest_w(*start).is_some_and(|watts| watts > 0.5 * (low_w + high_w));
-        let first = stretch.start + from;
-        let before = (0..first).rev().skip(1).step_by(2).take(BEYOND).take_while(cut);
+        let first = segment.start + from;
+        let before = (0..first).rev().skip(1).step_by(2).take(MARGIN_STARTS).take_while(cut);
         let last = every_other(from).next_back().unwrap_or(first);
-        let after = (last + 2..self.starts.len()).step_by(2).take(BEYOND).take_while(cut);
+        let after = (last + 2..self.starts.len()).step_by(2).take(MARGIN_STARTS).take_while(cut);
         before.chain(every_other(from)).chain(after).collect()
     }
 }
@@ -174,13 +178,13 @@ mod tests {
             |start: &f64| if *start < 30.0 * 320.0 { vec![*start] } else { vec![*start, start + 160.0] };
         let starts: Vec<f64> = whole.iter().flat_map(cut).collect();
         let marked: Vec<bool> = (0..starts.len()).map(|start| start == marked).collect();
-        let left = left(&power, &starts, &marked, WIDTH);
-        (0..starts.len()).filter(|&start| left[start] < 1.0).collect()
+        let confidence_factors = alternation_confidence(&power, &starts, &marked, WIDTH);
+        (0..starts.len()).filter(|&start| confidence_factors[start] < 1.0).collect()
     }
 
     /// Of 60 frames with a rest before 300 samples of draws and a dip of `dip` samples in the midst of those: all starts, with those in
     /// the dip from the 30th frame on, and what is said of them.
-    fn with_dips(dip_w: f64) -> (Vec<f64>, Turns) {
+    fn with_dips(dip_w: f64) -> (Vec<f64>, SplitFrames) {
         let random = Random::new(9, 0);
         let (mut power, mut starts) = (vec![1.2; 300], Vec::new());
         for frame in 0..60 {
@@ -195,19 +199,22 @@ mod tests {
         }
         power.iter_mut().enumerate().for_each(|(i, w)| *w += random.between(i as u64, [-0.05, 0.05]));
         let marked: Vec<bool> = (0..starts.len()).map(|start| start == 10).collect();
-        let turns = Turns::new(&power, &starts, &marked, WIDTH);
-        (starts, turns)
+        let split = SplitFrames::new(&power, &starts, &marked, WIDTH);
+        (starts, split)
     }
 
     #[test]
     fn starts_that_go_down_less_than_those_they_take_turns_with_are_cuts() {
         let (starts, turns) = with_dips(0.5);
-        let cut: Vec<usize> = (0..starts.len()).filter(|start| turns.cut[*start]).collect();
+        let cut: Vec<usize> = (0..starts.len()).filter(|start| turns.splits_frame[*start]).collect();
         assert!(cut.iter().all(|start| *start > 30 && start % 2 == 1), "{cut:?}");
         assert!(cut.len() > 27, "{cut:?}");
         // Where both go down as far, either may be a start: that is a doubt and no more.
         let (starts, turns) = with_dips(0.2);
-        assert!((40..starts.len() - 4).all(|start| turns.left[start] < 1.0 && !turns.cut[start]));
+        assert!(
+            (40..starts.len() - 4)
+                .all(|start| turns.confidence_factors[start] < 1.0 && !turns.splits_frame[start])
+        );
     }
 
     #[test]
@@ -227,8 +234,14 @@ mod tests {
     fn few_starts_or_none_are_no_doubt() {
         let (power, starts) = frames(0.5);
         for count in 0..5 {
-            assert_eq!(left(&power, &starts[..count], &vec![false; count], WIDTH), vec![1.0; count]);
+            assert_eq!(
+                alternation_confidence(&power, &starts[..count], &vec![false; count], WIDTH),
+                vec![1.0; count]
+            );
         }
-        assert_eq!(left(&[1.0; 3000], &[500.0, 900.0, 1400.0], &[true, false, false], WIDTH), [1.0; 3]);
+        assert_eq!(
+            alternation_confidence(&[1.0; 3000], &[500.0, 900.0, 1400.0], &[true, false, false], WIDTH),
+            [1.0; 3]
+        );
     }
 }

@@ -1,26 +1,28 @@
 //! Templates, and the nearest of them at every offset.
 
-use super::super::correlate::Correlator;
 use super::FEATURES;
+use crate::frames::profile::Correlator;
 use core::ops::Range;
 
-/// At most so many templates are added in one round.
-const MOST_A_ROUND: usize = 6;
-/// Neighbours must resemble a start by this much more (in correlation) than any template does.
-const NEW: f64 = 0.08;
-/// The gaps before and after a start that is to be a template differ by less than this share.
-const EVEN: f64 = 0.1;
-/// Added to the norm of every window, as a share of the whole trace's deviation, so that steady windows resemble nothing.
-const FLOOR: f64 = 1e-3;
+/// Most templates added in one round.
+const MAX_NEW_PER_ROUND: usize = 6;
+/// Neighbours of a new template must resemble it by this much more (in correlation) than any template does.
+const MIN_SIMILARITY_GAIN: f64 = 0.08;
+/// Largest deviation between the gaps before and after a new template, as a share.
+const MAX_GAP_DEVIATION: f64 = 0.1;
+/// Added to the norm of every window, as a share of the deviation of the whole trace: steady windows then
+/// resemble nothing.
+const NORM_FLOOR: f64 = 1e-3;
 
-/// The core of a window: so much of its length after the start and a quarter of that before it, where the first frame after a
-/// pause is like no other. Where content or clock change, what is farther away moves more.
-const CORE: f64 = 0.1;
-/// What a sample of the core weighs beyond the 1 that every sample does: with the core an eighth of the window, two fifths of all weight.
-const EXTRA: f64 = 5.0;
+/// Core of a window: this share of its length after the start and a quarter of that before it, where the
+/// first frame after a pause differs from all others. Farther away, changes of content or clock move more.
+const CORE_SHARE: f64 = 0.1;
+/// Weight of a sample of the core beyond the 1 of every sample: with the core an eighth of the window, two
+/// fifths of all weight.
+const CORE_WEIGHT: f64 = 5.0;
 
 /// The templates' distances to the trace.
-pub(super) struct Bank {
+pub(super) struct Templates {
     width: usize,
     /// The part of the window about the start, which counts more.
     core: Range<usize>,
@@ -39,22 +41,23 @@ pub(super) struct Bank {
     pub own: Vec<usize>,
 }
 
-impl Bank {
+impl Templates {
     /// The windows at `marks` are the first templates.
     pub fn new(power: &[f64], width: usize, anchor: usize, marks: &[usize]) -> Self {
         let centre = power.iter().sum::<f64>() / power.len() as f64;
         let signal: Vec<f64> = power.iter().map(|watts| watts - centre).collect();
-        let half = ((CORE * width as f64) as usize).max(1);
+        let half = ((CORE_SHARE * width as f64) as usize).max(1);
         let core = anchor.saturating_sub(half / 4)..(anchor + half).min(width);
         let (mean, norm) = windows(&signal, width, &core);
         let total: f64 = signal.iter().map(|x| x * x).sum();
-        let floor = FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;
+        let floor = NORM_FLOOR * libm::sqrt(total / signal.len() as f64 * width as f64) + f64::MIN_POSITIVE;
         let (shape, squares_w2) = (vec![2.0; mean.len()], vec![f64::INFINITY; mean.len()]);
-        let mut bank = Self { width, core, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
+        let mut templates =
+            Self { width, core, signal, mean, norm, floor, shape, squares_w2, own: Vec::new() };
         for &mark in marks {
-            bank.add(&[mark]);
+            templates.add(&[mark]);
         }
-        bank
+        templates
     }
 
     /// Adds the mean of the windows at `starts` as a template.
@@ -67,13 +70,13 @@ impl Bank {
             }
         }
         let weighted =
-            |of: &[f64]| of.iter().sum::<f64>() + EXTRA * of[self.core.clone()].iter().sum::<f64>();
+            |of: &[f64]| of.iter().sum::<f64>() + CORE_WEIGHT * of[self.core.clone()].iter().sum::<f64>();
         let mean = weighted(&template) / width;
         template.iter_mut().for_each(|x| *x -= mean);
         let squares: Vec<f64> = template.iter().map(|x| x * x).collect();
         let norm = libm::sqrt(weighted(&squares)) + f64::MIN_POSITIVE;
         template.iter_mut().for_each(|x| *x /= norm);
-        template[self.core.clone()].iter_mut().for_each(|x| *x *= 1.0 + EXTRA);
+        template[self.core.clone()].iter_mut().for_each(|x| *x *= 1.0 + CORE_WEIGHT);
         for (k, c) in Correlator::new(&template).correlate(&self.signal).into_iter().enumerate() {
             let offset = self.mean[k] - mean;
             let squares =
@@ -91,25 +94,26 @@ impl Bank {
     }
 
     /// Weighted correlation coefficient of two windows of the trace.
-    pub fn alike(&self, a: usize, b: usize) -> f64 {
+    pub fn similarity(&self, a: usize, b: usize) -> f64 {
         let (x, y) = (&self.signal[a..a + self.width], &self.signal[b..b + self.width]);
-        let inner = dot(x, y) + EXTRA * dot(&x[self.core.clone()], &y[self.core.clone()]);
+        let inner = dot(x, y) + CORE_WEIGHT * dot(&x[self.core.clone()], &y[self.core.clone()]);
         let about = inner - weight(self.width, &self.core) * self.mean[a] * self.mean[b];
         about / ((self.norm[a] + self.floor) * (self.norm[b] + self.floor))
     }
 
     /// Makes templates of starts that sit in an even beat and that their neighbours resemble more than any template does.
     pub fn learn(&mut self, starts: &[usize]) {
-        for _ in 0..MOST_A_ROUND {
+        for _ in 0..MAX_NEW_PER_ROUND {
             let novelty = |three: &[usize]| {
-                let uneven =
-                    libm::log((three[2] - three[1]) as f64 / (three[1] - three[0]) as f64).abs() > EVEN;
-                let alike = f64::min(self.alike(three[0], three[1]), self.alike(three[1], three[2]));
+                let uneven = libm::log((three[2] - three[1]) as f64 / (three[1] - three[0]) as f64).abs()
+                    > MAX_GAP_DEVIATION;
+                let alike =
+                    f64::min(self.similarity(three[0], three[1]), self.similarity(three[1], three[2]));
                 if uneven { f64::NEG_INFINITY } else { alike - (1.0 - self.shape[three[1]]) }
             };
             let newest = starts.windows(3).map(|three| (novelty(three), three));
             match newest.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((novelty, three)) if novelty > NEW => self.add(three),
+                Some((novelty, three)) if novelty > MIN_SIMILARITY_GAIN => self.add(three),
                 _ => return,
             }
         }
@@ -130,7 +134,7 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
 
 /// The sum of all weights of a window.
 fn weight(width: usize, core: &Range<usize>) -> f64 {
-    width as f64 + EXTRA * core.len() as f64
+    width as f64 + CORE_WEIGHT * core.len() as f64
 }
 
 /// Weighted mean and norm about the mean of every window, by running sums.
@@ -147,12 +151,12 @@ fn windows(signal: &[f64], width: usize, core: &Range<usize>) -> (Vec<f64>, Vec<
 /// The weighted sum of every window.
 fn boxes(of: &[f64], width: usize, core: &Range<usize>) -> Vec<f64> {
     let count = of.len() - width + 1;
-    let mut sum = of[..width].iter().sum::<f64>() + EXTRA * of[core.clone()].iter().sum::<f64>();
+    let mut sum = of[..width].iter().sum::<f64>() + CORE_WEIGHT * of[core.clone()].iter().sum::<f64>();
     let mut sums = Vec::with_capacity(count);
     for first in 0..count {
         sums.push(sum);
         if let Some(next) = of.get(first + width) {
-            sum += next - of[first] + EXTRA * (of[first + core.end] - of[first + core.start]);
+            sum += next - of[first] + CORE_WEIGHT * (of[first + core.end] - of[first + core.start]);
         }
     }
     sums

@@ -1,48 +1,51 @@
 //! Doubt that spreads: past a place where the sequence may have slipped to another phase of the frame, nothing ties it to a mark.
 
-/// Ratios of gaps that are the same beat.
-const SAME: [f64; 2] = [0.92, 1.085];
+/// Ratios of gaps of the same period.
+const SAME_RATIOS: [f64; 2] = [0.92, 1.085];
 /// Ratios of gaps beyond which the later one is odd.
-const ODD: [f64; 2] = [0.887, 1.13];
-/// Two gaps in one, a start missed between them, are no slip if they are as long as two by this share.
-const TWO: f64 = 0.1;
-/// What is left of the confidence beyond a slip.
-const LEFT: f64 = 0.3;
+const ODD_RATIOS: [f64; 2] = [0.887, 1.13];
+/// Two gaps in one (a missed start) are no phase slip if they are as long as two, within this share.
+const MAX_DOUBLE_DEVIATION: f64 = 0.1;
+/// Confidence factor beyond a phase slip.
+const SLIPPED_CONFIDENCE: f64 = 0.3;
 
 /// Whether the beat goes on as before after one odd gap that is not two of it. A clock step would change it for longer.
 pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
     let ratio = between / before;
-    !within(ratio, ODD) && (ratio - 2.0).abs() > TWO && within(after / before, SAME)
+    !within(ratio, ODD_RATIOS)
+        && (ratio - 2.0).abs() > MAX_DOUBLE_DEVIATION
+        && within(after / before, SAME_RATIOS)
 }
 
 /// What is left of the confidence of each start: less by each slip between it and the nearest of the places that are `known`, and where
 /// that is itself off the beat of the starts around it, or was put right beyond a slip from the nearest one of `marks`. A slip does not
 /// say which of its sides is in the right phase, so it counts on this side, too, back to where the clock stepped, as the phase may
 /// have been lost there. Without marks all of it.
-pub(super) fn left(offsets: &[usize], marks: &[usize], known: &[usize]) -> Vec<f64> {
-    let beat = Beat::new(offsets);
+pub(super) fn confidence_factors(offsets: &[usize], marks: &[usize], known: &[usize]) -> Vec<f64> {
+    let sequence = GapSequence::new(offsets);
     let among = |places: &[usize]| -> Vec<usize> {
         places.iter().filter_map(|place| offsets.binary_search(place).ok()).collect()
     };
     let (marks, known) = (among(marks), among(known));
     let nearest = |places: &[usize], start: usize| places.iter().copied().min_by_key(|p| p.abs_diff(start));
-    let doubted = |place: usize| {
-        let beyond = nearest(&marks, place)
-            .is_some_and(|mark| beat.slips_between(place, mark) > 0 || beat.may_have_been_lost(place, mark));
-        usize::from(off_beat(&beat.gaps, place)) + usize::from(beyond)
+    let uncertainty = |place: usize| {
+        let beyond = nearest(&marks, place).is_some_and(|mark| {
+            sequence.slips_between(place, mark) > 0 || sequence.may_have_been_lost(place, mark)
+        });
+        usize::from(off_period(&sequence.gaps, place)) + usize::from(beyond)
     };
     let of_start = |start: usize| {
         nearest(&known, start).map_or(1.0, |place| {
-            let doubts = beat.slips_between(start, place) + doubted(place);
-            let lost = doubts == 0 && beat.may_have_been_lost(start, place);
-            libm::pow(LEFT, (doubts + usize::from(lost)) as f64)
+            let slips = sequence.slips_between(start, place) + uncertainty(place);
+            let lost = slips == 0 && sequence.may_have_been_lost(start, place);
+            libm::pow(SLIPPED_CONFIDENCE, (slips + usize::from(lost)) as f64)
         })
     };
     (0..offsets.len()).map(of_start).collect()
 }
 
 /// The gaps between starts, and where their beat breaks.
-struct Beat {
+struct GapSequence {
     gaps: Vec<f64>,
     /// How many slips, and how many clock steps, lie before each start.
     slips: Vec<usize>,
@@ -51,7 +54,7 @@ struct Beat {
     slipped: Vec<bool>,
 }
 
-impl Beat {
+impl GapSequence {
     fn new(offsets: &[usize]) -> Self {
         let gaps: Vec<f64> = offsets.windows(2).map(|two| (two[1] - two[0]) as f64).collect();
         let count = |breaks: &dyn Fn(&[f64]) -> bool| -> Vec<usize> {
@@ -85,7 +88,7 @@ impl Beat {
 
 /// The beats before and after the gap before the last two of these, where the clock steps in it.
 fn step(gaps: &[f64]) -> Option<[f64; 2]> {
-    let same = |a: f64, b: f64| within(b / a, SAME);
+    let same = |a: f64, b: f64| within(b / a, SAME_RATIOS);
     match *gaps {
         [.., a, b, _, c, d] if same(a, b) && same(c, d) && !same(b, c) && !whole(c / b) => Some([b, c]),
         _ => None,
@@ -97,7 +100,8 @@ fn step_slipped(gaps: &[f64]) -> bool {
     let Some([before, after]) = step(gaps) else { return false };
     let between = gaps[gaps.len() - 3];
     let (least, most) = (before.min(after), before.max(after));
-    let outside = |frames: f64| !(ODD[0] * frames * least..ODD[1] * frames * most).contains(&between);
+    let outside =
+        |frames: f64| !(ODD_RATIOS[0] * frames * least..ODD_RATIOS[1] * frames * most).contains(&between);
     outside(1.0) && outside(2.0)
 }
 
@@ -106,21 +110,21 @@ fn slipped(gaps: &[f64]) -> bool {
     match *gaps {
         [.., before, between, after] if slip(before, between, after) => true,
         [.., before, one, two, after] => {
-            let odd = |gap: f64| !within(gap / before, ODD);
-            odd(one) && odd(two) && within(after / before, SAME) && !whole((one + two) / before)
+            let odd = |gap: f64| !within(gap / before, ODD_RATIOS);
+            odd(one) && odd(two) && within(after / before, SAME_RATIOS) && !whole((one + two) / before)
         }
         _ => false,
     }
 }
 
 /// Whether a start stands between two beats of the same phase, but not on a beat: then either it or all others are something else.
-fn off_beat(gaps: &[f64], start: usize) -> bool {
+fn off_period(gaps: &[f64], start: usize) -> bool {
     let Some(&[before, one, two, after]) = start.checked_sub(2).and_then(|from| gaps.get(from..from + 4))
     else {
         return false;
     };
-    let odd = |gap: f64| !within(gap / before, ODD) && !whole(gap / before);
-    within(after / before, SAME) && odd(one) && odd(two)
+    let odd = |gap: f64| !within(gap / before, ODD_RATIOS) && !whole(gap / before);
+    within(after / before, SAME_RATIOS) && odd(one) && odd(two)
 }
 
 fn within(ratio: f64, [low, high]: [f64; 2]) -> bool {
@@ -129,7 +133,7 @@ fn within(ratio: f64, [low, high]: [f64; 2]) -> bool {
 
 /// Whether so many beats are a whole number of them.
 fn whole(beats: f64) -> bool {
-    (beats - libm::round(beats)).abs() < TWO
+    (beats - libm::round(beats)).abs() < MAX_DOUBLE_DEVIATION
 }
 
 #[cfg(test)]
@@ -151,31 +155,40 @@ mod tests {
         // A start was missed where the clock stepped; a steady beat is not of concern here, nor is a single start off the beat.
         assert!(!slipped(144.0, 330.0, 187.0) && !slipped(100.0, 60.0, 100.0));
         assert!(!step_slipped(&[100.0, 130.0, 70.0, 100.0, 100.0]));
-        assert_eq!(left(&[0, 144, 288, 395, 582, 769], &[0], &[0]), [1.0, 1.0, 1.0, 1.0, LEFT, LEFT]);
+        assert_eq!(
+            confidence_factors(&[0, 144, 288, 395, 582, 769], &[0], &[0]),
+            [1.0, 1.0, 1.0, 1.0, SLIPPED_CONFIDENCE, SLIPPED_CONFIDENCE]
+        );
     }
 
     #[test]
     fn doubt_is_on_the_far_side_of_the_slip() {
         let offsets = [0, 100, 200, 300, 450, 550, 650];
-        assert_eq!(left(&offsets, &[100], &[100]), [1.0, 1.0, 1.0, 1.0, LEFT, LEFT, LEFT]);
-        assert_eq!(left(&offsets, &[650], &[650]), [LEFT, LEFT, LEFT, LEFT, 1.0, 1.0, 1.0]);
-        assert_eq!(left(&offsets, &[], &[]), [1.0; 7]);
+        assert_eq!(
+            confidence_factors(&offsets, &[100], &[100]),
+            [1.0, 1.0, 1.0, 1.0, SLIPPED_CONFIDENCE, SLIPPED_CONFIDENCE, SLIPPED_CONFIDENCE]
+        );
+        assert_eq!(
+            confidence_factors(&offsets, &[650], &[650]),
+            [SLIPPED_CONFIDENCE, SLIPPED_CONFIDENCE, SLIPPED_CONFIDENCE, SLIPPED_CONFIDENCE, 1.0, 1.0, 1.0]
+        );
+        assert_eq!(confidence_factors(&offsets, &[], &[]), [1.0; 7]);
     }
 
     #[test]
     fn what_was_put_right_beyond_a_slip_is_no_surer_than_what_lies_there() {
         let offsets = [0, 100, 200, 300, 450, 550, 650];
-        assert_eq!(left(&offsets, &[100], &[100, 550])[5], LEFT);
-        assert_eq!(left(&offsets, &[100], &[100, 300])[3], 1.0);
+        assert_eq!(confidence_factors(&offsets, &[100], &[100, 550])[5], SLIPPED_CONFIDENCE);
+        assert_eq!(confidence_factors(&offsets, &[100], &[100, 300])[3], 1.0);
     }
 
     #[test]
     fn a_slip_leaves_doubt_on_this_side_of_it_back_to_the_last_clock_step() {
         // Beats of 100 at the mark, of 150 from 300 on, and a slip at 750.
         let offsets = [0, 100, 200, 300, 450, 600, 750, 830, 980, 1130];
-        let left = left(&offsets, &[0], &[0]);
+        let left = confidence_factors(&offsets, &[0], &[0]);
         assert_eq!(left[..3], [1.0; 3]);
-        assert!(left[5..].iter().all(|left| *left <= LEFT), "{left:?}");
+        assert!(left[5..].iter().all(|left| *left <= SLIPPED_CONFIDENCE), "{left:?}");
     }
 
     #[test]
@@ -187,9 +200,9 @@ mod tests {
     #[test]
     fn a_mark_that_is_off_the_beat_of_all_others_leaves_them_in_doubt() {
         let offsets = [0, 100, 200, 330, 400, 500, 600];
-        assert!(left(&offsets, &[330], &[330]).iter().all(|left| *left <= LEFT));
-        assert_eq!(left(&offsets, &[200], &[200]), [1.0; 7]);
+        assert!(confidence_factors(&offsets, &[330], &[330]).iter().all(|left| *left <= SLIPPED_CONFIDENCE));
+        assert_eq!(confidence_factors(&offsets, &[200], &[200]), [1.0; 7]);
         let missed = [0, 100, 200, 400, 600, 700, 800];
-        assert_eq!(left(&missed, &[400], &[400]), [1.0; 7]);
+        assert_eq!(confidence_factors(&missed, &[400], &[400]), [1.0; 7]);
     }
 }
