@@ -6,7 +6,7 @@ use std::process::Command;
 
 /// What the program is made of, from the root of the repository. A change of these builds the program anew anyway, so that asking git
 /// costs nothing more.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "Cargo.toml",
     "Cargo.lock",
     "pipeline/src",
@@ -18,6 +18,7 @@ const SOURCES: [&str; 14] = [
     "sim/gpus",
     "sim/src",
     "sim/timing/src",
+    "traces/jls/src",
     "traces/src",
     "workloads/scenes",
     "workloads/src",

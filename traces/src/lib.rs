@@ -57,6 +57,7 @@ pub mod stream;
 pub mod synth;
 pub mod table;
 pub mod trace;
+pub mod units;
 mod warning;
 
 pub use curve::{Curve, CurveBuilder, CurveError};

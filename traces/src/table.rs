@@ -1,6 +1,6 @@
 //! Small tables of text and numbers, from CSV, TSV or Parquet.
 
-use crate::io::{PackedFile, field_units};
+use crate::io::{PagedFile, field_units};
 use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use std::collections::BTreeMap;
@@ -162,7 +162,7 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 fn from_parquet(path: &Path) -> Result<Content, String> {
     let told = |error: parquet::errors::ParquetError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;
-    let file = PackedFile::new(path, file).map_err(told)?;
+    let file = PagedFile::new(path, file).map_err(told)?;
     check_packing(&file)?;
     // Columns of columns count as one, as they do in a row.
     let names = file.metadata().file_metadata().schema().get_fields();
@@ -181,9 +181,9 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
 }
 
 /// Refuses columns that cannot be unpacked, with what to do.
-fn check_packing(file: &PackedFile) -> Result<(), String> {
+fn check_packing(file: &PagedFile) -> Result<(), String> {
     let chunks = file.metadata().row_groups().iter().flat_map(|group| group.columns());
-    let mut packed = chunks.filter(|chunk| !PackedFile::unpacks(chunk.compression()));
+    let mut packed = chunks.filter(|chunk| !PagedFile::unpacks(chunk.compression()));
     packed.next().map_or(Ok(()), |chunk| {
         let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
         let codec = codec.split('(').next().unwrap_or_default();

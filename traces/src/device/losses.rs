@@ -3,7 +3,7 @@
 //! What was lost, between samples that were made.
 
 use super::Device;
-use crate::io::{Sink, Stretch, WriteError};
+use crate::io::{TraceChunk, TraceWriter, WriteError};
 use crate::random::Random;
 use crate::trace::on_line;
 use core::ops::Range;
@@ -40,15 +40,15 @@ pub(super) struct Gaps<'a> {
     at: usize,
     /// Voltage and current before it.
     before: [f32; 2],
-    into: &'a mut dyn Sink,
+    into: &'a mut dyn TraceWriter,
 }
 
 impl<'a> Gaps<'a> {
-    pub fn new(lost: &'a [Range<usize>], into: &'a mut dyn Sink) -> Self {
+    pub fn new(lost: &'a [Range<usize>], into: &'a mut dyn TraceWriter) -> Self {
         Self { lost, at: 0, before: [0.0; 2], into }
     }
 
-    pub fn take(&mut self, made: &Stretch<'_>) -> Result<(), WriteError> {
+    pub fn write(&mut self, made: &TraceChunk<'_>) -> Result<(), WriteError> {
         let (mut from, len) = (0, made.len());
         while from < len {
             let (now, place) =
@@ -61,7 +61,7 @@ impl<'a> Gaps<'a> {
                 Some(gap) if gap.start <= now => from = place(gap.end),
                 next => {
                     let to = next.map_or(len, |gap| place(gap.start));
-                    self.into.take(&made.part(from, to))?;
+                    self.into.write(&made.part(from, to))?;
                     self.before = [made.voltage_v[to - 1], made.current_a[to - 1]];
                     from = to;
                 }
@@ -90,7 +90,7 @@ impl<'a> Gaps<'a> {
             };
             let (voltage_v, current_a) = (line(0), line(1));
             let (voltage_v, current_a) = (&voltage_v[..], &current_a[..]);
-            self.into.take(&Stretch { first: from as u64, voltage_v, current_a, lost: true })?;
+            self.into.write(&TraceChunk { first: from as u64, voltage_v, current_a, lost: true })?;
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use super::losses::Gaps;
 use super::sample::{Channels, LowPass, SampleError};
 use crate::curve::CurveError;
 use crate::energy::Sums;
-use crate::io::{Heading, Sink, Source, Stretch, WriteError};
+use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};
 use crate::stats::PairSum;
 use crate::trace::{check_times, losses, lost_at_end, lost_samples};
 use core::ops::Range;
@@ -21,8 +21,8 @@ const MOST: f64 = (1_u64 << 36) as f64;
 /// neither is in memory. The samples are those of [`Device::resample`], to the last bit.
 pub struct Resampled<'a> {
     device: &'a Device,
-    trace: &'a dyn Source,
-    heading: Heading,
+    trace: &'a dyn TraceReader,
+    header: TraceHeader,
     lost: Vec<Range<usize>>,
     /// Energy of all samples, J.
     pub energy_j: f64,
@@ -38,13 +38,13 @@ impl Device {
     ///
     /// # Errors
     /// [`WriteError::Source`] as [`Device::resample`], and [`WriteError::Read`] if the trace cannot be read.
-    pub fn resample_in_pieces<'a>(&'a self, trace: &'a dyn Source) -> Result<Resampled<'a>, WriteError> {
-        let Heading { start_s, metadata, .. } = trace.heading();
-        let end_s = trace.heading().end_s();
+    pub fn resample_in_pieces<'a>(&'a self, trace: &'a dyn TraceReader) -> Result<Resampled<'a>, WriteError> {
+        let TraceHeader { start_s, metadata, .. } = trace.header();
+        let end_s = trace.header().end_s();
         let count = self.periods([start_s, end_s], [start_s, end_s], MOST);
         let samples = count.as_ref().map_or(0, |count| *count);
         let lost = self.lost(samples);
-        let heading = Heading {
+        let header = TraceHeader {
             start_s,
             rate_hz: self.spec.rate_hz,
             samples: samples as u64,
@@ -54,12 +54,12 @@ impl Device {
         };
         let (energy_j, clipped_currents, clipped_voltages) = (0.0, 0, 0);
         let mut made =
-            Resampled { device: self, trace, heading, lost, energy_j, clipped_currents, clipped_voltages };
-        let mut sums = Sums::up_to(&made.heading, [start_s, made.heading.end_s()].into_iter());
+            Resampled { device: self, trace, header, lost, energy_j, clipped_currents, clipped_voltages };
+        let mut sums = Sums::up_to(&made.header, [start_s, made.header.end_s()].into_iter());
         let pass = made.pass(&mut sums)?;
         pass.check(count.err())?;
         (made.clipped_currents, made.clipped_voltages) = (pass.clipped_currents, pass.clipped_voltages);
-        check_times(made.heading.samples, self.spec.rate_hz, start_s).map_err(SampleError::Trace)?;
+        check_times(made.header.samples, self.spec.rate_hz, start_s).map_err(SampleError::Trace)?;
         made.energy_j = sums.energies_j(self.spec.rate_hz).next().unwrap_or(0.0);
         Ok(made)
     }
@@ -68,32 +68,32 @@ impl Device {
 impl Resampled<'_> {
     /// What the device lost and from when on, in words; `None` if nothing.
     pub fn losses(&self) -> Option<String> {
-        losses(&self.lost, |index| self.heading.time_s(index as u64))
+        losses(&self.lost, |index| self.header.time_s(index as u64))
     }
 
-    fn pass<'a>(&'a self, into: &'a mut dyn Sink) -> Result<Pass<'a>, WriteError> {
+    fn pass<'a>(&'a self, into: &'a mut dyn TraceWriter) -> Result<Pass<'a>, WriteError> {
         let mut pass = Pass::new(self, into);
-        self.trace.pour(&mut pass)?;
+        self.trace.read_into(&mut pass)?;
         pass.finish()?;
         Ok(pass)
     }
 }
 
-impl Source for Resampled<'_> {
-    fn heading(&self) -> Heading {
-        self.heading.clone()
+impl TraceReader for Resampled<'_> {
+    fn header(&self) -> TraceHeader {
+        self.header.clone()
     }
 
-    fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
-        Ok(self.pass(sink)?.check(None)?)
+    fn read_into(&self, writer: &mut dyn TraceWriter) -> Result<(), WriteError> {
+        Ok(self.pass(writer)?.check(None)?)
     }
 }
 
 /// One way through the trace.
 struct Pass<'a> {
     device: &'a Device,
-    of: Heading,
-    made: &'a Heading,
+    of: TraceHeader,
+    made: &'a TraceHeader,
     /// Energy before the sample at hand, and before the mean that comes next, J.
     energy: PairSum,
     before: PairSum,
@@ -110,12 +110,12 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn new(resampled: &'a Resampled<'_>, into: &'a mut dyn Sink) -> Self {
-        let Resampled { device, trace, heading, lost, .. } = resampled;
+    fn new(resampled: &'a Resampled<'_>, into: &'a mut dyn TraceWriter) -> Self {
+        let Resampled { device, trace, header, lost, .. } = resampled;
         Self {
             device,
-            of: trace.heading(),
-            made: heading,
+            of: trace.header(),
+            made: header,
             energy: PairSum::default(),
             before: PairSum::default(),
             means: 0,
@@ -199,7 +199,7 @@ impl<'a> Pass<'a> {
         self.clipped_currents += channels.clipped_currents;
         self.clipped_voltages += channels.clipped_voltages;
         let (voltage_v, current_a) = (&channels.voltage_v[..], &channels.current_a[..]);
-        self.gaps.take(&Stretch { first, voltage_v, current_a, lost: false })
+        self.gaps.write(&TraceChunk { first, voltage_v, current_a, lost: false })
     }
 
     fn finish(&mut self) -> Result<(), WriteError> {
@@ -214,8 +214,8 @@ impl<'a> Pass<'a> {
     }
 }
 
-impl Sink for Pass<'_> {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Pass<'_> {
+    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
         (stretch.first..).zip(stretch.powers_w()).try_for_each(|(index, power_w)| self.step(index, power_w))
     }
 }
@@ -224,7 +224,7 @@ impl Sink for Pass<'_> {
 mod tests {
     use super::*;
     use crate::device::DeviceSpec;
-    use crate::io::Cut;
+    use crate::io::SplitTrace;
     use crate::metadata::Metadata;
     use crate::trace::Trace;
     use proptest::prelude::*;
@@ -237,8 +237,8 @@ mod tests {
         lost: Vec<usize>,
     }
 
-    impl Sink for All {
-        fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+    impl TraceWriter for All {
+        fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
             assert_eq!(stretch.first, self.voltage_v.len() as u64);
             if stretch.lost {
                 self.lost.extend(stretch.first as usize..stretch.first as usize + stretch.len());
@@ -272,15 +272,15 @@ mod tests {
                 rate_hz: rates_hz.1, low_pass_s, current_noise_a: noise, packet_samples, packet_loss,
                 current_range_a: [-4.0, 4.0], ..DeviceSpec::default()
             }).unwrap();
-            let cut = Cut(&trace, piece);
+            let cut = SplitTrace(&trace, piece);
             match (device.resample(&trace), device.resample_in_pieces(&cut)) {
                 (Ok(whole), Ok(pieces)) => {
                     let mut all = All::default();
-                    pieces.pour(&mut all).unwrap();
+                    pieces.read_into(&mut all).unwrap();
                     prop_assert_eq!(bits(&all.voltage_v), bits(whole.trace.voltage_v()));
                     prop_assert_eq!(bits(&all.current_a), bits(whole.trace.current_a()));
                     prop_assert_eq!(all.lost, whole.trace.lost().iter().cloned().flatten().collect::<Vec<_>>());
-                    prop_assert_eq!(pieces.heading(), whole.trace.heading());
+                    prop_assert_eq!(pieces.header(), whole.trace.header());
                     prop_assert_eq!(pieces.energy_j, crate::energy::PowerIntegral::new(&whole.trace).total_j());
                     prop_assert_eq!(
                         (pieces.clipped_currents, pieces.clipped_voltages),

@@ -2,7 +2,7 @@
 //!
 //! Recorders whose range fits what they record.
 
-use crate::io::{Sink, Source, Stretch, WriteError};
+use crate::io::{TraceChunk, TraceReader, TraceWriter, WriteError};
 use crate::trace::RATE_LIMITS_HZ;
 use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
@@ -159,15 +159,15 @@ impl Peaks {
     ///
     /// # Errors
     /// [`WriteError::Read`] if it cannot be read.
-    pub fn of(trace: &dyn Source) -> Result<Self, WriteError> {
+    pub fn of(trace: &dyn TraceReader) -> Result<Self, WriteError> {
         let mut peaks = Self::default();
-        trace.pour(&mut peaks)?;
+        trace.read_into(&mut peaks)?;
         Ok(peaks)
     }
 }
 
-impl Sink for Peaks {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Peaks {
+    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
         let largest = |most: f64, numbers: &[f32]| {
             numbers.iter().map(|number| f64::from(number.abs())).fold(most, f64::max)
         };

@@ -1,7 +1,7 @@
 //! Energies of samples that are seen in passing: by the rule of [`PowerIntegral`](super::PowerIntegral), to the last bit.
 
 use super::FrameEnergy;
-use crate::io::{Heading, Sink, Source, Stretch, WriteError};
+use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};
 use crate::stats::PairSum;
 
 /// Energy of each of some spans of time, from one time (s) to another, J; negative where they are the other way round.
@@ -9,11 +9,11 @@ use crate::stats::PairSum;
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
-pub fn energies_j(source: &dyn Source, spans_s: &[(f64, f64)]) -> Result<Vec<f64>, WriteError> {
-    let heading = source.heading();
-    let mut sums = Sums::up_to(&heading, spans_s.iter().flat_map(|&(a_s, b_s)| [a_s, b_s]));
-    source.pour(&mut sums)?;
-    Ok(sums.energies_j(heading.rate_hz).collect())
+pub fn energies_j(source: &dyn TraceReader, spans_s: &[(f64, f64)]) -> Result<Vec<f64>, WriteError> {
+    let header = source.header();
+    let mut sums = Sums::up_to(&header, spans_s.iter().flat_map(|&(a_s, b_s)| [a_s, b_s]));
+    source.read_into(&mut sums)?;
+    Ok(sums.energies_j(header.rate_hz).collect())
 }
 
 /// Running sums of power up to given places.
@@ -27,13 +27,13 @@ pub(crate) struct Sums {
 }
 
 impl Sums {
-    pub(crate) fn up_to(heading: &Heading, times_s: impl Iterator<Item = f64>) -> Self {
-        let place = |time_s: f64| heading.position(time_s).clamp(0.0, heading.samples as f64);
+    pub(crate) fn up_to(header: &TraceHeader, times_s: impl Iterator<Item = f64>) -> Self {
+        let place = |time_s: f64| header.position(time_s).clamp(0.0, header.samples as f64);
         let mut places: Vec<(f64, u32)> =
             times_s.enumerate().map(|(slot, time_s)| (place(time_s), slot as u32)).collect();
         places.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let sums_w = vec![PairSum::default(); places.len()];
-        Self { places, next: 0, last: heading.samples.saturating_sub(1), sums_w, sum_w: PairSum::default() }
+        Self { places, next: 0, last: header.samples.saturating_sub(1), sums_w, sum_w: PairSum::default() }
     }
 
     /// Energy between every two places, J.
@@ -47,8 +47,8 @@ impl Sums {
     }
 }
 
-impl Sink for Sums {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Sums {
+    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
         let mut wanted = self.next_sample();
         for (sample, power_w) in (stretch.first..).zip(stretch.powers_w()) {
             while wanted == sample {
@@ -68,14 +68,18 @@ impl Sink for Sums {
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
-pub fn finishes_s(source: &dyn Source, frames: &[FrameEnergy], watts: f64) -> Result<Vec<f64>, WriteError> {
-    let heading = source.heading();
-    let place = |time_s: f64| heading.position(time_s).clamp(0.0, heading.samples as f64) as u64;
+pub fn finishes_s(
+    source: &dyn TraceReader,
+    frames: &[FrameEnergy],
+    watts: f64,
+) -> Result<Vec<f64>, WriteError> {
+    let header = source.header();
+    let place = |time_s: f64| header.position(time_s).clamp(0.0, header.samples as f64) as u64;
     let ranges = frames.iter().map(|frame| (place(frame.start_s), place(frame.end_s))).collect();
     let mut lasts = Lasts { ranges, watts, at: 0, last: vec![None; frames.len()] };
-    source.pour(&mut lasts)?;
+    source.read_into(&mut lasts)?;
     let finish = |(last, frame): (&Option<u64>, &FrameEnergy)| {
-        last.map_or(frame.start_s, |last| heading.time_s(last + 1).clamp(frame.start_s, frame.end_s))
+        last.map_or(frame.start_s, |last| header.time_s(last + 1).clamp(frame.start_s, frame.end_s))
     };
     Ok(lasts.last.iter().zip(frames).map(finish).collect())
 }
@@ -88,8 +92,8 @@ struct Lasts {
     last: Vec<Option<u64>>,
 }
 
-impl Sink for Lasts {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Lasts {
+    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
         for (sample, power_w) in (stretch.first..).zip(stretch.powers_w()) {
             while self.ranges.get(self.at).is_some_and(|(_, end)| *end <= sample) {
                 self.at += 1;
@@ -110,10 +114,10 @@ impl Sink for Lasts {
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
-pub fn levels_w(source: &dyn Source, count: u64) -> Result<Vec<f64>, WriteError> {
-    let step = source.heading().samples.div_ceil(count.max(1));
+pub fn levels_w(source: &dyn TraceReader, count: u64) -> Result<Vec<f64>, WriteError> {
+    let step = source.header().samples.div_ceil(count.max(1));
     let mut levels = Levels { step, watts: Vec::new() };
-    source.pour(&mut levels)?;
+    source.read_into(&mut levels)?;
     Ok(levels.watts)
 }
 
@@ -122,8 +126,8 @@ struct Levels {
     watts: Vec<f64>,
 }
 
-impl Sink for Levels {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Levels {
+    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
         let skip = (stretch.first.next_multiple_of(self.step) - stretch.first) as usize;
         self.watts.extend(stretch.powers_w().skip(skip).step_by(self.step as usize));
         Ok(())
@@ -135,7 +139,7 @@ mod tests {
     use super::*;
     use crate::energy::PowerIntegral;
     use crate::frames::Flags;
-    use crate::io::Cut;
+    use crate::io::SplitTrace;
     use crate::metadata::Metadata;
     use crate::trace::Trace;
     use proptest::prelude::*;
@@ -165,7 +169,7 @@ mod tests {
         ) {
             let samples = amperes.len();
             let trace = Trace::new(vec![2.3; samples], amperes, 101.0, 0.7, Metadata::default()).unwrap();
-            let (cut, integral) = (Cut(&trace, piece), PowerIntegral::new(&trace));
+            let (cut, integral) = (SplitTrace(&trace, piece), PowerIntegral::new(&trace));
             let spans: Vec<(f64, f64)> = ends.windows(2).map(|two| (two[0], two[1])).collect();
             let expected: Vec<f64> = spans.iter().map(|(a_s, b_s)| integral.energy_j(*a_s, *b_s)).collect();
             prop_assert_eq!(energies_j(&cut, &spans).unwrap(), expected);

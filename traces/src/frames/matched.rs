@@ -2,6 +2,7 @@
 //!
 //! The first frame of a free-running stretch: nothing was drawn before it, so what lies before the mark differs.
 
+use super::assess;
 use super::assess::confidence;
 use super::found::{Found, FrameStart, Method, marked_starts, spacing};
 use super::marks::{MarkError, Marks, Placement, flat_mark_of};
@@ -9,7 +10,6 @@ use super::periodicity::regularity;
 use super::profile::{normalized, spaced_minima, squares, summed_squared_difference};
 use super::refine::align;
 use super::threshold::{Threshold, choose};
-use super::assess;
 use crate::stats::median;
 use crate::trace::Trace;
 

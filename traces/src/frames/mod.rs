@@ -30,5 +30,3 @@ pub(crate) use periodicity::regularity;
 pub(crate) use refine::vertex;
 pub(crate) use threshold::choose;
 pub use threshold::{Population, Rule, Threshold};
-
-

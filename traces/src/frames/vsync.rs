@@ -146,7 +146,10 @@ mod tests {
     #[test]
     fn what_lies_on_ticks_or_does_not_wait_is_left_alone() {
         let even = starts(|i| (i % 3) as f64);
-        assert_eq!(snap_to_ticks(&even, 60, 250), Some(Snapped { positions: even, off_tick: vec![false; 200] }));
+        assert_eq!(
+            snap_to_ticks(&even, 60, 250),
+            Some(Snapped { positions: even, off_tick: vec![false; 200] })
+        );
         let free = |i: usize| 15.0 * libm::sin(i as f64) + 40.0 * libm::sin(0.1 * i as f64);
         assert_eq!(snap_to_ticks(&starts(free), 60, 250), None);
         assert_eq!(snap_to_ticks(&starts(|_| 0.0)[..10], 3, 250), None);

@@ -1,9 +1,10 @@
 //! A whole file into memory.
 
-use super::repair::{Columns, Repair, mend};
-use super::rows::{Chunk, Rows};
-use super::timing::{self, Stamps};
-use super::{ReadError, ReadOptions};
+use super::columns::RowBatch;
+use super::repair::{Columns, Repair, repair_rows};
+use super::rows::Rows;
+use super::time_base::Stamps;
+use super::{ReadError, ReadOptions, time_base};
 use crate::trace::Trace;
 use std::path::Path;
 
@@ -55,27 +56,27 @@ fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     if read == 0 {
         return Err(ReadError::Empty { path });
     }
-    rows.header.check_rows(&path, read as u64)?;
+    rows.description.check_rows(&path, read as u64)?;
     let mut repairs: Vec<Repair> = rows.repair().into_iter().collect();
-    let mut header = std::mem::take(&mut rows.header);
-    if rows.mends() {
-        repairs.extend(mend(&path, &mut columns, &mut header)?);
+    let mut description = std::mem::take(&mut rows.description);
+    if rows.repairs_input() {
+        repairs.extend(repair_rows(&path, &mut columns, &mut description)?);
     }
     let Columns { stamps, voltage_v, current_a } = columns;
-    let grid = timing::grid(&path, &stamps, &header)?;
-    if !rows.mends() {
-        header.check_end(&path)?;
+    let grid = time_base::grid(&path, &stamps, &description)?;
+    if !rows.repairs_input() {
+        description.check_end(&path)?;
     }
-    let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata)
+    let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, description.metadata)
         .map_err(|error| ReadError::trace(&path, error))?;
     Ok(Loaded { trace, repairs })
 }
 
 fn gather(rows: &mut Rows) -> Result<Columns, ReadError> {
     let mut all = Columns { stamps: Stamps::Absent, voltage_v: Vec::new(), current_a: Vec::new() };
-    let mut chunk = Chunk::default();
-    while rows.append(PIECE, &mut chunk, &mut all.voltage_v, &mut all.current_a)? > 0 {
-        match (&mut all.stamps, &chunk.stamps) {
+    let mut batch = RowBatch::default();
+    while rows.append(PIECE, &mut batch, &mut all.voltage_v, &mut all.current_a)? > 0 {
+        match (&mut all.stamps, &batch.stamps) {
             (Stamps::Nanoseconds(all), Stamps::Nanoseconds(more)) => all.extend_from_slice(more),
             (Stamps::Seconds(all), Stamps::Seconds(more)) => all.extend_from_slice(more),
             (all, more) => *all = more.clone(),

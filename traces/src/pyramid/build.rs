@@ -1,7 +1,7 @@
 //! The lowest level, block by block as a file is read.
 
 use super::{BLOCK, Entry, Pyramid};
-use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, rounded_rate_hz};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, rounded_rate_hz};
 use crate::stream::clock;
 use std::path::Path;
 
@@ -14,15 +14,15 @@ pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, Rea
     let mut clock = clock(path, options)?;
     let mut rows = Rows::open(path, options)?;
     // Texts do not say how many rows they have: the rate is then that of the first rows until all are read.
-    let mut steps = (clock.samples.is_none() && rows.header.rate_hz.is_none()).then(Steps::default);
-    let mut chunk = Chunk::default();
+    let mut steps = (clock.samples.is_none() && rows.description.rate_hz.is_none()).then(Steps::default);
+    let mut batch = RowBatch::default();
     let (mut voltage_v, mut current_a) = (Vec::new(), Vec::new());
     let (mut base, mut samples) = (Vec::new(), 0);
     loop {
-        let read = rows.append(ROWS, &mut chunk, &mut voltage_v, &mut current_a)? as u64;
+        let read = rows.append(ROWS, &mut batch, &mut voltage_v, &mut current_a)? as u64;
         match &mut steps {
-            Some(steps) => steps.check(path, &chunk.stamps, samples, clock.rate_hz)?,
-            None => clock.check(path, &chunk.stamps, samples)?,
+            Some(steps) => steps.check(path, &batch.stamps, samples, clock.rate_hz)?,
+            None => clock.check(path, &batch.stamps, samples)?,
         }
         rows.check_finite(&voltage_v, &current_a, base.len() as u64 * BLOCK)?;
         samples += read;
@@ -35,8 +35,8 @@ pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, Rea
             break;
         }
     }
-    rows.header.check_rows(path, samples)?;
-    rows.header.check_end(path)?;
+    rows.description.check_rows(path, samples)?;
+    rows.description.check_end(path)?;
     clock.rate_hz = steps.and_then(|steps| steps.rate_hz(samples)).unwrap_or(clock.rate_hz);
     Ok(Pyramid::of_blocks(clock, samples, base))
 }

@@ -1,8 +1,9 @@
 //! The file that a pyramid is kept in: a header, checksums of groups of entries, and the entries, level by level.
 
 use super::{BLOCK, ENTRY_BYTES, Entry, FAN, Pyramid, Store};
-use crate::io::{ReadOptions, WriteError, atomic, crc32c};
+use crate::io::{ReadOptions, WriteError, atomic};
 use crate::stream::Clock;
+use crc32c::crc32c;
 use std::fs;
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};

@@ -6,7 +6,7 @@
 mod build;
 mod cache;
 
-use crate::io::{Chunk, ReadError, ReadOptions, Rows, read};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows, read};
 use crate::pyramid::cache::Found;
 use crate::stream::Clock;
 use crate::trace::Trace;
@@ -255,11 +255,11 @@ impl Pyramid {
         };
         let mut rows = Rows::open(path, options)?;
         rows.skip(range.start)?;
-        let (mut chunk, mut voltage_v, mut current_a) = (Chunk::default(), Vec::new(), Vec::new());
+        let (mut batch, mut voltage_v, mut current_a) = (RowBatch::default(), Vec::new(), Vec::new());
         let wanted = (range.end - range.start) as usize;
         while voltage_v.len() < wanted {
             let missing = wanted - voltage_v.len();
-            if rows.append(missing, &mut chunk, &mut voltage_v, &mut current_a)? == 0 {
+            if rows.append(missing, &mut batch, &mut voltage_v, &mut current_a)? == 0 {
                 return Err(ReadError::Changed { path: path.to_owned() });
             }
         }

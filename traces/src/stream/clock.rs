@@ -1,6 +1,6 @@
 //! When samples were taken, before all of them have been seen.
 
-use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, all_apart, grid};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, all_apart, grid};
 use std::path::Path;
 
 /// Rows from which the rate is first taken.
@@ -74,21 +74,21 @@ impl Clock {
 pub fn clock(path: &Path, options: &ReadOptions) -> Result<Clock, ReadError> {
     let mut rows = Rows::open(path, options)?;
     let samples = rows.count();
-    let mut chunk = Chunk::default();
-    if rows.next(FIRST_ROWS, &mut chunk)? == 0 {
+    let mut batch = RowBatch::default();
+    if rows.next(FIRST_ROWS, &mut batch)? == 0 {
         return Err(ReadError::Empty { path: path.to_owned() });
     }
-    let stated = rows.header.rate_hz.is_some();
-    let first = grid(path, &chunk.stamps, &rows.header)?;
+    let stated = rows.description.rate_hz.is_some();
+    let first = grid(path, &batch.stamps, &rows.description)?;
     let mut clock = Clock { start_s: first.start_s, rate_hz: first.rate_hz, samples };
     let Some(last) = samples.filter(|&n| !stated && n > FIRST_ROWS as u64).map(|n| n - 1) else {
         return Ok(clock);
     };
-    let (start_s, doubt) = (chunk.stamps.time_s(0), doubt(&chunk.stamps, clock.rate_hz));
+    let (start_s, doubt) = (batch.stamps.time_s(0), doubt(&batch.stamps, clock.rate_hz));
     let mut rows = Rows::open(path, options)?;
     rows.skip(last)?;
-    if rows.next(1, &mut chunk)? == 1 {
-        let span_s = chunk.stamps.time_s(0) - start_s;
+    if rows.next(1, &mut batch)? == 1 {
+        let span_s = batch.stamps.time_s(0) - start_s;
         let (off_periods, whole_hz) = (span_s * clock.rate_hz - last as f64, last as f64 / span_s);
         // What the first rows do not leave open is no other rate: samples are missing, and where the check will tell.
         let open = off_periods.abs() < STEP || (whole_hz / clock.rate_hz - 1.0).abs() <= doubt;
@@ -130,9 +130,9 @@ mod tests {
         json.unwrap();
         let clock = clock(&path, &ReadOptions::default()).unwrap();
         let mut rows = Rows::open(&path, &ReadOptions::default()).unwrap();
-        let mut chunk = Chunk::default();
-        rows.next(samples, &mut chunk).unwrap();
-        (clock, clock.check(&path, &chunk.stamps, 0))
+        let mut batch = RowBatch::default();
+        rows.next(samples, &mut batch).unwrap();
+        (clock, clock.check(&path, &batch.stamps, 0))
     }
 
     #[test]

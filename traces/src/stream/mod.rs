@@ -45,9 +45,9 @@ pub fn find(path: &Path, options: &ReadOptions, marks: &Marks) -> Result<Streame
     let plan = pass::Plan::new(path, options, marks, clock)?;
     let mut rows = Rows::open(path, options)?;
     let gathered = plan.gather(&mut rows)?;
-    rows.header.check_rows(path, gathered.samples)?;
-    rows.header.check_end(path)?;
-    Ok(conclude::conclude(plan, marks, gathered, rows.header.metadata)?)
+    rows.description.check_rows(path, gathered.samples)?;
+    rows.description.check_end(path)?;
+    Ok(conclude::conclude(plan, marks, gathered, rows.description.metadata)?)
 }
 
 /// Why a file could not be analysed.

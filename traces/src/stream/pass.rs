@@ -7,7 +7,7 @@ use super::clock::Clock;
 use super::piece::{Piece, difference, powers, templates};
 use super::screen::{Buffers, Screen, minima};
 use crate::frames::{Marks, Placed, Placement, vertex};
-use crate::io::{Chunk, ReadError, ReadOptions, Rows};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows};
 use crate::stats::PairSum;
 use core::ops::Range;
 use multiversion::multiversion;
@@ -90,8 +90,8 @@ impl Plan {
 
     pub fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
-        let (mut piece, mut chunk, mut coming) = (Piece::default(), Chunk::default(), Piece::default());
-        let mut read = self.read(rows, &mut chunk, &mut piece)?;
+        let (mut piece, mut batch, mut coming) = (Piece::default(), RowBatch::default(), Piece::default());
+        let mut read = self.read(rows, &mut batch, &mut piece)?;
         let (mut from, mut fresh, workspaces) = (0, 0, Workspaces::new());
         loop {
             self.look_up(&piece, &mut gathered);
@@ -106,7 +106,7 @@ impl Plan {
             let old = coming.len();
             // The next rows are decoded while these are searched.
             let (next, ()) = rayon::join(
-                || self.read(rows, &mut chunk, &mut coming),
+                || self.read(rows, &mut batch, &mut coming),
                 || {
                     gathered.keep_head(&piece, fresh);
                     self.search(&piece, from..to, &workspaces, &mut gathered);
@@ -118,15 +118,15 @@ impl Plan {
     }
 
     /// Appends the next rows of the file to a piece; how many there were.
-    fn read(&self, rows: &mut Rows, chunk: &mut Chunk, piece: &mut Piece) -> Result<usize, ReadError> {
+    fn read(&self, rows: &mut Rows, batch: &mut RowBatch, piece: &mut Piece) -> Result<usize, ReadError> {
         let mut read = 0;
         while read < ROWS {
             let end = piece.end();
-            let now = rows.append(BATCH, chunk, &mut piece.voltage_v, &mut piece.current_a)?;
+            let now = rows.append(BATCH, batch, &mut piece.voltage_v, &mut piece.current_a)?;
             if now == 0 {
                 break;
             }
-            self.clock.check(rows.path(), &chunk.stamps, end)?;
+            self.clock.check(rows.path(), &batch.stamps, end)?;
             piece.add_up();
             read += now;
         }

@@ -5,7 +5,7 @@
 use super::StreamError;
 use super::clock::Clock;
 use crate::frames::{MarkError, Marks, Placement};
-use crate::io::{Chunk, ReadOptions, Rows};
+use crate::io::{ReadOptions, RowBatch, Rows};
 use crate::stats::PairSum;
 use core::ops::Range;
 use multiversion::multiversion;
@@ -108,10 +108,10 @@ pub(super) fn templates(
     for (placed, &mark_s) in placement.marks.iter().zip(&marks.starts_s) {
         let mut rows = Rows::open(path, options)?;
         rows.skip(placed.first as u64)?;
-        let (mut chunk, mut piece) = (Chunk::default(), Piece::default());
+        let (mut batch, mut piece) = (RowBatch::default(), Piece::default());
         let mut missing = placement.samples;
         while missing > 0 {
-            let read = rows.append(missing, &mut chunk, &mut piece.voltage_v, &mut piece.current_a)?;
+            let read = rows.append(missing, &mut batch, &mut piece.voltage_v, &mut piece.current_a)?;
             if read == 0 {
                 break;
             }

@@ -90,7 +90,7 @@ fn a_rate_that_contradicts_the_times_is_refused_also_where_they_are_to_be_mended
         for rate_hz in [2000.0, 500.0, 1002.0] {
             let error = io::read(&path, &of(rate_hz)).unwrap_err();
             says(&error, &[&format!("a rate of {rate_hz} Hz was asked for"), "column time_s it is 1000 Hz"]);
-            assert!(matches!(error, ReadError::Asked { .. }));
+            assert!(matches!(error, ReadError::Conflict { .. }));
         }
         assert_eq!(io::read(&path, &of(1000.0)).unwrap().trace.samples(), 500);
     }

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde_json::json;
 use traces::align::{AlignError, Alignment};
-use traces::io::Heading;
+use traces::io::TraceHeader;
 use traces::io::atomic::write_file;
 
 use super::energy::is_within;
@@ -24,7 +24,7 @@ impl From<AlignError> for Failure {
 }
 
 /// Refuses an anchor at a time that the trace does not have.
-fn check_anchor((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Failure> {
+fn check_anchor((stamp_s, time_s): (f64, f64), trace: &TraceHeader) -> Result<(), Failure> {
     let (start_s, end_s) = (trace.start_s, trace.end_s());
     if is_within([start_s, end_s], time_s) {
         return Ok(());
@@ -59,7 +59,7 @@ pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> 
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {
         [a, b] => {
-            let trace = args.input.source(terminal)?.0.heading();
+            let trace = args.input.source(terminal)?.0.header();
             [a, b].iter().try_for_each(|anchor| check_anchor(*anchor, &trace))?;
             let alignment = Alignment::by_anchors(a, b)?;
             warn_of_anchors([a, b], &alignment, &stamps, terminal);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, parquet};
+use traces::io::{TraceHeader, TraceWriter, TraceReader, TraceChunk, WriteError, atomic, csv, jls, parquet};
 
 use super::failure::wrong;
 use super::report;
@@ -23,7 +23,7 @@ pub(super) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure
     may_be_saved("OUT", &args.out, [args.input.trace.as_path()])?;
     let (trace, repairs) = args.input.source(terminal)?;
     save(&*trace, &args.out, terminal)?;
-    let Heading { samples, rate_hz, .. } = trace.heading();
+    let TraceHeader { samples, rate_hz, .. } = trace.header();
     if args.json {
         let out = args.out.display().to_string();
         return print_json(
@@ -72,8 +72,8 @@ fn description_path(out: &Path) -> Option<PathBuf> {
     text.then(|| csv::description_path(out))
 }
 
-/// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].
-pub(super) fn save(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
+/// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`TraceWriter`].
+pub(super) fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let name = name(path);
     let plain = name.trim_end_matches(".gz");
     if name.ends_with(".parquet") {
@@ -85,7 +85,7 @@ pub(super) fn save(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Resu
     if name.ends_with(".perfetto-trace") {
         return perfetto(trace, path, terminal);
     }
-    let bytes = trace.heading().samples * ROW_BYTES;
+    let bytes = trace.header().samples * ROW_BYTES;
     if bytes > LARGE_BYTES {
         terminal.note(&format!(
             "{}: about {:.1} GB as text; Parquet takes a tenth",
@@ -98,14 +98,14 @@ pub(super) fn save(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Resu
 }
 
 /// A counter track of the power, thinned out to what the viewer holds.
-fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
-    let heading = trace.heading();
-    let mut thinner = Thinner::new(heading.samples, MAX_POINTS);
-    trace.pour(&mut thinner)?;
-    let start_ns = heading.time_ns(0);
-    let place = |(index, watts): (u64, f64)| ((heading.time_ns(index) - start_ns).unsigned_abs(), watts);
+fn perfetto(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
+    let header = trace.header();
+    let mut thinner = Thinner::new(header.samples, MAX_POINTS);
+    trace.read_into(&mut thinner)?;
+    let start_ns = header.time_ns(0);
+    let place = |(index, watts): (u64, f64)| ((header.time_ns(index) - start_ns).unsigned_abs(), watts);
     let points: Vec<(u64, f64)> = thinner.kept().into_iter().map(place).collect();
-    let (kept, samples) = (points.len() as u64, heading.samples);
+    let (kept, samples) = (points.len() as u64, header.samples);
     if kept < samples {
         terminal.note(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
     }
@@ -115,8 +115,8 @@ fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), 
 }
 
 /// Of the samples, their power.
-impl Sink for Thinner {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Thinner {
+    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
         stretch.powers_w().for_each(|watts| self.push(watts));
         Ok(())
     }

@@ -8,7 +8,7 @@ use traces::energy::{
     FrameEnergy, Idle, Pooled, PowerIntegral, Spread, energies_j, finishes_s, levels_w, outliers, pooled,
     warm_up, whole,
 };
-use traces::io::{Heading, Repair, Source};
+use traces::io::{TraceHeader, Repair, TraceReader};
 
 use super::failure::wrong;
 use crate::cli::Failure;
@@ -61,15 +61,15 @@ fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
 /// Energy between two times.
 fn stretch(
     args: &EnergyArgs,
-    (trace, repairs): (&dyn Source, &[Repair]),
+    (trace, repairs): (&dyn TraceReader, &[Repair]),
     recording: Option<&PowerIntegral<'_>>,
 ) -> Result<(), Failure> {
-    let heading = trace.heading();
+    let header = trace.header();
     let idle = idle(args, trace, recording)?;
-    let (from_s, to_s) = (args.from.unwrap_or(heading.start_s), args.to.unwrap_or(heading.end_s()));
-    check(&heading, from_s, to_s, "--from and --to")?;
+    let (from_s, to_s) = (args.from.unwrap_or(header.start_s), args.to.unwrap_or(header.end_s()));
+    check(&header, from_s, to_s, "--from and --to")?;
     let total_j = energies_j(trace, &[(from_s, to_s)])?[0];
-    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(heading.start_s, from_s, to_s));
+    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(header.start_s, from_s, to_s));
     let (energy_j, power_w) = (total_j - idle_j, (total_j - idle_j) / (to_s - from_s));
     if args.json {
         return print_json(
@@ -81,7 +81,7 @@ fn stretch(
     print(&format!("{from_s} s to {to_s} s: {energy_j:.6} J, {power_w:.4} W (idle taken off: {idle_j:.6} J)"))
 }
 
-fn check(trace: &Heading, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
+fn check(trace: &TraceHeader, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
     check_within((trace.start_s, trace.end_s()), (from_s, to_s), what)
 }
 
@@ -112,11 +112,11 @@ pub(super) fn check_within(
 
 fn idle<'a>(
     args: &EnergyArgs,
-    trace: &dyn Source,
+    trace: &dyn TraceReader,
     recording: Option<&PowerIntegral<'a>>,
 ) -> Result<Option<Idle<'a>>, Failure> {
     if let Some((from_s, to_s)) = args.idle {
-        check(&trace.heading(), from_s, to_s, "--idle")?;
+        check(&trace.header(), from_s, to_s, "--idle")?;
         return Ok(Some(Idle::Mean(energies_j(trace, &[(from_s, to_s)])?[0] / (to_s - from_s))));
     }
     if let Some(recording) = recording {
@@ -124,7 +124,7 @@ fn idle<'a>(
         return Ok(Some(match args.idle_by {
             IdleBy::Mean => Idle::Mean(recording.total_j() / length_s),
             IdleBy::Instant => {
-                covers(recording.trace(), &trace.heading())?;
+                covers(recording.trace(), &trace.header())?;
                 Idle::Instant(recording.clone())
             }
         }));
@@ -133,7 +133,7 @@ fn idle<'a>(
 }
 
 /// Refuses an idle recording that ends before the trace does: instants are compared from the starts of both on.
-fn covers(idle: &Trace, trace: &Heading) -> Result<(), Failure> {
+fn covers(idle: &Trace, trace: &TraceHeader) -> Result<(), Failure> {
     let [idle_s, trace_s] = [idle.end_s() - idle.start_s(), trace.end_s() - trace.start_s];
     if idle_s >= trace_s * (1.0 - 1e-9) {
         return Ok(());
@@ -163,7 +163,7 @@ fn one_run(
     let (found, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
     found.warn(terminal);
     let mut frames = whole(&found.energies).to_vec();
-    let (trace, start_s) = (&*trace, trace.heading().start_s);
+    let (trace, start_s) = (&*trace, trace.header().start_s);
     let idle = idle(args, trace, recording)?;
     let idle_j = |a_s: f64, b_s: f64| idle.as_ref().map_or(0.0, |idle| idle.energy_j(start_s, a_s, b_s));
     let all: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
@@ -202,7 +202,7 @@ type Span = (f64, f64);
 /// From when to when each frame's work goes on, and its energy, J: the old method.
 fn begin_to_finish(
     args: &EnergyArgs,
-    trace: &dyn Source,
+    trace: &dyn TraceReader,
     frames: &[FrameEnergy],
 ) -> Result<Vec<(Span, f64)>, Failure> {
     let busy_w = match args.busy_above {
@@ -227,7 +227,7 @@ fn busy_above(mut powers: Vec<f64>, frames: &[FrameEnergy]) -> f64 {
 /// of its own, so that they add up.
 fn passes(
     args: &EnergyArgs,
-    trace: &dyn Source,
+    trace: &dyn TraceReader,
     frames: &[FrameEnergy],
     idle_j: &dyn Fn(f64, f64) -> f64,
 ) -> Result<Vec<(String, Spread)>, Failure> {

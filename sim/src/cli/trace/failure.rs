@@ -10,7 +10,7 @@ impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
         let asked = matches!(
             error,
-            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Asked { .. }
+            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Conflict { .. }
         ) || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
         Self { message: error.to_string(), code: if asked { 2 } else { 1 } }
     }

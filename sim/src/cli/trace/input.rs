@@ -5,7 +5,7 @@ use std::path::Path;
 
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadOptions, Recording, Repair, Rows, Source, rail_of_sums, read};
+use traces::io::{ReadOptions, Recording, Repair, Rows, TraceReader, rail_of_sums, read};
 use traces::stream;
 use traces::trace::RATE_LIMITS_HZ;
 use traces::{MarkKind, Metadata, Trace};
@@ -71,7 +71,7 @@ impl InputArgs {
 
     /// The trace as a source of samples, read in pieces; one that has to be mended is in memory, as what is mended depends
     /// on all of it. What was mended is told.
-    pub(super) fn source(&self, terminal: &Terminal) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
+    pub(super) fn source(&self, terminal: &Terminal) -> Result<(Box<dyn TraceReader>, Vec<Repair>), Failure> {
         match Recording::open(&self.trace, &self.options()?) {
             Ok(recording) => {
                 self.warn_of_sums(&self.trace, terminal)?;
@@ -150,7 +150,7 @@ impl FindArgs {
         input: &InputArgs,
         path: &Path,
         terminal: &Terminal,
-    ) -> Result<(Frames, Box<dyn Source>), Failure> {
+    ) -> Result<(Frames, Box<dyn TraceReader>), Failure> {
         if self.streams(input, path)? {
             let recording = Recording::open(path, &input.options()?)?;
             return Ok((self.in_pieces(input, path, terminal)?, Box::new(recording)));

@@ -105,7 +105,8 @@ impl View<'_> {
         let unexplained: Vec<f64> = (0..self.starts.len().saturating_sub(1)).map(remainder).collect();
         let usual = median(&mut unexplained.clone());
         let limit = (UNLIKE_LIMITS[0] * usual).max(UNLIKE_LIMITS[1]);
-        let mut steps: Vec<usize> = (0..unexplained.len()).filter(|&index| unexplained[index] > limit).collect();
+        let mut steps: Vec<usize> =
+            (0..unexplained.len()).filter(|&index| unexplained[index] > limit).collect();
         steps.sort_by(|a, b| unexplained[*b].total_cmp(&unexplained[*a]));
         steps.truncate(MAX_CHANGES);
         steps.sort_unstable();
