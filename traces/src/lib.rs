@@ -56,6 +56,7 @@ mod stats;
 pub mod stream;
 pub mod synth;
 pub mod table;
+pub mod times;
 pub mod trace;
 pub mod units;
 mod warning;

@@ -47,3 +47,15 @@ pub struct Metadata {
     #[serde(flatten)]
     pub other: BTreeMap<String, serde_json::Value>,
 }
+
+impl Metadata {
+    /// The marked frame starts, s, in the order given.
+    pub fn frame_starts_s(&self) -> impl Iterator<Item = f64> + '_ {
+        self.marks.iter().filter(|mark| mark.kind == MarkKind::FrameStart).map(|mark| mark.time_s)
+    }
+
+    /// The marked end of the last frame, s: the last such mark.
+    pub fn end_mark_s(&self) -> Option<f64> {
+        self.marks.iter().rev().find(|mark| mark.kind == MarkKind::End).map(|mark| mark.time_s)
+    }
+}

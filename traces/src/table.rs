@@ -100,7 +100,12 @@ impl Table {
         Ok(Self { path: path.to_owned(), names, rows, units })
     }
 
-    /// How many rows there are.
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows.len()
     }

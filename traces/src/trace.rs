@@ -234,6 +234,50 @@ pub(crate) fn check_times(samples: u64, rate_hz: f64, start_s: f64) -> Result<()
     Ok(())
 }
 
+/// A span of time that is not part of a trace.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum SpanError {
+    /// It ends before it begins, or at once.
+    #[error("{from_s} s to {to_s} s ends before it begins or has no length; give the earlier time first")]
+    Reversed {
+        /// Begin, s.
+        from_s: f64,
+        /// End, s.
+        to_s: f64,
+    },
+    /// It is not within the trace.
+    #[error("{from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s; give times inside it")]
+    Outside {
+        /// Begin, s.
+        from_s: f64,
+        /// End, s.
+        to_s: f64,
+        /// Start of the trace, s.
+        start_s: f64,
+        /// End of the trace, s.
+        end_s: f64,
+    },
+}
+
+/// Whether a number is between two others, to rounding.
+pub fn is_within([low, high]: [f64; 2], number: f64) -> bool {
+    let rounding = 1e-12 * low.abs().max(high.abs());
+    (low - rounding..=high + rounding).contains(&number)
+}
+
+/// Refuses a span of time that is not within a trace from `start_s` to `end_s`.
+///
+/// # Errors
+/// [`SpanError`] names both.
+pub fn check_span([start_s, end_s]: [f64; 2], [from_s, to_s]: [f64; 2]) -> Result<(), SpanError> {
+    let inside = [from_s, to_s].into_iter().all(|time_s| is_within([start_s, end_s], time_s));
+    match (inside, from_s < to_s) {
+        (true, true) => Ok(()),
+        (true, false) => Err(SpanError::Reversed { from_s, to_s }),
+        (false, _) => Err(SpanError::Outside { from_s, to_s, start_s, end_s }),
+    }
+}
+
 fn check_finite(values: &[f32], channel: &'static str) -> Result<(), TraceError> {
     match values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
         Some((index, &value)) => Err(TraceError::NotFinite { row: index + 1, channel, value }),
@@ -268,5 +312,13 @@ mod tests {
         assert!(message(&[1.0], &[1.0], f64::NAN, 0.0).contains("NaN Hz"));
         assert!(message(&[1.0], &[1.0], 1.0, 1e10).contains("10000000000 s"));
         assert!(message(&[1.0, 1.0], &[1.0, f32::NAN], 1.0, 0.0).contains("row 2: current_A is NaN"));
+    }
+
+    #[test]
+    fn spans_are_within_a_trace_to_rounding() {
+        assert_eq!(check_span([0.0, 0.3], [0.1, 0.1 + 0.2]), Ok(()));
+        assert_eq!(check_span([0.0, 1.0], [0.5, 0.5]), Err(SpanError::Reversed { from_s: 0.5, to_s: 0.5 }));
+        assert!(matches!(check_span([0.0, 1.0], [0.5, 1.1]), Err(SpanError::Outside { .. })));
+        assert!(matches!(check_span([0.0, 1.0], [f64::NAN, 0.5]), Err(SpanError::Outside { .. })));
     }
 }

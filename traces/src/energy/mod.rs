@@ -1,11 +1,15 @@
 //! Energy between any two times, and per frame.
 
+mod idle;
 mod integral;
+mod run;
 mod statistics;
 mod streaming;
 mod table;
 
-pub use integral::{FrameEnergy, Idle, PowerIntegral, TrueFrame};
+pub use idle::{Idle, IdleTooShort};
+pub use integral::{FrameEnergy, PowerIntegral, TrueFrame};
+pub use run::{InverseUnits, Pass, RunEnergy, RunError, RunOptions, passes_j};
 pub use statistics::{
     Pooled, Spread, Summary, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole,
 };

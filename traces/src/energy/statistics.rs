@@ -1,10 +1,4 @@
-//! Frames in a few numbers.
-//!
-//! Several runs of the same thing.
-//!
-//! Frames that differ from those around them: touched by something that is not theirs.
-//!
-//! The first frames after launch draw more (Paper III, Figure 5); how many they are.
+//! Statistics of frames: summaries, pooled runs, outliers, and the warm-up after launch.
 
 use super::FrameEnergy;
 use crate::frames::{Flag, Flags};

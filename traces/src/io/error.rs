@@ -302,6 +302,12 @@ pub enum WriteError {
         /// The path.
         path: PathBuf,
     },
+    /// A name that stands for no format.
+    #[error("{path}: its ending is none of {formats}", path = path.display(), formats = super::FORMATS.join(", "))]
+    Ending {
+        /// The path.
+        path: PathBuf,
+    },
     /// Encoding or writing failed.
     #[error("cannot write the trace: {0}")]
     Encode(String),

@@ -1,8 +1,8 @@
 //! Trace files: one file or folder per format, with its reader and its writer.
 //!
 //! [`read`] reads any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces what does not
-//! fit into memory. [`csv`], [`parquet`] and [`jls`] write a [`TraceReader`]: a trace in memory, or a [`Recording`], a file
-//! of any length.
+//! fit into memory. [`save`] and the modules [`csv`], [`parquet`] and [`jls`] write a [`TraceReader`]: a trace in memory, or
+//! a [`Recording`], a file of any length.
 
 pub mod atomic;
 mod columns;
@@ -16,18 +16,20 @@ mod recording;
 mod repair;
 mod rows;
 mod samples;
+mod save;
 mod sum_of_rails;
 mod time_base;
 pub mod unfinished;
 
 pub use error::{ReadError, WriteError};
-pub use read::{Loaded, read, read_csv, read_parquet};
+pub use read::{Loaded, open, read, read_csv, read_parquet};
 pub use recording::Recording;
 pub use repair::Repair;
 pub use rows::Rows;
 #[cfg(test)]
 pub(crate) use samples::SplitTrace;
 pub use samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
+pub use save::{FORMATS, save};
 pub use sum_of_rails::{SumOfRails, rail_of_sums};
 
 pub(crate) use columns::RowBatch;

@@ -1,8 +1,10 @@
 //! A whole file into memory.
 
 use super::columns::RowBatch;
+use super::recording::Recording;
 use super::repair::{Columns, Repair, repair_rows};
 use super::rows::Rows;
+use super::samples::TraceReader;
 use super::time_base::Stamps;
 use super::{ReadError, ReadOptions, time_base};
 use crate::trace::Trace;
@@ -26,6 +28,25 @@ pub struct Loaded {
 /// [`ReadError`] names the file, the row and how to mend it.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     load(Rows::open(path, options)?)
+}
+
+/// Opens a trace of any length: as a [`Recording`], or in memory where it has to be repaired, as repairs depend on all of
+/// it. Also returns the repairs.
+///
+/// # Errors
+/// As [`read`].
+pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>, Vec<Repair>), ReadError> {
+    match Recording::open(path, options) {
+        Ok(recording) => {
+            let repairs = recording.repairs().to_vec();
+            Ok((Box::new(recording), repairs))
+        }
+        Err(_) if options.repair => {
+            let Loaded { trace, repairs } = read(path, options)?;
+            Ok((Box::new(trace), repairs))
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// Reads a CSV file, and its description if there is one at [`csv::description_path`](super::csv::description_path) or

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use traces::io::{TraceHeader, TraceWriter, TraceReader, TraceChunk, WriteError, atomic, csv, jls, parquet};
+use traces::io::{self, FORMATS, TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError, atomic, csv};
 
 use super::failure::wrong;
 use super::report;
@@ -14,9 +14,11 @@ use crate::cli::terminal::print_json;
 use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
 use crate::output::terminal::Terminal;
 
-/// Bytes of a row of CSV, about; larger files than this many are announced.
+/// About the bytes of a row of CSV. Files of more than [`LARGE_BYTES`] are announced.
 const ROW_BYTES: u64 = 50;
 const LARGE_BYTES: u64 = 1 << 30;
+/// The ending of files for the viewer of Perfetto.
+const PERFETTO: &str = ".perfetto-trace";
 
 pub(super) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure> {
     check(&args.out)?;
@@ -40,14 +42,15 @@ fn name(path: &Path) -> String {
 
 /// Refuses a file of unknown kind before anything is read.
 pub(super) fn check(path: &Path) -> Result<(), Failure> {
-    let known = [".parquet", ".jls", ".csv", ".tsv", ".csv.gz", ".tsv.gz", ".perfetto-trace"];
+    let known = [&FORMATS[..], &[PERFETTO]].concat();
     if known.iter().any(|end| name(path).ends_with(end)) {
         return Ok(());
     }
     Err(wrong(format!("{}: its ending is none of {}", path.display(), known.join(", "))))
 }
 
-/// Refuses what [`save`] could not write, or would write over: an input, or a description that is not that of an older `out`.
+/// Refuses a file that [`save`] could not write, or that would overwrite an input, or a description that is not that of an
+/// older `out`.
 pub(super) fn may_be_saved<'a>(
     flag: &str,
     out: &Path,
@@ -64,7 +67,7 @@ pub(super) fn may_be_saved<'a>(
     })
 }
 
-/// The file that tells what a text does not.
+/// The description beside a text.
 fn description_path(out: &Path) -> Option<PathBuf> {
     let name = name(out);
     let plain = name.trim_end_matches(".gz");
@@ -72,32 +75,23 @@ fn description_path(out: &Path) -> Option<PathBuf> {
     text.then(|| csv::description_path(out))
 }
 
-/// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`TraceWriter`].
+/// Writes a trace, in pieces, in the format of its ending.
 pub(super) fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
-    let name = name(path);
-    let plain = name.trim_end_matches(".gz");
-    if name.ends_with(".parquet") {
-        return Ok(parquet::save(trace, path)?);
-    }
-    if name.ends_with(".jls") {
-        return Ok(jls::save(trace, path)?);
-    }
-    if name.ends_with(".perfetto-trace") {
+    if name(path).ends_with(PERFETTO) {
         return perfetto(trace, path, terminal);
     }
     let bytes = trace.header().samples * ROW_BYTES;
-    if bytes > LARGE_BYTES {
+    if description_path(path).is_some() && bytes > LARGE_BYTES {
         terminal.note(&format!(
             "{}: about {:.1} GB as text; Parquet takes a tenth",
             path.display(),
             bytes as f64 * 1e-9
         ));
     }
-    let delimiter = if plain.ends_with(".tsv") { b'\t' } else { b',' };
-    Ok(csv::save_as(trace, path, delimiter, name.ends_with(".gz"))?)
+    Ok(io::save(trace, path)?)
 }
 
-/// A counter track of the power, thinned out to what the viewer holds.
+/// Writes a counter track of the power, thinned out to as many points as the viewer holds.
 fn perfetto(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let header = trace.header();
     let mut thinner = Thinner::new(header.samples, MAX_POINTS);
@@ -114,10 +108,10 @@ fn perfetto(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result
     Ok(atomic::write_file(path, |out| perfetto::write(&timeline, out))?)
 }
 
-/// Of the samples, their power.
+/// Thins out the power of the samples.
 impl TraceWriter for Thinner {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-        stretch.powers_w().for_each(|watts| self.push(watts));
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        chunk.powers_w().for_each(|watts| self.push(watts));
         Ok(())
     }
 }
