@@ -5,7 +5,7 @@
 //! Frame times are a fingerprint: a short run of stamps fits the starts in hardly more than one place. So runs of stamps are laid on runs
 //! of starts; the lines that fit best are held against all stamps, each paired with the nearest start, and fitted anew to what pairs.
 
-use crate::stats::median;
+use crate::stats::upper_median;
 use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
@@ -233,7 +233,7 @@ fn settled(line: Alignment, stamps_s: &[f64], starts_s: &[f64], near_s: f64) -> 
 /// The median distance of neighbours, s; `None` where that is nothing.
 pub(super) fn usual_gap(times_s: &[f64]) -> Option<f64> {
     let mut gaps: Vec<f64> = times_s.windows(2).map(|two| two[1] - two[0]).collect();
-    let gap_s = if gaps.is_empty() { 0.0 } else { median(&mut gaps) };
+    let gap_s = if gaps.is_empty() { 0.0 } else { upper_median(&mut gaps) };
     (gap_s > 0.0).then_some(gap_s)
 }
 

@@ -1,24 +1,85 @@
-//! The middle of many values.
+//! Medians, means, spreads, and exact running sums.
 //!
-//! What spreads are made of.
-//!
-//! Sums carried in two f64, so that differences of long running totals keep full precision.
+//! There are two medians: [`median`] is what reports print; [`upper_median`] takes an actual value, as the frame finder
+//! and the time base need.
 
-/// The (upper) median; 0 for no values. They are left in another order.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+use serde::Serialize;
+
+/// The `n`-th smallest value, from 0; the values are left in another order. There must be more than `n`.
+pub(crate) fn nth_smallest(values: &mut [f64], n: usize) -> f64 {
+    *values.select_nth_unstable_by(n, f64::total_cmp).1
 }
 
-/// The mean of some values; no values have none.
+/// The median, of an even number of values the upper of the middle two; 0 for no values, which are left in another order.
+pub(crate) fn upper_median(values: &mut [f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { nth_smallest(values, values.len() / 2) }
+}
+
+/// The median, of an even number of values the mean of the middle two; there must be one. They are left in another order.
+fn median(values: &mut [f64]) -> f64 {
+    let odd = values.len() % 2 == 1;
+    let (below, &mut upper, _) = values.select_nth_unstable_by(values.len() / 2, f64::total_cmp);
+    let lower = if odd { upper } else { below.iter().copied().fold(f64::MIN, f64::max) };
+    0.5 * (lower + upper)
+}
+
+/// The mean; NaN for no values.
 pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The mean of some values and the sum of their squared differences from it; no values have no mean.
+/// The mean and the sum of squared differences from it; the mean of no values is NaN.
 pub(crate) fn about_mean(values: &[f64]) -> (f64, f64) {
     let mean = mean(values);
     (mean, values.iter().map(|value| (value - mean) * (value - mean)).sum())
+}
+
+/// The mean and its standard error.
+pub(crate) fn mean_and_error(values: &[f64]) -> [f64; 2] {
+    let (mean, squares) = about_mean(values);
+    let count = values.len() as f64;
+    [mean, libm::sqrt(squares / (count - 1.0) / count)]
+}
+
+/// Mean and standard deviation (over `n`).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Moments {
+    pub mean: f64,
+    pub deviation: f64,
+}
+
+/// Mean and standard deviation (over `n`); zeros for no values.
+pub(crate) fn moments(values: &[f64]) -> Moments {
+    if values.is_empty() {
+        return Moments::default();
+    }
+    let count = values.len() as f64;
+    let (mean, squares) = about_mean(values);
+    Moments { mean, deviation: libm::sqrt(squares / count) }
+}
+
+/// Mean, sample standard deviation (over `n - 1`; 0 for one value) and median.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Median; the mean of the middle two for an even number.
+    pub median: f64,
+}
+
+impl Spread {
+    /// Of some values, in any order; `None` for no values.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        if values.is_empty() {
+            return None;
+        }
+        let count = values.len() as f64;
+        let (mean, squares) = about_mean(values);
+        let deviation = if values.len() > 1 { libm::sqrt(squares / (count - 1.0)) } else { 0.0 };
+        Some(Self { mean, deviation, median: median(&mut values.to_vec()) })
+    }
 }
 
 /// A running sum as an unevaluated pair `hi + lo` (double-double; two-sum: Knuth 1969, TAOCP vol. 2, 4.2.2;
@@ -83,7 +144,7 @@ mod tests {
 
     #[test]
     fn the_upper_of_two_middles_and_nothing_of_nothing() {
-        assert_eq!((median(&mut [3.0, 1.0, 2.0, 9.0]), median(&mut [])), (3.0, 0.0));
+        assert_eq!((upper_median(&mut [3.0, 1.0, 2.0, 9.0]), upper_median(&mut [])), (3.0, 0.0));
     }
 
     #[test]

@@ -3,10 +3,10 @@
 use crate::ReadError;
 use crate::chunk::{ChunkFile, ChunkHeader, ChunkWriter, List};
 use crate::format::{
-    ANNOTATIONS, DEFINITION, F32, FIXED_RATE, HEAD, JSON, LEVELS, SIGNAL, SIGNAL_MASK, SIGNAL_TEXTS, SOURCE,
-    SOURCE_TEXTS, USER_DATA, UTC, VARIABLE_RATE, field,
+    ANNOTATIONS, DATA_SAMPLES, DEFINITION, ENTRIES_PER_ENTRY, ENTRY_SAMPLES, F32, FIXED_RATE, HEAD, JSON,
+    LEVELS, SIGNAL, SIGNAL_MASK, SIGNAL_TEXTS, SOURCE, SOURCE_TEXTS, SUMMARY_ENTRIES, USER_DATA, UTC,
+    VARIABLE_RATE, field,
 };
-use crate::write::{BLOCK, ENTRIES, ENTRY_SAMPLES, FANOUT};
 use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};
 
@@ -56,7 +56,8 @@ pub(crate) fn write<W: Write + Seek, const N: usize>(
     track(chunks, &mut list, VARIABLE_RATE, 0)?;
     track(chunks, &mut list, ANNOTATIONS, 0)?;
     write_source(chunks, &mut sources, 1, [&source_name(device), "", "", "", ""])?;
-    let [block, samples, entries, fanout] = [BLOCK, ENTRY_SAMPLES, ENTRIES, FANOUT].map(|count| count as u32);
+    let [block, samples, entries, fanout] =
+        [DATA_SAMPLES, ENTRY_SAMPLES, SUMMARY_ENTRIES, ENTRIES_PER_ENTRY].map(|count| count as u32);
     let mut heads = [Heads::default(); N];
     for ((heads, named), number) in heads.iter_mut().zip(signals).zip(1..) {
         let numbers = [F32, rate_hz, block, samples, entries, fanout, STAMPS_PER_SUMMARY, STAMPS_PER_SUMMARY];

@@ -67,5 +67,14 @@ pub(crate) fn field<const N: usize>(bytes: &[u8], from: usize) -> [u8; N] {
     bytes.get(from..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; N])
 }
 
+/// Samples of a chunk of data. This and the next three are the defaults of pyjls for f32.
+pub(crate) const DATA_SAMPLES: usize = 8192;
+/// Samples of an entry of level 1.
+pub(crate) const ENTRY_SAMPLES: usize = 128;
+/// Entries of a summary.
+pub(crate) const SUMMARY_ENTRIES: usize = 640;
+/// Entries that make one of the level above.
+pub(crate) const ENTRIES_PER_ENTRY: usize = 20;
+
 /// Number of a signal, in the lower bits of the mark of a chunk.
 pub(crate) const SIGNAL_MASK: u16 = 0x0fff;

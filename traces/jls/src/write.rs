@@ -5,20 +5,14 @@
 
 use crate::chunk::{ChunkWriter, List};
 use crate::definitions::{self, Heads, SignalName};
-use crate::format::{DATA, END, FIXED_RATE, INDEX, LEVELS, MAX_PAYLOAD_BYTES, SUMMARY, UTC, front};
+use crate::format::{
+    DATA, DATA_SAMPLES, END, ENTRIES_PER_ENTRY, ENTRY_SAMPLES, FIXED_RATE, INDEX, LEVELS, MAX_PAYLOAD_BYTES,
+    SUMMARY, SUMMARY_ENTRIES, UTC, front,
+};
 use crate::summary::Moments;
 use crate::time::Timestamp;
 use core::array::from_fn;
 use std::io::{self, ErrorKind, Seek, Write};
-
-/// Samples of a chunk of data. This and the next three are the defaults of pyjls for f32.
-pub(crate) const BLOCK: usize = 8192;
-/// Samples of an entry of level 1.
-pub(crate) const ENTRY_SAMPLES: usize = 128;
-/// Entries of a summary.
-pub(crate) const ENTRIES: usize = 640;
-/// Entries that make one of the level above.
-pub(crate) const FANOUT: usize = 20;
 
 /// Indices and summaries of one level.
 #[derive(Default)]
@@ -72,7 +66,7 @@ impl Level {
             bytes.extend(front(self.first, self.entries.len(), 128));
             bytes.extend(self.entries.iter().flat_map(Moments::entry).flat_map(f32::to_le_bytes));
         })?;
-        let above = self.entries.chunks_exact(FANOUT).map(Moments::together).collect();
+        let above = self.entries.chunks_exact(ENTRIES_PER_ENTRY).map(Moments::together).collect();
         self.below.clear();
         self.entries.clear();
         Ok((index, above))
@@ -92,14 +86,14 @@ impl SignalWriter {
             number,
             data: List::default(),
             first: 0,
-            samples: Vec::with_capacity(BLOCK),
+            samples: Vec::with_capacity(DATA_SAMPLES),
             levels: Vec::new(),
         }
     }
 
     /// How many samples can be added before a chunk is full.
     pub fn room(&self) -> usize {
-        BLOCK - self.samples.len()
+        DATA_SAMPLES - self.samples.len()
     }
 
     /// Adds samples, no more than there is [room](Self::room) for.
@@ -143,7 +137,7 @@ impl SignalWriter {
             }
             let this = &mut self.levels[level - 1];
             this.add(at, first, &entries);
-            if this.entries.len() < ENTRIES {
+            if this.entries.len() < SUMMARY_ENTRIES {
                 break;
             }
             first = this.first;
@@ -286,7 +280,7 @@ impl<W: Write + Seek, const N: usize> Writer<W, N> {
 
     /// How many samples can be added before a chunk is full.
     fn room(&self) -> usize {
-        self.signals.first().map_or(BLOCK, SignalWriter::room)
+        self.signals.first().map_or(DATA_SAMPLES, SignalWriter::room)
     }
 
     fn extend(&mut self, channels: [impl IntoIterator<Item = f32>; N], count: usize) -> io::Result<()> {

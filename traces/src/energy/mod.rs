@@ -7,12 +7,11 @@ mod statistics;
 mod streaming;
 mod table;
 
+pub use crate::stats::Spread;
 pub use idle::{Idle, IdleTooShort};
 pub use integral::{FrameEnergy, PowerIntegral, TrueFrame};
 pub use run::{InverseUnits, Pass, RunEnergy, RunError, RunOptions, passes_j};
-pub use statistics::{
-    Pooled, Spread, Summary, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole,
-};
+pub use statistics::{Pooled, Summary, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole};
 pub(crate) use streaming::Sums;
 pub use streaming::{energies_j, finishes_s, levels_w};
 pub use table::{FrameTable, TABLE_COLUMNS, TableError};

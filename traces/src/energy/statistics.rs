@@ -1,38 +1,10 @@
 //! Statistics of frames: summaries, pooled runs, outliers, and the warm-up after launch.
 
-use super::FrameEnergy;
+use super::{FrameEnergy, Spread};
 use crate::frames::{Flag, Flags};
 use crate::stats::about_mean;
 use rayon::prelude::*;
 use serde::Serialize;
-
-/// Mean, sample standard deviation (over `n - 1`; 0 for one value) and median.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
-    /// Arithmetic mean.
-    pub mean: f64,
-    /// Standard deviation.
-    pub deviation: f64,
-    /// Median; the mean of the middle two for an even number.
-    pub median: f64,
-}
-
-impl Spread {
-    /// Of some values, in any order; `None` for no values.
-    pub fn of(values: &[f64]) -> Option<Self> {
-        if values.is_empty() {
-            return None;
-        }
-        let count = values.len() as f64;
-        let (mean, squares) = about_mean(values);
-        let deviation = if values.len() > 1 { libm::sqrt(squares / (count - 1.0)) } else { 0.0 };
-        let mut others = values.to_vec();
-        let (below, &mut upper, _) = others.select_nth_unstable_by(values.len() / 2, f64::total_cmp);
-        let lower =
-            if values.len() % 2 == 1 { upper } else { below.iter().copied().fold(f64::MIN, f64::max) };
-        Some(Self { mean, deviation, median: 0.5 * (lower + upper) })
-    }
-}
 
 /// A table of frames in a few numbers. Averages are over frames; for joules per pixel divide by the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -263,7 +235,7 @@ pub fn mean_over_discarded(energies_j: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::median;
+    use crate::stats::upper_median;
 
     #[test]
     fn mean_deviation_and_median_of_known_numbers() {
@@ -311,9 +283,10 @@ mod tests {
             for (index, found) in found.into_iter().enumerate() {
                 let from = index.saturating_sub(AROUND).min(count - width);
                 let mut around = values[from..from + width].to_vec();
-                let usual = median(&mut around);
+                let usual = upper_median(&mut around);
                 around.iter_mut().for_each(|value| *value = (*value - usual).abs());
-                let spread = (NORMAL * median(&mut around)).max(LEAST * usual.abs()).max(f64::MIN_POSITIVE);
+                let spread =
+                    (NORMAL * upper_median(&mut around)).max(LEAST * usual.abs()).max(f64::MIN_POSITIVE);
                 assert_eq!(found, (values[index] - usual) / spread, "{index} of {count}");
             }
         }

@@ -13,7 +13,7 @@ use super::threshold::choose;
 use super::tracked::find_tracked;
 use super::{assess, periodicity};
 use crate::metadata::Metadata;
-use crate::stats::median;
+use crate::stats::upper_median;
 use crate::trace::Trace;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -221,7 +221,7 @@ pub(super) fn neighbour_similarity(trace: &Trace, found: &Found) -> f64 {
     let window = |first: usize| &power[first..first + width];
     let similarity = |pair: &[usize]| correlation(window(pair[0]), window(pair[1]));
     let mut all: Vec<f64> = firsts.par_windows(2).map(similarity).collect();
-    median(&mut all)
+    upper_median(&mut all)
 }
 
 /// Of two lists of equal length; 0 where one is constant.

@@ -10,7 +10,7 @@
 //! A frame begins in little power, after the end of the one before. What was found amidst work, where others near have a rest, may lie
 //! within a frame: where a frame takes two ticks of the display at a slow clock, its middle is on a tick, too.
 
-use crate::stats::{mean, median};
+use crate::stats::{mean, nth_smallest, upper_median};
 use rayon::prelude::*;
 
 /// Segment examined on either side of a start, as a share of the window.
@@ -132,7 +132,7 @@ fn idle_gap(profile: &[f64], bound: &Bound, width: usize) -> Option<[usize; 2]> 
     let places = middle.saturating_sub(before)..(middle + after).min(profile.len());
     let lowest_w = profile[places.clone()].iter().copied().fold(f64::INFINITY, f64::min);
     let high = ((1.0 - bound.above) * profile.len() as f64) as usize;
-    let high_w = *profile.to_vec().select_nth_unstable_by(high, f64::total_cmp).1;
+    let high_w = nth_smallest(&mut profile.to_vec(), high);
     let ends_w = lowest_w + bound.rises * (high_w - lowest_w);
     let within =
         places.filter(|place| profile[*place] <= ends_w).min_by_key(|place| place.abs_diff(middle))?;
@@ -169,8 +169,8 @@ pub(super) fn missing_gap_confidence(power: &[f64], starts: &[f64], width: usize
         let near = neighbours(&depths, start, NEIGHBOURS);
         let mut lowest: Vec<f64> = near.iter().flatten().map(|depth| depth.lowest_w).collect();
         let quarter = lowest.len() / 4;
-        let low_w = *lowest.select_nth_unstable_by(quarter, f64::total_cmp).1;
-        let usual_w = median(&mut near.iter().flatten().map(|depth| depth.usual_w).collect::<Vec<_>>());
+        let low_w = nth_smallest(&mut lowest, quarter);
+        let usual_w = upper_median(&mut near.iter().flatten().map(|depth| depth.usual_w).collect::<Vec<_>>());
         let none = usual_w - own_w < MIN_DIP_RATIO * (usual_w - low_w);
         Some(if none && usual_w - low_w > clear_w { SUSPECT_CONFIDENCE } else { 1.0 })
     };
@@ -188,7 +188,7 @@ struct Depth {
 
 impl Depth {
     fn of(power: &[f64], start: f64, width: usize, gap_samples: usize) -> Option<Self> {
-        let usual_w = median(&mut window_around(power, start, USUAL_SHARES, width)?.to_vec());
+        let usual_w = upper_median(&mut window_around(power, start, USUAL_SHARES, width)?.to_vec());
         Some(Self { lowest_w: lowest_w(power, start, width, gap_samples)?, usual_w })
     }
 }

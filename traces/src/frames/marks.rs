@@ -2,7 +2,7 @@
 //!
 //! A mark where there is nothing to see: whatever is as flat resembles it.
 
-use super::threshold::moments;
+use crate::stats::moments;
 use crate::trace::Trace;
 use crate::warning::Warning;
 use thiserror::Error;

@@ -10,7 +10,7 @@ use super::periodicity::regularity;
 use super::profile::{normalized, spaced_minima, squares, summed_squared_difference};
 use super::refine::align;
 use super::threshold::{Threshold, choose};
-use crate::stats::median;
+use crate::stats::upper_median;
 use crate::trace::Trace;
 
 /// How far, in samples, refinement may move a start from the lowest offset of the profile.
@@ -165,7 +165,7 @@ pub(crate) fn noise_deviation(median_step: f64) -> f64 {
 /// The (upper) median of at most [`MAX_MEDIAN_VALUES`] of `count` values, evenly picked; 0 for none.
 fn median_of(values: impl Iterator<Item = f64>, count: usize) -> f64 {
     let mut picked: Vec<f64> = values.step_by(count.div_ceil(MAX_MEDIAN_VALUES).max(1)).collect();
-    median(&mut picked)
+    upper_median(&mut picked)
 }
 
 /// Farthest the first frame may begin before the first start found, in median gaps.
@@ -218,5 +218,5 @@ impl View<'_> {
 /// The median distance between neighbours, s; `None` for fewer than two starts.
 fn median_gap_s(starts: &[FrameStart]) -> Option<f64> {
     let mut gaps: Vec<f64> = starts.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-    (!gaps.is_empty()).then(|| median(&mut gaps))
+    (!gaps.is_empty()).then(|| upper_median(&mut gaps))
 }

@@ -3,7 +3,7 @@
 //!
 //! How evenly starts are spaced.
 
-use crate::stats::median;
+use crate::stats::upper_median;
 use rayon::prelude::*;
 
 /// Gaps on either side that give the usual gap.
@@ -27,9 +27,9 @@ pub(super) fn usual_gaps(gaps: &[f64]) -> Vec<Option<[f64; 2]>> {
         if count < 2 {
             return None;
         }
-        let usual = median(around);
+        let usual = upper_median(around);
         around.iter_mut().for_each(|gap| *gap = (*gap - usual).abs());
-        Some([usual, median(around)])
+        Some([usual, upper_median(around)])
     };
     (0..gaps.len()).into_par_iter().with_min_len(MIN_TASK_GAPS).map(one).collect()
 }

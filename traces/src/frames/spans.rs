@@ -2,7 +2,7 @@
 
 use super::found::{Flag, Flags, FrameSpan, FrameStart};
 use super::periodicity;
-use crate::stats::median;
+use crate::stats::upper_median;
 
 /// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
 const MAX_LENGTH_RATIO: f64 = 1.6;
@@ -84,7 +84,7 @@ fn lower_coarse_confidence(frames: &mut [FrameSpan], sampling: Sampling) {
     let mut even = periodicity::even_gaps(&lengths_s, most_s);
     let many = even.iter().filter(|even| **even).count() as f64;
     let crowded =
-        median(&mut lengths_s.clone()) * sampling.rate_hz < MIN_GAP_WINDOWS * sampling.window as f64;
+        upper_median(&mut lengths_s.clone()) * sampling.rate_hz < MIN_GAP_WINDOWS * sampling.window as f64;
     if many < mostly * even.len() as f64 || crowded && sampling.window < COARSE_WINDOW_SAMPLES {
         even.fill(false);
     } else if sampling.window >= COARSE_WINDOW_SAMPLES {
@@ -131,7 +131,7 @@ fn flag_unusual(frames: &mut [FrameSpan]) {
 pub(super) fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
     let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
     let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();
-    (!durations.is_empty()).then(|| median(&mut durations))
+    (!durations.is_empty()).then(|| upper_median(&mut durations))
 }
 
 #[cfg(test)]

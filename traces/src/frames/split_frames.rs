@@ -6,7 +6,7 @@
 //! that take turns, those that go down clearly less are cuts.
 
 use super::idle_gap::{SUSPECT_CONFIDENCE, lowest_w, neighbours, window_around};
-use crate::stats::{about_mean, mean, median};
+use crate::stats::{mean, mean_and_error, upper_median};
 use core::ops::Range;
 use rayon::prelude::*;
 
@@ -74,7 +74,7 @@ fn alternation(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -
     if after_next.len() < MIN_COMPARISONS {
         return 1.0;
     }
-    let [next, after_next] = [next, after_next].map(|mut of| median(&mut of));
+    let [next, after_next] = [next, after_next].map(|mut of| upper_median(&mut of));
     if next > 0.0 { next / after_next } else { 1.0 }
 }
 
@@ -116,7 +116,7 @@ impl Dips<'_> {
 
     /// Median of the power around a start, W.
     fn usual_w(&self, start: usize) -> Option<f64> {
-        Some(median(
+        Some(upper_median(
             &mut window_around(self.power, self.starts[start], COMPARED_SHARES, self.width)?.to_vec(),
         ))
     }
@@ -130,7 +130,7 @@ impl Dips<'_> {
             return Vec::new();
         }
         let usual_w =
-            median(&mut segment.clone().filter_map(|start| self.usual_w(start)).collect::<Vec<_>>());
+            upper_median(&mut segment.clone().filter_map(|start| self.usual_w(start)).collect::<Vec<_>>());
         let ([a_w, a_error], [b_w, b_error]) = (mean_and_error(&a), mean_and_error(&b));
         let (from, low_w, high_w) = if a_w > b_w { (0, b_w, a_w) } else { (1, a_w, b_w) };
         let clear = high_w - low_w > MIN_STANDARD_ERRORS * libm::hypot(a_error, b_error);
@@ -144,13 +144,6 @@ impl Dips<'_> {
         let after = (last + 2..self.starts.len()).step_by(2).take(MARGIN_STARTS).take_while(cut);
         before.chain(every_other(from)).chain(after).collect()
     }
-}
-
-/// The mean of some values and its standard error.
-fn mean_and_error(values: &[f64]) -> [f64; 2] {
-    let (mean, squares) = about_mean(values);
-    let count = values.len() as f64;
-    [mean, libm::sqrt(squares / (count - 1.0) / count)]
 }
 
 #[cfg(test)]

@@ -8,8 +8,7 @@
 //! another phase, nor up into more power, as the way out of a frame leads down.
 
 use super::refine::between;
-use super::threshold::moments;
-use crate::stats::{mean, median};
+use crate::stats::{mean, moments, upper_median};
 use rayon::prelude::*;
 
 /// Largest move of a start, as a share of the window.
@@ -49,7 +48,7 @@ pub(super) fn refine_starts(
             if level(power, &starts[near.clone()], by) < level(power, &starts[near], 0.0) { by } else { 0.0 }
         })
         .collect();
-    let moves = smoothed(&smoothed(&moves, median), |near| mean(near));
+    let moves = smoothed(&smoothed(&moves, upper_median), |near| mean(near));
     let refined = positions.iter().zip(moves).zip(fixed);
     refined.map(|((position, by), fixed)| if *fixed { *position } else { position + by }).collect()
 }

@@ -2,7 +2,7 @@
 //!
 //! Splitting sorted numbers into populations.
 
-use crate::stats::about_mean;
+use crate::stats::{Moments, moments};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -255,13 +255,6 @@ fn ratio(difference: f64, spread: f64) -> f64 {
     f64::min(difference / spread.max(1e-3), 1e3)
 }
 
-/// Mean and standard deviation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Moments {
-    pub mean: f64,
-    pub deviation: f64,
-}
-
 /// Sorted numbers cut in two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Split {
@@ -306,16 +299,6 @@ fn otsu(sorted: &[f64]) -> Option<usize> {
         }
     }
     best.1
-}
-
-/// Mean and standard deviation (over `n`); zeros for no values.
-pub(super) fn moments(values: &[f64]) -> Moments {
-    if values.is_empty() {
-        return Moments::default();
-    }
-    let count = values.len() as f64;
-    let (mean, squares) = about_mean(values);
-    Moments { mean, deviation: libm::sqrt(squares / count) }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! the start. A sequence then wanders about, though the frames it follows do not. If nearly all gaps are whole numbers of one period the
 //! display gives the beat, and where the starts of such a trace are spread all the same, the mark and the period say where they lie.
 
-use crate::stats::median;
+use crate::stats::upper_median;
 
 /// A gap is a whole number of periods if it is off by less than this share of one.
 const MAX_PERIOD_RESIDUE: f64 = 2e-3;
@@ -57,7 +57,7 @@ fn tick_distances(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
     if gaps.len() < MIN_GAPS {
         return None;
     }
-    let usual = median(&mut gaps.clone());
+    let usual = upper_median(&mut gaps.clone());
     let periods = whole_periods(&gaps, usual);
     let residues: Vec<f64> =
         gaps.iter().zip(&periods).map(|(gap, count)| (gap - count * usual).abs()).collect();
@@ -72,10 +72,10 @@ fn tick_distances(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
 
 /// Whether starts that lie so far `off` the ticks are scattered about them; gaps lie so far `residues` whole periods.
 fn scattered(off: &[f64], mut residues: Vec<f64>) -> bool {
-    let middle = median(&mut off.to_vec());
+    let middle = upper_median(&mut off.to_vec());
     let mut far: Vec<f64> = off.iter().map(|off| (off - middle).abs()).collect();
     let most = (SCATTER_LIMITS[0] * libm::sqrt(residues.len() as f64)).min(SCATTER_LIMITS[1]);
-    median(&mut far) < most * median(&mut residues)
+    upper_median(&mut far) < most * upper_median(&mut residues)
 }
 
 /// How many periods each gap is, as whole numbers: what a start between two ticks leaves over is counted with the next gap.

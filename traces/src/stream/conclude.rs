@@ -8,7 +8,7 @@ use crate::frames::{
     noise_deviation, regularity, start_after_idle,
 };
 use crate::metadata::Metadata;
-use crate::stats::{PairSum, median};
+use crate::stats::{PairSum, upper_median};
 use crate::trace::Trace;
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ pub(super) fn conclude(
     let clock = Clock { samples: Some(gathered.samples), ..plan.clock };
     let trace_end_s = clock.time_s(gathered.samples as f64);
     let marks = Marks { end_s: marks.end_s.min(trace_end_s), ..marks.clone() };
-    let sigma_w = noise_deviation(median(&mut gathered.steps_w));
+    let sigma_w = noise_deviation(upper_median(&mut gathered.steps_w));
     let threshold = plan.threshold(&mut gathered, sigma_w);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };
@@ -106,7 +106,7 @@ impl Plan {
         let candidates = &gathered.candidates;
         let distances: Vec<f64> = candidates.par_iter().map(|candidate| candidate.distance_w2).collect();
         let noise_w2 = 2.0 * self.placement.samples as f64 * sigma_w * sigma_w;
-        let background_w2 = median(&mut gathered.distances_w2);
+        let background_w2 = upper_median(&mut gathered.distances_w2);
         let span = match (candidates.first(), candidates.last()) {
             (Some(first), Some(last)) => (last.offset - first.offset) as usize,
             _ => 0,

@@ -6,7 +6,7 @@
 //! is held against the last one that is known to be right. Where it lies elsewhere, one of its frames, put right, is worth a mark.
 
 use crate::frames::refine::{ScaledFit, ScaledPair};
-use crate::stats::median;
+use crate::stats::upper_median;
 
 /// Neighbours differ if they leave at least this many times the usual unexplained variance, and at least this
 /// share.
@@ -103,7 +103,7 @@ impl View<'_> {
             fit.map_or(1.0, |fit| fit.unexplained)
         };
         let unexplained: Vec<f64> = (0..self.starts.len().saturating_sub(1)).map(remainder).collect();
-        let usual = median(&mut unexplained.clone());
+        let usual = upper_median(&mut unexplained.clone());
         let limit = (UNLIKE_LIMITS[0] * usual).max(UNLIKE_LIMITS[1]);
         let mut steps: Vec<usize> =
             (0..unexplained.len()).filter(|&index| unexplained[index] > limit).collect();
@@ -150,8 +150,8 @@ impl View<'_> {
                 Some((to, self.fit(comparison, from, to, moved)?))
             })
             .collect();
-        let shift = median(&mut fits.iter().map(|(_, fit)| fit.shift).collect::<Vec<_>>());
-        let ratio = median(&mut fits.iter().map(|(_, fit)| fit.ratio).collect::<Vec<_>>());
+        let shift = upper_median(&mut fits.iter().map(|(_, fit)| fit.shift).collect::<Vec<_>>());
+        let ratio = upper_median(&mut fits.iter().map(|(_, fit)| fit.ratio).collect::<Vec<_>>());
         let within = self.share(comparison.within) as f64;
         let near = |(_, fit): &&(usize, ScaledFit)| {
             (fit.shift - shift).abs() <= within && (fit.ratio / ratio - 1.0).abs() < MAX_CLOCK_DEVIATION

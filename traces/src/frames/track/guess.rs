@@ -4,7 +4,7 @@ use super::templates::Templates;
 use crate::frames::periodicity::regularity;
 use crate::frames::profile::spaced_minima;
 use crate::frames::threshold::{Split, otsu_tree};
-use crate::stats::median;
+use crate::stats::upper_median;
 
 /// How far around a mark the first guess looks, in windows.
 const REACH_WINDOWS: usize = 200;
@@ -29,7 +29,7 @@ pub(super) fn first(templates: &Templates, spacing: usize, marks: &[usize]) -> (
         let usual = median_gap(&minima).unwrap_or(spacing) as f64;
         let span = minima.last().zip(minima.first()).map_or(0, |(last, first)| last - first);
         let mut among: Vec<f64> = minima.iter().map(|&offset| profile[offset]).collect();
-        let least = half_a_sample(profile, marks).min(MAX_NEAR_SHARE * median(&mut among)).max(1e-12);
+        let least = half_a_sample(profile, marks).min(MAX_NEAR_SHARE * upper_median(&mut among)).max(1e-12);
         let mut logs: Vec<f64> = minima
             .iter()
             .filter(|offset| !marks.contains(offset))
@@ -84,8 +84,9 @@ fn between(
     // At edges half a sample leaves half of what a whole one does. Parts of whole samples would fall on the mark's place, too.
     let off = if period.is_multiple_of(parts) { 1.0 } else { 2.0 } * half_a_sample(profile, marks);
     // Noise leaves as much of them as of the starts.
-    let usual =
-        |offsets: &[usize]| median(&mut offsets.iter().map(|&offset| profile[offset]).collect::<Vec<_>>());
+    let usual = |offsets: &[usize]| {
+        upper_median(&mut offsets.iter().map(|&offset| profile[offset]).collect::<Vec<_>>())
+    };
     if more.is_empty() || usual(&more) > off + usual(starts) {
         return None;
     }

@@ -2,6 +2,7 @@
 
 use super::{Grid, Stamp, Stamps, all_apart, rounded_rate_hz};
 use crate::io::ReadError;
+use crate::stats::upper_median;
 use std::path::{Path, PathBuf};
 
 /// How far a stamp may be off its place, in sample periods: rounded stamps are, by less.
@@ -148,8 +149,7 @@ impl Fit {
         if steps.is_empty() {
             return;
         }
-        let middle = steps.len() / 2;
-        self.guess_s = Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1);
+        self.guess_s = Some(upper_median(&mut steps));
         for (row, pair) in head.windows(2).enumerate() {
             self.check_step(row as u64 + 1, pair[0], pair[1]);
         }

@@ -6,6 +6,7 @@ mod tests;
 
 use super::ReadError;
 use super::description::Description;
+use crate::stats::upper_median;
 pub(crate) use fit::{Fit, Fitted};
 use multiversion::multiversion;
 use std::path::Path;
@@ -115,8 +116,7 @@ pub(crate) fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f
 /// The rate by all steps that are no gaps: where stamps are rounded, these differ, and their mean does not.
 pub(crate) fn mean_rate_hz(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let middle = steps.len() / 2;
-    let usual_s = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let usual_s = upper_median(&mut steps);
     let single = || steps.iter().filter(|step_s| **step_s < 1.6 * usual_s);
     rounded_rate_hz(single().count() as f64, single().sum(), f64::INFINITY)
 }
@@ -126,8 +126,7 @@ pub(crate) fn mean_rate_hz(times: &[f64]) -> f64 {
 pub(crate) fn usual_rate_hz(times: &[f64]) -> f64 {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let mut sorted: Vec<f64> = steps().collect();
-    let middle = sorted.len() / 2;
-    let usual_s = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let usual_s = upper_median(&mut sorted);
     let (sum_s, count) = steps()
         .filter(|step_s| (step_s / usual_s - 1.0).abs() < 0.5)
         .fold((0.0, 0.0), |(sum_s, count), step_s| (sum_s + step_s, count + 1.0));
