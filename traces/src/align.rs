@@ -1,24 +1,23 @@
-//! Recorded time stamps put onto the time of a curve: by two anchors, or by the best fit to the starts found in it.
+//! Alignment of recorded time stamps with a curve: by two anchors, or by the best fit to the starts found in it.
 //!
-//! Pairs of stamps and starts where some of either are missing.
-//!
-//! Frame times are a fingerprint: a short run of stamps fits the starts in hardly more than one place. So runs of stamps are laid on runs
-//! of starts; the lines that fit best are held against all stamps, each paired with the nearest start, and fitted anew to what pairs.
+//! Frame times are a fingerprint: a short run of stamps fits the starts in hardly more than one place. Where stamps or
+//! starts are missing, runs of stamps are laid on runs of starts. The lines that fit best are compared with all stamps,
+//! each paired with the nearest start, and fitted again to these pairs.
 
 use crate::stats::upper_median;
 use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
-/// Fewer pairs than this fit anything.
-const LEAST_PAIRS: usize = 4;
-/// A second fit no worse than this many times the best leaves it open which is right.
-const RIVAL: f64 = 2.0;
+/// Fewest pairs of a fit: fewer fit anything.
+const MIN_PAIRS: usize = 4;
+/// A fit is ambiguous if the second best leaves at most this many times the residual of the best.
+const MAX_RIVAL_RATIO: f64 = 2.0;
 
-/// A fit that leaves more than this share of the median gap of the starts is none.
-const LEFT: f64 = 0.1;
+/// Largest residual of a fit, as a share of the median gap of the starts.
+const MAX_RESIDUAL_SHARE: f64 = 0.1;
 
-/// What is left by less than this is rounding, s.
+/// Residuals below this are rounding, s.
 const EXACT_S: f64 = 1e-9;
 
 /// Why stamps cannot be aligned.
@@ -46,12 +45,12 @@ pub enum AlignError {
          found, or give two anchors instead"
     )]
     Unlike {
-        /// Root mean square of what is left, s.
+        /// Root mean square of the residuals, s.
         left_s: f64,
         /// Median gap of the starts, s.
         gap_s: f64,
     },
-    /// Stamps that do not tell times apart.
+    /// Stamps that are equal.
     #[error("too many of the {stamps} stamps are the same for a fit; give two anchors instead")]
     Equal {
         /// Stamps given.
@@ -66,7 +65,7 @@ pub struct Alignment {
     pub scale: f64,
     /// Time of stamp 0, s.
     pub offset_s: f64,
-    /// Root mean square of what is left, s; 0 by anchors.
+    /// Root mean square of the residuals, s; 0 by anchors.
     pub residual_s: f64,
     /// How many pairs it rests on.
     pub pairs: usize,
@@ -92,8 +91,8 @@ impl Alignment {
         Ok(Self { scale, offset_s: a.1 - scale * a.0, residual_s: 0.0, pairs: 2, ambiguous: false })
     }
 
-    /// The pairing of stamps with starts that leaves least: one after another from some shift on or, if that does not fit, with gaps
-    /// in either. Both sorted, s.
+    /// The pairing of stamps with starts of the least residual: one after another from some shift on or, if that does not fit, with
+    /// gaps in either. Both sorted, s.
     ///
     /// # Errors
     /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same,
@@ -101,13 +100,13 @@ impl Alignment {
     pub fn by_fit(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
         let in_step = Self::in_step(stamps_s, starts_s)?;
         let gap_s = usual_gap(starts_s).unwrap_or(0.0);
-        if in_step.residual_s <= EXACT_S.max(LEFT * LEFT * gap_s) {
+        if in_step.residual_s <= EXACT_S.max(MAX_RESIDUAL_SHARE * MAX_RESIDUAL_SHARE * gap_s) {
             return Ok(in_step);
         }
-        let least = (stamps_s.len().min(starts_s.len()) / 2).max(LEAST_PAIRS);
+        let least = (stamps_s.len().min(starts_s.len()) / 2).max(MIN_PAIRS);
         let with_gaps = paired(stamps_s, starts_s, least).filter(|fit| fit.residual_s < in_step.residual_s);
         let best = with_gaps.unwrap_or(in_step);
-        if best.residual_s > LEFT * gap_s {
+        if best.residual_s > MAX_RESIDUAL_SHARE * gap_s {
             return Err(AlignError::Unlike { left_s: best.residual_s, gap_s });
         }
         Ok(best)
@@ -116,10 +115,10 @@ impl Alignment {
     /// The shift by which one after another leaves least.
     fn in_step(stamps_s: &[f64], starts_s: &[f64]) -> Result<Self, AlignError> {
         let fewer = stamps_s.len().min(starts_s.len());
-        if fewer < LEAST_PAIRS {
+        if fewer < MIN_PAIRS {
             return Err(AlignError::Few { stamps: stamps_s.len(), starts: starts_s.len() });
         }
-        let overlap = (fewer / 2).max(LEAST_PAIRS);
+        let overlap = (fewer / 2).max(MIN_PAIRS);
         // Stamps before `skip` lie before the first start, starts before `skip` before the first stamp.
         let later_starts = (0..=starts_s.len() - overlap).map(|skip| fit(stamps_s, &starts_s[skip..]));
         let later_stamps = (1..=stamps_s.len() - overlap).map(|skip| fit(&stamps_s[skip..], starts_s));
@@ -129,7 +128,7 @@ impl Alignment {
         }
         fits.sort_by(|a, b| a.residual_s.total_cmp(&b.residual_s));
         // Of all that fit about as well, the one that pairs most.
-        let limit_s = RIVAL * fits[0].residual_s.max(EXACT_S);
+        let limit_s = MAX_RIVAL_RATIO * fits[0].residual_s.max(EXACT_S);
         fits.retain(|fit| fit.residual_s <= limit_s);
         let ambiguous = fits.len() > 1;
         fits.sort_by_key(|fit| core::cmp::Reverse(fit.pairs));
@@ -150,20 +149,21 @@ fn fit(stamps_s: &[f64], starts_s: &[f64]) -> Alignment {
     Alignment { scale, offset_s: y - scale * x, residual_s, pairs, ambiguous: false }
 }
 
-/// Stamps in a run: many tell more, few may be without a gap where every fifth is missing.
-const RUN: [usize; 2] = [12, 4];
-/// Runs of few are tried where less than this share of stamps, or of starts, pairs.
-const MOSTLY: f64 = 0.95;
-/// Runs tried, evenly picked.
-const RUNS: usize = 24;
-/// Lines looked at closer.
-const LINES: usize = 150;
-/// A stamp has a start where that is nearer than this share of the median gap.
-const NEAR: f64 = 0.1;
-/// How often pairs and line are put right in turn.
-const ROUNDS: usize = 8;
-/// Scales within this factor of that of the median gaps are tried: a run may also lie on every second start.
-const SCALES: f64 = 1.3;
+/// Stamps in a run: long ones decide better, short ones may be free of gaps where every fifth stamp is
+/// missing.
+const RUN_STAMPS: [usize; 2] = [12, 4];
+/// Short runs are tried if a smaller share of the stamps, or of the starts, pairs.
+const MIN_PAIRED_SHARE: f64 = 0.95;
+/// Most runs that are tried, evenly picked.
+const MAX_RUNS: usize = 24;
+/// Most lines that are refined.
+const MAX_LINES: usize = 150;
+/// A stamp pairs with a start nearer than this share of the median gap.
+const MAX_PAIR_DISTANCE: f64 = 0.1;
+/// Rounds in which pairs and line are refined in turn.
+const MAX_ROUNDS: usize = 8;
+/// Scales within this factor of that of the median gaps are tried: a run may also match every second start.
+const MAX_SCALE_RATIO: f64 = 1.3;
 
 /// The line that pairs most stamps, and of those with as many the one that leaves least; with whether another place pairs nearly
 /// as many. `None` where none pairs `least`.
@@ -172,12 +172,12 @@ pub(super) fn paired(stamps_s: &[f64], starts_s: &[f64], least: usize) -> Option
     let scale = gap_s / usual_gap(stamps_s)?;
     let fewer = stamps_s.len().min(starts_s.len());
     let mut fits: Vec<Alignment> = Vec::new();
-    for run in RUN {
+    for run in RUN_STAMPS {
         let lines = lines(stamps_s, starts_s, run.min(fewer), scale);
-        let settled = |line: &Alignment| settled(*line, stamps_s, starts_s, NEAR * gap_s);
+        let settled = |line: &Alignment| settled(*line, stamps_s, starts_s, MAX_PAIR_DISTANCE * gap_s);
         fits.par_extend(lines.par_iter().filter_map(settled));
         fits.sort_by(|a, b| b.pairs.cmp(&a.pairs).then(a.residual_s.total_cmp(&b.residual_s)));
-        if fits.first().is_some_and(|best| best.pairs as f64 >= MOSTLY * fewer as f64) {
+        if fits.first().is_some_and(|best| best.pairs as f64 >= MIN_PAIRED_SHARE * fewer as f64) {
             break;
         }
     }
@@ -195,17 +195,18 @@ fn lines(stamps_s: &[f64], starts_s: &[f64], run: usize, scale: f64) -> Vec<Alig
         let stamps = &stamps_s[at..at + run];
         starts_s.windows(run).map(move |starts| fit(stamps, starts))
     };
-    let mut lines: Vec<Alignment> = (0..RUNS).flat_map(|pick| laid(pick * last / (RUNS - 1))).collect();
-    lines.retain(|line| (scale / SCALES..scale * SCALES).contains(&line.scale));
+    let mut lines: Vec<Alignment> =
+        (0..MAX_RUNS).flat_map(|pick| laid(pick * last / (MAX_RUNS - 1))).collect();
+    lines.retain(|line| (scale / MAX_SCALE_RATIO..scale * MAX_SCALE_RATIO).contains(&line.scale));
     lines.sort_by(|a, b| a.residual_s.total_cmp(&b.residual_s));
-    lines.truncate(LINES);
+    lines.truncate(MAX_LINES);
     lines
 }
 
 /// A line fitted to the pairs it makes, until those stay; `None` where hardly any are left.
 fn settled(line: Alignment, stamps_s: &[f64], starts_s: &[f64], near_s: f64) -> Option<Alignment> {
     let mut line = line;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let nearest = |stamp: &f64| {
             let time_s = line.time_s(*stamp);
             let after = starts_s.partition_point(|start| *start < time_s);
@@ -218,7 +219,7 @@ fn settled(line: Alignment, stamps_s: &[f64], starts_s: &[f64], near_s: f64) -> 
         let mut pairs: Vec<(f64, f64)> = stamps_s.iter().filter_map(nearest).collect();
         pairs.dedup_by_key(|pair| pair.1);
         let (stamps, starts): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
-        if stamps.len() < LEAST_PAIRS {
+        if stamps.len() < MIN_PAIRS {
             return None;
         }
         let next = fit(&stamps, &starts);

@@ -1,6 +1,4 @@
-//! Noise-free power over time, as a simulator knows it before any instrument looks at it.
-//!
-//! Appending segments one after another.
+//! Noise-free power over time, as a simulator computes it.
 
 use crate::stats::PairSum;
 use thiserror::Error;
@@ -236,7 +234,7 @@ impl CurveBuilder {
         }
     }
 
-    /// Where the next segment will begin, s.
+    /// Begin of the next segment, s.
     pub fn now_s(&self) -> f64 {
         self.clock.value()
     }

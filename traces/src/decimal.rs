@@ -1,4 +1,4 @@
-//! Numbers as text.
+//! Shortest decimals of numbers.
 
 /// Appends a number as [`f64`]'s `Display` writes it: the shortest decimal that reads back the same, without an exponent.
 pub(crate) fn push(out: &mut Vec<u8>, value: f64) {

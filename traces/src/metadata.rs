@@ -1,9 +1,9 @@
-//! What a trace file says about itself beside its samples.
+//! Metadata of a trace: its origin and its marks.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a [`Mark`] stands for.
+/// Meaning of a [`Mark`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkKind {
@@ -20,22 +20,22 @@ pub enum MarkKind {
 pub struct Mark {
     /// When, s.
     pub time_s: f64,
-    /// What it stands for.
+    /// Its meaning.
     pub kind: MarkKind,
     /// Free text.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub label: String,
 }
 
-/// Where a trace comes from. Every field may be left out; keys of other programs are kept in `other`.
+/// Origin and marks of a trace. Every field is optional; keys of other programs go into `other`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Metadata {
     /// The instrument.
     pub device: String,
-    /// What was drawn.
+    /// The rendered scene.
     pub scene: String,
-    /// What it was drawn on.
+    /// The GPU or device that rendered it.
     pub platform: String,
     /// Seed of the noise; 0 for a recording.
     pub seed: u64,

@@ -41,7 +41,7 @@ pub struct TradeoffPoint {
 pub const DRAWS: u32 = 4096;
 
 /// Which points are on the frontier. With `idle_w`, the faster of two is charged idling for the time it saves (Paper IV,
-/// section 5): all are charged up to the slowest, which compares any two alike.
+/// section 5): all are charged up to the slowest, so that any two are compared in the same way.
 pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<TradeoffPoint> {
     let slowest_s = points.iter().map(|point| point.time_s).fold(0.0, f64::max);
     let compensated = |time_s: f64, energy_j: f64| energy_j + idle_w * (slowest_s - time_s);
@@ -146,7 +146,7 @@ pub enum ParetoError {
         path: PathBuf,
         /// The row, from 1.
         row: usize,
-        /// What is wrong.
+        /// The error.
         reason: String,
     },
 }
@@ -228,7 +228,7 @@ fn check_settings(
 /// Writes the settings of all groups as CSV.
 ///
 /// # Errors
-/// What `out` returns.
+/// The errors of `out`.
 pub fn write_csv(groups: &BTreeMap<String, Vec<TradeoffPoint>>, out: &mut impl Write) -> std::io::Result<()> {
     let mut rows = csv::Writer::from_writer(out);
     rows.write_record([

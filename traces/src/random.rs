@@ -13,7 +13,7 @@ pub fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// One stream of numbers, asked for by their counters.
+/// One stream of numbers, by their counters.
 #[derive(Clone, Copy, Debug)]
 pub struct Random {
     key: u64,

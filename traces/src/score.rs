@@ -1,9 +1,9 @@
-//! Found frames against true ones.
+//! Found frames compared with the ground truth.
 
 use crate::energy::{FrameEnergy, TrueFrame};
 use serde::Serialize;
 
-/// The tolerance of `shared/peers/traces/score.py`, s.
+/// Largest timing error of a start that counts as found, s.
 pub const TOLERANCE_S: f64 = 0.5e-3;
 
 /// How well found frames agree with true ones. Counts; the rates are functions of them.

@@ -1,18 +1,10 @@
-//! Power curves with known frames, for measuring how well frames are found.
+//! Power curves with known frames, to measure the frame finder.
 //!
-//! A model made for that purpose, of no one GPU. A frame is a front end, a clear, and draws that each have a length and a power;
-//! a [`Scenario`] says what makes finding its frames hard: free running or V-sync, idle gaps within the frame, changing content,
-//! clock steps, a launch transient, disturbances, drifting idle power. [`Scenario::scene`] draws it, and [`Recording`] says what a
-//! recorder of some rate, resolution and noise makes of that. All numbers that vary are functions of (seed, what, frame, draw), so
-//! a longer scene begins like a shorter one.
-//!
-//! What happens over time.
-//!
-//! A scenario as a power curve.
-//!
-//! What a recorder makes of a scene.
-//!
-//! Frame after frame of power.
+//! The model stands for no particular GPU. A frame is a front end, a clear, and draws with a length and a power each. A
+//! [`Scenario`] makes its frames hard to find: free running or V-sync, idle gaps within the frame, changing content, clock
+//! steps, a launch transient, disturbances, drifting idle power. [`Scenario::scene`] makes a curve of it, and [`Recording`]
+//! samples that with a recorder of some rate, resolution and noise. All random numbers are functions of (seed, purpose, frame,
+//! draw), so a longer scene begins like a shorter one.
 
 use crate::device::{Device, DeviceError, DeviceSpec, SampleError};
 use crate::energy::TrueFrame;
@@ -22,7 +14,7 @@ use crate::{Curve, CurveBuilder, CurveError};
 use core::f64::consts::TAU;
 use thiserror::Error;
 
-/// What makes a recording easy or hard.
+/// The properties that make a recording easy or hard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scenario {
     /// Its name.
@@ -82,12 +74,12 @@ pub struct Scene {
     pub curve: Curve,
     /// The frames, in order; each reaches to the next one's start, the last to `end_s`.
     pub truth: Vec<TrueFrame>,
-    /// Where the last one ends, s.
+    /// End of the last one, s.
     pub end_s: f64,
 }
 
 impl Scenario {
-    /// Draws so many frames, idle before and after them.
+    /// Makes a number of frames, with idle time before and after them.
     ///
     /// # Errors
     /// [`CurveError`] if a number of the scenario is not finite or so large that power would be negative.
@@ -205,7 +197,7 @@ const BURST_S: f64 = 0.09;
 const BURST_STEP_S: [f64; 2] = [0.4e-3, 3e-3];
 const BURST_W: f64 = 0.45;
 
-/// What varies, each with random numbers of its own.
+/// The random quantities, each with a stream of its own.
 #[derive(Clone, Copy)]
 enum Vary {
     Length,

@@ -10,8 +10,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// The most bytes a table may have.
-const LARGEST_BYTES: u64 = 1 << 28;
+/// Largest table, in bytes.
+const MAX_BYTES: u64 = 1 << 28;
 
 /// Why a table cannot be used.
 #[derive(Debug, Error)]
@@ -21,7 +21,7 @@ pub enum TableReadError {
     Absent {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         reason: String,
     },
     /// The file.
@@ -39,7 +39,7 @@ pub enum TableReadError {
         path: PathBuf,
         /// The column.
         column: String,
-        /// What there is.
+        /// The names found.
         found: String,
     },
     /// A value.
@@ -51,7 +51,7 @@ pub enum TableReadError {
         row: usize,
         /// The column.
         column: String,
-        /// What stands there.
+        /// The value found.
         value: String,
     },
 }
@@ -83,7 +83,7 @@ impl Table {
         if there.is_dir() {
             return Err(refuse("it is a folder; name a file in it".to_owned()));
         }
-        if there.len() > LARGEST_BYTES {
+        if there.len() > MAX_BYTES {
             return Err(refuse("a table of settings has to be smaller than 256 MiB".to_owned()));
         }
         let mut bytes = Vec::new();
@@ -165,16 +165,16 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 }
 
 fn from_parquet(path: &Path) -> Result<Content, String> {
-    let told = |error: parquet::errors::ParquetError| error.to_string();
+    let reason = |error: parquet::errors::ParquetError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;
-    let file = PagedFile::new(path, file).map_err(told)?;
+    let file = PagedFile::new(path, file).map_err(reason)?;
     check_packing(&file)?;
     // Columns of columns count as one, as they do in a row.
     let names = file.metadata().file_metadata().schema().get_fields();
     let names = names.iter().map(|field| field.name().to_owned()).collect();
     let mut rows = Vec::new();
-    for row in file.get_row_iter(None).map_err(told)? {
-        let row = row.map_err(told)?;
+    for row in file.get_row_iter(None).map_err(reason)? {
+        let row = row.map_err(reason)?;
         let text = |field: &Field| match field {
             Field::Str(text) => text.clone(),
             Field::Null => String::new(),

@@ -14,7 +14,7 @@ pub enum TimesError {
     NotFound {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// A folder where a file has to be.
@@ -28,7 +28,7 @@ pub enum TimesError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The file has no times.
@@ -53,7 +53,7 @@ pub enum TimesError {
     Unit {
         /// The file.
         path: PathBuf,
-        /// What is wrong with the unit.
+        /// The error of the unit.
         source: UnitError,
     },
     /// A line without a time.
@@ -65,7 +65,7 @@ pub enum TimesError {
         line: usize,
         /// Its text.
         text: String,
-        /// What is wrong with it.
+        /// The error.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Voltage and current over time, recorded or synthetic alike.
+//! Voltage and current over time, recorded or synthetic.
 
 use crate::metadata::Metadata;
 use core::ops::Range;
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// The largest |time| a trace may reach, s: its nanoseconds must fit an i64.
 pub const TIME_LIMIT_S: f64 = 9.0e9;
-/// The lowest and highest sample rate, Hz: above it, time stamps in whole nanoseconds could not be told apart.
+/// The lowest and highest sample rate, Hz: above it, time stamps in whole nanoseconds would be equal.
 pub const RATE_LIMITS_HZ: [f64; 2] = [1e-6, 1e8];
 
 /// Why a [`Trace`] cannot be built. Rows count samples from 1.
@@ -57,7 +57,7 @@ pub struct Trace {
     rate_hz: f64,
     start_s: f64,
     lost: Vec<Range<usize>>,
-    /// Where the trace comes from.
+    /// Origin and marks of the trace.
     pub metadata: Metadata,
 }
 
@@ -100,7 +100,7 @@ impl Trace {
         self
     }
 
-    /// Stretches that the recorder lost, in order.
+    /// Segments that the recorder lost, in order.
     pub fn lost(&self) -> &[Range<usize>] {
         &self.lost
     }
@@ -110,7 +110,7 @@ impl Trace {
         lost_samples(&self.lost)
     }
 
-    /// What the recorder lost and from when on, in words; `None` if nothing.
+    /// The losses of the recorder, in words; `None` without any.
     pub fn losses(&self) -> Option<String> {
         losses(&self.lost, |index| self.time_s(index))
     }
@@ -179,12 +179,12 @@ impl Trace {
     }
 }
 
-/// How many samples are in stretches that were lost.
+/// How many samples are in segments that were lost.
 pub(crate) fn lost_samples(lost: &[Range<usize>]) -> usize {
     lost.iter().map(ExactSizeIterator::len).sum()
 }
 
-/// Stretches that were lost, in words; `None` if there are none.
+/// Segments that were lost, in words; `None` if there are none.
 pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Option<String> {
     let first = lost.first()?;
     Some(format!(

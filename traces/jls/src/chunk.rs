@@ -155,9 +155,9 @@ const REPAIR: &str = "the Joulescope UI or pyjls mends a copy of it by opening i
 /// The header of a chunk.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChunkHeader {
-    /// Where the chunk begins.
+    /// Its place.
     pub at: u64,
-    /// Where the next chunk of its list begins.
+    /// The place of the next chunk of its list.
     pub next: Option<u64>,
     pub tag: u8,
     pub meta: u16,
@@ -166,7 +166,7 @@ pub(crate) struct ChunkHeader {
 }
 
 impl ChunkHeader {
-    /// Where the next chunk of the file begins.
+    /// The place of the next chunk of the file.
     pub fn end(&self) -> u64 {
         self.at + HEADER_BYTES as u64 + on_disk(self.bytes)
     }

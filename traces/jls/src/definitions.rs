@@ -22,13 +22,13 @@ const MAX_NAME_CHARS: usize = 64;
 /// Name and unit of a signal to be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SignalName<'a> {
-    /// What instruments call it: `current`, `voltage`.
+    /// As instruments name it: `current`, `voltage`.
     pub name: &'a str,
     /// The unit of its samples: `A`, `V`.
     pub unit: &'a str,
 }
 
-/// Where the heads of a signal's tracks are, to be written anew once it is known what they lead to.
+/// Places of the heads of a signal's tracks, which are overwritten once the places of its data are known.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Heads {
     pub samples: u64,
@@ -145,7 +145,7 @@ pub struct Signal {
     pub number: u16,
     /// The number of its source.
     pub source: u16,
-    /// What the instrument calls it.
+    /// As the instrument names it.
     pub name: String,
     /// The unit of its samples.
     pub unit: String,

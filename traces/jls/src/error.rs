@@ -1,4 +1,4 @@
-//! What can be wrong with a file.
+//! Errors of reading.
 
 use crate::sample::SAMPLE_TYPES;
 use std::io;
@@ -41,7 +41,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// What is wrong at a place in the file.
+    /// An error at a place in the file.
     pub(crate) fn damaged(at: u64, reason: &str) -> Self {
         Self::Damaged(format!("byte {at}: {reason}"))
     }

@@ -39,7 +39,7 @@ pub(crate) const SUMMARY: u8 = 4;
 pub(crate) const LEVELS: usize = 16;
 /// Zeros before the texts of a source.
 pub(crate) const SOURCE_TEXTS: usize = 64;
-/// Where the texts of a signal begin: numbers and zeros before.
+/// Place of the texts of a signal, after numbers and zeros.
 pub(crate) const SIGNAL_TEXTS: usize = 128;
 /// The type of samples in f32: float (4), 32 bits.
 pub(crate) const F32: u32 = 0x2004;

@@ -210,8 +210,8 @@ impl SampleReader {
         Ok(head.at)
     }
 
-    /// The next chunk of the same list. Where a mended list leads to another chunk it ends; that no samples are missing
-    /// before their end is seen by their numbers.
+    /// The next chunk of the same list. A list of a repaired file that leads to another chunk ends there; the numbers of samples
+    /// show whether any are missing before the end.
     fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, ReadError> {
         let next = self.file.follow(head)?;
         Ok(next.filter(|next| next.tag == head.tag && next.meta & SIGNAL_MASK == self.number))

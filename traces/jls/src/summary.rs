@@ -43,7 +43,7 @@ fn extreme(values: &[f32], below: impl Fn(f32, f32) -> bool) -> f32 {
 impl Moments {
     const NONE: Self = Self { count: 0, mean: 0.0, squares: 0.0, lowest: 0.0, highest: 0.0 };
 
-    /// Of samples.
+    /// The moments of samples.
     pub fn of(values: &[f32]) -> Self {
         // No sum of so few f32 overflows: it is finite if and only if all of them are.
         if lanes(values, |value| value).is_finite() {
@@ -67,7 +67,7 @@ impl Moments {
         }
     }
 
-    /// Of several parts together.
+    /// The moments of several parts together.
     pub fn together(parts: &[Self]) -> Self {
         parts.iter().fold(Self::NONE, |sum, part| sum.and(part))
     }

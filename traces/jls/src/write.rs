@@ -222,7 +222,7 @@ pub struct Writer<W, const N: usize> {
 
 impl<W: Write + Seek, const N: usize> Writer<W, N> {
     /// Begins a recording in an empty file: the name of the instrument, samples per second, the signals (numbered from
-    /// 1), and a JSON text of any content for whoever reads the file.
+    /// 1), and a JSON text of any content.
     ///
     /// # Errors
     /// If `out` cannot be written, or the text is longer than [`MAX_PAYLOAD_BYTES`].

@@ -1,6 +1,4 @@
-//! Packets that get lost between recorder and host.
-//!
-//! What was lost, between samples that were made.
+//! Packets that are lost between recorder and host, and the gaps they leave between samples.
 
 use super::Device;
 use crate::io::{TraceChunk, TraceWriter, WriteError};
@@ -8,13 +6,13 @@ use crate::random::Random;
 use crate::trace::on_line;
 use core::ops::Range;
 
-/// The random numbers of losses are none of those of the noise.
-const STREAM: u64 = 1;
+/// Stream of the random numbers of losses, apart from those of the noise.
+const RANDOM_STREAM: u64 = 1;
 
 impl Device {
-    /// The stretches of `samples` that do not arrive, neighbouring packets in one. Each packet but the first is lost or not by itself.
+    /// The segments of `samples` that do not arrive, neighbouring packets in one. Each packet but the first is lost or not by itself.
     pub(super) fn lost(&self, samples: usize) -> Vec<Range<usize>> {
-        let random = Random::new(self.spec.seed, STREAM);
+        let random = Random::new(self.spec.seed, RANDOM_STREAM);
         let length = self.spec.packet_samples as usize;
         let packets = 1..samples.div_ceil(length);
         let mut lost: Vec<Range<usize>> = Vec::new();
@@ -30,13 +28,13 @@ impl Device {
 }
 
 /// Samples of a gap that are made at once.
-const PIECE: usize = 1 << 16;
+const PIECE_SAMPLES: usize = 1 << 16;
 
-/// Takes samples as if none were lost, and hands them on with those that were put on the line between their neighbours, as
+/// Writes samples as if none were lost, with the lost ones on the line between their neighbours, as
 /// [`Trace::without`](crate::Trace::without) does.
 pub(super) struct Gaps<'a> {
     lost: &'a [Range<usize>],
-    /// The gap that is next, or in which the samples at hand are.
+    /// The next gap, or that of the current samples.
     at: usize,
     /// Voltage and current before it.
     before: [f32; 2],
@@ -80,8 +78,8 @@ impl<'a> Gaps<'a> {
     }
 
     fn bridge(&mut self, gap: Range<usize>, after: [f32; 2]) -> Result<(), WriteError> {
-        for from in gap.clone().step_by(PIECE) {
-            let places = from - gap.start..gap.len().min(from - gap.start + PIECE);
+        for from in gap.clone().step_by(PIECE_SAMPLES) {
+            let places = from - gap.start..gap.len().min(from - gap.start + PIECE_SAMPLES);
             let line = |channel: usize| -> Vec<f32> {
                 places
                     .clone()
@@ -122,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_has_the_gaps_and_whoever_reads_it_is_told_where() {
+    fn a_file_has_the_gaps_and_a_reader_reports_their_places() {
         let curve = Curve::new((0..=40).map(|i| f64::from(i) * 0.01).collect(), vec![12.0; 40]).unwrap();
         let trace = device(0.2, 3).sample(&curve, 0.0, 0.4).unwrap().trace;
         let first = trace.lost()[0].clone();
@@ -135,8 +133,8 @@ mod tests {
             let refused = io::read(&path, &ReadOptions::default()).unwrap_err();
             let at_gap = |row: u64| row == first.start as u64 + 1;
             assert!(matches!(refused, ReadError::Uneven { row, .. } if at_gap(row)), "{refused}");
-            let mended = io::read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
-            let gaps = mended.repairs.iter().filter(|repair| repair.code == "filled-gap");
+            let repaired = io::read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
+            let gaps = repaired.repairs.iter().filter(|repair| repair.code == "filled-gap");
             let gaps: Vec<u64> = gaps.map(|repair| repair.count).collect();
             let lost: Vec<u64> = trace
                 .lost()

@@ -1,10 +1,4 @@
 //! The data-acquisition device: from noise-free power to the voltage and current a recorder would write.
-//!
-//! The supply rail between its source and the point of measurement.
-//!
-//! One analog-to-digital converter.
-//!
-//! How far the energy of a trace can be from that of the curve it was sampled from.
 
 mod losses;
 mod resample;
@@ -39,7 +33,7 @@ impl Device {
         })
     }
 
-    /// What the device was built from.
+    /// Its specification.
     pub fn spec(&self) -> &DeviceSpec {
         &self.spec
     }
@@ -102,7 +96,7 @@ impl Rail {
     }
 }
 
-/// Rounds to the nearest of `2^bits` codes whose first and last stand for the ends of the range.
+/// Rounds to the nearest of `2^bits` codes from one end of the range to the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Quantizer {
     lowest: f64,

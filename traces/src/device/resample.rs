@@ -1,4 +1,4 @@
-//! Sampling a trace again, piece by piece.
+//! Sampling a recorded trace again, in pieces.
 
 use super::Device;
 use super::losses::Gaps;
@@ -11,13 +11,14 @@ use crate::trace::{check_times, losses, lost_at_end, lost_samples};
 use core::ops::Range;
 use rayon::prelude::*;
 
-/// Mean powers that are turned into samples at once, and by a thread.
-const PIECE: usize = 1 << 16;
-const TASK: usize = 1 << 12;
-/// The most samples: none is held, but somebody has to wait for them.
-const MOST: f64 = (1_u64 << 36) as f64;
+/// Mean powers that are converted at once.
+const PIECE_SAMPLES: usize = 1 << 16;
+/// Mean powers that a thread converts at once.
+const TASK_SAMPLES: usize = 1 << 12;
+/// Most samples: they are not held in memory, but take time.
+const MAX_SAMPLES: f64 = (1_u64 << 36) as f64;
 
-/// What a coarser device would have recorded of a trace: the trace is read again whenever samples are asked for, and
+/// A trace as a coarser device would have recorded it: the original is read again whenever samples are needed, and
 /// neither is in memory. The samples are those of [`Device::resample`], to the last bit.
 pub struct Resampled<'a> {
     device: &'a Device,
@@ -34,14 +35,14 @@ pub struct Resampled<'a> {
 
 impl Device {
     /// Samples a trace as if its power were drawn from the device's rail. It is gone through once, so that whatever is
-    /// wrong is known before a sample is asked for.
+    /// wrong is known before the first sample.
     ///
     /// # Errors
     /// [`WriteError::Source`] as [`Device::resample`], and [`WriteError::Read`] if the trace cannot be read.
     pub fn resample_in_pieces<'a>(&'a self, trace: &'a dyn TraceReader) -> Result<Resampled<'a>, WriteError> {
         let TraceHeader { start_s, metadata, .. } = trace.header();
         let end_s = trace.header().end_s();
-        let count = self.periods([start_s, end_s], [start_s, end_s], MOST);
+        let count = self.periods([start_s, end_s], [start_s, end_s], MAX_SAMPLES);
         let samples = count.as_ref().map_or(0, |count| *count);
         let lost = self.lost(samples);
         let header = TraceHeader {
@@ -66,7 +67,7 @@ impl Device {
 }
 
 impl Resampled<'_> {
-    /// What the device lost and from when on, in words; `None` if nothing.
+    /// The losses of the device, in words; `None` without any.
     pub fn losses(&self) -> Option<String> {
         losses(&self.lost, |index| self.header.time_s(index as u64))
     }
@@ -94,7 +95,7 @@ struct Pass<'a> {
     device: &'a Device,
     of: TraceHeader,
     made: &'a TraceHeader,
-    /// Energy before the sample at hand, and before the mean that comes next, J.
+    /// Energy before the current sample, and before the next mean, J.
     energy: PairSum,
     before: PairSum,
     /// Means so far, and those not yet turned into samples, W.
@@ -119,7 +120,7 @@ impl<'a> Pass<'a> {
             energy: PairSum::default(),
             before: PairSum::default(),
             means: 0,
-            means_w: Vec::with_capacity(PIECE),
+            means_w: Vec::with_capacity(PIECE_SAMPLES),
             low_pass: device.low_pass(),
             gaps: Gaps::new(lost, into),
             clipped_currents: 0,
@@ -148,7 +149,7 @@ impl<'a> Pass<'a> {
             let energy = self.energy.plus_span(begin_s, time_s, power_w);
             self.means_w.push(energy.minus(self.before) * rate_hz);
             (self.before, self.means) = (energy, self.means + 1);
-            if self.means_w.len() == PIECE {
+            if self.means_w.len() == PIECE_SAMPLES {
                 self.convert()?;
             }
         }
@@ -167,7 +168,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Turns the means at hand into samples, side by side, and hands them on.
+    /// Converts the pending means to samples, in parallel, and writes them.
     fn convert(&mut self) -> Result<(), WriteError> {
         let mut means_w = std::mem::take(&mut self.means_w);
         if self.edge.is_none() && self.power.is_none() && self.overload.is_none() {
@@ -176,13 +177,13 @@ impl<'a> Pass<'a> {
             }
             let (device, start_s, first) =
                 (self.device, self.made.start_s, self.means - means_w.len() as u64);
-            let tasks = means_w.par_chunks(TASK).enumerate();
+            let tasks = means_w.par_chunks(TASK_SAMPLES).enumerate();
             let made: Vec<_> = tasks
-                .map(|(task, means_w)| device.convert(first + (task * TASK) as u64, means_w, start_s))
+                .map(|(task, means_w)| device.convert(first + (task * TASK_SAMPLES) as u64, means_w, start_s))
                 .collect();
             for (task, channels) in made.into_iter().enumerate() {
                 match channels {
-                    Ok(channels) => self.hand_on(first + (task * TASK) as u64, &channels)?,
+                    Ok(channels) => self.hand_on(first + (task * TASK_SAMPLES) as u64, &channels)?,
                     Err(error) => {
                         self.overload = Some(error);
                         break;
@@ -207,7 +208,7 @@ impl<'a> Pass<'a> {
         self.gaps.finish()
     }
 
-    /// What was wrong, in the order in which a trace in memory is checked.
+    /// The first errors, in the order in which a trace in memory is checked.
     fn check(&self, periods: Option<SampleError>) -> Result<(), SampleError> {
         let curve = self.edge.clone().or(self.power.clone()).map(SampleError::Curve);
         curve.or(periods).or(self.overload.clone()).map_or(Ok(()), Err)
@@ -215,8 +216,8 @@ impl<'a> Pass<'a> {
 }
 
 impl TraceWriter for Pass<'_> {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-        (stretch.first..).zip(stretch.powers_w()).try_for_each(|(index, power_w)| self.step(index, power_w))
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        (chunk.first..).zip(chunk.powers_w()).try_for_each(|(index, power_w)| self.step(index, power_w))
     }
 }
 
@@ -229,7 +230,7 @@ mod tests {
     use crate::trace::Trace;
     use proptest::prelude::*;
 
-    /// Puts pieces together again.
+    /// Joins pieces.
     #[derive(Default)]
     struct All {
         voltage_v: Vec<f32>,
@@ -238,13 +239,13 @@ mod tests {
     }
 
     impl TraceWriter for All {
-        fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-            assert_eq!(stretch.first, self.voltage_v.len() as u64);
-            if stretch.lost {
-                self.lost.extend(stretch.first as usize..stretch.first as usize + stretch.len());
+        fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+            assert_eq!(chunk.first, self.voltage_v.len() as u64);
+            if chunk.lost {
+                self.lost.extend(chunk.first as usize..chunk.first as usize + chunk.len());
             }
-            self.voltage_v.extend_from_slice(stretch.voltage_v);
-            self.current_a.extend_from_slice(stretch.current_a);
+            self.voltage_v.extend_from_slice(chunk.voltage_v);
+            self.current_a.extend_from_slice(chunk.current_a);
             Ok(())
         }
     }

@@ -1,6 +1,4 @@
-//! What a device is described by.
-//!
-//! Recorders whose range fits what they record.
+//! Specification of a device, and ranges that fit a signal.
 
 use crate::io::{TraceChunk, TraceReader, TraceWriter, WriteError};
 use crate::trace::RATE_LIMITS_HZ;
@@ -18,7 +16,7 @@ pub struct DeviceError {
     pub field: &'static str,
     /// Its value.
     pub value: f64,
-    /// What it must be.
+    /// The valid range.
     pub must: &'static str,
 }
 
@@ -45,13 +43,13 @@ pub struct DeviceSpec {
     pub voltage_range_v: [f64; 2],
     /// Resolution of both converters, 1 to 24 bits.
     pub bits: u32,
-    /// What the current is multiplied by on the way: 1 for a device without error of gain.
+    /// Gain of the current: 1 for a device without gain error.
     pub current_gain: f64,
-    /// What is added to the current, A.
+    /// Offset of the current, A.
     pub current_offset_a: f64,
-    /// What the voltage is multiplied by on the way.
+    /// Gain of the voltage.
     pub voltage_gain: f64,
-    /// What is added to the voltage, V.
+    /// Offset of the voltage, V.
     pub voltage_offset_v: f64,
     /// A voltage by specification, V, recorded in place of a measured one: what the rail sags is then missed.
     pub specified_voltage_v: Option<f64>,
@@ -167,18 +165,18 @@ impl Peaks {
 }
 
 impl TraceWriter for Peaks {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
         let largest = |most: f64, numbers: &[f32]| {
             numbers.iter().map(|number| f64::from(number.abs())).fold(most, f64::max)
         };
-        self.voltage_v = largest(self.voltage_v, stretch.voltage_v);
-        self.current_a = largest(self.current_a, stretch.current_a);
-        self.power_w = stretch.powers_w().map(f64::abs).fold(self.power_w, f64::max);
+        self.voltage_v = largest(self.voltage_v, chunk.voltage_v);
+        self.current_a = largest(self.current_a, chunk.current_a);
+        self.power_w = chunk.powers_w().map(f64::abs).fold(self.power_w, f64::max);
         Ok(())
     }
 }
 
-/// What a range holds above the peak, as a factor.
+/// Ratio of a range to the peak.
 const HEADROOM: f64 = 1.25;
 
 /// Ranges of currents, A.

@@ -183,7 +183,7 @@ pub struct InverseUnits {
 }
 
 impl InverseUnits {
-    /// Of some frames.
+    /// The inverse units of some frames.
     pub fn of(frames: &[FrameEnergy], pixels: Option<u64>) -> Self {
         let energies: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
         let count = energies.len() as f64;

@@ -6,7 +6,7 @@ use crate::stats::about_mean;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// A table of frames in a few numbers. Averages are over frames; for joules per pixel divide by the pixels.
+/// Summary of a table of frames. Averages are over frames; for joules per pixel divide by the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// How many frames.
@@ -17,14 +17,14 @@ pub struct Summary {
     pub energy_j: Spread,
     /// Duration of a frame, s.
     pub duration_s: Spread,
-    /// Mean power of a frame, W; frames count alike, however long they are.
+    /// Mean power of a frame, W; each frame counts once, however long.
     pub power_w: Spread,
     /// All energy over all time, W.
     pub overall_power_w: f64,
 }
 
 impl Summary {
-    /// Of some frames; `None` for no frames.
+    /// The summary of some frames; `None` for no frames.
     pub fn of(frames: &[FrameEnergy]) -> Option<Self> {
         let spread =
             |value: fn(&FrameEnergy) -> f64| Spread::of(&frames.iter().map(value).collect::<Vec<_>>());
@@ -41,8 +41,8 @@ impl Summary {
     }
 }
 
-/// The frames without a last one that ends with the trace, or at an end mark, rather than where a frame would: it is much longer or
-/// shorter than the others.
+/// The frames without an incomplete last one, which ends with the trace or at an end mark and is much longer or shorter than the
+/// others.
 pub fn whole(frames: &[FrameEnergy]) -> &[FrameEnergy] {
     let cut = |flags: Flags| {
         flags.contains(Flag::Last) && (flags.contains(Flag::Long) || flags.contains(Flag::Short))
@@ -53,7 +53,7 @@ pub fn whole(frames: &[FrameEnergy]) -> &[FrameEnergy] {
     }
 }
 
-/// Runs taken together.
+/// Several runs, pooled.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Pooled {
     /// How many runs.
@@ -80,48 +80,48 @@ pub fn pooled(runs: &[Vec<f64>]) -> Option<Pooled> {
     Some(Pooled { runs: runs.len(), values, mean, deviation })
 }
 
-/// How many frames on either side tell what is usual.
-const AROUND: usize = 15;
-/// Values a thread goes along at once.
-const TASK: usize = 4096;
-/// A frame this many deviations off is an outlier; one beside it from the second number on: a disturbance that lasts for
-/// several frames touches the outermost ones only in part.
-const FAR: [f64; 2] = [5.0, 2.5];
-/// The least deviation, as a share of the median: frames that are all alike differ by rounding alone.
-const LEAST: f64 = 1e-3;
-/// Median absolute deviation to standard deviation of a normal distribution.
-const NORMAL: f64 = 1.4826;
+/// Frames on either side that show what is usual.
+const NEIGHBOURS: usize = 15;
+/// Values that a thread handles at once.
+const TASK_VALUES: usize = 4096;
+/// Deviations from which a frame is an outlier, and from which one beside an outlier is: a disturbance of
+/// several frames covers the outermost ones only in part.
+const OUTLIER_DEVIATIONS: [f64; 2] = [5.0, 2.5];
+/// Least deviation, as a share of the median: equal frames differ by rounding alone.
+const MIN_DEVIATION: f64 = 1e-3;
+/// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
+const MAD_TO_DEVIATION: f64 = 1.4826;
 
-/// Whether each of `values` is an outlier among its neighbours: off their median by so many of their median absolute
+/// Whether each of `values` is an outlier among its neighbours: off their median by several of their median absolute
 /// deviations (Hampel 1974). Fewer than five values have none.
 pub fn outliers(values: &[f64]) -> Vec<bool> {
     if values.len() < 5 {
         return vec![false; values.len()];
     }
-    let tasks = (0..values.len()).into_par_iter().step_by(TASK);
+    let tasks = (0..values.len()).into_par_iter().step_by(TASK_VALUES);
     let deviations: Vec<f64> = tasks.flat_map_iter(|from| deviations(values, from)).collect();
-    let mut out: Vec<bool> = deviations.iter().map(|z| z.abs() > FAR[0]).collect();
+    let mut out: Vec<bool> = deviations.iter().map(|z| z.abs() > OUTLIER_DEVIATIONS[0]).collect();
     let core = out.clone();
     for index in 0..values.len() {
         let beside = [index.checked_sub(1), Some(index + 1)].into_iter().flatten();
         let same_way = |other: usize| deviations.get(other).is_some_and(|z| z * deviations[index] > 0.0);
-        out[index] |= deviations[index].abs() > FAR[1]
+        out[index] |= deviations[index].abs() > OUTLIER_DEVIATIONS[1]
             && beside.into_iter().any(|other| core.get(other) == Some(&true) && same_way(other));
     }
     out
 }
 
-/// How many deviations each value of one task is off those around it.
+/// Deviation of each value of one task from its neighbours, in their deviations.
 fn deviations(values: &[f64], from: usize) -> impl Iterator<Item = f64> + '_ {
     let mut around = Around::new(values, from);
-    (from..values.len().min(from + TASK)).map(move |index| {
+    (from..values.len().min(from + TASK_VALUES)).map(move |index| {
         around.go_to(index);
         let (usual, spread) = around.usual_and_spread();
         (values[index] - usual) / spread
     })
 }
 
-/// The values around one of many, in order of their size: going on by one exchanges one.
+/// The neighbours of a value, sorted: moving on by one value exchanges one.
 struct Around<'a> {
     values: &'a [f64],
     from: usize,
@@ -130,8 +130,8 @@ struct Around<'a> {
 
 impl<'a> Around<'a> {
     fn new(values: &'a [f64], index: usize) -> Self {
-        let width = (2 * AROUND + 1).min(values.len());
-        let from = index.saturating_sub(AROUND).min(values.len() - width);
+        let width = (2 * NEIGHBOURS + 1).min(values.len());
+        let from = index.saturating_sub(NEIGHBOURS).min(values.len() - width);
         let mut sorted = values[from..from + width].to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         Self { values, from, sorted }
@@ -139,7 +139,7 @@ impl<'a> Around<'a> {
 
     fn go_to(&mut self, index: usize) {
         let width = self.sorted.len();
-        while self.from < index.saturating_sub(AROUND).min(self.values.len() - width) {
+        while self.from < index.saturating_sub(NEIGHBOURS).min(self.values.len() - width) {
             let [old, new] = [self.values[self.from], self.values[self.from + width]];
             let place = |sorted: &[f64], value: f64| sorted.partition_point(|x| x.total_cmp(&value).is_lt());
             self.sorted.remove(place(&self.sorted, old));
@@ -161,7 +161,7 @@ impl<'a> Around<'a> {
             farthest = next[side];
             next[side] = apart(if side == 0 { below.next() } else { above.next() }, usual);
         }
-        (usual, (NORMAL * farthest).max(LEAST * usual.abs()).max(f64::MIN_POSITIVE))
+        (usual, (MAD_TO_DEVIATION * farthest).max(MIN_DEVIATION * usual.abs()).max(f64::MIN_POSITIVE))
     }
 }
 
@@ -170,10 +170,10 @@ fn apart(value: Option<&f64>, usual: f64) -> f64 {
     value.map_or(f64::INFINITY, |value| (value - usual).abs())
 }
 
-/// A change of the mean must be this many of its standard errors to count.
-const CLEAR: f64 = 5.0;
+/// Least change of the mean that counts, in its standard errors.
+const MIN_STANDARD_ERRORS: f64 = 5.0;
 
-/// Where the mean settles.
+/// The end of the warm-up.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WarmUp {
     /// Frames to discard; 0 where there is no clear change.
@@ -213,7 +213,11 @@ pub fn warm_up(energies_j: &[f64]) -> WarmUp {
     let error_j = libm::sqrt(variance * (1.0 / split as f64 + 1.0 / (count - split) as f64));
     let clearness = excess_j / error_j.max(1e-12 * late_j.abs()).max(f64::MIN_POSITIVE);
     // A split after one frame is that frame's own oddness.
-    WarmUp { frames: if clearness > CLEAR && split > 1 { split } else { 0 }, excess_j, clearness }
+    WarmUp {
+        frames: if clearness > MIN_STANDARD_ERRORS && split > 1 { split } else { 0 },
+        excess_j,
+        clearness,
+    }
 }
 
 /// Mean energy of the frames left when the first `d` are discarded, J, for each `d` that leaves one.
@@ -275,18 +279,19 @@ mod tests {
 
     #[test]
     fn oracle_windows_that_go_along_are_those_taken_anew() {
-        for count in [5, 6, 30, 31, 32, 2 * TASK + 3] {
+        for count in [5, 6, 30, 31, 32, 2 * TASK_VALUES + 3] {
             let values: Vec<f64> = (0..count).map(|i| ((i * 7919) % 101) as f64 / 7.0 - 3.0).collect();
-            let tasks = (0..count).step_by(TASK);
+            let tasks = (0..count).step_by(TASK_VALUES);
             let found: Vec<f64> = tasks.flat_map(|from| deviations(&values, from)).collect();
-            let width = (2 * AROUND + 1).min(count);
+            let width = (2 * NEIGHBOURS + 1).min(count);
             for (index, found) in found.into_iter().enumerate() {
-                let from = index.saturating_sub(AROUND).min(count - width);
+                let from = index.saturating_sub(NEIGHBOURS).min(count - width);
                 let mut around = values[from..from + width].to_vec();
                 let usual = upper_median(&mut around);
                 around.iter_mut().for_each(|value| *value = (*value - usual).abs());
-                let spread =
-                    (NORMAL * upper_median(&mut around)).max(LEAST * usual.abs()).max(f64::MIN_POSITIVE);
+                let spread = (MAD_TO_DEVIATION * upper_median(&mut around))
+                    .max(MIN_DEVIATION * usual.abs())
+                    .max(f64::MIN_POSITIVE);
                 assert_eq!(found, (values[index] - usual) / spread, "{index} of {count}");
             }
         }

@@ -1,11 +1,11 @@
-//! Energies of samples that are seen in passing: by the rule of [`PowerIntegral`](super::PowerIntegral), to the last bit.
+//! Energies of a trace of any length, in one pass: by the rule of [`PowerIntegral`](super::PowerIntegral), to the last bit.
 
 use super::FrameEnergy;
 use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};
 use crate::stats::PairSum;
 
 /// Energy of each of some spans of time, from one time (s) to another, J; negative where they are the other way round.
-/// All samples are asked for once.
+/// All samples are read once.
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
@@ -18,7 +18,7 @@ pub fn energies_j(source: &dyn TraceReader, spans_s: &[(f64, f64)]) -> Result<Ve
 
 /// Running sums of power up to given places.
 pub(crate) struct Sums {
-    /// Places in samples, in order, and the number of the sum that is asked for.
+    /// Places in samples, in order, and the number of the sum.
     places: Vec<(f64, u32)>,
     next: usize,
     last: u64,
@@ -48,9 +48,9 @@ impl Sums {
 }
 
 impl TraceWriter for Sums {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
         let mut wanted = self.next_sample();
-        for (sample, power_w) in (stretch.first..).zip(stretch.powers_w()) {
+        for (sample, power_w) in (chunk.first..).zip(chunk.powers_w()) {
             while wanted == sample {
                 let (place, slot) = self.places[self.next];
                 self.sums_w[slot as usize] = self.sum_w.plus_product(power_w, place - sample as f64);
@@ -63,8 +63,8 @@ impl TraceWriter for Sums {
     }
 }
 
-/// When the work of each frame ends, s: the end of its last sample above `watts`; its start where there is none. What the
-/// old method, from begin to finish, takes as the end of the frame. Frames are in order and apart.
+/// When the work of each frame ends, s: the end of its last sample above `watts`; its start where there is none. This is
+/// the end of the frame by the older rule, from begin to finish. Frames are in order and apart.
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
@@ -93,8 +93,8 @@ struct Lasts {
 }
 
 impl TraceWriter for Lasts {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-        for (sample, power_w) in (stretch.first..).zip(stretch.powers_w()) {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        for (sample, power_w) in (chunk.first..).zip(chunk.powers_w()) {
             while self.ranges.get(self.at).is_some_and(|(_, end)| *end <= sample) {
                 self.at += 1;
             }
@@ -127,9 +127,9 @@ struct Levels {
 }
 
 impl TraceWriter for Levels {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-        let skip = (stretch.first.next_multiple_of(self.step) - stretch.first) as usize;
-        self.watts.extend(stretch.powers_w().skip(skip).step_by(self.step as usize));
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        let skip = (chunk.first.next_multiple_of(self.step) - chunk.first) as usize;
+        self.watts.extend(chunk.powers_w().skip(skip).step_by(self.step as usize));
         Ok(())
     }
 }

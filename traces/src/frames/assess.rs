@@ -1,7 +1,5 @@
-//! How sure the finder is, and what it has to say about the result as a whole.
-//!
-//! Work before the first start found and after the last frame: a sequence that begins late or ends early says nothing of what it left
-//! out.
+//! Confidence of each start, and warnings about the result as a whole: also about work before the first start and after
+//! the last frame.
 
 use super::found::{Flag, Found, FrameStart};
 use super::marks::{Marks, Placement, Window};
@@ -42,7 +40,7 @@ pub(super) fn conclude(
     conclude_at(trace.rate_hz(), marks, placement, starts, threshold)
 }
 
-/// As [`conclude`], of samples at `rate_hz` that need not be at hand.
+/// As [`conclude`], of samples at `rate_hz` that need not be in memory.
 pub(crate) fn conclude_at(
     rate_hz: f64,
     marks: &Marks,
@@ -161,7 +159,7 @@ const BUSY_LEVEL: f64 = 0.5;
 /// Segments per usual length of a frame; the lowest power is that of a segment.
 const SEGMENTS_PER_LENGTH: usize = 20;
 
-/// How many usual lengths of work lie beyond the starts, whose places are in samples and in order. `None` for fewer than three.
+/// Work beyond the starts, in usual lengths of a frame; places are in samples and in order. `None` for fewer than three starts.
 fn uncovered_lengths(power: &[f64], starts: &[f64]) -> Option<usize> {
     let (&first, &last) = starts.first().zip(starts.last())?;
     let mut gaps: Vec<f64> = starts.windows(2).map(|two| two[1] - two[0]).collect();

@@ -1,10 +1,4 @@
-//! Finding frames, by the method asked for.
-//!
-//! Which method, where none was asked for.
-//!
-//! A mark proposed by the program: of the steepest rises, the one whose likes are most evenly spaced.
-//!
-//! How alike frames are to their neighbours: starts that were put where there is nothing have windows with nothing in common.
+//! Finding frames: by a given method, by the most suitable one, or from a mark that the program proposes.
 
 use super::found::{Found, Method, marked_starts};
 use super::marks::{MarkError, Marks, default_window};
@@ -88,7 +82,7 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
         return Ok(squares);
     }
     if squares.starts.len() < MIN_TRACKED_STARTS {
-        // A mark whose like comes back seldom finds itself alone among frames that are plainly there.
+        // A mark that hardly any frame resembles may be alone among frames that are plainly there.
         let tracked =
             (trace.samples() <= MAX_TRACKED_SAMPLES).then(|| find_tracked(trace, marks)).transpose()?;
         let plain = |tracked: &Found| enough_starts(tracked, &squares) && even_and_similar(trace, tracked);
@@ -104,8 +98,8 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     if long_and_clear { Ok(squares) } else { find_tracked(trace, marks) }
 }
 
-/// Whether tracking found starts enough to be asked how plain they are: many, or fewer than the sum of squares where that doubts itself,
-/// over as long a stretch.
+/// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a warning, over as
+/// long a part of the trace.
 fn enough_starts(tracked: &Found, squares: &Found) -> bool {
     let count = tracked.starts.len();
     let last_s = span_s(tracked) / count.max(2).saturating_sub(1) as f64;
@@ -114,13 +108,13 @@ fn enough_starts(tracked: &Found, squares: &Found) -> bool {
         || (squares.threshold.clarity() < 1.0 && (MIN_STARTS..squares.starts.len()).contains(&count) && over)
 }
 
-/// Whether starts keep time and are followed by the like.
+/// Whether starts keep the period, and frames are similar to their neighbours.
 fn even_and_similar(trace: &Trace, found: &Found) -> bool {
     let [even, similar] = PLAIN_COVERAGE_AND_SIMILARITY;
     covered_s(found) >= even * span_s(found) && neighbour_similarity(trace, found) >= similar
 }
 
-/// That of the results whose even beat covers most time.
+/// The result that covers most time at an even period.
 fn most_even(first: Found, others: [Found; 2]) -> Found {
     others.into_iter().fold(first, |best, other| {
         let more_s = covered_s(&other) - covered_s(&best);
@@ -147,9 +141,9 @@ const MAX_RISES: usize = 8;
 pub struct Proposal {
     /// The frame start, s.
     pub mark_s: f64,
-    /// How evenly the starts like it divide the stretch that was looked at, 0 to 1.
+    /// How evenly the starts like it divide the segment that was looked at, 0 to 1.
     pub regularity: f64,
-    /// How many starts like it there are in that stretch.
+    /// How many starts like it there are in that segment.
     pub alike: usize,
     /// How many rises were tried.
     pub tried: usize,
@@ -171,7 +165,7 @@ pub fn propose(trace: &Trace) -> Option<Proposal> {
         let (regularity, alike) = (found.threshold.regularity, found.starts.len());
         Some(Proposal { mark_s, regularity, alike, tried })
     });
-    // Of equally even ones the rarer: a start comes once a frame, what is alike within frames more often.
+    // Of equally even ones the rarer: a start occurs once per frame, similar parts of frames more often.
     judged.max_by(|a, b| {
         let even = |p: &Proposal| libm::round(p.regularity * 20.0);
         even(a).total_cmp(&even(b)).then(b.alike.cmp(&a.alike)).then(b.mark_s.total_cmp(&a.mark_s))
@@ -224,7 +218,7 @@ pub(super) fn neighbour_similarity(trace: &Trace, found: &Found) -> f64 {
     upper_median(&mut all)
 }
 
-/// Of two lists of equal length; 0 where one is constant.
+/// The correlation of two lists of equal length; 0 if one is constant.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
     let (mean_a, mean_b) = (mean(a), mean(b));
@@ -264,11 +258,11 @@ mod tests {
 
     #[test]
     fn a_mark_whose_like_does_not_come_back_is_tracked_if_frames_are_plainly_there() {
-        // After one of idle, each frame of 400 samples is busy for six stretches of 50, whose levels go their own ways from frame to frame.
+        // After one of idle, each frame of 400 samples is busy for six segments of 50, whose levels go their own ways from frame to frame.
         let power = |sample: usize| {
-            let (frame, stretch) = ((sample / 400) as f32, sample % 400 / 50);
-            let level = 3.0 + 2.0 * (0.1 * frame + 2.1 * stretch as f32).sin();
-            0.1 * noise(sample) + if sample >= 400 && stretch < 6 { level } else { 0.5 }
+            let (frame, segment) = ((sample / 400) as f32, sample % 400 / 50);
+            let level = 3.0 + 2.0 * (0.1 * frame + 2.1 * segment as f32).sin();
+            0.1 * noise(sample) + if sample >= 400 && segment < 6 { level } else { 0.5 }
         };
         let found = found(power, 400 * 60, 400 * 30);
         assert_eq!((found.method, found.starts.len()), (Method::Tracking, 59));

@@ -1,8 +1,4 @@
-//! What the finder found.
-//!
-//! What is remarkable about a frame.
-//!
-//! The ways to find frames.
+//! The result of the frame finder: starts, frames, their flags, and the method.
 
 use super::marks::{Placed, Placement, Window};
 use super::threshold::Threshold;
@@ -33,11 +29,11 @@ pub struct FrameSpan {
     pub end_s: f64,
     /// The lower confidence of its two ends (of its start for the last frame).
     pub confidence: f64,
-    /// What is remarkable about it.
+    /// Its flags.
     pub flags: Flags,
 }
 
-/// What the finder found.
+/// The result of the frame finder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The starts, in order.
@@ -52,7 +48,7 @@ pub struct Found {
     pub window: Window,
     /// Which minima were taken, and why.
     pub threshold: Threshold,
-    /// Where the result stands on weak ground.
+    /// Warnings about the result.
     pub warnings: Vec<Warning>,
 }
 
@@ -88,9 +84,9 @@ pub enum Flag {
     Merged,
     /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
     Split,
-    /// Its length breaks the even beat of the frames around it: one of its ends may be misplaced.
+    /// Its length deviates from the even period of its neighbours: one of its ends may be misplaced.
     Odd,
-    /// Of fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of it and more.
+    /// It has fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of it and more.
     Coarse,
 }
 
@@ -108,7 +104,7 @@ impl Flag {
         Self::Coarse,
     ];
 
-    /// Those that tell of ends that may not be where they are said to be.
+    /// Flags of frames whose ends may be misplaced.
     pub const DOUBTS: [Self; 7] =
         [Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split, Self::Odd, Self::Coarse];
 
@@ -172,10 +168,11 @@ pub enum Method {
     SumOfSquares,
     /// The same by z-normalized distance: likeness of shape, whatever the level and the scale of power.
     Normalized,
-    /// The sequence of starts that resembles several templates, by shape and by squares, itself, and an even beat best.
+    /// The sequence of starts with the most evidence: similar to several templates, by shape and by squares, to each other, and
+    /// at an even period.
     Tracking,
-    /// Tracking; with fewer than 20 samples in the window, of tracking, the sum of squares and normalized that with the most even beat,
-    /// with fewer than 8 the sum of squares. That also where there are fewer than 16 frames, or more than 16 million samples and no doubt.
+    /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and normalized; with fewer
+    /// than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or more than 16 million samples without a warning.
     #[default]
     Auto,
 }

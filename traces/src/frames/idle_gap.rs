@@ -1,14 +1,12 @@
-//! Doubt where the rest that frames begin in is another than at the mark.
+//! Lower confidence where the idle gap before a frame differs from that at the mark, or is missing.
 //!
-//! A frame begins in little power, between the end of the one before and its own draws. What is aligned are the draws. If the rest
-//! before them has become longer, power does not tell whether the wait for the frame has, or its own quiet beginning (the front end):
-//! the start may be anywhere in what was added. So starts whose rest begins or ends at another distance than it did at the mark, by
-//! more than a start may be off, are in doubt.
+//! A frame begins in little power, between the end of the frame before and its own draws. The alignment follows the draws.
 //!
-//! Doubt where a start, unlike its neighbours, has no rest.
-//!
-//! A frame begins in little power, after the end of the one before. What was found amidst work, where others near have a rest, may lie
-//! within a frame: where a frame takes two ticks of the display at a slow clock, its middle is on a tick, too.
+//! - A changed gap: if the gap before the draws has become longer, power does not show whether the wait for the frame has,
+//!   or its own quiet beginning (the front end). The start may be anywhere in the added time. Starts whose gap begins or
+//!   ends at another distance than at the mark are suspect.
+//! - A missing gap: a start amidst work, where others nearby have an idle gap, may lie within a frame. Where a frame takes
+//!   two ticks of the display at a slow clock, its middle is on a tick, too.
 
 use crate::stats::{mean, nth_smallest, upper_median};
 use rayon::prelude::*;
@@ -18,13 +16,13 @@ const REACH_SHARE: f64 = 0.32;
 /// Shares of the window before and after the start in which the lowest power is searched.
 const LOWEST_SHARES: [f64; 2] = [0.2, 0.12];
 
-/// How a rest is bounded.
+/// How an idle gap is bounded.
 struct Bound {
-    /// It ends where power is this share of the way from the lowest
+    /// It ends where power has risen by this share of the way from the lowest
     rises: f64,
-    /// to what it is above for this share of the stretch.
+    /// to what it is above for this share of the segment.
     above: f64,
-    /// An end that has moved by this share of the window is a doubt.
+    /// An end that has moved by this share of the window is suspect.
     moved: f64,
 }
 
@@ -43,10 +41,11 @@ const MIN_SUSPECT_SHARE: f64 = 0.125;
 /// Confidence factor of a suspect start.
 pub(super) const SUSPECT_CONFIDENCE: f64 = 0.4;
 
-/// The samples of a profile at which a rest begins and ends, by each of the [`BOUNDS`].
+/// The samples of a profile at which an idle gap begins and ends, by each of the [`BOUNDS`].
 type GapBounds = [Option<[usize; 2]>; BOUNDS.len()];
 
-/// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
+/// Confidence factors of starts, from their places (samples, in order) and the width of the window: lower where the idle gap
+/// has changed since the mark.
 pub(super) fn shifted_gap_confidence(
     power: &[f64],
     starts: &[f64],
@@ -75,12 +74,12 @@ pub(super) fn shifted_gap_confidence(
 }
 
 impl Bound {
-    /// The samples by which an end must have moved in a window of that width; `None` where so few are noise.
+    /// The least move of an end in a window of that width, in samples; `None` if it would be noise.
     fn min_moved(&self, width: usize) -> Option<f64> {
         Some(self.moved * width as f64).filter(|moved| *moved >= MIN_MOVED_SAMPLES)
     }
 
-    /// Whether a rest is bounded elsewhere than another, in samples of a window of that width.
+    /// Whether an idle gap is bounded elsewhere than another, in samples of a window of that width.
     fn moved(&self, here: Option<[usize; 2]>, there: Option<[usize; 2]>, width: usize) -> bool {
         let (Some(least), Some(here), Some(there)) = (self.min_moved(width), here, there) else {
             return false;
@@ -89,12 +88,12 @@ impl Bound {
     }
 }
 
-/// Doubts spread to all starts near which enough others are in doubt: what moved does not move for a frame and back.
+/// Spreads suspicion to all starts near enough suspect ones: what moved does not move for a single frame.
 pub(super) fn spread_to_neighbours(left: Vec<f64>) -> Vec<f64> {
     let of_start = |start: usize| {
         let near = neighbours(&left, start, NEIGHBOURS);
-        let doubted = near.iter().filter(|left| **left < 1.0).count();
-        if doubted as f64 >= MIN_SUSPECT_SHARE * near.len() as f64 {
+        let suspect = near.iter().filter(|left| **left < 1.0).count();
+        if suspect as f64 >= MIN_SUSPECT_SHARE * near.len() as f64 {
             SUSPECT_CONFIDENCE.min(left[start])
         } else {
             left[start]
@@ -103,7 +102,7 @@ pub(super) fn spread_to_neighbours(left: Vec<f64>) -> Vec<f64> {
     (0..left.len()).map(of_start).collect()
 }
 
-/// One of some starts and so many on either side of it.
+/// A start and its neighbours on either side.
 pub(super) fn neighbours<T>(starts: &[T], start: usize, frames: usize) -> &[T] {
     &starts[start.saturating_sub(frames)..starts.len().min(start + frames + 1)]
 }
@@ -117,15 +116,15 @@ pub(super) fn window_around(power: &[f64], start: f64, shares: [f64; 2], width: 
 
 /// The mean power about some starts, W; `None` where none lies well within the trace.
 fn mean_profile(power: &[f64], starts: &[f64], width: usize) -> Option<Vec<f64>> {
-    let stretches: Vec<&[f64]> =
+    let segments: Vec<&[f64]> =
         starts.iter().filter_map(|start| window_around(power, *start, [REACH_SHARE; 2], width)).collect();
-    let length = stretches.first()?.len();
-    let at = |sample: usize| mean(&stretches.iter().map(|of| of[sample]).collect::<Vec<_>>());
+    let length = segments.first()?.len();
+    let at = |sample: usize| mean(&segments.iter().map(|of| of[sample]).collect::<Vec<_>>());
     let means: Vec<f64> = (0..length).map(at).collect();
     Some(means.windows(SMOOTHED_SAMPLES).map(mean).collect())
 }
 
-/// The samples of a profile at which the rest in its middle, or next to that, begins and ends.
+/// The samples of a profile at which the idle gap in its middle, or next to that, begins and ends.
 fn idle_gap(profile: &[f64], bound: &Bound, width: usize) -> Option<[usize; 2]> {
     let [before, after] = LOWEST_SHARES.map(|share| (share * width as f64) as usize);
     let middle = (REACH_SHARE * width as f64) as usize;
@@ -154,8 +153,8 @@ const MIN_DIP_RATIO: f64 = 0.6;
 /// That dip must be at least this many deviations of the noise.
 const MIN_NOISE_DEVIATIONS: f64 = 6.0;
 
-/// What is left of the confidence of each start from their places (samples, in order), the width of the window
-/// and the deviation of the noise in a sample.
+/// Confidence factors of starts, from their places (samples, in order), the width of the window and the deviation of the noise:
+/// lower where the idle gap is missing.
 pub(super) fn missing_gap_confidence(power: &[f64], starts: &[f64], width: usize, noise_w: f64) -> Vec<f64> {
     let gap_samples = (MIN_GAP_SHARE * width as f64) as usize;
     if gap_samples == 0 {
@@ -177,10 +176,10 @@ pub(super) fn missing_gap_confidence(power: &[f64], starts: &[f64], width: usize
     (0..starts.len()).map(|start| of_start(start).unwrap_or(1.0)).collect()
 }
 
-/// How far power goes down at a start.
+/// The dip of power at a start.
 #[derive(Clone, Copy, Debug)]
 struct Depth {
-    /// Least mean of a gap_samples stretch, W.
+    /// Least mean of a gap_samples segment, W.
     lowest_w: f64,
     /// Median of the power around, W.
     usual_w: f64,
@@ -193,7 +192,7 @@ impl Depth {
     }
 }
 
-/// The least mean of a stretch of `gap_samples` samples at a start, W.
+/// The least mean of `gap_samples` samples at a start, W.
 pub(super) fn lowest_w(power: &[f64], start: f64, width: usize, gap_samples: usize) -> Option<f64> {
     window_around(power, start, OWN_SHARES, width)?.windows(gap_samples).map(mean).min_by(f64::total_cmp)
 }
@@ -215,7 +214,7 @@ mod tests {
         (power, starts)
     }
 
-    fn doubted(count: usize, mark: usize, rest: impl Fn(usize) -> usize) -> Vec<usize> {
+    fn suspect(count: usize, mark: usize, rest: impl Fn(usize) -> usize) -> Vec<usize> {
         let (power, starts) = frames(count, rest);
         let marked: Vec<bool> = (0..count).map(|frame| frame == mark).collect();
         let left = shifted_gap_confidence(&power, &starts, &marked, WIDTH);
@@ -225,16 +224,16 @@ mod tests {
     #[test]
     fn a_rest_that_has_grown_by_more_than_a_start_may_be_off_is_a_doubt() {
         // From 15 samples at the mark to 45: 0.12 of the window.
-        let doubted = doubted(120, 10, |frame| if frame < 60 { 15 } else { 45 });
-        assert!(doubted.iter().all(|frame| (50..120).contains(frame)), "{doubted:?}");
-        assert!((70..112).all(|frame| doubted.contains(&frame)), "{doubted:?}");
+        let suspect = suspect(120, 10, |frame| if frame < 60 { 15 } else { 45 });
+        assert!(suspect.iter().all(|frame| (50..120).contains(frame)), "{suspect:?}");
+        assert!((70..112).all(|frame| suspect.contains(&frame)), "{suspect:?}");
     }
 
     #[test]
     fn a_rest_that_stays_or_changes_a_little_is_none() {
-        assert!(doubted(60, 10, |_| 15).is_empty());
-        assert!(doubted(60, 10, |frame| 12 + frame * 7 % 5).is_empty());
-        assert!(doubted(120, 10, |frame| if frame < 60 { 15 } else { 25 }).is_empty());
+        assert!(suspect(60, 10, |_| 15).is_empty());
+        assert!(suspect(60, 10, |frame| 12 + frame * 7 % 5).is_empty());
+        assert!(suspect(120, 10, |frame| if frame < 60 { 15 } else { 25 }).is_empty());
     }
 
     #[test]
@@ -273,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn without_marks_or_with_few_samples_nothing_is_doubted() {
+    fn without_marks_or_with_few_samples_nothing_is_suspect() {
         let (power, starts) = frames(60, |frame| 15 + frame);
         assert_eq!(shifted_gap_confidence(&power, &starts, &[false; 60], WIDTH), [1.0; 60]);
         let marked: Vec<bool> = (0..60).map(|frame| frame == 1).collect();
@@ -308,36 +307,36 @@ mod unrested_tests {
         (power, starts)
     }
 
-    fn doubted(power: &[f64], starts: &[f64], noise_w: f64) -> Vec<usize> {
+    fn suspect(power: &[f64], starts: &[f64], noise_w: f64) -> Vec<usize> {
         let left = missing_gap_confidence(power, starts, WIDTH, noise_w);
         (0..starts.len()).filter(|&start| left[start] < 1.0).collect()
     }
 
     #[test]
-    fn a_start_amidst_work_is_doubted_and_those_around_it_are_not() {
+    fn a_start_amidst_work_is_suspect_and_those_around_it_are_not() {
         for noise_w in [0.0, 0.05] {
             let (power, mut starts) = frames(10, noise_w);
             starts.insert(21, starts[20] + 155.0);
             starts.insert(31, starts[30] + 155.0);
-            assert_eq!(doubted(&power, &starts, noise_w), [21, 31]);
+            assert_eq!(suspect(&power, &starts, noise_w), [21, 31]);
         }
     }
 
     #[test]
-    fn where_every_other_frame_is_cut_in_two_the_cuts_are_what_is_doubted() {
+    fn where_every_other_frame_is_cut_in_two_the_cuts_are_what_is_suspect() {
         let (power, starts) = frames(10, 0.02);
         let cut: Vec<f64> = starts[..39].iter().flat_map(|start| [*start, start + 155.0]).collect();
-        assert_eq!(doubted(&power, &cut, 0.02), (0..39).map(|frame| 2 * frame + 1).collect::<Vec<_>>());
+        assert_eq!(suspect(&power, &cut, 0.02), (0..39).map(|frame| 2 * frame + 1).collect::<Vec<_>>());
     }
 
     #[test]
-    fn where_no_frame_has_a_rest_or_noise_hides_it_nothing_is_doubted() {
+    fn where_no_frame_has_a_rest_or_noise_hides_it_nothing_is_suspect() {
         let (power, starts) = frames(0, 0.05);
-        assert!(doubted(&power, &starts, 0.05).is_empty());
+        assert!(suspect(&power, &starts, 0.05).is_empty());
         let (power, mut starts) = frames(10, 2.0);
         starts.insert(21, starts[20] + 155.0);
-        assert!(doubted(&power, &starts, 2.0).is_empty());
-        assert!(doubted(&[], &[], 0.0).is_empty());
+        assert!(suspect(&power, &starts, 2.0).is_empty());
+        assert!(suspect(&[], &[], 0.0).is_empty());
         assert_eq!(missing_gap_confidence(&[1.0; 20], &[3.0, 9.0], 10, 0.0), [1.0; 2]);
     }
 

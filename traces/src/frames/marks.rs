@@ -1,6 +1,4 @@
-//! What the user points at.
-//!
-//! A mark where there is nothing to see: whatever is as flat resembles it.
+//! Marked frame starts and their windows, and the warning about a window without a signal.
 
 use crate::stats::moments;
 use crate::trace::Trace;
@@ -24,7 +22,7 @@ pub enum MarkError {
         /// Its value, s.
         value_s: f64,
     },
-    /// A marked start is outside the trace, or so near its ends that no usable window is left.
+    /// A marked start is outside the trace, or too near its ends for a usable window.
     #[error(
         "the frame start marked at {mark_s} s has no window in the trace ({start_s} s to {end_s} s): \
          mark a frame further inside"
@@ -80,11 +78,11 @@ pub fn default_window(period_hint_s: f64, rate_hz: f64) -> Window {
 /// Marked frame starts, the window around them and where the last frame ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marks {
-    /// Marked starts of frames, s; usually one. With several, a stretch is as near as its nearest window.
+    /// Marked starts of frames, s; usually one. With several, a segment is as near as its nearest window.
     pub starts_s: Vec<f64>,
-    /// What is compared around each.
+    /// The window that is compared around each.
     pub window: Window,
-    /// Where the last frame ends, s: starts found from here on are left out.
+    /// End of the last frame, s: starts from here on are dropped.
     pub end_s: f64,
 }
 
@@ -114,12 +112,12 @@ impl Marks {
         Self { starts_s: vec![start_s], window, end_s }
     }
 
-    /// Puts the windows on the samples of a trace, cutting them where the trace ends.
+    /// Places the windows on the samples of a trace, cut at its ends.
     pub(super) fn place(&self, trace: &Trace) -> Result<Placement, MarkError> {
         self.place_on(trace.start_s(), trace.rate_hz(), trace.samples() as u64)
     }
 
-    /// As [`Marks::place`], on samples that need not be at hand. An end mark may be infinite: the end of the samples.
+    /// As [`Marks::place`], on samples that need not be in memory. An end mark may be infinite: the end of the samples.
     pub(crate) fn place_on(&self, start_s: f64, rate_hz: f64, samples: u64) -> Result<Placement, MarkError> {
         let room = Room { start_s, rate_hz, samples: samples as f64 };
         self.check(&room)?;
@@ -179,7 +177,7 @@ impl Marks {
     }
 }
 
-/// Where samples lie in time.
+/// The time base of samples.
 struct Room {
     start_s: f64,
     rate_hz: f64,
@@ -221,7 +219,7 @@ pub(crate) fn flat_mark<'a>(
     ))
 }
 
-/// [`flat_mark`] of a trace that is all at hand.
+/// [`flat_mark`] of a trace in memory.
 pub(super) fn flat_mark_of(power: &[f64], placement: &Placement, sigma: f64) -> Option<Warning> {
     let windows = placement
         .marks

@@ -1,6 +1,7 @@
 //! Starts by distance to the marked windows alone: threshold and local minima.
 //!
-//! The first frame of a free-running stretch: nothing was drawn before it, so what lies before the mark differs.
+//! The first frame of a free-running recording is searched separately: nothing was drawn before it, so the part of the
+//! window before the mark differs.
 
 use super::assess;
 use super::assess::confidence;
@@ -96,7 +97,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
     Ok(Found { method, ..found })
 }
 
-/// The minima that could be starts, the marks and their surroundings left out.
+/// The minima that could be starts, without the marks and their surroundings.
 fn candidates(profile: &[f64], placement: &Placement, spacing: usize) -> Vec<Candidate> {
     let beside_marks =
         |offset: &usize| placement.marks.iter().all(|mark| mark.first.abs_diff(*offset) >= spacing);
@@ -175,7 +176,7 @@ const MAX_MATCH_SHARE: f64 = 0.5;
 
 impl View<'_> {
     /// One more start before the first one found, matched only by what follows the mark, with the threshold (and the
-    /// distance told) in proportion to the part compared. `None` if nothing there is near enough.
+    /// reported distance) in proportion to the compared part. `None` if nothing there is near enough.
     pub(super) fn start_after_idle(&self, starts: &[FrameStart], spacing: usize) -> Option<FrameStart> {
         let gap_s = median_gap_s(starts)?;
         let first = self.trace.position(starts.first()?.time_s);
@@ -184,8 +185,8 @@ impl View<'_> {
         let lead = |mark: &super::marks::Placed| libm::round(mark.anchor) as usize;
         let found = self.placement.marks.iter().filter_map(|mark| {
             let template = &self.power[mark.first + lead(mark)..mark.first + self.placement.samples];
-            let stretch = self.power.get(from..to + template.len())?;
-            let profile = summed_squared_difference(stretch, template);
+            let segment = self.power.get(from..to + template.len())?;
+            let profile = summed_squared_difference(segment, template);
             let (near, &distance) = profile.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1))?;
             let distance_w2 = distance * self.placement.samples as f64 / template.len() as f64;
             let offset = align(self.power, template, from + near, MAX_REFINEMENT_SAMPLES)

@@ -1,7 +1,4 @@
-//! How even the beat of starts is, told from the gaps around each: what a start is found by need not be right, but what is wrong
-//! seldom keeps time.
-//!
-//! How evenly starts are spaced.
+//! Periodicity: how regular the gaps between starts are. Wrong starts rarely keep the period.
 
 use crate::stats::upper_median;
 use rayon::prelude::*;
@@ -13,8 +10,7 @@ const MIN_TASK_GAPS: usize = 1024;
 /// Largest deviation of an even gap from the usual one, as a share of that.
 const MAX_EVEN_DEVIATION: f64 = 0.1;
 
-/// Of each gap of `gaps`, the gaps around it: their median, and the median of how far they are from that. `None` where there are fewer
-/// than two.
+/// For each gap, the median of its neighbours and their median deviation from it. `None` for fewer than two neighbours.
 pub(super) fn usual_gaps(gaps: &[f64]) -> Vec<Option<[f64; 2]>> {
     let one = |index: usize| {
         let around = index.saturating_sub(NEIGHBOUR_GAPS)..gaps.len().min(index + NEIGHBOUR_GAPS + 1);
@@ -34,7 +30,7 @@ pub(super) fn usual_gaps(gaps: &[f64]) -> Vec<Option<[f64; 2]>> {
     (0..gaps.len()).into_par_iter().with_min_len(MIN_TASK_GAPS).map(one).collect()
 }
 
-/// Whether each gap is as long as those around it: within a tenth, and within `max_deviation`.
+/// Whether each gap is as long as its neighbours: within a tenth, and within `max_deviation`.
 pub(super) fn even_gaps(gaps: &[f64], max_deviation: f64) -> Vec<bool> {
     let fits = |(gap, usual): (&f64, Option<[f64; 2]>)| {
         usual.is_some_and(|[usual, _]| (gap - usual).abs() < (MAX_EVEN_DEVIATION * usual).min(max_deviation))

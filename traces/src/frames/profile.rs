@@ -1,10 +1,6 @@
-//! The distance of a template to every stretch of a trace.
+//! Distance profiles: the distance of a template to every window of a trace, by summed squares or by shape, and its minima.
 //!
-//! Correlation of a template with a whole trace by the Fourier transform, block by block.
-//!
-//! Distance by shape alone.
-//!
-//! Non-maximum suppression, on minima.
+//! Narrow templates are summed directly, wide ones correlated by the Fourier transform, block by block.
 
 use crate::overlap::{Buffers, OverlapSave};
 use rayon::prelude::*;
@@ -40,8 +36,8 @@ pub fn summed_squared_difference(power: &[f64], template: &[f64]) -> Vec<f64> {
 /// [`LANES`] successive offsets; `power` is `LANES - 1` longer than the template.
 fn lanes(power: &[f64], template: &[f64]) -> [f64; LANES] {
     let mut sums = [0.0; LANES];
-    for (stretch, &reference) in power.windows(LANES).zip(template) {
-        for (sum, &value) in sums.iter_mut().zip(stretch) {
+    for (segment, &reference) in power.windows(LANES).zip(template) {
+        for (sum, &value) in sums.iter_mut().zip(segment) {
             let difference = value - reference;
             *sum += difference * difference;
         }
@@ -49,7 +45,7 @@ fn lanes(power: &[f64], template: &[f64]) -> [f64; LANES] {
     sums
 }
 
-/// The summed squared difference of two stretches of the same length.
+/// The summed squared difference of two segments of the same length.
 pub(super) fn difference(power: &[f64], template: &[f64]) -> f64 {
     power.iter().zip(template).map(|(&value, &reference)| (value - reference) * (value - reference)).sum()
 }
@@ -61,7 +57,7 @@ const MIN_BLOCK_SAMPLES: usize = 1 << 14;
 const MAX_DIRECT_SAMPLES: usize = 48;
 
 /// Summed squared difference at every offset, W^2, by whichever way is faster. By transforms it is exact to about 1e-13 of the
-/// template's and the stretch's own squares.
+/// template's and the segment's own squares.
 pub(super) fn squares(power: &[f64], template: &[f64]) -> Vec<f64> {
     let width = template.len();
     if width < MAX_DIRECT_SAMPLES || power.len() < width {
@@ -123,7 +119,7 @@ const MIN_NORM_SHARE: f64 = 0.05;
 
 /// z-normalized squared distance (Goldin and Kanellakis 1995; Mueen's MASS) at every offset, in W^2: `2 |q|^2 (1 - r)`, with `r` the
 /// correlation coefficient and `|q|` the template's norm about its mean. It is what the summed squared difference would be had the
-/// stretch the template's mean and norm: neither idle power nor a factor on power changes it.
+/// segment the template's mean and norm: neither idle power nor a factor on power changes it.
 pub(super) fn normalized(power: &[f64], template: &[f64]) -> Vec<f64> {
     let width = template.len();
     if width == 0 || power.len() < width {

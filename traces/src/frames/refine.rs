@@ -1,10 +1,8 @@
-//! Frame starts finer than a sample.
+//! Alignment finer than a sample, also between two frames at different clocks.
 //!
-//! Alignment of two frames at different clocks.
-//!
-//! Where the clock has stepped, the same draws take longer or shorter: what follows the start of one frame is what follows that
-//! of the other, drawn out in time. Compared as they are, the two fit best where the start is up to a sixth of the window off. So the
-//! earlier stretch is drawn out about its start by one ratio after another, and the shift is taken from the ratio that fits best.
+//! After a clock step the same draws take longer or shorter: the power after the start of one frame is that of the other,
+//! scaled in time. Compared without scaling, the two fit best up to a sixth of the window away from the start. So the
+//! earlier frame is scaled about its start by one ratio after another, and the shift is taken from the best ratio.
 
 use super::profile::difference;
 use core::ops::RangeInclusive;
@@ -13,7 +11,7 @@ use core::ops::RangeInclusive;
 /// `reach` of it and the vertex of the parabola through it and its two neighbours.
 ///
 /// For a signal smooth on the scale of a sample the difference is a parabola near its minimum, and the result exact;
-/// for a single sharp edge it is off by up to a tenth of a sample, alike to both sides (tests show both).
+/// for a single sharp edge it is off by up to a tenth of a sample, to either side (tests show both).
 pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) -> f64 {
     let Some(last) = power.len().checked_sub(template.len()) else { return near as f64 };
     let at = |offset: usize| difference(&power[offset..offset + template.len()], template);
@@ -31,7 +29,7 @@ pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) 
     best as f64 + vertex(at(best - 1), lowest, at(best + 1))
 }
 
-/// Where in a range of shifts the residual is least, looked at in steps and then about the best of them.
+/// The shift of the least residual in a range, searched in steps and then around the best of them.
 pub(super) fn nearest(shifts: RangeInclusive<usize>, step: usize, residual: impl Fn(usize) -> f64) -> usize {
     let (first, last) = shifts.into_inner();
     let least = |from: usize, to: usize, step: usize| {
@@ -42,7 +40,7 @@ pub(super) fn nearest(shifts: RangeInclusive<usize>, step: usize, residual: impl
     if step == 1 { rough } else { least(first.max(rough.saturating_sub(step)), last.min(rough + step), 1) }
 }
 
-/// Where the parabola through three equally spaced values is lowest, relative to the middle one, within half a step.
+/// The vertex of the parabola through three equally spaced values, relative to the middle one, within half a step.
 pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     let curvature = before - 2.0 * middle + after;
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
@@ -62,14 +60,14 @@ const MAX_POWER: i32 = 11;
 /// Distance, in samples, of the shifts that are tried first.
 const COARSE_STEP_SAMPLES: usize = 3;
 
-/// Where a drawn-out stretch fits.
+/// The best fit of a scaled segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ScaledFit {
     /// How much longer things take in the later frame.
     pub ratio: f64,
     /// How much later than its place the start of the later frame lies, samples.
     pub shift: f64,
-    /// Share of the variance that is left unexplained, whatever the gain.
+    /// Unexplained share of the variance, at the best gain.
     pub unexplained: f64,
     /// Second difference of that share over the shift, per squared sample.
     pub curvature: f64,
@@ -101,14 +99,14 @@ impl ScaledPair<'_> {
         self.fit(1.0)
     }
 
-    /// What of the later frame is compared at one shift or another.
+    /// The part of the later frame that is compared at any shift.
     fn searched(&self) -> Option<&[f64]> {
         let first = self.starts[1].checked_sub(self.before + self.reach)?;
         self.power.get(first..self.starts[1] + self.after + self.reach)
     }
 
-    /// What lies about the start of the earlier frame, drawn out about it, of mean 0.
-    fn drawn_out(&self, ratio: f64) -> Option<Vec<f64>> {
+    /// The surroundings of the start of the earlier frame, scaled about it, of mean 0.
+    fn scaled(&self, ratio: f64) -> Option<Vec<f64>> {
         let value = |index: usize| {
             let place = self.starts[0] as f64 + (index as f64 - self.before as f64) / ratio;
             between(self.power, place)
@@ -121,9 +119,9 @@ impl ScaledPair<'_> {
 
     /// The best shift at one ratio.
     fn fit(&self, ratio: f64) -> Option<ScaledFit> {
-        let (stretch, template) = (self.searched()?, self.drawn_out(ratio)?);
+        let (segment, template) = (self.searched()?, self.scaled(ratio)?);
         let own: f64 = template.iter().map(|x| x * x).sum();
-        let unlike = |shift: usize| unexplained(&template, own, &stretch[shift..shift + template.len()]);
+        let unlike = |shift: usize| unexplained(&template, own, &segment[shift..shift + template.len()]);
         let last = (2 * self.reach).checked_sub(1)?;
         let at = nearest(1..=last, COARSE_STEP_SAMPLES, unlike);
         let [left, middle, right] = [at - 1, at, at + 1].map(unlike);
@@ -137,15 +135,15 @@ impl ScaledPair<'_> {
     }
 }
 
-/// One less the squared correlation coefficient of a template (of mean 0 and squares `own`) and a stretch; 1 where they are opposed.
-fn unexplained(template: &[f64], own: f64, stretch: &[f64]) -> f64 {
+/// One less the squared correlation coefficient of a template (of mean 0 and squares `own`) and a segment; 1 where they are opposed.
+fn unexplained(template: &[f64], own: f64, segment: &[f64]) -> f64 {
     let (mut sum, mut squares, mut inner) = (0.0, 0.0, 0.0);
-    for (t, x) in template.iter().zip(stretch) {
+    for (t, x) in template.iter().zip(segment) {
         sum += x;
         squares += x * x;
         inner += t * x;
     }
-    let variance = squares - sum * sum / stretch.len() as f64;
+    let variance = squares - sum * sum / segment.len() as f64;
     if inner <= 0.0 || variance <= 0.0 || own <= 0.0 { 1.0 } else { 1.0 - inner * inner / (variance * own) }
 }
 

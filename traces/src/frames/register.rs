@@ -1,10 +1,12 @@
-//! Starts finer than a sample: each is aligned with its neighbours, and all alignments are reconciled by least squares.
+//! Registration of starts finer than a sample: each is aligned with its neighbours, and all alignments are reconciled by
+//! least squares.
 //!
-//! A window of the marked frame is a poor ruler where content changes, as draws after the start move. Two frames in a row differ
-//! little, and least right after the start. So the shift of each frame against its next few is measured by what lies about the
-//! start, and positions `x_i` are chosen to fit all of them: minimize `sum w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with
-//! `c_i` the position by template and marks held fixed. It is solved by Gauss-Seidel sweeps. An edge just where the compared stretch
-//! ends enters at some shifts only and pulls the result by up to a quarter of a sample (a test shows it).
+//! Where content changes, the window of the marked frame is a poor reference, as draws after the start move. Successive
+//! frames differ little, and least right after the start. So the shift of each frame against its next few is measured
+//! around the start, and positions `x_i` are chosen to fit all shifts: minimize
+//! `sum w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with `c_i` the position by template and marks fixed, by Gauss-Seidel
+//! sweeps. An edge just at the end of the compared window enters some shifts only and pulls the result by up to a quarter of
+//! a sample (a test shows it).
 
 use super::refine::{ScaledPair, nearest, vertex};
 use rayon::prelude::*;
@@ -100,12 +102,12 @@ fn scaled(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Op
     clear.then_some((fit.ratio, fit.shift, 1.0 / variance))
 }
 
-/// How much later than at `b` the stretch at `a` is found again, in samples, and the inverse variance of that; after a ratio of 1.
+/// How much later than at `b` the segment at `a` is found again, in samples, and the inverse variance of that; after a ratio of 1.
 fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Option<(f64, f64, f64)> {
     let template = power.get(a..a + length)?;
     let from = b.checked_sub(reach)?;
-    let stretch = power.get(from..b + reach + length)?;
-    let residual = |shift: usize| unexplained(&stretch[shift..shift + length], template);
+    let segment = power.get(from..b + reach + length)?;
+    let residual = |shift: usize| unexplained(&segment[shift..shift + length], template);
     let last = 2 * reach - 1;
     let at = nearest(1..=last, (last - 1).div_ceil(MAX_COARSE_SHIFTS).max(1), residual);
     let [left, middle, right] = [at - 1, at, at + 1].map(residual);
@@ -116,13 +118,13 @@ fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Opti
     {
         return None;
     }
-    // Of a parabola `c d^2 / 2` with noise of variance v a sample in each stretch, the vertex has about variance 2 v / c; the floor is the
+    // Of a parabola `c d^2 / 2` with noise of variance v a sample in each segment, the vertex has about variance 2 v / c; the floor is the
     // parabola's own error on sharp edges.
     let variance = 2.0 * middle / length as f64 / curvature + 0.01;
     Some((1.0, at as f64 - reach as f64 + vertex(left, middle, right), 1.0 / variance))
 }
 
-/// Summed squared difference of two stretches beyond their difference in mean.
+/// Summed squared difference of two segments beyond their difference in mean.
 fn unexplained(a: &[f64], b: &[f64]) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
     for (x, y) in a.iter().zip(b) {
@@ -195,13 +197,13 @@ mod tests {
 
     #[test]
     fn known_limit_a_second_edge_at_the_end_of_the_stretch_costs_up_to_a_quarter_of_a_sample() {
-        // The stretch compared ends 12 samples after the start; an edge there enters at some shifts only.
+        // The segment compared ends 12 samples after the start; an edge there enters at some shifts only.
         assert!(worst_error(13.4) < 0.25, "{}", worst_error(13.4));
     }
 
     #[test]
     fn a_stretch_that_is_off_by_a_tenth_of_the_window_is_brought_back() {
-        // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends tell.
+        // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends show it.
         let at: Vec<f64> = (0..60).map(|i| 100.0 + 400.37 * f64::from(i)).collect();
         let draws: Vec<f64> = at.iter().flat_map(|a| [a + 27.0, a + 58.0]).collect();
         let (frames, draws) = (pulses(&at, 90.0, 24_400), pulses(&draws, 9.0, 24_400));

@@ -1,4 +1,4 @@
-//! The frames between starts, and what is remarkable about each.
+//! The frames between starts, and their flags.
 
 use super::found::{Flag, Flags, FrameSpan, FrameStart};
 use super::periodicity;
@@ -73,7 +73,7 @@ fn lengths_s(frames: &[FrameSpan]) -> Vec<f64> {
     inner.iter().map(|frame| frame.end_s - frame.start_s).collect()
 }
 
-/// In a coarse window lowers the confidence of what breaks the beat; of everything where there is none.
+/// Lowers confidence in coarse windows: of frames off the period, or of all frames if there is no period.
 fn lower_coarse_confidence(frames: &mut [FrameSpan], sampling: Sampling) {
     let Some((_, mostly)) = MIN_EVEN_SHARES.into_iter().find(|(samples, _)| sampling.window < *samples)
     else {
@@ -110,7 +110,7 @@ fn flag_lengths(frames: &mut [FrameSpan]) {
     }
 }
 
-/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one, or break their beat.
+/// Flags frames about as long as several of their neighbours, as a part of one, or of odd length.
 fn flag_unusual(frames: &mut [FrameSpan]) {
     let lengths_s = lengths_s(frames);
     for ((frame, length_s), usual_s) in

@@ -1,9 +1,9 @@
-//! Doubt where every other start is alike, and starts that cut a frame in two.
+//! Split frames: every other start is similar, and false starts split a frame in two.
 //!
-//! Content changes slowly: a frame is as unlike the next as it is unlike the one after that, or less. Where a start is far more like the
-//! one after the next, each frame may have been cut in two, as happens where a slow clock makes them as long as two were at the mark.
-//! Frames that take turns by themselves (a shadow map drawn every other time) do so at the mark, too. A frame begins in its rest: of starts
-//! that take turns, those that go down clearly less are cuts.
+//! Content changes slowly, so a frame differs from the next at least as little as from the one after that. If a start is far
+//! more similar to the one after the next, each frame may have been split, as happens when a slow clock makes a frame as
+//! long as two were at the mark. Frames that alternate by themselves (a shadow map drawn every other time) do so at the
+//! mark, too. A frame begins in an idle gap: of alternating starts, those with a clearly smaller dip are false.
 
 use super::idle_gap::{SUSPECT_CONFIDENCE, lowest_w, neighbours, window_around};
 use crate::stats::{mean, mean_and_error, upper_median};
@@ -30,11 +30,11 @@ const MIN_STARTS: usize = 4;
 /// Starts of either kind that may lie beyond either end of the alternating segment.
 const MARGIN_STARTS: usize = 2;
 
-/// What is said of each start.
+/// The assessment of each start.
 pub(super) struct SplitFrames {
-    /// What is left of its confidence.
+    /// Its confidence factor.
     pub confidence_factors: Vec<f64>,
-    /// Whether it cuts a frame in two.
+    /// Whether it splits a frame.
     pub splits_frame: Vec<bool>,
 }
 
@@ -53,7 +53,7 @@ impl SplitFrames {
     }
 }
 
-/// What is left of the confidence of each start, from their places (samples, in order) and the width of the window.
+/// Confidence factors of starts, from their places (samples, in order) and the width of the window.
 fn alternation_confidence(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Vec<f64> {
     let [next, after_next] = [1, 2].map(|apart| differences(power, starts, width, apart));
     let alternations: Vec<f64> =
@@ -67,7 +67,7 @@ fn alternation_confidence(power: &[f64], starts: &[f64], marked: &[bool], width:
     (0..starts.len()).map(of_start).collect()
 }
 
-/// How many times as much as every other start neighbours near one differ; 1 where too few are near.
+/// Ratio of the differences of direct neighbours to those of every other start, near a start; 1 with too few starts near.
 fn alternation(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -> f64 {
     let [next, after_next] = [next, after_next]
         .map(|of| neighbours(of, start, NEIGHBOURS).iter().flatten().copied().collect::<Vec<f64>>());
@@ -78,7 +78,7 @@ fn alternation(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -
     if next > 0.0 { next / after_next } else { 1.0 }
 }
 
-/// The mean squared difference, W^2, of each start from the one so many after it; `None` where there is none, or not all of it.
+/// The mean squared difference, W^2, of each start from the one `apart` starts later; `None` if that is missing or cut.
 fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec<Option<f64>> {
     let of_start = |start: usize| {
         let window = |start: f64| window_around(power, start, COMPARED_SHARES, width);
@@ -88,7 +88,7 @@ fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec
     (0..starts.len()).into_par_iter().map(of_start).collect()
 }
 
-/// The stretches of starts in doubt.
+/// The segments of suspect starts.
 fn segments(left: &[f64]) -> Vec<Range<usize>> {
     let ends = |place: usize| place == 0 || (left[place] < 1.0) != (left[place - 1] < 1.0);
     let mut bounds: Vec<usize> = (0..left.len()).filter(|place| ends(*place)).collect();
@@ -100,7 +100,7 @@ fn segments(left: &[f64]) -> Vec<Range<usize>> {
         .collect()
 }
 
-/// How far power goes down at starts.
+/// The dips of power at starts.
 struct Dips<'a> {
     power: &'a [f64],
     starts: &'a [f64],
@@ -164,8 +164,8 @@ mod tests {
         (power, (0..60).map(|frame| (frame * FRAME) as f64).collect())
     }
 
-    /// The starts in doubt where frames from the 30th on are cut in two; marked is that number.
-    fn doubted(apart_w: f64, marked: usize) -> Vec<usize> {
+    /// The suspect starts if frames from the 30th on are split; `marked` is the number of the mark.
+    fn suspect(apart_w: f64, marked: usize) -> Vec<usize> {
         let (power, whole) = frames(apart_w);
         let cut =
             |start: &f64| if *start < 30.0 * 320.0 { vec![*start] } else { vec![*start, start + 160.0] };
@@ -202,7 +202,7 @@ mod tests {
         let cut: Vec<usize> = (0..starts.len()).filter(|start| turns.splits_frame[*start]).collect();
         assert!(cut.iter().all(|start| *start > 30 && start % 2 == 1), "{cut:?}");
         assert!(cut.len() > 27, "{cut:?}");
-        // Where both go down as far, either may be a start: that is a doubt and no more.
+        // Where both dip as far, either may be a start: they are suspect, but none is false.
         let (starts, turns) = with_dips(0.2);
         assert!(
             (40..starts.len() - 4)
@@ -211,16 +211,16 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_are_cut_in_two_are_doubted_and_whole_ones_are_not() {
-        let doubted = doubted(0.5, 10);
-        assert!(doubted.iter().all(|start| *start >= 26), "{doubted:?}");
-        assert!((34..88).all(|start| doubted.contains(&start)), "{doubted:?}");
+    fn frames_that_are_cut_in_two_are_suspect_and_whole_ones_are_not() {
+        let suspect = suspect(0.5, 10);
+        assert!(suspect.iter().all(|start| *start >= 26), "{suspect:?}");
+        assert!((34..88).all(|start| suspect.contains(&start)), "{suspect:?}");
     }
 
     #[test]
-    fn halves_that_noise_hides_and_frames_that_take_turns_at_the_mark_are_no_doubt() {
-        assert!(doubted(0.02, 10).is_empty());
-        assert!(doubted(0.5, 60).is_empty());
+    fn halves_hidden_by_noise_and_frames_that_alternate_at_the_mark_are_not_suspect() {
+        assert!(suspect(0.02, 10).is_empty());
+        assert!(suspect(0.5, 60).is_empty());
     }
 
     #[test]

@@ -1,11 +1,11 @@
-//! Starts put where neighbouring frames agree.
+//! Start refinement: starts move to where neighbouring frames begin to agree.
 //!
-//! Frames are aligned by what follows their start. Where what lies between the start and that has become shorter since the mark (a
-//! front end with less to do), a start kept at the mark's distance lies before its frame, in the end of the one before. That ends at
-//! another time in each frame, so there neighbours differ, and the energy from start to start changes with them. What is common to
-//! all begins at the right place: so a start is moved on to the first sample from which on neighbours agree about as well as anywhere
-//! near. Where they agree already, as in a rest or in a steady beat, nothing moves; nor at an edge, of which each frame is sampled at
-//! another phase, nor up into more power, as the way out of a frame leads down.
+//! Frames are aligned by the power after their start. If the part in between has become shorter since the mark (a front end
+//! with less to do), a start at the distance of the mark lies in the end of the frame before. That end varies from frame to
+//! frame, so neighbours differ there, and the energy from start to start varies with them. A start therefore moves to the
+//! first sample from which on neighbours agree about as well as anywhere near. Starts that agree already do not move; nor
+//! do starts at an edge, which each frame samples at another phase, nor up into more power, as power falls at the end of a
+//! frame.
 
 use super::refine::between;
 use crate::stats::{mean, moments, upper_median};
@@ -28,7 +28,7 @@ const MAX_AGREEMENT_SHARE: f64 = 1e-4;
 /// Neighbours on either side over which moves are smoothed, as content changes slowly.
 const SMOOTHED_MOVES: usize = 8;
 
-/// Positions of windows, samples, moved on; `anchor` is the place of the start in a window of `width` samples. What is `fixed` stays.
+/// Positions of windows, samples, moved forward; `anchor` is the place of the start in a window of `width` samples. `fixed` ones stay.
 pub(super) fn refine_starts(
     power: &[f64],
     positions: Vec<f64>,
@@ -84,13 +84,13 @@ fn first_agreeing(differ: &[f64], agreement_w2: f64) -> f64 {
         as f64
 }
 
-/// Mean power so many samples after some starts, W.
+/// Mean power at `after` samples after some starts, W.
 fn level(power: &[f64], starts: &[f64], after: f64) -> f64 {
     let sampled: Vec<f64> = starts.iter().filter_map(|start| between(power, start + after)).collect();
     mean(&sampled)
 }
 
-/// Each value by its neighbours.
+/// Each value, averaged over its neighbours.
 fn smoothed(values: &[f64], by: impl Fn(&mut [f64]) -> f64) -> Vec<f64> {
     let near =
         |index: usize| index.saturating_sub(SMOOTHED_MOVES)..(index + SMOOTHED_MOVES + 1).min(values.len());

@@ -1,6 +1,4 @@
-//! Which minima are frame starts: a threshold taken from the minima themselves, with its reason as data.
-//!
-//! Splitting sorted numbers into populations.
+//! The threshold that separates starts from other minima, chosen from the minima themselves, with its reason as data.
 
 use crate::stats::{Moments, moments};
 use rayon::prelude::*;
@@ -67,7 +65,7 @@ pub struct Population {
 
 /// The threshold and why it lies where it does.
 ///
-/// Noise adds the same to the distance of a match and of anything else, so minima are told apart by their **excess**
+/// Noise adds the same to the distance of a match and of anything else, so minima are compared by their **excess**
 /// distance, that beyond `noise_w2`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Threshold {
@@ -81,9 +79,9 @@ pub struct Threshold {
     pub rest: Population,
     /// Median excess distance over all offsets, W^2: what no match at all looks like.
     pub background_w2: f64,
-    /// What sensor noise leaves of a perfect match, W^2: `2 m sigma^2`, or the lowest minimum if that is less.
+    /// Distance of a perfect match in sensor noise, W^2: `2 m sigma^2`, or the lowest minimum if that is less.
     pub noise_w2: f64,
-    /// What a match half a sample off leaves, W^2: starts fall between samples, and steep edges make that count.
+    /// Distance of a match half a sample off, W^2: starts fall between samples, and steep edges make it large.
     pub alignment_w2: f64,
     /// Difference of the populations' mean logarithms over the sum of their standard deviations; above 2 is clear.
     pub separation: f64,
@@ -93,12 +91,12 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Whether starts and the rest are told apart beyond doubt: by distance, or else by the even spacing of the starts.
+    /// Whether starts and the rest are clearly separated: by distance, or else by the even spacing of the starts.
     pub(super) fn clarity(&self) -> f64 {
         (self.separation / MIN_SEPARATION).max(self.regularity / MIN_REGULARITY).clamp(0.0, 1.0)
     }
 
-    /// The part of a distance that noise does not explain, W^2; at least what can be told apart.
+    /// The part of a distance that noise does not explain, W^2; at least the smallest difference that counts.
     pub(super) fn excess_w2(&self, distance_w2: f64) -> f64 {
         let floor_w2 = (MIN_EXCESS_SHARE * self.background_w2).max(MIN_NOISE_SHARE * self.noise_w2);
         let floor_w2 =
@@ -127,8 +125,8 @@ pub(crate) fn choose(
     let splits = otsu_tree(&logs, MAX_SPLIT_DEPTH);
     // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by that.
     // The first split stands on Otsu's criterion alone and is spared.
-    let alike = |split: &Split| between(split) - none.noise_w2 < MAX_MATCH_SHARE * none.background_w2;
-    let regular = most_regular(&splits, alike, |split| regularity(between(split)));
+    let matching = |split: &Split| between(split) - none.noise_w2 < MAX_MATCH_SHARE * none.background_w2;
+    let regular = most_regular(&splits, matching, |split| regularity(between(split)));
     let even = splits.get(regular).is_some_and(|split| {
         split.count >= MIN_SPACED_MATCHES || regularity(between(split)) >= MIN_REGULARITY
     });
@@ -210,7 +208,7 @@ fn separation(split: &Split) -> f64 {
     ratio(split.high.mean - split.low.mean, split.low.deviation + split.high.deviation)
 }
 
-/// Whether a split tells matches from the rest.
+/// Whether a split separates matches from the rest.
 fn judge(split: &Split, logs: &[f64], chosen: Threshold) -> Threshold {
     let [matched_w2, rest_w2] = [split.low.mean, split.high.mean].map(libm::exp);
     let separation = separation(split);
@@ -316,7 +314,7 @@ mod tests {
 
     #[test]
     fn a_few_matches_are_told_from_look_alikes_by_distance() {
-        // A run of four equal frames: three matches, stretches within frames that resemble the marked window a little, and
+        // A run of four equal frames: three matches, segments within frames that resemble the marked window a little, and
         // the rest. A threshold among the look-alikes happens to space the starts a little more evenly.
         let look_alikes =
             [143.4, 143.44, 143.99].into_iter().chain((0..30).map(|i| 144.86 + 0.001 * f64::from(i)));
@@ -328,7 +326,7 @@ mod tests {
 
     #[test]
     fn a_lone_frame_resembles_nothing_else() {
-        // One frame in a trace of idle: two stretches within it are nearer to its start than idle is.
+        // One frame in a trace of idle: two segments within it are nearer to its start than idle is.
         let distances: Vec<f64> =
             [121.9, 127.2].into_iter().chain((0..66).map(|i| 342.0 + 0.02 * f64::from(i))).collect();
         assert_eq!(choose(&distances, 343.0, 0.002, 5.0, |_| 0.0).rule, Rule::NoneAlike);

@@ -1,4 +1,4 @@
-//! Starts by the sequence that fits best.
+//! Starts by the sequence with the most evidence.
 
 use super::assess::uncovered_work;
 use super::found::{Found, FrameStart, Method, spacing};
@@ -16,7 +16,7 @@ use crate::trace::Trace;
 /// Confidence factor of a start between the ticks of the display that the others wait for.
 const OFF_TICK_CONFIDENCE: f64 = 0.4;
 
-/// By the sequence of starts that fits best.
+/// Finds the sequence of starts with the most evidence.
 pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
@@ -51,7 +51,7 @@ pub(super) fn find_tracked(trace: &Trace, marks: &Marks) -> Result<Found, MarkEr
     Ok(found)
 }
 
-/// The starts without those that cut a frame in two; what is left of the confidence of those that take turns is less.
+/// The starts without those that split a frame; alternating starts have lower confidence.
 fn without_false_starts(power: &[f64], starts: Vec<Start>, placement: &Placement) -> Vec<Start> {
     let is_marked = |start: &Start| placement.marks.iter().any(|mark| mark.first == start.offset);
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
@@ -67,7 +67,7 @@ fn without_false_starts(power: &[f64], starts: Vec<Start>, placement: &Placement
         .collect()
 }
 
-/// Positions on the ticks of the display, where there are any, and what is left of the confidence of each start.
+/// Positions, on the ticks of the display if there are any, and confidence factors.
 fn in_phase(
     power: &[f64],
     noise_w: f64,
@@ -100,7 +100,7 @@ fn in_phase(
     (positions, product(in_phase, with_gap))
 }
 
-/// Doubts spread to the starts near, but not to marks, which are where they were put.
+/// Spreads suspicion to nearby starts, but not to marks, which are exact.
 fn spread_from_unmarked(factors: Vec<f64>, marked: &[bool]) -> Vec<f64> {
     let spread = idle_gap::spread_to_neighbours(factors).into_iter().zip(marked);
     spread.map(|(factor, marked)| if *marked { 1.0 } else { factor }).collect()

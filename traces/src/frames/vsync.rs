@@ -1,8 +1,9 @@
-//! Frames that wait for the display: all starts lie on the ticks of one clock.
+//! V-sync snapping: frames that wait for the display start on the ticks of one clock.
 //!
-//! Where the beginning of a frame changes from frame to frame, templates are aligned by what stands out, which may lie a millisecond after
-//! the start. A sequence then wanders about, though the frames it follows do not. If nearly all gaps are whole numbers of one period the
-//! display gives the beat, and where the starts of such a trace are spread all the same, the mark and the period say where they lie.
+//! Where the beginning of a frame varies, templates are aligned by its most prominent part, up to a millisecond after the
+//! start. The sequence then wanders, although the frames do not. If nearly all gaps are whole numbers of one period, the
+//! display sets that period. If the starts of such a trace are spread all the same, the mark and the period give their
+//! positions.
 
 use crate::stats::upper_median;
 
@@ -25,7 +26,7 @@ const SCATTER_LIMITS: [f64; 2] = [0.1, 1.5];
 /// Rounds of reweighting.
 const MAX_ROUNDS: usize = 60;
 
-/// What the display says of starts.
+/// Starts relative to the ticks of the display.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Snapped {
     /// Positions, samples: on the ticks where the starts were spread about, else as they were.
@@ -34,8 +35,8 @@ pub(super) struct Snapped {
     pub off_tick: Vec<bool>,
 }
 
-/// Holds the starts at `positions` (samples, in order) against the ticks of the display, if they wait for it; `fixed` is the number of
-/// one that is right.
+/// Snaps the starts at `positions` (samples, in order) to the ticks of the display, if they wait for it; `fixed` is the number of
+/// an exact one.
 pub(super) fn snap_to_ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Snapped> {
     let (off, period) = tick_distances(positions, fixed)?;
     let share =
@@ -78,7 +79,7 @@ fn scattered(off: &[f64], mut residues: Vec<f64>) -> bool {
     upper_median(&mut far) < most * upper_median(&mut residues)
 }
 
-/// How many periods each gap is, as whole numbers: what a start between two ticks leaves over is counted with the next gap.
+/// Each gap in whole periods; the remainder of a start between two ticks counts with the next gap.
 fn whole_periods(gaps: &[f64], period: f64) -> Vec<f64> {
     let mut over = 0.0;
     let whole = |gap: &f64| {

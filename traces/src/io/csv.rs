@@ -16,26 +16,26 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Where the description of a CSV file may lie as well: the same name ending in `.json`.
+/// Another place of the description of a CSV file: the same name ending in `.json`.
 pub fn sidecar_path(path: &Path) -> PathBuf {
     path.with_extension("json")
 }
 
-/// Where [`save_as`] puts the description of a file: its whole name and `.json`, which no other file shares.
+/// The place where [`save_as`] writes the description of a file: its whole name and `.json`, which no other file shares.
 pub fn description_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".json");
     name.into()
 }
 
-/// Where a description may be, in the order in which they are tried: [`description_path`], then [`sidecar_path`], also without `.gz`.
+/// The places of a description, in the order in which they are tried: [`description_path`], then [`sidecar_path`], also without `.gz`.
 pub(crate) fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
     let inner = path.with_extension("");
     let unpacked = inner.extension().is_some().then(|| sidecar_path(&inner));
     [description_path(path), sidecar_path(path)].into_iter().chain(unpacked)
 }
 
-/// What stands between the fields of a text's first line: a tab or a semicolon if it has any, else a comma.
+/// The delimiter of a text, by its first line: a tab or a semicolon if it has any, else a comma.
 pub(crate) fn delimiter(text: &[u8]) -> u8 {
     let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
     [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
@@ -47,8 +47,7 @@ const TASK_ROWS: usize = 1 << 12;
 const HELD_ROWS: usize = 1 << 18;
 
 /// Writes the samples. Times are whole nanoseconds written as seconds; values have the digits that read back as the same
-/// number in f32 and in f64 alike, so that whoever integrates them in f64 finds the joules found here. About 50 bytes a
-/// sample.
+/// number in f32 and in f64, so that an integral in f64 gives the same joules as here. About 50 bytes a sample.
 ///
 /// # Errors
 /// [`WriteError::Encode`] if the writer fails, [`WriteError::Read`] if the samples cannot be read.
@@ -80,12 +79,12 @@ struct Writer<W: Write + Send> {
 }
 
 impl<W: Write + Send> TraceWriter for Writer<W> {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-        if stretch.lost {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        if chunk.lost {
             return Ok(());
         }
-        for from in (0..stretch.len()).step_by(HELD_ROWS) {
-            let held = stretch.part(from, stretch.len().min(from + HELD_ROWS));
+        for from in (0..chunk.len()).step_by(HELD_ROWS) {
+            let held = chunk.part(from, chunk.len().min(from + HELD_ROWS));
             for text in self.texts(&held) {
                 self.out.write_all(&text).map_err(encode)?;
             }
@@ -100,7 +99,7 @@ impl<W: Write + Send> Writer<W> {
         writeln!(self.out, "{TIME_S}{c}{VOLTAGE_V}{c}{CURRENT_A}")
     }
 
-    /// The rows in order, made side by side.
+    /// The text of rows, formatted in parallel.
     fn texts(&self, held: &TraceChunk<'_>) -> Vec<Vec<u8>> {
         let (header, delimiter) = (&self.header, self.delimiter);
         let tasks = (0..held.len().div_ceil(TASK_ROWS)).into_par_iter();
@@ -109,7 +108,7 @@ impl<W: Write + Send> Writer<W> {
     }
 }
 
-/// The rows of a stretch.
+/// The text of some rows.
 fn text(header: &TraceHeader, rows: &TraceChunk<'_>, c: char) -> Vec<u8> {
     let mut out = Vec::with_capacity(rows.len() * 56);
     for (index, (voltage, current)) in rows.voltage_v.iter().zip(rows.current_a).enumerate() {
@@ -148,7 +147,7 @@ pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
     save_as(trace, path, b',', false)
 }
 
-/// As [`save`], with another delimiter and compressed with gzip if asked.
+/// As [`save`], with another delimiter and optionally compressed with gzip.
 ///
 /// # Errors
 /// [`WriteError`] names the file.
@@ -176,7 +175,7 @@ pub(super) struct CsvRows {
     record: ByteRecord,
     names: Vec<String>,
     row: u64,
-    /// Whether the first record is in `record` already: it was looked at for names and had none.
+    /// Whether the first record, which has no names, is in `record` already.
     held: bool,
     /// Rows with more or fewer fields than there are names: the first, its time if it has one, and how many.
     uneven: Option<(u64, Option<f64>, u64)>,
@@ -243,7 +242,7 @@ impl CsvRows {
         &self.names
     }
 
-    /// What was mended in the rows so far, by a description with rate and start where they have no times.
+    /// The repair of the rows so far; without times, by the rate and start of the description.
     pub fn repair(&self, header: &Description) -> Option<Repair> {
         let (row, time_s, count) = self.uneven?;
         let time_s = time_s.unwrap_or_else(|| header.time_s(row as usize - 1));
@@ -327,7 +326,7 @@ impl CsvRows {
         Ok(rows)
     }
 
-    /// A finite number; if it is to be mended later, what stands for none; else the error that names its place.
+    /// A finite number; otherwise the placeholder `none` if it is repaired later, or the error that names its place.
     fn field<T: std::str::FromStr + Finite>(
         &self,
         column: &Picked,

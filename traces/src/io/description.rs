@@ -1,4 +1,4 @@
-//! The JSON description that goes with every trace.
+//! The JSON description of a trace.
 
 use super::samples::TraceHeader;
 use super::{CURRENT_A, ReadError, TIME_NS, TIME_S, VOLTAGE_V, WriteError};

@@ -1,6 +1,4 @@
-//! What can be wrong with a file.
-//!
-//! What can go wrong as a file is written.
+//! Errors of reading and of writing.
 
 use crate::trace::TraceError;
 use std::error::Error;
@@ -15,7 +13,7 @@ pub enum ReadError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The file is cut off, damaged, or not of its format.
@@ -25,7 +23,7 @@ pub enum ReadError {
         path: PathBuf,
         /// Parquet, JLS or CSV.
         format: &'static str,
-        /// What the reader says.
+        /// The error of the reader.
         reason: String,
     },
     /// A format that is not read.
@@ -33,12 +31,12 @@ pub enum ReadError {
     Format {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// The format found.
         found: &'static str,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
-    /// A stretch cannot be mended.
+    /// Input that cannot be repaired.
     #[error("{path}: {reason}; cut the stretch out by hand", path = path.display())]
     Repair {
         /// The file.
@@ -53,7 +51,7 @@ pub enum ReadError {
         path: PathBuf,
         /// The row.
         row: u64,
-        /// What is wrong.
+        /// The error.
         reason: String,
     },
     /// The file has fewer or more rows than it says.
@@ -66,7 +64,7 @@ pub enum ReadError {
         /// Rows stated.
         stated: u64,
     },
-    /// The recorder lost the end, and nothing in the rows tells of it.
+    /// The recorder lost the end, and no row shows it.
     #[error("{path}: the recorder lost {lost} samples after the last row: cut the recording there and take lost_at_end out of its description, or have them filled with --repair", path = path.display())]
     LostEnd {
         /// The file.
@@ -91,7 +89,7 @@ pub enum ReadError {
         column: String,
         /// The unit.
         unit: String,
-        /// What the column is read as.
+        /// The quantity that the column is read as.
         of: &'static str,
     },
     /// A unit beside a column's name that is not known.
@@ -121,7 +119,7 @@ pub enum ReadError {
         row: u64,
         /// The column.
         column: String,
-        /// What stands there.
+        /// The value found.
         value: String,
     },
     /// A folder where a file has to be.
@@ -137,7 +135,7 @@ pub enum ReadError {
         path: PathBuf,
         /// The column.
         column: String,
-        /// What there is.
+        /// The names found.
         found: String,
     },
     /// Two columns have the same name but for case.
@@ -185,7 +183,7 @@ pub enum ReadError {
         row: u64,
         /// The column.
         column: String,
-        /// What stands there.
+        /// The value found.
         value: String,
     },
     /// A time stamp is not later than the one before it.
@@ -214,7 +212,7 @@ pub enum ReadError {
         time_s: f64,
         /// How far it is off, in sample periods.
         off_periods: f64,
-        /// The rate it was held against, Hz.
+        /// The rate it was compared with, Hz.
         rate_hz: f64,
     },
     /// Signals that do not make up rows.
@@ -236,7 +234,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
     },
-    /// The sample rate cannot be told.
+    /// The sample rate is unknown.
     #[error("{path}: a single row and no stated rate: the sample rate is unknown; give --rate, or state rate_hz in the description", path = path.display())]
     NoRate {
         /// The file.
@@ -247,7 +245,7 @@ pub enum ReadError {
     Description {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         reason: String,
     },
     /// The file is no longer what it was a moment ago.
@@ -261,7 +259,7 @@ pub enum ReadError {
     Trace {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         source: TraceError,
     },
 }
@@ -293,7 +291,7 @@ pub enum WriteError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// A path that names no file.
@@ -335,7 +333,7 @@ pub enum WriteError {
         /// Its time, s.
         time_s: f64,
     },
-    /// What is to be written cannot be made.
+    /// The trace to be written cannot be made.
     #[error(transparent)]
     Source(Box<dyn Error + Send + Sync>),
     /// The samples to be written could not be read.
@@ -346,7 +344,7 @@ pub enum WriteError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What failed.
+        /// The error.
         source: Box<dyn Error + Send + Sync>,
     },
 }

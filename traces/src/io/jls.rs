@@ -1,4 +1,4 @@
-//! JLS version 2, what Joulescope instruments record: traces from and to the signals of the crate [`jls`](::jls).
+//! JLS version 2, what Joulescope instruments record: traces from and to the signals of the crate [`::jls`].
 //!
 //! [`Writer`] writes samples in pieces, [`save`] a whole trace. Current and voltage are signals of fixed rate. A JSON text
 //! among the user data (`{"trace": ...}`) holds the exact rate and start and the metadata of the trace, which

@@ -34,7 +34,7 @@ pub use sum_of_rails::{SumOfRails, rail_of_sums};
 
 pub(crate) use columns::RowBatch;
 pub(crate) use parquet::{PagedFile, field_units};
-pub(crate) use time_base::{Stamps, all_apart, grid, rounded_rate_hz};
+pub(crate) use time_base::{Stamps, all_apart, grid, rate_of_steps_hz, rate_to_last_row_hz};
 
 /// The names of the columns that files are written with; read without regard to case.
 pub const COLUMNS: [&str; 4] = [TIME_NS, TIME_S, VOLTAGE_V, CURRENT_A];

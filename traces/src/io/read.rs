@@ -1,4 +1,4 @@
-//! A whole file into memory.
+//! Reading a whole file.
 
 use super::columns::RowBatch;
 use super::recording::Recording;
@@ -11,21 +11,21 @@ use crate::trace::Trace;
 use std::path::Path;
 
 /// Rows read at once.
-const PIECE: usize = 1 << 18;
+const PIECE_ROWS: usize = 1 << 18;
 
-/// A trace and what was mended in it.
+/// A trace and its repairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// The trace.
     pub trace: Trace,
-    /// What was mended; always empty unless [`ReadOptions::repair`] asked for it.
+    /// The repairs; always empty without [`ReadOptions::repair`].
     pub repairs: Vec<Repair>,
 }
 
-/// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), told apart by their first bytes.
+/// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), by their first bytes.
 ///
 /// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
+/// [`ReadError`] names the file, the row and what to do.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     load(Rows::open(path, options)?)
 }
@@ -56,7 +56,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>,
 /// description states the rate. Without a description the rate is that of the time stamps.
 ///
 /// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
+/// [`ReadError`] names the file, the row and what to do.
 pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
     Ok(load(Rows::csv(path, &ReadOptions::default(), false)?)?.trace)
 }
@@ -65,7 +65,7 @@ pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
 /// `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
 ///
 /// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
+/// [`ReadError`] names the file, the row and what to do.
 pub fn read_parquet(path: &Path) -> Result<Trace, ReadError> {
     Ok(load(Rows::parquet(path, &ReadOptions::default())?)?.trace)
 }
@@ -96,7 +96,7 @@ fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
 fn gather(rows: &mut Rows) -> Result<Columns, ReadError> {
     let mut all = Columns { stamps: Stamps::Absent, voltage_v: Vec::new(), current_a: Vec::new() };
     let mut batch = RowBatch::default();
-    while rows.append(PIECE, &mut batch, &mut all.voltage_v, &mut all.current_a)? > 0 {
+    while rows.append(PIECE_ROWS, &mut batch, &mut all.voltage_v, &mut all.current_a)? > 0 {
         match (&mut all.stamps, &batch.stamps) {
             (Stamps::Nanoseconds(all), Stamps::Nanoseconds(more)) => all.extend_from_slice(more),
             (Stamps::Seconds(all), Stamps::Seconds(more)) => all.extend_from_slice(more),

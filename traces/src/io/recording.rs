@@ -1,4 +1,4 @@
-//! A file that is read in pieces, as often as its samples are asked for.
+//! A file that is read in pieces, as often as its samples are needed.
 
 use super::columns::RowBatch;
 use super::rows::Rows;
@@ -10,10 +10,10 @@ use crate::trace::check_times;
 use std::path::{Path, PathBuf};
 
 /// Rows read at once.
-const PIECE: usize = 1 << 18;
+const PIECE_ROWS: usize = 1 << 18;
 
-/// A file that was looked through once and is a trace: finite samples at an even rate, as many as it says. It holds what
-/// [`read`](super::read()) would have made of it, but for the samples.
+/// A file that was checked once and is a trace: finite samples at an even rate, as many as it states. It holds what
+/// [`read`](super::read()) would return, except the samples.
 #[derive(Clone, Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -28,9 +28,9 @@ impl Recording {
     /// Reads a file through, once.
     ///
     /// # Errors
-    /// [`ReadError`] as [`read`](super::read()) without [`ReadOptions::repair`]: what is to be mended needs the whole trace.
+    /// [`ReadError`] as [`read`](super::read()) without [`ReadOptions::repair`]: repairs need the whole trace.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        Self::in_pieces(path, options, PIECE)
+        Self::in_pieces(path, options, PIECE_ROWS)
     }
 
     fn in_pieces(path: &Path, options: &ReadOptions, piece: usize) -> Result<Self, ReadError> {
@@ -54,7 +54,7 @@ impl Recording {
         Ok(Self { path: path.to_owned(), options: options.clone(), piece, header, repairs: seen.repairs })
     }
 
-    /// What was mended as the file was looked through.
+    /// The repairs made when the file was checked.
     pub fn repairs(&self) -> &[Repair] {
         &self.repairs
     }
@@ -64,7 +64,7 @@ impl Recording {
     }
 }
 
-/// What one look at all rows shows.
+/// The result of one pass over all rows.
 struct Seen {
     fit: Fit,
     rows: u64,
@@ -73,7 +73,7 @@ struct Seen {
     /// The first value of each channel that is not finite.
     voltage: Option<ReadError>,
     current: Option<ReadError>,
-    /// What is wrong with the end of a recording that is whole up to there.
+    /// The error at the end of a recording that is whole up to there.
     end: Option<ReadError>,
 }
 
@@ -98,7 +98,7 @@ impl Seen {
     }
 }
 
-/// The samples at hand.
+/// The current samples.
 #[derive(Default)]
 struct Piece {
     voltage_v: Vec<f32>,
@@ -128,12 +128,12 @@ impl TraceReader for Recording {
             if rows.check_finite(voltage_v, current_a, first).is_err() {
                 return Err(self.changed());
             }
-            let stretch = TraceChunk { first, voltage_v, current_a, lost: false };
+            let chunk = TraceChunk { first, voltage_v, current_a, lost: false };
             // The next rows are decoded while these are taken.
             let (next, taken) =
-                rayon::join(|| coming.read(&mut rows, self.piece, &mut batch), || writer.write(&stretch));
+                rayon::join(|| coming.read(&mut rows, self.piece, &mut batch), || writer.write(&chunk));
             taken?;
-            (first, read) = (first + stretch.len() as u64, next?);
+            (first, read) = (first + chunk.len() as u64, next?);
             std::mem::swap(&mut piece, &mut coming);
         }
         if first == self.header.samples { Ok(()) } else { Err(self.changed()) }
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_changes_between_the_looks_is_refused() {
+    fn a_file_that_changes_between_passes_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let (path, out) = (folder.path().join("t.csv"), folder.path().join("out.parquet"));
         fs::write(&path, text(1000.0, 9, &[])).unwrap();

@@ -1,4 +1,4 @@
-//! Mending on request. Whatever is mended is repairs.
+//! Repair of input, if requested: sort rows, fill gaps and non-finite values. Every repair is reported.
 
 use super::ReadError;
 use super::description::Description;
@@ -6,24 +6,24 @@ use super::time_base::{Stamps, usual_rate_hz};
 use serde::Serialize;
 use std::path::Path;
 
-/// How far a stamp may be off its place, in sample periods, to count as there.
-const OFF: f64 = 0.25;
-/// A repair that would make the trace longer than this many times is refused.
-const LONGER: usize = 16;
+/// Largest distance of a stamp from its place in the time base, in sample periods.
+const MAX_OFFSET_PERIODS: f64 = 0.25;
+/// Largest factor by which a repair may lengthen a trace.
+const MAX_GROWTH: usize = 16;
 
-/// All rows of a file as they stand in it.
+/// All rows of a file, as they are in it.
 pub(super) struct Columns {
     pub stamps: Stamps,
     pub voltage_v: Vec<f32>,
     pub current_a: Vec<f32>,
 }
 
-/// Something that was mended.
+/// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
     /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
     pub code: &'static str,
-    /// The first row (from 1, as rows stand in the file; after sorting, as they stand then).
+    /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,
     /// When, s; by rate and start where the file has no times.
     pub time_s: f64,
@@ -33,8 +33,8 @@ pub struct Repair {
     pub message: String,
 }
 
-/// Mends rows in place: drops those without a time, sorts them, fills what is not finite from its neighbours, and puts
-/// samples where some are missing.
+/// Repairs rows in place: drops those without a time, sorts them, fills non-finite values from their neighbours, and adds
+/// missing samples.
 pub(super) fn repair_rows(
     path: &Path,
     columns: &mut Columns,
@@ -90,7 +90,7 @@ fn order(times: Vec<f64>, columns: &mut Columns, repairs: &mut Vec<Repair>) -> V
     rows.iter().map(|&row| times[row]).collect()
 }
 
-/// Tells of rows without a time and of those that repeat one. The place is the first of them; where it has no time, that of
+/// Reports rows without a time and those that repeat one. The place is the first of them; where it has no time, that of
 /// the last row before which has one, else of the first after.
 fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
     let count = times.iter().filter(|time| !time.is_finite()).count() + repeats.len();
@@ -106,7 +106,7 @@ fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
     Some(Repair { code: "dropped-rows", row, time_s, count: count as u64, message })
 }
 
-/// Puts the straight line between its neighbours in place of every stretch that is not finite.
+/// Replaces non-finite values by the straight line between their neighbours.
 fn fill(
     path: &Path,
     name: &str,
@@ -144,7 +144,7 @@ fn fill(
     Ok(())
 }
 
-/// Puts the rows on an even grid of times; between rows, on the straight line.
+/// Resamples the rows to an even time base, by straight lines between rows.
 fn space(
     path: &Path,
     times: &mut Vec<f64>,
@@ -155,22 +155,28 @@ fn space(
     let rate_hz = description.rate_hz.unwrap_or_else(|| usual_rate_hz(times));
     let start_s = times[0];
     let place = |time: f64| (time - start_s) * rate_hz;
-    let even = times.iter().enumerate().all(|(row, &time)| (place(time) - row as f64).abs() <= OFF);
+    let even =
+        times.iter().enumerate().all(|(row, &time)| (place(time) - row as f64).abs() <= MAX_OFFSET_PERIODS);
     if even {
         return Ok(());
     }
     let slots = libm::round(place(times[times.len() - 1])) + 1.0;
-    if !(slots >= 1.0 && slots <= (LONGER * times.len()) as f64) {
+    if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
         let reason = format!(
             "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
             times.len()
         );
         return Err(ReadError::Repair { path: path.to_owned(), reason });
     }
-    let off = times.iter().filter(|&&time| (place(time) - libm::round(place(time))).abs() > OFF).count();
+    let off = times
+        .iter()
+        .filter(|&&time| (place(time) - libm::round(place(time))).abs() > MAX_OFFSET_PERIODS)
+        .count();
     if off > 0 {
-        let row =
-            times.iter().position(|&time| (place(time) - libm::round(place(time))).abs() > OFF).unwrap_or(0);
+        let row = times
+            .iter()
+            .position(|&time| (place(time) - libm::round(place(time))).abs() > MAX_OFFSET_PERIODS)
+            .unwrap_or(0);
         let message =
             format!("{off} rows, the first of them {}, were off an even rate of {rate_hz} Hz", row + 1);
         repairs.push(Repair {
@@ -195,14 +201,14 @@ fn space(
         }
     }
     let grid: Vec<f64> = (0..slots as usize).map(|slot| start_s + slot as f64 / rate_hz).collect();
-    columns.voltage_v = interpolated(times, &columns.voltage_v, &grid, OFF / rate_hz);
-    columns.current_a = interpolated(times, &columns.current_a, &grid, OFF / rate_hz);
+    columns.voltage_v = interpolated(times, &columns.voltage_v, &grid, MAX_OFFSET_PERIODS / rate_hz);
+    columns.current_a = interpolated(times, &columns.current_a, &grid, MAX_OFFSET_PERIODS / rate_hz);
     *times = grid;
     description.rate_hz = Some(rate_hz);
     Ok(())
 }
 
-/// Puts samples like the last one where the recorder lost the end.
+/// Repeats the last sample where the recorder lost the end.
 fn lengthen(
     path: &Path,
     columns: &mut Columns,
@@ -213,7 +219,7 @@ fn lengthen(
     let rows = columns.voltage_v.len();
     let Some(lost) = description.lost_at_end.filter(|lost| *lost > 0 && rows > 0) else { return Ok(()) };
     let longer = usize::try_from(lost).ok().map(|lost| rows.saturating_add(lost));
-    let Some(longer) = longer.filter(|longer| *longer <= LONGER.saturating_mul(rows)) else {
+    let Some(longer) = longer.filter(|longer| *longer <= MAX_GROWTH.saturating_mul(rows)) else {
         let reason = format!("{lost} samples are said to be lost after {rows} rows");
         return Err(ReadError::Repair { path: path.to_owned(), reason });
     };
@@ -262,7 +268,7 @@ mod tests {
             .collect()
     }
 
-    fn mended(times: Vec<f64>, spoilt: usize) -> (Vec<Repair>, Columns, Description) {
+    fn repaired(times: Vec<f64>, spoilt: usize) -> (Vec<Repair>, Columns, Description) {
         let mut current_a: Vec<f32> = (0..times.len()).map(|row| row as f32).collect();
         current_a[spoilt] = f32::NAN;
         let mut columns =
@@ -274,14 +280,14 @@ mod tests {
 
     #[test]
     fn rounded_stamps_of_an_even_rate_stay_as_they_are() {
-        let (repairs, columns, _) = mended(rounded(0..0), 777);
+        let (repairs, columns, _) = repaired(rounded(0..0), 777);
         assert_eq!(repairs.iter().map(|repair| repair.code).collect::<Vec<_>>(), ["filled-values"]);
         assert!(columns.current_a.iter().enumerate().all(|(row, amps)| *amps == row as f32));
     }
 
     #[test]
     fn a_gap_in_rounded_stamps_is_filled_with_as_many_as_are_missing() {
-        let (repairs, columns, description) = mended(rounded(5000..5100), 3);
+        let (repairs, columns, description) = repaired(rounded(5000..5100), 3);
         assert_eq!(description.rate_hz, Some(44_100.0));
         let gaps: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
         assert_eq!(gaps, [("filled-values", 4, 1), ("filled-gap", 5000, 100)]);

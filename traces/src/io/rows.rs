@@ -231,7 +231,7 @@ impl Rows {
     }
 
     /// Appends a batch's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
-    /// power is known, the voltage is 1 V and the current stands for the power.
+    /// power is known, the voltage is 1 V and the current is the power.
     fn channels(&self, batch: &mut RowBatch, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
         self.layout.scale(&mut batch.values);
         match self.layout.rails[..] {

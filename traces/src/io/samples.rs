@@ -1,14 +1,14 @@
-//! Where samples come from and where they go, piece by piece, so that no trace has to fit into memory.
+//! Readers and writers of samples, in pieces, so that no trace has to fit into memory.
 //!
-//! A [`TraceReader`] is a trace in memory or a file that is read again; a [`TraceWriter`] is the writer of a format, or whoever wants to
-//! see all samples once. Writers take samples in pieces only, so that a trace in memory and a file of any length go the
-//! same way, and their bytes do not depend on where pieces end.
+//! A [`TraceReader`] is a trace in memory or a file; a [`TraceWriter`] is the writer of a format, or anything else that needs
+//! all samples once. Writers take samples in pieces only, so that a trace in memory and a file of any length are written in
+//! the same way, and the bytes do not depend on where pieces end.
 
 use super::WriteError;
 use crate::metadata::Metadata;
 use crate::trace::{Trace, lost_at_end, time_ns};
 
-/// What is known of a trace before its first sample.
+/// Everything about a trace but its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TraceHeader {
     /// Left edge of the first sample, s.
@@ -19,9 +19,9 @@ pub struct TraceHeader {
     pub samples: u64,
     /// How many of them the recorder lost.
     pub lost_samples: u64,
-    /// How many of those come after the last sample that was not lost: where files leave lost samples out, no row tells of them.
+    /// How many of those come after the last sample that was not lost: in files that leave lost samples out, no row shows them.
     pub lost_at_end: u64,
-    /// Where the trace comes from.
+    /// Origin and marks of the trace.
     pub metadata: Metadata,
 }
 
@@ -47,7 +47,7 @@ impl TraceHeader {
     }
 }
 
-/// Samples that follow one another.
+/// Consecutive samples of a trace.
 #[derive(Clone, Copy, Debug)]
 pub struct TraceChunk<'a> {
     /// Number of the first in the whole trace, from 0.
@@ -56,7 +56,7 @@ pub struct TraceChunk<'a> {
     pub voltage_v: &'a [f32],
     /// Current of each, A; as many.
     pub current_a: &'a [f32],
-    /// Whether the recorder lost them: then they are the line between their neighbours, and left out of files.
+    /// Whether the recorder lost them: then they lie on the line between their neighbours, and files leave them out.
     pub lost: bool,
 }
 
@@ -76,7 +76,7 @@ impl TraceChunk<'_> {
         self.voltage_v.is_empty()
     }
 
-    /// A part of it, by places in it.
+    /// A part, by indices.
     #[must_use]
     pub fn part(&self, from: usize, to: usize) -> Self {
         Self {
@@ -88,24 +88,24 @@ impl TraceChunk<'_> {
     }
 }
 
-/// Takes samples in order.
+/// A destination of samples.
 pub trait TraceWriter: Send {
-    /// Takes the samples after those taken before.
+    /// Writes the samples after those written before.
     ///
     /// # Errors
-    /// [`WriteError`] if they cannot be written; the rest is then not offered.
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError>;
+    /// [`WriteError`] if they cannot be written; the rest is then not written.
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError>;
 }
 
-/// Has samples, and gives them as often as asked.
+/// A source of samples, which can be read any number of times.
 pub trait TraceReader {
-    /// What is known of them.
+    /// The header.
     fn header(&self) -> TraceHeader;
 
-    /// Gives all samples in order, none twice and none left out.
+    /// Writes all samples to `writer`, in order, none twice and none left out.
     ///
     /// # Errors
-    /// What the writer returns, or [`WriteError::Read`] where the samples cannot be read.
+    /// The errors of `writer`, or [`WriteError::Read`] where the samples cannot be read.
     fn read_into(&self, writer: &mut dyn TraceWriter) -> Result<(), WriteError>;
 }
 
@@ -134,7 +134,7 @@ impl TraceReader for Trace {
     }
 }
 
-/// For tests: a trace that comes in pieces of some size.
+/// For tests: a trace in pieces of some size.
 #[cfg(test)]
 pub(crate) struct SplitTrace<'a>(pub &'a Trace, pub usize);
 

@@ -1,4 +1,4 @@
-//! Rails that are the sum of others, which would count twice.
+//! Rails that are the sum of others and would count twice.
 
 use super::columns::RowBatch;
 use super::rows::Rows;

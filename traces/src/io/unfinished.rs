@@ -1,6 +1,6 @@
 //! Unfinished files of this process, which an interrupt removes.
 //!
-//! The handler of a signal is given nothing, so it has to find them in a list of the whole process.
+//! A signal handler has no arguments, so it finds them in a list of the whole process.
 
 use std::collections::BTreeMap;
 use std::fmt;

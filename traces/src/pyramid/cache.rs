@@ -1,6 +1,6 @@
-//! The file that a pyramid is kept in: a header, checksums of groups of entries, and the entries, level by level.
+//! The cache file of a pyramid: a header, checksums of groups of entries, and the entries, level by level.
 
-use super::{BLOCK, ENTRY_BYTES, Entry, FAN, Pyramid, Store};
+use super::{BLOCK, ENTRY_BYTES, Entry, FANOUT, Pyramid, Store};
 use crate::io::{ReadOptions, WriteError, atomic};
 use crate::stream::Clock;
 use crc32c::crc32c;
@@ -10,15 +10,15 @@ use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-/// Begins every file; the format's version is in it.
+/// First bytes of every file, with the version of the format.
 const MAGIC: u64 = 0x3230_5259_505f_5451;
-/// That of the version before, which had no checksums.
-const BEFORE: u64 = 0x3130_5259_505f_5451;
+/// First bytes of the version before, which had no checksums.
+const MAGIC_1: u64 = 0x3130_5259_505f_5451;
 const HEADER_BYTES: usize = 64;
-/// Where the checksum of the header and of all checksums stands, in words of 8 bytes.
-const SEAL: usize = 7;
-/// Entries of a level that share a checksum: 12 KB, so that a look checks little more than it shows.
-const GROUP: u64 = 1024;
+/// Place of the checksum of the header and of all checksums, in words of 8 bytes.
+const CHECKSUM_WORD: usize = 7;
+/// Entries of a level that share a checksum: 12 KB, so that a view checks little more than it shows.
+const GROUP_ENTRIES: u64 = 1024;
 
 /// A file whose header is whole; its entries are checked as they are read.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ pub(super) struct Kept {
     sums: Vec<u32>,
 }
 
-/// Tells a file as it is now, and how it is read, from any other (FNV-1a, Fowler, Noll and Vo).
+/// Hash of a file as it is now and of how it is read (FNV-1a, Fowler, Noll and Vo).
 pub(super) fn stamp(path: &Path, options: &ReadOptions) -> u64 {
     let metadata = fs::metadata(path).ok();
     let modified = metadata.as_ref().and_then(|m| m.modified().ok()?.duration_since(UNIX_EPOCH).ok());
@@ -42,8 +42,8 @@ pub(super) fn stamp(path: &Path, options: &ReadOptions) -> u64 {
 /// Entries of each level.
 fn sizes(samples: u64) -> Vec<u64> {
     let mut sizes = vec![samples.div_ceil(BLOCK)];
-    while sizes[sizes.len() - 1] > FAN as u64 {
-        sizes.push(sizes[sizes.len() - 1].div_ceil(FAN as u64));
+    while sizes[sizes.len() - 1] > FANOUT as u64 {
+        sizes.push(sizes[sizes.len() - 1].div_ceil(FANOUT as u64));
     }
     sizes
 }
@@ -52,10 +52,10 @@ fn bytes(entries: &[Entry]) -> Vec<u8> {
     entries.iter().flat_map(|entry| entry.to_bytes()).collect()
 }
 
-/// Writes levels for a trace that is told by its stamp.
+/// Writes the levels of the trace with this stamp.
 pub(super) fn keep(pyramid: &Pyramid, path: &Path, stamp: u64) -> Result<(), WriteError> {
     let Store::Memory(levels) = &pyramid.store else { return Ok(()) };
-    let groups = || levels.iter().flat_map(|level| level.chunks(GROUP as usize));
+    let groups = || levels.iter().flat_map(|level| level.chunks(GROUP_ENTRIES as usize));
     let sums: Vec<u8> = groups().flat_map(|group| crc32c(&bytes(group)).to_le_bytes()).collect();
     let clock = pyramid.clock;
     let words = [MAGIC, stamp, pyramid.samples, clock.start_s.to_bits(), clock.rate_hz.to_bits(), 0, 0];
@@ -69,10 +69,10 @@ pub(super) fn keep(pyramid: &Pyramid, path: &Path, stamp: u64) -> Result<(), Wri
 }
 
 fn seal(head: &[u8], sums: &[u8]) -> u32 {
-    crc32c(&[&head[..8 * SEAL], sums].concat())
+    crc32c(&[&head[..8 * CHECKSUM_WORD], sums].concat())
 }
 
-/// What is kept beside a trace.
+/// The cache file found beside a trace.
 pub(super) enum Found {
     /// The pyramid of the trace, whole as far as can be seen without its entries.
     Whole(Pyramid),
@@ -82,7 +82,7 @@ pub(super) enum Found {
     Damaged,
 }
 
-/// Looks for the pyramid of the trace with that stamp.
+/// Searches the pyramid of the trace with this stamp.
 pub(super) fn kept(path: &Path, stamp: u64) -> Found {
     let Ok(mut file) = File::open(path) else { return Found::Other };
     let mut head = [0; HEADER_BYTES];
@@ -90,12 +90,12 @@ pub(super) fn kept(path: &Path, stamp: u64) -> Found {
         return Found::Damaged;
     }
     let word = |index: usize| head[8 * index..].first_chunk().map_or(0, |word| u64::from_le_bytes(*word));
-    if word(0) == BEFORE {
+    if word(0) == MAGIC_1 {
         return Found::Other;
     }
     let (samples, start_s, rate_hz) = (word(2), f64::from_bits(word(3)), f64::from_bits(word(4)));
     let Some((sizes, sums)) = checksums(&mut file, samples) else { return Found::Damaged };
-    if word(0) != MAGIC || word(SEAL) != u64::from(seal(&head, &sums)) {
+    if word(0) != MAGIC || word(CHECKSUM_WORD) != u64::from(seal(&head, &sums)) {
         return Found::Damaged;
     }
     if word(1) != stamp {
@@ -113,7 +113,7 @@ fn checksums(file: &mut File, samples: u64) -> Option<(Vec<u64>, Vec<u8>)> {
         return None;
     }
     let sizes = sizes(samples);
-    let groups: u64 = sizes.iter().map(|size| size.div_ceil(GROUP)).sum();
+    let groups: u64 = sizes.iter().map(|size| size.div_ceil(GROUP_ENTRIES)).sum();
     let whole = HEADER_BYTES as u64 + 4 * groups + ENTRY_BYTES * sizes.iter().sum::<u64>();
     if file.metadata().ok()?.len() != whole {
         return None;
@@ -128,19 +128,22 @@ impl Kept {
     pub(super) fn entries(&self, level: usize, first: u64, count: u64) -> Option<Vec<Entry>> {
         let (size, below) = (*self.sizes.get(level)?, self.sizes.get(..level)?);
         let end = size.min(first.saturating_add(count));
-        let (from, to) = (first.min(end) / GROUP, end.div_ceil(GROUP));
+        let (from, to) = (first.min(end) / GROUP_ENTRIES, end.div_ceil(GROUP_ENTRIES));
         let (before, groups): (u64, u64) =
-            (below.iter().sum(), below.iter().map(|size| size.div_ceil(GROUP)).sum());
+            (below.iter().sum(), below.iter().map(|size| size.div_ceil(GROUP_ENTRIES)).sum());
         let mut file = File::open(&self.path).ok()?;
         let entries_at = HEADER_BYTES as u64 + 4 * self.sums.len() as u64;
-        file.seek(SeekFrom::Start(entries_at + ENTRY_BYTES * (before + from * GROUP))).ok()?;
-        let mut bytes = vec![0; (ENTRY_BYTES * (size.min(to * GROUP) - size.min(from * GROUP))) as usize];
+        file.seek(SeekFrom::Start(entries_at + ENTRY_BYTES * (before + from * GROUP_ENTRIES))).ok()?;
+        let mut bytes =
+            vec![0; (ENTRY_BYTES * (size.min(to * GROUP_ENTRIES) - size.min(from * GROUP_ENTRIES))) as usize];
         file.read_exact(&mut bytes).ok()?;
         let sums = self.sums.get((groups + from) as usize..(groups + to) as usize)?;
-        let right =
-            bytes.chunks((ENTRY_BYTES * GROUP) as usize).zip(sums).all(|(group, sum)| crc32c(group) == *sum);
-        let within = (ENTRY_BYTES * (first.min(end) - from * GROUP)) as usize
-            ..(ENTRY_BYTES * (end - from * GROUP)) as usize;
+        let right = bytes
+            .chunks((ENTRY_BYTES * GROUP_ENTRIES) as usize)
+            .zip(sums)
+            .all(|(group, sum)| crc32c(group) == *sum);
+        let within = (ENTRY_BYTES * (first.min(end) - from * GROUP_ENTRIES)) as usize
+            ..(ENTRY_BYTES * (end - from * GROUP_ENTRIES)) as usize;
         right.then(|| bytes[within].chunks_exact(ENTRY_BYTES as usize).map(Entry::from_bytes).collect())
     }
 }

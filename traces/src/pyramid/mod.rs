@@ -1,7 +1,5 @@
-//! Overviews of any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks of blocks,
-//! and so on, made once and kept in a file beside the trace.
-//!
-//! Columns narrower than blocks, from the samples themselves.
+//! Overviews at any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks of blocks, and
+//! so on, built once and kept in a file beside the trace. Columns narrower than blocks come from the samples themselves.
 
 mod build;
 mod cache;
@@ -16,15 +14,15 @@ use std::path::{Path, PathBuf};
 /// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample, 2.5 % of
 /// the 8 bytes of voltage and current.
 pub const BLOCK: u64 = 64;
-/// Blocks of a level in one of the next.
-const FAN: usize = 16;
-/// Blocks a column is made of at least, where the level below has them.
-const PER_COLUMN: u64 = 4;
+/// Blocks of a level that make one of the next.
+const FANOUT: usize = 16;
+/// Fewest blocks of a column, if the level below has as many.
+const MIN_BLOCKS_PER_COLUMN: u64 = 4;
 const ENTRY_BYTES: u64 = 12;
-/// How near an edge of a sample a time counts as there, in samples.
-const EDGE: f64 = 1e-6;
+/// Distance from an edge of a sample within which a time counts as on it, in samples.
+const EDGE_SAMPLES: f64 = 1e-6;
 
-/// A stretch of time and the powers in it, W.
+/// A segment of time and the powers in it, W.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
     /// Its begin, s.
@@ -62,7 +60,7 @@ enum Store {
     File(cache::Kept),
 }
 
-/// Where the pyramid of a trace is kept.
+/// The cache file of the pyramid of a trace.
 pub fn pyramid_path(trace: &Path) -> PathBuf {
     let mut name = trace.as_os_str().to_owned();
     name.push(".pyramid");
@@ -113,7 +111,7 @@ impl Pyramid {
         Ok(pyramid)
     }
 
-    /// Reads a whole trace, in pieces; one that is to be mended at once, as the places of its samples depend on all of them.
+    /// Reads a whole trace, in pieces; at once if it is to be repaired, as the places of its samples then depend on all of them.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read, or its samples are not even or finite.
@@ -134,8 +132,8 @@ impl Pyramid {
 
     fn of_blocks(clock: Clock, samples: u64, base: Vec<Entry>) -> Self {
         let mut levels = vec![base];
-        while levels[levels.len() - 1].len() > FAN {
-            levels.push(levels[levels.len() - 1].chunks(FAN).map(Entry::of_entries).collect());
+        while levels[levels.len() - 1].len() > FANOUT {
+            levels.push(levels[levels.len() - 1].chunks(FANOUT).map(Entry::of_entries).collect());
         }
         Self { clock, samples, store: Store::Memory(levels), was_damaged: false }
     }
@@ -157,8 +155,8 @@ impl Pyramid {
         let (from, to) = self.places(from_s, to_s);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
         let (mut level, mut size) = (0, BLOCK);
-        while size * FAN as u64 * PER_COLUMN <= wanted {
-            (level, size) = (level + 1, size * FAN as u64);
+        while size * FANOUT as u64 * MIN_BLOCKS_PER_COLUMN <= wanted {
+            (level, size) = (level + 1, size * FANOUT as u64);
         }
         let per_column = wanted.div_ceil(size).max(1);
         let (first, last) = (from / size, to.div_ceil(size));
@@ -176,7 +174,7 @@ impl Pyramid {
         let place = |time_s: f64| {
             let (at, whole) = (self.clock.position(time_s), libm::round(self.clock.position(time_s)));
             // Times of samples are rounded; what is an edge but for that is one.
-            let at = if (at - whole).abs() < EDGE { whole } else { at };
+            let at = if (at - whole).abs() < EDGE_SAMPLES { whole } else { at };
             at.clamp(0.0, self.samples as f64)
         };
         (place(from_s) as u64, libm::ceil(place(to_s)) as u64)
@@ -280,7 +278,7 @@ impl Pyramid {
         Some(self.of_samples(range.start, channels, columns))
     }
 
-    /// The samples of a stretch, if they are fewer than as many blocks would hold as there are to be columns.
+    /// The samples of a segment, if they are fewer than as many blocks would hold as there are to be columns.
     fn few(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Range<u64>> {
         let (from, to) = self.places(from_s, to_s);
         (to > from && to - from < columns as u64 * BLOCK).then_some(from..to)

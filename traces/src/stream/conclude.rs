@@ -121,7 +121,7 @@ impl Plan {
         })
     }
 
-    /// Where each mark is, s, and the powers about it.
+    /// The time of each mark, s, and the powers around it.
     fn windows(&self) -> impl Iterator<Item = (f64, &[f64])> {
         let marks = self.placement.marks.iter().map(|mark| mark.mark_s);
         marks.zip(self.templates.iter().map(Vec::as_slice))

@@ -1,10 +1,8 @@
-//! Frames of a file that need not fit into memory: one pass, in pieces, on all threads.
+//! Frames of a file of any length: one pass, in pieces, on all threads.
 //!
-//! The method is the sum of squares of [`frames`](crate::frames), the same minima and the same threshold. What differs:
-//! offsets are screened by a transform in f32, and the distance of every minimum, its place finer than a sample and the
-//! energy up to there are worked out in f64 while its samples are at hand. No step depends on how many threads there are.
-//!
-//! What can go wrong.
+//! The method is the sum of squares of [`frames`](crate::frames), with the same minima and the same threshold. Here, offsets
+//! are screened by a transform in f32; the distance of every minimum, its place finer than a sample and the energy up to
+//! there are computed in f64 while its samples are in memory. No step depends on the number of threads.
 
 mod clock;
 mod conclude;
@@ -31,7 +29,7 @@ pub struct Streamed {
     pub clock: Clock,
     /// Energy of the whole trace, J.
     pub total_j: f64,
-    /// What the file says of itself.
+    /// The metadata of the file.
     pub metadata: Metadata,
 }
 
@@ -139,7 +137,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
         parquet::save(&trace, &path).unwrap();
-        let told = |mark_s: f64, window: Window| {
+        let warned = |mark_s: f64, window: Window| {
             let marks = Marks::one(mark_s, window, trace.end_s());
             let options = Options { method: Method::SumOfSquares };
             let [ours, theirs] = [
@@ -151,7 +149,7 @@ mod tests {
             ours.is_some()
         };
         // Before the first frame there is idle power alone.
-        assert!(told(0.02, Window { pre_s: 5e-3, post_s: 20e-3 }));
-        assert!(!told(0.05, default_window(0.01, trace.rate_hz())));
+        assert!(warned(0.02, Window { pre_s: 5e-3, post_s: 20e-3 }));
+        assert!(!warned(0.05, default_window(0.01, trace.rate_hz())));
     }
 }

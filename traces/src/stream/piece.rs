@@ -1,6 +1,4 @@
-//! The samples at hand.
-//!
-//! The marks' windows, and the exact distance to them.
+//! The samples in memory, the marked windows, and the exact distance to them.
 
 use super::StreamError;
 use super::clock::Clock;
@@ -14,7 +12,7 @@ use std::path::Path;
 /// Samples per stored sum.
 pub(super) const BLOCK: usize = 256;
 
-/// A stretch of samples with running sums of power, for energies to any place in it.
+/// A segment of samples with running sums of power, for energies to any place in it.
 #[derive(Default)]
 pub(super) struct Piece {
     /// Number of the first sample, a multiple of [`BLOCK`].

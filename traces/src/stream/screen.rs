@@ -1,14 +1,13 @@
-//! The distance of the nearest template to every stretch, in f32: good enough to tell where minima are.
-//!
-//! Minima of one stretch of the profile, such that stretches join without a seam.
+//! The distance of the nearest template to every window, in f32: exact enough to show where minima are; and these minima,
+//! piece by piece.
 
 use crate::overlap;
 use crate::overlap::OverlapSave;
 use multiversion::multiversion;
 use rustfft::num_complex::Complex;
 
-/// Least length of a transform: its arrays stay in the first cache, or nearly so.
-const LEAST_BLOCK: usize = 1 << 12;
+/// Least length of a transform: its arrays nearly stay in the first cache.
+const MIN_BLOCK_SAMPLES: usize = 1 << 12;
 
 /// Templates of one width, ready to be compared.
 pub(super) struct Screen {
@@ -18,7 +17,7 @@ pub(super) struct Screen {
     width: usize,
 }
 
-/// What a thread works in.
+/// The buffers of a thread.
 #[derive(Default)]
 pub(super) struct Buffers {
     overlap: overlap::Buffers<f32>,
@@ -29,7 +28,7 @@ impl Screen {
     /// Prepares templates of equal width, W less the mean that signals will have taken off, too.
     pub fn new(centred: &[Vec<f64>]) -> Self {
         let width = centred.first().map_or(1, Vec::len);
-        let block = (16 * width).next_power_of_two().max(LEAST_BLOCK);
+        let block = (16 * width).next_power_of_two().max(MIN_BLOCK_SAMPLES);
         let own = centred.iter().map(|template| template.iter().map(|x| x * x).sum()).collect();
         // The factor is that of the cross term.
         Self { overlap: OverlapSave::new(centred, -2.0, block), own, width }
@@ -72,16 +71,16 @@ fn lower(
     }
 }
 
-/// Samples that are summed up by themselves: one sum of all would wait for itself at every sample.
-const GROUP: usize = 8;
+/// Samples that are summed by themselves: a single sum would wait for itself at every sample.
+const GROUP_SAMPLES: usize = 8;
 
 /// Sums of the squares before each sample, and of all.
 #[multiversion(targets("x86_64+avx2"))]
 fn running_squares(signal: &[f32], squares: &mut Vec<f64>) {
     squares.resize(signal.len() + 1, 0.0);
     squares[0] = 0.0;
-    let (groups, rest) = signal.as_chunks::<GROUP>();
-    let (sums, rest_sums) = squares[1..].as_chunks_mut::<GROUP>();
+    let (groups, rest) = signal.as_chunks::<GROUP_SAMPLES>();
+    let (sums, rest_sums) = squares[1..].as_chunks_mut::<GROUP_SAMPLES>();
     let mut sum = 0.0;
     for (group, sums) in groups.iter().zip(sums) {
         sum = add_up(group, sum, sums);
@@ -101,8 +100,8 @@ fn add_up(group: &[f32], before: f64, sums: &mut [f64]) -> f64 {
 }
 
 /// Offsets in `from..to` of `profile` (which begins before `from` and reaches beyond `to`) that are lowest within less
-/// than `spacing` on either side; `from` is a multiple of `spacing` in the whole. Of ties, the first of each stretch of
-/// `spacing`; who joins stretches drops those nearer than `spacing` to the one before.
+/// than `spacing` on either side; `from` is a multiple of `spacing` in the whole. Of ties, the first of each segment of
+/// `spacing`; who joins segments drops those nearer than `spacing` to the one before.
 pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mut take: impl FnMut(usize)) {
     let mut block = from;
     while block < to {
@@ -120,7 +119,7 @@ pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mu
     }
 }
 
-/// Values that are compared at once: what the compiler keeps in few registers.
+/// Values that are compared together: as many as the compiler keeps in few registers.
 const LANES: usize = 16;
 
 /// The lowest value; infinity of none.
@@ -140,7 +139,7 @@ fn lowest(values: &[f32]) -> f32 {
     few.iter().copied().chain(lanes).fold(f32::INFINITY, less)
 }
 
-/// Where a value stands first.
+/// The first index of a value.
 #[multiversion(targets("x86_64+avx2"))]
 fn first(values: &[f32], value: f32) -> Option<usize> {
     let (chunks, _) = values.as_chunks::<LANES>();

@@ -58,7 +58,7 @@ proptest! {
     }
 }
 
-/// A trace whose stretches are handed on in other pieces.
+/// A trace whose chunks are handed on in other pieces.
 struct Cut<'a>(&'a Trace, &'a [usize]);
 
 struct Cutter<'a> {
@@ -77,11 +77,11 @@ impl TraceReader for Cut<'_> {
 }
 
 impl TraceWriter for Cutter<'_> {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
         let mut from = 0;
-        while from < stretch.len() {
-            let to = stretch.len().min(from + self.sizes.next().unwrap());
-            self.into.write(&stretch.part(from, to))?;
+        while from < chunk.len() {
+            let to = chunk.len().min(from + self.sizes.next().unwrap());
+            self.into.write(&chunk.part(from, to))?;
             from = to;
         }
         Ok(())

@@ -42,21 +42,21 @@ pub(super) struct Graph<'a> {
     period: f64,
     /// The earliest that may come before each.
     before: Vec<usize>,
-    /// Where the pairs of each begin; one more than there are candidates.
+    /// First pair of each candidate; one more than there are candidates.
     first: Vec<usize>,
-    /// What the similarity of each pair says, nats.
+    /// Evidence of the similarity of each pair, nats.
     similarity: Vec<f64>,
 }
 
 /// Best scores.
 struct Solution {
-    /// Of sequences that end in each pair.
+    /// Best score of the sequences that end in each pair.
     score: Vec<f64>,
-    /// The pair before it, or none where a stretch begins.
+    /// The pair before it, or none where a segment begins.
     back: Vec<usize>,
     /// The candidate that each pair begins with.
     begin: Vec<usize>,
-    /// The last pair of the stretch before the one that begins with each candidate.
+    /// The last pair of the segment before the one that begins with each candidate.
     entry: Vec<usize>,
     last: usize,
 }
@@ -153,7 +153,7 @@ impl<'a> Graph<'a> {
         self.or_alone(Chain { nodes, support })
     }
 
-    /// Where nothing follows anything, the candidates that stand by themselves beyond doubt.
+    /// If no candidate follows another, the candidates of overwhelming weight.
     fn or_alone(&self, chain: Chain) -> Chain {
         if !chain.nodes.is_empty() {
             return chain;
@@ -217,14 +217,14 @@ impl<'a> Graph<'a> {
     }
 }
 
-/// How many samples lie between neighbours that are no farther apart than those of one stretch.
+/// How many samples lie between neighbours that are no farther apart than those of one segment.
 pub(super) fn covered(offsets: &[usize], period: usize) -> usize {
     let most = GAP_LIMITS[1] * period as f64;
     offsets.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap as f64 <= most).sum()
 }
 
-/// What a gap says after the one before it, nats. An even beat counts by the time it covers, up to a period, so that frames cut
-/// in two are not worth twice as much as whole ones.
+/// Evidence of a gap after the one before it, nats. An even period counts by the time it covers, up to a period, so that split
+/// frames are not worth twice as much as whole ones.
 fn period_evidence(before: f64, after: f64, period: f64) -> f64 {
     (EVEN_GAIN * (after / period).min(1.0) - libm::log(after / before).abs() / GAP_CHANGE_PER_NAT)
         .max(MIN_GAP_EVIDENCE)

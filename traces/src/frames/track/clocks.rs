@@ -1,9 +1,10 @@
-//! Frames at another clock than the mark's, looked for again.
+//! Frames at another clock than the mark's, searched again.
 //!
-//! Templates follow content that changes slowly; at a clock step everything changes at once, and the sequence may go on evenly in
-//! another phase of the frame. So where neighbours become unlike, frames of both sides are aligned with the earlier ones drawn out in
-//! time ([`stretch`](crate::frames::refine)), over the whole of a period. Outwards from the mark, each stretch between two such places
-//! is held against the last one that is known to be right. Where it lies elsewhere, one of its frames, put right, is worth a mark.
+//! Templates follow content that changes slowly. At a clock step everything changes at once, and the sequence may go on at
+//! the same period in another phase of the frame. So where neighbours differ, frames of both sides are aligned over a whole
+//! period, the earlier ones [scaled in time](crate::frames::refine). Outwards from the mark, each segment between two such
+//! changes is compared with the last one known to be right. If it lies elsewhere, one of its frames is corrected and used
+//! like a mark.
 
 use crate::frames::refine::{ScaledFit, ScaledPair};
 use crate::stats::upper_median;
@@ -25,7 +26,7 @@ const BEGINNING_SHARE: f64 = 0.6;
 /// Largest share of the unexplained variance at the assumed place that a better alignment leaves.
 const MAX_IMPROVED_SHARE: f64 = 0.5;
 
-/// How frames of both sides of a step are held against each other.
+/// How frames of both sides of a step are compared.
 struct Comparison {
     /// Which frames are aligned: how many from the step on the known side, and how many on the other.
     pairs: &'static [[usize; 2]],
@@ -36,7 +37,7 @@ struct Comparison {
     /// How much after the start is compared.
     after: After,
     /// An alignment leaves at most this share of the variance.
-    alike: f64,
+    max_unexplained: f64,
 }
 
 /// How much after a start is compared: a share of the window, or of a period.
@@ -51,7 +52,7 @@ const NEAREST: Comparison = Comparison {
     agree: 3,
     within: 0.03,
     after: After::Window(BEGINNING_SHARE),
-    alike: 0.3,
+    max_unexplained: 0.3,
 };
 /// Nearly whole frames, for beginnings that resemble another part of the frame (in noise, at a slow clock).
 /// The nearest frames are left out, as the clock may have stepped within one.
@@ -60,10 +61,10 @@ const WHOLE: Comparison = Comparison {
     agree: 4,
     within: 0.06,
     after: After::Period(0.8),
-    alike: 0.5,
+    max_unexplained: 0.5,
 };
 
-/// Offsets of windows of starts, put right, one for each stretch of `starts` that lies elsewhere; `anchor` is the place of the start in a
+/// Offsets of windows of starts, put right, one for each segment of `starts` that lies elsewhere; `anchor` is the place of the start in a
 /// window of `width` samples.
 pub(super) fn misplaced(
     power: &[f64],
@@ -113,7 +114,7 @@ impl View<'_> {
         steps
     }
 
-    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step can be told.
+    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step can be resolved.
     fn walk(&self, steps: impl Iterator<Item = [usize; 2]>, way: isize, found: &mut Vec<usize>) {
         let mut moved = 0;
         for [here, there] in steps {
@@ -124,7 +125,7 @@ impl View<'_> {
             moved = if misplaced { by } else { 0 };
             if misplaced {
                 found.extend(self.starts[at].checked_add_signed(by));
-                // From where it takes whole frames to tell, the sequence had better be followed anew.
+                // Where only whole frames decide, the sequence is better tracked again from there.
                 if near.is_none() {
                     return;
                 }
@@ -161,8 +162,7 @@ impl View<'_> {
         (agreed.len() >= comparison.agree).then(|| (best.0, libm::round(best.1.shift) as isize))
     }
 
-    /// The fit of a start to another over a period, if it is a good one, and either at hand or at another clock and much better than
-    /// what is at hand.
+    /// The fit of a start to another over a period, if it is a good one, and either at the assumed place, or at another clock and much better than there.
     fn fit(&self, comparison: &Comparison, from: usize, to: usize, moved: isize) -> Option<ScaledFit> {
         let period = self.period(to)?;
         let after = match comparison.after {
@@ -171,13 +171,13 @@ impl View<'_> {
         };
         let best = |reach: usize| ScaledPair { after, ..self.pair([from, to], moved, reach) }.best();
         let fit = best(period / 2)?;
-        let at_hand = libm::fabs(fit.shift) <= self.share(MIN_MISPLACEMENT) as f64;
+        let in_place = libm::fabs(fit.shift) <= self.share(MIN_MISPLACEMENT) as f64;
         let better = || {
             best(self.share(MIN_MISPLACEMENT))
                 .is_none_or(|near| fit.unexplained < MAX_IMPROVED_SHARE * near.unexplained)
         };
-        let good = fit.unexplained < comparison.alike
-            && (at_hand || (fit.ratio - 1.0).abs() > MAX_CLOCK_DEVIATION && better());
+        let good = fit.unexplained < comparison.max_unexplained
+            && (in_place || (fit.ratio - 1.0).abs() > MAX_CLOCK_DEVIATION && better());
         good.then_some(fit)
     }
 
@@ -226,7 +226,7 @@ mod tests {
         (power, starts)
     }
 
-    /// Starts of which those at the other clock are found so many samples late.
+    /// Starts of which those at the other clock are found late, in samples.
     fn late(right: &[usize], by: usize) -> Vec<usize> {
         right.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + by }).collect()
     }

@@ -1,4 +1,4 @@
-//! How much more likely a candidate is a start than not: the linear discriminant of two normal populations (Fisher 1936).
+//! Evidence for a candidate: the linear discriminant of two normal populations, starts and others (Fisher 1936).
 
 use super::Candidate;
 
@@ -14,7 +14,7 @@ const MARK_WEIGHT: f64 = 1e3;
 /// squares, which depend on idle power and clock as well.
 const SHRINKAGE: [f64; FEATURES] = [0.2, 0.4];
 
-/// What a candidate is an example of.
+/// The class of an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Label {
     Start,

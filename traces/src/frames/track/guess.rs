@@ -18,7 +18,7 @@ const MAX_FRAMES_PER_GAP: usize = 5;
 /// Weight of a separation, capped at 5, beside regularity.
 const SEPARATION_WEIGHT: f64 = 0.1;
 
-/// The period in samples and the starts of that split of the minima, by either measure, that leaves the most even beat.
+/// The period in samples and the starts by that split of the minima, by either measure, that is most even.
 pub(super) fn first(templates: &Templates, spacing: usize, marks: &[usize]) -> (usize, Vec<usize>) {
     let mut best = (f64::NEG_INFINITY, 2 * spacing, marks.to_vec());
     let mut by = &templates.shape;
@@ -61,7 +61,7 @@ pub(super) fn first(templates: &Templates, spacing: usize, marks: &[usize]) -> (
 
 /// The starts and those between them, where what divides every gap of a period into so many equal parts resembles the mark as well as
 /// half a sample and noise let anything: of V-synchronized frames whose period is no whole number of samples, only some fall on the mark's place
-/// between samples, and they keep a beat of their own.
+/// between samples, and they have a period of their own.
 fn between(
     profile: &[f64],
     starts: &[usize],
@@ -101,8 +101,8 @@ fn lowest_beside(profile: &[f64], offset: usize) -> usize {
     three.min_by(|a, b| profile[*a].total_cmp(&profile[*b])).unwrap_or(offset)
 }
 
-/// What a match half a sample off leaves: a quarter of what a whole one does. Nearer ones are not told apart, or else, where a few
-/// periods are a whole number of samples, only every so many frames would seem to match.
+/// Distance of a match half a sample off: a quarter of that of a whole one. Nearer ones count as equal, or else, where a few
+/// periods are a whole number of samples, only one in several frames would seem to match.
 fn half_a_sample(profile: &[f64], marks: &[usize]) -> f64 {
     let beside = |mark: &usize| [mark.checked_sub(1), Some(mark + 1)];
     let values = marks.iter().flat_map(beside).flatten().filter_map(|offset| profile.get(offset));

@@ -1,13 +1,13 @@
-//! Following the frames outwards from the mark.
+//! Tracking: following the frames outwards from the mark.
 //!
-//! What a frame start looks like changes slowly, so it is learnt where it is known: from the frames around the mark. In rounds the
-//! stretch considered doubles; in each one
+//! The appearance of a frame start changes slowly, so it is learnt where it is known: from the frames around the mark. In
+//! rounds the considered part of the trace doubles; in each round
 //!
 //! 1. candidates are the local minima of the distance to the nearest template, by shape and by summed squares;
-//! 2. how much a distance says is learnt from the starts found so far and from what lies between them ([`evidence`]);
-//! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a template, alike to the
-//!    one before, and in an even beat that may jump now and then;
-//! 4. starts that their neighbours resemble more than any template does become templates ([`bank`]).
+//! 2. the weight of a distance is learnt from the starts found so far and from the samples between them ([`evidence`]);
+//! 3. the best sequence is found by dynamic programming over pairs of candidates ([`chain`]): near to a template, similar to
+//!    the one before, and at an even period that may jump now and then;
+//! 4. starts that their neighbours resemble more than any template does become templates ([`templates`]).
 
 mod chain;
 mod clocks;
@@ -36,7 +36,7 @@ const MIN_DISTANCE_SAMPLES: usize = 3;
 /// changed.
 const MIN_COVERAGE: f64 = 0.75;
 
-/// What was found.
+/// The tracked sequence.
 #[derive(Debug)]
 pub(super) struct Tracked {
     /// Offsets of the windows of the starts, in order.
@@ -52,7 +52,7 @@ pub(super) struct Start {
     pub distance_w2: f64,
     /// Whether the evidence is for it, 0 to 1.
     pub confidence: f64,
-    /// What is left of that, as the sequence may have slipped between it and the mark, 0 to 1.
+    /// Factor of the confidence, 0 to 1, as the sequence may have slipped between it and the mark.
     pub confidence_factor: f64,
 }
 
@@ -199,16 +199,16 @@ impl Tracker {
         labels
     }
 
-    /// Keeps the likeliest candidates of every stretch of a period, and the marks, which weigh most.
+    /// Keeps the likeliest candidates of every segment of a period, and the marks, which weigh most.
     fn prune(&mut self) {
         let period = self.period.max(1);
         let mut kept = Vec::with_capacity(self.candidates.len());
-        for stretch in self.candidates.chunk_by(|a, b| a.offset / period == b.offset / period) {
-            let mut stretch = stretch.to_vec();
-            stretch.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-            stretch.truncate(MAX_PER_PERIOD);
-            stretch.sort_by_key(|candidate| candidate.offset);
-            kept.extend(stretch);
+        for segment in self.candidates.chunk_by(|a, b| a.offset / period == b.offset / period) {
+            let mut segment = segment.to_vec();
+            segment.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+            segment.truncate(MAX_PER_PERIOD);
+            segment.sort_by_key(|candidate| candidate.offset);
+            kept.extend(segment);
         }
         self.candidates = kept;
     }

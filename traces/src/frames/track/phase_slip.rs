@@ -1,4 +1,4 @@
-//! Doubt that spreads: past a place where the sequence may have slipped to another phase of the frame, nothing ties it to a mark.
+//! Phase slips: past a place where the sequence may have slipped to another phase of the frame, confidence is lower.
 
 /// Ratios of gaps of the same period.
 const SAME_RATIOS: [f64; 2] = [0.92, 1.085];
@@ -9,7 +9,7 @@ const MAX_DOUBLE_DEVIATION: f64 = 0.1;
 /// Confidence factor beyond a phase slip.
 const SLIPPED_CONFIDENCE: f64 = 0.3;
 
-/// Whether the beat goes on as before after one odd gap that is not two of it. A clock step would change it for longer.
+/// Whether the period goes on as before after one odd gap that is not two periods. A clock step would change it for longer.
 pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
     let ratio = between / before;
     !within(ratio, ODD_RATIOS)
@@ -17,10 +17,10 @@ pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
         && within(after / before, SAME_RATIOS)
 }
 
-/// What is left of the confidence of each start: less by each slip between it and the nearest of the places that are `known`, and where
-/// that is itself off the beat of the starts around it, or was put right beyond a slip from the nearest one of `marks`. A slip does not
-/// say which of its sides is in the right phase, so it counts on this side, too, back to where the clock stepped, as the phase may
-/// have been lost there. Without marks all of it.
+/// Confidence factors of starts: lower by each slip between a start and the nearest `known` place, and if that place is itself off
+/// the period of its neighbours, or was corrected beyond a slip from the nearest of `marks`. A slip does not show which of its
+/// sides is in the right phase, so it counts on this side, too, back to where the clock stepped, as the phase may have been lost
+/// there. Without marks all factors are 1.
 pub(super) fn confidence_factors(offsets: &[usize], marks: &[usize], known: &[usize]) -> Vec<f64> {
     let sequence = GapSequence::new(offsets);
     let among = |places: &[usize]| -> Vec<usize> {
@@ -44,7 +44,7 @@ pub(super) fn confidence_factors(offsets: &[usize], marks: &[usize], known: &[us
     (0..offsets.len()).map(of_start).collect()
 }
 
-/// The gaps between starts, and where their beat breaks.
+/// The gaps between starts, and the breaks of their period.
 struct GapSequence {
     gaps: Vec<f64>,
     /// How many slips, and how many clock steps, lie before each start.
@@ -80,13 +80,13 @@ impl GapSequence {
         self.slips[a].abs_diff(self.slips[b])
     }
 
-    /// Whether the clock stepped between a start and a place, and the beat around the start slips.
+    /// Whether the clock stepped between a start and a place, and the sequence around the start slips.
     fn may_have_been_lost(&self, start: usize, place: usize) -> bool {
         self.steps[start] != self.steps[place] && self.slipped[self.steps[start]]
     }
 }
 
-/// The beats before and after the gap before the last two of these, where the clock steps in it.
+/// The periods before and after the third last of these gaps, if the clock steps in it.
 fn step(gaps: &[f64]) -> Option<[f64; 2]> {
     let same = |a: f64, b: f64| within(b / a, SAME_RATIOS);
     match *gaps {
@@ -95,7 +95,7 @@ fn step(gaps: &[f64]) -> Option<[f64; 2]> {
     }
 }
 
-/// Whether the frame in which the clock steps is too short or too long for one of either beat, and for two.
+/// Whether the frame in which the clock steps is too short or too long for one frame of either period, and for two.
 fn step_slipped(gaps: &[f64]) -> bool {
     let Some([before, after]) = step(gaps) else { return false };
     let between = gaps[gaps.len() - 3];
@@ -105,7 +105,7 @@ fn step_slipped(gaps: &[f64]) -> bool {
     outside(1.0) && outside(2.0)
 }
 
-/// Whether the last of these gaps takes up the beat from before one odd gap, or two, in another phase.
+/// Whether the last of these gaps resumes the period from before one odd gap, or two, in another phase.
 fn slipped(gaps: &[f64]) -> bool {
     match *gaps {
         [.., before, between, after] if slip(before, between, after) => true,
@@ -117,7 +117,7 @@ fn slipped(gaps: &[f64]) -> bool {
     }
 }
 
-/// Whether a start stands between two beats of the same phase, but not on a beat: then either it or all others are something else.
+/// Whether a start lies between two starts of the same phase, but off the period: then either it or all others are wrong.
 fn off_period(gaps: &[f64], start: usize) -> bool {
     let Some(&[before, one, two, after]) = start.checked_sub(2).and_then(|from| gaps.get(from..from + 4))
     else {
@@ -131,9 +131,9 @@ fn within(ratio: f64, [low, high]: [f64; 2]) -> bool {
     ratio > low && ratio < high
 }
 
-/// Whether so many beats are a whole number of them.
-fn whole(beats: f64) -> bool {
-    (beats - libm::round(beats)).abs() < MAX_DOUBLE_DEVIATION
+/// Whether a number of periods is whole.
+fn whole(periods: f64) -> bool {
+    (periods - libm::round(periods)).abs() < MAX_DOUBLE_DEVIATION
 }
 
 #[cfg(test)]
@@ -152,7 +152,7 @@ mod tests {
             |before: f64, between: f64, after: f64| step_slipped(&[before, before, between, after, after]);
         assert!(slipped(144.0, 107.0, 187.0) && slipped(187.0, 240.0, 144.0));
         assert!(!slipped(144.0, 160.0, 187.0) && !slipped(187.0, 150.0, 144.0));
-        // A start was missed where the clock stepped; a steady beat is not of concern here, nor is a single start off the beat.
+        // A start was missed where the clock stepped; a steady period is no slip, nor is a single start off the period.
         assert!(!slipped(144.0, 330.0, 187.0) && !slipped(100.0, 60.0, 100.0));
         assert!(!step_slipped(&[100.0, 130.0, 70.0, 100.0, 100.0]));
         assert_eq!(

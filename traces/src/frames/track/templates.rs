@@ -1,4 +1,4 @@
-//! Templates, and the nearest of them at every offset.
+//! The templates, and the distance to the nearest of them at every offset.
 
 use super::FEATURES;
 use crate::frames::profile::Correlator;
@@ -28,9 +28,9 @@ pub(super) struct Templates {
     core: Range<usize>,
     /// Power less its mean over the trace, W.
     signal: Vec<f64>,
-    /// Of each window.
+    /// Mean of each window.
     mean: Vec<f64>,
-    /// Of each window, about its mean.
+    /// Norm of each window about its mean.
     norm: Vec<f64>,
     floor: f64,
     /// One less the weighted correlation coefficient with the nearest template, at every offset.
@@ -101,7 +101,7 @@ impl Templates {
         about / ((self.norm[a] + self.floor) * (self.norm[b] + self.floor))
     }
 
-    /// Makes templates of starts that sit in an even beat and that their neighbours resemble more than any template does.
+    /// Adds templates: starts at an even period that their neighbours resemble more than any template does.
     pub fn learn(&mut self, starts: &[usize]) {
         for _ in 0..MAX_NEW_PER_ROUND {
             let novelty = |three: &[usize]| {

@@ -1,5 +1,6 @@
-//! Units that other programs put into the metadata of fields: Arrow keeps them in a schema of its own among the metadata of
-//! a Parquet file (`ARROW:schema`: Base64 of an IPC message, which is a FlatBuffer; Schema.fbs and Message.fbs of Apache Arrow).
+//! Units that other programs put into the metadata of fields. Arrow keeps them in a schema of its own among the metadata of
+//! a Parquet file (`ARROW:schema`: Base64 of an IPC message, which is a FlatBuffer; Schema.fbs and Message.fbs of Apache
+//! Arrow).
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -56,12 +57,12 @@ impl<'a> Flat<'a> {
         self.bytes.get(at..)?.first_chunk().map(|bytes| u16::from_le_bytes(*bytes))
     }
 
-    /// Where an offset leads to.
+    /// The target of an offset.
     fn follow(&self, at: usize) -> Option<usize> {
         at.checked_add(self.u32(at)? as usize)
     }
 
-    /// Where a table's field stands; `None` if it is left out.
+    /// The place of a table's field; `None` if it is absent.
     fn field(&self, table: usize, field: usize) -> Option<usize> {
         let back = i64::from(self.u32(table)?.cast_signed());
         let layout = usize::try_from(i64::try_from(table).ok()? - back).ok()?;

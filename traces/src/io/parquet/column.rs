@@ -1,4 +1,4 @@
-//! One column of Parquet.
+//! Reading one column.
 
 use super::{PagedFile, damaged, open};
 use crate::io::ReadError;
@@ -11,8 +11,8 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::FileReader;
 use std::path::{Path, PathBuf};
 
-/// Values decoded at once. What a file claims about its length is never allocated on trust.
-const BATCH: usize = 1 << 16;
+/// Values decoded at once. No length that a file states is allocated on trust.
+const BATCH_VALUES: usize = 1 << 16;
 
 /// One column, over all row groups.
 pub(super) struct Column {
@@ -28,10 +28,10 @@ pub(super) struct Column {
     /// Rows before the ones to come.
     row: u64,
     levels: Vec<i16>,
-    /// What a whole number counts, ns.
+    /// Unit of a whole number, ns.
     tick_ns: i64,
     scale: f64,
-    /// Whether a missing value is to be mended later, and none stands for it until then.
+    /// Whether missing values are repaired later; until then a placeholder stands for them.
     repair: bool,
 }
 
@@ -76,7 +76,7 @@ impl Column {
         damaged(&self.path, error.to_string())
     }
 
-    /// The reader of the row group at hand; `false` at the end.
+    /// Opens the reader of the current row group; `false` at the end.
     fn open_group(&mut self) -> Result<bool, ReadError> {
         while self.reader.is_none() && self.group < self.file.num_row_groups() {
             let reader = self.reader_of(self.group);
@@ -122,7 +122,7 @@ impl Column {
         let mut doubles: Vec<f64> = Vec::new();
         let from = into.len();
         while into.len() - from < limit && self.open_group()? {
-            let want = (limit - (into.len() - from)).min(BATCH);
+            let want = (limit - (into.len() - from)).min(BATCH_VALUES);
             let mut places = Places { max: self.max_definition, levels: &mut self.levels, fill: self.repair };
             let got = match &mut self.reader {
                 Some(ColumnReader::FloatColumnReader(reader)) => {
@@ -158,7 +158,7 @@ impl Column {
         s.clear();
         while ns.len().max(s.len()) < limit && self.open_group()? {
             let from = ns.len();
-            let want = (limit - ns.len().max(s.len())).min(BATCH);
+            let want = (limit - ns.len().max(s.len())).min(BATCH_VALUES);
             let scale = self.scale;
             let mut places = Places { max: self.max_definition, levels: &mut self.levels, fill: self.repair };
             let got = match &mut self.reader {
@@ -225,7 +225,7 @@ struct Places<'a> {
     /// The level of those that have one.
     max: i16,
     levels: &'a mut Vec<i16>,
-    /// Whether the others get a value that stands for none.
+    /// Whether the others get a placeholder.
     fill: bool,
 }
 

@@ -102,7 +102,7 @@ fn description(path: &Path, file: &PagedFile) -> Result<Description, ReadError> 
     json.map_or(Ok(Description::default()), |json| Description::from_json(path, json))
 }
 
-/// Holds what the file says of the parts that are read against its size, before the decoder trusts it.
+/// Checks the places of the columns that are read against the size of the file, before the decoder trusts them.
 fn check_chunks(path: &Path, file: &PagedFile, size_bytes: u64, layout: &Layout) -> Result<(), ReadError> {
     let read: Vec<usize> = layout.time.iter().chain(&layout.values).map(|picked| picked.index).collect();
     for group in file.metadata().row_groups() {

@@ -1,8 +1,6 @@
-//! A Parquet file with all its pages, those included that the parquet crate would need C for.
+//! A reader of Parquet files that also decompresses Zstandard, for which the parquet crate would need C.
 //!
-//! Pages of Parquet columns that are compressed with Zstandard: the parquet crate would need C for them.
-//!
-//! Headers are Thrift's compact protocol (thrift-compact-protocol.md of Apache Thrift); field numbers are those of
+//! Page headers are in Thrift's compact protocol (thrift-compact-protocol.md of Apache Thrift); field numbers are those of
 //! `PageHeader` in parquet.thrift.
 
 use bytes::Bytes;
@@ -54,7 +52,7 @@ impl FileReader for PagedFile {
     }
 }
 
-/// Where the pages of a column begin, by what the file says.
+/// The place of the first page of a column, as the file states it.
 pub(super) fn first_page(chunk: &ColumnChunkMetaData) -> i64 {
     let data = chunk.data_page_offset();
     chunk.dictionary_page_offset().map_or(data, |dictionary| dictionary.min(data))
@@ -93,23 +91,23 @@ impl RowGroupReader for PagedGroup<'_> {
     }
 }
 
-/// The longest header that is read, bytes: statistics may be in it.
-const LONGEST_HEADER: usize = 1 << 16;
-/// The largest page that is unpacked, bytes.
-const LARGEST_PAGE: u64 = 1 << 28;
-/// Structs within structs, at most.
-const DEEPEST: usize = 8;
+/// Longest page header that is read, in bytes: it may hold statistics.
+const MAX_HEADER_BYTES: usize = 1 << 16;
+/// Largest page that is decompressed, in bytes.
+const MAX_PAGE_BYTES: u64 = 1 << 28;
+/// Deepest nesting of structs.
+const MAX_DEPTH: usize = 8;
 
 /// The pages of one column of one row group.
 pub(super) struct ZstdPages {
     file: File,
-    /// Where the next header begins, and where the last page ends.
+    /// Places of the next header and of the end of the last page.
     at: u64,
     end: u64,
     header: Option<Header>,
 }
 
-/// What is needed of a page's header.
+/// The relevant fields of a page header.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Header {
     kind: i64,
@@ -139,11 +137,11 @@ impl ZstdPages {
     /// The header of the next page, `None` at the end.
     fn header(&mut self) -> Result<Option<Header>> {
         if self.header.is_none() && self.at < self.end {
-            let mut bytes = vec![0; LONGEST_HEADER.min((self.end - self.at) as usize)];
+            let mut bytes = vec![0; MAX_HEADER_BYTES.min((self.end - self.at) as usize)];
             self.file.seek(SeekFrom::Start(self.at))?;
             self.file.read_exact(&mut bytes)?;
             let header = Header::read(&bytes).ok_or_else(|| damaged("its header is damaged"))?;
-            if header.packed > self.end - self.at - header.bytes || header.unpacked > LARGEST_PAGE {
+            if header.packed > self.end - self.at - header.bytes || header.unpacked > MAX_PAGE_BYTES {
                 return Err(damaged("its size is wrong"));
             }
             self.header = Some(header);
@@ -306,8 +304,8 @@ impl Thrift<'_> {
         Some((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
-    /// Reads a struct; tells the path and value of every number and truth value in it.
-    fn fields(&mut self, path: &mut Vec<i64>, tell: &mut dyn FnMut(&[i64], i64)) -> Option<()> {
+    /// Reads a struct; passes the path and value of every number and truth value in it to `visit`.
+    fn fields(&mut self, path: &mut Vec<i64>, visit: &mut dyn FnMut(&[i64], i64)) -> Option<()> {
         let mut field = 0;
         loop {
             let head = self.byte()?;
@@ -316,25 +314,25 @@ impl Thrift<'_> {
             }
             field = if head >> 4 == 0 { self.signed()? } else { field + i64::from(head >> 4) };
             path.push(field);
-            self.value(head & 0x0f, path, tell)?;
+            self.value(head & 0x0f, path, visit)?;
             path.pop();
         }
     }
 
-    fn value(&mut self, kind: u8, path: &mut Vec<i64>, tell: &mut dyn FnMut(&[i64], i64)) -> Option<()> {
+    fn value(&mut self, kind: u8, path: &mut Vec<i64>, visit: &mut dyn FnMut(&[i64], i64)) -> Option<()> {
         match kind {
-            1 | 2 => tell(path, i64::from(kind == 1)),
+            1 | 2 => visit(path, i64::from(kind == 1)),
             3 => self.at += 1,
             4..=6 => {
                 let value = self.signed()?;
-                tell(path, value);
+                visit(path, value);
             }
             7 => self.at += 8,
             8 => {
                 let length = usize::try_from(self.unsigned()?).ok()?;
                 self.at = self.at.checked_add(length)?;
             }
-            12 if path.len() < DEEPEST => self.fields(path, tell)?,
+            12 if path.len() < MAX_DEPTH => self.fields(path, visit)?,
             _ => return None,
         }
         (self.at <= self.bytes.len()).then_some(())

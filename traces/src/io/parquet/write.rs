@@ -1,4 +1,4 @@
-//! Writing.
+//! Writing the native format.
 
 use crate::io::description::KEYS;
 use crate::io::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
@@ -66,7 +66,7 @@ fn encode(error: ParquetError) -> WriteError {
 struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
     header: TraceHeader,
-    /// Number of the group at hand, as the numbers of samples have it: of groups that were lost whole nothing is written.
+    /// Number of the current group, by the numbers of its samples: groups that were lost whole are not written.
     group: u64,
     times_ns: Vec<i64>,
     voltage_v: Vec<f32>,
@@ -74,8 +74,8 @@ struct Writer<W: Write + Send> {
 }
 
 impl<W: Write + Send> TraceWriter for Writer<W> {
-    fn write(&mut self, stretch: &TraceChunk<'_>) -> Result<(), WriteError> {
-        let mut rest = *stretch;
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        let mut rest = *chunk;
         while !rest.is_empty() && !rest.lost {
             let group = rest.first / GROUP_ROWS;
             if group != self.group {

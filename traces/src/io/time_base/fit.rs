@@ -1,21 +1,21 @@
-//! The grid of stamps that are seen once, piece by piece.
+//! The time base of stamps that are read once, in pieces.
 
 use super::{Grid, Stamp, Stamps, all_apart, rounded_rate_hz};
 use crate::io::ReadError;
 use crate::stats::upper_median;
 use std::path::{Path, PathBuf};
 
-/// How far a stamp may be off its place, in sample periods: rounded stamps are, by less.
-const OFF: f64 = 0.25;
-/// How far a step may be off the usual one, as a share of it.
-const STEP_OFF: f64 = 0.5;
-/// From how many steps the period is first guessed.
-const GUESS_FROM: usize = 1001;
+/// Largest distance of a stamp from its place, in sample periods; rounding alone stays below.
+const MAX_OFFSET_PERIODS: f64 = 0.25;
+/// Largest deviation of a step from the usual one, as a share of it.
+const MAX_STEP_DEVIATION: f64 = 0.5;
+/// Number of steps from which the period is first guessed.
+const GUESS_STEPS: usize = 1001;
 /// Share of a rate within which rounding may decide whether a row is in its place.
-const DOUBT: f64 = 1e-13;
+const ROUNDING: f64 = 1e-13;
 
-/// Looks at stamps in order. What is wrong is told in the end, what forbids any rate first: a row out of order, then a step
-/// unlike the others, then a row off its place.
+/// Checks stamps in order. Errors are reported at the end, those that exclude any rate first: a row out of order, then an odd
+/// step, then a row off its place.
 #[derive(Debug)]
 pub(crate) struct Fit {
     path: PathBuf,
@@ -38,7 +38,7 @@ pub(crate) struct Fit {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fitted {
     pub grid: Grid,
-    /// Whether all rows are known to be in their places; if not, they are to be looked at again with the rate as stated.
+    /// Whether all rows are known to be in their places; if not, they must be checked again with this rate as stated.
     pub sure: bool,
 }
 
@@ -73,7 +73,7 @@ impl Fit {
         }
     }
 
-    /// Takes nanoseconds of equal steps: what holds for both ends holds for all between. `false` if it cannot tell.
+    /// Takes nanoseconds of equal steps: if both ends are in place, all between are. `false` if that is not certain.
     fn push_even(&mut self, stamps: &Stamps) -> bool {
         let Stamps::Nanoseconds(times) = stamps else { return false };
         let ([a, b, ..], [.., last], Some(before)) = (&times[..], &times[..], self.before) else {
@@ -94,7 +94,7 @@ impl Fit {
         }
         for row in [0, len - 1] {
             let (stamp, row) = (stamps.stamp(row), self.rows + row as u64);
-            if self.off(stamp, row).is_some_and(|off| off.abs() > 0.99 * OFF) {
+            if self.off(stamp, row).is_some_and(|off| off.abs() > 0.99 * MAX_OFFSET_PERIODS) {
                 return false;
             }
             self.narrow(stamp, row);
@@ -111,7 +111,7 @@ impl Fit {
         }
         self.first.get_or_insert(stamp);
         if let Some((off, rate_hz)) = self.off(stamp, row).zip(self.stated_hz)
-            && off.abs() > OFF
+            && off.abs() > MAX_OFFSET_PERIODS
             && self.misplaced.is_none()
         {
             self.misplaced = Some(self.uneven(row, stamp, off, rate_hz));
@@ -130,11 +130,11 @@ impl Fit {
         Some(ReadError::Unsorted { path: path(), row, time_s, before_s: before.time_s() })
     }
 
-    /// Holds a step against the usual one, once that is known.
+    /// Compares a step with the usual one, once that is known.
     fn look_at_step(&mut self, stamp: Stamp) {
         if self.guess_s.is_none() {
             self.head.push(stamp);
-            if self.head.len() > GUESS_FROM {
+            if self.head.len() > GUESS_STEPS {
                 self.guess();
             }
         } else if let Some(before) = self.before {
@@ -142,7 +142,7 @@ impl Fit {
         }
     }
 
-    /// Guesses the step from the first rows, and holds theirs against it.
+    /// Guesses the step from the first rows, and compares theirs with it.
     fn guess(&mut self) {
         let head = std::mem::take(&mut self.head);
         let mut steps: Vec<f64> = head.windows(2).map(|pair| pair[1].since_s(pair[0])).collect();
@@ -168,13 +168,16 @@ impl Fit {
         Some(stamp.since_s(self.first?) * self.stated_hz? - row as f64)
     }
 
-    /// Leaves out the rates that put a row off its place.
+    /// Excludes the rates that put a row off its place.
     fn narrow(&mut self, stamp: Stamp, row: u64) {
         if self.stated_hz.is_none()
             && let Some(first) = self.first.filter(|_| row > 0)
         {
             let (since_s, row, [low, high]) = (stamp.since_s(first), row as f64, self.rates_hz);
-            self.rates_hz = [low.max((row - OFF) / since_s), high.min((row + OFF) / since_s)];
+            self.rates_hz = [
+                low.max((row - MAX_OFFSET_PERIODS) / since_s),
+                high.min((row + MAX_OFFSET_PERIODS) / since_s),
+            ];
         }
     }
 
@@ -211,15 +214,16 @@ impl Fit {
             None => rounded_rate_hz((self.rows - 1) as f64, last.since_s(first), first.resolution_s()),
         };
         let [low, high] = self.rates_hz;
-        let sure =
-            self.stated_hz.is_some() || (low * (1.0 + DOUBT) <= rate_hz && rate_hz <= high * (1.0 - DOUBT));
+        let sure = self.stated_hz.is_some()
+            || (low * (1.0 + ROUNDING) <= rate_hz && rate_hz <= high * (1.0 - ROUNDING));
         let first_s = first.time_s();
         // The stated start is exact where the first stamp was rounded; if it is another time, the file was edited.
-        let stated = self.stated_start_s.filter(|start_s| (start_s - first_s).abs() * rate_hz <= OFF);
+        let stated =
+            self.stated_start_s.filter(|start_s| (start_s - first_s).abs() * rate_hz <= MAX_OFFSET_PERIODS);
         Ok(Fitted { grid: Grid { start_s: stated.unwrap_or(first_s), rate_hz }, sure })
     }
 }
 
 fn off_step(step_s: f64, guess_s: f64) -> bool {
-    (step_s / guess_s - 1.0).abs() > STEP_OFF
+    (step_s / guess_s - 1.0).abs() > MAX_STEP_DEVIATION
 }

@@ -1,4 +1,8 @@
-//! From time stamps to a start and a rate, or to the row where they are not even.
+//! The time base: start and sample rate from time stamps, or the row where they are uneven.
+//!
+//! Rates are estimated here alone, by as much as is known: [`grid`] from all stamps, which must be even; [`usual_rate_hz`]
+//! from stamps with gaps that are to be filled; [`mean_rate_hz`] from a few rows with gaps; [`rate_to_last_row_hz`] from the
+//! first rows and the last one; [`rate_of_steps_hz`] from a count.
 
 mod fit;
 #[cfg(test)]
@@ -11,23 +15,26 @@ pub(crate) use fit::{Fit, Fitted};
 use multiversion::multiversion;
 use std::path::Path;
 
-/// A rate is rounded only if that moves the last sample by less than this share of a period.
-const SNAP: f64 = 0.05;
+/// Farthest that rounding of the rate may move the last sample, in sample periods.
+const MAX_ROUNDING_PERIODS: f64 = 0.05;
 
-/// Stands for a time that is missing, where missing values are to be mended: a nanosecond 292 years before 1970, and not one of
-/// the first that times come to that wrap around.
+/// No sample is missing if the last one is off by less than this, in sample periods.
+const MIN_MISSING_PERIODS: f64 = 0.5;
+
+/// Stands for a missing time until it is repaired: a nanosecond 292 years before 1970, and none of the first
+/// that times reach when they wrap around.
 pub(crate) const NO_TIME_NS: i64 = i64::MIN + 999_999_937;
 
-/// Time stamps as a file has them.
+/// Time stamps of a file.
 #[derive(Clone, Debug)]
 pub(crate) enum Stamps {
     Nanoseconds(Vec<i64>),
     Seconds(Vec<f64>),
-    /// No column of times; the description must state the rate.
+    /// No times; the description must state the rate.
     Absent,
 }
 
-/// One stamp as a file has it.
+/// A time stamp of a file.
 #[derive(Clone, Copy, Debug)]
 enum Stamp {
     Nanoseconds(i64),
@@ -53,7 +60,7 @@ impl Stamp {
         }
     }
 
-    /// How finely it tells time, s. Of seconds in a text it is not known.
+    /// Its resolution, s; unknown for seconds in a text.
     fn resolution_s(self) -> f64 {
         if matches!(self, Self::Nanoseconds(_)) { 1.5e-9 } else { f64::INFINITY }
     }
@@ -93,7 +100,7 @@ impl Stamps {
     }
 }
 
-/// The grid all stamps lie on.
+/// The time base of all stamps.
 pub(crate) fn grid(path: &Path, stamps: &Stamps, description: &Description) -> Result<Grid, ReadError> {
     let fit = |rate_hz: Option<f64>| {
         let mut fit = Fit::new(path, rate_hz, description.start_s);
@@ -104,16 +111,16 @@ pub(crate) fn grid(path: &Path, stamps: &Stamps, description: &Description) -> R
     if fitted.sure { Ok(fitted.grid) } else { Ok(fit(Some(fitted.grid.rate_hz))?.grid) }
 }
 
-/// The roundest rate (the one with most zeros) that moves the last sample by no more than the stamps can tell.
-pub(crate) fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
+/// The roundest rate (with most zeros) that moves the last sample by no more than the resolution of the stamps.
+fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
     let rate_hz = periods / span_s;
-    let tolerance = f64::min(SNAP, resolution_s * rate_hz);
+    let tolerance = f64::min(MAX_ROUNDING_PERIODS, resolution_s * rate_hz);
     let round_to = |unit_hz: f64| libm::round(rate_hz / unit_hz) * unit_hz;
     let snaps = |candidate: &f64| *candidate > 0.0 && (span_s * candidate - periods).abs() <= tolerance;
     [1e6, 1e5, 1e4, 1e3, 100.0, 10.0, 1.0].map(round_to).into_iter().find(snaps).unwrap_or(rate_hz)
 }
 
-/// The rate by all steps that are no gaps: where stamps are rounded, these differ, and their mean does not.
+/// The rate by all steps that are not gaps: rounding changes single steps, but not their mean.
 pub(crate) fn mean_rate_hz(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual_s = upper_median(&mut steps);
@@ -121,8 +128,8 @@ pub(crate) fn mean_rate_hz(times: &[f64]) -> f64 {
     rounded_rate_hz(single().count() as f64, single().sum(), f64::INFINITY)
 }
 
-/// The rate that all rows agree on, those with missing samples between them too. The usual step alone would not do: where
-/// stamps are rounded, it is off by up to that much, which adds up over the rows.
+/// The rate that agrees with all rows, also across gaps. The usual step alone is not enough: it is off by up to the
+/// rounding of the stamps, which adds up over the rows.
 pub(crate) fn usual_rate_hz(times: &[f64]) -> f64 {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let mut sorted: Vec<f64> = steps().collect();
@@ -135,7 +142,31 @@ pub(crate) fn usual_rate_hz(times: &[f64]) -> f64 {
     rounded_rate_hz(periods, times[times.len() - 1] - times[0], f64::INFINITY)
 }
 
-/// Whether each time is one step after the one before; without a way out on the way, so that many pairs are held at once.
+/// The rate of steps in a row, from their number and the time they take, as round as that allows.
+pub(crate) fn rate_of_steps_hz(steps: f64, span_s: f64) -> f64 {
+    rounded_rate_hz(steps, span_s, f64::INFINITY)
+}
+
+/// The rate of a whole file, from that of its first rows and the time from its first row to row number `last` (from 0).
+/// The rate of the first rows is kept if it puts the last one in its place, or if it leaves no room for another rate:
+/// then samples are missing.
+pub(crate) fn rate_to_last_row_hz(first_rows: &Stamps, rate_hz: f64, last: u64, span_s: f64) -> f64 {
+    let (off_periods, whole_hz) = (span_s * rate_hz - last as f64, last as f64 / span_s);
+    let possible = off_periods.abs() < MIN_MISSING_PERIODS
+        || (whole_hz / rate_hz - 1.0).abs() <= rate_uncertainty(first_rows, rate_hz);
+    if off_periods.abs() > MAX_ROUNDING_PERIODS && span_s > 0.0 && possible { whole_hz } else { rate_hz }
+}
+
+/// Uncertainty of the rate of some rows, as a share: stamps at both ends may be as far off as any, and are rounded.
+fn rate_uncertainty(stamps: &Stamps, rate_hz: f64) -> f64 {
+    let off = |row: usize| (stamps.since_s(row, 0) * rate_hz - row as f64).abs();
+    let farthest = (1..stamps.len()).map(off).fold(0.0, f64::max);
+    let rounded =
+        if matches!(stamps, Stamps::Nanoseconds(_)) { 1.5e-9 * rate_hz } else { MAX_ROUNDING_PERIODS };
+    2.0 * (farthest + rounded) / stamps.len().saturating_sub(1).max(1) as f64
+}
+
+/// Whether each time is one step after the one before; without an early exit, so that the loop vectorizes.
 #[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn all_apart(times: &[i64], step: i64) -> bool {
     times.iter().zip(&times[1..]).fold(0, |any, (a, b)| any | (b.wrapping_sub(*a) ^ step)) == 0

@@ -1,11 +1,11 @@
-//! Stamps looked at in pieces, against the rule written down for all of them at once.
+//! Stamps in pieces, compared with the rule applied to all of them at once.
 
 use super::*;
 use proptest::prelude::*;
 
 const PATH: &str = "t.csv";
 
-/// The rule, in the order in which it complains: all rows in time, all steps alike, all rows in place.
+/// The rule, in the order in which it complains: all rows in time, all steps equal, all rows in place.
 fn oracle(stamps: &Stamps, description: &Description) -> Result<Grid, String> {
     let count = stamps.len();
     let since = |row: usize, earlier: usize| match stamps {
@@ -114,9 +114,9 @@ fn a_rate_that_puts_one_late_row_a_hair_off_is_looked_at_again() {
         let mut times: Vec<f64> = (0..5000).map(f64::from).collect();
         times[4000] += hair;
         let stamps = Stamps::Seconds(times);
-        let told = in_pieces(&stamps, &Description::default(), &[700]);
-        assert_eq!(told.is_ok(), right, "{told:?}");
-        assert_eq!(told.is_ok(), oracle(&stamps, &Description::default()).is_ok());
+        let result = in_pieces(&stamps, &Description::default(), &[700]);
+        assert_eq!(result.is_ok(), right, "{result:?}");
+        assert_eq!(result.is_ok(), oracle(&stamps, &Description::default()).is_ok());
     }
 }
 
@@ -125,9 +125,9 @@ fn a_step_between_two_pieces_is_held_against_the_others_too() {
     for (at, periods) in [(1100, 5), (1100, -5), (1101, 5), (2199, 1), (2200, 1), (2201, 1)] {
         let time = |row: i64| 1_000_000 * (row + if row < at { 0 } else { periods });
         let stamps = Stamps::Nanoseconds((0..3000).map(time).collect());
-        let told = in_pieces(&stamps, &Description::default(), &[1100]).unwrap_err();
+        let result = in_pieces(&stamps, &Description::default(), &[1100]).unwrap_err();
         let says = oracle(&stamps, &Description::default()).unwrap_err();
-        assert!(told.contains(&says), "{told} {says}");
+        assert!(result.contains(&says), "{result} {says}");
     }
 }
 
