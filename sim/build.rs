@@ -1,12 +1,11 @@
-//! Tells the program the git revision it is built from: in release builds within a clone. Without git, or in an archive of the sources,
-//! it has none.
+//! The git revision that the program is built from, in release builds within a clone; and whether there are real scenes to test with.
 
 use std::path::Path;
 use std::process::Command;
 
 /// What the program is made of, from the root of the repository. A change of these builds the program anew anyway, so that asking git
 /// costs nothing more.
-const SOURCES: [&str; 15] = [
+const SOURCES: [&str; 19] = [
     "Cargo.toml",
     "Cargo.lock",
     "pipeline/src",
@@ -14,8 +13,12 @@ const SOURCES: [&str; 15] = [
     "power-model/platforms",
     "power-model/src",
     "power-model/tables",
-    "sim/assets",
-    "sim/gpus",
+    "sim/experiments/papers",
+    "sim/experiments/src",
+    "sim/output/assets",
+    "sim/output/src",
+    "sim/run/gpus",
+    "sim/run/src",
     "sim/src",
     "sim/timing/src",
     "traces/jls/src",
@@ -25,6 +28,15 @@ const SOURCES: [&str; 15] = [
 ];
 
 fn main() {
+    // Tests on real scenes count as ignored where there are none.
+    println!("cargo:rerun-if-env-changed=QUINTILE_SCENES");
+    println!("cargo:rustc-check-cfg=cfg(real_scenes, collision_data)");
+    if let Some(scenes) = std::env::var_os("QUINTILE_SCENES") {
+        println!("cargo:rustc-cfg=real_scenes");
+        if Path::new(&scenes).join("../ccd").is_dir() {
+            println!("cargo:rustc-cfg=collision_data");
+        }
+    }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         SOURCES.iter().for_each(|source| println!("cargo:rerun-if-changed={}", root.join(source).display()));

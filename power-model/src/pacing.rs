@@ -1,7 +1,7 @@
 //! Frames one after another: V-sync or free-running, with idle between them.
 
-use activity::Warning;
 use traces::Curve;
+use warnings::{Code, Warning};
 
 use crate::error::PacingError;
 use crate::frame::{FramePower, S_PER_PS};
@@ -170,7 +170,7 @@ impl Schedule {
         let period_ms = 1e3 / rate.value();
         (late > 0).then(|| {
             Warning::new(
-                "missed-vsync",
+                Code::MissedVsync,
                 format!(
                     "{late} of {frames} frames took longer than the V-sync period of {period_ms:.3} ms and missed \
                      {missed} ticks in all: the animation stutters, and its mean frame rate is below the display's"

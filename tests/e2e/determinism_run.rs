@@ -46,8 +46,9 @@ fn one_frame_free_running() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn a_real_animated_scene() {
-    let Some(fox) = crate::support::real_scenes("Fox.glb") else { return };
+    let fox = crate::support::real_scene("Fox.glb");
     same_for_any_number_of_threads(&fox, &["--size", "128x96", "--frames", "0..4", "--lens", "4"]);
 }
 

@@ -55,7 +55,7 @@ fn files_of_ones_own_name_each_other() {
     let inputs = Inputs::new();
     let platform = copy(&inputs, "power-model/platforms/reference.ron", "board", |text| text);
     let own = "power: (platform: \"board.ron\", energy: \"28nm\")";
-    let gpu = copy(&inputs, "sim/gpus/reference.ron", "chip", |text| {
+    let gpu = copy(&inputs, "sim/run/gpus/reference.ron", "chip", |text| {
         text.replacen("power: (platform: \"reference\", energy: \"28nm\")", own, 1)
     });
     // The platform's file is looked for beside the GPU's.
@@ -64,7 +64,7 @@ fn files_of_ones_own_name_each_other() {
     assert!(!mismatch(&together));
     assert!(!mismatch(&quintile().run("tiny", &["--gpu", &gpu, "--platform", &platform])));
     assert!(mismatch(&quintile().run("tiny", &["--platform", &platform])));
-    let alone = copy(&inputs, "sim/gpus/reference.ron", "alone", |text| {
+    let alone = copy(&inputs, "sim/run/gpus/reference.ron", "alone", |text| {
         text.replacen("    power: (platform: \"reference\", energy: \"28nm\"),\n", "", 1)
     });
     let alone = quintile().run("tiny", &["--gpu", &alone]);

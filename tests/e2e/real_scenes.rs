@@ -1,6 +1,6 @@
-//! Real scenes from the folder in `QUINTILE_SCENES`, through the command; skipped, with a word, where it is not set.
+//! Real scenes from the folder in `QUINTILE_SCENES`, through the command; ignored where it is not set.
 
-use crate::support::{Inputs, Results, lit_bounds, number, quintile, real_scenes};
+use crate::support::{Inputs, Results, lit_bounds, number, quintile, real_scene};
 use image::{Rgb, RgbImage};
 use serde_json::Value;
 
@@ -69,8 +69,9 @@ fn assert_whole_in_view(picture: &RgbImage) {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn the_fox_runs_moves_and_wears_its_texture() {
-    let Some(fox) = real_scenes("Fox.glb") else { return };
+    let fox = real_scene("Fox.glb");
     let args = ["--size", "320x180", "--frames", "0..6", "--clip", "Run"];
     let results = quintile().run(&fox, &args);
     assert_sound(&results, 576, 6);
@@ -90,6 +91,7 @@ fn the_fox_runs_moves_and_wears_its_texture() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn no_real_object_is_taken_for_a_room() {
     for name in [
         "AnimatedMorphCube/AnimatedMorphCube.gltf",
@@ -102,7 +104,7 @@ fn no_real_object_is_taken_for_a_room() {
         "cloth-ball/cloth_ball92.ply",
         "dragon_vrip_res3.ply.gz",
     ] {
-        let Some(scene) = real_scenes(name) else { return };
+        let scene = real_scene(name);
         let ended = quintile().call(["info", &scene, "--camera", "fitted: Auto", "--json"]);
         assert_eq!(ended.code, Some(0), "{}", ended.stderr);
         let found: Value = serde_json::from_str(&ended.stdout).expect("JSON");
@@ -111,8 +113,9 @@ fn no_real_object_is_taken_for_a_room() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn a_shutter_that_is_open_blurs_the_fox() {
-    let Some(fox) = real_scenes("Fox.glb") else { return };
+    let fox = real_scene("Fox.glb");
     let run = |shutter: &str| {
         let args =
             ["--size", "320x180", "--frames", "0..2", "--clip", "Run", "--rate", "10", "--shutter", shutter];
@@ -131,8 +134,9 @@ fn a_shutter_that_is_open_blurs_the_fox() {
 /// Frames of enough samples, V-synced, are found, each one, and cost what the simulator says. What is enough is what the
 /// warning says; frames a little above it count as well.
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn every_frame_of_the_fox_is_found_where_frames_are_long_enough() {
-    let Some(fox) = real_scenes("Fox.glb") else { return };
+    let fox = real_scene("Fox.glb");
     let mut long_enough = 0;
     for (samples, seed) in [("16", "1"), ("16", "2"), ("16", "3"), ("32", "1")] {
         let settings = ["--samples", samples, "--seed", seed];
@@ -152,8 +156,9 @@ fn every_frame_of_the_fox_is_found_where_frames_are_long_enough() {
 
 /// Whatever the length of frames: all starts are found, or a warning says that they are not.
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn frames_that_are_missed_are_owned_up_to() {
-    let Some(fox) = real_scenes("Fox.glb") else { return };
+    let fox = real_scene("Fox.glb");
     for size in ["64x36", "160x90", "320x180", "640x360"] {
         let results = quintile().run(&fox, &["--size", size, "--frames", "0..5"]);
         let detection = &results.summary()["detection"];
@@ -164,8 +169,9 @@ fn frames_that_are_missed_are_owned_up_to() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn the_truck_turns_its_wheels_and_says_what_it_lacks() {
-    let Some(truck) = real_scenes("CesiumMilkTruck/CesiumMilkTruck.gltf") else { return };
+    let truck = real_scene("CesiumMilkTruck/CesiumMilkTruck.gltf");
     let results = quintile().run(&truck, &["--size", "192x108", "--frames", "0..3"]);
     assert_sound(&results, 3_624, 3);
     assert_whole_in_view(&results.image(0));
@@ -178,8 +184,9 @@ fn the_truck_turns_its_wheels_and_says_what_it_lacks() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn the_toy_car_of_a_hundred_thousand_triangles() {
-    let Some(car) = real_scenes("ToyCar/ToyCar.gltf") else { return };
+    let car = real_scene("ToyCar/ToyCar.gltf");
     let results = quintile().run(&car, &["--size", "320x180", "--frames", "0..1"]);
     assert_sound(&results, 108_936, 1);
     assert!(results.warning_codes().contains(&"missing-image".to_owned()));
@@ -190,16 +197,18 @@ fn the_toy_car_of_a_hundred_thousand_triangles() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn the_dragon_from_a_gzipped_ply() {
-    let Some(dragon) = real_scenes("dragon_vrip_res3.ply.gz") else { return };
+    let dragon = real_scene("dragon_vrip_res3.ply.gz");
     let results = quintile().run(&dragon, &["--size", "192x108", "--frames", "0..1"]);
     assert_sound(&results, 47_794, 1);
     assert_whole_in_view(&results.image(0));
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn two_frames_of_cloth_are_the_ends_of_a_shutter() {
-    let Some(start) = real_scenes("cloth-ball/cloth_ball92.ply") else { return };
+    let start = real_scene("cloth-ball/cloth_ball92.ply");
     let end = start.replace("cloth_ball92", "cloth_ball93");
     let inputs = Inputs::new();
     let text = format!(

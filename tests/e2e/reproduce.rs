@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use crate::support::{Ended, Inputs, quintile, real_scenes, root};
+use crate::support::{Ended, Inputs, quintile, real_scene, root};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde_json::Value;
@@ -36,7 +36,7 @@ fn reproduce(paper: &str, out: &Path, args: &[&str]) -> (Ended, Value) {
 
 /// The committed settings of a paper.
 fn committed(number: u32) -> String {
-    fs::read_to_string(root().join(format!("sim/data/reproduce/paper{number}.ron")))
+    fs::read_to_string(root().join(format!("sim/experiments/papers/paper{number}.ron")))
         .expect("a file of settings")
 }
 
@@ -348,13 +348,10 @@ fn public_cases_are_run_where_their_folder_is_given() {
 
 /// The public data that the book's row is made with, where they are: beside the real scenes.
 #[test]
+#[cfg_attr(not(collision_data), ignore = "no folder ccd beside QUINTILE_SCENES")]
 fn no_public_case_is_missed() {
-    let Some(scenes) = real_scenes("") else { return };
-    let data = Path::new(&scenes).parent().map(|folder| folder.join("ccd")).filter(|folder| folder.is_dir());
-    let Some(data) = data else {
-        eprintln!("skipped: no folder ccd beside the real scenes");
-        return;
-    };
+    let scenes = real_scene("");
+    let data = Path::new(&scenes).join("../ccd");
     let out = TempDir::new().expect("a folder");
     let (ended, json) =
         reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data.display().to_string()]);

@@ -65,7 +65,7 @@ fn a_summary_says_what_the_run_was_made_from() {
     let camera = "(camera: (position: (1, 1, 3), target: (0, 0, 0)), ";
     let scene = inputs.put("still.ron", STILL.replacen('(', camera, 1));
     let gpu = inputs
-        .put("gpu.ron", fs::read(crate::support::root().join("sim/gpus/reference.ron")).expect("a GPU"));
+        .put("gpu.ron", fs::read(crate::support::root().join("sim/run/gpus/reference.ron")).expect("a GPU"));
     let results = run(&scene, &["--lens", "0.2", "--gpu", &gpu, "--threads", "2", "--seed", "5"]);
     let (summary, report) = (results.summary(), results.text("report.html"));
     assert_eq!((&summary["schema"], &summary["request"]["seed"]), (&Value::from(1), &Value::from(5)));
@@ -221,7 +221,7 @@ fn a_crash_says_where_and_how_to_run_the_frame_again() {
         let ended = crate::support::Quintile::new("sh").call(["-c", shell, program, backtrace, &out]);
         assert_eq!(ended.code, Some(1), "{}", ended.stderr);
         for says in [
-            "error: sim/src/run/simulate.rs:",
+            "error: sim/run/src/simulate.rs:",
             "internal error in frame 2: a test asked for it",
             env!("CARGO_PKG_VERSION"),
             "quintile run tiny --seed 3 --frames 2..3 --out frame_2",

@@ -250,3 +250,62 @@ fn what_is_wrong_with_a_pipe_is_said_of_standard_input() {
     refused(&["trace", "convert", "-", "-", "--json"], b"", "or --json, not both");
     refused(&["trace", "convert", "-", "o.csv", "--format", "jls"], b"", "--format jls goes with `-`");
 }
+
+/// Frames of `samples` samples at 5 kHz, one after another from 0.1 s on, each 4 ms at 20 W and then 2 W.
+fn frames_of(samples: &[u32]) -> String {
+    let starts = samples.iter().scan(500, |next, &length| {
+        let start = *next;
+        *next += length;
+        Some(start)
+    });
+    let starts: Vec<u32> = starts.collect();
+    let row = |i: u32| {
+        let into = starts.iter().rev().find(|&&start| start <= i).map_or(u32::MAX, |&start| i - start);
+        let watts = if into < 20 { 20.0 - 0.4 * f64::from(into) } else { 2.0 };
+        let noise = 0.02 * (f64::from(i * 7919 % 101) / 101.0 - 0.5);
+        format!("{},{}\n", f64::from(i) / 5000.0, watts + noise)
+    };
+    let end = 500 + samples.iter().sum::<u32>() + 350;
+    "time_s,power_W\n".to_owned() + &(0..end).map(row).collect::<String>()
+}
+
+/// What a command warns of, on standard error.
+fn warned(args: &[&str], code: &str) -> String {
+    let ended = quintile().call(args);
+    assert_eq!(ended.code, Some(0), "{args:?}: {}", ended.stderr);
+    assert!(ended.stderr.contains(&format!("warning: [{code}] ")), "{args:?}: {}", ended.stderr);
+    ended.stderr
+}
+
+#[test]
+fn a_pass_that_begins_after_the_end_of_some_frames_is_warned_about() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", frames_of(&[50, 60].repeat(10)));
+    let energy = ["trace", "energy", &trace, "--mark", "0.1", "--pass", "late=11"];
+    assert!(warned(&energy, "pass-beyond").contains(" of 20 frames end before pass late begins, 11 ms"));
+}
+
+#[test]
+fn an_alignment_of_even_frames_without_anchors_is_ambiguous() {
+    let inputs = Inputs::new();
+    let stamps: String = (0..20).map(|frame| format!("{}\n", 7.0 + 0.01 * f64::from(frame))).collect();
+    let (trace, stamps) = (inputs.put("t.csv", recording()), inputs.put("stamps.txt", stamps));
+    warned(&["trace", "align", &trace, &stamps, "--mark", "0.1"], "ambiguous-alignment");
+}
+
+#[test]
+fn inverse_units_come_with_a_warning_about_their_mean() {
+    let inputs = Inputs::new();
+    let trace = inputs.put("t.csv", recording());
+    warned(&["trace", "frames", &trace, "--mark", "0.1", "--inverse"], "inverse-units");
+}
+
+#[test]
+fn runs_of_different_length_are_compared_as_far_as_the_shorter_goes() {
+    let inputs = Inputs::new();
+    let [long, short] =
+        [30, 22].map(|frames| inputs.put(&format!("{frames}.csv"), frames_of(&vec![50; frames])));
+    let out = inputs.path("o.svg");
+    let plot = ["trace", "plot", &long, "--mark", "0.1", "--kind", "repeats", "--run", &short, "--out", &out];
+    assert!(warned(&plot, "uneven-runs").contains("runs have 22 to 30 frames; the first 22 are shown"));
+}

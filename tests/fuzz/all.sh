@@ -7,7 +7,7 @@ seeds() {
     case $1 in
         scene) echo ../../workloads/scenes ;;
         energy) echo ../../power-model/tables ;;
-        gpu) echo ../../sim/gpus ;;
+        gpu) echo ../../sim/run/gpus ;;
         platform) echo ../../power-model/platforms ;;
         *) echo "seeds/$1" ;;
     esac

@@ -6,7 +6,6 @@
 //! - [`Packet`]: a piece of work that moves through the units as one, with the events it causes.
 //! - [`LineAccess`]: a line of memory a packet asks the L2 for, in order.
 //! - [`Timeline`]: counts over time, made by a timing model, read by a power model.
-//! - [`Warning`]: a coded remark that a run has entered a regime its methods are bad at.
 //! - [`inputs`]: opening files so that it is known which were.
 //! - [`Bounded`]: a whole number that cannot be built out of range.
 //! - [`spec`]: reading RON files with the place of every mistake and a suggestion.
@@ -21,7 +20,6 @@ mod lines;
 mod packet;
 pub mod spec;
 mod timeline;
-mod warning;
 
 pub use bounded::{Bounded, OutOfBounds};
 pub use counts::Counts;
@@ -29,4 +27,3 @@ pub use events::{Event, Unit};
 pub use lines::{LineAccess, LineKind};
 pub use packet::{Packet, PacketCounts, PacketKind};
 pub use timeline::{Bin, Timeline};
-pub use warning::Warning;

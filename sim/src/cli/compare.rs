@@ -6,10 +6,10 @@ use super::Failure;
 use super::args::CompareArgs;
 use super::outputs::may_hold_results;
 use super::terminal::{print, print_json};
-use crate::compare::{
+use output::table::{Table, digits, grouped, si};
+use run::compare::{
     Change, CompareError, Comparison, FolderComparison, ImageComparison, RunComparison, compare, shown,
 };
-use crate::output::table::{Table, digits, grouped, si};
 
 impl From<CompareError> for Failure {
     fn from(error: CompareError) -> Self {

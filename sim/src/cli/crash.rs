@@ -4,8 +4,8 @@ use std::any::Any;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::output::table::shell_line;
-use crate::run::CrashedFrame;
+use output::table::shell_line;
+use run::CrashedFrame;
 
 /// The panics of this process, in all its threads.
 #[derive(Clone, Default)]

@@ -11,7 +11,7 @@ use workloads::visibility::{self, FixedSamples, VisibilityScene};
 use super::Failure;
 use super::args::InfoArgs;
 use super::terminal::{print, print_json};
-use crate::output::table::{Table, digits, grouped};
+use output::table::{Table, digits, grouped};
 
 pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let overrides = args.view.overrides();
@@ -29,7 +29,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         Some("smp") => print_samples(name, args.json, &FixedSamples::load(&args.scene)?),
         _ => {
             let scene = workloads::load(&args.scene).map_err(catalog::or_job)?.with_overrides(&overrides)?;
-            let info = scene.info().map_err(crate::run::RunError::from)?;
+            let info = scene.info().map_err(run::RunError::from)?;
             if args.json { print_json(&info, true) } else { print(&scene_text(&info)) }
         }
     }
@@ -73,7 +73,7 @@ struct MeshFile<'a> {
     near: f32,
     /// The camera, where the file does not carry one.
     camera: Option<String>,
-    warnings: &'a [activity::Warning],
+    warnings: &'a [warnings::Warning],
 }
 
 fn print_mesh(name: &str, json: bool, scene: &VisibilityScene) -> Result<(), Failure> {
@@ -307,6 +307,6 @@ fn camera_text(info: &SceneInfo) -> String {
     text + &format!("  --camera '{ron}'\n")
 }
 
-fn warnings_text(warnings: &[activity::Warning]) -> Vec<String> {
+fn warnings_text(warnings: &[warnings::Warning]) -> Vec<String> {
     warnings.iter().map(|warning| format!("warning: {warning}")).collect()
 }

@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write, stderr};
 
 use traces::io::unfinished;
 
-use crate::output::terminal::Terminal;
+use output::terminal::Terminal;
 
 /// The exit code of a process that an interrupt ended, as shells have it: 128 and the number of the signal.
 const CODE: i32 = 130;

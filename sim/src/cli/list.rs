@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Failure;
 use super::args::ListArgs;
 use super::terminal::{print, print_json};
-use crate::gpu::GpuSpec;
+use run::GpuSpec;
 
 /// Everything that can be named, each with a line that says what it is.
 #[derive(Serialize)]
@@ -102,8 +102,8 @@ fn listing() -> Listing {
         platforms: power_model::Platform::names().map(platform).collect(),
         energy_tables: power_model::EnergyTable::names().map(table).collect(),
         sample_tables: pipeline::SampleSpec::names().map(|(name, what)| Entry::new(name, what)).collect(),
-        charts: crate::chart::CHARTS.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
+        charts: experiments::chart::CHARTS.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
         workloads: workloads::catalog::names().map(|(name, what)| Entry::new(name, what)).collect(),
-        figures: crate::run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
+        figures: run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
     }
 }

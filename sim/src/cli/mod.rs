@@ -28,9 +28,9 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
 
-use crate::output::terminal::Terminal;
-use crate::run::RunError;
+use ::run::RunError;
 use crash::Crashes;
+use output::terminal::Terminal;
 
 pub use args::{Cli, Command};
 

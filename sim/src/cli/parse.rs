@@ -6,7 +6,7 @@ use std::str::FromStr;
 use pipeline::Features;
 
 use super::quantity::length_of_time;
-use crate::stress::methods::SWITCHES;
+use experiments::stress::methods::SWITCHES;
 
 /// Frames from the first to one past the last, at least one.
 pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {

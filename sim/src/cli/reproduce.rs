@@ -7,10 +7,10 @@ use clap::Args;
 
 use super::Failure;
 use super::terminal::{print, print_json};
-use crate::output::Destination;
-use crate::output::progress::Progress;
-use crate::output::terminal::Terminal;
-use crate::reproduce::{Options, Paper, reproduce};
+use experiments::reproduce::{Options, Paper, reproduce};
+use output::Destination;
+use output::progress::Progress;
+use output::terminal::Terminal;
 
 /// Arguments of `reproduce`.
 #[derive(Debug, Args)]
@@ -20,7 +20,7 @@ use crate::reproduce::{Options, Paper, reproduce};
     Each row of the paper is computed from scratch, by simulating, recording and analysing, and compared with what the paper\n\
     says, at every value of the settings that the paper leaves open. It holds at all of them, differs at all of them, depends\n\
     on them, or is not yet there because a part is missing. Rows of kind E have to hold exactly, N are numbers to be near, O\n\
-    orders or signs that have to come out, F have figures. The settings are in sim/data/reproduce; every row names the SHA-256\n\
+    orders or signs that have to come out, F have figures. The settings are in sim/experiments/papers; every row names the SHA-256\n\
     of its file, what was run, and what it does not exercise.\n\n\
     Results are in DIR: plots/ as SVG and PNG, reproduce_III.md and, last, reproduce_III.json with a list `rows`. Ends with 0\n\
     if every row of kind E holds and every row ran something, otherwise with 1; one that is not yet there does not hold.")]
@@ -34,7 +34,7 @@ pub struct ReproduceArgs {
     /// Only this row, for example VI-13; may be given more than once
     #[arg(long, value_name = "ID")]
     pub row: Vec<String>,
-    /// Settings in place of the committed ones; a copy of sim/data/reproduce/paper6.ron with other values
+    /// Settings in place of the committed ones; a copy of sim/experiments/papers/paper6.ron with other values
     #[arg(long, value_name = "FILE")]
     pub settings: Option<PathBuf>,
     /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is run

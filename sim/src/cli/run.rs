@@ -9,13 +9,16 @@ use workloads::job::OptionSource;
 use super::Failure;
 use super::args::{BoundArg, PacingArg, RunArgs};
 use super::terminal::{print, print_json};
-use crate::output::progress::Progress;
-use crate::output::table::{Table, count_or_digits, counted, si, si_mean_sd};
-use crate::output::terminal::{Terminal, Verbosity};
-use crate::output::{Destination, MeanSd};
-use crate::run::{
+use output::progress::Progress;
+use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
+use output::terminal::{Terminal, Verbosity};
+use output::{Destination, MeanSd};
+use run::{
     DryRun, Outcome, PacingChoice, Plan, Prepared, RunError, RunOptions, Summary, Wish, again, open, prepare,
 };
+
+/// The git revision of this program.
+const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
 
 pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let started = Instant::now();
@@ -23,12 +26,12 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let out = Destination { folder: args.out.clone(), force: args.force };
     let pool = super::threads(args.threads)?;
     let (options, made) = match &args.again {
-        Some(summary) => again(summary, args.force)?,
+        Some(summary) => again(summary, args.force, REVISION)?,
         None => (options(args), None),
     };
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, &out)?;
-    let prepared = pool.install(|| prepare(plan, made, &progress))?;
+    let prepared = pool.install(|| prepare(plan, made, REVISION, &progress))?;
     if args.dry_run {
         return dry_run(args, &pool.install(|| DryRun::new(&prepared))?, terminal);
     }

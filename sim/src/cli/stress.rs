@@ -3,17 +3,18 @@
 use super::Failure;
 use super::args::StressArgs;
 use super::terminal::{print, print_json};
-use crate::output::Destination;
-use crate::output::progress::Progress;
-use crate::output::terminal::Terminal;
+use output::Destination;
+use output::progress::Progress;
+use output::terminal::Terminal;
 
 pub(super) fn run(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure> {
     // The folder first: that it cannot be written is better known before the work than after it.
     let out = Destination { folder: args.out.clone(), force: args.force };
-    let mut dir = out.open([crate::stress::claim()])?;
+    let mut dir = out.open([experiments::stress::claim()])?;
     let pool = super::threads(args.threads)?;
     let progress = Progress::on(terminal, args.json);
-    let report = pool.install(|| crate::stress::stress(args.family.as_deref(), args.quick, &progress))?;
+    let report =
+        pool.install(|| experiments::stress::stress(args.family.as_deref(), args.quick, &progress))?;
     report.write(&dir, &args.look.look())?;
     dir.publish()?;
     if args.json {

@@ -4,19 +4,19 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use activity::Warning;
 use pipeline::SampleTable;
 use pipeline::sampling::SampleSource;
 use pipeline::visibility::Sighting;
 use serde::Serialize;
+use warnings::{Code, Warning};
 use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, write_hits};
 
 use super::Failure;
 use super::args::VisibilityArgs;
 use super::terminal::{print, print_json};
-use crate::output::terminal::Terminal;
-use crate::run::fits_memory;
-use crate::visibility::{Rates, find};
+use output::terminal::Terminal;
+use run::fits_memory;
+use run::visibility::{Rates, find};
 
 /// What was found.
 #[derive(Serialize)]
@@ -85,7 +85,7 @@ fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> 
     let pixels = scene.viewport.pixels() as u64;
     fits_memory(&named(args), pixels, samples.per_pixel(), BYTES_PER_SAMPLE)?;
     let mut warnings = scene.warnings.clone();
-    warnings.extend(crate::visibility::warnings(&scene));
+    warnings.extend(run::visibility::warnings(&scene));
     warnings.extend((args.tests.is_none() && scene.camera.is_orthographic()).then(slow_view));
     let found = find(&scene, &*samples, args.tests, args.repeat)
         .map_err(|message| Failure { message: format!("{}: {message}", named(args)), code: 1 })?;
@@ -109,7 +109,7 @@ fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> 
 fn slow_view() -> Warning {
     let message = "the engine that is fast takes no orthographic camera, so all tile tests were modelled: the samples see what they \
                    would, but the rates are those of the model";
-    Warning::new("orthographic-view", message)
+    Warning::new(Code::OrthographicView, message)
 }
 
 fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[Sighting]) -> Result<(), Failure> {

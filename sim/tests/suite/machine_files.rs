@@ -4,8 +4,8 @@
 use std::ops::Range;
 use std::process::Command;
 
-use sim::run::MachineTexts;
-use sim::timing::Level;
+use run::MachineTexts;
+use timing::Level;
 
 /// Values that break what is not bounded: none, one, the largest 32-bit count, large, below zero, no number.
 const EXTREMES: [&str; 8] = ["0", "1", "1e-30", "4294967295", "1e30", "-1", "NaN", "inf"];
@@ -89,7 +89,7 @@ fn gpu_files_with_extreme_numbers_run_or_are_refused() {
     if !bounded("gpu_files_with_extreme_numbers_run_or_are_refused") {
         return;
     }
-    let text = include_str!("../../gpus/reference.ron");
+    let text = include_str!("../../run/gpus/reference.ron");
     let of = |text: &str| one_frame(MachineTexts { gpu: Some(text), ..MachineTexts::default() });
     let complaints = sweep("reference.ron", text, of);
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
@@ -119,7 +119,7 @@ fn energy_tables_with_extreme_numbers_run_or_are_refused() {
 
 #[test]
 fn an_endless_queue_is_refused_with_its_place_and_range() {
-    let text = include_str!("../../gpus/reference.ron");
+    let text = include_str!("../../run/gpus/reference.ron");
     for (at, _) in text.match_indices("queue: ") {
         let number = text[at + 7..].find(|c: char| !c.is_ascii_digit()).unwrap_or(0);
         let changed = format!("{}4294967295{}", &text[..at + 7], &text[at + 7 + number..]);

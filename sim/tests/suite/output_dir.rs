@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use sim::output::{Claim, Destination, OutDir, OutputError};
+use output::{Claim, Destination, OutDir, OutputError};
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();

@@ -1,8 +1,8 @@
 //! Images survive the way through their files.
 
 use image::GenericImageView;
-use sim::output::image::{ImageError, LinearImage};
-use sim::output::{Claim, Destination};
+use output::image::{ImageError, LinearImage};
+use output::{Claim, Destination};
 
 fn ramp() -> Vec<[f32; 3]> {
     (0..12).map(|i| [i as f32 / 11.0, 1.0 - i as f32 / 11.0, 2.5]).collect()

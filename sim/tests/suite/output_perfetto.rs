@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sim::output::perfetto::{BusySlice, CounterTrack, FrameSpan, MAX_POINTS, Timeline, UnitTrack, write};
+use output::perfetto::{BusySlice, CounterTrack, FrameSpan, MAX_POINTS, Timeline, UnitTrack, write};
 
 /// A decoded field: a varint, eight bytes, or bytes that may be a message.
 #[derive(Clone, Debug, PartialEq)]

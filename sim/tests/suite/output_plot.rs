@@ -1,7 +1,7 @@
 //! Plots as files: real text in SVG, letters without any system font in PNG, the same bytes every time.
 
-use sim::output::plot::{FrameEnergy, FrameEnergyPoint, Look, Picture, PowerRun};
-use sim::output::{Claim, Destination};
+use output::plot::{FrameEnergy, FrameEnergyPoint, Look, Picture, PowerRun};
+use output::{Claim, Destination};
 
 fn picture(subject: &str, power_w: &[f64]) -> Picture {
     let run = PowerRun {

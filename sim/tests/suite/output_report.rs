@@ -1,11 +1,11 @@
 //! The report: whole without a network, harmless whatever it is told, complete whatever is missing.
 
-use power_model::Part;
-use sim::output::report::{
+use output::report::{
     CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, Report, ReportImage,
     ReportPlot, UnitRow, WarningRow,
 };
-use sim::output::{Claim, Destination, MeanSd, plot};
+use output::{Claim, Destination, MeanSd, plot};
+use power_model::Part;
 
 const EVIL: &str = "<script>alert('\"1\"')</script><img src=x onerror=alert(2)>";
 

@@ -2,6 +2,7 @@
 //!
 //! - [`MachineSpec`]: the units of the block diagram, with throughput, latency, queues and clocks.
 //! - [`Jobs`] and [`Job`]: what a packet owes each unit, in cycles; every level reads the same.
+//! - [`Level`] and [`FrameClock`]: the ladder, and a clock at any rung of it; [`AccuracyWarning`]: where a rung is not to be trusted.
 //! - [`stepped`]: the reference, from cycle to cycle.
 //! - [`PacketClock`]: packets, not cycles: a recurrence, with calendars for what is shared.
 //! - [`BoundClock`]: no packets: the busiest unit of each stretch, from [`Totals`] gathered while packets come by.
@@ -15,6 +16,7 @@
 mod address;
 mod bound;
 mod clock;
+mod frame_clock;
 mod job;
 mod packet;
 mod rates;
@@ -24,9 +26,11 @@ mod spec;
 mod stalls;
 pub mod stepped;
 pub mod streams;
+mod warning;
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
+pub use frame_clock::{FrameClock, Level, Machine, TimingError};
 pub use job::{CLIENTS, Job, Jobs, Place};
 pub use packet::{MAX_CYCLES, PacketClock};
 pub use rates::Rates;
@@ -36,6 +40,7 @@ pub use spec::{
     UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
+pub use warning::AccuracyWarning;
 
 /// Bytes of a line of memory.
 pub const LINE_BYTES: u32 = 64;

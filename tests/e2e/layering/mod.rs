@@ -10,7 +10,7 @@ use crate::support::{Inputs, root};
 use cargo_metadata::{Metadata, MetadataCommand};
 
 /// Which crates of the house each may use, in builds and in tests.
-const ARROWS: [(&str, &[&str]); 8] = [
+const ARROWS: [(&str, &[&str]); 11] = [
     ("activity", &[]),
     ("pipeline", &["activity"]),
     ("workloads", &["activity", "pipeline"]),
@@ -18,7 +18,26 @@ const ARROWS: [(&str, &[&str]); 8] = [
     ("traces", &["jls"]),
     ("power-model", &["activity", "traces"]),
     ("timing", &["activity"]),
-    ("sim", &["activity", "pipeline", "power-model", "timing", "traces", "workloads"]),
+    ("output", &["activity", "pipeline", "power-model", "traces"]),
+    ("run", &["activity", "output", "pipeline", "power-model", "timing", "traces", "workloads"]),
+    (
+        "experiments",
+        &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "workloads"],
+    ),
+    (
+        "sim",
+        &[
+            "activity",
+            "experiments",
+            "output",
+            "pipeline",
+            "power-model",
+            "run",
+            "timing",
+            "traces",
+            "workloads",
+        ],
+    ),
 ];
 
 fn workspace() -> Metadata {
@@ -61,8 +80,8 @@ fn the_arrows_that_the_design_draws_are_there() {
         ("power-model", "traces"),
         ("traces", "jls"),
     ];
-    let of_sim = ARROWS[7].1.iter().map(|used| ("sim", *used));
-    for (name, used) in drawn.into_iter().chain(of_sim) {
+    let of_run = ARROWS[8].1.iter().map(|used| ("run", *used));
+    for (name, used) in drawn.into_iter().chain(of_run) {
         assert!(arrows[name].contains(used), "{name} is to use {used}");
     }
 }

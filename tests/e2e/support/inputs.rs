@@ -48,11 +48,8 @@ pub fn root() -> PathBuf {
     here.parent().unwrap_or(here).to_path_buf()
 }
 
-/// The file `name` among the real scenes, or nothing, saying so, where `QUINTILE_SCENES` is not set.
-pub fn real_scenes(name: &str) -> Option<String> {
-    let folder = std::env::var_os("QUINTILE_SCENES").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("skipped: QUINTILE_SCENES is not set, so {name} is not there to be run");
-    }
-    folder.map(|folder| folder.join(name).display().to_string())
+/// The file `name` among the real scenes. A test that calls this is ignored unless `cfg(real_scenes)`.
+pub fn real_scene(name: &str) -> String {
+    let folder = std::env::var_os("QUINTILE_SCENES").expect("the folder of real scenes");
+    Path::new(&folder).join(name).display().to_string()
 }

@@ -11,7 +11,7 @@ mod schema;
 
 pub use command::{Ended, Quintile, Running};
 pub use glb::Glb;
-pub use inputs::{Inputs, real_scenes, root};
+pub use inputs::{Inputs, real_scene, root};
 pub use mts::mts;
 pub use picture::{lit_bounds, mean_where};
 pub use refusals::Refusals;

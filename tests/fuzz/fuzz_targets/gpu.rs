@@ -2,8 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use sim::run::MachineTexts;
-use sim::timing::Level;
+use run::MachineTexts;
+use timing::Level;
 
 fuzz_target!(|text: &str| {
     let machine = MachineTexts { gpu: Some(text), ..MachineTexts::default() };

@@ -5,7 +5,8 @@
 //! frame, so neighbours differ there, and the energy from start to start varies with them. A start therefore moves to the
 //! first sample from which on neighbours agree about as well as anywhere near. Starts that agree already do not move; nor
 //! do starts at an edge, which each frame samples at another phase, nor up into more power, as power falls at the end of a
-//! frame.
+//! frame; nor past most of the work in the window, as a frame that is busy for a few samples differs from its neighbours
+//! while it works, and agrees with them in the idle gap after it.
 
 use super::refine::between;
 use crate::stats::{mean, moments, upper_median};
@@ -45,7 +46,13 @@ pub(super) fn refine_starts(
         .map(|frame| {
             let near = frame.saturating_sub(NEIGHBOURS)..(frame + NEIGHBOURS).min(differences.len());
             let by = first_agreeing(&mean_of_each(&differences[near.clone()], reach + 1), agreement_w2);
-            if level(power, &starts[near.clone()], by) < level(power, &starts[near], 0.0) { by } else { 0.0 }
+            let starts = &starts[near];
+            let is_down = level(power, starts, by) < level(power, starts, 0.0);
+            if by > 0.0 && is_down && has_work_ahead(power, starts, by, width as f64 - anchor) {
+                by
+            } else {
+                0.0
+            }
         })
         .collect();
     let moves = smoothed(&smoothed(&moves, upper_median), |near| mean(near));
@@ -82,6 +89,16 @@ fn first_agreeing(differ: &[f64], agreement_w2: f64) -> f64 {
     let limit = agreement_w2.max(MAX_AGREEMENT_RATIO * least);
     differ.iter().position(|value| *value <= limit).filter(|first| *first > MAX_EDGE_SAMPLES).unwrap_or(0)
         as f64
+}
+
+/// Whether more of the work in a window lies after the first `by` of its `length` samples than in them: energy above the power there.
+fn has_work_ahead(power: &[f64], starts: &[f64], by: f64, length: f64) -> bool {
+    let base = level(power, starts, by);
+    let work = |samples: std::ops::Range<usize>| -> f64 {
+        samples.map(|sample| (level(power, starts, sample as f64) - base).max(0.0)).sum()
+    };
+    let split = by as usize;
+    work(0..split) < work(split..length as usize)
 }
 
 /// Mean power at `after` samples after some starts, W.
@@ -159,6 +176,21 @@ mod tests {
         let (power, right) = frames(20, |_| 4);
         let early: Vec<f64> = right.iter().map(|start| start - 11.0).collect();
         assert_eq!(refine_starts(&power, early.clone(), &[false; 20], 0.0, 8), early);
+    }
+
+    #[test]
+    fn a_start_is_not_moved_past_a_frame_of_a_few_samples() {
+        // Each frame works for seven samples, another amount each time, and is idle for long after it.
+        let power: Vec<f64> = (0..40 * 600)
+            .map(|i| {
+                let work = if i % 600 < 7 { 2.0 + 0.3 * f64::from(i / 600 * 7 % 5) } else { 0.0 };
+                0.5 + work + 1e-3 * f64::from(i * 79 % 97) / 97.0
+            })
+            .collect();
+        let starts: Vec<f64> = (0..40).map(|frame| f64::from(600 * frame)).collect();
+        assert_eq!(refine_starts(&power, starts.clone(), &[false; 40], 50.0, WIDTH), starts);
+        let early: Vec<f64> = starts.iter().skip(1).map(|start| start - 50.0).collect();
+        assert_eq!(refine_starts(&power, early.clone(), &[false; 39], 50.0, WIDTH), early);
     }
 
     proptest! {

@@ -6,7 +6,7 @@ use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Replacement, Shadi
 use workloads::multiview::{Layout, Rig, Target};
 use workloads::{Overrides, Scene};
 
-/// The hardware of `sim/gpus/reference.ron`.
+/// The hardware of `sim/run/gpus/reference.ron`.
 pub fn hardware() -> PipelineSpec {
     let lines = CacheSpec::lru(256, 4);
     PipelineSpec {

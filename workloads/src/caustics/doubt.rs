@@ -1,6 +1,6 @@
 //! Regimes in which beams are known to be bad.
 
-use activity::Warning;
+use warnings::{Code, Warning};
 
 use super::Beam;
 use super::generator::Ocean;
@@ -22,7 +22,7 @@ pub fn doubts(ocean: &Ocean, beams: &[Beam]) -> Vec<Warning> {
     let squares = ocean.shortest_m() / ocean.side_m * f64::from(ocean.cells);
     let crossed = (crossed > CROSSED).then(|| {
         Warning::new(
-            "caustics-crossed",
+            Code::CausticsCrossed,
             format!(
                 "the sides of beams cross for {:.1} % of their length on average (a warning from {:.0} % on): triangles stand along the light for much \
                  of its way, which then differs in length within a beam, and light in the water is missing, half a percent from there on and more beyond; \
@@ -34,7 +34,7 @@ pub fn doubts(ocean: &Ocean, beams: &[Beam]) -> Vec<Warning> {
     });
     let coarse = (squares < SQUARES).then(|| {
         Warning::new(
-            "caustics-coarse",
+            Code::CausticsCoarse,
             format!(
                 "the shortest wave is {squares:.1} squares of generator triangles long, fewer than {SQUARES:.0}: the surface is not resolved and its light \
                  falls elsewhere; more cells or longer waves help"

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use activity::Warning;
 use pipeline::PipelineSpec;
 use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
 
 use super::cases::load_objects;
 use super::compare::Scratch;
@@ -146,7 +146,7 @@ fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
             "{kept} of {pairs} pairs whose swept boxes touch may collide: images tell hardly any apart, as where surfaces slide along \
              each other; raise `resolution` and `bins`, or use `quintile ccd`, which looks closer"
         );
-        Warning::new("collision-near-everywhere", message)
+        Warning::new(Code::CollisionNearEverywhere, message)
     })
 }
 

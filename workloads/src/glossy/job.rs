@@ -1,10 +1,11 @@
 //! Glossy reflection or refraction as a job: the map, and the scene with the map on its receiver.
 
-use activity::{Event, Warning};
+use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::frame::render_with_heat;
 use pipeline::{Camera, Cull, Draw, Geometry, PipelineSpec, Rendered, SampleSpec, SampleTable, Viewport};
 use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
 
 use super::map::Map;
 use super::receiver::{Effect, Receiver};
@@ -170,7 +171,7 @@ impl Glossy {
             "the lens is {radius} in radius and the receiver {least} in half its shorter side: texels at its rim gather from quite other \
              directions than a surface of one roughness would, and samples are too few for the blur"
         );
-        (radius > least).then(|| Warning::new("lens-wider-than-receiver", message)).into_iter().collect()
+        (radius > least).then(|| Warning::new(Code::LensWiderThanReceiver, message)).into_iter().collect()
     }
 }
 

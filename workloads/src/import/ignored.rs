@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use activity::Warning;
+use warnings::{Code, Warning};
 
 /// A material with a normal or bump map.
 pub(super) fn normal_map(material: &str) -> Warning {
     about_material(
-        "normal-map-ignored",
+        Code::NormalMapIgnored,
         "normal map",
         "ignored: surfaces keep the normals of their vertices",
         material,
@@ -16,39 +16,39 @@ pub(super) fn normal_map(material: &str) -> Warning {
 
 /// A material that sheds light.
 pub(super) fn emissive(material: &str) -> Warning {
-    about_material("emissive-ignored", "emissive material", "drawn without the light that it sheds", material)
+    about_material(
+        Code::EmissiveIgnored,
+        "emissive material",
+        "drawn without the light that it sheds",
+        material,
+    )
 }
 
 /// A material that is cut out by its alpha.
 pub(super) fn cut_out(material: &str) -> Warning {
     let what = "drawn whole, with what should be cut away";
-    about_material("alpha-ignored", "cut-out material", what, material)
+    about_material(Code::AlphaIgnored, "cut-out material", what, material)
 }
 
 /// A material that is blended with what is behind it.
 pub(super) fn blended(material: &str) -> Warning {
     let what = "drawn opaque: what is behind is hidden";
-    about_material("alpha-ignored", "see-through material", what, material)
+    about_material(Code::AlphaIgnored, "see-through material", what, material)
 }
 
 /// A texture that cannot be read, in words `why`.
 pub(super) fn texture(material: &str, why: &str) -> Warning {
     let detail = format!("material `{material}`: {why}");
-    Warning::about("missing-image", "texture", "not read: the material's colour is used alone", detail)
+    Warning::about(Code::MissingImage, "texture", "not read: the material's colour is used alone", detail)
 }
 
 /// A file whose faces have colours of their own.
 pub(super) fn face_colors(path: &Path) -> Warning {
     let what = "with colours for faces, which are drawn without them";
-    Warning::about("face-colors-ignored", "file", what, path.display().to_string())
+    Warning::about(Code::FaceColorsIgnored, "file", what, path.display().to_string())
 }
 
 /// A warning about a material.
-pub(super) fn about_material(
-    code: &'static str,
-    thing: &'static str,
-    what: &'static str,
-    material: &str,
-) -> Warning {
+pub(super) fn about_material(code: Code, thing: &'static str, what: &'static str, material: &str) -> Warning {
     Warning::about(code, thing, what, format!("material `{material}`"))
 }

@@ -17,7 +17,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use crate::error::LoadError;
-use crate::scene::{Local, Node, Parts, Trs, far};
+use crate::scene::{Local, Node, Parts, Trs};
 pub(crate) use foreign::foreign;
 pub(crate) use obj::{Face, statements};
 use soup::{Looks, Soup};
@@ -92,7 +92,7 @@ fn bare(path: &Path, format: Format) -> Result<Soup, LoadError> {
     let mut soup = if format == Format::Obj { obj::surface(path)? } else { soup(path, format)? };
     soup.colors.clear();
     soup.looks = Looks::default();
-    soup.warnings.retain(|warning| warning.code == far::ROUNDED);
+    soup.warnings.retain(|warning| warning.code == warnings::Code::CoordinatesFarFromOrigin);
     Ok(soup)
 }
 

@@ -3,12 +3,12 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use activity::Warning;
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
+use warnings::{Code, Warning};
 
 use super::soup::{Soup, linear};
 use super::{ignored, reader};
@@ -213,7 +213,7 @@ fn left_out(header: &Header, path: &Path) -> Vec<Warning> {
     for texture in header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile ")) {
         let (what, detail) =
             ("ignored: textures that PLY files name are not read", texture.trim().to_owned());
-        warnings.push(Warning::about("texture-ignored", "texture", what, detail));
+        warnings.push(Warning::about(Code::TextureIgnored, "texture", what, detail));
     }
     warnings
 }

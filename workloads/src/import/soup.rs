@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use activity::Warning;
 use glam::{DVec3, Vec2, Vec3};
+use warnings::Warning;
 
 use crate::error::{LoadError, Source};
 use crate::material::Material;

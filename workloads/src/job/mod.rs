@@ -10,11 +10,12 @@ mod passes;
 pub(crate) mod testing;
 mod words;
 
-use activity::{Counts, LineAccess, Packet, Warning};
+use activity::{Counts, LineAccess, Packet};
 use glam::Vec3;
 use pipeline::PipelineSpec;
 use pipeline::memory::CacheError;
 use serde::Serialize;
+use warnings::Warning;
 
 use crate::fingerprint::{Fingerprint, FingerprintError};
 use crate::scene::{FrameError, Overrides, Settings};

@@ -1,8 +1,9 @@
 //! Multi-view as a job.
 
-use activity::{Event, Warning};
+use activity::Event;
 use pipeline::{CacheSpec, Draw, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
 
 use super::layout::Layout;
 use super::lenticular::Panel;
@@ -146,7 +147,7 @@ impl MultiView {
                 "views see the same point from up to {angle:.0} degrees apart, and shading is that of their middle: highlights do \
                  not move with the viewer"
             );
-            Warning::new("view-dependent-shading", message)
+            Warning::new(Code::ViewDependentShading, message)
         })
     }
 }
@@ -217,7 +218,7 @@ fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
              a time; a larger cache, or fewer views and samples",
             spec.shading_cache.entries
         );
-        Warning::new("shading-cache-small", message)
+        Warning::new(Code::ShadingCacheSmall, message)
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use activity::{Counts, Event, PacketCounts, Warning};
+use activity::{Counts, Event, PacketCounts};
 use glam::{Vec3, Vec4};
 use pipeline::depth::BoxGrid;
 use pipeline::frame::render_with_heat;
@@ -10,6 +10,7 @@ use pipeline::geometry::Projection;
 use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPoint, Viewport};
 use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
 
 use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
 use crate::error::LoadError;
@@ -219,7 +220,7 @@ fn warnings(answers: &[Answer], half_covered: f64) -> Vec<Warning> {
     };
     // Where nothing is asked for, nothing is found in vain.
     (half_covered > HALF_COVERED && !answers.is_empty())
-        .then(|| Warning::new("occlusion-small-occluders", message()))
+        .then(|| Warning::new(Code::OcclusionSmallOccluders, message()))
         .into_iter()
         .collect()
 }

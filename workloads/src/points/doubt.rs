@@ -1,6 +1,6 @@
 //! Regimes in which points are known to be bad.
 
-use activity::Warning;
+use warnings::{Code, Warning};
 
 /// So many voids without a number in them for each point.
 pub const THIN: f64 = 0.01;
@@ -10,7 +10,7 @@ pub fn doubt(points: usize, thin_voids: u64) -> Option<Warning> {
     let each = thin_voids as f64 / points.max(1) as f64;
     (each > THIN).then(|| {
         Warning::new(
-            "points-thin-voids",
+            Code::PointsThinVoids,
             format!(
                 "{thin_voids} voids beside {points} points have no number in them (a warning from one for {:.0} points on): no other point can be \
                  written, but places are farther than r from all points; coordinates in double precision or a larger r help",

@@ -1,13 +1,7 @@
 //! Coordinates far from the origin: which are kept relative to the middle of a scene, and which have lost their shape.
 
-use activity::Warning;
 use glam::{DAffine3, DVec3};
-
-/// Code of the warning that a scene is kept relative to a point of its own.
-pub(super) const RECENTRED: &str = "coordinates-recentred";
-
-/// Code of the warning that a file has lost a shape.
-pub(crate) const ROUNDED: &str = "coordinates-far-from-origin";
+use warnings::{Code, Warning};
 
 /// Distance from the origin, in sizes of the scene, beyond which positions are kept relative to the scene's middle.
 const FAR: f64 = 100.0;
@@ -83,7 +77,7 @@ impl Bounds {
                     program that made it";
         let detail =
             format!("`{name}`: about {:.0} different positions along its longest side", steps.max(1.0));
-        Some(Warning::about(ROUNDED, "surface", what, detail))
+        Some(Warning::about(Code::CoordinatesFarFromOrigin, "surface", what, detail))
     }
 }
 
@@ -94,7 +88,7 @@ pub(super) fn recentred(origin: DVec3) -> Warning {
          which keeps its shape; coordinates in files and flags stay as they are",
         origin.x, origin.y, origin.z
     );
-    Warning::new(RECENTRED, message)
+    Warning::new(Code::CoordinatesRecentred, message)
 }
 
 #[cfg(test)]

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use activity::Warning;
 use glam::DVec3;
 use serde::Serialize;
+use warnings::Warning;
 
 use super::Scene;
 use super::camera::{Rig, View};

@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use activity::Warning;
 use glam::DVec3;
+use warnings::{Code, Warning};
 
 use super::Scene;
 use super::camera::{Rig, Side, View};
@@ -13,17 +13,11 @@ use super::frame::FrameError;
 use super::inside::Inside;
 use super::settings::LAST_FRAME;
 
-/// Code of the warning that a fitted camera cannot hold a scene for the whole lens.
-const LENS_LEAVES_VIEW: &str = "lens-leaves-view";
-
 /// Codes of the warnings that placing a camera gives; they hold for the settings of that time.
-pub(super) const CODES: [&str; 3] = [LENS_LEAVES_VIEW, LEAVES_FITTED_VIEW, CAMERA_INSIDE];
+pub(super) const CODES: [Code; 3] = [Code::LensLeavesView, Code::LeavesFittedView, Code::CameraInside];
 
 /// Triangles of a scene above which it is not looked at whether it is a room: that takes 72 bytes a triangle.
 const MAX_ROOM_TRIANGLES: usize = 4_000_000;
-
-/// Code of the warning that the camera stands inside.
-const CAMERA_INSIDE: &str = "camera-inside";
 
 fn camera_inside(room: &Inside) -> Warning {
     let message = format!(
@@ -31,7 +25,7 @@ fn camera_inside(room: &Inside) -> Warning {
          scene from outside",
         100.0 * room.enclosed
     );
-    Warning::new(CAMERA_INSIDE, message)
+    Warning::new(Code::CameraInside, message)
 }
 
 /// A camera that was placed by itself.
@@ -46,11 +40,8 @@ pub(super) struct Placed {
 /// The warning itself.
 pub(crate) fn lens_leaves_view() -> Warning {
     let message = "the lens is so large for its focus depth that parts of the scene leave the view: the fitted camera only holds them for the centre of the lens";
-    Warning::new(LENS_LEAVES_VIEW, message)
+    Warning::new(Code::LensLeavesView, message)
 }
-
-/// Code of the warning that a fitted camera does not hold the frames asked for.
-const LEAVES_FITTED_VIEW: &str = "leaves-fitted-view";
 
 fn leaves_fitted_view(fitted: &Range<u32>) -> Warning {
     let message = format!(
@@ -59,7 +50,7 @@ fn leaves_fitted_view(fitted: &Range<u32>) -> Warning {
         fitted.start,
         fitted.end - 1
     );
-    Warning::new(LEAVES_FITTED_VIEW, message)
+    Warning::new(Code::LeavesFittedView, message)
 }
 
 /// Frames looked at when a camera is fitted; more are sampled evenly.

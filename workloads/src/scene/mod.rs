@@ -23,8 +23,8 @@ mod track;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use activity::Warning;
 use glam::{DVec3, Vec3};
+use warnings::Warning;
 
 pub use camera::{Aim, DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, Side, View, tan_half};
 pub use camera_choice::OwnCamera;
@@ -198,7 +198,7 @@ impl Scene {
             self.playing = Some(index);
             self.room = None;
         }
-        let placed = |code| code == far::RECENTRED || measure::CODES.contains(&code);
+        let placed = |code| code == warnings::Code::CoordinatesRecentred || measure::CODES.contains(&code);
         self.warnings.retain(|warning| !placed(warning.code));
         self.prepare()?;
         Ok(self)

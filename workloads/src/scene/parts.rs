@@ -1,7 +1,7 @@
 //! What a scene is made from.
 
-use activity::Warning;
 use glam::Vec3;
+use warnings::Warning;
 
 use super::camera::SceneCamera;
 use super::camera_choice::OwnCamera;

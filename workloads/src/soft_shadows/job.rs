@@ -2,11 +2,12 @@
 
 use std::collections::HashSet;
 
-use activity::{Counts, Event, Warning};
+use activity::{Counts, Event};
 use glam::{DVec3, Vec3};
 use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec};
 use pipeline::{Cull, Draw, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
+use warnings::{Code, Warning};
 
 use super::light::{AreaLight, LightSpec};
 use super::look_up::look_up_packets;
@@ -120,7 +121,7 @@ impl SoftShadows {
                 "the bias is {bias} and a texel of the map {texel:.3} scene units wide at the target: with less than half a texel \
                  surfaces shade themselves (acne), with more than eight shadows come off what throws them"
             );
-            warnings.push(Warning::new("shadow-bias", message));
+            warnings.push(Warning::new(Code::ShadowBias, message));
         }
         warnings
     }
@@ -138,7 +139,7 @@ impl SoftShadows {
         (count < fewest).then(|| {
             let message =
                 format!("{count} places on the light: penumbras show as {count} steps (bands); {mend}");
-            Warning::new("shadow-banding", message)
+            Warning::new(Code::ShadowBanding, message)
         })
     }
 

@@ -3,10 +3,10 @@
 use std::ops::Range;
 use std::path::Path;
 
-use activity::Warning;
 use glam::Vec3;
 use pipeline::sampling::HashedSamples;
 use pipeline::{Camera, LensShape, Viewport};
+use warnings::Warning;
 
 use super::camera::{View, fit};
 use super::mesh::MovingMesh;

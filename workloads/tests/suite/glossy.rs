@@ -124,7 +124,7 @@ fn drawn(options: Options) -> (Vec<Vec3>, Vec<&'static str>) {
     let mut sum = activity::Counts::default();
     let drawn = job.frame(0, &spec(), &mut |packet, _| sum += &packet.counts).unwrap();
     assert_eq!(sum, drawn.counts);
-    (drawn.image, drawn.warnings.iter().map(|warning| warning.code).collect())
+    (drawn.image, drawn.warnings.iter().map(|warning| warning.code.name()).collect())
 }
 
 #[test]

@@ -152,7 +152,7 @@ fn drawn(options: Options, spec: &PipelineSpec) -> (Vec<Vec3>, Vec<&'static str>
     let mut sum = activity::Counts::default();
     let drawn = job.frame(0, spec, &mut |packet, _| sum += &packet.counts).unwrap();
     assert_eq!(sum, drawn.counts);
-    let codes = drawn.warnings.iter().map(|warning| warning.code).collect();
+    let codes = drawn.warnings.iter().map(|warning| warning.code.name()).collect();
     (drawn.image, codes, job.settings().width)
 }
 

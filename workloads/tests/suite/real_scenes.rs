@@ -1,16 +1,17 @@
-//! Real scenes from the folder in `QUINTILE_SCENES`; skipped, with a word, where it is not set.
+//! Real scenes from the folder in `QUINTILE_SCENES`; ignored where it is not set.
 
 use std::collections::HashSet;
 
 use glam::{DQuat, DVec3, Vec3};
 use workloads::{Fingerprint, Overrides, Scene, load};
 
-fn scene(name: &str) -> Option<Scene> {
-    let path = crate::common::real_scenes()?.join(name);
-    Some(load(path.display().to_string()).unwrap_or_else(|error| panic!("{error}")))
+fn scene(name: &str) -> Scene {
+    let path = crate::common::real_scenes().join(name);
+    load(path.display().to_string()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn every_scene_has_its_triangles_and_gives_every_frame() {
     // Counts of the folder's README; SimpleSkin's eight are counted from its indices.
     let known = [
@@ -28,7 +29,7 @@ fn every_scene_has_its_triangles_and_gives_every_frame() {
         ("cloth-ball/cloth_ball92.ply", 92_230, false),
     ];
     for (name, triangles, animated) in known {
-        let Some(scene) = scene(name) else { return };
+        let scene = scene(name);
         let mut prints = HashSet::new();
         for index in scene.settings().frames.clone() {
             let frame = scene.frame(index).unwrap();
@@ -41,23 +42,25 @@ fn every_scene_has_its_triangles_and_gives_every_frame() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn missing_images_are_warnings_and_the_fox_has_its_own() {
     for name in
         ["ToyCar/ToyCar.gltf", "MosquitoInAmber/MosquitoInAmber.gltf", "CesiumMilkTruck/CesiumMilkTruck.gltf"]
     {
-        let Some(scene) = scene(name) else { return };
+        let scene = scene(name);
         assert!(scene.warnings().iter().any(|warning| warning.code == "missing-image"), "{name}");
     }
-    let Some(fox) = scene("Fox.glb") else { return };
+    let fox = scene("Fox.glb");
     assert!(fox.warnings().iter().all(|warning| warning.code != "missing-image"));
     assert_eq!(fox.materials()[0].texture.as_ref().unwrap().size(), [1024, 1024]);
     assert_eq!(fox.clip_names().count(), 3);
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn simple_skin_bends_as_its_joint_turns() {
     for name in ["SimpleSkin/SimpleSkin.gltf", "SimpleSkin/SimpleSkin-multi-target.gltf"] {
-        let Some(scene) = scene(name) else { return };
+        let scene = scene(name);
         let overrides = Overrides { frame_rate_hz: Some(2.0), shutter: Some(0.5), ..Overrides::default() };
         let scene = scene.with_overrides(&overrides).unwrap();
         // Keys at 0, 0.5 and 1 s: identity, then the file's (rounded) eighth and quarter turn about z.
@@ -90,8 +93,9 @@ fn simple_skin_bends_as_its_joint_turns() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn the_wheels_of_the_truck_turn_about_themselves_and_the_rest_stays() {
-    let Some(truck) = scene("CesiumMilkTruck/CesiumMilkTruck.gltf") else { return };
+    let truck = scene("CesiumMilkTruck/CesiumMilkTruck.gltf");
     let frame = truck.frame(2).unwrap();
     let (wheels, body): (Vec<_>, Vec<_>) = frame.meshes.iter().partition(|mesh| !mesh.is_still());
     assert_eq!((wheels.len(), body.len()), (2, 3));
@@ -103,8 +107,9 @@ fn the_wheels_of_the_truck_turn_about_themselves_and_the_rest_stays() {
 }
 
 #[test]
+#[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn two_frames_of_cloth_are_two_ends_of_a_shutter() {
-    let Some(folder) = crate::common::real_scenes() else { return };
+    let folder = crate::common::real_scenes();
     let folder = folder.join("cloth-ball");
     let text = format!(
         "(settings: (shutter: 1, frames: (0, 1)), objects: [(file: {:?}, end: {:?})])",

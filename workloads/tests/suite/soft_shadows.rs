@@ -222,7 +222,7 @@ fn depths_are_all_that_the_passes_of_depth_write() {
 fn warned(options: Options, samples: u32) -> Vec<&'static str> {
     let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
     let job = SoftShadows::new(options, &overrides, 1).unwrap();
-    job.frame(0, &spec(), &mut |_, _| ()).unwrap().warnings.iter().map(|w| w.code).collect()
+    job.frame(0, &spec(), &mut |_, _| ()).unwrap().warnings.iter().map(|w| w.code.name()).collect()
 }
 
 #[test]

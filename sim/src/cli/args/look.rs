@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::output::plot::{COLUMN_MM, Look};
+use output::plot::{COLUMN_MM, Look};
 
 /// How pictures are to look. Without these each has its own width, and letters for a screen.
 #[derive(Clone, Debug, Default, Args)]

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 
 use clap::{Args, ColorChoice, ValueEnum};
 
-use crate::output::terminal::{Terminal, Verbosity};
+use output::terminal::{Terminal, Verbosity};
 
 /// Options of every command.
 #[derive(Clone, Debug, Args)]

@@ -9,7 +9,7 @@ use pipeline::frame::HeatMap;
 use super::{LookArgs, SceneArgs};
 use crate::cli::parse::{duration, percent, setting, share_below_one};
 use crate::cli::quantity::rate;
-use crate::timing::Method;
+use run::Method;
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]

@@ -11,7 +11,7 @@ use crate::cli::parse::{per_pixel, size};
 #[command(
     after_help = "Example:\n  quintile samples jittered --samples 16 --size 640x360 --out mine.smp\n\n\
     `quintile run --table mine.smp` and `quintile visibility --samples mine.smp` read the file. Its layout is\n\
-    described in docs/guide/visibility.md."
+    described in docs/formats.md."
 )]
 pub struct SamplesArgs {
     /// A built-in sample table (see `quintile list`) or a description of one in a .ron file

@@ -12,7 +12,7 @@ use crate::cli::parse::tests;
 #[command(after_help = "Examples:\n  quintile visibility s7_soup5d_10k.m5d --out ours.hit\n  \
     quintile visibility start.ply end.ply --camera camera.ron --json\n  \
     quintile visibility cloth-ball.mts.gz --print-camera > camera.ron\n\n\
-    The layouts of all files, and the hashed samples, are described in docs/guide/visibility.md.")]
+    The layouts of all files, and the hashed samples, are described in docs/formats.md.")]
 pub struct VisibilityArgs {
     /// A moving mesh: an .m5d or .mts file, a .ply, .obj, .off or .stl file, or two of equal topology as the ends of the shutter
     #[arg(value_name = "FILE", required = true, num_args = 1..=2)]

@@ -12,9 +12,9 @@ use workloads::collision::{Answer, Method, Object, Search, Verdict, candidates, 
 
 use super::Failure;
 use super::terminal::{print, print_json};
-use crate::output::progress::Progress;
-use crate::output::table::{Table, grouped};
-use crate::output::terminal::Terminal;
+use output::progress::Progress;
+use output::table::{Table, grouped};
+use output::terminal::Terminal;
 use rows::Rows;
 
 /// Arguments of `ccd`.

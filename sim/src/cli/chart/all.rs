@@ -6,13 +6,13 @@ use clap::ValueEnum;
 use serde_json::{Map, Value};
 
 use super::{Done, make};
-use crate::chart::CHARTS;
-use crate::chart::index::{Entry, Index};
 use crate::cli::Failure;
 use crate::cli::args::{ChartArg, ChartArgs};
 use crate::cli::terminal::{json_text, print, print_json};
-use crate::output::OutDir;
-use crate::output::progress::Progress;
+use experiments::chart::CHARTS;
+use experiments::chart::index::{Entry, Index};
+use output::OutDir;
+use output::progress::Progress;
 
 /// The failure catalogue, which has a command of its own.
 const STRESS: &str = "stress";
@@ -76,7 +76,7 @@ fn entry(name: String, done: Done, took_s: f64) -> Entry {
 
 /// The failure catalogue as a chart among the others.
 fn stress(args: &ChartArgs, dir: &OutDir, progress: &Progress) -> Result<Done, Failure> {
-    let report = crate::stress::stress(None, args.quick, progress)?;
+    let report = experiments::stress::stress(None, args.quick, progress)?;
     let (text, fault) = (report.text(), report.fault().map(str::to_owned));
     let json = json_text(&report.summary(), false)?;
     report.write(dir, &args.look.look())?;

@@ -8,18 +8,18 @@ use serde::Serialize;
 use super::Failure;
 use super::args::{ChartArg, ChartArgs};
 use super::terminal::{json_text, print};
-use crate::chart::ChartError;
-use crate::chart::sampling::{self, Effort, SamplingChart};
-use crate::chart::standing::{Standing, Standings};
-use crate::chart::{
+use experiments::chart::ChartError;
+use experiments::chart::sampling::{self, Effort, SamplingChart};
+use experiments::chart::standing::{Standing, Standings};
+use experiments::chart::{
     caustics, collision, frames, glossy, growth, index, occlusion, points, sampled, shadows, tile_tests,
     timing, views,
 };
-use crate::output::progress::Progress;
-use crate::output::table::Table;
-use crate::output::terminal::Terminal;
-use crate::output::{Claim, Destination, OutDir, OutputError};
-use crate::run::RunError;
+use output::progress::Progress;
+use output::table::Table;
+use output::terminal::Terminal;
+use output::{Claim, Destination, OutDir, OutputError};
+use run::RunError;
 
 mod all;
 
@@ -44,7 +44,7 @@ fn claims(chart: ChartArg) -> Vec<Claim> {
         ChartArg::All => {
             let charts = ChartArg::value_variants().iter().filter(|&&chart| chart != ChartArg::All);
             let charts = charts.flat_map(|&chart| claims(chart));
-            return charts.chain([crate::stress::claim(), index::claim()]).collect();
+            return charts.chain([experiments::stress::claim(), index::claim()]).collect();
         }
         ChartArg::Caustics => caustics::claim(),
         ChartArg::Collision => collision::claim(),

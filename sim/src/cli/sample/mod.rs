@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::Failure;
 use super::terminal::{print, print_json};
-use crate::output::terminal::Terminal;
 use file::Points;
+use output::terminal::Terminal;
 
 /// Arguments of `sample`.
 #[derive(Debug, Args)]

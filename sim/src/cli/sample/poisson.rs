@@ -1,8 +1,8 @@
 //! `quintile sample poisson`.
 
-use activity::Warning;
 use clap::{ArgGroup, Args};
 use serde::Serialize;
+use warnings::Warning;
 use workloads::points::doubt;
 use workloads::points::poisson::{
     Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_telling, radius_for, saturation, span,
@@ -10,8 +10,8 @@ use workloads::points::poisson::{
 
 use super::file::Points;
 use super::{Common, Failure, usage};
-use crate::output::progress::Progress;
-use crate::output::terminal::Terminal;
+use output::progress::Progress;
+use output::terminal::Terminal;
 
 /// Arguments of `sample poisson`.
 #[derive(Debug, Args)]

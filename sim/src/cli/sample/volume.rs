@@ -139,7 +139,7 @@ mod tests {
     use clap::Parser;
 
     use crate::cli::args::{Cli, Command};
-    use crate::output::terminal::Terminal;
+    use output::terminal::Terminal;
 
     #[test]
     fn a_mesh_has_no_ring_and_no_tube() {

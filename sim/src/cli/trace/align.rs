@@ -15,7 +15,8 @@ use crate::cli::Failure;
 use crate::cli::args::trace::AlignArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::terminal::Terminal;
+use output::terminal::Terminal;
+use warnings::Code;
 
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {
@@ -40,7 +41,7 @@ const MAX_CLOCK_DEVIATION: f64 = 0.02;
 /// Warns of anchors that are likely wrong: stamps in another unit, or of another recording.
 fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f64], terminal: &Terminal) {
     let warn = |what: String| {
-        terminal.warn_of("anchors-off", &format!("{what}; look at --anchor STAMP=TIME"));
+        terminal.warn_of(Code::AnchorsOff, &format!("{what}; look at --anchor STAMP=TIME"));
     };
     if (alignment.scale - 1.0).abs() > MAX_CLOCK_DEVIATION {
         warn(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
@@ -74,7 +75,7 @@ pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> 
     };
     if alignment.ambiguous {
         terminal.warn_of(
-            "ambiguous-alignment",
+            Code::AmbiguousAlignment,
             "another pairing fits about as well, as frame times are even; give two anchors",
         );
     }

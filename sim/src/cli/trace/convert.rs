@@ -11,8 +11,8 @@ use crate::cli::Failure;
 use crate::cli::args::trace::ConvertArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
-use crate::output::terminal::Terminal;
+use output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
+use output::terminal::Terminal;
 
 /// About the bytes of a row of CSV. Files of more than [`LARGE_BYTES`] are announced.
 const ROW_BYTES: u64 = 50;
@@ -94,11 +94,11 @@ pub(super) fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) ->
 /// Writes a counter track of the power, thinned out to as many points as the viewer holds.
 fn perfetto(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
     let header = trace.header();
-    let mut thinner = Thinner::new(header.samples, MAX_POINTS);
-    trace.read_into(&mut thinner)?;
+    let mut extremes = PowerExtremes(Thinner::new(header.samples, MAX_POINTS));
+    trace.read_into(&mut extremes)?;
     let start_ns = header.time_ns(0);
     let place = |(index, watts): (u64, f64)| ((header.time_ns(index) - start_ns).unsigned_abs(), watts);
-    let points: Vec<(u64, f64)> = thinner.kept().into_iter().map(place).collect();
+    let points: Vec<(u64, f64)> = extremes.0.kept().into_iter().map(place).collect();
     let (kept, samples) = (points.len() as u64, header.samples);
     if kept < samples {
         terminal.note(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
@@ -108,10 +108,12 @@ fn perfetto(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result
     Ok(atomic::write_file(path, |out| perfetto::write(&timeline, out))?)
 }
 
-/// Thins out the power of the samples.
-impl TraceWriter for Thinner {
+/// Keeps the extremes of the power of a trace.
+struct PowerExtremes(Thinner);
+
+impl TraceWriter for PowerExtremes {
     fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
-        chunk.powers_w().for_each(|watts| self.push(watts));
+        chunk.powers_w().for_each(|watts| self.0.push(watts));
         Ok(())
     }
 }

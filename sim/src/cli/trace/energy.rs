@@ -14,8 +14,9 @@ use super::failure::wrong;
 use crate::cli::Failure;
 use crate::cli::args::trace::{Discard, EnergyArgs, IdleBy};
 use crate::cli::terminal::{print, print_json};
-use crate::output::table::counted;
-use crate::output::terminal::Terminal;
+use output::table::counted;
+use output::terminal::Terminal;
+use warnings::Code;
 
 pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure> {
     passes_differ(&args.pass)?;
@@ -178,7 +179,7 @@ fn within_frames(
             "{beyond} of {frames} frames end before pass {name} begins, {} ms after their start: it has no energy there",
             begins_s * 1e3
         );
-        terminal.warn_of("pass-beyond", &message);
+        terminal.warn_of(Code::PassBeyond, &message);
     }
     Ok(())
 }

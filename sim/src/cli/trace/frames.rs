@@ -14,8 +14,9 @@ use crate::cli::args::trace::FramesArgs;
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
 use crate::cli::{Failure, threads};
-use crate::output::table::{Table, counted, si, si_digits};
-use crate::output::terminal::Terminal;
+use output::table::{Table, counted, si, si_digits};
+use output::terminal::Terminal;
+use warnings::Code;
 
 /// Frames shown on the terminal.
 const SHOWN: usize = 12;
@@ -187,7 +188,7 @@ fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
 fn inverse_text(table: &FrameTable, pixels: Option<u64>, terminal: &Terminal) -> String {
     let units = InverseUnits::of(table.frames(), pixels);
     terminal.warn_of(
-        "inverse-units",
+        Code::InverseUnits,
         "inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
     );
     let number = |value: f64| if value.is_finite() { value } else { f64::NAN };

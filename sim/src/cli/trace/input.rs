@@ -15,7 +15,8 @@ use super::failure::wrong;
 use super::pipes::shown;
 use crate::cli::Failure;
 use crate::cli::args::trace::{FindArgs, InputArgs};
-use crate::output::terminal::Terminal;
+use output::terminal::Terminal;
+use warnings::Code;
 
 /// Traces of more samples are read in pieces.
 const MAX_SAMPLES_IN_MEMORY: u64 = 1 << 24;
@@ -85,7 +86,7 @@ impl InputArgs {
         if let Some(sum) = rail_of_sums(path, &self.options()?)? {
             let others: Vec<String> = sum.others.iter().map(|rail| format!("--rail {rail}")).collect();
             let alone = if sum.rail.is_empty() { String::new() } else { format!("--rail {}, or ", sum.rail) };
-            terminal.warn_of("rail-counted-twice", &format!("{sum}: give {alone}{}", others.join(" ")));
+            terminal.warn_of(Code::RailCountedTwice, &format!("{sum}: give {alone}{}", others.join(" ")));
         }
         Ok(())
     }

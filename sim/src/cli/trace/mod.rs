@@ -14,7 +14,7 @@ mod sample;
 use super::Failure;
 use super::args::trace::{TraceArgs, TraceCommand};
 use super::terminal::print;
-use crate::output::terminal::Terminal;
+use output::terminal::Terminal;
 
 use pipes::Pipes;
 

@@ -14,9 +14,9 @@ use crate::cli::Failure;
 use crate::cli::args::trace::{ParetoArgs, ParetoShow};
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Series};
-use crate::output::table::{Table, si_digits};
-use crate::output::terminal::Terminal;
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Series};
+use output::table::{Table, si_digits};
+use output::terminal::Terminal;
 
 impl From<TableReadError> for Failure {
     fn from(error: TableReadError) -> Self {

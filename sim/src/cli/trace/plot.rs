@@ -16,9 +16,10 @@ use crate::cli::Failure;
 use crate::cli::args::trace::{PlotArgs, PlotKind};
 use crate::cli::outputs::may_hold_results;
 use crate::cli::terminal::print_json;
-use crate::output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};
-use crate::output::table::{counted, si};
-use crate::output::terminal::Terminal;
+use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};
+use output::table::{counted, si};
+use output::terminal::Terminal;
+use warnings::Code;
 
 /// Columns of the curve.
 const COLUMNS: usize = 1050;
@@ -297,7 +298,7 @@ fn repeats(args: &PlotArgs, first: &[f64], terminal: &Terminal) -> Result<Drawn,
         (runs.iter().map(Vec::len).min().unwrap_or(0), runs.iter().map(Vec::len).max().unwrap_or(0));
     if frames < most {
         let message = format!("runs have {frames} to {most} frames; the first {frames} are shown");
-        terminal.warn_of("uneven-runs", &message);
+        terminal.warn_of(Code::UnevenRuns, &message);
     }
     let spreads =
         (0..frames).filter_map(|index| Spread::of(&runs.iter().map(|run| run[index]).collect::<Vec<_>>()));

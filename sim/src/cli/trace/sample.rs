@@ -11,8 +11,9 @@ use super::report;
 use crate::cli::Failure;
 use crate::cli::args::trace::SampleArgs;
 use crate::cli::terminal::print_json;
-use crate::output::table::si;
-use crate::output::terminal::Terminal;
+use output::table::si;
+use output::terminal::Terminal;
+use warnings::Code;
 
 /// A recorder whose codes are used to a smaller share loses energy to rounding.
 const FEW_CODES: f64 = 0.05;
@@ -31,11 +32,11 @@ pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure>
             "{} currents and {} voltages were beyond the device's range; widen it with --current-range or --voltage-range",
             sampled.clipped_currents, sampled.clipped_voltages
         );
-        terminal.warn_of("clipped", &message);
+        terminal.warn_of(Code::Clipped, &message);
     }
     warn_of_few_codes(device.spec(), &peaks, terminal);
     if let Some(losses) = sampled.losses() {
-        terminal.warn_of("packets-lost", &format!("{losses}; --repair fills them"));
+        terminal.warn_of(Code::PacketsLost, &format!("{losses}; --repair fills them"));
     }
     save(&sampled, &args.out, terminal)?;
     let header = sampled.header();
@@ -75,7 +76,7 @@ fn warn_of_few_codes(spec: &DeviceSpec, peaks: &Peaks, terminal: &Terminal) {
             si(spec.current_range_a[0], "A"),
             si(spec.current_range_a[1], "A")
         );
-        terminal.warn_of("range-unused", &message);
+        terminal.warn_of(Code::RangeUnused, &message);
     }
 }
 

@@ -1,8 +1,8 @@
 //! What the file asks for and is not drawn.
 
-use activity::Warning;
 use gltf::json::material::{AlphaMode, Material as Described};
 use gltf::json::validation::Checked;
+use warnings::{Code, Warning};
 
 use super::Looks;
 use super::document::Document;
@@ -48,7 +48,7 @@ pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alph
     }
     let what = "ignored: what it describes looks or moves in another way";
     let changing = root.extensions_used.iter().filter(|name| changes_the_picture(name));
-    warnings.extend(changing.map(|name| Warning::about("extension-ignored", "extension", what, name)));
+    warnings.extend(changing.map(|name| Warning::about(Code::ExtensionIgnored, "extension", what, name)));
     warnings
 }
 
@@ -79,9 +79,9 @@ fn maps(described: &Described, name: &str) -> Vec<Warning> {
     let found = [
         normal.then(|| ignored::normal_map(name)),
         emissive.then(|| ignored::emissive(name)),
-        occlusion.then(|| about_material("occlusion-map-ignored", "occlusion map", shaded, name)),
-        metallic.then(|| about_material("metallic-ignored", "metallic material", matt, name)),
-        rough.then(|| about_material("metallic-ignored", "metallic-roughness map", gloss, name)),
+        occlusion.then(|| about_material(Code::OcclusionMapIgnored, "occlusion map", shaded, name)),
+        metallic.then(|| about_material(Code::MetallicIgnored, "metallic material", matt, name)),
+        rough.then(|| about_material(Code::MetallicIgnored, "metallic-roughness map", gloss, name)),
     ];
     found.into_iter().flatten().collect()
 }

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use activity::Warning;
 use glam::Vec3;
 use gltf::json::texture::{MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use pipeline::{Texture, Wrap};
+use warnings::{Code, Warning};
 
 use super::buffers;
 use super::document::Document;
@@ -46,7 +46,7 @@ impl Images<'_, '_> {
         let (image, wrap) = (texture.source.value(), self.wrap(index));
         if self.is_blocky(index) {
             let what = "without filter drawn with one: magnified texels have soft edges";
-            warnings.push(ignored::about_material("texture-filter-ignored", "texture", what, material));
+            warnings.push(ignored::about_material(Code::TextureFilterIgnored, "texture", what, material));
         }
         let document = self.document;
         let key = (image, wrap.map(|wrap| wrap as u8));

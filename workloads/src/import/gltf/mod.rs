@@ -15,7 +15,7 @@ mod view;
 
 use std::path::Path;
 
-use activity::Warning;
+use warnings::Warning;
 
 use crate::error::{LoadError, Source};
 use crate::scene::far::Bounds;

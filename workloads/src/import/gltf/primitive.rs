@@ -1,10 +1,10 @@
 //! One primitive of a mesh: its vertices, triangles, morph targets and joints.
 
-use activity::Warning;
 use glam::{Vec2, Vec3};
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
+use warnings::{Code, Warning};
 
 use super::accessor::Values;
 use super::document::Document;
@@ -61,7 +61,7 @@ pub(super) fn read(
 }
 
 fn dropped(detail: String) -> Warning {
-    Warning::about("primitive-dropped", "primitive", "not drawn: only triangles are", detail)
+    Warning::about(Code::PrimitiveDropped, "primitive", "not drawn: only triangles are", detail)
 }
 
 impl Reading<'_, '_> {
@@ -167,7 +167,7 @@ impl Reading<'_, '_> {
         let Some(values) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
             let what = "without the coordinates that its texture needs: the base colour is used alone";
             let detail = format!("{}: no texture coordinates {set}", self.place);
-            warnings.push(Warning::about("missing-texcoord", "primitive", what, detail));
+            warnings.push(Warning::about(Code::MissingTexcoord, "primitive", what, detail));
             materials.push(Material { texture: None, ..materials[mesh.material].clone() });
             mesh.material = materials.len() - 1;
             return Ok(());

@@ -1,10 +1,10 @@
 //! The file's camera and light.
 
-use activity::Warning;
 use glam::{DVec3, Vec3};
 use gltf::json::camera::{Camera, Type as CameraType};
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use gltf::json::validation::Checked;
+use warnings::{Code, Warning};
 
 use super::document::Document;
 use super::nodes::Tree;
@@ -35,7 +35,7 @@ fn cameras(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Vec
             continue;
         }
         let what = "without a usable field of view, height or near plane ignored: it cannot be used";
-        warnings.push(Warning::about("camera-ignored", "camera", what, at_node(index, node)));
+        warnings.push(Warning::about(Code::CameraIgnored, "camera", what, at_node(index, node)));
     }
     cameras
 }
@@ -82,7 +82,7 @@ fn light(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Light
                 Checked::Valid(LightType::Spot) => "spot light",
                 _ => "further directional light",
             };
-            warnings.push(Warning::about("light-ignored", kind, what, at_node(index, node)));
+            warnings.push(Warning::about(Code::LightIgnored, kind, what, at_node(index, node)));
         }
     }
     found.map_or_else(Light::default, |(toward, color)| lamp(toward, color))

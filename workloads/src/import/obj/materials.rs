@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use activity::Warning;
 use glam::{Vec2, Vec3};
 use pipeline::{Texture, Wrap};
+use warnings::{Code, Warning};
 
 use super::mtl::{self, Described, Map};
 use super::statements::Statements;
@@ -64,7 +64,7 @@ impl Library {
                     library.whole = false;
                     let what = "not read: what it describes is grey";
                     let detail = format!("{file}: {source}");
-                    warnings.push(Warning::about("missing-material", "material file", what, detail));
+                    warnings.push(Warning::about(Code::MissingMaterial, "material file", what, detail));
                 }
                 Err(error) => return Err(error),
             }
@@ -79,7 +79,7 @@ impl Library {
         let names = found.materials.iter().zip(used).filter(|(_, used)| *used && self.whole);
         let names = names.map(|(name, _)| name).filter(|name| !self.described.contains_key(*name));
         let what = "described in no material file: drawn grey";
-        names.map(|name| ignored::about_material("missing-material", "material", what, name)).collect()
+        names.map(|name| ignored::about_material(Code::MissingMaterial, "material", what, name)).collect()
     }
 }
 
@@ -156,7 +156,7 @@ fn untextured(found: &Statements, looks: &Looks) -> Vec<Warning> {
     let what = "on faces without texture coordinates: these show one texel, or the base colour where no face has any";
     materials
         .map(|(material, _)| {
-            ignored::about_material("missing-texcoord", "textured material", what, &material.name)
+            ignored::about_material(Code::MissingTexcoord, "textured material", what, &material.name)
         })
         .collect()
 }

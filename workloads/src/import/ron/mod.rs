@@ -5,8 +5,8 @@ mod spec;
 
 use std::path::Path;
 
-use activity::Warning;
 use glam::{DVec3, Vec3};
+use warnings::{Code, Warning};
 
 use crate::error::{LoadError, Source};
 use crate::material::Light;
@@ -76,7 +76,7 @@ fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
     }
     if matches!(parts.camera.rig, Rig::Fitted(_)) && parts.settings.focus.is_some() {
         let message = "`focus` is a depth from a camera that is placed by itself: give the scene a `camera` to be sure of it";
-        parts.warnings.push(Warning::new("focus-of-fitted-camera", message));
+        parts.warnings.push(Warning::new(Code::FocusOfFittedCamera, message));
     }
     Ok(parts)
 }

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use activity::Warning;
 use glam::{DQuat, DVec3, Vec3};
 use pipeline::{Wrap, linear_to_srgb8};
+use warnings::Warning;
 
 use super::spec::{MaterialSpec, ObjectSpec, ShapeSpec, TextureSpec};
 use super::{Context, broken, color, vector};

@@ -1,0 +1,34 @@
+//! Each way a chart can fail.
+
+use output::OutputError;
+use run::GpuError;
+
+/// Why a chart could not be made.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum ChartError {
+    #[error(transparent)]
+    Scene(#[from] workloads::LoadError),
+    #[error(transparent)]
+    Frame(#[from] workloads::FrameError),
+    #[error(transparent)]
+    Samples(#[from] pipeline::sampling::TableError),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Soup(#[from] workloads::stress::StressError),
+    #[error(transparent)]
+    Curve(#[from] traces::CurveError),
+    #[error(transparent)]
+    Recording(#[from] traces::synth::SynthError),
+    #[error(transparent)]
+    Mark(#[from] traces::frames::MarkError),
+    #[error("starting the thread that is timed: {0}")]
+    Thread(#[from] rayon::ThreadPoolBuildError),
+    #[error("the pipeline does not take the scene: {0}")]
+    Pipeline(String),
+    #[error(transparent)]
+    Job(#[from] workloads::job::JobError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}

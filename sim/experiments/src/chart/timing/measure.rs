@@ -1,0 +1,212 @@
+//! One stream at every level: how far from the reference, and how fast.
+
+use activity::{Event, Timeline, Unit};
+use cpu_time::ThreadTime;
+use power_model::{EnergyTable, FramePower, Platform, PowerModel};
+use serde::Serialize;
+use timing::stepped::{self, Manner, Stream};
+use timing::{Clocks, Jobs, PacketClock, Recorder, Timed, Totals, bound};
+
+use super::Reference;
+use super::subjects::Packets;
+use run::GpuSpec;
+use run::RunError;
+use timing::{AccuracyWarning, Level, TimingError};
+
+/// Bins of a microsecond, as in a run.
+pub(super) const BIN_PS: u64 = 1_000_000;
+pub(super) const MOST_BINS: usize = 1 << 20;
+/// Fast levels are timed several times, and the fastest counts.
+const TIMES: usize = 5;
+
+/// A level on a stream.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The scene.
+    pub scene: String,
+    /// The GPU.
+    pub gpu: String,
+    /// The level.
+    pub level: Level,
+    /// Packets of the stream.
+    pub packets: usize,
+    /// Cycles of the frame.
+    pub cycles: u64,
+    /// Cycles of the frame by the reference.
+    pub stepped_cycles: u64,
+    /// Relative error of the cycles.
+    pub cycle_error_percent: f64,
+    /// Relative error of the energy of the frame.
+    pub energy_error_percent: f64,
+    /// Error of the busy time of the unit that is worst, over the time of the frame.
+    pub busy_error_percent: f64,
+    /// Relative error of the bytes to and from memory.
+    pub dram_error_percent: f64,
+    /// RMS of the difference of power over mean power, at 50 kHz.
+    pub power_shape_error_percent: f64,
+    /// The same at 1 us.
+    pub power_shape_error_1us_percent: f64,
+    /// The unit that the reference finds busiest over the frame, and its share.
+    pub busiest: (&'static str, f64),
+    /// Codes of the warnings that a run at this level would give of its time.
+    pub warns: Vec<&'static str>,
+    /// Seconds of the host's processor, timing alone: the stream is written.
+    pub host_s: f64,
+    /// Seconds of the host's processor to turn packets into what units owe, once for all levels.
+    pub written_s: f64,
+    /// Seconds of the host for the reference over these.
+    pub speedup_over_stepped: f64,
+}
+
+/// How fast the reference was.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Speed {
+    unit_cycles: u64,
+    cycles: u64,
+    host_s: f64,
+}
+
+impl Speed {
+    pub fn figures(&self) -> Reference {
+        let per_s = |count: u64| count as f64 / self.host_s.max(1e-12);
+        Reference {
+            unit_cycles_per_s: per_s(self.unit_cycles),
+            cycles_per_s: per_s(self.cycles),
+            host_s: self.host_s,
+        }
+    }
+}
+
+/// A row for each level but the reference.
+pub(super) fn rows(
+    scene: &str,
+    gpu: &GpuSpec,
+    stream: &Packets,
+    speed: &mut Speed,
+) -> Result<Vec<Row>, RunError> {
+    let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
+    let power = |timed: &Timed| {
+        model.frame(&timed.timeline).map_err(|source| RunError::Timeline { frame: 0, source })
+    };
+    let written = Written::new(gpu, stream)?;
+    let (truth, stepped_s) = timed(Level::Stepped, gpu, &written)?;
+    speed.unit_cycles += truth.unit_cycles;
+    speed.cycles += truth.cycles;
+    speed.host_s += stepped_s;
+    let true_power = power(&truth)?;
+    let mut rows = Vec::new();
+    for level in Level::ALL.into_iter().filter(|&level| level != Level::Stepped) {
+        let (found, mut host_s) = timed(level, gpu, &written)?;
+        for _ in 1..TIMES {
+            host_s = host_s.min(timed(level, gpu, &written)?.1);
+        }
+        let found_power = power(&found)?;
+        rows.push(Row {
+            scene: scene.to_owned(),
+            gpu: gpu.name.clone(),
+            level,
+            packets: stream.packets.len(),
+            cycles: found.cycles,
+            stepped_cycles: truth.cycles,
+            cycle_error_percent: percent(found.cycles as f64, truth.cycles as f64),
+            energy_error_percent: percent(found_power.energy().total_j(), true_power.energy().total_j()),
+            busy_error_percent: busy_error(&found.timeline, &truth.timeline),
+            dram_error_percent: percent(dram(&found.timeline), dram(&truth.timeline)),
+            power_shape_error_percent: shape_error(&found_power, &true_power, 20e-6),
+            power_shape_error_1us_percent: shape_error(&found_power, &true_power, 1e-6),
+            busiest: busiest(&truth.timeline),
+            warns: AccuracyWarning::all(level, &found)
+                .into_iter()
+                .map(|warning| warning.code().name())
+                .collect(),
+            host_s,
+            written_s: written.host_s,
+            speedup_over_stepped: stepped_s / host_s,
+        });
+    }
+    Ok(rows)
+}
+
+/// A frame's packets as what the units of one machine owe, written once for all levels.
+pub(super) struct Written {
+    clocks: Clocks,
+    makes: Jobs,
+    stream: Stream,
+    totals: Totals,
+    host_s: f64,
+}
+
+impl Written {
+    pub fn new(gpu: &GpuSpec, packets: &Packets) -> Result<Self, RunError> {
+        let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
+        let started = ThreadTime::now();
+        let mut makes = Jobs::new(&gpu.units, gpu.pipeline.batch_triangles);
+        let (mut stream, mut totals) = (Stream::default(), Totals::new(&gpu.units, &clocks));
+        packets.each(|packet, lines| {
+            stream.push(&mut makes, packet, lines);
+            stream.add_last(&makes, &mut totals);
+        });
+        Ok(Self { clocks, makes, stream, totals, host_s: started.elapsed().as_secs_f64() })
+    }
+}
+
+/// The frame at a level, and the host's seconds for it: timing alone, as the stream is written.
+pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(Timed, f64), RunError> {
+    let Written { clocks, makes, stream, totals, .. } = written;
+    let started = ThreadTime::now();
+    let recorder = Recorder::new(BIN_PS, MOST_BINS);
+    let timed = match level {
+        Level::Stepped => stepped::run(&gpu.units, *clocks, makes, stream, recorder, &Manner::default())
+            .map_err(TimingError::from)?,
+        Level::Packet => {
+            PacketClock::new(&gpu.units, *clocks, gpu.pipeline.batch_triangles, recorder).run(stream)
+        }
+        Level::Bound => bound(&gpu.units, *clocks, totals, recorder),
+    };
+    Ok((timed, started.elapsed().as_secs_f64()))
+}
+
+fn percent(found: f64, truth: f64) -> f64 {
+    if found == truth { 0.0 } else { (found / truth - 1.0) * 100.0 }
+}
+
+fn dram(timeline: &Timeline) -> f64 {
+    let total = timeline.total();
+    (total[Event::DramReadBytes] + total[Event::DramWriteBytes]) as f64
+}
+
+fn busy_error(found: &Timeline, truth: &Timeline) -> f64 {
+    let pairs = found.busy_ps().into_iter().zip(truth.busy_ps());
+    pairs.map(|(a, b)| a.abs_diff(b) as f64 / truth.duration_ps as f64 * 100.0).fold(0.0, f64::max)
+}
+
+fn busiest(timeline: &Timeline) -> (&'static str, f64) {
+    let busy = timeline.busy_ps();
+    let unit = Unit::ALL.into_iter().max_by_key(|&unit| busy[unit as usize]).unwrap_or(Unit::Command);
+    (unit.name(), busy[unit as usize] as f64 / timeline.duration_ps as f64)
+}
+
+/// Root mean square of the difference of power, each sample the mean over `step_s`, over the mean power of the truth.
+fn shape_error(found: &FramePower, truth: &FramePower, step_s: f64) -> f64 {
+    let steps = (found.duration_s().max(truth.duration_s()) / step_s).ceil().max(1.0) as usize;
+    let (a, b) = (sampled(found, step_s, steps), sampled(truth, step_s, steps));
+    let square: f64 = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / steps as f64;
+    square.sqrt() / (b.iter().sum::<f64>() / steps as f64) * 100.0
+}
+
+fn sampled(power: &FramePower, step_s: f64, steps: usize) -> Vec<f64> {
+    let mut joules = vec![0.0; steps];
+    let mut from_s = 0.0;
+    for (length_s, watts) in power.bins() {
+        let watts: f64 = watts.iter().sum();
+        let to_s = from_s + length_s;
+        let mut at = ((from_s / step_s) as usize).min(steps - 1);
+        while at < steps && at as f64 * step_s < to_s {
+            let overlap = to_s.min((at + 1) as f64 * step_s) - from_s.max(at as f64 * step_s);
+            joules[at] += watts * overlap.max(0.0);
+            at += 1;
+        }
+        from_s = to_s;
+    }
+    joules.into_iter().map(|joules| joules / step_s).collect()
+}

@@ -1,0 +1,244 @@
+//! Shader runs, times and errors of views.
+
+use std::time::Instant;
+
+use activity::Event;
+use glam::Vec3;
+use pipeline::{CacheSpec, Draw, PipelineSpec, Replacement, Viewport};
+use serde::Serialize;
+use workloads::multiview::{Layout, Rig, Target, Views};
+use workloads::{Frame, Overrides, Scene};
+
+use super::gloss::Gloss;
+use super::{ChartError, SAMPLES, line, stereo};
+use crate::chart::image::{errors, mean_square};
+use run::GpuSpec;
+
+/// What a way of rendering all views took.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Run {
+    /// Passes over the geometry.
+    pub passes: u32,
+    /// Pixel shader lanes run, helpers included.
+    pub invocations: u64,
+    /// The same over those of one view alone.
+    pub over_one_view: f64,
+    /// Vertex shader runs.
+    pub vertices: u64,
+    /// Bytes read from and written to memory.
+    pub dram_bytes: u64,
+    /// Seconds of the host.
+    pub host_s: f64,
+}
+
+/// One number of views.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Row {
+    /// Views.
+    pub views: u32,
+    /// Samples for each view of a pixel; fewer where all of them do not fit in a pixel.
+    pub samples_per_view: u32,
+    /// All in one pass.
+    pub one_pass: Run,
+    /// A pass each.
+    pub view_by_view: Run,
+    /// A pass for each sample.
+    pub accumulation: Run,
+}
+
+/// One shading cache.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Cached {
+    /// Views.
+    pub views: u32,
+    /// Name of the replacement policy.
+    pub policy: &'static str,
+    /// Entries, quads each, in sets of four.
+    pub entries: u32,
+    /// Pixel shader lanes run for all views, for each pixel of one.
+    pub invocations_per_pixel: f64,
+    /// Those of one view alone.
+    pub one_view_per_pixel: f64,
+    /// The first over the second, less one.
+    pub increase: f64,
+}
+
+/// Pixel shader lanes of views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lanes {
+    /// Of all views in one pass.
+    pub all: u64,
+    /// Of one view alone.
+    pub one: u64,
+    /// Draws of the one pass.
+    pub draws: u64,
+    /// Samples of it that saw something.
+    pub samples_hit: u64,
+}
+
+/// One length of the camera line.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Angle {
+    /// Its length over the distance of what is in focus.
+    pub baseline: f64,
+    /// The angle under which a point in focus sees it, in degrees.
+    pub degrees: f64,
+    /// Error of the outer views against cameras of their own, where shading does not depend on who looks.
+    pub rmse_matt: f64,
+    /// The same with a highlight.
+    pub rmse_shiny: f64,
+}
+
+/// Exponent of that highlight.
+const EXPONENT: i32 = 64;
+
+/// A scene and hardware to draw it with.
+pub struct Bench {
+    scene: Scene,
+    frame: Frame,
+    gpu: GpuSpec,
+    viewport: Viewport,
+    focus: f32,
+}
+
+impl Bench {
+    /// Frame of a built-in scene, for views of a size.
+    ///
+    /// # Errors
+    /// When it cannot be loaded, or has no lens to say what is in focus.
+    pub fn new((name, number): (&str, u32), size: [u32; 2]) -> Result<Self, ChartError> {
+        Self::with_shutter((name, number), size, None)
+    }
+
+    /// The same with a shutter of its own, as a share of the frame's time.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_shutter(
+        (name, number): (&str, u32),
+        [width, height]: [u32; 2],
+        shutter: Option<f64>,
+    ) -> Result<Self, ChartError> {
+        let refused = |why: &str| ChartError::Pipeline(why.to_owned());
+        let size = Some((width, height));
+        let scene =
+            workloads::load(name)?.with_overrides(&Overrides { size, shutter, ..Overrides::default() })?;
+        let frame = scene.frame(number)?;
+        let focus = frame.camera.lens().ok_or_else(|| refused("it has no lens"))?.focus();
+        let viewport = Viewport::new(width, height).ok_or_else(|| refused("views of no size"))?;
+        Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, viewport, focus })
+    }
+
+    /// Distance of what is in focus, scene units.
+    pub fn focus(&self) -> f64 {
+        f64::from(self.focus)
+    }
+
+    fn rig(&self, layout: &Layout, samples: u32) -> Result<Rig, ChartError> {
+        let strips = layout.overlap.max(1);
+        let per_strip = (samples / strips).min(256 / layout.strips());
+        Ok(Rig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
+    }
+
+    fn target<'a>(&self, spec: &'a PipelineSpec) -> Target<'a> {
+        Target { viewport: self.viewport, spec, background: self.scene.background() }
+    }
+
+    /// All ways of rendering so many views: two are apart as eyes are, others overlap.
+    pub(super) fn row(&self, views: u32) -> Result<Row, ChartError> {
+        let layout = if views == 2 { stereo() } else { line(views) };
+        let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
+        let draws = self.frame.draws(&self.scene)?;
+        let one = self.one_view(&rig, &layout, &draws, &to)?;
+        let run = |render: &dyn Fn() -> Result<Views, workloads::job::JobError>| {
+            let started = Instant::now();
+            let views = render()?;
+            let host_s = started.elapsed().as_secs_f64();
+            let counts = &views.counts;
+            let invocations = counts[Event::PixelInvocations];
+            Ok::<_, ChartError>(Run {
+                passes: views.passes,
+                invocations,
+                over_one_view: invocations as f64 / one as f64,
+                vertices: counts[Event::VertexInvocations],
+                dram_bytes: counts[Event::DramReadBytes] + counts[Event::DramWriteBytes],
+                host_s,
+            })
+        };
+        Ok(Row {
+            views,
+            samples_per_view: rig.samples() / layout.strips() * layout.overlap.max(1),
+            one_pass: run(&|| rig.one_pass(&draws, &to, &mut |_, _| ()))?,
+            view_by_view: run(&|| rig.view_by_view(&draws, &to, &mut |_, _| ()))?,
+            accumulation: run(&|| rig.accumulated(&draws, &to, &mut |_, _| ()))?,
+        })
+    }
+
+    /// Lanes that the view nearest to the middle takes alone.
+    fn one_view(
+        &self,
+        rig: &Rig,
+        layout: &Layout,
+        draws: &[Draw<'_>],
+        to: &Target<'_>,
+    ) -> Result<u64, ChartError> {
+        let (_, counts) = rig.view((layout.views as usize - 1) / 2, draws, to, &mut |_, _| ())?;
+        Ok(counts[Event::PixelInvocations].max(1))
+    }
+
+    /// Shader runs with another cache.
+    ///
+    /// # Errors
+    /// When the cache cannot be built.
+    pub fn cached(
+        &self,
+        layout: Layout,
+        (policy, replacement): (&'static str, Replacement),
+        entries: u32,
+    ) -> Result<Cached, ChartError> {
+        let cache = CacheSpec { replacement, ..CacheSpec::lru(entries, 4) };
+        let lanes = self.lanes(layout, cache, SAMPLES)?;
+        let pixels = self.viewport.pixels() as f64;
+        Ok(Cached {
+            views: layout.views,
+            policy,
+            entries,
+            invocations_per_pixel: lanes.all as f64 / pixels,
+            one_view_per_pixel: lanes.one as f64 / pixels,
+            increase: lanes.all as f64 / lanes.one as f64 - 1.0,
+        })
+    }
+
+    /// Shader lanes of all views in one pass, and of the one nearest to the middle alone, with a cache and samples of each view.
+    ///
+    /// # Errors
+    /// When the cache cannot be built.
+    pub fn lanes(&self, layout: Layout, shading_cache: CacheSpec, samples: u32) -> Result<Lanes, ChartError> {
+        let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
+        let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
+        let draws = self.frame.draws(&self.scene)?;
+        let counts = rig.one_pass(&draws, &to, &mut |_, _| ())?.counts;
+        let one = self.one_view(&rig, &layout, &draws, &to)?;
+        let [draws, samples_hit] = [Event::Draws, Event::SamplesHit].map(|event| counts[event]);
+        Ok(Lanes { all: counts[Event::PixelInvocations], one, draws, samples_hit })
+    }
+
+    /// The error of two views at the ends of a camera line, shaded for its middle.
+    pub(super) fn angle(&self, baseline: f64) -> Result<Angle, ChartError> {
+        let spacing = baseline * self.focus();
+        let layout = Layout::stereo(spacing, (0.4 * spacing).min(0.02));
+        let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
+        let error = |exponent| {
+            let draws = self.frame.draws(&self.scene)?;
+            let glosses: Vec<_> = draws.iter().map(|draw| Gloss { looks: draw.shader, exponent }).collect();
+            let draws: Vec<_> =
+                draws.iter().zip(&glosses).map(|(draw, shader)| Draw { shader, ..*draw }).collect();
+            let found = rig.one_pass(&draws, &to, &mut |_, _| ())?.images;
+            let truth = rig.own_cameras(&draws, &to)?;
+            let pixels = |images: &[Vec<Vec3>]| images.concat();
+            Ok::<_, ChartError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())
+        };
+        let degrees = rig.degrees();
+        Ok(Angle { baseline, degrees, rmse_matt: error(None)?, rmse_shiny: error(Some(EXPONENT))? })
+    }
+}

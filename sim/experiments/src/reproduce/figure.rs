@@ -1,0 +1,80 @@
+//! Figures of the papers, drawn anew.
+
+use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Picture, Scale, Series};
+
+/// A picture and its name.
+pub struct Figure {
+    /// Its name without ending, for example `III_fig3`.
+    pub name: &'static str,
+    /// What is drawn.
+    pub picture: Picture,
+}
+
+impl Figure {
+    /// Where it is below the folder of results, as SVG.
+    pub(super) fn path(&self) -> String {
+        format!("plots/{}.svg", self.name)
+    }
+
+    /// Series over two axes, each `(what, unit)`.
+    pub(super) fn lines(
+        name: &'static str,
+        title: &str,
+        subject: &str,
+        axes: [(&str, &str); 2],
+        series: Vec<Series>,
+    ) -> Self {
+        let axes = axes.map(|(name, unit)| AxisSpec::even(name, unit));
+        Self::of(name, [title, subject], ChartPanel::over("", axes, series))
+    }
+
+    /// Points in a plane, distances the same across and up.
+    pub(super) fn plane(name: &'static str, title: &str, subject: &str, series: Vec<Series>) -> Self {
+        let axes = ["x", "y"].map(|name| AxisSpec::even(name, ""));
+        Self::of(name, [title, subject], ChartPanel::over("", axes, series).equal())
+    }
+
+    /// One panel.
+    pub(super) fn of(name: &'static str, [title, subject]: [&str; 2], panel: ChartPanel) -> Self {
+        Self { name, picture: Chart::new(title, subject, vec![panel]).picture(&Look::default()) }
+    }
+}
+
+/// Curves over a number that doubles, `axes` saying what goes across and up.
+pub(super) fn over_doublings(
+    name: &'static str,
+    titles: [&str; 2],
+    axes: [&str; 2],
+    curves: Vec<Series>,
+) -> Figure {
+    let panel = ChartPanel::new("", axes, curves).on(Scale::Doublings, Scale::Even);
+    Figure::of(name, titles, panel)
+}
+
+/// Time.
+pub(super) const TIME: (&str, &str) = ("time", "s");
+/// Power.
+pub(super) const POWER: (&str, &str) = ("power", "W");
+/// Energy of a frame.
+pub(super) const ENERGY: (&str, &str) = ("energy per frame", "J");
+
+/// A line.
+pub(super) fn line(name: &str, points: Vec<(f64, f64)>) -> Series {
+    Series::new(name, Mark::Line(points))
+}
+
+/// Dots without names.
+pub(super) fn dots(name: &str, points: Vec<(f64, f64)>) -> Series {
+    let dots = points.into_iter().map(|(x, y)| (x, y, String::new())).collect();
+    Series::new(name, Mark::Dots(dots))
+}
+
+/// A level line across from one place to another.
+pub(super) fn level(name: &str, from: f64, to: f64, height: f64) -> Series {
+    line(name, vec![(from, height), (to, height)])
+}
+
+/// Values over their place in the list, from 0.
+pub(super) fn by_place(values: &[f64]) -> Vec<(f64, f64)> {
+    values.iter().enumerate().map(|(place, value)| (place as f64, *value)).collect()
+}

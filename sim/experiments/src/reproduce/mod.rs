@@ -1,0 +1,153 @@
+//! What the papers report, computed from scratch and compared with them: a module for each paper, a function for each row of the
+//! list of claims.
+//!
+//! ```text
+//! settings -> scenes -> Stage (pipeline, clock, watts) -> Recording (pacing, surroundings, recorder, analysis) -> Row, Figure
+//! ```
+//!
+//! Nothing is looked up but what the papers themselves say. What they state and what they leave open is in one committed file of
+//! settings for each paper; a row is judged over all that is left open (`Band`).
+
+mod band;
+mod figure;
+mod paper2;
+mod paper3;
+mod paper6;
+mod recording;
+mod report;
+mod row;
+mod scenes;
+mod settings;
+mod stage;
+mod verdict;
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use output::Destination;
+use output::progress::Progress;
+use run::RunError;
+
+use settings::Form;
+
+pub use band::{Band, Case, Turn};
+pub use figure::Figure;
+pub use report::Report;
+pub use row::{Number, Row};
+pub use settings::{About, Listed, Origin};
+pub use verdict::{Kind, Verdict};
+
+/// The papers whose rows there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+pub enum Paper {
+    /// Performance per What? Energy-Efficiency Units for Graphics
+    #[value(name = "II")]
+    #[serde(rename = "II")]
+    Two,
+    /// Per-frame Energy Measurement Methodology for Computer Graphics
+    #[value(name = "III")]
+    #[serde(rename = "III")]
+    Three,
+    /// Design and Novel Uses of Higher-Dimensional Rasterization
+    #[value(name = "VI")]
+    #[serde(rename = "VI")]
+    Six,
+}
+
+impl Paper {
+    /// Its number.
+    pub const fn number(self) -> &'static str {
+        match self {
+            Self::Two => "II",
+            Self::Three => "III",
+            Self::Six => "VI",
+        }
+    }
+
+    /// Its title.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Two => "Performance per What? Energy-Efficiency Units for Graphics",
+            Self::Six => "Design and Novel Uses of Higher-Dimensional Rasterization",
+            Self::Three => "Per-frame Energy Measurement Methodology for Computer Graphics",
+        }
+    }
+}
+
+/// How, and how much, to compute.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Fewer values and less work: less than a minute.
+    pub quick: bool,
+    /// Rows to compute, by their ids; all of them where it is empty.
+    pub rows: Vec<String>,
+    /// A file of settings in place of the committed one.
+    pub settings: Option<PathBuf>,
+    /// A folder with public cases of collision detection.
+    pub collision_data: Option<PathBuf>,
+}
+
+impl Options {
+    fn form(&self) -> Form {
+        if self.quick { Form::Quick } else { Form::Full }
+    }
+
+    /// Whether a row is asked for.
+    fn wants(&self, id: &str) -> bool {
+        self.rows.is_empty() || self.rows.iter().any(|row| row.eq_ignore_ascii_case(id))
+    }
+
+    /// Refuses rows that the paper does not have.
+    fn check(&self, paper: Paper, ids: &[&str]) -> Result<(), RunError> {
+        let unknown = self.rows.iter().find(|row| !ids.iter().any(|id| id.eq_ignore_ascii_case(row)));
+        unknown.map_or(Ok(()), |row| {
+            let message = format!("no row `{row}` in Paper {}; its rows: {}", paper.number(), ids.join(", "));
+            Err(RunError::Setting(message))
+        })
+    }
+}
+
+/// A row and what it draws.
+struct Done {
+    row: Row,
+    figures: Vec<Figure>,
+}
+
+impl Done {
+    /// A row without a figure.
+    fn bare(row: Row) -> Self {
+        Self { row, figures: Vec::new() }
+    }
+}
+
+/// Computes the rows of `paper` that are asked for.
+///
+/// # Errors
+/// When settings cannot be used or a part of the line fails; a row that differs is none.
+pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<Report, RunError> {
+    let (origin, done) = match paper {
+        Paper::Two => paper2::rows(options, progress),
+        Paper::Three => paper3::rows(options, progress),
+        Paper::Six => paper6::rows(options, progress),
+    }?;
+    Ok(Report::new(paper, options.form(), origin, done))
+}
+
+/// Computes them and writes table and figures into `out`.
+///
+/// # Errors
+/// As [`compute`], and when `out` cannot be written.
+pub fn reproduce(
+    paper: Paper,
+    options: &Options,
+    out: &Destination,
+    progress: &Progress,
+) -> Result<Report, RunError> {
+    // The folder first: that it cannot be made is better known before the work than after it.
+    let mut dir = out.open([report::claim(paper)])?;
+    let report = compute(paper, options, progress)?;
+    report.write(&dir)?;
+    dir.publish()?;
+    Ok(report)
+}

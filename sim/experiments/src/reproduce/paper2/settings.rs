@@ -1,0 +1,76 @@
+//! Settings of Paper II's rows.
+
+use serde::{Deserialize, Serialize};
+
+use super::super::settings::{About, PaperSettings, Setting};
+
+/// The file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
+    paper: String,
+    #[allow(dead_code, reason = "as above")]
+    source: String,
+    pub work: Work,
+    pub ii_1: Passes,
+    pub ii_2: Inverses,
+}
+
+/// What is recorded for both rows.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Work {
+    pub pc_frames: Setting<u32>,
+    pub recorded_frames: Setting<usize>,
+    pub seed: Setting<u64>,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Passes {
+    pub about: About,
+    pub frame_nj: Setting<f64>,
+    pub g_buffer_nj: Setting<f64>,
+    pub lighting_nj: Setting<f64>,
+    pub same: Setting<f64>,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Inverses {
+    pub about: About,
+    pub same: Setting<f64>,
+}
+
+impl PaperSettings for Settings {
+    const FILE: &str = "sim/experiments/papers/paper2.ron";
+    const TEXT: &str = include_str!("../../../papers/paper2.ron");
+
+    fn check(&self) -> Result<(), String> {
+        self.work.pc_frames.within("work.pc_frames", 1..=36)?;
+        self.work.recorded_frames.within("work.recorded_frames", 8..=10_000)?;
+        self.work.seed.within("work.seed", 0..=u64::MAX)?;
+        for (name, setting) in [
+            ("ii_1.frame_nj", &self.ii_1.frame_nj),
+            ("ii_1.g_buffer_nj", &self.ii_1.g_buffer_nj),
+            ("ii_1.lighting_nj", &self.ii_1.lighting_nj),
+        ] {
+            setting.within(name, 0.0..=1e9)?;
+        }
+        self.ii_1.same.within("ii_1.same", 0.0..=1.0)?;
+        self.ii_2.same.within("ii_2.same", 0.0..=1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::settings::load;
+    use super::*;
+
+    #[test]
+    fn the_committed_file_is_valid() {
+        let (_, origin) = load::<Settings>(None).unwrap();
+        assert!(origin.committed && origin.sha256.len() == 64);
+    }
+}

@@ -1,0 +1,174 @@
+//! Rows VI-6 and VI-7: caustic volumes as moving triangles.
+
+use glam::DVec3;
+use workloads::caustics::generator::{Ocean, turned_beams};
+use workloads::caustics::{Eye, Floor, Found, Method, receivers};
+
+use super::super::band::Cases;
+use super::super::figure::line;
+use super::super::row::{Row, numbers};
+use super::super::{Done, Figure};
+use super::Task;
+use super::caustics_figures::{light, warped};
+use super::settings::{Lost, Size};
+use crate::chart::caustics::view::{DEPTH_M, SIDE_M, WAVE_M};
+use crate::chart::caustics::{Ocean as Counted, ocean};
+use crate::reproduce::settings::Form;
+use output::plot::{Look, Series};
+use run::RunError;
+
+/// Executions of the moving triangles over those of the bounding volume with fewer.
+fn over_fewer(counted: &Counted) -> f64 {
+    let [moving, refined, _, prism] = counted.executions;
+    moving as f64 / refined.min(prism) as f64
+}
+
+/// VI-6: shader executions by method on an ocean of 130,050 volumes.
+pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_6);
+    let (row, form) = (with.settings, with.form);
+    let size = *row.size_px.get(form);
+    let count = |slope: f64, depth_m: f64| {
+        ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress)
+            .map_err(RunError::setting)
+    };
+    let (slope, depth_m) = (*row.slope.get(form), *row.depth_m.get(form));
+    let base = count(slope, depth_m)?;
+    let mut slopes = row.slope.all(form).to_vec();
+    slopes.sort_by(f64::total_cmp);
+    let counted = |at: f64| if at == slope { Ok(base.clone()) } else { count(at, depth_m) };
+    let slopes: Vec<(f64, Counted)> =
+        slopes.into_iter().map(|at| Ok((at, counted(at)?))).collect::<Result<_, RunError>>()?;
+    let mut depths = Vec::new();
+    for &at in row.depth_m.all(form) {
+        let counted = if at == depth_m { base.clone() } else { count(slope, at)? };
+        depths.push((at, counted));
+    }
+    let mut tried = Cases::new("executions over those of the bounding volume with fewer");
+    let judged = |(at, counted): &(f64, Counted)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
+    tried.along("slope", slopes.iter().map(judged)).standing_at(slope);
+    tried.along("depth_m", depths.iter().map(judged)).standing_at(depth_m);
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-6 has nothing to try"))?;
+    let [moving, refined, hull, prism] = base.executions;
+    let part = |total: u64| total as f64 / prism as f64;
+    let ours = format!(
+        "{} volumes, slope {slope}: {moving} executions, refined bound {refined}, hull {hull}, prism {prism} ({:.3}, {:.3} and {:.3} of the \
+         prism's); the most of a pixel is {} (Figure 8: {})",
+        base.volumes,
+        part(moving),
+        part(refined),
+        part(hull),
+        base.most[3],
+        row.dark_red.get(form)
+    );
+    let facts = numbers([
+        ("moving", moving as f64),
+        ("refined", refined as f64),
+        ("hull", hull as f64),
+        ("prism", prism as f64),
+        ("most_of_a_pixel_moving", f64::from(base.most[0])),
+        ("most_of_a_pixel_prism", f64::from(base.most[3])),
+    ]);
+    let executions: u64 = slopes.iter().chain(&depths).flat_map(|(_, counted)| counted.executions).sum();
+    let ran = numbers([
+        ("volumes", base.volumes as f64),
+        ("oceans", (slopes.len() + depths.len() - 1) as f64),
+        ("shader_executions", executions as f64),
+    ]);
+    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    Ok(Done { row, figures: figures(&base, &slopes, form)? })
+}
+
+fn figures(base: &Counted, slopes: &[(f64, Counted)], form: Form) -> Result<Vec<Figure>, RunError> {
+    let maps = [
+        ("VI_fig8_moving", Method::Moving),
+        ("VI_fig8_refined", Method::Refined),
+        ("VI_fig8_prism", Method::Prism),
+    ];
+    let mut figures = vec![warped()?, over_slopes(slopes)];
+    figures.extend(maps.map(|(name, method)| Figure { name, picture: base.map(method, &Look::default()) }));
+    figures.extend(light(form)?);
+    Ok(figures)
+}
+
+/// The sweep of slopes: executions over those of the prism.
+fn over_slopes(slopes: &[(f64, Counted)]) -> Figure {
+    let of = |(place, method): (usize, Method)| -> Series {
+        let part = |counted: &Counted| counted.executions[place] as f64 / counted.executions[3] as f64;
+        line(method.name(), slopes.iter().map(|(slope, counted)| (*slope, part(counted))).collect())
+    };
+    Figure::lines(
+        "VI_caustics_slopes",
+        "Shader executions over the slope of the waves (Paper VI, section 4)",
+        "over those of the prism; the paper does not give the slope of its ocean",
+        [("root mean square slope", ""), ("executions over the prism's", "")],
+        Method::ALL.into_iter().enumerate().map(of).collect(),
+    )
+}
+
+/// Beams that go on below the floor, so that it does not lie at their ends.
+const OVERSHOOT: f64 = 0.25;
+
+/// VI-7: every point of a floor that a beam lights is covered by it.
+pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_7);
+    let (row, form) = (with.settings, with.form);
+    let (mut tried, mut all) = (Cases::new("pairs of a pixel and a beam that are missed"), Found::default());
+    for &pleat in row.pleat.all(form) {
+        let mut at = Vec::new();
+        for &slope in row.slope.all(form) {
+            let found = in_ocean(row, form, [slope, pleat])?;
+            all = all.and(&found);
+            at.push((slope, found.missed as f64, found.missed == 0));
+        }
+        tried.along(&format!("slope (pleat {pleat})"), at);
+    }
+    let mut at = Vec::new();
+    for &height_m in row.turned_floors.get(form) {
+        let found = turned(row, form, height_m)?;
+        all = all.and(&found);
+        at.push((height_m, found.missed as f64, found.missed == 0));
+    }
+    tried.along("floor of turned beams", at);
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-7 has nothing to try"))?;
+    let [once, twice, thrice] = all.by_hits;
+    let ours = format!(
+        "{} missed of {} pairs of a pixel and a beam; {once} of them are hit once, {twice} twice and {thrice} three times",
+        all.missed, all.lit
+    );
+    let facts = numbers([
+        ("missed", all.missed as f64),
+        ("largest_of_band", band.max),
+        ("pairs_hit_once", once as f64),
+    ]);
+    // Without beams that fold the claim would not be put to the test.
+    let ran = numbers([
+        ("pairs", all.lit as f64),
+        ("pairs_hit_twice", twice as f64),
+        ("pairs_hit_three_times", thrice as f64),
+    ]);
+    Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
+}
+
+fn eye(place: [DVec3; 3], half_height: f64, size: &Size) -> Result<Eye, RunError> {
+    let eye = Eye::new(place, half_height, [size.0, size.1]);
+    eye.ok_or_else(|| RunError::setting("VI-7: a view without extent"))
+}
+
+/// Water with waves of a slope, its triangles pleated along the light.
+fn in_ocean(row: &Lost, form: Form, [slope, pleat]: [f64; 2]) -> Result<Found, RunError> {
+    let middle = DVec3::new(0.6, -0.5 * DEPTH_M, 0.3);
+    let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
+    let eye = eye([from, middle, DVec3::Y], 6.5, row.size_px.get(form))?;
+    let (cells, seed) = (*row.cells.get(form), *row.seed.get(form));
+    let water =
+        Ocean { overshoot: OVERSHOOT, pleat, ..Ocean::new(cells, SIDE_M, DEPTH_M, [WAVE_M, slope], seed) };
+    Ok(receivers(&water.beams(0.0), &eye, Method::Moving, &Floor { height_m: -DEPTH_M }))
+}
+
+/// Beams that turn about themselves, cut by a floor and seen from above.
+fn turned(row: &Lost, form: Form, height_m: f64) -> Result<Found, RunError> {
+    let eye = eye([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 1.2, row.turned_px.get(form))?;
+    let beams = turned_beams(*row.turned_beams.get(form), *row.seed.get(form));
+    Ok(receivers(&beams, &eye, Method::Moving, &Floor { height_m }))
+}

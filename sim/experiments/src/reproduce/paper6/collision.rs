@@ -1,0 +1,283 @@
+//! Rows VI-1 to VI-3: continuous collision detection.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use workloads::collision::families::{Case, cases};
+use workloads::collision::{Drawn, Method, Object, PlainPasses, Search, candidates, detect};
+use workloads::shapes;
+
+use super::super::band::Cases;
+use super::super::figure::over_doublings;
+use super::super::row::{Number, Row, numbers};
+use super::super::{Done, Figure};
+use super::Task;
+use super::public::{Pair, Public};
+use super::settings::{Moving, Shape, TwoObjects};
+use output::plot::Series;
+use run::RunError;
+
+/// As the file has it.
+const fn name(method: Method) -> &'static str {
+    match method {
+        Method::FragmentBox => "fragment against box",
+        Method::BoxBox => "box against box",
+        Method::DepthOnly => "by depth",
+    }
+}
+
+/// What passes have drawn, as the rows print it.
+fn ran(drawn: &Drawn) -> Vec<Number> {
+    numbers([
+        ("passes", drawn.passes as f64),
+        ("draws", drawn.draws as f64),
+        ("triangles", drawn.triangles as f64),
+        ("fragments", drawn.fragments as f64),
+    ])
+}
+
+/// How many of these pairs, all of which collide, the passes clear, and what they drew.
+fn cleared(pairs: &[Pair], method: Method, resolution: u32) -> (u64, Drawn) {
+    let one = |passes: &mut PlainPasses, [a, b]: &Pair| {
+        let drawn = passes.pair(a, b);
+        (u64::from(!drawn.may_collide()), drawn)
+    };
+    let each = pairs.par_iter().map_init(|| PlainPasses::new(method, resolution), one);
+    each.reduce(Default::default, |(n, all), (m, drawn)| (n + m, all.and(&drawn)))
+}
+
+/// VI-1: no pair that collides is missed.
+pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_1);
+    let (row, form) = (with.settings, with.form);
+    let own = cases(*row.seed.get(form), *row.cases_of_each_family.get(form));
+    let pair = |case: &Case, (a, b): (usize, usize)| [case.objects[a].clone(), case.objects[b].clone()];
+    let generated: Vec<Pair> =
+        own.iter().flat_map(|case| case.collide.iter().map(move |&both| pair(case, both))).collect();
+    let public = match task.collision_data {
+        Some(folder) => super::public::load(folder, row.public_scenes.get(form))?,
+        None => Public::default(),
+    };
+    let (mut tried, mut drawn, mut missed) = (Cases::new("pairs missed"), Drawn::default(), 0);
+    for &method in row.methods.get(form) {
+        let mut at = Vec::new();
+        for &resolution in row.resolution_px.all(form) {
+            let (own, own_drawn) = cleared(&generated, method, resolution);
+            let (theirs, their_drawn) = cleared(&public.collide, method, resolution);
+            drawn = drawn.and(&own_drawn).and(&their_drawn);
+            missed += own + theirs;
+            at.push((resolution, (own + theirs) as f64, own + theirs == 0));
+        }
+        tried.along(&format!("resolution_px ({})", name(method)), at);
+    }
+    let closer: usize = own.iter().map(missed_closer).sum::<usize>() + public.missed_closer;
+    tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
+    let ours = format!(
+        "{} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`",
+        missed + closer as u64,
+        generated.len(),
+        said(&public, task.collision_data.is_some()),
+        row.methods.get(form).len() * row.resolution_px.all(form).len()
+    );
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-1 has nothing to try"))?;
+    let facts = numbers([
+        ("missed", missed as f64 + closer as f64),
+        ("generated_cases", own.len() as f64),
+        ("generated_pairs_that_collide", generated.len() as f64),
+        ("public_scenes", public.scenes as f64),
+        ("public_scene_pairs_that_collide", public.known as f64),
+        ("public_scene_pairs_identified", public.seen as f64),
+        ("public_query_files", public.query_files as f64),
+        ("public_queries", public.queries as f64),
+        ("public_cases_that_collide_drawn", public.collide.len() as f64),
+    ]);
+    Ok(Done::bare(Row { numbers: facts, ran: ran(&drawn), ..with.banded(&row.about, ours, band) }))
+}
+
+/// What of the public data was run.
+fn said(public: &Public, given: bool) -> String {
+    if !given {
+        return "; no public case, as no folder was given (--collision-data)".to_owned();
+    }
+    let unknown = match public.known - public.seen {
+        0 => String::new(),
+        n => format!(" (which {n} of them are is not known; they are counted for `quintile ccd` alone)"),
+    };
+    format!(
+        "; {} public scenes with {} pairs that collide{unknown}; {} public queries in {} files, of which {} collide",
+        public.scenes,
+        public.known,
+        public.queries,
+        public.query_files,
+        public.collide.len() - public.seen
+    )
+}
+
+/// Pairs of a case that `quintile ccd` misses.
+fn missed_closer(case: &Case) -> usize {
+    let answers = detect(&case.objects, &Search::default());
+    let kept: Vec<_> = answers
+        .iter()
+        .filter(|answer| answer.verdict.may_collide())
+        .map(|answer| (answer.a, answer.b))
+        .collect();
+    case.collide.iter().filter(|pair| !kept.contains(pair)).count()
+}
+
+/// A shape on its way, as triangles.
+fn object(moving: &Moving) -> Option<Object> {
+    let mesh = match moving.shape {
+        Shape::Cuboid(x, y, z) => shapes::cuboid(DVec3::new(x, y, z).as_vec3(), 0),
+        Shape::Ball { radius, segments } => shapes::sphere(radius, segments, 0),
+    };
+    let (sin, cos) = libm::sincos(moving.turned_deg.to_radians());
+    let at = |vertex: u32, (x, y, z): (f64, f64, f64)| {
+        let p = mesh.positions[vertex as usize].as_dvec3();
+        [cos * p.x - sin * p.y + x, sin * p.x + cos * p.y + y, p.z + z]
+    };
+    let ends =
+        |triangle: &[u32; 3]| [moving.from, moving.to].map(|place| triangle.map(|vertex| at(vertex, place)));
+    Object::from_ends(mesh.triangles.iter().map(ends).collect(), 0.0)
+}
+
+/// Two objects of a case, and what each way of drawing them leaves.
+struct Looked<'a> {
+    case: &'a TwoObjects,
+    objects: Pair,
+}
+
+impl Looked<'_> {
+    fn drawn(&self, method: Method, resolution: u32) -> Drawn {
+        PlainPasses::new(method, resolution).pair(&self.objects[0], &self.objects[1])
+    }
+
+    /// Whether boxes of time and depth and boxes of depth alone say what they have to.
+    fn is_told_apart(&self, ours: &Drawn, depth: &Drawn) -> bool {
+        depth.may_collide() && ours.may_collide() == self.case.collide
+    }
+}
+
+/// VI-2: time separates what depth alone cannot.
+pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_2);
+    let (row, form) = (with.settings, with.form);
+    let refused = || RunError::setting("VI-2: a coordinate is beyond 1e60 or not a number");
+    let (mut tried, mut drawn, mut said) =
+        (Cases::new("pixels left of a pair"), Drawn::default(), Vec::new());
+    for case in row.objects.get(form).iter().filter(|case| row.cases.all(form).contains(&case.name)) {
+        let objects = [object(&case.first).ok_or_else(refused)?, object(&case.second).ok_or_else(refused)?];
+        let looked = Looked { case, objects };
+        let mut resolutions = row.resolution_px.all(form).to_vec();
+        resolutions.sort_unstable();
+        for &method in row.methods.get(form) {
+            let mut at = Vec::new();
+            for &resolution in &resolutions {
+                let (ours, depth) =
+                    (looked.drawn(method, resolution), looked.drawn(Method::DepthOnly, resolution));
+                drawn = drawn.and(&ours).and(&depth);
+                let fewest = ours.left.into_iter().min().unwrap_or(0);
+                at.push((resolution, fewest as f64, looked.is_told_apart(&ours, &depth)));
+                if resolution == *row.resolution_px.get(form) && method == row.methods.get(form)[0] {
+                    said.push(told(case, &ours, &depth, resolution));
+                }
+            }
+            tried.along(&format!("resolution_px ({}, {})", case.name, name(method)), at);
+        }
+    }
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-2 has no case to try"))?;
+    let made = with.banded(&row.about, said.join("; "), band);
+    Ok(Done::bare(Row { ran: ran(&drawn), ..made }))
+}
+
+/// What the passes say of a case.
+fn told(case: &TwoObjects, ours: &Drawn, depth: &Drawn, resolution: u32) -> String {
+    let kept = |drawn: &Drawn| if drawn.may_collide() { "keep" } else { "clear" };
+    let along =
+        ["x", "y", "z"].into_iter().zip(ours.left).filter(|(_, left)| *left == 0).map(|(axis, _)| axis);
+    let along: Vec<&str> = along.collect();
+    let where_ =
+        if along.is_empty() { String::new() } else { format!(" (apart along {})", along.join(" and ")) };
+    format!(
+        "{} at {resolution} px: the {} passes {} the pair{where_}, the {} by depth {} it ({} fragments)",
+        case.name,
+        ours.passes,
+        kept(ours),
+        depth.passes,
+        kept(depth),
+        ours.fragments
+    )
+}
+
+/// VI-3: a fragment against a box is at least as tight as a box against a box.
+pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_3);
+    let (row, form) = (with.settings, with.form);
+    let all = cases(*row.seed.get(form), *row.cases_of_each_family.get(form));
+    let mut resolutions = row.resolution_px.all(form).to_vec();
+    resolutions.sort_unstable();
+    let mut drawn = Drawn::default();
+    let mut kept = |method| -> Vec<Vec<usize>> {
+        let at = |&resolution: &u32| {
+            let each: Vec<_> = all.par_iter().map(|case| kept_in_vain(case, method, resolution)).collect();
+            drawn = each.iter().fold(drawn, |all, (_, one)| all.and(one));
+            each.into_iter().map(|(count, _)| count).collect()
+        };
+        resolutions.iter().map(at).collect()
+    };
+    let (boxes, fragments) = (kept(Method::BoxBox), kept(Method::FragmentBox));
+    let mut tried = Cases::new("cases with fewer false positives for fragments, less those with more");
+    let judged = |(at, (fragments, boxes)): (&u32, (&Vec<usize>, &Vec<usize>))| {
+        let count =
+            |is: fn(&usize, &usize) -> bool| fragments.iter().zip(boxes).filter(|(f, b)| is(f, b)).count();
+        let (worse, better) = (count(|f, b| f > b), count(|f, b| f < b));
+        (*at, better as f64 - worse as f64, worse == 0 && better > 0)
+    };
+    tried.along("resolution_px", resolutions.iter().zip(fragments.iter().zip(&boxes)).map(judged));
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-3 has nothing to try"))?;
+    let each = || fragments.iter().flatten().zip(boxes.iter().flatten());
+    let (worse, better) = (each().filter(|(f, b)| f > b).count(), each().filter(|(f, b)| f < b).count());
+    let sums =
+        |of: &[Vec<usize>]| of.iter().map(|counts| counts.iter().sum::<usize>()).collect::<Vec<usize>>();
+    let (boxes, fragments) = (sums(&boxes), sums(&fragments));
+    let ours = format!(
+        "false positives at {resolutions:?} px: {fragments:?} for fragments, {boxes:?} for boxes; fewer in {better} of {} cases, more in {worse}",
+        each().count()
+    );
+    let facts = numbers([
+        ("cases", each().count() as f64),
+        ("cases_fewer", better as f64),
+        ("cases_more", worse as f64),
+    ]);
+    let figure = curves(&resolutions, [("fragment against box", &fragments), ("box against box", &boxes)]);
+    let row = Row { numbers: facts, ran: ran(&drawn), ..with.banded(&row.about, ours, band) };
+    Ok(Done { row, figures: vec![figure] })
+}
+
+/// Pairs of a case that do not collide and are kept, and what was drawn for that.
+fn kept_in_vain(case: &Case, method: Method, resolution: u32) -> (usize, Drawn) {
+    let mut passes = PlainPasses::new(method, resolution);
+    let (mut kept, mut all) = (0, Drawn::default());
+    for (a, b) in candidates(&case.objects) {
+        if !case.collide.contains(&(a, b)) {
+            let drawn = passes.pair(&case.objects[a], &case.objects[b]);
+            kept += usize::from(drawn.may_collide());
+            all = all.and(&drawn);
+        }
+    }
+    (kept, all)
+}
+
+fn curves(resolutions: &[u32], kept: [(&str, &Vec<usize>); 2]) -> Figure {
+    let curve = |(name, kept): (&str, &Vec<usize>)| {
+        let points = resolutions.iter().zip(kept).map(|(pixels, kept)| (f64::from(*pixels), *kept as f64));
+        Series::curve(name, points)
+    };
+    over_doublings(
+        "VI_fig5",
+        [
+            "False positives: fragment against box, box against box",
+            "families of moving objects, one box of time and depth a pixel",
+        ],
+        ["pixels across", "false positives"],
+        kept.into_iter().map(curve).collect(),
+    )
+}

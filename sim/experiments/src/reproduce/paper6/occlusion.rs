@@ -1,0 +1,232 @@
+//! Rows VI-4 and VI-5: occlusion queries by intervals.
+
+use workloads::occlusion::{Answer, Seen, YardSpec};
+
+use super::super::Done;
+use super::super::band::{Cases, short};
+use super::super::figure::over_doublings;
+use super::super::row::{Row, numbers};
+use super::Task;
+use super::settings::Asked;
+use crate::chart::occlusion::{Drawn, Kind};
+use output::plot::Series;
+use run::RunError;
+
+/// Yards drawn, with so many boxes asked for in each.
+fn drawn(
+    kind: Kind,
+    yards: u64,
+    change: impl Fn(YardSpec) -> YardSpec,
+    size: (u32, u32),
+    samples: u32,
+    asked: u32,
+) -> Result<Vec<Drawn>, RunError> {
+    let one = |seed| Drawn::new([size.0, size.1], &change(kind.spec(asked, seed)), samples);
+    (0..yards).map(one).collect::<Result<_, _>>().map_err(RunError::setting)
+}
+
+/// What queries by intervals found: objects hidden, those of them found, and those called hidden that a sample sees.
+#[derive(Clone, Copy, Default)]
+struct Share {
+    hidden: u64,
+    found: u64,
+    wrong: u64,
+    tiles: u64,
+}
+
+impl Share {
+    fn of(yards: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Self {
+        let mut share = Self::default();
+        for yard in yards {
+            for (answer, seen) in yard.ask(boxes, tile_px).0.iter().zip(&yard.seen) {
+                let hidden = seen.passed == 0;
+                share.hidden += u64::from(hidden);
+                share.found += u64::from(hidden && answer.hidden);
+                share.wrong += u64::from(!hidden && answer.hidden);
+                share.tiles += answer.tiles;
+            }
+        }
+        share
+    }
+
+    fn rate(&self) -> f64 {
+        self.found as f64 / self.hidden.max(1) as f64
+    }
+}
+
+/// VI-4: the rate grows with the boxes in time.
+pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_4);
+    let (row, form) = (with.settings, with.form);
+    let (size, asked) = (*row.size_px.get(form), *row.asked.get(form));
+    let mut total = Share::default();
+    let mut measure = |motion: f32, tile_px: u32| -> Result<Vec<(f64, f64)>, RunError> {
+        let change = |spec| YardSpec { motion, ..spec };
+        let yards = drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), asked)?;
+        let at = |&boxes: &u32| {
+            let share = Share::of(&yards, [1, 1, boxes], tile_px);
+            total.hidden += share.hidden;
+            total.tiles += share.tiles;
+            total.wrong += share.wrong;
+            (f64::from(boxes), share.rate())
+        };
+        Ok(row.boxes_in_t.get(form).iter().map(at).collect())
+    };
+    let (motion, tile_px) = (*row.motion_m.get(form), *row.tile_px.get(form));
+    let mut curves = Vec::new();
+    let mut tiles = Vec::new();
+    let mut sides = row.tile_px.all(form).to_vec();
+    sides.sort_unstable();
+    for side in sides {
+        let rates = measure(motion, side)?;
+        tiles.push((side, gain(&rates), grows(&rates)));
+        curves.push((format!("{side}-pixel tiles"), rates));
+    }
+    let mut motions = Vec::new();
+    for &motion in row.motion_m.all(form) {
+        let rates = measure(motion, tile_px)?;
+        motions.push((motion, gain(&rates), grows(&rates)));
+    }
+    let wrong = total.wrong;
+    let mut tried = Cases::new("share found gained by more boxes");
+    let at = tiles.into_iter().map(|(side, gain, grows)| (side, gain, grows && wrong == 0));
+    tried.along("tile_px", at).standing_at(tile_px);
+    let at = motions.into_iter().map(|(motion, gain, grows)| (motion, gain, grows && wrong == 0));
+    tried.along("motion_m", at).standing_at(motion);
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-4 has nothing to try"))?;
+    let base = curves.iter().find(|(name, _)| *name == format!("{tile_px}-pixel tiles"));
+    let listed: Vec<String> =
+        base.iter().flat_map(|(_, rates)| rates).map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
+    let ours = format!(
+        "share of hidden objects found by boxes in t, {tile_px}-pixel tiles: {}; {wrong} seen objects called hidden",
+        listed.join(", ")
+    );
+    let ends = base.and_then(|(_, rates)| rates.first().zip(rates.last()));
+    let facts = numbers([
+        ("share_fewest_boxes", ends.map_or(f64::NAN, |(first, _)| first.1)),
+        ("share_most_boxes", ends.map_or(f64::NAN, |(_, last)| last.1)),
+        ("wrong", wrong as f64),
+    ]);
+    let ran = numbers([("hidden_objects_asked_for", total.hidden as f64), ("tiles", total.tiles as f64)]);
+    let figure = over_doublings(
+        "VI_occlusion",
+        [
+            "Occlusion rate over boxes in time (Paper VI, section 3)",
+            "share of the objects hidden from every sample that a query by intervals finds",
+        ],
+        ["boxes in t", "share found"],
+        curves.into_iter().map(|(name, rates)| Series::curve(name, rates)).collect(),
+    );
+    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    Ok(Done { row, figures: vec![figure] })
+}
+
+fn gain(rates: &[(f64, f64)]) -> f64 {
+    rates.first().zip(rates.last()).map_or(f64::NAN, |(first, last)| last.1 - first.1)
+}
+
+/// Whether the share never falls, and grows in all.
+fn grows(rates: &[(f64, f64)]) -> bool {
+    rates.is_sorted_by(|a, b| a.1 <= b.1) && gain(rates) > 0.0
+}
+
+/// Tests, bytes and multiply-adds of both queries, summed over objects.
+#[derive(Clone, Copy, Default)]
+struct Costs {
+    sampled: [f64; 3],
+    interval: [f64; 3],
+    objects: f64,
+}
+
+impl Costs {
+    /// Over the objects that are asked for; `charged` is the share of making the boxes of depth that queries pay for.
+    fn of(yards: &[(Drawn, Vec<Answer>)], asked: Asked, charged: f64) -> Self {
+        let mut costs = Self::default();
+        for (yard, answers) in yards {
+            // Each stored depth is read and compared once, for all queries of the frame.
+            let made = charged * yard.stored() as f64 / answers.len().max(1) as f64;
+            for (answer, seen) in answers.iter().zip(&yard.seen) {
+                if asked == Asked::All || seen.passed == 0 {
+                    costs.add(seen, answer, made);
+                }
+            }
+        }
+        costs
+    }
+
+    fn add(&mut self, seen: &Seen, answer: &Answer, made: f64) {
+        let sampled = [seen.tests(), seen.bytes(), seen.madds].map(|count| count as f64);
+        let interval =
+            [answer.tests() as f64 + made, answer.bytes() as f64 + 4.0 * made, answer.madds as f64];
+        for n in 0..3 {
+            self.sampled[n] += sampled[n];
+            self.interval[n] += interval[n];
+        }
+        self.objects += 1.0;
+    }
+
+    fn ratio(&self, of: usize) -> f64 {
+        self.sampled[of] / self.interval[of]
+    }
+}
+
+/// The least ratios of tests, bytes and multiply-adds over all kinds of blur and numbers of samples.
+fn least(all: &[Costs]) -> [f64; 3] {
+    [0, 1, 2].map(|of| all.iter().map(|costs| costs.ratio(of)).fold(f64::INFINITY, f64::min))
+}
+
+/// VI-5: what a query costs.
+pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_5);
+    let (row, form) = (with.settings, with.form);
+    let (size, asked, tile_px) = (*row.size_px.get(form), *row.asked.get(form), *row.tile_px.get(form));
+    let mut queried = Vec::new();
+    for kind in Kind::ALL {
+        for &samples in row.samples.get(form) {
+            let yards = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, asked)?;
+            let answered = |yard: Drawn| {
+                let answers = yard.ask(kind.typical(), tile_px).0;
+                (yard, answers)
+            };
+            queried.push(yards.into_iter().map(answered).collect::<Vec<_>>());
+        }
+    }
+    let costs =
+        |objects, charged| queried.iter().map(|yards| Costs::of(yards, objects, charged)).collect::<Vec<_>>();
+    let far = *row.far_fewer.get(form);
+    let mut tried = Cases::new("times fewer tests or bytes, whichever are nearer");
+    for &objects in row.objects.all(form) {
+        let at = row.boxes_charged.all(form).iter().map(|&charged| {
+            let [tests, bytes, _] = least(&costs(objects, charged));
+            (charged, tests.min(bytes), tests > far && bytes > far)
+        });
+        let which = if objects == Asked::All { "all objects" } else { "hidden objects" };
+        tried.along(&format!("boxes_charged ({which})"), at.collect::<Vec<_>>());
+    }
+    let band = tried.band().ok_or_else(|| RunError::setting("VI-5 has nothing to try"))?;
+    let base = costs(*row.objects.get(form), *row.boxes_charged.get(form));
+    let [tests, bytes, madds] = least(&base);
+    let charged = least(&costs(*row.objects.get(form), 1.0));
+    let ours = format!(
+        "at least {} times fewer tests, {} times fewer bytes, {} times fewer multiply-adds; with the boxes of depth charged to the queries {}, {} and {}",
+        short(tests),
+        short(bytes),
+        short(madds),
+        short(charged[0]),
+        short(charged[1]),
+        short(charged[2])
+    );
+    let facts = numbers([
+        ("least_tests_ratio", tests),
+        ("least_bytes_ratio", bytes),
+        ("least_madds_ratio", madds),
+        ("least_tests_ratio_boxes_charged", charged[0]),
+        ("least_bytes_ratio_boxes_charged", charged[1]),
+    ]);
+    let ran = numbers([
+        ("objects_asked_for", base.iter().map(|costs| costs.objects).sum()),
+        ("sampled_tests", base.iter().map(|costs| costs.sampled[0]).sum()),
+        ("interval_tests", base.iter().map(|costs| costs.interval[0]).sum()),
+    ]);
+    Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
+}

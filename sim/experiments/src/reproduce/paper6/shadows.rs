@@ -1,0 +1,56 @@
+//! VI-12: motion-blurred soft shadows.
+
+use activity::Event;
+use glam::Vec3;
+use workloads::Overrides;
+use workloads::job::{Drawn, Job};
+use workloads::soft_shadows::{Options, SoftShadows};
+
+use super::Task;
+use crate::reproduce::Done;
+use crate::reproduce::row::{Row, numbers};
+use crate::reproduce::verdict::Verdict;
+use run::GpuSpec;
+use run::RunError;
+
+pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_12);
+    let (row, form) = (with.settings, with.form);
+    let draw = |accumulate| -> Result<Drawn, RunError> {
+        let (size, samples) = (Some(*row.size_px.get(form)), Some(*row.places.get(form)));
+        let overrides = Overrides { size, samples, ..Overrides::default() };
+        let job = SoftShadows::new(Options { accumulate, ..Options::default() }, &overrides, 1)?;
+        Ok(job.frame(*row.frame.get(form), &GpuSpec::load("reference")?.pipeline, &mut |_, _| ())?)
+    };
+    let (one, many) = (draw(false)?, draw(true)?);
+    let bits = |pixel: &Vec3| pixel.to_array().map(f32::to_bits);
+    let differ = one.image.iter().zip(&many.image).filter(|(a, b)| bits(a) != bits(b)).count();
+    let count = |event: Event| [&one, &many].map(|drawn| drawn.counts[event] as f64);
+    let (vertices, tested) = (count(Event::VertexInvocations), count(Event::SamplesTested));
+    let same = differ == 0 && one.image.len() == many.image.len();
+    let ours = format!(
+        "{differ} of {} pixels differ in any bit; vertex shader runs {:.0} against {:.0}, samples tested {:.3e} against {:.3e}",
+        one.image.len(),
+        vertices[0],
+        vertices[1],
+        tested[0],
+        tested[1]
+    );
+    let facts = numbers([
+        ("pixels", one.image.len() as f64),
+        ("pixels_that_differ", differ as f64),
+        ("vertices_one_pass", vertices[0]),
+        ("vertices_accumulation", vertices[1]),
+        ("samples_tested_one_pass", tested[0]),
+        ("samples_tested_accumulation", tested[1]),
+    ]);
+    let (draws, hit) = (count(Event::Draws), count(Event::SamplesHit));
+    let ran = numbers([
+        ("draws_one_pass", draws[0]),
+        ("draws_accumulation", draws[1]),
+        ("samples_hit_one_pass", hit[0]),
+        ("samples_hit_accumulation", hit[1]),
+    ]);
+    let made = with.row(&row.about, (ours, Verdict::of(same), String::new()));
+    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+}

@@ -1,0 +1,244 @@
+//! All rows of a paper as text, JSON and files.
+
+use serde::Serialize;
+
+use super::row::Row;
+use super::settings::{Form, Listed, Origin};
+use super::verdict::Verdict;
+use super::{Done, Figure, Paper};
+use output::table::Table;
+use output::{Claim, OutDir, OutputError};
+
+/// The rows of a paper.
+#[derive(Serialize)]
+pub struct Report {
+    /// Which paper.
+    pub paper: Paper,
+    /// Its title.
+    pub title: &'static str,
+    /// How much was computed.
+    pub form: Form,
+    /// The file of settings.
+    pub settings: Origin,
+    /// Whether every row of kind E holds.
+    pub equalities_hold: bool,
+    /// The rows in order.
+    pub rows: Vec<Row>,
+    /// What was drawn.
+    #[serde(skip)]
+    figures: Vec<Figure>,
+}
+
+/// The files of a paper.
+pub(super) fn claim(paper: Paper) -> Claim {
+    let (number, stem) = (paper.number(), stem(paper));
+    Claim::new(format!("reproduce {number}"))
+        .plots([format!("plots/{number}_*")])
+        .files([format!("{stem}.md"), format!("{stem}.json")])
+}
+
+fn stem(paper: Paper) -> String {
+    format!("reproduce_{}", paper.number())
+}
+
+impl Report {
+    pub(super) fn new(paper: Paper, form: Form, settings: Origin, done: Vec<Done>) -> Self {
+        let (mut rows, mut figures) = (Vec::new(), Vec::new());
+        for Done { mut row, figures: drawn } in done {
+            row.figures = drawn.iter().map(Figure::path).collect();
+            row.figure = row.figures.first().cloned();
+            rows.push(row.judged());
+            figures.extend(drawn);
+        }
+        let equalities_hold = !rows.iter().any(Row::is_unequal);
+        Self { paper, title: paper.title(), form, settings, equalities_hold, rows, figures }
+    }
+
+    /// The rows of kind E that do not hold, and those that ran nothing.
+    pub fn failing(&self) -> Vec<&str> {
+        self.rows.iter().filter(|row| row.fails()).map(|row| row.about.id.as_str()).collect()
+    }
+
+    /// What is printed: a table, and below it the reasons.
+    pub fn text(&self) -> String {
+        let mut table = Table::new(["claim", "kind", "verdict"]);
+        for row in &self.rows {
+            table.row([
+                format!("{:<6} {}", row.about.id, row.about.claim),
+                letters(row),
+                row.verdict.name().to_owned(),
+            ]);
+        }
+        let mut text =
+            format!("Paper {}: {}\n{}\n\n{table}", self.paper.number(), self.title, self.settings_text());
+        self.rows.iter().for_each(|row| text += &said(row));
+        let count = |verdict| self.rows.iter().filter(|row| row.verdict == verdict).count();
+        let [holds, differs, depends, not_yet] = Verdict::ALL.map(count);
+        text + &format!("\n{holds} hold, {differs} differ, {depends} depend, {not_yet} not yet\n")
+    }
+
+    /// Which settings these are.
+    fn settings_text(&self) -> String {
+        let whose = if self.settings.committed { "" } else { ", which is NOT the committed one" };
+        let form = if self.form == Form::Quick { ", quick form" } else { "" };
+        format!("settings {} (SHA-256 {}){whose}{form}", self.settings.file, self.settings.sha256)
+    }
+
+    /// The table of the book's chapter, and what each row was computed with.
+    fn markdown(&self) -> String {
+        let mut text = format!("{}\n\n", self.settings_text());
+        text += "| id | kind | paper | ours | verdict |\n|---|---|---|---|---|\n";
+        for row in &self.rows {
+            let verdict = match row.note.as_str() {
+                "" => format!("*{}*", row.verdict.name()),
+                note => format!("*{}*: {note}", row.verdict.name()),
+            };
+            text += &format!(
+                "| {} | {} | {} | {} | {verdict} |\n",
+                row.about.id,
+                letters(row),
+                row.about.paper,
+                row.ours
+            );
+        }
+        for row in &self.rows {
+            text += &format!(
+                "\n## {}: {}\n\nHolds when {}. {}\n\nRun: {}.\n\n| setting | | value | tried | passage or reason |\n|---|---|---|---|---|\n",
+                row.about.id,
+                row.about.claim,
+                row.about.holds_when,
+                row.about.limits,
+                ran(row)
+            );
+            for one in &row.settings {
+                let tried: Vec<String> = one.tried.iter().map(ToString::to_string).collect();
+                text += &format!(
+                    "| `{}` | {} | {} | {} | {} |\n",
+                    one.name,
+                    one.basis,
+                    one.value,
+                    tried.join(", "),
+                    one.source
+                );
+            }
+        }
+        text
+    }
+
+    /// Writes figures and tables.
+    pub(super) fn write(&self, dir: &OutDir) -> Result<(), OutputError> {
+        for figure in &self.figures {
+            figure.picture.write(dir, stem_of(&figure.path()))?;
+        }
+        let stem = stem(self.paper);
+        dir.write_file(&format!("{stem}.md"), |out| Ok(out.write_all(self.markdown().as_bytes())?))?;
+        dir.write_json(&format!("{stem}.json"), self)?;
+        Ok(())
+    }
+}
+
+/// A row as it is printed.
+fn said(row: &Row) -> String {
+    let about = &row.about;
+    let mut text = format!("\n{}: {}\n", about.id, row.verdict.name());
+    let mut line = |name: &str, what: &str| {
+        if !what.is_empty() {
+            text += &format!("  {name:<8} {what}\n");
+        }
+    };
+    line("paper", &about.paper);
+    line("ours", &row.ours);
+    line("holds", &format!("when {}", about.holds_when));
+    line("note", &row.note);
+    line("limits", &about.limits);
+    line("run", &ran(row));
+    for (name, basis) in [("stated", "stated"), ("open", "open")] {
+        line(name, &settings(&row.settings, basis));
+    }
+    line("settings", &format!("SHA-256 {}", row.settings_sha256));
+    line("figures", &row.figures.join(" "));
+    text
+}
+
+/// How much was run.
+fn ran(row: &Row) -> String {
+    let each = row.ran.iter().map(|number| format!("{} {}", number.name.replace('_', " "), number.value));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+/// Settings of one kind with what was tried.
+fn settings(all: &[Listed], basis: &str) -> String {
+    let one = |one: &Listed| {
+        let tried: Vec<String> = one.tried.iter().map(ToString::to_string).collect();
+        let of = if tried.is_empty() { String::new() } else { format!(" of {}", tried.join(", ")) };
+        format!("{} {}{of}", one.name, one.value)
+    };
+    all.iter().filter(|listed| listed.basis == basis).map(one).collect::<Vec<_>>().join("; ")
+}
+
+/// Letters of the row's kind, with an F where there are figures.
+fn letters(row: &Row) -> String {
+    let drawn = if row.figures.is_empty() { "" } else { ",F" };
+    format!("{}{drawn}", row.about.kind.letter())
+}
+
+/// A figure's path without its ending.
+fn stem_of(path: &str) -> &str {
+    path.strip_suffix(".svg").unwrap_or(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::row::tests::row;
+    use super::super::verdict::Kind;
+    use super::*;
+
+    fn done(id: &'static str, kind: Kind, verdict: Verdict) -> Done {
+        let axes = [("x", ""), ("y", "W")];
+        let figure = Figure::lines("III_fig1", "t", "s", axes, Vec::new());
+        let figures = if kind == Kind::Order { vec![figure] } else { Vec::new() };
+        Done { row: row(id, kind, verdict), figures }
+    }
+
+    fn report(verdict: Verdict) -> Report {
+        let rows = vec![done("III-8", Kind::Equality, verdict), done("III-9", Kind::Order, Verdict::Differs)];
+        let origin = Origin { file: "paper.ron".to_owned(), sha256: "abc".to_owned(), committed: false };
+        Report::new(Paper::Three, Form::Quick, origin, rows)
+    }
+
+    #[test]
+    fn an_equality_that_does_not_hold_is_named() {
+        assert!(report(Verdict::Holds).failing().is_empty() && report(Verdict::Holds).equalities_hold);
+        for verdict in [Verdict::Differs, Verdict::Depends, Verdict::NotYet] {
+            assert_eq!(report(verdict).failing(), ["III-8"]);
+            assert!(!report(verdict).equalities_hold);
+        }
+    }
+
+    #[test]
+    fn text_and_json_say_the_same() {
+        let report = report(Verdict::NotYet);
+        let text = report.text();
+        for part in [
+            "III-8  a claim",
+            "O,F  differs",
+            "paper    one",
+            "ours     two",
+            "run      draws 3",
+            "holds    when it does",
+            "limits   Little.",
+            "settings SHA-256 abc",
+            "SHA-256 abc), which is NOT the committed one, quick form",
+            "0 hold, 1 differ, 0 depend, 1 not yet",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!(json["rows"][0]["figure"], serde_json::Value::Null);
+        assert_eq!(json["rows"][1]["figure"], "plots/III_fig1.svg");
+        assert_eq!((&json["rows"][1]["kind"], &json["rows"][1]["id"]), (&"O".into(), &"III-9".into()));
+        assert_eq!((&json["paper"], &json["form"]), (&"III".into(), &"quick".into()));
+        assert_eq!(json["rows"][0]["settings_sha256"], json["settings"]["sha256"]);
+        assert!(report.markdown().contains("| III-9 | O,F | one | two | *differs*: because |"));
+    }
+}

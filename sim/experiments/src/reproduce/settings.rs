@@ -1,0 +1,291 @@
+//! Settings of the rows: what the thesis states, what it leaves open, and what is ours; one committed file for each paper.
+//!
+//! A row holds where its condition is met at every value that the thesis leaves open, differs where it is met at none, and
+//! depends otherwise. The files are in `sim/experiments/papers`; every result names the SHA-256 of the one it was computed with.
+
+use std::fmt::Debug;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use activity::spec::{self, SpecError};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::verdict::Kind;
+use output::dir::sha256_of_text;
+use run::RunError;
+
+/// How much is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// All of it: minutes.
+    Full,
+    /// Fewer values and less work: less than a minute.
+    Quick,
+}
+
+/// What a row says whatever comes out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct About {
+    /// Its name in the list of claims.
+    pub id: String,
+    /// What has to agree.
+    pub kind: Kind,
+    /// The claim, in full.
+    pub claim: String,
+    /// What the paper says, with the passage.
+    pub paper: String,
+    /// The condition it is judged by.
+    pub holds_when: String,
+    /// What is not exercised, and what the outcome follows from by construction.
+    pub limits: String,
+}
+
+/// A setting of a row with where it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Setting<T> {
+    /// The thesis states it.
+    Stated {
+        /// What it states.
+        value: T,
+        /// What the quick form has in its place.
+        #[serde(default = "none")]
+        quick: Option<T>,
+        /// Section or figure, and its words.
+        passage: String,
+    },
+    /// The thesis leaves it open.
+    Open {
+        /// What stands while other settings vary.
+        value: T,
+        /// All values tried, `value` among them.
+        over: Vec<T>,
+        /// Those of the quick form, of which the first stands for `value`.
+        #[serde(default = "Vec::new")]
+        quick: Vec<T>,
+        /// Why this range.
+        why: String,
+    },
+    /// An amount of work, a tolerance or a scene of ours that is not varied.
+    Ours {
+        /// What it is.
+        value: T,
+        /// What the quick form has in its place.
+        #[serde(default = "none")]
+        quick: Option<T>,
+        /// Why.
+        why: String,
+    },
+}
+
+fn none<T>() -> Option<T> {
+    None
+}
+
+impl<T> Setting<T> {
+    /// What stands while other settings vary.
+    pub fn get(&self, form: Form) -> &T {
+        match self {
+            Self::Stated { value, quick, .. } | Self::Ours { value, quick, .. } => {
+                quick.as_ref().filter(|_| form == Form::Quick).unwrap_or(value)
+            }
+            Self::Open { value, quick, .. } => quick.first().filter(|_| form == Form::Quick).unwrap_or(value),
+        }
+    }
+
+    /// Every value to try.
+    pub fn all(&self, form: Form) -> &[T] {
+        match self {
+            Self::Open { quick, .. } if form == Form::Quick && !quick.is_empty() => quick,
+            Self::Open { over, .. } => over,
+            Self::Stated { .. } | Self::Ours { .. } => std::slice::from_ref(self.get(form)),
+        }
+    }
+
+    /// Every value that the file has for it.
+    fn written(&self) -> Vec<&T> {
+        match self {
+            Self::Stated { value, quick, .. } | Self::Ours { value, quick, .. } => {
+                std::iter::once(value).chain(quick).collect()
+            }
+            Self::Open { value, over, quick, .. } => {
+                std::iter::once(value).chain(over).chain(quick).collect()
+            }
+        }
+    }
+}
+
+impl<T: Debug + PartialEq> Setting<T> {
+    /// Checks every value of the setting called `name` and that it says where it comes from.
+    ///
+    /// # Errors
+    /// Names the first value that cannot be, and what would do.
+    pub fn must(&self, name: &str, holds: impl Fn(&T) -> bool, would_do: &str) -> Result<(), String> {
+        if let Some(value) = self.written().into_iter().find(|value| !holds(value)) {
+            return Err(format!("`{name}` is {value:?}; it has to be {would_do}"));
+        }
+        let (Self::Stated { passage: source, .. }
+        | Self::Open { why: source, .. }
+        | Self::Ours { why: source, .. }) = self;
+        if source.trim().is_empty() {
+            return Err(format!("`{name}` does not say where it comes from: give the passage or the reason"));
+        }
+        match self {
+            Self::Open { value, over, .. } if over.len() < 2 || !over.contains(value) => Err(format!(
+                "`{name}` is open, so `over` has to list two values or more, and {value:?} among them"
+            )),
+            Self::Open { over, quick, .. } if !quick.iter().all(|value| over.contains(value)) => {
+                Err(format!("`{name}`: `quick` has a value that is not in `over`; take it from there"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The same for numbers within a range.
+    ///
+    /// # Errors
+    /// As [`Self::must`].
+    pub fn within(&self, name: &str, range: RangeInclusive<T>) -> Result<(), String>
+    where
+        T: PartialOrd,
+    {
+        let would_do = format!("{:?} to {:?}", range.start(), range.end());
+        self.must(name, |value| range.contains(value), &would_do)
+    }
+}
+
+/// All settings of a paper.
+pub trait PaperSettings: DeserializeOwned {
+    /// The committed file, from the root of the repository.
+    const FILE: &str;
+    /// What is in it.
+    const TEXT: &str;
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// Names the first that cannot be, and what would do.
+    fn check(&self) -> Result<(), String>;
+}
+
+/// Which settings a result was computed with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Origin {
+    /// The file as it was named.
+    pub file: String,
+    /// SHA-256 of its bytes, as `sha256sum` prints it.
+    pub sha256: String,
+    /// Whether that is the committed file.
+    pub committed: bool,
+}
+
+/// Settings from `file`, or those that are committed.
+///
+/// # Errors
+/// When the file cannot be read or a value cannot be, with its place.
+pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunError> {
+    let Some(path) = file else { return parse(T::TEXT, T::FILE) };
+    let name = path.display().to_string();
+    let text =
+        std::fs::read_to_string(path).map_err(|source| SpecError::Read { path: name.clone(), source })?;
+    parse(&text, &name)
+}
+
+fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunError> {
+    let settings: T = spec::parse(text, name)?;
+    settings.check().map_err(|message| RunError::Setting(format!("{name}: {message}")))?;
+    Ok((settings, Origin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT }))
+}
+
+/// A setting as a report lists it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Listed {
+    /// Its name in the file.
+    pub name: String,
+    /// `stated`, `open` or `ours`.
+    pub basis: &'static str,
+    /// What stands while others vary.
+    pub value: serde_json::Value,
+    /// Every value tried, where that is more than one.
+    pub tried: Vec<serde_json::Value>,
+    /// The passage, or the reason.
+    pub source: String,
+}
+
+/// The settings of a row, by name.
+pub fn listed(row: &impl Serialize, form: Form) -> Vec<Listed> {
+    let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(row) else { return Vec::new() };
+    fields.into_iter().filter_map(|(name, value)| one(name, value, form)).collect()
+}
+
+fn one(name: String, value: serde_json::Value, form: Form) -> Option<Listed> {
+    let setting: Setting<serde_json::Value> = serde_json::from_value(value).ok()?;
+    let (value, tried) = (setting.get(form).clone(), setting.all(form).to_vec());
+    let tried = if tried.len() > 1 { tried } else { Vec::new() };
+    let (basis, source) = match setting {
+        Setting::Stated { passage, .. } => ("stated", passage),
+        Setting::Open { why, .. } => ("open", why),
+        Setting::Ours { why, .. } => ("ours", why),
+    };
+    Some(Listed { name, basis, value, tried, source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(value: u32, over: &[u32], quick: &[u32]) -> Setting<u32> {
+        Setting::Open { value, over: over.to_vec(), quick: quick.to_vec(), why: "because".to_owned() }
+    }
+
+    #[test]
+    fn the_quick_form_has_values_of_its_own() {
+        let setting = open(2, &[1, 2, 3], &[3, 1]);
+        assert_eq!((setting.get(Form::Full), setting.all(Form::Full)), (&2, &[1, 2, 3][..]));
+        assert_eq!((setting.get(Form::Quick), setting.all(Form::Quick)), (&3, &[3, 1][..]));
+        let same = open(2, &[1, 2], &[]);
+        assert_eq!((same.get(Form::Quick), same.all(Form::Quick)), (&2, &[1, 2][..]));
+        let ours = Setting::Ours { value: 9, quick: Some(4), why: String::new() };
+        assert_eq!((ours.get(Form::Full), ours.all(Form::Quick)), (&9, &[4][..]));
+    }
+
+    #[test]
+    fn values_that_cannot_be_are_named_with_what_would_do() {
+        let message = |setting: Setting<u32>| setting.within("px", 1..=8).unwrap_err();
+        assert_eq!(message(open(2, &[2, 9], &[])), "`px` is 9; it has to be 1 to 8");
+        assert!(message(open(2, &[2, 3], &[0])).contains("`px` is 0"));
+        assert!(message(open(2, &[3, 4], &[])).contains("2 among them"));
+        assert!(message(open(2, &[2], &[])).contains("two values or more"));
+        let silent = Setting::Stated { value: 2, quick: None, passage: " ".to_owned() };
+        assert!(message(silent).contains("where it comes from"));
+        assert!(open(2, &[1, 2], &[]).within("px", 1..=8).is_ok());
+    }
+
+    #[test]
+    fn a_row_lists_its_settings_with_their_sources() {
+        #[derive(Serialize)]
+        struct Row {
+            about: About,
+            px: Setting<u32>,
+            cells: Setting<(u32, u32)>,
+        }
+        let about = About {
+            id: "X-1".to_owned(),
+            kind: Kind::Order,
+            claim: String::new(),
+            paper: String::new(),
+            holds_when: String::new(),
+            limits: String::new(),
+        };
+        let cells = Setting::Stated { value: (2, 3), quick: None, passage: "section 1".to_owned() };
+        let row = Row { about, px: open(2, &[1, 2], &[]), cells };
+        let found = listed(&row, Form::Full);
+        let brief: Vec<_> = found.iter().map(|one| (one.name.as_str(), one.basis, one.tried.len())).collect();
+        assert_eq!(brief, [("cells", "stated", 0), ("px", "open", 2)]);
+        assert_eq!(found[0].value, serde_json::json!([2, 3]));
+        assert_eq!((found[0].source.as_str(), found[1].source.as_str()), ("section 1", "because"));
+    }
+}

@@ -1,0 +1,202 @@
+//! What `auto` takes beside every fixed choice of tests.
+
+use pipeline::Features;
+use serde::Serialize;
+use workloads::stress::{Family, Size};
+
+use super::measure::Work;
+use super::methods::combinations;
+use super::subject;
+use run::GpuSpec;
+use run::RunError;
+
+/// Multiply-adds at one value of a family.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// The family.
+    pub family: &'static str,
+    /// The value of its parameter.
+    pub value: f64,
+    /// What `auto` takes.
+    pub auto: u64,
+    /// What each of [`combinations`] takes, in their order.
+    pub fixed: Vec<u64>,
+}
+
+/// `auto` against the best fixed choice, at one value or over a whole family.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Choice {
+    /// The family.
+    pub family: &'static str,
+    /// The value of its parameter; `None` for all of them added up.
+    pub value: Option<f64>,
+    /// Multiply-adds of tile tests, screens and sample tests under `auto`.
+    pub auto_madds: u64,
+    /// The letters of the best fixed choice.
+    pub best: String,
+    /// Its multiply-adds.
+    pub best_madds: u64,
+    /// Multiply-adds with every test on.
+    pub all_madds: u64,
+    /// `auto` over the best.
+    pub over_best: f64,
+}
+
+/// The most that `auto` may take over the best fixed choice.
+pub const MOST_OVER_BEST: f64 = 1.05;
+
+/// `auto` and every fixed choice on `family` at `value`.
+///
+/// # Errors
+/// When the scene cannot be made or the hardware cannot be built.
+pub fn trial(
+    family: &'static Family,
+    value: f64,
+    size: Size,
+    seed: u64,
+    gpu: &GpuSpec,
+) -> Result<Trial, RunError> {
+    subject::on(family, value, (size, seed), gpu, |subject| {
+        let madds = |features| Ok(Work::new(&subject.counts(features)?).madds());
+        let auto = madds(Features { auto: true, ..Features::ALL })?;
+        let fixed = fixed(subject.camera.lens().is_some(), madds)?;
+        Ok(Trial { family: family.name, value, auto, fixed })
+    })
+}
+
+/// What each combination takes; those that cannot differ are measured once.
+fn fixed<E>(lens: bool, madds: impl Fn(Features) -> Result<u64, E>) -> Result<Vec<u64>, E> {
+    let mut known: Vec<(Features, u64)> = Vec::new();
+    let all = combinations().into_iter().map(|(_, features)| Features {
+        lens_lines: features.lens_lines && lens,
+        coarse: features.coarse && (features.facing || features.edges),
+        ..features
+    });
+    all.map(|features| {
+        if let Some((_, madds)) = known.iter().find(|(other, _)| *other == features) {
+            return Ok(*madds);
+        }
+        known.push((features, madds(features)?));
+        Ok(known[known.len() - 1].1)
+    })
+    .collect()
+}
+
+impl Choice {
+    /// Of one value.
+    pub fn of(trial: &Trial) -> Self {
+        Self::new(trial.family, Some(trial.value), trial.auto, &trial.fixed)
+    }
+
+    /// Of all values of a family, one choice for all of them; `None` where there is none.
+    pub fn over(trials: &[Trial]) -> Option<Self> {
+        let family = trials.first()?.family;
+        let sum = |at: usize| trials.iter().map(|trial| trial.fixed[at]).sum();
+        let fixed: Vec<u64> = (0..trials[0].fixed.len()).map(sum).collect();
+        Some(Self::new(family, None, trials.iter().map(|trial| trial.auto).sum(), &fixed))
+    }
+
+    fn new(family: &'static str, value: Option<f64>, auto_madds: u64, fixed: &[u64]) -> Self {
+        let (best_madds, at) = fixed.iter().copied().zip(0..).min().unwrap_or((auto_madds, 0));
+        Self {
+            family,
+            value,
+            auto_madds,
+            best: combinations()[at].0.clone(),
+            best_madds,
+            all_madds: fixed.last().copied().unwrap_or(auto_madds),
+            over_best: auto_madds.max(1) as f64 / best_madds.max(1) as f64,
+        }
+    }
+}
+
+/// `auto` against the best fixed choice, on every family and at every value.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Choices {
+    /// Each family as a whole, one fixed choice for all of its values.
+    pub families: Vec<Choice>,
+    /// Each value, with the best choice for it alone.
+    pub values: Vec<Choice>,
+}
+
+impl Choices {
+    /// Of the trials, those of a family one after the other.
+    pub fn new(trials: &[Trial]) -> Self {
+        let families = trials.chunk_by(|a, b| a.family == b.family);
+        Self {
+            families: families.filter_map(Choice::over).collect(),
+            values: trials.iter().map(Choice::of).collect(),
+        }
+    }
+
+    /// The families on which `auto` takes more than [`MOST_OVER_BEST`] of the best fixed choice.
+    pub fn families_over(&self) -> usize {
+        over(&self.families)
+    }
+
+    /// The values at which it does.
+    pub fn values_over(&self) -> usize {
+        over(&self.values)
+    }
+
+    /// What is printed: the worst family, and how many values are worse than that may be.
+    pub fn text(&self) -> String {
+        let (Some(family), Some(value)) = (worst(&self.families), worst(&self.values)) else {
+            return String::new();
+        };
+        format!(
+            "auto takes at most {:.3} of the best fixed choice on a family ({}), {} of {} families over {MOST_OVER_BEST}\n\
+             and at most {:.3} of the best choice for a single value ({} at {}), {} of {} values over {MOST_OVER_BEST}\n",
+            family.over_best,
+            family.family,
+            self.families_over(),
+            self.families.len(),
+            value.over_best,
+            value.family,
+            value.value.unwrap_or(f64::NAN),
+            self.values_over(),
+            self.values.len(),
+        )
+    }
+}
+
+fn over(choices: &[Choice]) -> usize {
+    choices.iter().filter(|choice| choice.over_best > MOST_OVER_BEST).count()
+}
+
+fn worst(choices: &[Choice]) -> Option<&Choice> {
+    choices.iter().max_by(|a, b| a.over_best.total_cmp(&b.over_best))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> Trial {
+        Trial { family: "speed", value, auto, fixed: fixed.to_vec() }
+    }
+
+    #[test]
+    fn over_a_family_one_choice_holds_for_all_values() {
+        let choices = Choices::new(&[trial(0.0, 110, [100, 300]), trial(1.0, 110, [300, 100])]);
+        assert_eq!((choices.values_over(), choices.families_over()), (2, 0));
+        let family = &choices.families[0];
+        assert_eq!((family.best_madds, family.auto_madds, family.best.as_str()), (400, 220, "-"));
+        assert!((family.over_best - 0.55).abs() < 1e-12);
+        assert!(choices.text().contains("1.100"), "{}", choices.text());
+    }
+
+    #[test]
+    fn choices_that_cannot_differ_are_measured_once() {
+        let runs = std::cell::Cell::new(0);
+        let found = fixed(false, |features| {
+            runs.set(runs.get() + 1);
+            assert!(!features.lens_lines);
+            Ok::<_, ()>(u64::from(features.screen))
+        });
+        // Screen, depth and side planes; three sets of facing and edges, with and without coarse ones, and none.
+        assert_eq!(runs.get(), 8 * 7);
+        let screens = combinations().iter().map(|(letters, _)| u64::from(letters.contains('c'))).collect();
+        assert_eq!(found, Ok::<Vec<u64>, ()>(screens));
+    }
+}

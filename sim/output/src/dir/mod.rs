@@ -1,0 +1,197 @@
+//! The folder of results: written aside, and moved into place when whole.
+//!
+//! ```text
+//! Destination --open--> OutDir --write--> .quintile/new --publish--> the folder, manifest.json
+//! ```
+//!
+//! While a command works, its files are in `.quintile/new` below the folder: on the same file system, also where the folder is a
+//! mount point, a link or the current directory. Until they are published, earlier results stay as they are. Files that no
+//! [manifest](Manifest) lists, or that changed since it was written, belong to the user: they are neither removed nor overwritten.
+
+mod claim;
+mod error;
+mod manifest;
+mod swap;
+mod work;
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use sha2::{Digest, Sha256};
+use traces::io::unfinished;
+
+pub use claim::Claim;
+pub use error::OutputError;
+pub use manifest::{Entry, MANIFEST, Manifest, sha256_of, sha256_of_text};
+use swap::Swap;
+use work::Work;
+
+/// Anything that a writer of a file can fail with.
+pub type BoxError = Box<dyn Error + Send + Sync>;
+
+/// The last file of a run; where it is, the run is whole.
+pub const SUMMARY: &str = "summary.json";
+
+/// A folder for results, as named by the caller.
+#[derive(Clone, Debug)]
+pub struct Destination {
+    /// The folder; made where it is missing.
+    pub folder: PathBuf,
+    /// Whether files that Quintile did not write may be overwritten.
+    pub force: bool,
+}
+
+impl Destination {
+    /// A folder in which only results of Quintile are overwritten.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), force: false }
+    }
+
+    /// Locks the folder for the files that `claims` list.
+    ///
+    /// # Errors
+    /// Before any work: [`OutputError::Folder`] when the folder cannot be made or written, [`OutputError::Busy`] when another
+    /// process writes into it, [`OutputError::InTheWay`] for a file of the user where a result has to go.
+    pub fn open(&self, claims: impl IntoIterator<Item = Claim>) -> Result<OutDir, OutputError> {
+        OutDir::open(self, claims.into_iter().collect())
+    }
+}
+
+/// The folder that a command writes into, locked. Dropped without [`Self::publish`], it leaves no trace.
+#[derive(Debug)]
+pub struct OutDir {
+    destination: Destination,
+    claims: Vec<Claim>,
+    /// What the folder held when it was opened or last published.
+    listed: Manifest,
+    /// Files written since.
+    written: Mutex<BTreeMap<String, Entry>>,
+    work: Work,
+}
+
+impl OutDir {
+    fn open(destination: &Destination, claims: Vec<Claim>) -> Result<Self, OutputError> {
+        let (root, force) = (destination.folder.as_path(), destination.force);
+        let work = Work::lock(root)?;
+        Swap::recover(root, &work, force)?;
+        let listed = Manifest::of_folder(root, force)?;
+        for claim in &claims {
+            claim.check(root, &listed, force)?;
+        }
+        work.try_folders(root, claims.iter().flat_map(Claim::folders).collect())?;
+        let (destination, written) = (destination.clone(), Mutex::default());
+        Ok(Self { destination, claims, listed, written, work })
+    }
+
+    /// The folder as it was named.
+    pub fn path(&self) -> &Path {
+        &self.destination.folder
+    }
+
+    /// Writes the file `relative` (folders in between are made) through `write`. It appears in the folder when it is
+    /// [published](Self::publish).
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file and the cause, [`OutputError::Unclaimed`] for a file that no claim lists.
+    pub fn write_file(
+        &self,
+        relative: &str,
+        write: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), BoxError>,
+    ) -> Result<(), OutputError> {
+        let by = self.producer(relative)?;
+        let staged = self.work.new_file(relative);
+        let failed = |source| OutputError::Write { path: self.path().join(relative), source };
+        // The handler of signals removes the folder: not between these two.
+        let created = unfinished::uninterrupted(|| {
+            staged.parent().map_or(Ok(()), fs::create_dir_all)?;
+            File::create(&staged)
+        });
+        let mut out = Counted::new(created.map_err(|error| failed(error.into()))?);
+        write(&mut out).map_err(failed)?;
+        let entry = out.entry(by).map_err(|error| failed(error.into()))?;
+        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        written.insert(relative.to_owned(), entry);
+        Ok(())
+    }
+
+    /// Writes `value` as a JSON file for people to read, a line end after it.
+    ///
+    /// # Errors
+    /// As [`Self::write_file`].
+    pub fn write_json(&self, relative: &str, value: &impl serde::Serialize) -> Result<(), OutputError> {
+        self.write_file(relative, |out| {
+            serde_json::to_writer_pretty(&mut *out, value)?;
+            Ok(writeln!(out)?)
+        })
+    }
+
+    /// Moves what was written into place, and removes what the same commands wrote before and did not write again. Returns the names
+    /// of the files, in order.
+    ///
+    /// # Errors
+    /// [`OutputError::InTheWay`] and [`OutputError::Publish`]: the folder is as it was before, and the new results stay in
+    /// `.quintile/new`, from where the next command with this folder moves them.
+    pub fn publish(&mut self) -> Result<Vec<String>, OutputError> {
+        let written = std::mem::take(self.written.get_mut().unwrap_or_else(PoisonError::into_inner));
+        let names = written.keys().cloned().collect();
+        let swap = Swap::new(self.path(), &self.work, self.listed.clone(), written);
+        // A signal waits until old and new are not mixed.
+        self.listed = unfinished::uninterrupted(|| swap.run(self.destination.force))?;
+        Ok(names)
+    }
+
+    /// Who writes `relative`.
+    fn producer(&self, relative: &str) -> Result<&str, OutputError> {
+        let plain = Path::new(relative).components().all(|part| matches!(part, Component::Normal(_)));
+        let claim = self.claims.iter().find(|claim| plain && claim.covers(relative));
+        claim.map(Claim::by).ok_or_else(|| OutputError::Unclaimed { path: relative.to_owned() })
+    }
+}
+
+impl OutDir {
+    /// Lets `make` write into `folder`, and publishes.
+    ///
+    /// # Errors
+    /// When the folder cannot be opened, or the results cannot be moved into it.
+    pub fn with<T>(folder: &Path, claim: Claim, make: impl FnOnce(&Self) -> T) -> Result<T, OutputError> {
+        let mut dir = Destination::new(folder).open([claim])?;
+        let made = make(&dir);
+        dir.publish()?;
+        Ok(made)
+    }
+}
+
+/// A file being written, with the number and the hash of its bytes.
+struct Counted {
+    out: BufWriter<File>,
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl Counted {
+    fn new(file: File) -> Self {
+        Self { out: BufWriter::new(file), hash: Sha256::new(), bytes: 0 }
+    }
+
+    fn entry(mut self, by: &str) -> io::Result<Entry> {
+        self.out.flush()?;
+        Ok(Entry { by: by.to_owned(), bytes: self.bytes, sha256: manifest::hex(self.hash) })
+    }
+}
+
+impl Write for Counted {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let count = self.out.write(buffer)?;
+        self.hash.update(&buffer[..count]);
+        self.bytes += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}

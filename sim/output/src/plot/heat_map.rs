@@ -1,0 +1,258 @@
+//! Where in the image something happens.
+
+use super::axis::{Axis, Way, is_drawable};
+use super::legend::{Key, legend_lines};
+use super::look::Look;
+use super::palette::{AXIS, CLASSES, Colour, INK, heat};
+use super::panel::tick_label;
+use super::picture::{Across, Picture, Text, text};
+use crate::table::digits;
+
+/// A rectangle of the image with a value.
+#[derive(Clone, Copy, Debug)]
+pub struct HeatTile {
+    /// Its first pixel.
+    pub origin: [u32; 2],
+    /// Its pixels across and down.
+    pub size: [u32; 2],
+    /// Its value.
+    pub value: f64,
+}
+
+/// What the colours stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Shading<'a> {
+    /// From nothing to the largest value.
+    #[default]
+    Even,
+    /// From nothing to this value, and all above: the same for maps that are compared.
+    UpTo(f64),
+    /// From nothing to the 99th percentile of what is above nothing, and all above: a few hot pixels do not make all others white.
+    Clipped,
+    /// Classes 0, 1, ... with these names, at most four.
+    Classes(&'a [&'a str]),
+}
+
+/// A map of a value over the image, with a bar of its colours.
+#[derive(Clone, Copy, Debug)]
+pub struct HeatMapPlot<'a> {
+    /// What is shown.
+    pub title: &'a str,
+    /// What was run, for the line below the title.
+    pub subject: &'a str,
+    /// What the values are.
+    pub label: &'a str,
+    /// Pixels of the image across and down.
+    pub size: [u32; 2],
+    /// The rectangles, which cover the image.
+    pub tiles: &'a [HeatTile],
+    /// How they are coloured.
+    pub shading: Shading<'a>,
+    /// Brightness of each pixel of the image, 0 to 1 as displayed, whose outlines are drawn over the map; empty for none.
+    pub brightness: &'a [f32],
+}
+
+/// Room for the map at most.
+const ROOM: (f64, f64) = (960.0, 640.0);
+/// Room for the bar of colours.
+const BAR: f64 = 110.0;
+/// Steps of the bar of colours.
+const STEPS: u32 = 120;
+/// Steps of brightness between neighbours from which on there is an outline, and with which it is darkest.
+const OUTLINE: [f32; 2] = [0.05, 0.4];
+/// Opacity of the darkest outline.
+const OUTLINE_ALPHA: f32 = 0.5;
+
+impl HeatMapPlot<'_> {
+    /// The map.
+    pub fn picture(&self, look: &Look) -> Picture {
+        let [width, height] = self.size.map(|side| f64::from(side.max(1)));
+        let most = self.tiles.iter().map(|tile| tile.value).fold(0.0, f64::max);
+        let high = self.high(most);
+        let subject = match self.shading {
+            Shading::Clipped if high < most => {
+                format!(
+                    "{}; darkest from {} on, the 99th percentile; most: {}",
+                    self.subject,
+                    digits(high),
+                    digits(most)
+                )
+            }
+            _ => self.subject.to_owned(),
+        };
+        let usual = ROOM.0.min(ROOM.1 * width / height) + 48.0 + BAR;
+        let mut picture = Picture::titled(look, (usual.max(760.0), 300.0), [self.title, &subject]);
+        if self.tiles.is_empty() || !is_drawable(0.0, high) {
+            return picture.nothing("nothing was counted");
+        }
+        if let Shading::Classes(names) = self.shading {
+            let top = picture.height + 10.0;
+            let keys =
+                names.iter().zip(CLASSES).map(|(name, colour)| (Key::Area(colour), (*name).to_owned()));
+            picture.height += legend_lines(&mut picture, top, &keys.collect::<Vec<_>>());
+        }
+        let (left, top) = (picture.margin(), picture.height + 8.0);
+        let aside = if self.is_classes() { 0.0 } else { BAR };
+        let scale = ((picture.width() - 2.0 * left - aside) / width).min(ROOM.1 / height);
+        self.draw_tiles(&mut picture, (left, top), scale, high);
+        self.draw_outlines(&mut picture, (left, top), scale);
+        let bottom = top + height * scale;
+        picture.height = bottom + 16.0;
+        if !self.is_classes() {
+            let bottom = bottom.max(top + 150.0);
+            let axis = Axis::new(self.label, "", (0.0, high), (Way::Up, bottom - top));
+            bar(&mut picture, &axis, (left + width * scale + 34.0, top, bottom), high < most);
+            picture.height = bottom + 16.0;
+        }
+        picture
+    }
+
+    fn is_classes(&self) -> bool {
+        matches!(self.shading, Shading::Classes(_))
+    }
+
+    /// The value of the darkest colour.
+    fn high(&self, most: f64) -> f64 {
+        match self.shading {
+            Shading::Even | Shading::Classes(_) => most,
+            Shading::UpTo(high) => high,
+            Shading::Clipped => {
+                let mut values: Vec<f64> =
+                    self.tiles.iter().map(|tile| tile.value).filter(|value| *value > 0.0).collect();
+                values.sort_by(f64::total_cmp);
+                values.get((values.len() * 99).div_ceil(100).saturating_sub(1)).copied().unwrap_or(most)
+            }
+        }
+    }
+
+    fn colour(&self, value: f64, high: f64) -> Colour {
+        match self.shading {
+            Shading::Classes(_) => CLASSES[(value.max(0.0) as usize).min(CLASSES.len() - 1)],
+            _ => heat(if high > 0.0 { value / high } else { 0.0 }),
+        }
+    }
+
+    fn draw_tiles(&self, picture: &mut Picture, (left, top): (f64, f64), scale: f64, high: f64) {
+        for tile in self.tiles {
+            let at = |x: u32, y: u32| (left + f64::from(x) * scale, top + f64::from(y) * scale);
+            let ([x, y], [w, h]) = (tile.origin, tile.size);
+            picture.rect(at(x, y), at(x + w, y + h), self.colour(tile.value, high));
+        }
+    }
+
+    /// Where neighbours in the image differ in brightness, in a few shades, alike pixels of a row as one.
+    fn draw_outlines(&self, picture: &mut Picture, (left, top): (f64, f64), scale: f64) {
+        let width = self.size[0] as usize;
+        if width == 0 || self.brightness.len() != width * self.size[1] as usize {
+            return;
+        }
+        let shade = |x: usize, y: usize| {
+            let at = |x: usize, y: usize| self.brightness.get(y * width + x.min(width - 1)).copied();
+            let here = at(x, y).unwrap_or(0.0);
+            let step = [at(x + 1, y), at(x, y + 1)].into_iter().flatten().map(|next| (next - here).abs());
+            let step = step.fold(0.0, f32::max);
+            if step < OUTLINE[0] { 0 } else { (1.0 + 4.0 * (step / OUTLINE[1]).min(1.0)) as u32 }
+        };
+        for y in 0..self.size[1] as usize {
+            let shades: Vec<u32> = (0..width).map(|x| shade(x, y)).collect();
+            let mut x = 0;
+            for alike in shades.chunk_by(|a, b| a == b) {
+                let at = |x: usize, y: usize| (left + x as f64 * scale, top + y as f64 * scale);
+                if alike[0] > 0 {
+                    let alpha = OUTLINE_ALPHA * alike[0] as f32 / 5.0;
+                    picture.rect(at(x, y), at(x + alike.len(), y + 1), INK.alpha(f64::from(alpha)));
+                }
+                x += alike.len();
+            }
+        }
+    }
+}
+
+/// The bar of colours from `bottom` up to `top`; its upper end says so where there are values beyond it.
+fn bar(picture: &mut Picture, axis: &Axis, (left, top, bottom): (f64, f64, f64), beyond: bool) {
+    let y = |fraction: f64| bottom - fraction * (bottom - top);
+    for step in 0..STEPS {
+        let [low, high] = [step, step + 1].map(|s| f64::from(s) / f64::from(STEPS));
+        picture.rect((left, y(high)), (left + 16.0, y(low)), heat((low + high) / 2.0));
+    }
+    for tick in &axis.ticks {
+        let at = y(axis.fraction_at(tick.at));
+        if beyond && at < top + 18.0 {
+            continue;
+        }
+        picture.line((left + 16.0, at), (left + 21.0, at), AXIS, 1.0);
+        tick_label(picture, &tick.label, (left + 25.0, at), Across::Left);
+    }
+    if beyond {
+        tick_label(picture, &format!("≥ {}", digits(axis.high)), (left + 20.0, top + 4.0), Across::Left);
+    }
+    let middle = (left - 11.0, (top + bottom) / 2.0);
+    picture.text(Text { across: Across::Centre, upwards: true, size: 12.0, ..text(&axis.label, middle) });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::picture::Shape;
+    use super::*;
+
+    fn plot<'a>(tiles: &'a [HeatTile], shading: Shading<'a>, brightness: &'a [f32]) -> HeatMapPlot<'a> {
+        HeatMapPlot { title: "t", subject: "s", label: "l", size: [200, 1], tiles, shading, brightness }
+    }
+
+    fn row(value: impl Fn(u32) -> f64) -> Vec<HeatTile> {
+        (0..200).map(|x| HeatTile { origin: [x, 0], size: [1, 1], value: value(x) }).collect()
+    }
+
+    fn fills_of(picture: &Picture) -> Vec<Colour> {
+        let fill = |shape: &Shape| match shape {
+            Shape::Rect { fill, .. } => Some(*fill),
+            _ => None,
+        };
+        picture.shapes.iter().filter_map(fill).collect()
+    }
+
+    /// In the book a few hot pixels left all others white.
+    #[test]
+    fn one_hot_pixel_leaves_the_others_their_colours() {
+        let tiles = row(|x| if x == 7 { 820.0 } else { f64::from(x % 10) + 1.0 });
+        let picture = plot(&tiles, Shading::Clipped, &[]).picture(&Look::default());
+        let fills = fills_of(&picture);
+        assert_eq!(fills[9], heat(1.0), "ten of one in ten is the darkest");
+        assert_eq!(fills[7], heat(1.0));
+        let svg = picture.svg().unwrap();
+        assert!(svg.contains("≥ 10.00") && svg.contains("most: 820.0"), "{svg}");
+        let even = plot(&tiles, Shading::Even, &[]).picture(&Look::default());
+        assert_eq!(fills_of(&even)[9], heat(10.0 / 820.0), "nearly white");
+    }
+
+    #[test]
+    fn maps_up_to_the_same_value_can_be_compared() {
+        let shade = |most: f64, shading| {
+            let tiles = row(|x| if x == 0 { most } else { 10.0 });
+            fills_of(&plot(&tiles, shading, &[]).picture(&Look::default()))[1]
+        };
+        assert_eq!(shade(20.0, Shading::UpTo(40.0)), shade(40.0, Shading::UpTo(40.0)));
+        assert_ne!(shade(20.0, Shading::Even), shade(40.0, Shading::Even));
+    }
+
+    #[test]
+    fn classes_are_named_and_have_no_shades_between_them() {
+        let names = ["not shaded", "shaded without light", "with light"];
+        let picture =
+            plot(&row(|x| f64::from(x % 3)), Shading::Classes(&names), &[]).picture(&Look::default());
+        let svg = picture.svg().unwrap();
+        assert!(names.iter().all(|name| svg.contains(name)));
+        let fills = fills_of(&picture);
+        assert!(fills.iter().all(|fill| CLASSES.contains(fill)), "{fills:?}");
+    }
+
+    #[test]
+    fn outlines_of_the_image_are_drawn_over_the_map() {
+        let brightness: Vec<f32> = (0..200).map(|x| if x < 100 { 0.1 } else { 0.9 }).collect();
+        let dark = |brightness: &[f32]| {
+            let picture = plot(&row(|_| 1.0), Shading::Even, brightness).picture(&Look::default());
+            fills_of(&picture).iter().filter(|fill| fill.rgb == INK.rgb).count()
+        };
+        assert_eq!((dark(&brightness), dark(&[])), (1, 0));
+    }
+}

@@ -1,0 +1,175 @@
+//! Pictures into files: SVG through `plotters`' backend, PNG through its rasterizer into a buffer of our own.
+//!
+//! Both are drawn on a grid twice as fine as the picture; for PNG two by two pixels are then averaged, and a pixel of the layout is as
+//! many of the file as the picture's [`Paper`](super::look::Paper) says.
+
+use std::fmt::Display;
+
+use plotters::backend::SVGBackend;
+use plotters::style::{FontTransform, RGBAColor, TextStyle};
+use plotters_backend::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend, DrawingErrorKind};
+
+use super::palette::{BACKGROUND, Colour};
+use super::picture::{Across, Picture, Point, Shape, Text};
+use super::text::{SCALE, plotters_font, register};
+use crate::dir::{OutDir, OutputError};
+use crate::{font, image};
+
+mod pdf;
+mod raster;
+
+use raster::Raster;
+
+/// Why a plot could not be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// The font inside the command cannot be read.
+    #[error("the font for plots is damaged: build the command anew")]
+    Font,
+    /// A backend failed.
+    #[error("cannot draw the plot: {0}")]
+    Draw(String),
+    /// The PNG encoder failed.
+    #[error(transparent)]
+    Encode(#[from] image::ImageError),
+}
+
+impl Picture {
+    /// The text of an SVG file with real text in it, without ids, so that several fit into one page.
+    ///
+    /// # Errors
+    /// [`PlotError`] when the font is damaged or the backend fails.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        let (width, height) = self.fine_size(SCALE);
+        let mut svg = String::new();
+        self.play(&mut SVGBackend::with_string(&mut svg, (width, height)), SCALE)?;
+        let fine = format!("width=\"{width}\" height=\"{height}\"");
+        let label = attribute(&font::drawable(&self.title));
+        let size = |side: f64| match self.paper.width_mm {
+            Some(width_mm) => format!("{:.2}mm", side / self.width() * width_mm),
+            None => format!("{:.0}", side * self.paper.zoom),
+        };
+        let (width, height) = (size(self.width()), size(self.height));
+        let shown = format!("width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"{label}\"");
+        Ok(svg.replacen(&fine, &shown, 1))
+    }
+
+    /// The bytes of a PNG file.
+    ///
+    /// # Errors
+    /// [`PlotError`] when the font is damaged, or drawing or encoding fails.
+    pub fn png(&self) -> Result<Vec<u8>, PlotError> {
+        let scale = SCALE * self.paper.zoom;
+        let (width, height) = self.fine_size(scale);
+        let mut raster = Raster::new(width, height);
+        self.play(&mut raster, scale)?;
+        Ok(image::encode_png(width / 2, height / 2, &raster.halved())?)
+    }
+
+    /// Writes the plot to `<stem>.svg` and `<stem>.png` in `dir`.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file and the cause.
+    pub fn write(&self, dir: &OutDir, stem: &str) -> Result<(), OutputError> {
+        dir.write_file(&format!("{stem}.svg"), |out| Ok(out.write_all(self.svg()?.as_bytes())?))?;
+        dir.write_file(&format!("{stem}.png"), |out| Ok(out.write_all(&self.png()?)?))?;
+        Ok(())
+    }
+
+    fn fine_size(&self, scale: f64) -> (u32, u32) {
+        ((self.width() * scale) as u32, (self.height * scale) as u32)
+    }
+
+    /// Draws everything with `scale` steps of the backend to a pixel of the layout.
+    fn play<B: DrawingBackend>(&self, backend: &mut B, scale: f64) -> Result<(), PlotError> {
+        if !register() {
+            return Err(PlotError::Font);
+        }
+        let paper = Shape::Rect { from: (0.0, 0.0), to: (self.width(), self.height), fill: BACKGROUND };
+        for shape in std::iter::once(&paper).chain(&self.shapes) {
+            draw(backend, shape, scale).map_err(failed)?;
+        }
+        backend.present().map_err(failed)
+    }
+}
+
+fn failed(error: impl Display) -> PlotError {
+    PlotError::Draw(error.to_string())
+}
+
+struct Stroke {
+    colour: BackendColor,
+    width: u32,
+}
+
+impl BackendStyle for Stroke {
+    fn color(&self) -> BackendColor {
+        self.colour
+    }
+
+    fn stroke_width(&self) -> u32 {
+        self.width
+    }
+}
+
+fn draw<B: DrawingBackend>(
+    backend: &mut B,
+    shape: &Shape,
+    scale: f64,
+) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+    let at = |point: Point| fine(point, scale);
+    match shape {
+        Shape::Rect { from, to, fill } => backend.draw_rect(at(*from), at(*to), &colour(*fill), true),
+        Shape::Polyline { points, stroke, width } => {
+            let width = (width * scale).max(1.0) as u32;
+            backend.draw_path(fine_path(points, scale), &Stroke { colour: colour(*stroke), width })
+        }
+        Shape::Polygon { points, fill } => backend.fill_polygon(fine_path(points, scale), &colour(*fill)),
+        Shape::Dot { centre, radius, fill } => {
+            backend.draw_circle(at(*centre), (radius * scale) as u32, &colour(*fill), true)
+        }
+        Shape::Text(text) => draw_text(backend, text, scale),
+    }
+}
+
+fn draw_text<B: DrawingBackend>(
+    backend: &mut B,
+    text: &Text,
+    scale: f64,
+) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+    let h_pos = match text.across {
+        Across::Left => HPos::Left,
+        Across::Centre => HPos::Center,
+        Across::Right => HPos::Right,
+    };
+    let turn = if text.upwards { FontTransform::Rotate270 } else { FontTransform::None };
+    let style = TextStyle {
+        font: plotters_font(text.size * scale, text.bold).transform(turn),
+        color: colour(text.colour),
+        pos: Pos::new(h_pos, VPos::Center),
+    };
+    backend.draw_text(&text.text, &style, fine(text.at, scale))
+}
+
+fn colour(colour: Colour) -> BackendColor {
+    let [r, g, b] = colour.rgb;
+    let RGBAColor(r, g, b, alpha) = RGBAColor(r, g, b, colour.alpha);
+    BackendColor { alpha, rgb: (r, g, b) }
+}
+
+fn fine(point: Point, scale: f64) -> BackendCoord {
+    let round = |value: f64| libm::round(value * scale) as i32;
+    (round(point.0), round(point.1))
+}
+
+/// The path on the fine grid, without points that fall together.
+fn fine_path(points: &[Point], scale: f64) -> Vec<BackendCoord> {
+    let mut path: Vec<BackendCoord> = points.iter().map(|point| fine(*point, scale)).collect();
+    path.dedup();
+    path
+}
+
+fn attribute(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

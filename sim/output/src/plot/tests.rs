@@ -1,0 +1,349 @@
+//! What holds for every plot: text lies inside the picture and on no other text, and odd input is no error.
+
+use activity::Unit;
+use power_model::Part;
+
+use super::picture::{Across, Picture, Shape, Text};
+use super::text::text_width;
+use super::*;
+
+/// Every look that a picture has to fit: its own, that of a column, of a page, and large letters.
+fn looks() -> [Look; 4] {
+    let look = Look::default();
+    [
+        look.clone(),
+        Look { width_mm: Some(COLUMN_MM), title: Some(String::new()), ..look.clone() },
+        Look { width_mm: Some(175.0), font_pt: Some(7.0), title: Some("A title of its own".to_owned()) },
+        Look { font_pt: Some(16.0), ..look },
+    ]
+}
+
+/// Left, top, right, bottom of a text in pixels.
+fn extent(text: &Text) -> [f64; 4] {
+    let width = text_width(&text.text, text.size, text.bold);
+    let before = match text.across {
+        Across::Left => 0.0,
+        Across::Centre => width / 2.0,
+        Across::Right => width,
+    };
+    let (x, y, half) = (text.at.0, text.at.1, text.size * 0.45);
+    if text.upwards {
+        [x - half, y - (width - before), x + half, y + before]
+    } else {
+        [x - before, y - half, x - before + width, y + half]
+    }
+}
+
+fn check_texts(picture: &Picture) {
+    let texts: Vec<&Text> = picture
+        .shapes
+        .iter()
+        .filter_map(|shape| match shape {
+            Shape::Text(text) => Some(text),
+            _ => None,
+        })
+        .collect();
+    for (index, text) in texts.iter().enumerate() {
+        let [left, top, right, bottom] = extent(text);
+        let inside = left >= 0.0 && top >= 0.0 && right <= picture.width() && bottom <= picture.height;
+        assert!(
+            inside,
+            "{:?} at {:?} leaves {} of {}x{}",
+            text.text,
+            text.at,
+            picture.title,
+            picture.width(),
+            picture.height
+        );
+        for other in &texts[..index] {
+            let [l, t, r, b] = extent(other);
+            let apart = right <= l || r <= left || bottom <= t || b <= top;
+            assert!(apart, "{:?} is on {:?} in {}", text.text, other.text, picture.title);
+        }
+    }
+}
+
+fn check(drawn: impl Fn(&Look) -> Picture) {
+    for look in looks() {
+        let picture = drawn(&look);
+        check_texts(&picture);
+        assert!(picture.svg().unwrap().ends_with("</svg>\n"));
+    }
+    assert!(drawn(&Look::default()).png().unwrap().starts_with(b"\x89PNG"));
+}
+
+fn power_run(rate_hz: f64, power_w: &[f64], look: &Look) -> Picture {
+    let starts = [0.0, 0.001, f64::NAN, 0.5, 1e9];
+    let mark_s = Some((0.0, 0.002));
+    let subject = "scene";
+    let run = PowerRun {
+        subject,
+        rate_hz,
+        start_s: 0.0,
+        power_w,
+        found_starts_s: &starts,
+        true_starts_s: &starts,
+        mark_s,
+    };
+    run.picture(look)
+}
+
+#[test]
+fn power_run_takes_anything() {
+    for rate_hz in [50_000.0, 1.0, 1e-9, 1e12, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+        check(|look| power_run(rate_hz, &[10.0, 12.0, 30.0, f64::NAN, 11.0], look));
+    }
+    let huge = [f64::MAX, f64::MIN, f64::MAX];
+    for power_w in [&[][..], &[5.0], &[0.0, 0.0], &[f64::NAN; 3], &[f64::INFINITY, 1.0], &huge, &[-3.0, 2.0]]
+    {
+        check(|look| power_run(1000.0, power_w, look));
+    }
+    check(|look| power_run(1000.0, &vec![7.0; 5000], look));
+}
+
+fn frame_power(parts: usize, bins: usize, power: f64, bin_s: f64, look: &Look) -> Picture {
+    let part = |part: &Part| PowerPart { part: *part, power_w: vec![power; bins] };
+    let parts = Part::ALL.iter().cycle().take(parts).map(part).collect();
+    let samples = &[(0.001, 4.0), (f64::NAN, 1.0)];
+    FramePower { subject: "scene", frame: 3, bin_s, parts, samples, frame_j: Some(0.0163) }.picture(look)
+}
+
+#[test]
+fn frame_power_takes_anything() {
+    for (parts, bins, power, bin_s) in [
+        (0, 0, 0.0, 1e-6),
+        (1, 1, 5.0, 1e-6),
+        (3, 0, 5.0, 1e-6),
+        (40, 700, 0.5, 1e-5),
+        (16, 2000, f64::NAN, 1e-6),
+        (4, 10, f64::MAX, 1e-6),
+        (4, 10, 1.0, f64::NAN),
+        (4, 10, 1.0, 0.0),
+        (4, 10, -1.0, 1.0),
+    ] {
+        check(|look| frame_power(parts, bins, power, bin_s, look));
+    }
+}
+
+#[test]
+fn frame_energy_takes_anything() {
+    let point = |frame, measured_j, true_j| FrameEnergyPoint { frame, measured_j, true_j };
+    let many: Vec<_> = (0..1000).map(|i| point(i, Some(0.5), Some(0.5 + i as f64 * 1e-6))).collect();
+    let cases: [&[FrameEnergyPoint]; 7] = [
+        &[],
+        &[point(0, None, None)],
+        &[point(7, Some(0.0), None)],
+        &[point(0, Some(f64::NAN), Some(1.0))],
+        &[point(0, Some(0.5), Some(0.5)), point(1, Some(0.5), Some(0.5))],
+        &[point(u64::MAX, Some(f64::MAX), Some(f64::MIN))],
+        &many,
+    ];
+    for frames in cases {
+        let measured_j = crate::MeanSd::of(frames.iter().filter_map(|frame| frame.measured_j));
+        for pixels in [0, 921_600] {
+            check(|look| FrameEnergy { subject: "scene", frames, measured_j, pixels }.picture(look));
+        }
+    }
+}
+
+#[test]
+fn unit_busy_takes_anything() {
+    let lane = |bins| UnitLane { name: "a unit whose name goes on and on and on", busy: vec![0.7; bins] };
+    for units in [vec![], vec![lane(0)], vec![lane(1)], vec![lane(5000); 14], vec![lane(3), lane(9)]] {
+        for bin_s in [1e-6, f64::NAN, 0.0] {
+            check(|look| UnitBusy { subject: "scene", frame: 0, bin_s, units: units.clone() }.picture(look));
+        }
+    }
+    let units = vec![UnitLane { name: "odd", busy: vec![f64::NAN, -5.0, 7.0] }];
+    check(|look| UnitBusy { subject: "scene", frame: 0, bin_s: 1e-3, units: units.clone() }.picture(look));
+}
+
+#[test]
+fn stalls_take_anything() {
+    let lane = |name, intervals| StallLane {
+        name,
+        shares: vec![[0.5, 0.2, 0.1]; intervals],
+        bottleneck: vec![true; intervals / 2],
+    };
+    for units in [vec![], vec![lane("dram", 0)], vec![lane("dram", 100), lane("a unit with a name", 3)]] {
+        let lanes = StallLanes { subject: "scene", frame: 1, interval_s: 1e-5, units };
+        check(|look| lanes.picture(look));
+    }
+}
+
+#[test]
+fn curves_and_their_legends_fit() {
+    let names = ["owen", "sobol", "random", "jittered", "interleaved"];
+    let panel = |scale: f64| {
+        let curves = names.iter().zip(1..).map(|(name, k)| Series {
+            note: "-0.71".to_owned(),
+            ..Series::curve(*name, (0..9).map(|i| (f64::from(1 << i), scale / f64::from((1 << i) + k))))
+        });
+        let [title, across, up] = ["motion", "samples per pixel", "RMSE"];
+        ChartPanel::new(title, [across, up], curves.collect()).on(Scale::Doublings, Scale::Decades)
+    };
+    let empty = ChartPanel { series: Vec::new(), ..panel(1.0) };
+    let long = "a title that goes on and on, so that it takes more than the one line there is over a panel";
+    let other = ChartPanel {
+        title: long.to_owned(),
+        ..ChartPanel::new("", ["x", "y"], vec![Series::curve("other", [(1.0, 0.0), (2.0, 5.0)])])
+    };
+    let failing = |range| other.clone().failing(Some(range), "the simulator warns");
+    for panels in [
+        vec![],
+        vec![panel(1.0)],
+        vec![panel(1e-6), panel(3e7), panel(0.1)],
+        vec![panel(0.0), empty],
+        vec![other.clone(), panel(1.0)],
+        vec![panel(1.0); 4],
+        vec![failing(0.0..1.2), failing(1.9..f64::INFINITY)],
+        vec![failing(7.0..3.0)],
+    ] {
+        for subject in ["of a scene".to_owned(), [long; 5].join(" ")] {
+            check(|look| Chart::new(long, &subject, panels.clone()).picture(look));
+        }
+    }
+    let small = |name: &str| ChartPanel { title: name.to_owned(), ..panel(1.0) };
+    let panels: Vec<_> = ["sides+edges+screen", "all but coarse"].repeat(7).into_iter().map(small).collect();
+    check(|look| Chart::new("small", "s", panels.clone()).small(7).picture(look));
+}
+
+#[test]
+fn every_mark_is_drawn_and_nothing_says_so() {
+    let points = |name: &str| vec![(0.5, 1.5, name.to_owned()), (0.7, 0.2, String::new())];
+    let marks = [
+        Mark::Band(vec![(0.0, 1.0, 2.0)]),
+        Mark::Line(vec![(0.0, 1.0), (1.0, 2.0)]),
+        Mark::Curve(vec![(0.0, 1.0), (1.0, 2.0)]),
+        Mark::Faint(vec![vec![(0.0, 1.0), (1.0, 2.0)]]),
+        Mark::Dots(points("named")),
+        Mark::Rings(points("ring")),
+        Mark::Bars(vec![(0.0, 1.0, 3.0)]),
+        Mark::Spreads(vec![Spread {
+            at: (0.5, 1.5),
+            across: [0.4, 0.8],
+            up: [1.0, 2.0],
+            name: "middle".to_owned(),
+        }]),
+        Mark::Steps(vec![(0.2, 1.0), (0.6, 0.5), (0.9, 0.1)]),
+        Mark::Uprights(vec![0.3, f64::NAN]),
+    ];
+    let series: Vec<Series> = marks.into_iter().map(|mark| Series::new("a", mark)).collect();
+    let panel =
+        |series| ChartPanel::over("", [AxisSpec::even("time", "s"), AxisSpec::even("power", "W")], series);
+    let drawn = |series: Vec<Series>, look: &Look| Chart::new("t", "s", vec![panel(series)]).picture(look);
+    check(|look| drawn(series.clone(), look));
+    let svg = drawn(series, &Look::default()).svg().unwrap();
+    assert!(["named", "ring", "middle", "power (W)"].iter().all(|word| svg.contains(word)));
+    assert!(drawn(vec![], &Look::default()).svg().unwrap().contains("nothing to show"));
+}
+
+/// Names of curves are whole where there is room for them on a page.
+#[test]
+fn names_of_curves_are_whole() {
+    let names = ["64 squares along a side: lost by the bound that is not cut", "all methods"];
+    let panel = |name: &str| {
+        ChartPanel::new("panel", ["x", "y"], vec![Series::curve(name, [(1.0, 1.0), (2.0, 5.0)])])
+    };
+    let picture = Chart::new("Names", "long ones", names.map(panel).into()).picture(&Look::default());
+    for name in names {
+        let is_name = |shape: &Shape| matches!(shape, Shape::Text(text) if text.text == name);
+        assert!(picture.shapes.iter().any(is_name), "{name}");
+    }
+}
+
+#[test]
+fn heat_maps_of_any_shape_fit() {
+    for (size, value) in [([1280, 720], 12.0), ([3, 800], 1e9), ([1, 1], 0.0), ([900, 2], f64::NAN)] {
+        let tiles = [HeatTile { origin: [0, 0], size, value }];
+        let (title, subject) =
+            ("samples_tested per pixel, frame 12", "default on reference: 6 364 653 in all");
+        for shading in
+            [Shading::Even, Shading::Clipped, Shading::UpTo(4.0), Shading::Classes(&["none", "some"])]
+        {
+            let label = "events per pixel";
+            let plot = HeatMapPlot { title, subject, label, size, tiles: &tiles, shading, brightness: &[] };
+            check(|look| plot.picture(look));
+        }
+    }
+}
+
+#[test]
+fn matrices_fit() {
+    let rows: Vec<_> = ["a", "sides+edges+screen"].map(|name| (name, vec![Some(1.0); 14])).into();
+    let panels = vec![MatrixPanel { name: "at the value of each family that is worst for the method", rows }];
+    let columns = vec!["a family with a name"; 14];
+    let matrix =
+        Matrix { title: "t", subject: "s", scale: ["the best", "32 times as much"], columns, panels };
+    check(|look| matrix.picture(look));
+}
+
+/// The colour of each unit in the legend or beside the lane of a picture, by its name.
+fn unit_colours(picture: &Picture) -> Vec<(String, [u8; 3])> {
+    let mut found = Vec::new();
+    for shape in &picture.shapes {
+        let Shape::Text(text) = shape else { continue };
+        if Unit::ALL.into_iter().all(|unit| unit.name() != text.text) {
+            continue;
+        }
+        // The swatch at the same height, nearest to the name.
+        let swatch = |shape: &Shape| match shape {
+            Shape::Rect { from, to, fill }
+                if (0.5 * (from.1 + to.1) - text.at.1).abs() < 1.0 && to.0 - from.0 < 15.0 =>
+            {
+                Some(((from.0 - text.at.0).abs(), fill.rgb))
+            }
+            _ => None,
+        };
+        let nearest = picture.shapes.iter().filter_map(swatch).min_by(|a, b| a.0.total_cmp(&b.0));
+        found.push((text.text.clone(), nearest.unwrap().1));
+    }
+    found
+}
+
+/// The colour of a unit depended on which other units were in use.
+#[test]
+fn a_unit_has_one_colour_in_every_plot() {
+    let few = [Unit::Shader, Unit::SampleTest, Unit::L2, Unit::Dram];
+    for units in [&Unit::ALL[..], &few[..]] {
+        let parts = units.iter().map(|&unit| PowerPart { part: Part::Unit(unit), power_w: vec![1.0; 4] });
+        let parts = parts.collect();
+        let power = FramePower { subject: "s", frame: 0, bin_s: 1e-6, parts, samples: &[], frame_j: None };
+        let busy = units.iter().map(|unit| UnitLane { name: unit.name(), busy: vec![0.0; 4] }).collect();
+        let busy = UnitBusy { subject: "s", frame: 0, bin_s: 1e-6, units: busy };
+        let lane =
+            |unit: &Unit| StallLane { name: unit.name(), shares: vec![[0.0; 3]; 4], bottleneck: vec![] };
+        let stalls =
+            StallLanes { subject: "s", frame: 0, interval_s: 1e-6, units: units.iter().map(lane).collect() };
+        let look = Look::default();
+        for picture in [power.picture(&look), busy.picture(&look), stalls.picture(&look)] {
+            let colours = unit_colours(&picture);
+            assert_eq!(colours.len(), units.len(), "{}", picture.title);
+            for (name, rgb) in colours {
+                let unit = Unit::ALL.into_iter().find(|unit| unit.name() == name).unwrap();
+                assert_eq!(part_colour(Part::Unit(unit)).rgb, rgb, "{name} in {}", picture.title);
+            }
+        }
+    }
+}
+
+/// What a paper asks for: so many millimetres, letters of so many points, its own caption.
+#[test]
+fn pictures_are_as_wide_as_asked_for() {
+    let chart = Chart::new(
+        "Own title",
+        "own subject",
+        vec![ChartPanel::new("", ["x", "y"], vec![Series::curve("one", [(1.0, 1.0), (10.0, 5.0)])])],
+    );
+    let look = Look { width_mm: Some(85.0), title: Some(String::new()), ..Look::default() };
+    let picture = chart.picture(&look);
+    let svg = picture.svg().unwrap();
+    assert!(svg.contains("width=\"85.00mm\"") && !svg.contains("own subject"), "{svg}");
+    let pdf: String = picture.pdf().iter().map(|&byte| char::from(byte)).collect();
+    assert!(pdf.contains("/MediaBox [0 0 240.9"), "85 mm are 240.94 points");
+    let png = picture.png().unwrap();
+    let width = u32::from_be_bytes([png[16], png[17], png[18], png[19]]);
+    assert!(width.abs_diff(1004) <= 1, "85 mm at 300 pixels an inch: {width}");
+    let titled = chart.picture(&Look { title: Some("Another".to_owned()), ..Look::default() }).svg().unwrap();
+    assert!(titled.contains("Another") && !titled.contains("Own title") && titled.contains("own subject"));
+}

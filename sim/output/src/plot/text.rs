@@ -1,0 +1,69 @@
+//! Text in pictures: its width, and what is done where it is too wide.
+
+use std::sync::OnceLock;
+
+use plotters::style::{FontFamily, FontStyle, IntoFont, register_font};
+
+use crate::font;
+
+/// How much finer than the picture text is measured and SVG is drawn, and PNG before it is halved.
+pub(super) const SCALE: f64 = 2.0;
+
+/// What `plotters` calls a font's size over its em.
+pub(super) const SIZE_OVER_EM: f64 = 1.24;
+
+/// Makes the embedded fonts known to `plotters`, once; whether it could.
+pub(super) fn register() -> bool {
+    static DONE: OnceLock<bool> = OnceLock::new();
+    *DONE.get_or_init(|| {
+        register_font(font::FAMILY, FontStyle::Normal, font::REGULAR).is_ok()
+            && register_font(font::FAMILY, FontStyle::Bold, font::BOLD).is_ok()
+    })
+}
+
+/// The font with an em of `size` steps of the backend.
+pub(super) fn plotters_font(size: f64, bold: bool) -> plotters::style::FontDesc<'static> {
+    let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
+    (FontFamily::Name(font::FAMILY), size * SIZE_OVER_EM, style).into_font()
+}
+
+/// The width in pixels of `text` in letters of `size`.
+pub(super) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
+    // A damaged font is reported when the picture is rendered; until then about half an em a letter will do.
+    let guess = text.chars().count() as f64 * size * 0.6;
+    if !register() {
+        return guess;
+    }
+    plotters_font(size * SCALE, bold).box_size(text).map_or(guess, |(width, _)| f64::from(width) / SCALE)
+}
+
+/// `label` in lines of at most `room` pixels, broken between words.
+pub(super) fn wrapped(label: &str, size: f64, bold: bool, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in label.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), size, bold) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// `label`, cut with `…` where it is wider than `room` pixels.
+pub(super) fn shortened(label: &str, size: f64, room: f64) -> String {
+    let mut short: Vec<char> = label.chars().collect();
+    if text_width(label, size, false) <= room {
+        return label.to_owned();
+    }
+    while !short.is_empty() {
+        short.pop();
+        let candidate: String = short.iter().chain(['…'].iter()).collect();
+        if text_width(&candidate, size, false) <= room {
+            return candidate;
+        }
+    }
+    String::new()
+}

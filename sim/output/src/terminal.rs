@@ -1,0 +1,109 @@
+//! Messages on standard error: errors, warnings, notes and details, coloured where the terminal shows colours.
+
+use std::io::{Write, stderr};
+
+use std::fmt::Display;
+
+use anstream::AutoStream;
+use clap::ColorChoice;
+use clap::builder::Styles;
+use clap::builder::styling::{AnsiColor, Style};
+use warnings::Warning;
+
+/// How much is printed on standard error. Results on standard output do not depend on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verbosity {
+    /// Errors only.
+    Quiet,
+    /// Errors, warnings, notes and, on a terminal, progress.
+    #[default]
+    Normal,
+    /// The same with details.
+    Verbose,
+}
+
+/// Standard error: what may be printed there and whether in colour. Made once from the command line and handed to what
+/// prints; it may be used from any thread.
+#[derive(Clone, Debug, Default)]
+pub struct Terminal {
+    verbosity: Verbosity,
+    colored: bool,
+}
+
+impl Terminal {
+    /// A terminal for messages up to `verbosity`. With [`ColorChoice::Auto`] colours depend on standard error and on
+    /// the variables `NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM`.
+    pub fn new(verbosity: Verbosity, color: ColorChoice) -> Self {
+        let colored = match color {
+            ColorChoice::Always => true,
+            ColorChoice::Never => false,
+            ColorChoice::Auto => AutoStream::choice(&stderr()) != anstream::ColorChoice::Never,
+        };
+        Self { verbosity, colored }
+    }
+
+    /// How much is printed.
+    pub fn verbosity(&self) -> Verbosity {
+        self.verbosity
+    }
+
+    /// Prints why the command failed.
+    pub fn error(&self, message: &str) {
+        self.line("error", *Styles::styled().get_error(), message);
+    }
+
+    /// Prints a warning with its code on one line, unless quiet; a line for each of several details where these are wanted.
+    pub fn warn(&self, warning: &Warning) {
+        if self.verbosity < Verbosity::Verbose || warning.details.len() < 2 {
+            return self.warn_of(warning.code, &warning.line());
+        }
+        self.warn_of(warning.code, &warning.message);
+        warning.details.iter().for_each(|detail| self.detail(detail));
+        if warning.omitted() > 0 {
+            self.detail(&format!("and {} more", warning.omitted()));
+        }
+    }
+
+    /// Prints a warning of this code, unless quiet.
+    pub fn warn_of(&self, code: impl Display, message: &str) {
+        if self.verbosity >= Verbosity::Normal {
+            self.line("warning", AnsiColor::Yellow.on_default().bold(), &format!("[{code}] {message}"));
+        }
+    }
+
+    /// Prints what is worth knowing and changes no result, unless quiet.
+    pub fn note(&self, message: &str) {
+        if self.verbosity >= Verbosity::Normal {
+            self.line("note", AnsiColor::Cyan.on_default().bold(), message);
+        }
+    }
+
+    /// Prints a detail where details are wanted.
+    pub fn detail(&self, message: &str) {
+        if self.verbosity >= Verbosity::Verbose {
+            self.line("detail", Style::new().dimmed(), message);
+        }
+    }
+
+    /// One line in one write, so that lines of several threads do not mix. If standard error cannot be written to there
+    /// is nowhere left to say so.
+    fn line(&self, kind: &str, style: Style, message: &str) {
+        let line = match self.colored {
+            true => format!("{style}{kind}:{style:#} {message}\n"),
+            false => format!("{kind}: {message}\n"),
+        };
+        let _ = stderr().lock().write_all(line.as_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_follow_the_choice() {
+        let [always, never] =
+            [ColorChoice::Always, ColorChoice::Never].map(|color| Terminal::new(Verbosity::Normal, color));
+        assert!(always.colored && !never.colored);
+    }
+}

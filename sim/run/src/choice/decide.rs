@@ -1,0 +1,229 @@
+//! From what the probe found to a choice.
+
+use crate::Sampling;
+use timing::Level;
+
+use super::Wish;
+
+/// What the probe found, over its frames.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Findings {
+    /// Of each level in the order of [`Level::ALL`]: the worst error.
+    errors: [f64; 3],
+    /// Seconds of the host for the clock, by level, and for the pipeline.
+    timing_s: [f64; 3],
+    pipeline_s: f64,
+    /// The worst error of leaving out dimensions that hardly show, where that changes anything.
+    pub dimensions_error: Option<f64>,
+    /// Multiply-adds with all dimensions and without these.
+    madds: [u64; 2],
+}
+
+impl Findings {
+    pub fn add(&mut self, level: Level, error: f64, timing_s: f64, pipeline_s: f64) {
+        let at = level as usize;
+        self.errors[at] = self.errors[at].max(error);
+        self.timing_s[at] += timing_s;
+        self.pipeline_s += pipeline_s / Level::ALL.len() as f64;
+    }
+
+    pub fn add_dimensions(&mut self, error: f64, madds: [u64; 2]) {
+        self.dimensions_error = Some(self.dimensions_error.map_or(error, |worst| worst.max(error)));
+        self.madds.iter_mut().zip(madds).for_each(|(sum, madds)| *sum += madds);
+    }
+
+    pub fn scale_times(&mut self, by: f64) {
+        self.timing_s.iter_mut().for_each(|seconds| *seconds *= by);
+        self.pipeline_s *= by;
+    }
+
+    /// The worst error of a level.
+    pub fn error(&self, level: Level) -> f64 {
+        self.errors[level as usize]
+    }
+
+    /// The share of multiply-adds that goes with dimensions that hardly show.
+    pub fn saved(&self) -> f64 {
+        let [all, fewer] = self.madds;
+        if all == 0 { 0.0 } else { 1.0 - fewer as f64 / all as f64 }
+    }
+
+    fn frame_s(&self, level: Level) -> f64 {
+        self.pipeline_s + self.timing_s[level as usize]
+    }
+}
+
+/// What to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Decision {
+    pub level: Level,
+    pub sampling: Sampling,
+    pub fewer_dimensions: bool,
+    /// Expected error of level and dimensions; that of predicting frames is known later.
+    pub error: f64,
+    /// Expected seconds of the host.
+    pub host_s: f64,
+}
+
+/// Fewer frames than these are not worth predicting.
+const FRAMES_WORTH_IT: usize = 20;
+/// Leaving out dimensions has to save this share of the work.
+const SAVED_WORTH_IT: f64 = 0.1;
+/// Previews of a run take about as long as this share of its frames.
+const PREVIEWS: f64 = 0.05;
+
+/// Chooses for a run of `frames` that differ.
+pub(super) fn decide(wish: &Wish, findings: &Findings, frames: usize) -> Decision {
+    let decision = match wish.accuracy {
+        Some(accuracy) => by_accuracy(accuracy, findings, frames),
+        None => every(Level::Stepped, findings, frames),
+    };
+    match wish.budget_s {
+        Some(budget_s) if decision.host_s > budget_s || decision.sampling != Sampling::Every => {
+            by_budget(budget_s, decision, findings, frames)
+        }
+        _ => decision,
+    }
+}
+
+/// The cheapest level whose error is within `limit`; the reference is its own.
+pub fn cheapest_level(error: impl Fn(Level) -> f64, limit: f64) -> Level {
+    Level::ALL.into_iter().rev().find(|&level| error(level) <= limit).unwrap_or(Level::Stepped)
+}
+
+/// The cheapest level whose error leaves half of the accuracy to predicting frames; all of it where there are too few.
+/// What dimensions cost comes off first.
+fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
+    let worth_it = findings.saved() >= SAVED_WORTH_IT;
+    let lost = findings.dimensions_error.filter(|lost| worth_it && *lost <= 0.25 * accuracy);
+    let left = accuracy - lost.unwrap_or(0.0);
+    let predicts = frames >= FRAMES_WORTH_IT;
+    let limit = if predicts { 0.5 * left } else { left };
+    let level = cheapest_level(|level| findings.error(level), limit);
+    let target = left - findings.error(level);
+    let mut decision = every(level, findings, frames);
+    decision.fewer_dimensions = lost.is_some();
+    decision.error += lost.unwrap_or(0.0);
+    if predicts {
+        decision.sampling = Sampling::Until { target, most: frames };
+        decision.host_s = some_s(level, Sampling::BEGIN, findings, frames);
+    }
+    decision
+}
+
+/// The most exact that fits: what was chosen, if need be with fewer frames; else every frame, then some, at cheaper levels.
+fn by_budget(budget_s: f64, wanted: Decision, findings: &Findings, frames: usize) -> Decision {
+    let fits = |level: Level| {
+        let spare_s = budget_s - PREVIEWS * frames as f64 * findings.frame_s(level);
+        (spare_s / findings.frame_s(level).max(f64::MIN_POSITIVE)).floor().clamp(0.0, frames as f64) as usize
+    };
+    if let Sampling::Until { target, .. } = wanted.sampling
+        && fits(wanted.level) >= Sampling::BEGIN
+    {
+        return Decision { sampling: Sampling::Until { target, most: fits(wanted.level) }, ..wanted };
+    }
+    let keep = |decision: Decision| Decision {
+        fewer_dimensions: wanted.fewer_dimensions,
+        error: decision.error + wanted.error - findings.error(wanted.level),
+        ..decision
+    };
+    let exact = [Level::Stepped, Level::Packet].map(|level| every(level, findings, frames));
+    if let Some(decision) = exact.into_iter().find(|decision| decision.host_s <= budget_s) {
+        return keep(decision);
+    }
+    let level = if fits(Level::Packet) >= Sampling::LEAST { Level::Packet } else { Level::Bound };
+    let whole = every(level, findings, frames);
+    if frames < FRAMES_WORTH_IT || whole.host_s <= budget_s {
+        return keep(every(Level::Bound, findings, frames));
+    }
+    let count = fits(level).max(Sampling::LEAST);
+    let host_s = some_s(level, count, findings, frames);
+    keep(Decision { sampling: Sampling::Count(count), host_s, ..whole })
+}
+
+fn every(level: Level, findings: &Findings, frames: usize) -> Decision {
+    let host_s = findings.frame_s(level) * frames as f64;
+    Decision {
+        level,
+        sampling: Sampling::Every,
+        fewer_dimensions: false,
+        error: findings.error(level),
+        host_s,
+    }
+}
+
+fn some_s(level: Level, count: usize, findings: &Findings, frames: usize) -> f64 {
+    findings.frame_s(level) * (count as f64 + PREVIEWS * frames as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors of 0, 0.5 and 10 %; a frame takes 1.1, 0.2 and 0.11 s.
+    fn findings() -> Findings {
+        let mut findings = Findings::default();
+        for (level, error, timing_s) in
+            [(Level::Stepped, 0.0, 1.0), (Level::Packet, 0.005, 0.1), (Level::Bound, 0.1, 0.01)]
+        {
+            findings.add(level, error, timing_s, 0.1);
+        }
+        findings
+    }
+
+    fn wish(accuracy: f64, budget_s: f64) -> Wish {
+        let given = |value: f64| (value > 0.0).then_some(value);
+        Wish { accuracy: given(accuracy), budget_s: given(budget_s) }
+    }
+
+    #[test]
+    fn the_cheapest_level_that_is_good_enough() {
+        let level = |accuracy, frames| decide(&wish(accuracy, 0.0), &findings(), frames).level;
+        assert_eq!(
+            [0.001, 0.005, 0.09, 0.1].map(|a| level(a, 1)),
+            [Level::Stepped, Level::Packet, Level::Packet, Level::Bound]
+        );
+        // Where frames are predicted, half is left to that.
+        assert_eq!([0.009, 0.01, 0.2].map(|a| level(a, 300)), [Level::Stepped, Level::Packet, Level::Bound]);
+    }
+
+    #[test]
+    fn frames_are_predicted_to_what_the_level_leaves() {
+        let decision = decide(&wish(0.02, 0.0), &findings(), 300);
+        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, most: 300 });
+        assert_eq!(decide(&wish(0.02, 0.0), &findings(), 19).sampling, Sampling::Every);
+    }
+
+    #[test]
+    fn the_most_exact_that_fits_the_budget() {
+        let of = |budget_s| {
+            let decision = decide(&wish(0.0, budget_s), &findings(), 100);
+            (decision.level, decision.sampling)
+        };
+        assert_eq!(of(120.0), (Level::Stepped, Sampling::Every));
+        assert_eq!(of(30.0), (Level::Packet, Sampling::Every));
+        assert_eq!(of(11.05), (Level::Packet, Sampling::Count(50)));
+        // Not even six frames at `packet`.
+        assert_eq!(of(1.6), (Level::Bound, Sampling::Count(9)));
+        assert_eq!(of(0.1), (Level::Bound, Sampling::Count(Sampling::LEAST)));
+    }
+
+    #[test]
+    fn both_take_as_many_frames_as_fit() {
+        let decision = decide(&wish(0.02, 5.05), &findings(), 100);
+        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, most: 20 });
+    }
+
+    #[test]
+    fn dimensions_are_left_out_where_that_saves_work_and_costs_little() {
+        let with = |error, madds| {
+            let mut findings = findings();
+            findings.add_dimensions(error, madds);
+            decide(&wish(0.02, 0.0), &findings, 1).fewer_dimensions
+        };
+        assert!(with(0.004, [100, 50]));
+        assert!(!with(0.006, [100, 50]), "it costs too much of the accuracy");
+        assert!(!with(0.001, [100, 95]), "it saves too little");
+        assert!(!decide(&wish(0.02, 0.0), &findings(), 1).fewer_dimensions);
+    }
+}

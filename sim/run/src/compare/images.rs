@@ -1,0 +1,276 @@
+//! Two images, or the images of two folders.
+//!
+//! PNG pairs are compared as they are shown: in sRGB values from 0 to 1. Pairs of EXR files, and an EXR with a PNG, are compared
+//! in linear light, without limits. The structural similarity is that of both as they are shown.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
+use std::path::Path;
+
+use ::image::{DynamicImage, ImageReader, Limits};
+use blazediff_ssim::{Plane, Rgba8, SsimOptions, ssim};
+use pipeline::texture::{linear_to_srgb8, srgb8_to_linear};
+use serde::Serialize;
+
+use super::CompareError;
+use output::image::{LinearImage, encode_png};
+
+/// Largest side of an image in pixels.
+const MAX_SIDE_PX: u32 = 32_768;
+
+/// Most bytes that a decoder may take.
+const MAX_DECODED_BYTES: u64 = 4 << 30;
+
+/// Two images of one size.
+#[derive(Clone, Debug, Serialize)]
+pub struct ImageComparison {
+    /// The files.
+    pub files: [String; 2],
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Whether values are linear light, as EXR has them, rather than sRGB from 0 to 1, as PNG has them.
+    pub linear: bool,
+    /// Mean squared error over pixels and channels.
+    pub mse: f64,
+    /// Peak signal to noise ratio for a peak of 1, in dB; none for equal images.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity (Wang and others 2004) of luma, 1 for equal images; none for images too small for its window.
+    pub ssim: Option<f64>,
+    /// Mean absolute difference.
+    pub mean_difference: f64,
+    /// Largest absolute difference of a channel.
+    pub largest_difference: f64,
+    /// Pixels that differ.
+    pub pixels_that_differ: u64,
+    /// Pixels left out because a channel is not finite.
+    pub pixels_not_finite: u64,
+    /// The factor by which the difference image is brighter than the difference, where one was written as PNG.
+    pub scale: Option<f64>,
+}
+
+/// The images of two folders.
+#[derive(Clone, Debug, Serialize)]
+pub struct FolderComparison {
+    /// The folders.
+    pub files: [String; 2],
+    /// Images that are in both, by name.
+    pub images: Vec<Named>,
+    /// Images that are only in A.
+    pub only_in_a: Vec<String>,
+    /// Images that are only in B.
+    pub only_in_b: Vec<String>,
+    /// Mean of the mean squared errors.
+    pub mse: Option<f64>,
+    /// How many are equal.
+    pub equal: usize,
+}
+
+/// Two images of one name.
+#[derive(Clone, Debug, Serialize)]
+pub struct Named {
+    /// The name.
+    pub name: String,
+    /// What is between them.
+    #[serde(flatten)]
+    pub comparison: ImageComparison,
+}
+
+/// An image in memory.
+struct Picture {
+    width: u32,
+    height: u32,
+    /// Linear light.
+    linear: Vec<[f32; 3]>,
+    /// As it is shown.
+    shown: Vec<[u8; 3]>,
+    is_linear: bool,
+}
+
+impl Picture {
+    fn read(path: &Path) -> Result<Self, CompareError> {
+        let file = File::open(path).map_err(CompareError::unreadable(path))?;
+        let broken = |error: String| {
+            let message =
+                format!("cannot be decoded as an image: {error}; give a PNG or an EXR file that is whole");
+            CompareError::broken(path, message)
+        };
+        let mut reader = ImageReader::new(BufReader::new(file))
+            .with_guessed_format()
+            .map_err(CompareError::unreadable(path))?;
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(MAX_SIDE_PX);
+        limits.max_image_height = Some(MAX_SIDE_PX);
+        limits.max_alloc = Some(MAX_DECODED_BYTES);
+        reader.limits(limits);
+        let image = reader.decode().map_err(|error| broken(error.to_string()))?;
+        let is_linear = matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
+        let (width, height) = (image.width(), image.height());
+        let (linear, shown) = if is_linear {
+            let linear: Vec<[f32; 3]> = image.into_rgb32f().pixels().map(|pixel| pixel.0).collect();
+            let shown = linear.iter().map(|pixel| pixel.map(linear_to_srgb8)).collect();
+            (linear, shown)
+        } else {
+            let shown: Vec<[u8; 3]> = image.into_rgb8().pixels().map(|pixel| pixel.0).collect();
+            let linear = shown.iter().map(|pixel| pixel.map(srgb8_to_linear)).collect();
+            (linear, shown)
+        };
+        Ok(Self { width, height, linear, shown, is_linear })
+    }
+
+    fn luma(&self) -> Option<Plane> {
+        let rgba: Vec<u8> = self.shown.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
+        Plane::from_rgba8(Rgba8::new(&rgba, self.width as usize, self.height as usize)).ok()
+    }
+}
+
+/// Compares two images and writes their difference into `out`.
+pub(super) fn compare(a: &Path, b: &Path, out: Option<&Path>) -> Result<ImageComparison, CompareError> {
+    let pictures = [Picture::read(a)?, Picture::read(b)?];
+    let mut comparison = between([a, b], &pictures)?;
+    if let Some(out) = out {
+        comparison.scale = write_difference(out, &pictures, comparison.linear)?;
+    }
+    Ok(comparison)
+}
+
+fn between(files: [&Path; 2], pictures: &[Picture; 2]) -> Result<ImageComparison, CompareError> {
+    let [a, b] = pictures;
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(CompareError::Usage(format!(
+            "{} has {}x{} pixels and {} {}x{}: give images of one size",
+            files[0].display(),
+            a.width,
+            a.height,
+            files[1].display(),
+            b.width,
+            b.height
+        )));
+    }
+    let linear = a.is_linear || b.is_linear;
+    let (mut squares, mut sum, mut largest) = (0.0, 0.0, 0.0_f64);
+    let (mut differ, mut not_finite) = (0, 0);
+    for difference in differences(pictures, linear) {
+        let Some(difference) = difference else {
+            not_finite += 1;
+            continue;
+        };
+        differ += u64::from(difference != [0.0; 3]);
+        for part in difference {
+            squares += part * part;
+            sum += part.abs();
+            largest = largest.max(part.abs());
+        }
+    }
+    let pixels = u64::from(a.width) * u64::from(a.height);
+    let count = 3.0 * (pixels - not_finite).max(1) as f64;
+    let mse = squares / count;
+    Ok(ImageComparison {
+        files: files.map(|path| path.display().to_string()),
+        width: a.width,
+        height: a.height,
+        linear,
+        mse,
+        psnr_db: (mse > 0.0).then(|| -10.0 * libm::log10(mse)),
+        ssim: similarity(pictures),
+        mean_difference: sum / count,
+        largest_difference: largest,
+        pixels_that_differ: differ,
+        pixels_not_finite: not_finite,
+        scale: None,
+    })
+}
+
+/// B minus A for each pixel; none where it is not finite.
+fn differences(pictures: &[Picture; 2], linear: bool) -> impl Iterator<Item = Option<[f64; 3]>> + '_ {
+    let [a, b] = pictures;
+    (0..a.shown.len()).map(move |pixel| {
+        let part = |channel: usize| {
+            if linear {
+                f64::from(b.linear[pixel][channel]) - f64::from(a.linear[pixel][channel])
+            } else {
+                (f64::from(b.shown[pixel][channel]) - f64::from(a.shown[pixel][channel])) / 255.0
+            }
+        };
+        let difference = [part(0), part(1), part(2)];
+        difference.iter().all(|part| part.is_finite()).then_some(difference)
+    })
+}
+
+fn similarity([a, b]: &[Picture; 2]) -> Option<f64> {
+    ssim(&a.luma()?, &b.luma()?, &SsimOptions::default()).ok().map(|outcome| outcome.score)
+}
+
+/// Writes the difference image; gives the factor by which it was made brighter.
+fn write_difference(out: &Path, pictures: &[Picture; 2], linear: bool) -> Result<Option<f64>, CompareError> {
+    let failed = |message: String| CompareError::Write { path: out.display().to_string(), message };
+    let [width, height] = [pictures[0].width, pictures[0].height];
+    let difference: Vec<[f64; 3]> =
+        differences(pictures, linear).map(|difference| difference.unwrap_or_default()).collect();
+    let (bytes, scale) = match out.extension().and_then(|ending| ending.to_str()) {
+        Some("exr") => {
+            let signed: Vec<[f32; 3]> = differences(pictures, true)
+                .map(|difference| difference.unwrap_or_default().map(|part| part as f32))
+                .collect();
+            let image = LinearImage::new(width, height, &signed).and_then(|image| image.exr());
+            (image.map_err(|error| failed(error.to_string()))?, None)
+        }
+        Some("png") => {
+            let largest = difference.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
+            let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
+            let shown: Vec<u8> =
+                difference.iter().flatten().map(|part| (255.0 * scale * part.abs()).round() as u8).collect();
+            (encode_png(width, height, &shown).map_err(|error| failed(error.to_string()))?, Some(scale))
+        }
+        _ => {
+            let message = format!("--out: {}: give a name that ends in .png or .exr", out.display());
+            return Err(CompareError::Usage(message));
+        }
+    };
+    let written = traces::io::atomic::write_file(out, |file: &mut BufWriter<File>| {
+        file.write_all(&bytes)?;
+        file.flush()
+    });
+    written.map_err(|error| failed(error.to_string()))?;
+    Ok(scale)
+}
+
+/// Compares the images of two folders by their names.
+pub(super) fn compare_folders(a: &Path, b: &Path) -> Result<FolderComparison, CompareError> {
+    let [in_a, in_b] = [names(a)?, names(b)?];
+    for (folder, names) in [(a, &in_a), (b, &in_b)] {
+        if names.is_empty() {
+            let message = "there is neither a summary.json nor a .png or .exr image in it: give the folder of a run, or one of images";
+            return Err(CompareError::broken(folder, message));
+        }
+    }
+    let mut images = Vec::new();
+    for name in in_a.intersection(&in_b) {
+        let comparison = compare(&a.join(name), &b.join(name), None)?;
+        images.push(Named { name: name.clone(), comparison });
+    }
+    let mean = images.iter().map(|image| image.comparison.mse).sum::<f64>() / images.len().max(1) as f64;
+    Ok(FolderComparison {
+        files: [a, b].map(|path| path.display().to_string()),
+        mse: (!images.is_empty()).then_some(mean),
+        equal: images.iter().filter(|image| image.comparison.pixels_that_differ == 0).count(),
+        only_in_a: in_a.difference(&in_b).cloned().collect(),
+        only_in_b: in_b.difference(&in_a).cloned().collect(),
+        images,
+    })
+}
+
+fn names(folder: &Path) -> Result<BTreeSet<String>, CompareError> {
+    let entries = std::fs::read_dir(folder).map_err(CompareError::unreadable(folder))?;
+    let mut names = BTreeSet::new();
+    for entry in entries {
+        let entry = entry.map_err(CompareError::unreadable(folder))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if (name.ends_with(".png") || name.ends_with(".exr")) && entry.path().is_file() {
+            names.insert(name);
+        }
+    }
+    Ok(names)
+}

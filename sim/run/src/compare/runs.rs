@@ -1,0 +1,255 @@
+//! Two runs by their `summary.json`.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::CompareError;
+use super::numbers::Change;
+
+/// The file of a run that is compared.
+pub(super) const SUMMARY: &str = "summary.json";
+
+/// Two runs.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunComparison {
+    /// The summaries.
+    pub files: [String; 2],
+    /// Why a difference may not be due to what is listed as different.
+    pub warnings: Vec<String>,
+    /// What the runs were made from and differs.
+    pub settings: Vec<Setting>,
+    /// Every number of the two, in the order of the file.
+    pub values: Vec<Change>,
+}
+
+/// Something that runs are made from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Setting {
+    /// Its place in the file.
+    pub name: String,
+    /// Its value in A; null where A has none.
+    pub a: Value,
+    /// Its value in B.
+    pub b: Value,
+}
+
+/// Keys that say what a run was made from. What only says how it was called is left out.
+const SETTINGS: [&str; 10] = [
+    "schema",
+    "version",
+    "scene",
+    "gpu",
+    "platform",
+    "energy_table",
+    "settings",
+    "camera",
+    "inputs",
+    "modelled",
+];
+
+/// Keys below these that follow from the others.
+const RESULTS: [&str; 4] = ["modelled.units", "modelled.units_not_modelled", "modelled.limits", "camera.ron"];
+
+/// Keys of numbers, each with the name of its group and its unit where the names below do not end in one.
+const GROUPS: [(&str, &str, &str); 12] = [
+    ("truth", "frames (truth)", ""),
+    ("measured", "frames (measured)", ""),
+    ("power_by_part_w", "power", "W"),
+    ("energy_by_part_j", "energy of the run", "J"),
+    ("unit_busy", "busy share", ""),
+    ("stalls", "shares of time", ""),
+    ("sample_test_efficiency", "sample test", ""),
+    ("facts", "facts", ""),
+    ("counts", "counters", ""),
+    ("checks", "checks", ""),
+    ("detection", "detection", ""),
+    ("verified", "actual errors", ""),
+];
+
+/// Numbers of frames whose means are compared.
+const OF_FRAMES: [&str; 3] = ["cycles", "busy_ms", "busy_s"];
+
+/// Compares the runs in the folders, or with the summaries, `a` and `b`.
+pub(super) fn compare(a: &Path, b: &Path) -> Result<RunComparison, CompareError> {
+    let paths = [a, b].map(|path| if path.is_dir() { path.join(SUMMARY) } else { path.to_owned() });
+    let runs = [read(&paths[0])?, read(&paths[1])?];
+    let settings = settings(&runs);
+    Ok(RunComparison {
+        files: paths.map(|path: PathBuf| path.display().to_string()),
+        warnings: warnings(&runs),
+        settings,
+        values: values(&runs),
+    })
+}
+
+fn read(path: &Path) -> Result<Value, CompareError> {
+    let text = std::fs::read(path).map_err(CompareError::unreadable(path))?;
+    let run: Value = serde_json::from_slice(&text)
+        .map_err(|error| CompareError::broken(path, format!("not JSON: {error}; run it again")))?;
+    let whole = run["scene"].is_string() && run["counts"].is_object() && run["frames"].is_array();
+    if !whole {
+        let message = "it is not the summary of `quintile run`: give the folder of a run or its summary.json";
+        return Err(CompareError::broken(path, message));
+    }
+    Ok(run)
+}
+
+fn warnings(runs: &[Value; 2]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let [a, b] = runs;
+    if a["schema"] != b["schema"] {
+        warnings.push(format!(
+            "the files have different schemas ({}, {}): what only one of them has is not compared",
+            shown(&a["schema"]),
+            shown(&b["schema"])
+        ));
+    }
+    if a["scene"] != b["scene"] {
+        warnings.push(format!("the scenes differ ({}, {})", shown(&a["scene"]), shown(&b["scene"])));
+    }
+    let pixels = |run: &Value| [run["settings"]["width"].as_u64(), run["settings"]["height"].as_u64()];
+    if pixels(a) != pixels(b) {
+        warnings.push("the images have different sizes: compare energies per pixel".to_owned());
+    }
+    let frames = |run: &Value| run["frames"].as_array().map_or(0, Vec::len);
+    if frames(a) != frames(b) {
+        warnings.push(format!(
+            "the runs have {} and {} frames: compare means of frames, not sums of runs",
+            frames(a),
+            frames(b)
+        ));
+    }
+    if a["modelled"]["timing"] != b["modelled"]["timing"] {
+        warnings.push(format!(
+            "time was modelled differently ({}, {}): a difference may be an error of the model",
+            shown(&a["modelled"]["timing"]),
+            shown(&b["modelled"]["timing"])
+        ));
+    }
+    warnings
+}
+
+/// A value for people: text without quotes, `-` for none.
+pub fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "-".to_owned(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn settings(runs: &[Value; 2]) -> Vec<Setting> {
+    let pairs = SETTINGS.iter().flat_map(|key| leaves(key, [&runs[0][key], &runs[1][key]]));
+    let differs = |(name, [a, b]): &(String, [&Value; 2])| {
+        a != b && !RESULTS.iter().any(|result| name.starts_with(result))
+    };
+    let made = |(name, [a, b]): (String, [&Value; 2])| Setting { name, a: a.clone(), b: b.clone() };
+    pairs.filter(differs).map(made).collect()
+}
+
+fn values(runs: &[Value; 2]) -> Vec<Change> {
+    let mut values: Vec<Change> = OF_FRAMES.iter().filter_map(|name| of_frames(runs, name)).collect();
+    for (key, group, unit) in GROUPS {
+        for (name, pair) in leaves(key, [&runs[0][key], &runs[1][key]]) {
+            let name = name.strip_prefix(key).map_or(name.as_str(), |rest| rest.trim_start_matches('.'));
+            let name = if name.is_empty() { key } else { name };
+            let numbers = pair.map(Value::as_f64);
+            if numbers.iter().any(Option::is_some) {
+                let unit = if unit.is_empty() { unit_of(name) } else { unit };
+                values.push(Change::new(group, name, unit, numbers));
+            }
+        }
+    }
+    values
+}
+
+/// The mean over frames of what each of them has under `name`.
+fn of_frames(runs: &[Value; 2], name: &str) -> Option<Change> {
+    let mean = |run: &Value| {
+        let numbers: Option<Vec<f64>> =
+            run["frames"].as_array()?.iter().map(|frame| frame[name].as_f64()).collect();
+        let numbers = numbers.filter(|numbers| !numbers.is_empty())?;
+        Some(numbers.iter().sum::<f64>() / numbers.len() as f64)
+    };
+    let means = [mean(&runs[0]), mean(&runs[1])];
+    let known = means.iter().any(Option::is_some);
+    known.then(|| Change::new("mean of a frame", name, unit_of(name), means))
+}
+
+/// The unit that a name ends in, or a part of it that holds mean and deviation.
+fn unit_of(name: &str) -> &'static str {
+    let units = [
+        ("_nj_per_pixel", "nJ"),
+        ("_ms", "ms"),
+        ("_mj", "mJ"),
+        ("_s", "s"),
+        ("_j", "J"),
+        ("_w", "W"),
+        ("_hz", "Hz"),
+        ("_bytes", "bytes"),
+    ];
+    let of_part = |part: &str| units.iter().find(|(ending, _)| part.ends_with(ending)).map(|(_, unit)| *unit);
+    name.split('.').find_map(of_part).unwrap_or("")
+}
+
+/// Every value below two others that is neither a list nor an object, by its place; lists are compared whole.
+fn leaves<'a>(name: &str, pair: [&'a Value; 2]) -> Vec<(String, [&'a Value; 2])> {
+    let objects = pair.map(Value::as_object);
+    if objects.iter().all(Option::is_none) {
+        return vec![(name.to_owned(), pair)];
+    }
+    let mut keys: Vec<&String> = objects.iter().flatten().flat_map(|object| object.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    keys.into_iter().flat_map(|key| leaves(&format!("{name}.{key}"), pair.map(|value| &value[key]))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn run(scene: &str, samples: u32, energy: f64) -> Value {
+        json!({
+            "schema": 1, "scene": scene, "gpu": "g", "settings": {"width": 4, "height": 4, "samples": samples},
+            "truth": {"frames": 2, "energy_j": {"mean": energy, "deviation": 0.0}},
+            "counts": {"samples_tested": 100 * samples}, "unit_busy": {"setup": 0.5},
+            "frames": [{"cycles": 10, "busy_s": 1.0}, {"cycles": 30, "busy_s": 1.0}],
+            "modelled": {"timing": "packet", "units": ["a"]},
+        })
+    }
+
+    #[test]
+    fn settings_that_differ_come_by_their_place_and_numbers_with_their_units() {
+        let runs = [run("a", 4, 2.0), run("a", 8, 3.0)];
+        let differ = settings(&runs);
+        assert_eq!(differ, [Setting { name: "settings.samples".to_owned(), a: json!(4), b: json!(8) }]);
+        let values = values(&runs);
+        let energy = values.iter().find(|change| change.name == "energy_j.mean").unwrap();
+        assert_eq!((energy.unit.as_str(), energy.difference, energy.ratio), ("J", Some(1.0), Some(1.5)));
+        let cycles = values.iter().find(|change| change.name == "cycles").unwrap();
+        assert_eq!((cycles.a, cycles.is_equal()), (Some(20.0), true));
+        assert!(warnings(&runs).is_empty());
+    }
+
+    #[test]
+    fn runs_that_do_not_compare_say_so() {
+        let mut other = run("b", 4, 2.0);
+        other["settings"]["width"] = json!(8);
+        other["frames"] = json!([{"cycles": 1}]);
+        other["modelled"]["timing"] = json!("stepped");
+        other["schema"] = json!(2);
+        let found = warnings(&[run("a", 4, 2.0), other]).join("\n");
+        for says in [
+            "different schemas (1, 2)",
+            "scenes differ (a, b)",
+            "sizes",
+            "2 and 1 frames",
+            "(packet, stepped)",
+        ] {
+            assert!(found.contains(says), "{found}");
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! One small frame on a machine whose files are at hand as text: for tests and fuzz targets of these files.
+
+use power_model::{EnergyTable, Platform};
+use workloads::Overrides;
+
+use super::{Plan, RunError, RunOptions, unwritten};
+use crate::gpu::GpuSpec;
+use output::progress::Progress;
+use timing::Level;
+
+/// The files of a machine as RON text; those that are absent are the reference's.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MachineTexts<'a> {
+    /// The GPU file.
+    pub gpu: Option<&'a str>,
+    /// The platform file.
+    pub platform: Option<&'a str>,
+    /// The energy table.
+    pub table: Option<&'a str>,
+}
+
+impl MachineTexts<'_> {
+    /// Draws one frame of the scene `tiny` at 16x12 pixels, times it at `level`, records it and finds it again; nothing is
+    /// written. The energy of the frame in the recording, J. Messages name the files `gpu.ron`, `platform.ron` and
+    /// `table.ron`.
+    ///
+    /// # Errors
+    /// What is wrong with a file, or with the files together.
+    pub fn one_frame(&self, level: Level) -> Result<f64, RunError> {
+        let gpu =
+            self.gpu.map_or_else(|| GpuSpec::load("reference"), |text| GpuSpec::parse(text, "gpu.ron"))?;
+        let platform = self
+            .platform
+            .map_or_else(|| Platform::builtin("reference"), |text| Platform::parse(text, "platform.ron"))?;
+        let table = self
+            .table
+            .map_or_else(|| EnergyTable::builtin("28nm"), |text| EnergyTable::parse(text, "table.ron"))?;
+        let overrides =
+            Overrides { size: Some((16, 12)), samples: Some(1), frames: Some(0..1), ..Overrides::default() };
+        let options = RunOptions { scene: "tiny".into(), overrides, timing: level, ..RunOptions::default() };
+        let plan = Plan::resolve(options)?.on(gpu, platform, table)?;
+        let (_, measurement) = unwritten(&plan, &Progress::new(true))?;
+        Ok(measurement.frames.iter().map(|frame| frame.energy_j).sum())
+    }
+}

@@ -1,0 +1,123 @@
+//! Why units did not work, where the level of timing knows.
+
+use std::collections::BTreeMap;
+
+use activity::Unit;
+use serde::Serialize;
+use timing::{Stalls, UnitTime};
+
+use super::{RunFrame, Simulated};
+use output::perfetto::CounterTrack;
+use output::plot::{Look, Picture, StallLane, StallLanes};
+
+/// Columns of the picture at most.
+const COLUMNS: usize = 128;
+
+/// Shares of a unit's time over the frames of a run; with those by unit they add up to 1.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct StallShares {
+    /// Working.
+    pub busy: f64,
+    /// With nothing left to do, or nobody asking.
+    pub idle: f64,
+    /// Waiting for a unit to hand something over, by that unit.
+    pub starved: BTreeMap<&'static str, f64>,
+    /// Waiting for a unit to take something or to answer, by that unit.
+    pub blocked: BTreeMap<&'static str, f64>,
+}
+
+/// The shares of every unit in use over all frames that differ; empty where the level of timing does not know.
+pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShares> {
+    let used = simulated.total();
+    let of = |unit: Unit| {
+        let frames = simulated.observed().filter_map(|(_, frame)| frame.stalls.as_ref());
+        let times: Vec<UnitTime> = frames.map(|stalls| stalls.of(unit)).collect();
+        let total = times.iter().map(UnitTime::total).sum::<u64>().max(1) as f64;
+        let share = |pick: &dyn Fn(&UnitTime) -> u64| times.iter().map(pick).sum::<u64>() as f64 / total;
+        let by = |pick: fn(&UnitTime, usize) -> u64| {
+            let shares = Unit::ALL.map(|by| (by.name(), share(&|time| pick(time, by as usize))));
+            shares.into_iter().filter(|(_, share)| *share > 0.0).collect()
+        };
+        let (starved, blocked) = (by(|time, by| time.starved[by]), by(|time, by| time.blocked[by]));
+        StallShares { busy: share(&|time| time.busy), idle: share(&|time| time.idle), starved, blocked }
+    };
+    if simulated.observed().all(|(_, frame)| frame.stalls.is_none()) {
+        return BTreeMap::new();
+    }
+    Unit::ALL.into_iter().filter(|&unit| used.uses(unit)).map(|unit| (unit.name(), of(unit))).collect()
+}
+
+/// Busy, starved and blocked shares of `unit` in each interval.
+fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
+    stalls.intervals().iter().map(move |interval| {
+        let time = &interval[unit as usize];
+        let total = time.total().max(1) as f64;
+        [time.busy, time.starved.iter().sum(), time.blocked.iter().sum()].map(|part| part as f64 / total)
+    })
+}
+
+/// What the units waited for in a frame.
+pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Picture> {
+    let observed = frame.observed()?;
+    let stalls = observed.stalls.as_ref()?;
+    let group = stalls.intervals().len().div_ceil(COLUMNS).max(1);
+    let bottlenecks = stalls.bottlenecks();
+    let of = |unit: Unit| {
+        let shares: Vec<[f64; 3]> = lane(stalls, unit).collect();
+        let mean = |group: &[[f64; 3]]| {
+            [0, 1, 2].map(|kind| group.iter().map(|s| s[kind]).sum::<f64>() / group.len() as f64)
+        };
+        let most = |group: &[(Unit, f64)]| {
+            2 * group.iter().filter(|(busiest, _)| *busiest == unit).count() > group.len()
+        };
+        let bottleneck = bottlenecks.chunks(group).map(most).collect();
+        StallLane { name: unit.name(), shares: shares.chunks(group).map(mean).collect(), bottleneck }
+    };
+    let units = Unit::ALL.into_iter().filter(|&unit| observed.counts.uses(unit)).map(of).collect();
+    let interval_s = stalls.interval_ps() as f64 * 1e-12 * group as f64;
+    Some(StallLanes { subject, frame: u64::from(frame.index), interval_s, units }.picture(look))
+}
+
+/// Names of the tracks, by unit.
+const TRACKS: [[&str; 2]; Unit::COUNT] = [
+    ["command starved", "command blocked"],
+    ["shader starved", "shader blocked"],
+    ["setup starved", "setup blocked"],
+    ["traversal starved", "traversal blocked"],
+    ["z_cull starved", "z_cull blocked"],
+    ["sample_test starved", "sample_test blocked"],
+    ["depth starved", "depth blocked"],
+    ["shading_cache starved", "shading_cache blocked"],
+    ["texture starved", "texture blocked"],
+    ["colour starved", "colour blocked"],
+    ["l2 starved", "l2 blocked"],
+    ["dram starved", "dram blocked"],
+];
+
+/// Tracks of the viewer: for each unit the share of its time that it is starved and that it is blocked. `starts` are those of
+/// the frames of the run, in ns.
+pub(super) fn tracks(simulated: &Simulated, starts: &[u64]) -> Vec<CounterTrack<'static>> {
+    let mut tracks = Vec::new();
+    for (unit, names) in Unit::ALL.into_iter().zip(TRACKS) {
+        for (kind, name) in names.into_iter().enumerate() {
+            let mut points = Vec::new();
+            for (frame, &start) in simulated.in_order().zip(starts) {
+                let Some(stalls) = frame.observed().and_then(|observed| observed.stalls.as_ref()) else {
+                    continue;
+                };
+                let interval_ns = stalls.interval_ps() as f64 * 1e-3;
+                let at = |place: usize| start + (place as f64 * interval_ns) as u64;
+                points.extend(
+                    lane(stalls, unit)
+                        .enumerate()
+                        .map(|(place, shares)| (at(place), 100.0 * shares[kind + 1])),
+                );
+                points.push((start + (frame.power.duration_s() * 1e9) as u64, 0.0));
+            }
+            if points.iter().any(|(_, share)| *share > 0.0) {
+                tracks.push(CounterTrack { name, unit: "%", points });
+            }
+        }
+    }
+    tracks
+}

@@ -1,0 +1,321 @@
+//! The numbers of `summary.json`: the same bytes for the same input, whatever the machine did meanwhile.
+
+use std::collections::BTreeMap;
+
+use activity::{Counts, Unit};
+use power_model::Energy;
+use serde::Serialize;
+use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
+use warnings::Warning;
+use workloads::scene::CameraUsed;
+
+use super::checks::Checks;
+use super::frame_rows::{FrameRow, hash, rows};
+use super::measure::mean_parts_w;
+use super::modelled::Modelled;
+use super::stalls::{self, StallShares};
+use super::{
+    Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated,
+    Verified, warn,
+};
+use output::MeanSd;
+use output::report::Headline;
+
+/// A run in numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Version of the form of this file.
+    pub schema: u32,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the GPU.
+    pub gpu: String,
+    /// Name of the platform.
+    pub platform: String,
+    /// Name of the energy table, and which of its values were used.
+    pub energy_table: [String; 2],
+    /// What was asked for: all that the results depend on but the content of `inputs`.
+    pub request: RunOptions,
+    /// The files that the run was made from, by name.
+    pub inputs: Vec<Input>,
+    /// Settings in use.
+    pub settings: SettingsSummary,
+    /// The camera of the first frame; workloads have cameras of their own.
+    pub camera: Option<CameraUsed>,
+    /// What was modelled and what not.
+    pub modelled: Modelled,
+    /// Regimes in which the methods are known to be bad.
+    pub warnings: Vec<Warning>,
+    /// Frames as measured in the trace; nothing where no frame was found but the marked one.
+    pub measured: Option<Figures>,
+    /// Frames as the simulator knows them.
+    pub truth: Option<Figures>,
+    /// How finely the frames were recorded.
+    pub recorder: Resolution,
+    /// Found against true frame starts.
+    pub detection: Detection,
+    /// Sums that have to agree.
+    pub checks: Checks,
+    /// Joules of the run by part, start of the first frame to end of the last.
+    pub energy_by_part_j: Energy,
+    /// Mean watts of the run by part.
+    pub power_by_part_w: BTreeMap<&'static str, f64>,
+    /// Share of the run's frame time for which each unit in use was busy.
+    pub unit_busy: BTreeMap<&'static str, f64>,
+    /// What each unit did and waited for, in shares of its time; where the level of timing knows.
+    pub stalls: BTreeMap<&'static str, StallShares>,
+    /// Samples hit over samples tested.
+    pub sample_test_efficiency: Option<f64>,
+    /// What a workload found out, its mean over frames.
+    pub facts: BTreeMap<&'static str, f64>,
+    /// How often each event happened in the frames that were simulated.
+    pub counts: Counts,
+    /// A hash of the counts of every frame that was simulated: equal runs have equal hashes.
+    pub counts_hash: String,
+    /// What was chosen for the accuracy or the time that was asked for.
+    pub choice: Option<Choice>,
+    /// Actual errors, where they were asked for.
+    pub verified: Option<Verified>,
+    /// Which frames were simulated and how sure the others are, where not all were.
+    pub sampled: Option<SampledSummary>,
+    /// Every frame of the run.
+    pub frames: Vec<FrameRow>,
+    /// The program, the call and the machine. Everything else is the same on every machine.
+    pub host: Host,
+}
+
+/// The version of the form of `summary.json`, described by `docs/summary.schema.json`. Within a version keys may be added; one that
+/// goes, or changes its meaning or unit, makes the next version.
+pub const SCHEMA: u32 = 1;
+
+/// Settings as they came to be.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "the names say it, documented at their sources")]
+pub struct SettingsSummary {
+    pub width: u32,
+    pub height: u32,
+    pub samples: u32,
+    pub table: String,
+    pub clip: Option<String>,
+    pub frame_rate_hz: f64,
+    pub shutter: f64,
+    pub first_frame: u32,
+    pub frames: u32,
+    pub lens_radius: f32,
+    pub focus: Option<f32>,
+    pub pacing: &'static str,
+    pub trace_rate_hz: f64,
+    pub seed: u64,
+    pub triangles: usize,
+}
+
+/// A table of frames in a few numbers.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Figures {
+    /// How many frames.
+    pub frames: usize,
+    /// Seconds from start to start.
+    pub duration_s: Spread,
+    /// Joules.
+    pub energy_j: Spread,
+    /// Joules per pixel.
+    pub energy_per_pixel_j: Spread,
+    /// Watts.
+    pub power_w: Spread,
+    /// Joules of all frames.
+    pub total_j: f64,
+}
+
+impl Figures {
+    fn of(frames: &[FrameEnergy], pixels: u64) -> Option<Self> {
+        let summary = FrameSummary::of(frames)?;
+        Some(Self {
+            frames: summary.frames,
+            duration_s: summary.duration_s,
+            energy_j: summary.energy_j,
+            energy_per_pixel_j: scaled(summary.energy_j, 1.0 / pixels as f64),
+            power_w: summary.power_w,
+            total_j: summary.total_j,
+        })
+    }
+}
+
+fn scaled(spread: Spread, by: f64) -> Spread {
+    Spread { mean: spread.mean * by, deviation: spread.deviation * by, median: spread.median * by }
+}
+
+/// How the frame finder did.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "the terms of information retrieval")]
+pub struct Detection {
+    pub true_frames: usize,
+    pub found_frames: usize,
+    pub matched_frames: usize,
+    pub precision: f64,
+    pub recall: f64,
+    pub median_timing_error_s: Option<f64>,
+    pub worst_timing_error_s: Option<f64>,
+    pub median_energy_error: Option<f64>,
+    pub worst_energy_error: Option<f64>,
+}
+
+impl Summary {
+    /// The quantities that people compare, measured beside true, mean and standard deviation over frames in SI units.
+    pub fn headline(&self) -> Vec<Headline> {
+        let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread| {
+            let number = |figures: &Option<Figures>| {
+                figures.as_ref().map(pick).map(|s| MeanSd { mean: s.mean, sd: s.deviation })
+            };
+            let (measured, truth) = (number(&self.measured), number(&self.truth));
+            Headline { label: label.to_owned(), unit: unit.to_owned(), measured, truth }
+        };
+        vec![
+            row("time per frame", "s", |f| f.duration_s),
+            row("energy per frame", "J", |f| f.energy_j),
+            row("energy per pixel", "J", |f| f.energy_per_pixel_j),
+            row("power", "W", |f| f.power_w),
+        ]
+    }
+
+    /// What was chosen, what was predicted and how wrong it was, in words; nothing where nothing of that was asked for.
+    pub fn judgement(&self) -> Vec<(&'static str, String)> {
+        let mut rows: Vec<(&'static str, String)> = Vec::new();
+        rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
+        rows.extend(self.sampled.as_ref().map(|sampled| ("predicted", sampled.line())));
+        rows.extend(self.verified.as_ref().map(|verified| ("actual error", verified.line())));
+        rows
+    }
+
+    /// With a warning where what was asked for is not met.
+    pub(super) fn warned(mut self) -> Self {
+        self.warnings.extend(self.choice.iter().flat_map(warn::missed));
+        self.warnings = Warning::fold(self.warnings);
+        self
+    }
+
+    pub(super) fn new(
+        plan: &Plan,
+        provenance: Provenance,
+        simulated: &Simulated,
+        measurement: &Measurement,
+    ) -> Self {
+        let Provenance { request, inputs, camera, host } = provenance;
+        let counts = simulated.total();
+        let truth = true_frames(measurement);
+        let by_part = mean_parts_w(&measurement.run);
+        let pixels = plan.pixels();
+        Self {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            scene: plan.work.name().to_owned(),
+            gpu: plan.gpu.name.clone(),
+            platform: plan.platform.name.clone(),
+            energy_table: [plan.table.name().to_owned(), format!("{:?}", plan.options.bound).to_lowercase()],
+            request,
+            inputs,
+            settings: settings(plan, simulated, measurement),
+            camera,
+            modelled: Modelled::new(plan, simulated),
+            warnings: warn::gather(plan, simulated, measurement),
+            measured: Figures::of(&measurement.frames, pixels).filter(|_| !measurement.is_mark_alone()),
+            truth: Figures::of(&truth, pixels),
+            recorder: measurement.resolution,
+            detection: detection(measurement),
+            checks: measurement.checks.clone(),
+            energy_by_part_j: measurement.run.energy(),
+            power_by_part_w: power_model::Part::ALL
+                .iter()
+                .map(|part| (part.name(), by_part[part.index()]))
+                .collect(),
+            unit_busy: unit_busy(simulated),
+            stalls: stalls::shares(simulated),
+            facts: facts(simulated),
+            sample_test_efficiency: counts.sample_test_efficiency(),
+            counts,
+            counts_hash: format!(
+                "{:016x}",
+                simulated.known().fold(0, |seed, frame| hash(seed, &frame.counts))
+            ),
+            choice: None,
+            verified: None,
+            sampled: simulated.sampled.clone(),
+            frames: rows(plan, simulated, measurement),
+            host,
+        }
+    }
+}
+
+/// The mean over frames of each fact that frames know.
+fn facts(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
+    let mut sums: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
+    for fact in simulated.known().flat_map(|frame| &frame.facts) {
+        let [sum, count] = sums.entry(fact.name).or_default();
+        *sum += fact.value;
+        *count += 1.0;
+    }
+    sums.into_iter().map(|(name, [sum, count])| (name, sum / count)).collect()
+}
+
+/// The true frames in the form of measured ones, for the same statistics.
+fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
+    let frame = |f: &power_model::PacedFrame| FrameEnergy {
+        start_s: f.start_s,
+        end_s: f.end_s,
+        energy_j: f.energy.total_j(),
+        confidence: 1.0,
+        flags: traces::frames::Flags::default(),
+    };
+    measurement.run.frames.iter().map(frame).collect()
+}
+
+fn settings(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> SettingsSummary {
+    let scene = plan.work.settings();
+    SettingsSummary {
+        width: scene.width,
+        height: scene.height,
+        samples: scene.samples,
+        table: scene.table.clone(),
+        clip: plan.work.clip().map(str::to_owned),
+        frame_rate_hz: scene.frame_rate_hz,
+        shutter: scene.shutter,
+        first_frame: scene.frames.start,
+        frames: scene.frames.end - scene.frames.start,
+        lens_radius: scene.lens_radius,
+        focus: scene.focus,
+        pacing: match plan.options.pacing {
+            super::PacingChoice::Vsync => "vsync",
+            super::PacingChoice::Free => "free",
+        },
+        trace_rate_hz: measurement.resolution.rate_hz,
+        seed: plan.options.seed,
+        triangles: simulated.distinct.first().map_or(0, |frame| frame.triangles),
+    }
+}
+
+fn detection(measurement: &Measurement) -> Detection {
+    let score = &measurement.score;
+    Detection {
+        true_frames: score.truth,
+        found_frames: score.found,
+        matched_frames: score.matched,
+        precision: score.precision(),
+        recall: score.recall(),
+        median_timing_error_s: score.median_timing_error_s(),
+        worst_timing_error_s: score.worst_timing_error_s(),
+        median_energy_error: score.median_energy_error(),
+        worst_energy_error: score.worst_energy_error(),
+    }
+}
+
+/// Busy time over the time of the frames, idle between them not counted.
+fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
+    let total = simulated.total();
+    let time: f64 = simulated.in_order().map(|frame| frame.power.duration_s()).sum();
+    let busy = |unit: Unit| {
+        let ps: u64 = simulated.in_order().map(|frame| frame.busy_ps[unit as usize]).sum();
+        ps as f64 * 1e-12 / time
+    };
+    Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
+}

@@ -1,0 +1,159 @@
+//! What every sample of a scene sees, and how long it takes to find out.
+
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use pipeline::sampling::SampleSource;
+use pipeline::visibility::{SampleLayout, Sighting, Visibility, resolve};
+use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, Settings, frame};
+use serde::Serialize;
+use warnings::{Code, Warning};
+use workloads::visibility::{Unshaded, VisibilityScene};
+
+use crate::Regime;
+use crate::gpu::GpuSpec;
+
+/// How fast, in samples of the image per second.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Rates {
+    /// By the CPU time of a thread in set-up, binning, tests and depth: the median of all runs.
+    pub samples_per_s: f64,
+    /// The same of the fastest run.
+    pub best_samples_per_s: f64,
+    /// By the clock, with samples made and sorted before and results put in the order of the image after the median run.
+    pub end_to_end_samples_per_s: f64,
+    /// How often it was rasterized.
+    pub runs: u16,
+    /// On how many threads.
+    pub threads: usize,
+}
+
+/// What was found.
+pub struct Found {
+    /// By sample, in the order `(y width + x) per_pixel + index`.
+    pub seen: Vec<Sighting>,
+    /// How fast.
+    pub rates: Rates,
+}
+
+/// Seconds of one run: CPU time of all threads, and the clock.
+struct Run {
+    cpu_s: f64,
+    wall_s: f64,
+}
+
+/// Finds what the samples of `source` see of `scene`, `runs` times: with tile tests as the modelled hardware does it, or
+/// without as fast as it goes; the engine that goes fastest takes no orthographic camera, so that is modelled with all tests. Uses
+/// the threads of the pool it is called in.
+///
+/// # Errors
+/// When the mesh cannot be drawn, in words.
+pub fn find(
+    scene: &VisibilityScene,
+    source: &dyn SampleSource,
+    tests: Option<Features>,
+    runs: u16,
+) -> Result<Found, String> {
+    // One array twice is a still mesh.
+    let close = if scene.open == scene.close { &scene.open } else { &scene.close };
+    let geometry = Geometry::new(&scene.open, close, &scene.triangles).map_err(|error| error.to_string())?;
+    let fast = if tests.is_none() { fastest(scene, source, &geometry, runs) } else { None };
+    match fast {
+        Some(found) => Ok(found),
+        None => modelled(scene, source, geometry, tests.unwrap_or(Features::ALL), runs),
+    }
+}
+
+/// What a user should know of what is seen: nothing at all, or lengths that f32 cannot multiply.
+pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
+    let Ok(geometry) = Geometry::new(&scene.open, &scene.close, &scene.triangles) else { return Vec::new() };
+    let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+    let regime = Regime::of(&scene.camera, &draws, scene.viewport, scene.per_pixel);
+    let extreme = format!(
+        "{} of {} triangles in view have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at \
+         wrong depths; scale mesh and camera to ordinary lengths",
+        regime.extreme, regime.in_view
+    );
+    let empty =
+        "no triangle is in view, so no sample can see one; look at the mesh and where the camera points";
+    let found = [
+        (regime.extreme > 0).then(|| Warning::new(Code::CoordinatesOutOfRange, extreme)),
+        (regime.in_view == 0).then(|| Warning::new(Code::EmptyFrame, empty)),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// `None` where the camera is one the engine does not take.
+fn fastest(
+    scene: &VisibilityScene,
+    source: &dyn SampleSource,
+    geometry: &Geometry<'_>,
+    runs: u16,
+) -> Option<Found> {
+    let before = Instant::now();
+    let layout = SampleLayout::new(&scene.camera, scene.viewport, source, !geometry.is_still())?;
+    let mut visibility = Visibility::new(&layout);
+    let before_s = before.elapsed().as_secs_f64();
+    let timed =
+        (0..runs).map(|_| timed(|| resolve(&layout, geometry, Cull::None, &mut visibility)).1).collect();
+    let after = Instant::now();
+    let seen = visibility.in_image_order(&layout);
+    Some(Found { rates: rates(seen.len(), timed, before_s + after.elapsed().as_secs_f64()), seen })
+}
+
+fn modelled(
+    scene: &VisibilityScene,
+    source: &dyn SampleSource,
+    geometry: Geometry<'_>,
+    features: Features,
+    runs: u16,
+) -> Result<Found, String> {
+    let gpu = GpuSpec::load("reference").map_err(|error| error.to_string())?;
+    let spec = PipelineSpec { features, ..gpu.pipeline };
+    let background = glam::Vec3::ZERO;
+    let settings = Settings { spec: &spec, viewport: scene.viewport, samples: source, background };
+    let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+    let (mut seen, mut all) = (Vec::new(), Vec::new());
+    for _ in 0..runs {
+        let (found, run) = timed(|| frame::visibility(&scene.camera, &draws, &settings));
+        seen = found.map_err(|error| error.to_string())?;
+        all.push(run);
+    }
+    let rates = rates(seen.len(), all, 0.0);
+    Ok(Found { seen: seen.into_iter().map(|(id, depth)| (id, f32::from_bits(depth))).collect(), rates })
+}
+
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Run) {
+    let (cpu, wall) = (ProcessTime::now(), Instant::now());
+    let result = work();
+    (result, Run { cpu_s: cpu.elapsed().as_secs_f64(), wall_s: wall.elapsed().as_secs_f64() })
+}
+
+/// Rates of runs over so many samples; `apart_s` seconds went by before and after them.
+fn rates(samples: usize, mut runs: Vec<Run>, apart_s: f64) -> Rates {
+    let (samples, threads) = (samples as f64, rayon::current_num_threads());
+    runs.sort_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
+    let rate = |run: &Run| samples * threads as f64 / run.cpu_s.max(f64::MIN_POSITIVE);
+    let median = &runs[runs.len() / 2];
+    Rates {
+        samples_per_s: rate(median),
+        best_samples_per_s: rate(&runs[0]),
+        end_to_end_samples_per_s: samples / (apart_s + median.wall_s),
+        runs: runs.len() as u16,
+        threads,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_those_of_a_thread_and_of_the_median_run() {
+        let runs = [(3.0, 2.0), (1.0, 0.5), (2.0, 1.0)].map(|(cpu_s, wall_s)| Run { cpu_s, wall_s });
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let rates = pool.install(|| rates(100, runs.into(), 3.0));
+        assert_eq!((rates.samples_per_s, rates.best_samples_per_s), (100.0, 200.0));
+        assert_eq!((rates.end_to_end_samples_per_s, rates.runs, rates.threads), (25.0, 3, 2));
+    }
+}

@@ -1,0 +1,330 @@
+//! Regimes in which the methods of a run are known to be bad.
+
+use std::collections::BTreeMap;
+
+use activity::{Counts, Event};
+use power_model::PacedFrame;
+use traces::frames::Flag;
+use warnings::{Code, Warning};
+
+use crate::recorder::MIN_BUSY_SAMPLES;
+mod regime;
+
+use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, pairing};
+use output::table::si;
+use timing::AccuracyWarning;
+
+/// Every warning of a run, sorted and each once.
+pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
+    let mut all = plan.work.warnings().to_vec();
+    all.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+    all.extend(of_frames(
+        simulated
+            .distinct
+            .iter()
+            .map(|frame| (frame.index, frame.observed().map_or(&[][..], |of| &of.warnings))),
+    ));
+    all.extend(measurement.run.warnings.iter().cloned());
+    let short = short_frames(measurement);
+    // A run of one frame has no other that could resemble it, and frames too short to be seen resemble nothing.
+    let unseen = short.is_some() && measurement.is_mark_alone();
+    let explained = simulated.frames.len() == 1 || unseen;
+    let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
+    all.extend(of_trace.filter_map(|w| Some(Warning::new(Code::named(w.code)?, w.message.clone()))));
+    all.extend(accuracy(plan, simulated));
+    all.extend(degenerate(simulated));
+    all.extend(nothing_seen(simulated));
+    all.extend(start_errors(measurement).filter(|_| short.is_none()));
+    all.extend(short);
+    all.extend(detection(measurement).filter(|_| !unseen));
+    all.extend(idle_above_busy(plan, simulated));
+    all.extend(clipped(measurement));
+    all.extend(lost(measurement));
+    all.extend(unsure(simulated));
+    all.extend(regime::gather(simulated));
+    Warning::fold(all)
+}
+
+/// The warnings of single frames: of each code the message of the first frame that has it, with the number of frames where they
+/// differ.
+fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) -> Vec<Warning> {
+    let of = frames.len();
+    let mut by_code: BTreeMap<Code, Vec<(u32, &Warning)>> = BTreeMap::new();
+    for (frame, warning) in frames.flat_map(|(frame, warnings)| warnings.iter().map(move |w| (frame, w))) {
+        by_code.entry(warning.code).or_default().push((frame, warning));
+    }
+    let joined = |found: Vec<(u32, &Warning)>| {
+        let (first, warning) = found[0];
+        if found.iter().all(|(_, other)| other.message == warning.message) {
+            return warning.clone();
+        }
+        let frames = found.len();
+        let message = format!("{} (frame {first}; the same in {frames} of {of} frames)", warning.message);
+        let details = found.iter().map(|(frame, warning)| format!("frame {frame}: {}", warning.message));
+        Warning::new(warning.code, message).with_details(frames, details)
+    };
+    by_code.into_values().map(joined).collect()
+}
+
+/// Accuracy warnings of the timing level: of each code, the frame with the largest extent.
+fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
+    let mut worst: Vec<(u32, AccuracyWarning)> = Vec::new();
+    let all =
+        simulated.observed().flat_map(|(f, observed)| observed.accuracy.iter().map(|of| (f.index, *of)));
+    for (frame, warning) in all {
+        match worst.iter_mut().find(|(_, known)| known.code() == warning.code()) {
+            Some(known) if known.1.extent() < warning.extent() => *known = (frame, warning),
+            Some(_) => {}
+            None => worst.push((frame, warning)),
+        }
+    }
+    let level = plan.options.timing;
+    worst.iter().map(|(frame, warning)| warning.warning(*frame, level)).collect()
+}
+
+fn degenerate(simulated: &Simulated) -> Option<Warning> {
+    let without_area = |counts: &Counts| counts[Event::TrianglesDegenerate] + counts[Event::TrianglesFlat];
+    let (worst, Observed { counts, .. }) =
+        simulated.observed().max_by_key(|(_, observed)| without_area(&observed.counts))?;
+    let (dropped, flat) = (counts[Event::TrianglesDegenerate], counts[Event::TrianglesFlat]);
+    (dropped + flat > 0).then(|| {
+        let (all, of, frame) = (dropped + flat, counts[Event::TrianglesIn], worst.index);
+        Warning::new(
+            Code::DegenerateTriangle,
+            format!(
+                "{all} of {of} triangles have no area at any time (frame {frame}): {dropped} with two equal corners were \
+                 dropped, {flat} with their corners on one line were kept, so that closed surfaces stay closed; clean the \
+                 mesh where it was made"
+            ),
+        )
+    })
+}
+
+fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
+    let empty = simulated.known().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
+    (empty > 0).then(|| {
+        Warning::new(
+            Code::EmptyFrame,
+            format!("{empty} of {} frames show nothing: check the camera", simulated.known().count()),
+        )
+    })
+}
+
+/// A choice that is not as good, or not as fast, as was asked for.
+pub(crate) fn missed(choice: &Choice) -> Vec<Warning> {
+    let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
+    let late = late.map(|(budget_s, expected_s)| {
+        let message = format!(
+            "simulating was expected to take {expected_s:.1} s, more than the {budget_s} s of --budget, at the cheapest \
+             there is; give more time, or fewer frames, samples or pixels"
+        );
+        Warning::new(Code::BudgetMissed, message)
+    });
+    let inexact = (choice.meets_accuracy == Some(false)).then(|| {
+        Warning::new(
+            Code::AccuracyMissed,
+            format!(
+                "the error is expected to be {:.2} %, more than the {} % of --accuracy: --budget allows no more, or all \
+                 frames would have to be simulated; give more time, or less accuracy",
+                choice.expected_error * 100.0,
+                choice.accuracy.unwrap_or_default() * 100.0
+            ),
+        )
+    });
+    late.into_iter().chain(inexact).collect()
+}
+
+/// Intervals wider than this share of their value either way are worth a word.
+const WIDE_PERCENT: f64 = 5.0;
+
+fn unsure(simulated: &Simulated) -> Option<Warning> {
+    let sampled = simulated.sampled.as_ref()?;
+    let worst = sampled.worst() * 100.0;
+    (worst > WIDE_PERCENT).then(|| {
+        Warning::new(
+            Code::PredictionUnsure,
+            format!(
+                "{} of {} frames were simulated, and totals predicted from them are good to {worst:.1} % only: frames differ in \
+                 ways that their previews do not show; give --accuracy, or simulate all",
+                sampled.simulated_frames.len(),
+                simulated.frames.len()
+            ),
+        )
+    })
+}
+
+/// Frames whose work the recorder may miss between two samples, with the remedy and what came of it.
+fn short_frames(measurement: &Measurement) -> Option<Warning> {
+    let resolution = &measurement.resolution;
+    let frames = &measurement.run.frames;
+    let is_short =
+        |frame: &&PacedFrame| (frame.busy_end_s - frame.start_s) * resolution.rate_hz < MIN_BUSY_SAMPLES;
+    let short = frames.iter().filter(is_short).count();
+    (short > 0).then(|| {
+        let found = if measurement.is_mark_alone() {
+            "only the marked one was found, so that nothing is measured by frame"
+        } else {
+            "they may be missed, or found elsewhere"
+        };
+        let faster = resolution.needed_hz().map_or(String::new(), |rate_hz| format!("--trace-rate {rate_hz}, or "));
+        Warning::new(
+            Code::ShortFrame,
+            format!(
+                "{short} of {} frames are too short for the recorder: at {} it takes {:.1} samples while the shortest is busy, and \
+                 {found}; {faster}a larger image",
+                frames.len(),
+                si(resolution.rate_hz, "Hz"),
+                resolution.samples_in_shortest()
+            ),
+        )
+    })
+}
+
+fn detection(measurement: &Measurement) -> Option<Warning> {
+    let score = &measurement.score;
+    let unsure = measurement.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
+    (score.matched < score.truth || score.found > score.matched).then(|| {
+        Warning::new(
+            Code::FramesMissed,
+            format!(
+                "{} of {} frame starts were found in the trace, with {} false ones ({unsure} flagged unsure): energies \
+                 of the frames beside them are wrong",
+                score.matched,
+                score.truth,
+                score.found - score.matched
+            ),
+        )
+    })
+}
+
+/// Starts that count as found and yet are so far off that energy moves from frame to frame.
+fn start_errors(measurement: &Measurement) -> Option<Warning> {
+    let found = measurement.by_true_frame();
+    let off = measurement.run.frames.iter().zip(found).filter_map(|(frame, found)| {
+        let (error_s, busy_s) = ((found?.start_s - frame.start_s).abs(), frame.busy_end_s - frame.start_s);
+        (error_s > 0.5 * busy_s).then_some((error_s, busy_s))
+    });
+    let off: Vec<(f64, f64)> = off.collect();
+    let (error_s, busy_s) = off.iter().copied().max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+    let message = format!(
+        "{} of {} frame starts were found more than half of their frame's busy time off, the worst by {} where the frame is busy \
+         for {}: part of its energy counts to its neighbour; raise --trace-rate, draw larger images, or find frames with a \
+         shorter --window of `quintile trace frames`",
+        off.len(),
+        measurement.truth.len(),
+        si(error_s, "s"),
+        si(busy_s, "s")
+    );
+    Some(Warning::new(Code::StartError, message))
+}
+
+/// A platform that draws more between frames than while the GPU works.
+fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
+    let idle_w = plan.platform.idle_w.value();
+    let busy_w = |frame: &RunFrame| frame.power.energy().total_j() / frame.power.duration_s();
+    let lowest_w = simulated.distinct.iter().map(busy_w).fold(f64::INFINITY, f64::min);
+    (idle_w > lowest_w).then(|| {
+        let message = format!(
+            "platform `{}` draws {} between frames and only {} in a frame: the longer a frame takes the less energy it needs, and \
+             frames show as dips; lower `idle_w`, or raise `constant_w`",
+            plan.platform.name,
+            si(idle_w, "W"),
+            si(lowest_w, "W")
+        );
+        Warning::new(Code::IdleAboveBusy, message)
+    })
+}
+
+fn clipped(measurement: &Measurement) -> Option<Warning> {
+    (measurement.clipped > 0).then(|| {
+        Warning::new(
+            Code::ClippedSamples,
+            format!("{} samples are beyond the recorder's range", measurement.clipped),
+        )
+    })
+}
+
+fn lost(measurement: &Measurement) -> Option<Warning> {
+    measurement.trace.losses().map(|losses| Warning::new(Code::PacketsLost, losses))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::GpuSpec;
+    use crate::{Quantity, SampledSummary};
+    use timing::streams::failures;
+    use timing::{FrameClock, Level, Recorder};
+
+    #[test]
+    fn a_warning_of_many_frames_is_one_line() {
+        let of = |frames: &[u32]| -> Vec<(u32, Vec<Warning>)> {
+            let warned = |frame| Warning::new(Code::CausticsCoarse, format!("waves of {frame} squares"));
+            (0..5).map(|f| (f, if frames.contains(&f) { vec![warned(f)] } else { vec![] })).collect()
+        };
+        let fold = |all: &[(u32, Vec<Warning>)]| of_frames(all.iter().map(|(f, w)| (*f, &w[..])));
+        let one = fold(&of(&[3]));
+        assert_eq!(one, [Warning::new(Code::CausticsCoarse, "waves of 3 squares")]);
+        let three = fold(&of(&[1, 2, 4]));
+        assert_eq!(three.len(), 1);
+        assert_eq!(three[0].message, "waves of 1 squares (frame 1; the same in 3 of 5 frames)");
+        assert_eq!((three[0].count, three[0].details[2].as_str()), (3, "frame 4: waves of 4 squares"));
+        assert!(fold(&of(&[])).is_empty());
+    }
+
+    #[test]
+    fn wide_intervals_are_told_and_narrow_ones_are_not() {
+        let of = |percent: f64| {
+            let relative_half_width = percent / 100.0;
+            let quantity =
+                |relative_half_width| Quantity { value: 1.0, low: 0.9, high: 1.1, relative_half_width };
+            let sampled = SampledSummary {
+                simulated_frames: vec![0, 7, 30],
+                frames_per_simulated: 12.0,
+                strata: 2,
+                preview: [160, 90, 1],
+                confidence: 0.95,
+                cycles_per_frame: quantity(0.01),
+                busy_energy_per_frame_j: quantity(relative_half_width),
+                busy_power_w: quantity(0.01),
+            };
+            let (distinct, pictures, heat) = (Vec::new(), Vec::new(), Vec::new());
+            unsure(&Simulated { distinct, frames: vec![0; 36], pictures, heat, sampled: Some(sampled) })
+        };
+        assert_eq!(of(WIDE_PERCENT), None);
+        let message = of(7.25).map(|warning| warning.to_string()).unwrap_or_default();
+        assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
+    }
+
+    /// The codes of every stream that breaks a level, where there are any.
+    fn codes(level: Level) -> Vec<(String, Code)> {
+        let mut found = Vec::new();
+        for name in ["mobile", "reference", "discrete"] {
+            let mut gpu = GpuSpec::load(name).unwrap();
+            gpu.pipeline.batch_triangles = 512;
+            for case in failures(&gpu.units.clone(), 512) {
+                gpu.units = case.units;
+                let mut clock =
+                    FrameClock::new(level, gpu.machine().unwrap(), Recorder::new(1_000_000, 1 << 16));
+                case.packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
+                let timed = clock.finish().unwrap();
+                let warnings = AccuracyWarning::all(level, &timed).into_iter();
+                found.extend(warnings.map(|warning| (format!("{} on {name}", case.name), warning.code())));
+            }
+        }
+        found.sort();
+        found
+    }
+
+    #[test]
+    fn streams_that_break_a_level_are_warned_about_and_others_are_not() {
+        let rows = ["discrete", "mobile", "reference"]
+            .map(|gpu| (format!("row after row on {gpu}"), Code::MemoryRows));
+        assert_eq!(codes(Level::Packet), rows);
+        assert_eq!(codes(Level::Stepped), []);
+        let tiny = ("tiny triangles on discrete".to_owned(), Code::ShortPackets);
+        let bound = codes(Level::Bound);
+        assert!(rows.iter().chain([&tiny]).all(|case| bound.contains(case)), "{bound:?}");
+        assert!(bound.len() <= 5, "{bound:?}");
+    }
+}

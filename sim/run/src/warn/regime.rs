@@ -1,0 +1,100 @@
+//! Warnings of scenes that enter the regimes of the failure catalogue: results stay right, but the tests that save work do not.
+
+use warnings::{Code, Warning};
+
+use crate::{Regime, Simulated};
+
+/// Shares of triangles in view from which a regime is worth a word.
+const MOST: f64 = 0.5;
+const MANY: f64 = 0.25;
+const SOME: f64 = 0.1;
+
+/// The warnings of a run, each about the frame that is worst.
+pub(super) fn gather(simulated: &Simulated) -> Vec<Warning> {
+    [
+        behind(simulated),
+        tiny(simulated),
+        slivers(simulated),
+        fast(simulated),
+        blurred(simulated),
+        extreme(simulated),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// The frame in which most triangles are in a regime, where these are at least `share` of those in view: `of` which, for
+/// example, `12 of 40 triangles in view (frame 3)`.
+fn worst(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
+    let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
+    let (count, all) = (of(&observed.regime), observed.regime.in_view);
+    (count > 0 && count as f64 >= share * all as f64)
+        .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
+}
+
+fn behind(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, SOME, |regime| regime.behind)?;
+    Some(Warning::new(
+        Code::BehindCamera,
+        format!(
+            "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
+             or cut large triangles into smaller ones"
+        ),
+    ))
+}
+
+fn tiny(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, MOST, |regime| regime.tiny)?;
+    Some(Warning::new(
+        Code::SubSampleTriangles,
+        format!(
+            "{which} are smaller than the spacing of samples: most are hit by none, and tile tests cannot help; use a \
+             coarser mesh, a larger image or more samples"
+        ),
+    ))
+}
+
+fn slivers(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, MANY, |regime| regime.slivers)?;
+    Some(Warning::new(
+        Code::SliverTriangles,
+        format!(
+            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; mend the mesh \
+             where it was made"
+        ),
+    ))
+}
+
+fn fast(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, SOME, |regime| regime.fast)?;
+    Some(Warning::new(
+        Code::FastMotion,
+        format!(
+            "{which} move by more than an image while the shutter is open: few samples see them, the image is noisy, and \
+             a straight way may be far from the true one; use a shorter shutter, a higher frame rate or more samples"
+        ),
+    ))
+}
+
+fn blurred(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, MANY, |regime| regime.blurred)?;
+    Some(Warning::new(
+        Code::BlurBeyondImage,
+        format!(
+            "{which} are out of focus by more than an image: the lens is too large for this scene; use a smaller --lens \
+             or another --focus"
+        ),
+    ))
+}
+
+fn extreme(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, 0.0, |regime| regime.extreme)?;
+    Some(Warning::new(
+        Code::CoordinatesOutOfRange,
+        format!(
+            "{which} have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at wrong \
+             depths; scale the scene to ordinary lengths"
+        ),
+    ))
+}

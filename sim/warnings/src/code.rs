@@ -1,0 +1,246 @@
+//! Every code: what it stands for, and where the book explains it.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+/// Where a warning comes from: a section of the book's chapter on warnings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Section {
+    /// A run of the simulator.
+    Simulator,
+    /// A workload.
+    Workload,
+    /// The analysis of a power trace.
+    Trace,
+    /// A scene file.
+    Scene,
+    /// The command `quintile visibility`.
+    Visibility,
+}
+
+impl Section {
+    /// Its heading in the book.
+    pub const fn heading(self) -> &'static str {
+        match self {
+            Self::Simulator => "From the simulator",
+            Self::Workload => "From workloads",
+            Self::Trace => "From the analysis of the trace",
+            Self::Scene => "From loading a scene",
+            Self::Visibility => "From `quintile visibility`",
+        }
+    }
+}
+
+macro_rules! codes {
+    ($($(#[doc = $line:literal])+ $code:ident = $name:literal in $section:ident,)+) => {
+        /// What a warning is about. A code never changes its meaning.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Code {
+            $($(#[doc = $line])+ $code,)+
+        }
+
+        impl Code {
+            /// Every code.
+            pub const ALL: &[Self] = &[$(Self::$code),+];
+
+            /// The code as files and messages have it, for example `missing-image`.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$code => $name,)+ }
+            }
+
+            /// The code of this name.
+            pub fn named(name: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|code| code.name() == name)
+            }
+
+            /// When it is reported, in a sentence.
+            pub const fn meaning(self) -> &'static str {
+                match self { $(Self::$code => concat!($($line),+).trim_ascii_start(),)+ }
+            }
+
+            /// Where the book explains it.
+            pub const fn section(self) -> Section {
+                match self { $(Self::$code => Section::$section,)+ }
+            }
+        }
+    };
+}
+
+codes! {
+    /// A triangle has no area at any time.
+    DegenerateTriangle = "degenerate-triangle" in Simulator,
+    /// No sample of a frame hits anything.
+    EmptyFrame = "empty-frame" in Simulator,
+    /// A frame is busy for less than two samples of the trace.
+    ShortFrame = "short-frame" in Simulator,
+    /// A true frame start was not found, or a false one was.
+    FramesMissed = "frames-missed" in Simulator,
+    /// The GPU file names another platform or energy table than those in use, or none.
+    PlatformMismatch = "platform-mismatch" in Simulator,
+    /// A found frame start is off by more than half of the time that its frame is busy for.
+    StartError = "start-error" in Simulator,
+    /// A platform draws more power idle than busy.
+    IdleAboveBusy = "idle-above-busy" in Simulator,
+    /// Power exceeds the recorder's range.
+    ClippedSamples = "clipped-samples" in Simulator,
+    /// The recorder lost packets, as `--packet-loss` asked.
+    PacketsLost = "packets-lost" in Simulator,
+    /// A tenth or more of the triangles in view reach behind the camera.
+    BehindCamera = "behind-camera" in Simulator,
+    /// Half or more of the triangles in view are smaller than the sample spacing.
+    SubSampleTriangles = "sub-sample-triangles" in Simulator,
+    /// A quarter or more of the triangles in view are a hundred times as long as high.
+    SliverTriangles = "sliver-triangles" in Simulator,
+    /// A tenth or more of the triangles in view move by more than the longer image side in one shutter.
+    FastMotion = "fast-motion" in Simulator,
+    /// A quarter or more of the triangles in view have blur larger than the longer image side.
+    BlurBeyondImage = "blur-beyond-image" in Simulator,
+    /// Products of a triangle's coordinates leave the range of 32-bit floats (lengths beyond about 1e10 or
+    /// below 1e-12 scene units).
+    CoordinatesOutOfRange = "coordinates-out-of-range" in Simulator,
+    /// At `packet` and `bound`: a memory bank opens and closes rows for at least a fifth of the busiest unit's
+    /// time.
+    MemoryRows = "memory-rows" in Simulator,
+    /// At `bound`: a packet arrives every two cycles or faster.
+    ShortPackets = "short-packets" in Simulator,
+    /// An interval of `--timing sampled` is wider than 5 % of its value either way.
+    PredictionUnsure = "prediction-unsure" in Simulator,
+    /// The expected error of the choice exceeds the requested accuracy.
+    AccuracyMissed = "accuracy-missed" in Simulator,
+    /// Even the cheapest choice was expected to exceed `--budget`.
+    BudgetMissed = "budget-missed" in Simulator,
+    /// A frame takes longer than a display period.
+    MissedVsync = "missed-vsync" in Simulator,
+    /// The shortest wave is under four squares of generator triangles long.
+    CausticsCoarse = "caustics-coarse" in Workload,
+    /// The sides of light volumes cross for more than a tenth of their length on average.
+    CausticsCrossed = "caustics-crossed" in Workload,
+    /// Nine in ten pairs with touching swept boxes may collide.
+    CollisionNearEverywhere = "collision-near-everywhere" in Workload,
+    /// A quarter or more of the tiles are covered for most of their samples, but not all.
+    OcclusionSmallOccluders = "occlusion-small-occluders" in Workload,
+    /// `quintile sample poisson`: more than one uncovered region per 100 points is thinner than the float
+    /// spacing.
+    PointsThinVoids = "points-thin-voids" in Workload,
+    /// `soft-shadows` has fewer than 16 distinct light samples.
+    ShadowBanding = "shadow-banding" in Workload,
+    /// The bias is below half a texel of the map or above eight.
+    ShadowBias = "shadow-bias" in Workload,
+    /// The shader of `multiview` runs a quarter more often than with an unlimited cache.
+    ShadingCacheSmall = "shading-cache-small" in Workload,
+    /// The outermost views are more than 6 degrees apart and materials have highlights.
+    ViewDependentShading = "view-dependent-shading" in Workload,
+    /// The lens of `glossy` is wider than half the receiver's shorter side.
+    LensWiderThanReceiver = "lens-wider-than-receiver" in Workload,
+    /// The marked window reaches beyond the trace.
+    WindowCut = "window-cut" in Trace,
+    /// Power around a mark varies no more than noise.
+    FlatMark = "flat-mark" in Trace,
+    /// Nothing resembles the marked frame.
+    OnlyMark = "only-mark" in Trace,
+    /// Matches and other minima are poorly separated.
+    WeakSeparation = "weak-separation" in Trace,
+    /// More than a tenth of the frames have a confidence below one half.
+    UnsureFrames = "unsure-frames" in Trace,
+    /// Too many frames are longer than 1.5 or shorter than 0.5 median durations.
+    IrregularSpacing = "irregular-spacing" in Trace,
+    /// The window is longer than the median frame.
+    WindowLongerThanFrame = "window-longer-than-frame" in Trace,
+    /// Work of at least three frames lies before the first start or after the last frame (tracking).
+    Uncovered = "uncovered" in Trace,
+    /// The median frame has fewer than 50 samples.
+    FewSamples = "few-samples" in Trace,
+    /// Several rails are added up and one of them is the sum of the others.
+    RailCountedTwice = "rail-counted-twice" in Trace,
+    /// The anchors of an alignment contradict the stamps or the trace.
+    AnchorsOff = "anchors-off" in Trace,
+    /// Without anchors, another pairing of stamps and frames fits about as well.
+    AmbiguousAlignment = "ambiguous-alignment" in Trace,
+    /// Frames or pixels per joule are computed, which cannot be averaged.
+    InverseUnits = "inverse-units" in Trace,
+    /// Some frames end before a pass begins.
+    PassBeyond = "pass-beyond" in Trace,
+    /// The runs of a plot differ in their number of frames.
+    UnevenRuns = "uneven-runs" in Trace,
+    /// Currents or voltages exceed the range of the device.
+    Clipped = "clipped" in Trace,
+    /// The largest current uses less than 5 % of the range of the device.
+    RangeUnused = "range-unused" in Trace,
+    /// A texture file cannot be read.
+    MissingImage = "missing-image" in Scene,
+    /// A `.mtl` file cannot be read, or lacks a material of an OBJ file.
+    MissingMaterial = "missing-material" in Scene,
+    /// A surface lacks the coordinates that its texture needs.
+    MissingTexcoord = "missing-texcoord" in Scene,
+    /// A material is cut out or blended, and its alpha is not 1 throughout.
+    AlphaIgnored = "alpha-ignored" in Scene,
+    /// A material has a normal or bump map.
+    NormalMapIgnored = "normal-map-ignored" in Scene,
+    /// A material is metallic, or has a metallic-roughness map.
+    MetallicIgnored = "metallic-ignored" in Scene,
+    /// A material emits light.
+    EmissiveIgnored = "emissive-ignored" in Scene,
+    /// A material has an occlusion map.
+    OcclusionMapIgnored = "occlusion-map-ignored" in Scene,
+    /// A texture asks for no filtering under magnification.
+    TextureFilterIgnored = "texture-filter-ignored" in Scene,
+    /// A PLY file names a texture in a comment.
+    TextureIgnored = "texture-ignored" in Scene,
+    /// Faces of a PLY, OFF or STL file have colours.
+    FaceColorsIgnored = "face-colors-ignored" in Scene,
+    /// A glTF file uses an unsupported extension that changes the picture.
+    ExtensionIgnored = "extension-ignored" in Scene,
+    /// Points, lines, or a primitive without positions.
+    PrimitiveDropped = "primitive-dropped" in Scene,
+    /// A camera has no usable numbers.
+    CameraIgnored = "camera-ignored" in Scene,
+    /// A light that emits is not the one directional light in use.
+    LightIgnored = "light-ignored" in Scene,
+    /// A scene lies more than 100 times its size from its origin.
+    CoordinatesRecentred = "coordinates-recentred" in Scene,
+    /// A file with 32-bit positions is so far from its origin that fewer than 4096 distinct positions lie along
+    /// a surface's longest side.
+    CoordinatesFarFromOrigin = "coordinates-far-from-origin" in Scene,
+    /// Most of the scene's surface is enclosed by the rest.
+    CameraInside = "camera-inside" in Scene,
+    /// A RON scene has a `focus` but no `camera`.
+    FocusOfFittedCamera = "focus-of-fitted-camera" in Scene,
+    /// `--frames` goes beyond the scene's own frames, and parts leave the view there.
+    LeavesFittedView = "leaves-fitted-view" in Scene,
+    /// The lens is too large for its focus depth.
+    LensLeavesView = "lens-leaves-view" in Scene,
+    /// The camera is orthographic and no `--tests` are given.
+    OrthographicView = "orthographic-view" in Visibility,
+}
+
+impl PartialOrd for Code {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Code {
+    /// By name, which is the order in which warnings are reported.
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.name().cmp(other.name())
+    }
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Serialize for Code {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl PartialEq<&str> for Code {
+    fn eq(&self, name: &&str) -> bool {
+        self.name() == *name
+    }
+}
