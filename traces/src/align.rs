@@ -1,8 +1,9 @@
-//! Alignment of recorded time stamps with a curve: by two anchors, or by the best fit to the starts found in it.
+//! Alignment of recorded time stamps with a curve: by two anchors, or by the best fit to the starts found in
+//! it.
 //!
-//! Frame times are a fingerprint: a short run of stamps fits the starts in hardly more than one place. Where stamps or
-//! starts are missing, runs of stamps are laid on runs of starts. The lines that fit best are compared with all stamps,
-//! each paired with the nearest start, and fitted again to these pairs.
+//! Frame times are a fingerprint: a short run of stamps fits the starts in hardly more than one place. Where
+//! stamps or starts are missing, runs of stamps are laid on runs of starts. The lines that fit best are
+//! compared with all stamps, each paired with the nearest start, and fitted again to these pairs.
 
 use crate::stats::upper_median;
 use rayon::prelude::*;
@@ -91,8 +92,8 @@ impl Alignment {
         Ok(Self { scale, offset_s: a.1 - scale * a.0, residual_s: 0.0, pairs: 2, ambiguous: false })
     }
 
-    /// The pairing of stamps with starts of the least residual: one after another from some shift on or, if that does not fit, with
-    /// gaps in either. Both sorted, s.
+    /// The pairing of stamps with starts of the least residual: one after another from some shift on or, if
+    /// that does not fit, with gaps in either. Both sorted, s.
     ///
     /// # Errors
     /// [`AlignError::Few`] for fewer than four of either, [`AlignError::Equal`] for stamps of which too many are the same,
@@ -165,8 +166,8 @@ const MAX_ROUNDS: usize = 8;
 /// Scales within this factor of that of the median gaps are tried: a run may also match every second start.
 const MAX_SCALE_RATIO: f64 = 1.3;
 
-/// The line that pairs most stamps, and of those with as many the one that leaves least; with whether another place pairs nearly
-/// as many. `None` where none pairs `least`.
+/// The line that pairs most stamps, and of those with as many the one that leaves least; with whether another
+/// place pairs nearly as many. `None` where none pairs `least`.
 pub(super) fn paired(stamps_s: &[f64], starts_s: &[f64], least: usize) -> Option<Alignment> {
     let gap_s = usual_gap(starts_s)?;
     let scale = gap_s / usual_gap(stamps_s)?;
@@ -188,7 +189,8 @@ pub(super) fn paired(stamps_s: &[f64], starts_s: &[f64], least: usize) -> Option
     Some(Alignment { ambiguous, ..best })
 }
 
-/// The lines through runs of stamps laid on runs of starts that leave least, of about the scale that is expected.
+/// The lines through runs of stamps laid on runs of starts that leave least, of about the scale that is
+/// expected.
 fn lines(stamps_s: &[f64], starts_s: &[f64], run: usize, scale: f64) -> Vec<Alignment> {
     let last = stamps_s.len() - run;
     let laid = |at: usize| {

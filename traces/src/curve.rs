@@ -132,7 +132,8 @@ impl Curve {
 
     /// Mean power of `count` successive periods of `1 / rate_hz` from `start_s`, W, in one sweep.
     ///
-    /// The means times the period add up to the energy of the whole span: successive periods share their edge.
+    /// The means times the period add up to the energy of the whole span: successive periods share their
+    /// edge.
     pub fn sample_means_w(&self, start_s: f64, rate_hz: f64, count: usize) -> Vec<f64> {
         let mut segment = 0;
         let mut before = self.energy_to(start_s);
@@ -202,8 +203,8 @@ impl CurveBuilder {
         Ok(Self { clock: PairSum::from_f64(start_s), edges_s: vec![start_s], watts: Vec::new() })
     }
 
-    /// Appends `duration_s` seconds at `watts`. A segment of the same power as the last one extends it; one too
-    /// short to move the clock (in particular of no duration) leaves no segment.
+    /// Appends `duration_s` seconds at `watts`. A segment of the same power as the last one extends it; one
+    /// too short to move the clock (in particular of no duration) leaves no segment.
     ///
     /// # Errors
     /// [`CurveError::Duration`] or [`CurveError::Power`], with the number of segments so far.

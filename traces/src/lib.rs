@@ -1,7 +1,8 @@
-//! Power traces, recorded or synthetic: reading and sampling them, finding frames in them, and the energy of every frame.
+//! Power traces, recorded or synthetic: reading and sampling them, finding frames in them, and the energy of
+//! every frame.
 //!
-//! No simulator is needed. A recording of voltage and current, one marked frame start and the end of the last frame are
-//! enough:
+//! No simulator is needed. A recording of voltage and current, one marked frame start and the end of the last
+//! frame are enough:
 //!
 //! 1. [`io`] reads a [`Trace`] from Parquet, JLS, CSV or TSV, and writes these formats; the crate [`jls`] can be used
 //!    alone;
@@ -12,9 +13,10 @@
 //! 4. [`pareto`] compares settings by time and energy, [`align`] puts time stamps of another clock onto a trace, and
 //!    [`score`] compares found frames with the ground truth.
 //!
-//! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace that a recorder would have written, and
-//! [`synth`] makes such curves with frames whose starts and energies are known. [`units`], [`times`] and [`table`] read
-//! the small files around a measurement; [`pyramid`] gives overviews of long traces.
+//! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace that a recorder would
+//! have written, and [`synth`] makes such curves with frames whose starts and energies are known. [`units`],
+//! [`times`] and [`table`] read the small files around a measurement; [`pyramid`] gives overviews of long
+//! traces.
 //!
 //! ```
 //! use traces::{device::{Device, DeviceSpec}, energy::PowerIntegral, frames, Curve, CurveBuilder};

@@ -1,7 +1,7 @@
 //! Correlation by overlap and save (Oppenheim and Schafer 2010, section 8.7.3), in f32 or f64.
 //!
-//! Templates are real, so two blocks of a signal share a transform, one as its real part and one as its imaginary part (Press
-//! et al. 2007, section 12.3), and come out in the same way.
+//! Templates are real, so two blocks of a signal share a transform, one as its real part and one as its
+//! imaginary part (Press et al. 2007, section 12.3), and come out in the same way.
 
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::Zero;
@@ -47,8 +47,9 @@ impl<T: FftNum> OverlapSave<T> {
         self.block - self.width + 1
     }
 
-    /// Hands every template's correlation with two blocks, whose first offsets are `from` and a step later, to `take`: in
-    /// real and imaginary parts, cyclic beyond a step. Every thread computes a pair in the same way.
+    /// Hands every template's correlation with two blocks, whose first offsets are `from` and a step later,
+    /// to `take`: in real and imaginary parts, cyclic beyond a step. Every thread computes a pair in the same
+    /// way.
     pub fn pair(
         &self,
         signal: &[T],

@@ -40,8 +40,8 @@ pub struct TradeoffPoint {
 /// Number of random draws for probabilities.
 pub const DRAWS: u32 = 4096;
 
-/// Which points are on the frontier. With `idle_w`, the faster of two is charged idling for the time it saves (Paper IV,
-/// section 5): all are charged up to the slowest, so that any two are compared in the same way.
+/// Which points are on the frontier. With `idle_w`, the faster of two is charged idling for the time it saves
+/// (Paper IV, section 5): all are charged up to the slowest, so that any two are compared in the same way.
 pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<TradeoffPoint> {
     let slowest_s = points.iter().map(|point| point.time_s).fold(0.0, f64::max);
     let compensated = |time_s: f64, energy_j: f64| energy_j + idle_w * (slowest_s - time_s);
@@ -72,8 +72,8 @@ pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<TradeoffPoint> 
     points.iter().enumerate().map(tradeoff).collect()
 }
 
-/// Whether each pair is dominated by no other (Kung, Luccio and Preparata 1975: sorted by one, a running minimum of the
-/// other). Equal pairs do not dominate one another.
+/// Whether each pair is dominated by no other (Kung, Luccio and Preparata 1975: sorted by one, a running
+/// minimum of the other). Equal pairs do not dominate one another.
 pub fn nondominated(pairs: &[(f64, f64)]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..pairs.len()).collect();
     order.sort_by(|&a, &b| pairs[a].0.total_cmp(&pairs[b].0).then(pairs[a].1.total_cmp(&pairs[b].1)));
@@ -99,7 +99,8 @@ impl Point {
         self.energy_j / self.time_s
     }
 
-    /// Standard deviation of the mean power, W: the relative ones of time and energy, added as independent errors.
+    /// Standard deviation of the mean power, W: the relative ones of time and energy, added as independent
+    /// errors.
     pub fn power_deviation_w(&self) -> f64 {
         let relative =
             libm::hypot(self.time_deviation_s / self.time_s, self.energy_deviation_j / self.energy_j);
@@ -151,8 +152,8 @@ pub enum ParetoError {
     },
 }
 
-/// The settings of a table by group, each compared with the others of its group by [`frontier`]. A group is named by its
-/// columns and values; without such columns there is one, with an empty name.
+/// The settings of a table by group, each compared with the others of its group by [`frontier`]. A group is
+/// named by its columns and values; without such columns there is one, with an empty name.
 ///
 /// # Errors
 /// [`ParetoError`] names the file and the row or column.

@@ -1,7 +1,7 @@
 //! Medians, means, spreads, and exact running sums.
 //!
-//! There are two medians: [`median`] is what reports print; [`upper_median`] takes an actual value, as the frame finder
-//! and the time base need.
+//! There are two medians: [`median`] is what reports print; [`upper_median`] takes an actual value, as the
+//! frame finder and the time base need.
 
 use serde::Serialize;
 
@@ -10,12 +10,14 @@ pub(crate) fn nth_smallest(values: &mut [f64], n: usize) -> f64 {
     *values.select_nth_unstable_by(n, f64::total_cmp).1
 }
 
-/// The median, of an even number of values the upper of the middle two; 0 for no values, which are left in another order.
+/// The median, of an even number of values the upper of the middle two; 0 for no values, which are left in
+/// another order.
 pub(crate) fn upper_median(values: &mut [f64]) -> f64 {
     if values.is_empty() { 0.0 } else { nth_smallest(values, values.len() / 2) }
 }
 
-/// The median, of an even number of values the mean of the middle two; there must be one. They are left in another order.
+/// The median, of an even number of values the mean of the middle two; there must be one. They are left in
+/// another order.
 fn median(values: &mut [f64]) -> f64 {
     let odd = values.len() % 2 == 1;
     let (below, &mut upper, _) = values.select_nth_unstable_by(values.len() / 2, f64::total_cmp);

@@ -1,10 +1,11 @@
 //! Power curves with known frames, to measure the frame finder.
 //!
-//! The model stands for no particular GPU. A frame is a front end, a clear, and draws with a length and a power each. A
-//! [`Scenario`] makes its frames hard to find: free running or V-sync, idle gaps within the frame, changing content, clock
-//! steps, a launch transient, disturbances, drifting idle power. [`Scenario::scene`] makes a curve of it, and [`Recording`]
-//! samples that with a recorder of some rate, resolution and noise. All random numbers are functions of (seed, purpose, frame,
-//! draw), so a longer scene begins like a shorter one.
+//! The model stands for no particular GPU. A frame is a front end, a clear, and draws with a length and a
+//! power each. A [`Scenario`] makes its frames hard to find: free running or V-sync, idle gaps within the
+//! frame, changing content, clock steps, a launch transient, disturbances, drifting idle power.
+//! [`Scenario::scene`] makes a curve of it, and [`Recording`] samples that with a recorder of some rate,
+//! resolution and noise. All random numbers are functions of (seed, purpose, frame, draw), so a longer scene
+//! begins like a shorter one.
 
 use crate::device::{Device, DeviceError, DeviceSpec, SampleError};
 use crate::energy::TrueFrame;
@@ -109,7 +110,8 @@ pub struct Recording {
     pub rate_hz: f64,
     /// Resolution of current and voltage.
     pub bits: u32,
-    /// Variance of the power while frames are drawn, at 50 kHz, over the variance of the noise of one sample at any rate, dB.
+    /// Variance of the power while frames are drawn, at 50 kHz, over the variance of the noise of one sample
+    /// at any rate, dB.
     pub snr_db: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -175,7 +177,8 @@ const STEP_S: [f64; 2] = [0.5, 2.5];
 const RELOCK_S: f64 = 0.15e-3;
 /// Front end and clear: length at the highest clock, s, and activity.
 const BEGIN: [[f64; 2]; 2] = [[0.14e-3, 0.15], [0.11e-3, 0.97]];
-/// Draws of a frame, how long they take together at the highest clock, s, and the spread of their lengths' logarithms.
+/// Draws of a frame, how long they take together at the highest clock, s, and the spread of their lengths'
+/// logarithms.
 const DRAWS: usize = 120;
 const WORK_S: f64 = 8.0e-3;
 const SPREAD: f64 = 0.7;

@@ -79,7 +79,8 @@ struct Column {
     scale: f64,
 }
 
-/// Reads times, s: a number in each line, or the column of times of a table with a header, by the unit in its name.
+/// Reads times, s: a number in each line, or the column of times of a table with a header, by the unit in its
+/// name.
 ///
 /// # Errors
 /// [`TimesError`] names the file, and the line where one is wrong.
@@ -131,8 +132,8 @@ impl Column {
         Ok(Self { index, columns: names.len(), scale: unit.unwrap_or(1.0) })
     }
 
-    /// The time of a row, s, or what is wrong, to be written after the row. A row of another length is refused: its fields
-    /// may be halves of a number with a decimal comma.
+    /// The time of a row, s, or what is wrong, to be written after the row. A row of another length is
+    /// refused: its fields may be halves of a number with a decimal comma.
     fn time_s(&self, fields: &[&str]) -> Result<f64, String> {
         if fields.len() != self.columns {
             return Err(match self.columns {

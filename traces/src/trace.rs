@@ -49,7 +49,8 @@ pub enum TraceError {
 
 /// Evenly sampled voltage (V) and current (A).
 ///
-/// Sample `i` begins at `start_s + i / rate_hz` (its **left edge**) and is the mean over the period that follows.
+/// Sample `i` begins at `start_s + i / rate_hz` (its **left edge**) and is the mean over the period that
+/// follows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
     voltage_v: Vec<f32>,
@@ -85,9 +86,10 @@ impl Trace {
         Ok(Self { voltage_v, current_a, rate_hz, start_s, lost: Vec::new(), metadata })
     }
 
-    /// The same samples, some of which the recorder lost on the way: they are put on the straight line between their neighbours, as
-    /// nothing is known of them, and left out of files. Of `lost`, in order and apart, what is beyond the samples is cut off, and so is
-    /// the first sample, with which a recording begins.
+    /// The same samples, some of which the recorder lost on the way: they are put on the straight line
+    /// between their neighbours, as nothing is known of them, and left out of files. Of `lost`, in order and
+    /// apart, what is beyond the samples is cut off, and so is the first sample, with which a recording
+    /// begins.
     #[must_use]
     pub fn without(mut self, lost: impl IntoIterator<Item = Range<usize>>) -> Self {
         let count = self.samples();

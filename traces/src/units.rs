@@ -1,4 +1,5 @@
-//! Units and what they measure: one table for the columns of traces, the signals of JLS and the columns of tables.
+//! Units and what they measure: one table for the columns of traces, the signals of JLS and the columns of
+//! tables.
 
 use thiserror::Error;
 
@@ -116,7 +117,8 @@ fn units(places: u8) -> impl Iterator<Item = &'static Unit> {
     UNITS.iter().filter(move |unit| unit.places & places != 0)
 }
 
-/// Quantity and factor of a unit in any case, as a word of the name of a trace's column; `of` restricts the quantity.
+/// Quantity and factor of a unit in any case, as a word of the name of a trace's column; `of` restricts the
+/// quantity.
 pub(crate) fn trace_unit(word: &str, of: Option<Quantity>) -> Option<(Quantity, f64)> {
     let fits = |unit: &&Unit| {
         unit.name.eq_ignore_ascii_case(word) && of.is_none_or(|quantity| unit.quantity == quantity)
@@ -136,7 +138,8 @@ pub(crate) fn jls_unit(text: &str) -> Option<f64> {
     units(JLS).find(|unit| unit.name.eq_ignore_ascii_case(&name)).map(|unit| unit.scale)
 }
 
-/// A unit in the name of a table's column: exactly as it is written, or else without regard to case, when `M` is milli.
+/// A unit in the name of a table's column: exactly as it is written, or else without regard to case, when `M`
+/// is milli.
 fn table_unit(word: &str) -> Option<(Quantity, f64)> {
     let exact = units(TABLE).find(|unit| unit.name == word);
     exact
@@ -163,7 +166,8 @@ const UNKNOWN: [&str; 18] = [
 #[error("{0}")]
 pub struct UnitError(String);
 
-/// Factor from the numbers of a table's column to s or J, by the last unit in its name; `None` for a name without a unit.
+/// Factor from the numbers of a table's column to s or J, by the last unit in its name; `None` for a name
+/// without a unit.
 ///
 /// # Errors
 /// [`UnitError`] if the unit is of something else, or may be.

@@ -23,8 +23,8 @@ pub(crate) struct List {
 
 /// Writes the chunks of a file, one after the other, and links their lists.
 ///
-/// A chunk holds the place of the next of its list, which is known only when that is written. The last bytes are held
-/// back, so that most such places are filled in memory; earlier ones are overwritten in the file.
+/// A chunk holds the place of the next of its list, which is known only when that is written. The last bytes
+/// are held back, so that most such places are filled in memory; earlier ones are overwritten in the file.
 pub(crate) struct ChunkWriter<W> {
     out: W,
     /// Place of the first byte held back.
@@ -250,8 +250,8 @@ impl ChunkFile {
         }
     }
 
-    /// The next chunk of a list. In a recording that was cut off and repaired, the last chunk of a list may still point to
-    /// where the next one was: beyond the end, or into other chunks. The list ends there.
+    /// The next chunk of a list. In a recording that was cut off and repaired, the last chunk of a list may
+    /// still point to where the next one was: beyond the end, or into other chunks. The list ends there.
     pub fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, ReadError> {
         let Some(next) = head.next.filter(|&next| next < self.size_bytes) else { return Ok(None) };
         match self.head(next) {

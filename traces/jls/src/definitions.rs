@@ -1,4 +1,5 @@
-//! Definitions at the beginning of a JLS file, written and read: sources, signals, and the places of their data.
+//! Definitions at the beginning of a JLS file, written and read: sources, signals, and the places of their
+//! data.
 
 use crate::ReadError;
 use crate::chunk::{ChunkFile, ChunkHeader, ChunkWriter, List};
@@ -35,8 +36,8 @@ pub(crate) struct Heads {
     pub utc: u64,
 }
 
-/// The numbers of a signal: type, rate in Hz, samples of a chunk, samples of an entry, entries of a summary, entries that
-/// become one of the level above, annotations and UTC entries of a summary.
+/// The numbers of a signal: type, rate in Hz, samples of a chunk, samples of an entry, entries of a summary,
+/// entries that become one of the level above, annotations and UTC entries of a summary.
 type Numbers = [u32; 8];
 
 /// Writes everything before the samples: sources, the signals, numbered from 1, and a description in JSON.
@@ -49,7 +50,8 @@ pub(crate) fn write<W: Write + Seek, const N: usize>(
 ) -> io::Result<[Heads; N]> {
     let [mut notes, mut sources, mut list] = [List::default(); 3];
     chunks.append(&mut notes, USER_DATA, 0, |_| ())?;
-    // Source and signal 0 are those of annotations to the whole file, which readers expect; named as pyjls does.
+    // Source and signal 0 are those of annotations to the whole file, which readers expect; named as pyjls
+    // does.
     write_source(chunks, &mut sources, 0, ["global_annotation_source", "jls", "-", "1.0.0", "-"])?;
     let unused = [F32, 0, 16, 16, 10, 10, STAMPS_PER_SUMMARY, STAMPS_PER_SUMMARY];
     write_signal(chunks, &mut list, 0, unused, SignalName { name: "global_annotation_signal", unit: "" })?;

@@ -1,7 +1,7 @@
 //! Layout of a JLS file of version 2. All numbers are little-endian.
 //!
-//! A file is a header and a sequence of chunks. A chunk is a header, a payload, and checksums of both. The chunks of one
-//! kind and signal form a doubly linked list.
+//! A file is a header and a sequence of chunks. A chunk is a header, a payload, and checksums of both. The
+//! chunks of one kind and signal form a doubly linked list.
 
 /// First bytes of every file.
 pub(crate) const IDENTIFICATION: &[u8; 16] = b"jlsfmt\r\n \n \x1a  \xb2\x1c";
@@ -9,12 +9,12 @@ pub(crate) const IDENTIFICATION: &[u8; 16] = b"jlsfmt\r\n \n \x1a  \xb2\x1c";
 pub(crate) const VERSION: u32 = 1 << 24;
 /// Identification, length (8), version (4), checksum (4).
 pub(crate) const FILE_HEADER_BYTES: u64 = 32;
-/// Next and previous of the list (8 each), tag (1), zero (1), mark (2), bytes of the payload and of that before it (4
-/// each), checksum (4).
+/// Next and previous of the list (8 each), tag (1), zero (1), mark (2), bytes of the payload and of that
+/// before it (4 each), checksum (4).
 pub(crate) const HEADER_BYTES: usize = 32;
 const CRC_BYTES: u64 = 4;
-/// Longest payload that is read or written, in bytes: no length that a file states is allocated on trust. pyjls writes
-/// 32 KiB.
+/// Longest payload that is read or written, in bytes: no length that a file states is allocated on trust.
+/// pyjls writes 32 KiB.
 pub const MAX_PAYLOAD_BYTES: u32 = 1 << 26;
 
 pub(crate) const SOURCE: u8 = 0x01;
@@ -28,7 +28,8 @@ pub(crate) const VARIABLE_RATE: u8 = 0x28;
 pub(crate) const ANNOTATIONS: u8 = 0x30;
 pub(crate) const UTC: u8 = 0x38;
 
-/// Kinds of chunks of a track. A head holds the places of the first chunk of data and of the first index of each level.
+/// Kinds of chunks of a track. A head holds the places of the first chunk of data and of the first index of
+/// each level.
 pub(crate) const DEFINITION: u8 = 0;
 pub(crate) const HEAD: u8 = 1;
 pub(crate) const DATA: u8 = 2;
@@ -45,7 +46,8 @@ pub(crate) const SIGNAL_TEXTS: usize = 128;
 pub(crate) const F32: u32 = 0x2004;
 /// The mark of user data that are JSON, ended by a zero.
 pub(crate) const JSON: u16 = 3 << 12;
-/// Before the entries of a payload: number of the first sample (8), entries (4), bits of an entry (2), zeros (2).
+/// Before the entries of a payload: number of the first sample (8), entries (4), bits of an entry (2), zeros
+/// (2).
 pub(crate) const FRONT: usize = 16;
 
 /// Length of a payload in the file, in bytes: with its checksum, padded to a multiple of 8.

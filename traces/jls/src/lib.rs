@@ -1,4 +1,5 @@
-//! JLS version 2, the recordings of Joulescope instruments: reading and writing, in pieces, in files of any length.
+//! JLS version 2, the recordings of Joulescope instruments: reading and writing, in pieces, in files of any
+//! length.
 //!
 //! - [`Writer`] writes signals of one fixed rate in f32, with the summaries (mean, standard deviation, lowest, highest)
 //!   that let viewers zoom, the times of first and last sample, and a JSON text of your own.
@@ -6,8 +7,8 @@
 //!   sample types, from any sample on.
 //!
 //! Summaries, annotations and times are written, but not read. The layout is Jetperch's (JLS 0.17,
-//! `include/jls/format.h`, Apache-2.0); the code is our own. Every checksum is verified; a damaged file is an error, never
-//! a panic, and no length that a file states is allocated on trust.
+//! `include/jls/format.h`, Apache-2.0); the code is our own. Every checksum is verified; a damaged file is an
+//! error, never a panic, and no length that a file states is allocated on trust.
 //!
 //! ```
 //! use jls::{Reader, SignalName, Timestamp, Writer};

@@ -41,8 +41,8 @@ impl Reader {
         self.definitions.sources.get(&signal.source)
     }
 
-    /// Opens a signal, at its first sample. Each reader has a file handle of its own, so that threads can read side by
-    /// side.
+    /// Opens a signal, at its first sample. Each reader has a file handle of its own, so that threads can
+    /// read side by side.
     ///
     /// # Errors
     /// [`ReadError`] if samples are of a type that is not read, or the index is damaged.
@@ -210,8 +210,8 @@ impl SampleReader {
         Ok(head.at)
     }
 
-    /// The next chunk of the same list. A list of a repaired file that leads to another chunk ends there; the numbers of samples
-    /// show whether any are missing before the end.
+    /// The next chunk of the same list. A list of a repaired file that leads to another chunk ends there; the
+    /// numbers of samples show whether any are missing before the end.
     fn follow(&mut self, head: &ChunkHeader) -> Result<Option<ChunkHeader>, ReadError> {
         let next = self.file.follow(head)?;
         Ok(next.filter(|next| next.tag == head.tag && next.meta & SIGNAL_MASK == self.number))
@@ -268,8 +268,8 @@ impl SampleReader {
         Ok(into.len() - before)
     }
 
-    /// Skips samples. Chunks skipped whole are not read: their headers hold their lengths, and the next chunk that is read
-    /// shows whether its samples are where they belong.
+    /// Skips samples. Chunks skipped whole are not read: their headers hold their lengths, and the next chunk
+    /// that is read shows whether its samples are where they belong.
     ///
     /// # Errors
     /// As [`Self::read`].

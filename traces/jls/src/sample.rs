@@ -20,8 +20,8 @@ const FLOAT: u32 = 4;
 const UNSIGNED: u32 = 2;
 
 impl Sample {
-    /// From the type of a definition: base type (bits 0 to 3), size in bits (8 to 15), binary digits after the point (16
-    /// to 23). Its name if it cannot be read.
+    /// From the type of a definition: base type (bits 0 to 3), size in bits (8 to 15), binary digits after
+    /// the point (16 to 23). Its name if it cannot be read.
     pub fn of(data_type: u32) -> Result<Self, String> {
         let (base, bits, point) = (data_type & 0xf, (data_type >> 8) & 0xff, (data_type >> 16) as u8 as i8);
         match (base, bits) {

@@ -3,10 +3,11 @@
 /// Sums computed together, so that the compiler may use as many lanes. Their order is fixed.
 const LANES: usize = 8;
 
-/// Number, mean, sum of squared differences from it, lowest and highest of some samples. Non-finite samples count as missing.
+/// Number, mean, sum of squared differences from it, lowest and highest of some samples. Non-finite samples
+/// count as missing.
 ///
-/// Parts are put together by Chan, Golub and LeVeque, "Updating Formulae and a Pairwise Algorithm for Computing Sample
-/// Variances", 1979, equation 2.1.
+/// Parts are put together by Chan, Golub and LeVeque, "Updating Formulae and a Pairwise Algorithm for
+/// Computing Sample Variances", 1979, equation 2.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moments {
     count: u64,
@@ -87,7 +88,8 @@ impl Moments {
         }
     }
 
-    /// The entry in a file: mean, standard deviation (over the number), lowest, highest; NaN where all are missing.
+    /// The entry in a file: mean, standard deviation (over the number), lowest, highest; NaN where all are
+    /// missing.
     pub fn entry(&self) -> [f32; 4] {
         if self.count == 0 {
             return [f32::NAN; 4];

@@ -10,8 +10,8 @@ const EPOCH_S: i64 = 1_514_764_800;
 pub struct Timestamp(pub(crate) i64);
 
 impl Timestamp {
-    /// The time `after_s` seconds after `start_s`, the latter since 1970-01-01 UTC; `None` if it is farther than about
-    /// 8.5e9 s from 2018. The start is exact to 2^-31 s.
+    /// The time `after_s` seconds after `start_s`, the latter since 1970-01-01 UTC; `None` if it is farther
+    /// than about 8.5e9 s from 2018. The start is exact to 2^-31 s.
     pub fn from_unix_s(start_s: f64, after_s: f64) -> Option<Self> {
         let ticks = |seconds: f64| libm::round(seconds * TICKS_PER_S) as i128;
         // A float-to-int cast saturates, far beyond i64.

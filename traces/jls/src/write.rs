@@ -1,7 +1,8 @@
 //! Writing a recording, sample by sample.
 //!
-//! Each chunk of data makes entries of level 1; a full summary of one level, with the index of its chunks, makes entries
-//! of the next. An incomplete entry at the end is left out, since readers take it from the samples.
+//! Each chunk of data makes entries of level 1; a full summary of one level, with the index of its chunks,
+//! makes entries of the next. An incomplete entry at the end is left out, since readers take it from the
+//! samples.
 
 use crate::chunk::{ChunkWriter, List};
 use crate::definitions::{self, Heads, SignalName};
@@ -72,8 +73,8 @@ impl Level {
         Ok((index, above))
     }
 
-    /// Whether entries remain to be written at the end. A single chunk below without an entry is found without an index,
-    /// unless there are indices before.
+    /// Whether entries remain to be written at the end. A single chunk below without an entry is found
+    /// without an index, unless there are indices before.
     fn is_pending(&self) -> bool {
         let needed = self.indices.first != 0 || self.below.len() > 1 || !self.entries.is_empty();
         !self.below.is_empty() && needed
@@ -146,7 +147,8 @@ impl SignalWriter {
         Ok(())
     }
 
-    /// Writes the remaining samples; returns the places of the first data and of the first index of each level.
+    /// Writes the remaining samples; returns the places of the first data and of the first index of each
+    /// level.
     pub fn finish<W: Write + Seek>(mut self, chunks: &mut ChunkWriter<W>) -> io::Result<Vec<u64>> {
         if !self.samples.is_empty() {
             self.flush(chunks)?;
@@ -188,7 +190,8 @@ impl Times {
         Ok(())
     }
 
-    /// Writes the index and summary of level 1, enough for few times; returns the places of the first data and of the index.
+    /// Writes the index and summary of level 1, enough for few times; returns the places of the first data
+    /// and of the index.
     pub fn finish<W: Write + Seek>(self, chunks: &mut ChunkWriter<W>, signal: u16) -> io::Result<[u64; 2]> {
         let Some(&(first, _, _)) = self.entries.first() else { return Ok([0; 2]) };
         let mark = signal | 1 << 12;
@@ -211,7 +214,8 @@ impl Times {
 
 /// A JLS file being written: `N` signals of one rate, in pieces of any size, which do not show in the bytes.
 ///
-/// Memory does not grow with the samples: about 4 MiB, and 25 KiB a signal for each level of summaries (five at 1e9).
+/// Memory does not grow with the samples: about 4 MiB, and 25 KiB a signal for each level of summaries (five
+/// at 1e9).
 pub struct Writer<W, const N: usize> {
     chunks: ChunkWriter<W>,
     signals: [SignalWriter; N],
@@ -221,8 +225,8 @@ pub struct Writer<W, const N: usize> {
 }
 
 impl<W: Write + Seek, const N: usize> Writer<W, N> {
-    /// Begins a recording in an empty file: the name of the instrument, samples per second, the signals (numbered from
-    /// 1), and a JSON text of any content.
+    /// Begins a recording in an empty file: the name of the instrument, samples per second, the signals
+    /// (numbered from 1), and a JSON text of any content.
     ///
     /// # Errors
     /// If `out` cannot be written, or the text is longer than [`MAX_PAYLOAD_BYTES`].

@@ -10,7 +10,8 @@ use core::ops::Range;
 const RANDOM_STREAM: u64 = 1;
 
 impl Device {
-    /// The segments of `samples` that do not arrive, neighbouring packets in one. Each packet but the first is lost or not by itself.
+    /// The segments of `samples` that do not arrive, neighbouring packets in one. Each packet but the first
+    /// is lost or not by itself.
     pub(super) fn lost(&self, samples: usize) -> Vec<Range<usize>> {
         let random = Random::new(self.spec.seed, RANDOM_STREAM);
         let length = self.spec.packet_samples as usize;

@@ -84,8 +84,8 @@ impl Rail {
 
     /// Voltage (V) and current (A) where the load draws `power_w`; `None` beyond [`Rail::limit_w`].
     ///
-    /// Kirchhoff: `V = V0 - R I`, `P = V I`, so `R I^2 - V0 I + P = 0`. Of its roots the smaller current is the
-    /// stable one; the form below has no cancellation and holds for `R = 0`.
+    /// Kirchhoff: `V = V0 - R I`, `P = V I`, so `R I^2 - V0 I + P = 0`. Of its roots the smaller current is
+    /// the stable one; the form below has no cancellation and holds for `R = 0`.
     pub(super) fn solve(&self, power_w: f64) -> Option<(f64, f64)> {
         let discriminant = self.volts * self.volts - 4.0 * self.ohm * power_w;
         if discriminant < 0.0 {
@@ -126,8 +126,8 @@ impl Quantizer {
 }
 
 impl Device {
-    /// A bound on |trace integral - curve integral| over the whole trace, J, for a device without noise and filter;
-    /// `None` for a device with either, and where samples were clipped (no bound holds then).
+    /// A bound on |trace integral - curve integral| over the whole trace, J, for a device without noise and
+    /// filter; `None` for a device with either, and where samples were clipped (no bound holds then).
     ///
     /// With `V = V' + a`, `I = I' + b`, `|a| <= e_V`, `|b| <= e_I`, the power is off by at most
     /// `|V'| e_I + |I'| e_V + e_V e_I`; `e` is half a code plus the f32 rounding of the stored value. The last term

@@ -18,8 +18,8 @@ const TASK_SAMPLES: usize = 1 << 12;
 /// Most samples: they are not held in memory, but take time.
 const MAX_SAMPLES: f64 = (1_u64 << 36) as f64;
 
-/// A trace as a coarser device would have recorded it: the original is read again whenever samples are needed, and
-/// neither is in memory. The samples are those of [`Device::resample`], to the last bit.
+/// A trace as a coarser device would have recorded it: the original is read again whenever samples are
+/// needed, and neither is in memory. The samples are those of [`Device::resample`], to the last bit.
 pub struct Resampled<'a> {
     device: &'a Device,
     trace: &'a dyn TraceReader,
@@ -34,8 +34,8 @@ pub struct Resampled<'a> {
 }
 
 impl Device {
-    /// Samples a trace as if its power were drawn from the device's rail. It is gone through once, so that whatever is
-    /// wrong is known before the first sample.
+    /// Samples a trace as if its power were drawn from the device's rail. It is gone through once, so that
+    /// whatever is wrong is known before the first sample.
     ///
     /// # Errors
     /// [`WriteError::Source`] as [`Device::resample`], and [`WriteError::Read`] if the trace cannot be read.

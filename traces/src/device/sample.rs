@@ -104,9 +104,9 @@ pub(super) struct Channels {
 impl Device {
     /// Samples a curve over the whole periods in `[start_s, end_s]`.
     ///
-    /// Each sample is the exact mean power of its period, low-passed if so specified, converted to voltage and current at
-    /// the rail (so that `V I` is the mean power), with noise added and both quantized. The trace's metadata names
-    /// the device and the seed.
+    /// Each sample is the exact mean power of its period, low-passed if so specified, converted to voltage
+    /// and current at the rail (so that `V I` is the mean power), with noise added and both quantized. The
+    /// trace's metadata names the device and the seed.
     ///
     /// # Errors
     /// [`SampleError`]: span outside the curve or too short, rail overloaded.
@@ -126,7 +126,8 @@ impl Device {
         })
     }
 
-    /// Samples a trace as if its power were drawn from the device's rail: what a coarser recorder would have shown.
+    /// Samples a trace as if its power were drawn from the device's rail: what a coarser recorder would have
+    /// shown.
     ///
     /// # Errors
     /// [`SampleError`] as [`Device::sample`].
@@ -206,8 +207,8 @@ impl Device {
     }
 }
 
-/// One pole with a time constant in samples, started at rest: `y += (1 - exp(-1/tau)) (x - y)`, the step response
-/// of an RC filter taken at sample steps.
+/// One pole with a time constant in samples, started at rest: `y += (1 - exp(-1/tau)) (x - y)`, the step
+/// response of an RC filter taken at sample steps.
 pub(super) struct LowPass {
     share: f64,
     state: Option<f64>,

@@ -68,8 +68,8 @@ pub struct DeviceSpec {
 }
 
 impl Default for DeviceSpec {
-    /// A 12 V rail through 4 mOhm into a 14-bit, 50 kHz recorder of +-30 A and +-20 V. Assumed, not any one product:
-    /// the desktop device of `shared/peers/traces`, with 5 mA and 2 mV of noise.
+    /// A 12 V rail through 4 mOhm into a 14-bit, 50 kHz recorder of +-30 A and +-20 V. Assumed, not any one
+    /// product: the desktop device of `shared/peers/traces`, with 5 mA and 2 mV of noise.
     fn default() -> Self {
         Self {
             name: "daq-50khz-14bit".to_owned(),
@@ -184,9 +184,9 @@ const RANGES_A: [f64; 18] =
     [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5];
 
 impl DeviceSpec {
-    /// The default recorder on a rail of `rail_v` volts, with the smallest range of currents of a 1-3-10 series that holds
-    /// a quarter more than `peak_w` takes, as one would choose in a laboratory. Its voltage range is half as large again as
-    /// the rail; noise goes with the ranges.
+    /// The default recorder on a rail of `rail_v` volts, with the smallest range of currents of a 1-3-10
+    /// series that holds a quarter more than `peak_w` takes, as one would choose in a laboratory. Its voltage
+    /// range is half as large again as the rail; noise goes with the ranges.
     pub fn fitting(rail_v: f64, peak_w: f64) -> Self {
         let needed_a = HEADROOM * peak_w / rail_v;
         let range_a = RANGES_A.into_iter().find(|range| *range >= needed_a).unwrap_or(needed_a);

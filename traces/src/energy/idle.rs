@@ -9,8 +9,8 @@ use thiserror::Error;
 pub enum Idle<'a> {
     /// The same at all times, W: the mean over a part of the trace or a recording. Less noisy.
     Mean(f64),
-    /// Instant by instant: the power of an idle recording at the same time after its start (repeated if it is shorter).
-    /// Periodic patterns are subtracted, but the noise of both adds up.
+    /// Instant by instant: the power of an idle recording at the same time after its start (repeated if it is
+    /// shorter). Periodic patterns are subtracted, but the noise of both adds up.
     Instant(PowerIntegral<'a>),
 }
 

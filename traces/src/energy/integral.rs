@@ -11,8 +11,8 @@ const BLOCK: usize = 256;
 ///
 /// `E(a, b) = sum over i of V_i I_i |[t_i, t_i + dt] cap [a, b]|`,
 ///
-/// so samples cut by `a` or `b` count by fraction, and what lies outside the trace counts nothing. As both ends use
-/// the same running integral, energies of adjoining spans add up to the energy of the whole.
+/// so samples cut by `a` or `b` count by fraction, and what lies outside the trace counts nothing. As both
+/// ends use the same running integral, energies of adjoining spans add up to the energy of the whole.
 #[derive(Clone, Debug)]
 pub struct PowerIntegral<'a> {
     trace: &'a Trace,

@@ -17,8 +17,8 @@ pub struct RunOptions {
     pub discard: Option<usize>,
     /// Whether to leave out [`outliers`].
     pub drop_outliers: bool,
-    /// Power, W, above which a frame is busy, for energies from begin to finish; by default a tenth of the way from the
-    /// lowest power of the trace to the mean of the frames.
+    /// Power, W, above which a frame is busy, for energies from begin to finish; by default a tenth of the
+    /// way from the lowest power of the trace to the mean of the frames.
     pub busy_above_w: Option<f64>,
 }
 
@@ -140,8 +140,8 @@ fn without_idle_j(
     Ok(energies.zip(spans).map(|(energy_j, span)| energy_j - idle_j(*span)).collect())
 }
 
-/// Energy of each pass, J. A pass called `before` is added if the first one does not begin with the frame, so that the
-/// passes add up to the frames.
+/// Energy of each pass, J. A pass called `before` is added if the first one does not begin with the frame, so
+/// that the passes add up to the frames.
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
@@ -171,7 +171,8 @@ pub fn passes_j(
     Ok(passes.iter().zip(spreads).filter_map(|(pass, spread)| Some((pass.name.clone(), spread?))).collect())
 }
 
-/// Mean frames and pixels per joule. Inverse units cannot be averaged: these are inverses of the mean energy (Paper II).
+/// Mean frames and pixels per joule. Inverse units cannot be averaged: these are inverses of the mean energy
+/// (Paper II).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseUnits {
     /// Frames per joule.

@@ -41,8 +41,8 @@ impl Summary {
     }
 }
 
-/// The frames without an incomplete last one, which ends with the trace or at an end mark and is much longer or shorter than the
-/// others.
+/// The frames without an incomplete last one, which ends with the trace or at an end mark and is much longer
+/// or shorter than the others.
 pub fn whole(frames: &[FrameEnergy]) -> &[FrameEnergy] {
     let cut = |flags: Flags| {
         flags.contains(Flag::Last) && (flags.contains(Flag::Long) || flags.contains(Flag::Short))
@@ -92,8 +92,8 @@ const MIN_DEVIATION: f64 = 1e-3;
 /// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
 const MAD_TO_DEVIATION: f64 = 1.4826;
 
-/// Whether each of `values` is an outlier among its neighbours: off their median by several of their median absolute
-/// deviations (Hampel 1974). Fewer than five values have none.
+/// Whether each of `values` is an outlier among its neighbours: off their median by several of their median
+/// absolute deviations (Hampel 1974). Fewer than five values have none.
 pub fn outliers(values: &[f64]) -> Vec<bool> {
     if values.len() < 5 {
         return vec![false; values.len()];
@@ -184,8 +184,8 @@ pub struct WarmUp {
     pub clearness: f64,
 }
 
-/// The frame at which the mean energy changes, by least squares of two levels (Hinkley 1970, eq. 2.2), looked for in the
-/// first half. It is the knee of [`mean_over_discarded`].
+/// The frame at which the mean energy changes, by least squares of two levels (Hinkley 1970, eq. 2.2), looked
+/// for in the first half. It is the knee of [`mean_over_discarded`].
 pub fn warm_up(energies_j: &[f64]) -> WarmUp {
     let none = WarmUp { frames: 0, excess_j: 0.0, clearness: 0.0 };
     let count = energies_j.len();

@@ -1,11 +1,12 @@
-//! Energies of a trace of any length, in one pass: by the rule of [`PowerIntegral`](super::PowerIntegral), to the last bit.
+//! Energies of a trace of any length, in one pass: by the rule of [`PowerIntegral`](super::PowerIntegral), to
+//! the last bit.
 
 use super::FrameEnergy;
 use crate::io::{TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError};
 use crate::stats::PairSum;
 
-/// Energy of each of some spans of time, from one time (s) to another, J; negative where they are the other way round.
-/// All samples are read once.
+/// Energy of each of some spans of time, from one time (s) to another, J; negative where they are the other
+/// way round. All samples are read once.
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.
@@ -63,8 +64,8 @@ impl TraceWriter for Sums {
     }
 }
 
-/// When the work of each frame ends, s: the end of its last sample above `watts`; its start where there is none. This is
-/// the end of the frame by the older rule, from begin to finish. Frames are in order and apart.
+/// When the work of each frame ends, s: the end of its last sample above `watts`; its start where there is
+/// none. This is the end of the frame by the older rule, from begin to finish. Frames are in order and apart.
 ///
 /// # Errors
 /// [`WriteError::Read`] if the samples cannot be read.

@@ -9,7 +9,8 @@ use thiserror::Error;
 
 /// The columns of `frames.csv`, in order. Later versions only add columns at the end.
 ///
-/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a simulator.
+/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a
+/// simulator.
 pub const TABLE_COLUMNS: [&str; 12] = [
     "frame",
     "start_s",
@@ -86,14 +87,15 @@ impl FrameTable {
         &self.outliers
     }
 
-    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads back the
-    /// same.
+    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads
+    /// back the same.
     ///
     /// # Errors
     /// [`TableError`] if the writer fails.
     pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), TableError> {
         writeln!(out, "{}", TABLE_COLUMNS.join(","))?;
-        // Numbers take longer to write down than to find: many rows at once on every thread, the next while some go to the file.
+        // Numbers take longer to write down than to find: many rows at once on every thread, the next while
+        // some go to the file.
         let step = HELD_TASKS * TASK_ROWS;
         let mut batches = self.batches(0, step);
         for from in (step..self.frames.len() + step).step_by(step) {

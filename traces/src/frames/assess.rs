@@ -1,5 +1,5 @@
-//! Confidence of each start, and warnings about the result as a whole: also about work before the first start and after
-//! the last frame.
+//! Confidence of each start, and warnings about the result as a whole: also about work before the first start
+//! and after the last frame.
 
 use super::found::{Flag, Found, FrameStart};
 use super::marks::{Marks, Placement, Window};
@@ -15,8 +15,9 @@ const MAX_ODD_SHARE: f64 = 0.1;
 /// Largest share of frames of low confidence without a warning about the whole result.
 const MAX_UNSURE_SHARE: f64 = 0.1;
 
-/// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest, linear in the logarithm
-/// between; scaled down where neither the populations are distinct nor the starts evenly spaced.
+/// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest,
+/// linear in the logarithm between; scaled down where neither the populations are distinct nor the starts
+/// evenly spaced.
 pub(crate) fn confidence(threshold: &Threshold) -> impl Fn(f64) -> f64 {
     let [low, high] =
         [threshold.matched, threshold.rest].map(|of| libm::log(of.mean_w2.max(f64::MIN_POSITIVE)));
@@ -159,7 +160,8 @@ const BUSY_LEVEL: f64 = 0.5;
 /// Segments per usual length of a frame; the lowest power is that of a segment.
 const SEGMENTS_PER_LENGTH: usize = 20;
 
-/// Work beyond the starts, in usual lengths of a frame; places are in samples and in order. `None` for fewer than three starts.
+/// Work beyond the starts, in usual lengths of a frame; places are in samples and in order. `None` for fewer
+/// than three starts.
 fn uncovered_lengths(power: &[f64], starts: &[f64]) -> Option<usize> {
     let (&first, &last) = starts.first().zip(starts.last())?;
     let mut gaps: Vec<f64> = starts.windows(2).map(|two| two[1] - two[0]).collect();

@@ -12,12 +12,12 @@ use crate::trace::Trace;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end mark, by
-/// [`Method::Auto`].
+/// Finds every frame start like the marked ones, anywhere the window fits into the trace and before the end
+/// mark, by [`Method::Auto`].
 ///
-/// A start is at `mark + offset of the best alignment`: the marks themselves are exact by definition, and a mark set
-/// late by some microseconds makes every start late by as many. Starts nearer to the end mark than a quarter of the
-/// window are taken to be that end.
+/// A start is at `mark + offset of the best alignment`: the marks themselves are exact by definition, and a
+/// mark set late by some microseconds makes every start late by as many. Starts nearer to the end mark than a
+/// quarter of the window are taken to be that end.
 ///
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
@@ -98,8 +98,8 @@ pub(super) fn find_auto(trace: &Trace, marks: &Marks) -> Result<Found, MarkError
     if long_and_clear { Ok(squares) } else { find_tracked(trace, marks) }
 }
 
-/// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a warning, over as
-/// long a part of the trace.
+/// Whether tracking found enough starts for a test: many, or fewer than the sum of squares where that gives a
+/// warning, over as long a part of the trace.
 fn enough_starts(tracked: &Found, squares: &Found) -> bool {
     let count = tracked.starts.len();
     let last_s = span_s(tracked) / count.max(2).saturating_sub(1) as f64;
@@ -199,8 +199,8 @@ fn rises(trace: &Trace) -> Vec<f64> {
     taken.into_iter().map(|place| trace.time_s(place)).collect()
 }
 
-/// The median correlation (Pearson 1896) of the windows at neighbouring starts: about 0 in noise, 1 for frames that repeat.
-/// 0 for fewer than two windows inside the trace.
+/// The median correlation (Pearson 1896) of the windows at neighbouring starts: about 0 in noise, 1 for
+/// frames that repeat. 0 for fewer than two windows inside the trace.
 pub(super) fn neighbour_similarity(trace: &Trace, found: &Found) -> f64 {
     let width = libm::round((found.window.pre_s + found.window.post_s) * trace.rate_hz()) as usize;
     let first = |time_s: f64| libm::round(trace.position(time_s - found.window.pre_s));
@@ -258,7 +258,8 @@ mod tests {
 
     #[test]
     fn a_mark_whose_like_does_not_come_back_is_tracked_if_frames_are_plainly_there() {
-        // After one of idle, each frame of 400 samples is busy for six segments of 50, whose levels go their own ways from frame to frame.
+        // After one of idle, each frame of 400 samples is busy for six segments of 50, whose levels go their
+        // own ways from frame to frame.
         let power = |sample: usize| {
             let (frame, segment) = ((sample / 400) as f32, sample % 400 / 50);
             let level = 3.0 + 2.0 * (0.1 * frame + 2.1 * segment as f32).sin();
@@ -270,7 +271,8 @@ mod tests {
 
     #[test]
     fn four_frames_of_passes_that_look_alike_are_four() {
-        // After one of idle, each frame is of four passes, unevenly apart, whose levels differ as much as frames do.
+        // After one of idle, each frame is of four passes, unevenly apart, whose levels differ as much as
+        // frames do.
         let power = |sample: usize| {
             let (frame, at) = (sample / 1600, sample % 1600);
             let pass = [0, 480, 700, 1040].partition_point(|&from| from <= at) - 1;

@@ -52,7 +52,8 @@ pub struct Found {
     pub warnings: Vec<Warning>,
 }
 
-/// The least distance between two frame starts, in samples: half the window, as no frame is shorter than that.
+/// The least distance between two frame starts, in samples: half the window, as no frame is shorter than
+/// that.
 pub(super) fn spacing(window_samples: usize) -> usize {
     (window_samples / 2).max(1)
 }
@@ -86,7 +87,8 @@ pub enum Flag {
     Split,
     /// Its length deviates from the even period of its neighbours: one of its ends may be misplaced.
     Odd,
-    /// It has fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of it and more.
+    /// It has fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of
+    /// it and more.
     Coarse,
 }
 
@@ -168,11 +170,12 @@ pub enum Method {
     SumOfSquares,
     /// The same by z-normalized distance: likeness of shape, whatever the level and the scale of power.
     Normalized,
-    /// The sequence of starts with the most evidence: similar to several templates, by shape and by squares, to each other, and
-    /// at an even period.
+    /// The sequence of starts with the most evidence: similar to several templates, by shape and by squares,
+    /// to each other, and at an even period.
     Tracking,
-    /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and normalized; with fewer
-    /// than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or more than 16 million samples without a warning.
+    /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and
+    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or
+    /// more than 16 million samples without a warning.
     #[default]
     Auto,
 }

@@ -1,6 +1,7 @@
 //! Lower confidence where the idle gap before a frame differs from that at the mark, or is missing.
 //!
-//! A frame begins in little power, between the end of the frame before and its own draws. The alignment follows the draws.
+//! A frame begins in little power, between the end of the frame before and its own draws. The alignment
+//! follows the draws.
 //!
 //! - A changed gap: if the gap before the draws has become longer, power does not show whether the wait for the frame has,
 //!   or its own quiet beginning (the front end). The start may be anywhere in the added time. Starts whose gap begins or
@@ -44,8 +45,8 @@ pub(super) const SUSPECT_CONFIDENCE: f64 = 0.4;
 /// The samples of a profile at which an idle gap begins and ends, by each of the [`BOUNDS`].
 type GapBounds = [Option<[usize; 2]>; BOUNDS.len()];
 
-/// Confidence factors of starts, from their places (samples, in order) and the width of the window: lower where the idle gap
-/// has changed since the mark.
+/// Confidence factors of starts, from their places (samples, in order) and the width of the window: lower
+/// where the idle gap has changed since the mark.
 pub(super) fn shifted_gap_confidence(
     power: &[f64],
     starts: &[f64],
@@ -107,7 +108,8 @@ pub(super) fn neighbours<T>(starts: &[T], start: usize, frames: usize) -> &[T] {
     &starts[start.saturating_sub(frames)..starts.len().min(start + frames + 1)]
 }
 
-/// The power about a start, by shares of the window before and after it; `None` where that is not all in the trace.
+/// The power about a start, by shares of the window before and after it; `None` where that is not all in the
+/// trace.
 pub(super) fn window_around(power: &[f64], start: f64, shares: [f64; 2], width: usize) -> Option<&[f64]> {
     let [before, after] = shares.map(|share| (share * width as f64) as usize);
     let place = libm::round(start) as usize;
@@ -153,8 +155,8 @@ const MIN_DIP_RATIO: f64 = 0.6;
 /// That dip must be at least this many deviations of the noise.
 const MIN_NOISE_DEVIATIONS: f64 = 6.0;
 
-/// Confidence factors of starts, from their places (samples, in order), the width of the window and the deviation of the noise:
-/// lower where the idle gap is missing.
+/// Confidence factors of starts, from their places (samples, in order), the width of the window and the
+/// deviation of the noise: lower where the idle gap is missing.
 pub(super) fn missing_gap_confidence(power: &[f64], starts: &[f64], width: usize, noise_w: f64) -> Vec<f64> {
     let gap_samples = (MIN_GAP_SHARE * width as f64) as usize;
     if gap_samples == 0 {
@@ -203,7 +205,8 @@ mod tests {
 
     const WIDTH: usize = 250;
 
-    /// Frames with a rest of `rest(frame)` samples before draws of 300; each starts, as it was found by its draws, 10 before those.
+    /// Frames with a rest of `rest(frame)` samples before draws of 300; each starts, as it was found by its
+    /// draws, 10 before those.
     fn frames(count: usize, rest: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<f64>) {
         let (mut power, mut starts) = (vec![1.2; 300], Vec::new());
         for frame in 0..count {
@@ -238,7 +241,8 @@ mod tests {
 
     #[test]
     fn a_quiet_end_of_the_frame_before_is_not_the_rest() {
-        // 30 samples at the end of each frame, 25 before its rest, draw as little as that, and for some frames even less.
+        // 30 samples at the end of each frame, 25 before its rest, draw as little as that, and for some
+        // frames even less.
         let (mut power, starts) = frames(120, |_| 12);
         for (frame, start) in starts.iter().enumerate() {
             let end = *start as usize - 30;
@@ -291,7 +295,8 @@ mod unrested_tests {
 
     const WIDTH: usize = 250;
 
-    /// 40 frames with a rest of `rest` samples before 300 of draws, in noise of up to `noise_w` either way, and their starts.
+    /// 40 frames with a rest of `rest` samples before 300 of draws, in noise of up to `noise_w` either way,
+    /// and their starts.
     fn frames(rest: usize, noise_w: f64) -> (Vec<f64>, Vec<f64>) {
         let (mut power, mut starts) = (vec![1.2; 300], Vec::new());
         for _ in 0..40 {

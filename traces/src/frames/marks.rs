@@ -117,7 +117,8 @@ impl Marks {
         self.place_on(trace.start_s(), trace.rate_hz(), trace.samples() as u64)
     }
 
-    /// As [`Marks::place`], on samples that need not be in memory. An end mark may be infinite: the end of the samples.
+    /// As [`Marks::place`], on samples that need not be in memory. An end mark may be infinite: the end of
+    /// the samples.
     pub(crate) fn place_on(&self, start_s: f64, rate_hz: f64, samples: u64) -> Result<Placement, MarkError> {
         let room = Room { start_s, rate_hz, samples: samples as f64 };
         self.check(&room)?;
@@ -197,14 +198,15 @@ impl Room {
 /// Standard errors above the deviation of the noise from which a window is more than noise.
 const MIN_STANDARD_ERRORS: f64 = 3.0;
 
-/// Whether a window varies by no more than the noise of a sample, `sigma`: the deviation of `n` samples of noise is known to
-/// one part in `sqrt(2 n)`.
+/// Whether a window varies by no more than the noise of a sample, `sigma`: the deviation of `n` samples of
+/// noise is known to one part in `sqrt(2 n)`.
 fn is_flat(window: &[f64], sigma: f64) -> bool {
     let most = sigma * (1.0 + MIN_STANDARD_ERRORS / libm::sqrt(2.0 * window.len() as f64));
     moments(window).deviation <= most
 }
 
-/// The warning, where one of some marked windows, each with where its mark is (s), is flat in noise of deviation `sigma`.
+/// The warning, where one of some marked windows, each with where its mark is (s), is flat in noise of
+/// deviation `sigma`.
 pub(crate) fn flat_mark<'a>(
     windows: impl IntoIterator<Item = (f64, &'a [f64])>,
     sigma: f64,

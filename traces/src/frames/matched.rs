@@ -1,7 +1,7 @@
 //! Starts by distance to the marked windows alone: threshold and local minima.
 //!
-//! The first frame of a free-running recording is searched separately: nothing was drawn before it, so the part of the
-//! window before the mark differs.
+//! The first frame of a free-running recording is searched separately: nothing was drawn before it, so the
+//! part of the window before the mark differs.
 
 use super::assess;
 use super::assess::confidence;
@@ -151,7 +151,8 @@ pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
 }
 
 /// Variance of the sensor noise, W^2, from the median step between neighbours: `median |p[i+1] - p[i]|` is
-/// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a median.
+/// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a
+/// median.
 pub(super) fn noise_variance(power: &[f64]) -> f64 {
     let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let sigma = noise_deviation(median_of(steps, power.len().saturating_sub(1)));
@@ -175,8 +176,9 @@ const MAX_LEAD_GAPS: f64 = 1.6;
 const MAX_MATCH_SHARE: f64 = 0.5;
 
 impl View<'_> {
-    /// One more start before the first one found, matched only by what follows the mark, with the threshold (and the
-    /// reported distance) in proportion to the compared part. `None` if nothing there is near enough.
+    /// One more start before the first one found, matched only by what follows the mark, with the threshold
+    /// (and the reported distance) in proportion to the compared part. `None` if nothing there is near
+    /// enough.
     pub(super) fn start_after_idle(&self, starts: &[FrameStart], spacing: usize) -> Option<FrameStart> {
         let gap_s = median_gap_s(starts)?;
         let first = self.trace.position(starts.first()?.time_s);
@@ -205,8 +207,8 @@ impl View<'_> {
         })
     }
 
-    /// How much what follows the mark differs from the steady power before it, W^2: where that is nothing, idle alone
-    /// resembles it. Unbounded where the window has nothing before the mark.
+    /// How much what follows the mark differs from the steady power before it, W^2: where that is nothing,
+    /// idle alone resembles it. Unbounded where the window has nothing before the mark.
     fn contrast_w2(&self, first: usize, lead: usize, template: &[f64]) -> f64 {
         if lead == 0 {
             return f64::INFINITY;

@@ -10,7 +10,8 @@ const MIN_TASK_GAPS: usize = 1024;
 /// Largest deviation of an even gap from the usual one, as a share of that.
 const MAX_EVEN_DEVIATION: f64 = 0.1;
 
-/// For each gap, the median of its neighbours and their median deviation from it. `None` for fewer than two neighbours.
+/// For each gap, the median of its neighbours and their median deviation from it. `None` for fewer than two
+/// neighbours.
 pub(super) fn usual_gaps(gaps: &[f64]) -> Vec<Option<[f64; 2]>> {
     let one = |index: usize| {
         let around = index.saturating_sub(NEIGHBOUR_GAPS)..gaps.len().min(index + NEIGHBOUR_GAPS + 1);
@@ -48,9 +49,9 @@ const REGULAR_RATIOS: [f64; 2] = [0.6, 1.6];
 /// Fewest gaps whose regularity means anything.
 const MIN_GAPS: usize = 4;
 
-/// The share of `span` that lies between neighbours at a regular distance: 1 if all of it is evenly divided, less
-/// where starts are missing (their gap is long), false (short), or absent at the ends. 0 if there are too few.
-/// Offsets in samples, sorted.
+/// The share of `span` that lies between neighbours at a regular distance: 1 if all of it is evenly divided,
+/// less where starts are missing (their gap is long), false (short), or absent at the ends. 0 if there are
+/// too few. Offsets in samples, sorted.
 pub(crate) fn regularity(offsets: &[usize], span: usize) -> f64 {
     let gaps: Vec<usize> = offsets.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if gaps.len() < MIN_GAPS || span == 0 {

@@ -1,4 +1,5 @@
-//! Distance profiles: the distance of a template to every window of a trace, by summed squares or by shape, and its minima.
+//! Distance profiles: the distance of a template to every window of a trace, by summed squares or by shape,
+//! and its minima.
 //!
 //! Narrow templates are summed directly, wide ones correlated by the Fourier transform, block by block.
 
@@ -10,9 +11,9 @@ const LANES: usize = 16;
 
 /// Summed squared difference `d[k] = sum over j of (power[k + j] - template[j])^2`, in W^2 for powers in W.
 ///
-/// One value per offset at which the template fits, `power.len() - template.len() + 1`; none if it does not fit or
-/// is empty. Terms are added in the order of the template, so the result does not depend on how it is blocked.
-/// Time: `O(n m)`, `O(n)` memory.
+/// One value per offset at which the template fits, `power.len() - template.len() + 1`; none if it does not
+/// fit or is empty. Terms are added in the order of the template, so the result does not depend on how it is
+/// blocked. Time: `O(n m)`, `O(n)` memory.
 pub fn summed_squared_difference(power: &[f64], template: &[f64]) -> Vec<f64> {
     let width = template.len();
     if width == 0 || power.len() < width {
@@ -56,8 +57,8 @@ const MIN_BLOCK_SAMPLES: usize = 1 << 14;
 /// Wider templates are correlated by transforms, narrower ones summed directly.
 const MAX_DIRECT_SAMPLES: usize = 48;
 
-/// Summed squared difference at every offset, W^2, by whichever way is faster. By transforms it is exact to about 1e-13 of the
-/// template's and the segment's own squares.
+/// Summed squared difference at every offset, W^2, by whichever way is faster. By transforms it is exact to
+/// about 1e-13 of the template's and the segment's own squares.
 pub(super) fn squares(power: &[f64], template: &[f64]) -> Vec<f64> {
     let width = template.len();
     if width < MAX_DIRECT_SAMPLES || power.len() < width {
@@ -151,8 +152,8 @@ const RESTART_NORM_OFFSETS: usize = 1 << 14;
 
 /// Offsets that are lowest within less than `spacing` on either side, in order and at least `spacing` apart.
 ///
-/// On a plateau the first offset stands for its neighbours, so that a level without any structure still yields
-/// one candidate per `spacing` (the threshold needs to see such levels).
+/// On a plateau the first offset stands for its neighbours, so that a level without any structure still
+/// yields one candidate per `spacing` (the threshold needs to see such levels).
 pub(super) fn spaced_minima(profile: &[f64], spacing: usize) -> Vec<usize> {
     let spacing = spacing.max(1);
     let mut found: Vec<usize> = Vec::new();

@@ -1,17 +1,18 @@
 //! Alignment finer than a sample, also between two frames at different clocks.
 //!
-//! After a clock step the same draws take longer or shorter: the power after the start of one frame is that of the other,
-//! scaled in time. Compared without scaling, the two fit best up to a sixth of the window away from the start. So the
-//! earlier frame is scaled about its start by one ratio after another, and the shift is taken from the best ratio.
+//! After a clock step the same draws take longer or shorter: the power after the start of one frame is that
+//! of the other, scaled in time. Compared without scaling, the two fit best up to a sixth of the window away
+//! from the start. So the earlier frame is scaled about its start by one ratio after another, and the shift
+//! is taken from the best ratio.
 
 use super::profile::difference;
 use core::ops::RangeInclusive;
 
-/// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared difference within
-/// `reach` of it and the vertex of the parabola through it and its two neighbours.
+/// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared
+/// difference within `reach` of it and the vertex of the parabola through it and its two neighbours.
 ///
-/// For a signal smooth on the scale of a sample the difference is a parabola near its minimum, and the result exact;
-/// for a single sharp edge it is off by up to a tenth of a sample, to either side (tests show both).
+/// For a signal smooth on the scale of a sample the difference is a parabola near its minimum, and the result
+/// exact; for a single sharp edge it is off by up to a tenth of a sample, to either side (tests show both).
 pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) -> f64 {
     let Some(last) = power.len().checked_sub(template.len()) else { return near as f64 };
     let at = |offset: usize| difference(&power[offset..offset + template.len()], template);
@@ -40,7 +41,8 @@ pub(super) fn nearest(shifts: RangeInclusive<usize>, step: usize, residual: impl
     if step == 1 { rough } else { least(first.max(rough.saturating_sub(step)), last.min(rough + step), 1) }
 }
 
-/// The vertex of the parabola through three equally spaced values, relative to the middle one, within half a step.
+/// The vertex of the parabola through three equally spaced values, relative to the middle one, within half a
+/// step.
 pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     let curvature = before - 2.0 * middle + after;
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
@@ -73,8 +75,8 @@ pub(super) struct ScaledFit {
     pub curvature: f64,
 }
 
-/// Two frames to be aligned, by where their starts are thought to be, and what of them is compared: `before` and `after` samples of the
-/// later one, for shifts up to `reach`.
+/// Two frames to be aligned, by where their starts are thought to be, and what of them is compared: `before`
+/// and `after` samples of the later one, for shifts up to `reach`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScaledPair<'a> {
     pub power: &'a [f64],
@@ -85,7 +87,8 @@ pub(super) struct ScaledPair<'a> {
 }
 
 impl ScaledPair<'_> {
-    /// The ratio and the shift that leave least unexplained; `None` where the trace ends too early or nothing fits best.
+    /// The ratio and the shift that leave least unexplained; `None` where the trace ends too early or nothing
+    /// fits best.
     pub fn best(&self) -> Option<ScaledFit> {
         let fits = (-MAX_POWER..=MAX_POWER)
             .filter_map(|power| Some((power, self.fit(libm::pow(RATIO_STEP, f64::from(power)))?)));
@@ -135,7 +138,8 @@ impl ScaledPair<'_> {
     }
 }
 
-/// One less the squared correlation coefficient of a template (of mean 0 and squares `own`) and a segment; 1 where they are opposed.
+/// One less the squared correlation coefficient of a template (of mean 0 and squares `own`) and a segment; 1
+/// where they are opposed.
 fn unexplained(template: &[f64], own: f64, segment: &[f64]) -> f64 {
     let (mut sum, mut squares, mut inner) = (0.0, 0.0, 0.0);
     for (t, x) in template.iter().zip(segment) {

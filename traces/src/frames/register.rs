@@ -1,5 +1,5 @@
-//! Registration of starts finer than a sample: each is aligned with its neighbours, and all alignments are reconciled by
-//! least squares.
+//! Registration of starts finer than a sample: each is aligned with its neighbours, and all alignments are
+//! reconciled by least squares.
 //!
 //! Where content changes, the window of the marked frame is a poor reference, as draws after the start move. Successive
 //! frames differ little, and least right after the start. So the shift of each frame against its next few is measured
@@ -58,8 +58,8 @@ struct Link {
     weight: f64,
 }
 
-/// Positions of windows, samples, from their offsets (in order). `anchor` is where in a window of `width` samples the start is;
-/// windows for which `fixed` is true keep their offset.
+/// Positions of windows, samples, from their offsets (in order). `anchor` is where in a window of `width`
+/// samples the start is; windows for which `fixed` is true keep their offset.
 pub(super) fn register(
     power: &[f64],
     offsets: &[usize],
@@ -89,7 +89,8 @@ pub(super) fn register(
     offsets.iter().zip(moves).map(|(&offset, by)| offset as f64 + by).collect()
 }
 
-/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly at different clocks.
+/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly at
+/// different clocks.
 fn scaled(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
     let [before, after, reach] = SCALED_SHARES.map(|share| (share * width as f64) as usize);
     let starts = offsets.map(|offset| offset + anchor);
@@ -102,7 +103,8 @@ fn scaled(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Op
     clear.then_some((fit.ratio, fit.shift, 1.0 / variance))
 }
 
-/// How much later than at `b` the segment at `a` is found again, in samples, and the inverse variance of that; after a ratio of 1.
+/// How much later than at `b` the segment at `a` is found again, in samples, and the inverse variance of
+/// that; after a ratio of 1.
 fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Option<(f64, f64, f64)> {
     let template = power.get(a..a + length)?;
     let from = b.checked_sub(reach)?;
@@ -118,8 +120,8 @@ fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Opti
     {
         return None;
     }
-    // Of a parabola `c d^2 / 2` with noise of variance v a sample in each segment, the vertex has about variance 2 v / c; the floor is the
-    // parabola's own error on sharp edges.
+    // Of a parabola `c d^2 / 2` with noise of variance v a sample in each segment, the vertex has about
+    // variance 2 v / c; the floor is the parabola's own error on sharp edges.
     let variance = 2.0 * middle / length as f64 / curvature + 0.01;
     Some((1.0, at as f64 - reach as f64 + vertex(left, middle, right), 1.0 / variance))
 }
@@ -173,7 +175,8 @@ mod tests {
             .collect()
     }
 
-    /// The worst deviation from the mean error over pulses of `length` samples off the grid, one of them fixed.
+    /// The worst deviation from the mean error over pulses of `length` samples off the grid, one of them
+    /// fixed.
     fn worst_error(length: f64) -> f64 {
         let at: Vec<f64> = (0..30).map(|i| 50.0 + 80.37 * f64::from(i)).collect();
         let power = pulses(&at, length, 2600);
@@ -191,7 +194,8 @@ mod tests {
 
     #[test]
     fn analytic_one_sharp_edge_is_found_as_well_as_by_one_alignment() {
-        // A single alignment is off by up to 0.13 of a sample (`refine`); errors do not add up over the links.
+        // A single alignment is off by up to 0.13 of a sample (`refine`); errors do not add up over the
+        // links.
         assert!(worst_error(30.0) < 0.13, "{}", worst_error(30.0));
     }
 
@@ -203,7 +207,8 @@ mod tests {
 
     #[test]
     fn a_stretch_that_is_off_by_a_tenth_of_the_window_is_brought_back() {
-        // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends show it.
+        // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends
+        // show it.
         let at: Vec<f64> = (0..60).map(|i| 100.0 + 400.37 * f64::from(i)).collect();
         let draws: Vec<f64> = at.iter().flat_map(|a| [a + 27.0, a + 58.0]).collect();
         let (frames, draws) = (pulses(&at, 90.0, 24_400), pulses(&draws, 9.0, 24_400));

@@ -127,7 +127,8 @@ fn flag_unusual(frames: &mut [FrameSpan]) {
     }
 }
 
-/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if alone.
+/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if
+/// alone.
 pub(super) fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
     let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
     let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();

@@ -1,9 +1,10 @@
 //! Split frames: every other start is similar, and false starts split a frame in two.
 //!
-//! Content changes slowly, so a frame differs from the next at least as little as from the one after that. If a start is far
-//! more similar to the one after the next, each frame may have been split, as happens when a slow clock makes a frame as
-//! long as two were at the mark. Frames that alternate by themselves (a shadow map drawn every other time) do so at the
-//! mark, too. A frame begins in an idle gap: of alternating starts, those with a clearly smaller dip are false.
+//! Content changes slowly, so a frame differs from the next at least as little as from the one after that. If
+//! a start is far more similar to the one after the next, each frame may have been split, as happens when a
+//! slow clock makes a frame as long as two were at the mark. Frames that alternate by themselves (a shadow
+//! map drawn every other time) do so at the mark, too. A frame begins in an idle gap: of alternating starts,
+//! those with a clearly smaller dip are false.
 
 use super::idle_gap::{SUSPECT_CONFIDENCE, lowest_w, neighbours, window_around};
 use crate::stats::{mean, mean_and_error, upper_median};
@@ -39,7 +40,8 @@ pub(super) struct SplitFrames {
 }
 
 impl SplitFrames {
-    /// From the places of all starts (samples, in order), which of them are marked, and the width of the window.
+    /// From the places of all starts (samples, in order), which of them are marked, and the width of the
+    /// window.
     pub fn new(power: &[f64], starts: &[f64], marked: &[bool], width: usize) -> Self {
         let confidence_factors = alternation_confidence(power, starts, marked, width);
         let dips = Dips { power, starts, width };
@@ -67,7 +69,8 @@ fn alternation_confidence(power: &[f64], starts: &[f64], marked: &[bool], width:
     (0..starts.len()).map(of_start).collect()
 }
 
-/// Ratio of the differences of direct neighbours to those of every other start, near a start; 1 with too few starts near.
+/// Ratio of the differences of direct neighbours to those of every other start, near a start; 1 with too few
+/// starts near.
 fn alternation(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -> f64 {
     let [next, after_next] = [next, after_next]
         .map(|of| neighbours(of, start, NEIGHBOURS).iter().flatten().copied().collect::<Vec<f64>>());
@@ -78,7 +81,8 @@ fn alternation(next: &[Option<f64>], after_next: &[Option<f64>], start: usize) -
     if next > 0.0 { next / after_next } else { 1.0 }
 }
 
-/// The mean squared difference, W^2, of each start from the one `apart` starts later; `None` if that is missing or cut.
+/// The mean squared difference, W^2, of each start from the one `apart` starts later; `None` if that is
+/// missing or cut.
 fn differences(power: &[f64], starts: &[f64], width: usize, apart: usize) -> Vec<Option<f64>> {
     let of_start = |start: usize| {
         let window = |start: f64| window_around(power, start, COMPARED_SHARES, width);
@@ -121,7 +125,8 @@ impl Dips<'_> {
         ))
     }
 
-    /// Every other start of a segment, and beyond as long as starts go down as little, if those clearly go down less than the others.
+    /// Every other start of a segment, and beyond as long as starts go down as little, if those clearly go
+    /// down less than the others.
     fn false_starts(&self, segment: Range<usize>) -> Vec<usize> {
         let every_other = |from: usize| (segment.start + from..segment.end).step_by(2);
         let lowest = [0, 1].map(|from| every_other(from).filter_map(|start| self.lowest_w(start)).collect());
@@ -154,7 +159,8 @@ mod tests {
     const WIDTH: usize = 250;
     const FRAME: usize = 320;
 
-    /// 60 frames whose first half differs from the second by `apart_w`, in noise of up to 0.1 W either way, and where each begins.
+    /// 60 frames whose first half differs from the second by `apart_w`, in noise of up to 0.1 W either way,
+    /// and where each begins.
     fn frames(apart_w: f64) -> (Vec<f64>, Vec<f64>) {
         let random = Random::new(7, 0);
         let draws = |i: usize| 1.0 + f64::from((i % FRAME % (FRAME / 2) / 2 * 37 % 11) as u32) / 11.0;
@@ -175,8 +181,8 @@ mod tests {
         (0..starts.len()).filter(|&start| confidence_factors[start] < 1.0).collect()
     }
 
-    /// Of 60 frames with a rest before 300 samples of draws and a dip of `dip` samples in the midst of those: all starts, with those in
-    /// the dip from the 30th frame on, and what is said of them.
+    /// Of 60 frames with a rest before 300 samples of draws and a dip of `dip` samples in the midst of those:
+    /// all starts, with those in the dip from the 30th frame on, and what is said of them.
     fn with_dips(dip_w: f64) -> (Vec<f64>, SplitFrames) {
         let random = Random::new(9, 0);
         let (mut power, mut starts) = (vec![1.2; 300], Vec::new());

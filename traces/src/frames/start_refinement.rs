@@ -1,11 +1,12 @@
 //! Start refinement: starts move to where neighbouring frames begin to agree.
 //!
-//! Frames are aligned by the power after their start. If the part in between has become shorter since the mark (a front end
-//! with less to do), a start at the distance of the mark lies in the end of the frame before. That end varies from frame to
-//! frame, so neighbours differ there, and the energy from start to start varies with them. A start therefore moves to the
-//! first sample from which on neighbours agree about as well as anywhere near. Starts that agree already do not move; nor
-//! do starts at an edge, which each frame samples at another phase, nor up into more power, as power falls at the end of a
-//! frame; nor past most of the work in the window, as a frame that is busy for a few samples differs from its neighbours
+//! Frames are aligned by the power after their start. If the part in between has become shorter since the
+//! mark (a front end with less to do), a start at the distance of the mark lies in the end of the frame
+//! before. That end varies from frame to frame, so neighbours differ there, and the energy from start to
+//! start varies with them. A start therefore moves to the first sample from which on neighbours agree about
+//! as well as anywhere near. Starts that agree already do not move; nor do starts at an edge, which each
+//! frame samples at another phase, nor up into more power, as power falls at the end of a frame; nor past
+//! most of the work in the window, as a frame that is busy for a few samples differs from its neighbours
 //! while it works, and agrees with them in the idle gap after it.
 
 use super::refine::between;
@@ -29,7 +30,8 @@ const MAX_AGREEMENT_SHARE: f64 = 1e-4;
 /// Neighbours on either side over which moves are smoothed, as content changes slowly.
 const SMOOTHED_MOVES: usize = 8;
 
-/// Positions of windows, samples, moved forward; `anchor` is the place of the start in a window of `width` samples. `fixed` ones stay.
+/// Positions of windows, samples, moved forward; `anchor` is the place of the start in a window of `width`
+/// samples. `fixed` ones stay.
 pub(super) fn refine_starts(
     power: &[f64],
     positions: Vec<f64>,
@@ -91,7 +93,8 @@ fn first_agreeing(differ: &[f64], agreement_w2: f64) -> f64 {
         as f64
 }
 
-/// Whether more of the work in a window lies after the first `by` of its `length` samples than in them: energy above the power there.
+/// Whether more of the work in a window lies after the first `by` of its `length` samples than in them:
+/// energy above the power there.
 fn has_work_ahead(power: &[f64], starts: &[f64], by: f64, length: f64) -> bool {
     let base = level(power, starts, by);
     let work = |samples: std::ops::Range<usize>| -> f64 {
@@ -121,8 +124,8 @@ mod tests {
 
     const WIDTH: usize = 250;
 
-    /// Frames with a rest of 8 to 12 samples of 0.1 W, a front end of `front` samples of 0.2 W, and draws of 1 to 1.5 W; and where each
-    /// starts.
+    /// Frames with a rest of 8 to 12 samples of 0.1 W, a front end of `front` samples of 0.2 W, and draws of
+    /// 1 to 1.5 W; and where each starts.
     fn frames(count: usize, front: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<f64>) {
         let (mut power, mut starts) = (vec![1.0; 60], Vec::new());
         for frame in 0..count {
@@ -156,7 +159,8 @@ mod tests {
 
     #[test]
     fn exact_equality_of_a_coarse_recorder_moves_nothing() {
-        // Without noise some samples are equal to the last bit; those before them differ by less than what matters.
+        // Without noise some samples are equal to the last bit; those before them differ by less than what
+        // matters.
         let power: Vec<f64> = (0..6000)
             .map(|i| match i % 300 {
                 0..10 => 0.1 + 1e-4 * f64::from((i / 300) % 2),

@@ -1,4 +1,5 @@
-//! The threshold that separates starts from other minima, chosen from the minima themselves, with its reason as data.
+//! The threshold that separates starts from other minima, chosen from the minima themselves, with its reason
+//! as data.
 
 use crate::stats::{Moments, moments};
 use rayon::prelude::*;
@@ -38,11 +39,11 @@ const MAX_FEW_MATCH_SHARE: f64 = 0.2;
 pub enum Rule {
     /// The split of the logarithms with the greatest variance between its sides (Otsu 1979).
     Otsu,
-    /// Of the splits of these two sides, and of theirs, the one that makes the starts most evenly spaced: minima can form
-    /// more than two populations (starts, look-alikes within the frame, idle).
+    /// Of the splits of these two sides, and of theirs, the one that makes the starts most evenly spaced:
+    /// minima can form more than two populations (starts, look-alikes within the frame, idle).
     OtsuRegular,
-    /// Of the same splits, the one whose sides are most distinct: with few frames the spacing says little, and matches
-    /// among many other minima are too few to sway Otsu's criterion.
+    /// Of the same splits, the one whose sides are most distinct: with few frames the spacing says little,
+    /// and matches among many other minima are too few to sway Otsu's criterion.
     OtsuDistinct,
     /// The minima form one population far below the background: all are frame starts.
     AllAlike,
@@ -79,11 +80,14 @@ pub struct Threshold {
     pub rest: Population,
     /// Median excess distance over all offsets, W^2: what no match at all looks like.
     pub background_w2: f64,
-    /// Distance of a perfect match in sensor noise, W^2: `2 m sigma^2`, or the lowest minimum if that is less.
+    /// Distance of a perfect match in sensor noise, W^2: `2 m sigma^2`, or the lowest minimum if that is
+    /// less.
     pub noise_w2: f64,
-    /// Distance of a match half a sample off, W^2: starts fall between samples, and steep edges make it large.
+    /// Distance of a match half a sample off, W^2: starts fall between samples, and steep edges make it
+    /// large.
     pub alignment_w2: f64,
-    /// Difference of the populations' mean logarithms over the sum of their standard deviations; above 2 is clear.
+    /// Difference of the populations' mean logarithms over the sum of their standard deviations; above 2 is
+    /// clear.
     pub separation: f64,
     /// Share of the trace, from the first to the last minimum, that the starts divide evenly (gaps of 0.6 to 1.6 median
     /// gaps); 0 for fewer than four gaps. Evidence of its own where the separation is weak.
@@ -91,7 +95,8 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Whether starts and the rest are clearly separated: by distance, or else by the even spacing of the starts.
+    /// Whether starts and the rest are clearly separated: by distance, or else by the even spacing of the
+    /// starts.
     pub(super) fn clarity(&self) -> f64 {
         (self.separation / MIN_SEPARATION).max(self.regularity / MIN_REGULARITY).clamp(0.0, 1.0)
     }
@@ -105,9 +110,10 @@ impl Threshold {
     }
 }
 
-/// Chooses the threshold. `distances` are those of the spaced minima, the marks left out; `background_w2` is the
-/// median distance over all offsets, `noise_w2` what the trace's noise is estimated to leave of a perfect match,
-/// `alignment_w2` what half a sample of misalignment does, `regularity` how evenly (0 to 1) the starts below a threshold are spaced.
+/// Chooses the threshold. `distances` are those of the spaced minima, the marks left out; `background_w2` is
+/// the median distance over all offsets, `noise_w2` what the trace's noise is estimated to leave of a perfect
+/// match, `alignment_w2` what half a sample of misalignment does, `regularity` how evenly (0 to 1) the starts
+/// below a threshold are spaced.
 pub(crate) fn choose(
     distances: &[f64],
     background_w2: f64,
@@ -123,8 +129,8 @@ pub(crate) fn choose(
     let between =
         |split: &Split| none.noise_w2 + libm::exp(0.5 * (logs[split.count - 1] + logs[split.count]));
     let splits = otsu_tree(&logs, MAX_SPLIT_DEPTH);
-    // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by that.
-    // The first split stands on Otsu's criterion alone and is spared.
+    // Minima are evenly spaced by construction, so a threshold that lets in what is no match would win by
+    // that. The first split stands on Otsu's criterion alone and is spared.
     let matching = |split: &Split| between(split) - none.noise_w2 < MAX_MATCH_SHARE * none.background_w2;
     let regular = most_regular(&splits, matching, |split| regularity(between(split)));
     let even = splits.get(regular).is_some_and(|split| {
@@ -196,8 +202,8 @@ fn most_distinct(splits: &[Split], otherwise: usize, eligible: impl Fn(&Split) -
     best.0
 }
 
-/// The separation of two sides whose distances vary by some share at least, so that frames that repeat to the last bit do not
-/// come apart by where they fall between samples.
+/// The separation of two sides whose distances vary by some share at least, so that frames that repeat to the
+/// last bit do not come apart by where they fall between samples.
 fn distinctness(split: &Split) -> f64 {
     let deviation = |side: &Moments| side.deviation.max(MIN_LOG_DEVIATION);
     ratio(split.high.mean - split.low.mean, deviation(&split.low) + deviation(&split.high))
@@ -264,8 +270,8 @@ pub(super) struct Split {
     pub high: Moments,
 }
 
-/// The split of all numbers, then of its two sides, and so on to `depth` levels, level by level. Values must be
-/// sorted; where they are all the same there is no split.
+/// The split of all numbers, then of its two sides, and so on to `depth` levels, level by level. Values must
+/// be sorted; where they are all the same there is no split.
 pub(super) fn otsu_tree(sorted: &[f64], depth: usize) -> Vec<Split> {
     let mut ranges = vec![(0, sorted.len())];
     let mut splits = Vec::new();
@@ -282,8 +288,8 @@ pub(super) fn otsu_tree(sorted: &[f64], depth: usize) -> Vec<Split> {
     splits
 }
 
-/// How many numbers lie below the cut with the greatest variance between its sides (Otsu 1979, eq. 14), tried at every
-/// gap; `None` if they are all the same.
+/// How many numbers lie below the cut with the greatest variance between its sides (Otsu 1979, eq. 14), tried
+/// at every gap; `None` if they are all the same.
 fn otsu(sorted: &[f64]) -> Option<usize> {
     let total: f64 = sorted.iter().sum();
     let (mut below, mut best) = (0.0, (0.0, None));
@@ -314,8 +320,9 @@ mod tests {
 
     #[test]
     fn a_few_matches_are_told_from_look_alikes_by_distance() {
-        // A run of four equal frames: three matches, segments within frames that resemble the marked window a little, and
-        // the rest. A threshold among the look-alikes happens to space the starts a little more evenly.
+        // A run of four equal frames: three matches, segments within frames that resemble the marked window a
+        // little, and the rest. A threshold among the look-alikes happens to space the starts a little more
+        // evenly.
         let look_alikes =
             [143.4, 143.44, 143.99].into_iter().chain((0..30).map(|i| 144.86 + 0.001 * f64::from(i)));
         let rest = (0..35).map(|i| 700.0 + 20.0 * f64::from(i));

@@ -1,9 +1,9 @@
 //! V-sync snapping: frames that wait for the display start on the ticks of one clock.
 //!
-//! Where the beginning of a frame varies, templates are aligned by its most prominent part, up to a millisecond after the
-//! start. The sequence then wanders, although the frames do not. If nearly all gaps are whole numbers of one period, the
-//! display sets that period. If the starts of such a trace are spread all the same, the mark and the period give their
-//! positions.
+//! Where the beginning of a frame varies, templates are aligned by its most prominent part, up to a
+//! millisecond after the start. The sequence then wanders, although the frames do not. If nearly all gaps are
+//! whole numbers of one period, the display sets that period. If the starts of such a trace are spread all
+//! the same, the mark and the period give their positions.
 
 use crate::stats::upper_median;
 
@@ -35,8 +35,8 @@ pub(super) struct Snapped {
     pub off_tick: Vec<bool>,
 }
 
-/// Snaps the starts at `positions` (samples, in order) to the ticks of the display, if they wait for it; `fixed` is the number of
-/// an exact one.
+/// Snaps the starts at `positions` (samples, in order) to the ticks of the display, if they wait for it;
+/// `fixed` is the number of an exact one.
 pub(super) fn snap_to_ticks(positions: &[f64], fixed: usize, width: usize) -> Option<Snapped> {
     let (off, period) = tick_distances(positions, fixed)?;
     let share =
@@ -51,8 +51,8 @@ pub(super) fn snap_to_ticks(positions: &[f64], fixed: usize, width: usize) -> Op
     })
 }
 
-/// How far each start lies from the nearest tick of the period that goes through the `fixed` one, and that period, samples; `None` where
-/// gaps are no whole numbers of it.
+/// How far each start lies from the nearest tick of the period that goes through the `fixed` one, and that
+/// period, samples; `None` where gaps are no whole numbers of it.
 fn tick_distances(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
     let gaps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
     if gaps.len() < MIN_GAPS {
@@ -71,7 +71,8 @@ fn tick_distances(positions: &[f64], fixed: usize) -> Option<(Vec<f64>, f64)> {
     (mostly || scattered(&off, residues)).then_some((off, period))
 }
 
-/// Whether starts that lie so far `off` the ticks are scattered about them; gaps lie so far `residues` whole periods.
+/// Whether starts that lie so far `off` the ticks are scattered about them; gaps lie so far `residues` whole
+/// periods.
 fn scattered(off: &[f64], mut residues: Vec<f64>) -> bool {
     let middle = upper_median(&mut off.to_vec());
     let mut far: Vec<f64> = off.iter().map(|off| (off - middle).abs()).collect();
@@ -93,8 +94,8 @@ fn whole_periods(gaps: &[f64], period: f64) -> Vec<f64> {
     gaps.iter().map(whole).collect()
 }
 
-/// The period by which the sum of the distances of all positions to ticks is least (iteratively reweighted least squares; Schlossmacher
-/// 1973); `periods` lie between each and the next.
+/// The period by which the sum of the distances of all positions to ticks is least (iteratively reweighted
+/// least squares; Schlossmacher 1973); `periods` lie between each and the next.
 fn slope(positions: &[f64], periods: &[f64]) -> f64 {
     let mut ticks = vec![0.0];
     ticks.extend(periods.iter().scan(0.0, |tick, periods| {

@@ -8,8 +8,9 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on any
-/// failure the temporary file is removed and what stood at `path` before is untouched. A link is followed, so that it stays one.
+/// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on
+/// any failure the temporary file is removed and what stood at `path` before is untouched. A link is
+/// followed, so that it stays one.
 ///
 /// # Errors
 /// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`]. Something other
@@ -34,7 +35,8 @@ where
     Ok(())
 }
 
-/// Checks whether a file can be written at `path`, by creating the temporary one and removing it: before long work, not after it.
+/// Checks whether a file can be written at `path`, by creating the temporary one and removing it: before long
+/// work, not after it.
 ///
 /// # Errors
 /// As [`write_file`].

@@ -221,7 +221,8 @@ fn chosen(
     mut rails: Rails,
 ) -> Result<Rails, ReadError> {
     if options.rails.is_empty() {
-        // A voltage alone (a sense line) is not a rail, unless it is the only column: then the error names the missing one.
+        // A voltage alone (a sense line) is not a rail, unless it is the only column: then the error names
+        // the missing one.
         let whole: Rails = rails
             .iter()
             .filter(|(_, columns)| {
@@ -309,7 +310,8 @@ struct ColumnName {
     /// Factor to s, V, A or W.
     scale: f64,
     rail: String,
-    /// Whether the quantity follows from a word or a unit of more than one letter, or from a unit in brackets.
+    /// Whether the quantity follows from a word or a unit of more than one letter, or from a unit in
+    /// brackets.
     sure: bool,
     has_unit: bool,
 }
@@ -323,8 +325,8 @@ fn unit(text: &str) -> Option<(Quantity, f64)> {
     written_out_unit(text).or_else(|| symbol(text))
 }
 
-/// Parses `gpu_voltage_V`, `Main(mA)`, `Time (s)`, `voltage_V`: quantity, unit and rail, the remaining words. `None` for
-/// the names of other things.
+/// Parses `gpu_voltage_V`, `Main(mA)`, `Time (s)`, `voltage_V`: quantity, unit and rail, the remaining words.
+/// `None` for the names of other things.
 fn parse_name(name: &str) -> Option<ColumnName> {
     let lower = name.trim_start_matches('\u{feff}').to_ascii_lowercase().replace(MICRO, "u");
     let words: Vec<&str> =
@@ -335,7 +337,8 @@ fn parse_name(name: &str) -> Option<ColumnName> {
         Some((*word, of, scale))
     });
     let quantity = stated.or(unit.map(|(_, of, _)| of))?;
-    // A single letter is a unit only where nothing but a rail stands beside it, or the quantity is stated as well.
+    // A single letter is a unit only where nothing but a rail stands beside it, or the quantity is stated as
+    // well.
     let scale = if is_mega(name, unit) { 1e6 } else { unit.map_or(1.0, |(_, _, scale)| scale) };
     let has_unit = unit.is_some();
     let sure = words.iter().any(|word| word.len() > 1 && quantity_word(word) == stated && stated.is_some())

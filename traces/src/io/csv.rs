@@ -1,5 +1,5 @@
-//! Interchange: CSV with the header `time_s,voltage_V,current_A`, no comment lines, and a JSON file beside it. CSV and TSV
-//! of other programs are read, too.
+//! Interchange: CSV with the header `time_s,voltage_V,current_A`, no comment lines, and a JSON file beside
+//! it. CSV and TSV of other programs are read, too.
 
 use super::columns::{Layout, Picked, RowBatch, layout};
 use super::description::{Description, to_json};
@@ -21,14 +21,16 @@ pub fn sidecar_path(path: &Path) -> PathBuf {
     path.with_extension("json")
 }
 
-/// The place where [`save_as`] writes the description of a file: its whole name and `.json`, which no other file shares.
+/// The place where [`save_as`] writes the description of a file: its whole name and `.json`, which no other
+/// file shares.
 pub fn description_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".json");
     name.into()
 }
 
-/// The places of a description, in the order in which they are tried: [`description_path`], then [`sidecar_path`], also without `.gz`.
+/// The places of a description, in the order in which they are tried: [`description_path`], then
+/// [`sidecar_path`], also without `.gz`.
 pub(crate) fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
     let inner = path.with_extension("");
     let unpacked = inner.extension().is_some().then(|| sidecar_path(&inner));
@@ -46,8 +48,9 @@ const TASK_ROWS: usize = 1 << 12;
 /// Rows whose text is held at once.
 const HELD_ROWS: usize = 1 << 18;
 
-/// Writes the samples. Times are whole nanoseconds written as seconds; values have the digits that read back as the same
-/// number in f32 and in f64, so that an integral in f64 gives the same joules as here. About 50 bytes a sample.
+/// Writes the samples. Times are whole nanoseconds written as seconds; values have the digits that read back
+/// as the same number in f32 and in f64, so that an integral in f64 gives the same joules as here. About 50
+/// bytes a sample.
 ///
 /// # Errors
 /// [`WriteError::Encode`] if the writer fails, [`WriteError::Read`] if the samples cannot be read.
@@ -326,7 +329,8 @@ impl CsvRows {
         Ok(rows)
     }
 
-    /// A finite number; otherwise the placeholder `none` if it is repaired later, or the error that names its place.
+    /// A finite number; otherwise the placeholder `none` if it is repaired later, or the error that names its
+    /// place.
     fn field<T: std::str::FromStr + Finite>(
         &self,
         column: &Picked,
@@ -405,7 +409,8 @@ impl Finite for f64 {
 /// Longest line that is read, in bytes.
 const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// Fails at a line longer than [`MAX_LINE_BYTES`], so that a file without line ends is not read into memory whole.
+/// Fails at a line longer than [`MAX_LINE_BYTES`], so that a file without line ends is not read into memory
+/// whole.
 struct LineLimit<R> {
     inner: R,
     since_end: usize,

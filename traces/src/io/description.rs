@@ -12,7 +12,8 @@ const VERSION: u32 = 1;
 /// The key of the description in the metadata of a Parquet file, and another one under which it is read.
 pub(super) const KEYS: [&str; 2] = ["trace", "power_trace"];
 
-/// The description: what the columns do not show, and the exact rate and start, which rounded time stamps lose.
+/// The description: what the columns do not show, and the exact rate and start, which rounded time stamps
+/// lose.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Description {

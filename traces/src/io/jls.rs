@@ -1,8 +1,8 @@
 //! JLS version 2, what Joulescope instruments record: traces from and to the signals of the crate [`::jls`].
 //!
-//! [`Writer`] writes samples in pieces, [`save`] a whole trace. Current and voltage are signals of fixed rate. A JSON text
-//! among the user data (`{"trace": ...}`) holds the exact rate and start and the metadata of the trace, which
-//! [`read`](super::read()) takes back.
+//! [`Writer`] writes samples in pieces, [`save`] a whole trace. Current and voltage are signals of fixed
+//! rate. A JSON text among the user data (`{"trace": ...}`) holds the exact rate and start and the metadata
+//! of the trace, which [`read`](super::read()) takes back.
 
 use super::atomic;
 use super::columns::{Layout, RowBatch, layout};
@@ -23,9 +23,11 @@ const SIGNALS: [SignalName<'_>; 2] =
 /// Largest difference between a rate and the whole number in the file, as a share of the rate.
 const MAX_RATE_DEVIATION: f64 = 1e-3;
 
-/// A JLS file being written: voltage and current of one trace, in pieces of any size, which do not show in the bytes.
+/// A JLS file being written: voltage and current of one trace, in pieces of any size, which do not show in
+/// the bytes.
 ///
-/// Memory does not grow with the samples: about 4 MiB, and 25 KiB a signal for each level of summaries (five at 1e9).
+/// Memory does not grow with the samples: about 4 MiB, and 25 KiB a signal for each level of summaries (five
+/// at 1e9).
 ///
 /// ```
 /// use traces::io::{atomic, jls};
@@ -64,8 +66,8 @@ fn whole_rate_hz(rate_hz: f64) -> Result<u32, WriteError> {
 }
 
 impl<W: Write + Seek> Writer<W> {
-    /// Begins a recording in an empty file. Sample 0 is at `start_s`, in s since 1970-01-01 UTC for readers that show
-    /// the time of day.
+    /// Begins a recording in an empty file. Sample 0 is at `start_s`, in s since 1970-01-01 UTC for readers
+    /// that show the time of day.
     ///
     /// # Errors
     /// [`WriteError`] if the rate (Hz) is not whole to 1 in 1000, the start is beyond about 8.5e9 s from 2018, a mark is
@@ -337,8 +339,8 @@ fn stated_description(path: &Path, reader: &mut Reader) -> Result<Option<Descrip
     found
 }
 
-/// A description moved to the samples from number `first` on at `rate_hz`. If it is of another rate, another program has
-/// resampled our samples, and their times are unknown.
+/// A description moved to the samples from number `first` on at `rate_hz`. If it is of another rate, another
+/// program has resampled our samples, and their times are unknown.
 fn placed(mut description: Description, rate_hz: f64, first: i128) -> Description {
     // The number of samples is checked by the file itself.
     description.samples = None;

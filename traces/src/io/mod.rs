@@ -1,8 +1,8 @@
 //! Trace files: one file or folder per format, with its reader and its writer.
 //!
-//! [`read`] reads any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces what does not
-//! fit into memory. [`save`] and the modules [`csv`], [`parquet`] and [`jls`] write a [`TraceReader`]: a trace in memory, or
-//! a [`Recording`], a file of any length.
+//! [`read`] reads any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces
+//! what does not fit into memory. [`save`] and the modules [`csv`], [`parquet`] and [`jls`] write a
+//! [`TraceReader`]: a trace in memory, or a [`Recording`], a file of any length.
 
 pub mod atomic;
 mod columns;
@@ -44,7 +44,8 @@ pub(crate) const VOLTAGE_V: &str = "voltage_V";
 pub(crate) const CURRENT_A: &str = "current_A";
 pub(crate) const POWER_W: &str = "power_W";
 
-/// How to read a file. By default all rails that the names of the columns show are added up, and nothing is repaired.
+/// How to read a file. By default all rails that the names of the columns show are added up, and nothing is
+/// repaired.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// Rails to add up, by name; all of them if empty.

@@ -30,8 +30,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     load(Rows::open(path, options)?)
 }
 
-/// Opens a trace of any length: as a [`Recording`], or in memory where it has to be repaired, as repairs depend on all of
-/// it. Also returns the repairs.
+/// Opens a trace of any length: as a [`Recording`], or in memory where it has to be repaired, as repairs
+/// depend on all of it. Also returns the repairs.
 ///
 /// # Errors
 /// As [`read`].
@@ -49,11 +49,12 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>,
     }
 }
 
-/// Reads a CSV file, and its description if there is one at [`csv::description_path`](super::csv::description_path) or
+/// Reads a CSV file, and its description if there is one at
+/// [`csv::description_path`](super::csv::description_path) or
 /// [`csv::sidecar_path`](super::csv::sidecar_path).
 ///
-/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if the
-/// description states the rate. Without a description the rate is that of the time stamps.
+/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if
+/// the description states the rate. Without a description the rate is that of the time stamps.
 ///
 /// # Errors
 /// [`ReadError`] names the file, the row and what to do.
@@ -61,8 +62,8 @@ pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
     Ok(load(Rows::csv(path, &ReadOptions::default(), false)?)?.trace)
 }
 
-/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64) and
-/// `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
+/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64)
+/// and `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
 ///
 /// # Errors
 /// [`ReadError`] names the file, the row and what to do.

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 /// Rows read at once.
 const PIECE_ROWS: usize = 1 << 18;
 
-/// A file that was checked once and is a trace: finite samples at an even rate, as many as it states. It holds what
-/// [`read`](super::read()) would return, except the samples.
+/// A file that was checked once and is a trace: finite samples at an even rate, as many as it states. It
+/// holds what [`read`](super::read()) would return, except the samples.
 #[derive(Clone, Debug)]
 pub struct Recording {
     path: PathBuf,

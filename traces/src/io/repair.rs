@@ -21,7 +21,8 @@ pub(super) struct Columns {
 /// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
+    /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or
+    /// `resampled`.
     pub code: &'static str,
     /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,
@@ -33,8 +34,8 @@ pub struct Repair {
     pub message: String,
 }
 
-/// Repairs rows in place: drops those without a time, sorts them, fills non-finite values from their neighbours, and adds
-/// missing samples.
+/// Repairs rows in place: drops those without a time, sorts them, fills non-finite values from their
+/// neighbours, and adds missing samples.
 pub(super) fn repair_rows(
     path: &Path,
     columns: &mut Columns,
@@ -90,8 +91,8 @@ fn order(times: Vec<f64>, columns: &mut Columns, repairs: &mut Vec<Repair>) -> V
     rows.iter().map(|&row| times[row]).collect()
 }
 
-/// Reports rows without a time and those that repeat one. The place is the first of them; where it has no time, that of
-/// the last row before which has one, else of the first after.
+/// Reports rows without a time and those that repeat one. The place is the first of them; where it has no
+/// time, that of the last row before which has one, else of the first after.
 fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
     let count = times.iter().filter(|time| !time.is_finite()).count() + repeats.len();
     let lost = times.iter().position(|time| !time.is_finite());

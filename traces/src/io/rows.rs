@@ -49,7 +49,8 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Opens Parquet, JLS, CSV or TSV, the latter two also with gzip; the format follows from the first bytes.
+    /// Opens Parquet, JLS, CSV or TSV, the latter two also with gzip; the format follows from the first
+    /// bytes.
     ///
     /// # Errors
     /// [`ReadError`] if there is no such file, it is of no known format, or columns are missing.
@@ -191,7 +192,8 @@ impl Rows {
         self.read(limit, batch)
     }
 
-    /// Reads up to `limit` rows and appends them, all rails together, to voltages (V) and currents (A); returns how many.
+    /// Reads up to `limit` rows and appends them, all rails together, to voltages (V) and currents (A);
+    /// returns how many.
     pub(crate) fn append(
         &mut self,
         limit: usize,
@@ -230,8 +232,8 @@ impl Rows {
         }
     }
 
-    /// Appends a batch's rows, all rails together, to voltages (V) and currents (A). Where rails are added or only the
-    /// power is known, the voltage is 1 V and the current is the power.
+    /// Appends a batch's rows, all rails together, to voltages (V) and currents (A). Where rails are added or
+    /// only the power is known, the voltage is 1 V and the current is the power.
     fn channels(&self, batch: &mut RowBatch, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
         self.layout.scale(&mut batch.values);
         match self.layout.rails[..] {
@@ -287,7 +289,8 @@ fn decoder_panicked(path: &Path) -> ReadError {
     ReadError::Damaged { path: path.to_owned(), format: "Parquet", reason: "its decoder gave up".to_owned() }
 }
 
-/// Largest difference between a requested rate and that of the file, as a share: clocks differ, and JLS rounds by as much.
+/// Largest difference between a requested rate and that of the file, as a share: clocks differ, and JLS
+/// rounds by as much.
 const MAX_RATE_DEVIATION: f64 = 1e-3;
 /// Largest difference of times, in sample periods; rounding alone stays below.
 const MAX_OFFSET_PERIODS: f64 = 0.25;
@@ -334,7 +337,8 @@ fn check_overrides(
     Ok(())
 }
 
-/// Refuses a rate that contradicts the times of the first rows: repairing to that rate would add or drop samples.
+/// Refuses a rate that contradicts the times of the first rows: repairing to that rate would add or drop
+/// samples.
 fn check_rate(rows: &Rows, options: &ReadOptions) -> Result<(), ReadError> {
     let (Some(requested_hz), Some(column)) = (options.rate_hz, &rows.layout.time) else { return Ok(()) };
     let mut again = Rows::of_kind(&rows.path, &ReadOptions { rate_hz: None, ..options.clone() })?;

@@ -1,8 +1,8 @@
 //! Readers and writers of samples, in pieces, so that no trace has to fit into memory.
 //!
-//! A [`TraceReader`] is a trace in memory or a file; a [`TraceWriter`] is the writer of a format, or anything else that needs
-//! all samples once. Writers take samples in pieces only, so that a trace in memory and a file of any length are written in
-//! the same way, and the bytes do not depend on where pieces end.
+//! A [`TraceReader`] is a trace in memory or a file; a [`TraceWriter`] is the writer of a format, or anything
+//! else that needs all samples once. Writers take samples in pieces only, so that a trace in memory and a
+//! file of any length are written in the same way, and the bytes do not depend on where pieces end.
 
 use super::WriteError;
 use crate::metadata::Metadata;
@@ -19,7 +19,8 @@ pub struct TraceHeader {
     pub samples: u64,
     /// How many of them the recorder lost.
     pub lost_samples: u64,
-    /// How many of those come after the last sample that was not lost: in files that leave lost samples out, no row shows them.
+    /// How many of those come after the last sample that was not lost: in files that leave lost samples out,
+    /// no row shows them.
     pub lost_at_end: u64,
     /// Origin and marks of the trace.
     pub metadata: Metadata,
@@ -56,7 +57,8 @@ pub struct TraceChunk<'a> {
     pub voltage_v: &'a [f32],
     /// Current of each, A; as many.
     pub current_a: &'a [f32],
-    /// Whether the recorder lost them: then they lie on the line between their neighbours, and files leave them out.
+    /// Whether the recorder lost them: then they lie on the line between their neighbours, and files leave
+    /// them out.
     pub lost: bool,
 }
 

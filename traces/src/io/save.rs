@@ -7,8 +7,8 @@ use std::path::Path;
 /// Endings of the names of files that [`save`] writes.
 pub const FORMATS: [&str; 6] = [".parquet", ".jls", ".csv", ".tsv", ".csv.gz", ".tsv.gz"];
 
-/// Writes a trace in the format that the ending of the name stands for, in any case; CSV and TSV with a description beside
-/// the file.
+/// Writes a trace in the format that the ending of the name stands for, in any case; CSV and TSV with a
+/// description beside the file.
 ///
 /// # Errors
 /// [`WriteError`] names the file.

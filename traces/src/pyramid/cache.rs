@@ -107,7 +107,8 @@ pub(super) fn kept(path: &Path, stamp: u64) -> Found {
     Found::Whole(Pyramid { clock, samples, store, was_damaged: false })
 }
 
-/// Entries of each level and the bytes of the checksums, which come next; `None` if the file is not as long as it has to be.
+/// Entries of each level and the bytes of the checksums, which come next; `None` if the file is not as long
+/// as it has to be.
 fn checksums(file: &mut File, samples: u64) -> Option<(Vec<u64>, Vec<u8>)> {
     if samples >= 1 << 48 {
         return None;
@@ -124,7 +125,8 @@ fn checksums(file: &mut File, samples: u64) -> Option<(Vec<u64>, Vec<u8>)> {
 }
 
 impl Kept {
-    /// Entries of a level, as far as there are any; `None` where they cannot be read or are not what was written.
+    /// Entries of a level, as far as there are any; `None` where they cannot be read or are not what was
+    /// written.
     pub(super) fn entries(&self, level: usize, first: u64, count: u64) -> Option<Vec<Entry>> {
         let (size, below) = (*self.sizes.get(level)?, self.sizes.get(..level)?);
         let end = size.min(first.saturating_add(count));

@@ -1,5 +1,6 @@
-//! Overviews at any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks of blocks, and
-//! so on, built once and kept in a file beside the trace. Columns narrower than blocks come from the samples themselves.
+//! Overviews at any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks
+//! of blocks, and so on, built once and kept in a file beside the trace. Columns narrower than blocks come
+//! from the samples themselves.
 
 mod build;
 mod cache;
@@ -68,8 +69,8 @@ pub fn pyramid_path(trace: &Path) -> PathBuf {
 }
 
 impl Pyramid {
-    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say; else made
-    /// anew and kept, if the folder lets itself be written to.
+    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say;
+    /// else made anew and kept, if the folder lets itself be written to.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
@@ -81,8 +82,8 @@ impl Pyramid {
         }
     }
 
-    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say; else made anew and not
-    /// kept.
+    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say;
+    /// else made anew and not kept.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
@@ -94,7 +95,8 @@ impl Pyramid {
         }
     }
 
-    /// Whether the pyramid that was kept was damaged, as far as was seen when it was opened, so that this was made in its place.
+    /// Whether the pyramid that was kept was damaged, as far as was seen when it was opened, so that this was
+    /// made in its place.
     pub fn was_damaged(&self) -> bool {
         self.was_damaged
     }
@@ -111,7 +113,8 @@ impl Pyramid {
         Ok(pyramid)
     }
 
-    /// Reads a whole trace, in pieces; at once if it is to be repaired, as the places of its samples then depend on all of them.
+    /// Reads a whole trace, in pieces; at once if it is to be repaired, as the places of its samples then
+    /// depend on all of them.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read, or its samples are not even or finite.
@@ -148,9 +151,9 @@ impl Pyramid {
         self.clock.time_s(self.samples as f64)
     }
 
-    /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64 samples.
-    /// Lowest and highest are those of all samples within (as f32), none missed. `None` where what was kept cannot be read or is
-    /// damaged: it is to be made [anew](Pyramid::anew).
+    /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64
+    /// samples. Lowest and highest are those of all samples within (as f32), none missed. `None` where what
+    /// was kept cannot be read or is damaged: it is to be made [anew](Pyramid::anew).
     pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Vec<Column>> {
         let (from, to) = self.places(from_s, to_s);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
@@ -237,8 +240,8 @@ impl Entry {
 }
 
 impl Pyramid {
-    /// As [`Pyramid::columns`] of a file, but where columns are narrower than blocks, from its samples: those before are
-    /// passed over, which takes texts as long as reading them.
+    /// As [`Pyramid::columns`] of a file, but where columns are narrower than blocks, from its samples: those
+    /// before are passed over, which takes texts as long as reading them.
     ///
     /// # Errors
     /// [`ReadError`] if samples cannot be read.

@@ -72,7 +72,8 @@ impl Starter<'_> {
         (start, candidate.sum_w)
     }
 
-    /// The first frame, after idle, if it lies in what was kept of the beginning. The marks' windows are put behind it.
+    /// The first frame, after idle, if it lies in what was kept of the beginning. The marks' windows are put
+    /// behind it.
     fn first(&self, starts: &[Summed], gathered: &mut Gathered) -> Option<Summed> {
         let starts: Vec<FrameStart> = starts.iter().map(|(start, _)| *start).collect();
         let head = &mut gathered.head;

@@ -1,8 +1,9 @@
 //! Frames of a file of any length: one pass, in pieces, on all threads.
 //!
-//! The method is the sum of squares of [`frames`](crate::frames), with the same minima and the same threshold. Here, offsets
-//! are screened by a transform in f32; the distance of every minimum, its place finer than a sample and the energy up to
-//! there are computed in f64 while its samples are in memory. No step depends on the number of threads.
+//! The method is the sum of squares of [`frames`](crate::frames), with the same minima and the same
+//! threshold. Here, offsets are screened by a transform in f32; the distance of every minimum, its place
+//! finer than a sample and the energy up to there are computed in f64 while its samples are in memory. No
+//! step depends on the number of threads.
 
 mod clock;
 mod conclude;
@@ -33,8 +34,8 @@ pub struct Streamed {
     pub metadata: Metadata,
 }
 
-/// Finds frames by the sum of squares and takes their energies. An infinite `marks.end_s` stands for the end of the
-/// file.
+/// Finds frames by the sum of squares and takes their energies. An infinite `marks.end_s` stands for the end
+/// of the file.
 ///
 /// # Errors
 /// [`StreamError`] if the file cannot be read, its samples are not even or finite, or the marks are not in it.

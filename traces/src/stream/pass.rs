@@ -163,7 +163,8 @@ impl Plan {
             let begin = from + index as u64 * task;
             workspaces.with(|workspace| self.task(piece, begin, to.min(begin + task), all, workspace))
         };
-        // One by one, as the thread that reads the next rows joins late and takes some of the remaining tasks.
+        // One by one, as the thread that reads the next rows joins late and takes some of the remaining
+        // tasks.
         let found: Vec<Found> = (0..tasks as usize).into_par_iter().with_max_len(1).map(one).collect();
         for found in found {
             gathered.distances_w2.extend(found.distances_w2);

@@ -131,7 +131,8 @@ pub(super) fn powers(voltage_v: &[f32], current_a: &[f32], into: &mut Vec<f64>) 
     into.extend(voltage_v.iter().zip(current_a).map(|(&v, &i)| f64::from(v) * f64::from(i)));
 }
 
-/// Summed squared difference of powers and a template, in eight lanes: always the same order, whatever vectors there are.
+/// Summed squared difference of powers and a template, in eight lanes: always the same order, whatever
+/// vectors there are.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn difference(power_w: &[f64], template: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];

@@ -1,5 +1,5 @@
-//! The distance of the nearest template to every window, in f32: exact enough to show where minima are; and these minima,
-//! piece by piece.
+//! The distance of the nearest template to every window, in f32: exact enough to show where minima are; and
+//! these minima, piece by piece.
 
 use crate::overlap;
 use crate::overlap::OverlapSave;
@@ -52,8 +52,8 @@ impl Screen {
     }
 }
 
-/// Lowers values to the distances that their cross terms, one part of each number, and the sums of squares up to each sample
-/// make.
+/// Lowers values to the distances that their cross terms, one part of each number, and the sums of squares up
+/// to each sample make.
 #[multiversion(targets("x86_64+avx2"))]
 fn lower(
     values: &mut [f32],
@@ -99,9 +99,10 @@ fn add_up(group: &[f32], before: f64, sums: &mut [f64]) -> f64 {
     before + own
 }
 
-/// Offsets in `from..to` of `profile` (which begins before `from` and reaches beyond `to`) that are lowest within less
-/// than `spacing` on either side; `from` is a multiple of `spacing` in the whole. Of ties, the first of each segment of
-/// `spacing`; who joins segments drops those nearer than `spacing` to the one before.
+/// Offsets in `from..to` of `profile` (which begins before `from` and reaches beyond `to`) that are lowest
+/// within less than `spacing` on either side; `from` is a multiple of `spacing` in the whole. Of ties, the
+/// first of each segment of `spacing`; who joins segments drops those nearer than `spacing` to the one
+/// before.
 pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mut take: impl FnMut(usize)) {
     let mut block = from;
     while block < to {

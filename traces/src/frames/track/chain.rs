@@ -100,7 +100,8 @@ impl<'a> Graph<'a> {
         (self.candidates[end].offset - self.candidates[begin].offset) as f64
     }
 
-    /// The evidence of similarity: how that of a pair compares with that of two sure starts and of a sure start with anything else.
+    /// The evidence of similarity: how that of a pair compares with that of two sure starts and of a sure
+    /// start with anything else.
     fn similarities(&self, templates: &Templates) -> Vec<f64> {
         let (mut logs, mut sums) = (vec![0.0; self.first[self.candidates.len()]], [[0.0_f64; 3]; 2]);
         for (end, candidate) in self.candidates.iter().enumerate() {
@@ -198,7 +199,8 @@ impl<'a> Graph<'a> {
         solution
     }
 
-    /// The best score of what comes before the pair `(begin, end)`, with `begin`, and the pair that ends in it.
+    /// The best score of what comes before the pair `(begin, end)`, with `begin`, and the pair that ends in
+    /// it.
     fn extend(&self, solution: &Solution, begin: usize, end: usize) -> (f64, usize) {
         let before = solution.score.get(solution.entry[begin]).map_or(0.0, |score| score - BREAK_COST);
         let mut best = (self.candidates[begin].weight + before, NONE);
@@ -223,8 +225,8 @@ pub(super) fn covered(offsets: &[usize], period: usize) -> usize {
     offsets.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap as f64 <= most).sum()
 }
 
-/// Evidence of a gap after the one before it, nats. An even period counts by the time it covers, up to a period, so that split
-/// frames are not worth twice as much as whole ones.
+/// Evidence of a gap after the one before it, nats. An even period counts by the time it covers, up to a
+/// period, so that split frames are not worth twice as much as whole ones.
 fn period_evidence(before: f64, after: f64, period: f64) -> f64 {
     (EVEN_GAIN * (after / period).min(1.0) - libm::log(after / before).abs() / GAP_CHANGE_PER_NAT)
         .max(MIN_GAP_EVIDENCE)

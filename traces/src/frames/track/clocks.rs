@@ -1,10 +1,10 @@
 //! Frames at another clock than the mark's, searched again.
 //!
-//! Templates follow content that changes slowly. At a clock step everything changes at once, and the sequence may go on at
-//! the same period in another phase of the frame. So where neighbours differ, frames of both sides are aligned over a whole
-//! period, the earlier ones [scaled in time](crate::frames::refine). Outwards from the mark, each segment between two such
-//! changes is compared with the last one known to be right. If it lies elsewhere, one of its frames is corrected and used
-//! like a mark.
+//! Templates follow content that changes slowly. At a clock step everything changes at once, and the sequence
+//! may go on at the same period in another phase of the frame. So where neighbours differ, frames of both
+//! sides are aligned over a whole period, the earlier ones [scaled in time](crate::frames::refine). Outwards
+//! from the mark, each segment between two such changes is compared with the last one known to be right. If
+//! it lies elsewhere, one of its frames is corrected and used like a mark.
 
 use crate::frames::refine::{ScaledFit, ScaledPair};
 use crate::stats::upper_median;
@@ -64,8 +64,8 @@ const WHOLE: Comparison = Comparison {
     max_unexplained: 0.5,
 };
 
-/// Offsets of windows of starts, put right, one for each segment of `starts` that lies elsewhere; `anchor` is the place of the start in a
-/// window of `width` samples.
+/// Offsets of windows of starts, put right, one for each segment of `starts` that lies elsewhere; `anchor` is
+/// the place of the start in a window of `width` samples.
 pub(super) fn misplaced(
     power: &[f64],
     starts: &[usize],
@@ -114,7 +114,8 @@ impl View<'_> {
         steps
     }
 
-    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step can be resolved.
+    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step
+    /// can be resolved.
     fn walk(&self, steps: impl Iterator<Item = [usize; 2]>, way: isize, found: &mut Vec<usize>) {
         let mut moved = 0;
         for [here, there] in steps {
@@ -133,8 +134,9 @@ impl View<'_> {
         }
     }
 
-    /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say that they should: the start
-    /// that fits best, and by how many samples. `None` where the two sides do not agree on one ratio of clocks and one place.
+    /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say
+    /// that they should: the start that fits best, and by how many samples. `None` where the two sides do not
+    /// agree on one ratio of clocks and one place.
     fn moved(
         &self,
         comparison: &Comparison,
@@ -162,7 +164,8 @@ impl View<'_> {
         (agreed.len() >= comparison.agree).then(|| (best.0, libm::round(best.1.shift) as isize))
     }
 
-    /// The fit of a start to another over a period, if it is a good one, and either at the assumed place, or at another clock and much better than there.
+    /// The fit of a start to another over a period, if it is a good one, and either at the assumed place, or
+    /// at another clock and much better than there.
     fn fit(&self, comparison: &Comparison, from: usize, to: usize, moved: isize) -> Option<ScaledFit> {
         let period = self.period(to)?;
         let after = match comparison.after {
@@ -210,7 +213,8 @@ mod tests {
     const ANCHOR: usize = 50;
     const WIDTH: usize = 250;
 
-    /// Power of frames of 300 samples at clock 1, of as many of 480 at another: each a rest of 40 samples and draws that differ.
+    /// Power of frames of 300 samples at clock 1, of as many of 480 at another: each a rest of 40 samples and
+    /// draws that differ.
     fn trace(frames: usize, seed: u32) -> (Vec<f64>, Vec<usize>) {
         let height = |draw: u32| 0.3 + f64::from((draw * 7919 + seed * 104_729) % 97) / 97.0;
         let (mut power, mut starts) = (Vec::new(), Vec::new());

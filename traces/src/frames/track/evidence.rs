@@ -32,8 +32,8 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// From examples. A feature by which starts are farther than the rest is left out: nearer is never less likely. Where power
-    /// levels have changed, shape alone speaks, and less.
+    /// From examples. A feature by which starts are farther than the rest is left out: nearer is never less
+    /// likely. Where power levels have changed, shape alone speaks, and less.
     pub fn learn(candidates: &[Candidate], labels: &[Label], levels_changed: bool) -> Self {
         let of = |label: Label| -> Vec<[f64; FEATURES]> {
             let labelled = candidates.iter().zip(labels).filter(|(_, l)| **l == label);

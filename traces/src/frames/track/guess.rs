@@ -41,7 +41,8 @@ pub(super) fn first(templates: &Templates, spacing: usize, marks: &[usize]) -> (
             let starts: Vec<usize> =
                 minima.iter().copied().filter(|&offset| profile[offset] < threshold).collect();
             let Some(gap) = median_gap(&starts) else { continue };
-            // As dense as minima are anyway: only if there is nothing else, as where frames are shorter than the window.
+            // As dense as minima are anyway: only if there is nothing else, as where frames are shorter than
+            // the window.
             let dense = if (gap as f64) < MIN_SPARSENESS * usual { 10.0 } else { 0.0 };
             let value = regularity(&starts, span) + SEPARATION_WEIGHT * separation(&split).min(5.0) - dense;
             if value > best.0 {
@@ -59,9 +60,10 @@ pub(super) fn first(templates: &Templates, spacing: usize, marks: &[usize]) -> (
     }
 }
 
-/// The starts and those between them, where what divides every gap of a period into so many equal parts resembles the mark as well as
-/// half a sample and noise let anything: of V-synchronized frames whose period is no whole number of samples, only some fall on the mark's place
-/// between samples, and they have a period of their own.
+/// The starts and those between them, where what divides every gap of a period into so many equal parts
+/// resembles the mark as well as half a sample and noise let anything: of V-synchronized frames whose period
+/// is no whole number of samples, only some fall on the mark's place between samples, and they have a period
+/// of their own.
 fn between(
     profile: &[f64],
     starts: &[usize],
@@ -81,7 +83,8 @@ fn between(
         return None;
     }
     let more: Vec<usize> = starts.windows(2).filter(even).flat_map(divided).collect();
-    // At edges half a sample leaves half of what a whole one does. Parts of whole samples would fall on the mark's place, too.
+    // At edges half a sample leaves half of what a whole one does. Parts of whole samples would fall on the
+    // mark's place, too.
     let off = if period.is_multiple_of(parts) { 1.0 } else { 2.0 } * half_a_sample(profile, marks);
     // Noise leaves as much of them as of the starts.
     let usual = |offsets: &[usize]| {
@@ -101,8 +104,8 @@ fn lowest_beside(profile: &[f64], offset: usize) -> usize {
     three.min_by(|a, b| profile[*a].total_cmp(&profile[*b])).unwrap_or(offset)
 }
 
-/// Distance of a match half a sample off: a quarter of that of a whole one. Nearer ones count as equal, or else, where a few
-/// periods are a whole number of samples, only one in several frames would seem to match.
+/// Distance of a match half a sample off: a quarter of that of a whole one. Nearer ones count as equal, or
+/// else, where a few periods are a whole number of samples, only one in several frames would seem to match.
 fn half_a_sample(profile: &[f64], marks: &[usize]) -> f64 {
     let beside = |mark: &usize| [mark.checked_sub(1), Some(mark + 1)];
     let values = marks.iter().flat_map(beside).flatten().filter_map(|offset| profile.get(offset));
@@ -138,7 +141,8 @@ mod tests {
 
     #[test]
     fn frames_between_those_that_fall_on_the_marks_place_between_samples_are_seen() {
-        // A period of 33 1/3 samples: every third start is nearest to the mark, the others a third of a sample off.
+        // A period of 33 1/3 samples: every third start is nearest to the mark, the others a third of a
+        // sample off.
         let near = |offset: f64| {
             let phase = (offset / (100.0 / 3.0)).fract();
             let off = phase.min(1.0 - phase) * (100.0 / 3.0);

@@ -1,7 +1,7 @@
 //! Tracking: following the frames outwards from the mark.
 //!
-//! The appearance of a frame start changes slowly, so it is learnt where it is known: from the frames around the mark. In
-//! rounds the considered part of the trace doubles; in each round
+//! The appearance of a frame start changes slowly, so it is learnt where it is known: from the frames around
+//! the mark. In rounds the considered part of the trace doubles; in each round
 //!
 //! 1. candidates are the local minima of the distance to the nearest template, by shape and by summed squares;
 //! 2. the weight of a distance is learnt from the starts found so far and from the samples between them ([`evidence`]);
@@ -182,8 +182,8 @@ impl Tracker {
         offsets.into_iter().map(candidate).collect()
     }
 
-    /// Starts are examples of starts, what is well away from them of the rest. What is beside them, or what a template was made
-    /// of, is an example of neither.
+    /// Starts are examples of starts, what is well away from them of the rest. What is beside them, or what a
+    /// template was made of, is an example of neither.
     fn labels(&self, candidates: &[Candidate], starts: &[usize]) -> Vec<Label> {
         let mut labels = vec![Label::Rest; candidates.len()];
         for &start in starts {

@@ -1,4 +1,5 @@
-//! Phase slips: past a place where the sequence may have slipped to another phase of the frame, confidence is lower.
+//! Phase slips: past a place where the sequence may have slipped to another phase of the frame, confidence is
+//! lower.
 
 /// Ratios of gaps of the same period.
 const SAME_RATIOS: [f64; 2] = [0.92, 1.085];
@@ -9,7 +10,8 @@ const MAX_DOUBLE_DEVIATION: f64 = 0.1;
 /// Confidence factor beyond a phase slip.
 const SLIPPED_CONFIDENCE: f64 = 0.3;
 
-/// Whether the period goes on as before after one odd gap that is not two periods. A clock step would change it for longer.
+/// Whether the period goes on as before after one odd gap that is not two periods. A clock step would change
+/// it for longer.
 pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
     let ratio = between / before;
     !within(ratio, ODD_RATIOS)
@@ -17,10 +19,10 @@ pub(super) fn slip(before: f64, between: f64, after: f64) -> bool {
         && within(after / before, SAME_RATIOS)
 }
 
-/// Confidence factors of starts: lower by each slip between a start and the nearest `known` place, and if that place is itself off
-/// the period of its neighbours, or was corrected beyond a slip from the nearest of `marks`. A slip does not show which of its
-/// sides is in the right phase, so it counts on this side, too, back to where the clock stepped, as the phase may have been lost
-/// there. Without marks all factors are 1.
+/// Confidence factors of starts: lower by each slip between a start and the nearest `known` place, and if
+/// that place is itself off the period of its neighbours, or was corrected beyond a slip from the nearest of
+/// `marks`. A slip does not show which of its sides is in the right phase, so it counts on this side, too,
+/// back to where the clock stepped, as the phase may have been lost there. Without marks all factors are 1.
 pub(super) fn confidence_factors(offsets: &[usize], marks: &[usize], known: &[usize]) -> Vec<f64> {
     let sequence = GapSequence::new(offsets);
     let among = |places: &[usize]| -> Vec<usize> {
@@ -95,7 +97,8 @@ fn step(gaps: &[f64]) -> Option<[f64; 2]> {
     }
 }
 
-/// Whether the frame in which the clock steps is too short or too long for one frame of either period, and for two.
+/// Whether the frame in which the clock steps is too short or too long for one frame of either period, and
+/// for two.
 fn step_slipped(gaps: &[f64]) -> bool {
     let Some([before, after]) = step(gaps) else { return false };
     let between = gaps[gaps.len() - 3];
@@ -117,7 +120,8 @@ fn slipped(gaps: &[f64]) -> bool {
     }
 }
 
-/// Whether a start lies between two starts of the same phase, but off the period: then either it or all others are wrong.
+/// Whether a start lies between two starts of the same phase, but off the period: then either it or all
+/// others are wrong.
 fn off_period(gaps: &[f64], start: usize) -> bool {
     let Some(&[before, one, two, after]) = start.checked_sub(2).and_then(|from| gaps.get(from..from + 4))
     else {
@@ -152,7 +156,8 @@ mod tests {
             |before: f64, between: f64, after: f64| step_slipped(&[before, before, between, after, after]);
         assert!(slipped(144.0, 107.0, 187.0) && slipped(187.0, 240.0, 144.0));
         assert!(!slipped(144.0, 160.0, 187.0) && !slipped(187.0, 150.0, 144.0));
-        // A start was missed where the clock stepped; a steady period is no slip, nor is a single start off the period.
+        // A start was missed where the clock stepped; a steady period is no slip, nor is a single start off
+        // the period.
         assert!(!slipped(144.0, 330.0, 187.0) && !slipped(100.0, 60.0, 100.0));
         assert!(!step_slipped(&[100.0, 130.0, 70.0, 100.0, 100.0]));
         assert_eq!(

@@ -1,6 +1,6 @@
-//! Units that other programs put into the metadata of fields. Arrow keeps them in a schema of its own among the metadata of
-//! a Parquet file (`ARROW:schema`: Base64 of an IPC message, which is a FlatBuffer; Schema.fbs and Message.fbs of Apache
-//! Arrow).
+//! Units that other programs put into the metadata of fields. Arrow keeps them in a schema of its own among
+//! the metadata of a Parquet file (`ARROW:schema`: Base64 of an IPC message, which is a FlatBuffer;
+//! Schema.fbs and Message.fbs of Apache Arrow).
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -1,5 +1,5 @@
-//! The native format: Parquet with the columns `time_ns`, `voltage_V` and `current_A`, and one JSON text under the
-//! key `trace` in the file's metadata. It is read column by column, in parallel.
+//! The native format: Parquet with the columns `time_ns`, `voltage_V` and `current_A`, and one JSON text
+//! under the key `trace` in the file's metadata. It is read column by column, in parallel.
 
 mod arrow_schema;
 mod column;
@@ -102,7 +102,8 @@ fn description(path: &Path, file: &PagedFile) -> Result<Description, ReadError> 
     json.map_or(Ok(Description::default()), |json| Description::from_json(path, json))
 }
 
-/// Checks the places of the columns that are read against the size of the file, before the decoder trusts them.
+/// Checks the places of the columns that are read against the size of the file, before the decoder trusts
+/// them.
 fn check_chunks(path: &Path, file: &PagedFile, size_bytes: u64, layout: &Layout) -> Result<(), ReadError> {
     let read: Vec<usize> = layout.time.iter().chain(&layout.values).map(|picked| picked.index).collect();
     for group in file.metadata().row_groups() {

@@ -1,7 +1,7 @@
 //! A reader of Parquet files that also decompresses Zstandard, for which the parquet crate would need C.
 //!
-//! Page headers are in Thrift's compact protocol (thrift-compact-protocol.md of Apache Thrift); field numbers are those of
-//! `PageHeader` in parquet.thrift.
+//! Page headers are in Thrift's compact protocol (thrift-compact-protocol.md of Apache Thrift); field numbers
+//! are those of `PageHeader` in parquet.thrift.
 
 use bytes::Bytes;
 use parquet::basic::{Compression, Encoding};

@@ -20,10 +20,11 @@ const GROUP_ROWS: u64 = 1 << 20;
 const FIELDS: [(&str, Physical); 3] =
     [(TIME_NS, Physical::INT64), (VOLTAGE_V, Physical::FLOAT), (CURRENT_A, Physical::FLOAT)];
 
-/// Writes a trace, one row group after the other. The same trace gives the same bytes, whatever pieces it comes in.
+/// Writes a trace, one row group after the other. The same trace gives the same bytes, whatever pieces it
+/// comes in.
 ///
-/// Times are delta encoded, values a dictionary of the device's codes (byte planes where there are too many), both
-/// compressed with Snappy, which needs no C.
+/// Times are delta encoded, values a dictionary of the device's codes (byte planes where there are too many),
+/// both compressed with Snappy, which needs no C.
 ///
 /// # Errors
 /// [`WriteError`] if a mark is not finite, the writer fails, or the samples cannot be read.
@@ -66,7 +67,8 @@ fn encode(error: ParquetError) -> WriteError {
 struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
     header: TraceHeader,
-    /// Number of the current group, by the numbers of its samples: groups that were lost whole are not written.
+    /// Number of the current group, by the numbers of its samples: groups that were lost whole are not
+    /// written.
     group: u64,
     times_ns: Vec<i64>,
     voltage_v: Vec<f32>,

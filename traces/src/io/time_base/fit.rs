@@ -14,8 +14,8 @@ const GUESS_STEPS: usize = 1001;
 /// Share of a rate within which rounding may decide whether a row is in its place.
 const ROUNDING: f64 = 1e-13;
 
-/// Checks stamps in order. Errors are reported at the end, those that exclude any rate first: a row out of order, then an odd
-/// step, then a row off its place.
+/// Checks stamps in order. Errors are reported at the end, those that exclude any rate first: a row out of
+/// order, then an odd step, then a row off its place.
 #[derive(Debug)]
 pub(crate) struct Fit {
     path: PathBuf,
@@ -38,7 +38,8 @@ pub(crate) struct Fit {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fitted {
     pub grid: Grid,
-    /// Whether all rows are known to be in their places; if not, they must be checked again with this rate as stated.
+    /// Whether all rows are known to be in their places; if not, they must be checked again with this rate as
+    /// stated.
     pub sure: bool,
 }
 
@@ -73,7 +74,8 @@ impl Fit {
         }
     }
 
-    /// Takes nanoseconds of equal steps: if both ends are in place, all between are. `false` if that is not certain.
+    /// Takes nanoseconds of equal steps: if both ends are in place, all between are. `false` if that is not
+    /// certain.
     fn push_even(&mut self, stamps: &Stamps) -> bool {
         let Stamps::Nanoseconds(times) = stamps else { return false };
         let ([a, b, ..], [.., last], Some(before)) = (&times[..], &times[..], self.before) else {
@@ -217,7 +219,8 @@ impl Fit {
         let sure = self.stated_hz.is_some()
             || (low * (1.0 + ROUNDING) <= rate_hz && rate_hz <= high * (1.0 - ROUNDING));
         let first_s = first.time_s();
-        // The stated start is exact where the first stamp was rounded; if it is another time, the file was edited.
+        // The stated start is exact where the first stamp was rounded; if it is another time, the file was
+        // edited.
         let stated =
             self.stated_start_s.filter(|start_s| (start_s - first_s).abs() * rate_hz <= MAX_OFFSET_PERIODS);
         Ok(Fitted { grid: Grid { start_s: stated.unwrap_or(first_s), rate_hz }, sure })

@@ -1,8 +1,8 @@
 //! The time base: start and sample rate from time stamps, or the row where they are uneven.
 //!
-//! Rates are estimated here alone, by as much as is known: [`grid`] from all stamps, which must be even; [`usual_rate_hz`]
-//! from stamps with gaps that are to be filled; [`mean_rate_hz`] from a few rows with gaps; [`rate_to_last_row_hz`] from the
-//! first rows and the last one; [`rate_of_steps_hz`] from a count.
+//! Rates are estimated here alone, by as much as is known: [`grid`] from all stamps, which must be even;
+//! [`usual_rate_hz`] from stamps with gaps that are to be filled; [`mean_rate_hz`] from a few rows with gaps;
+//! [`rate_to_last_row_hz`] from the first rows and the last one; [`rate_of_steps_hz`] from a count.
 
 mod fit;
 #[cfg(test)]
@@ -50,7 +50,8 @@ impl Stamp {
         }
     }
 
-    /// Seconds since an earlier one; nanoseconds are subtracted as integers, so a large start costs no precision.
+    /// Seconds since an earlier one; nanoseconds are subtracted as integers, so a large start costs no
+    /// precision.
     fn since_s(self, earlier: Self) -> f64 {
         match (self, earlier) {
             (Self::Nanoseconds(time), Self::Nanoseconds(earlier)) => {
@@ -111,7 +112,8 @@ pub(crate) fn grid(path: &Path, stamps: &Stamps, description: &Description) -> R
     if fitted.sure { Ok(fitted.grid) } else { Ok(fit(Some(fitted.grid.rate_hz))?.grid) }
 }
 
-/// The roundest rate (with most zeros) that moves the last sample by no more than the resolution of the stamps.
+/// The roundest rate (with most zeros) that moves the last sample by no more than the resolution of the
+/// stamps.
 fn rounded_rate_hz(periods: f64, span_s: f64, resolution_s: f64) -> f64 {
     let rate_hz = periods / span_s;
     let tolerance = f64::min(MAX_ROUNDING_PERIODS, resolution_s * rate_hz);
@@ -128,8 +130,8 @@ pub(crate) fn mean_rate_hz(times: &[f64]) -> f64 {
     rounded_rate_hz(single().count() as f64, single().sum(), f64::INFINITY)
 }
 
-/// The rate that agrees with all rows, also across gaps. The usual step alone is not enough: it is off by up to the
-/// rounding of the stamps, which adds up over the rows.
+/// The rate that agrees with all rows, also across gaps. The usual step alone is not enough: it is off by up
+/// to the rounding of the stamps, which adds up over the rows.
 pub(crate) fn usual_rate_hz(times: &[f64]) -> f64 {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let mut sorted: Vec<f64> = steps().collect();
@@ -147,9 +149,9 @@ pub(crate) fn rate_of_steps_hz(steps: f64, span_s: f64) -> f64 {
     rounded_rate_hz(steps, span_s, f64::INFINITY)
 }
 
-/// The rate of a whole file, from that of its first rows and the time from its first row to row number `last` (from 0).
-/// The rate of the first rows is kept if it puts the last one in its place, or if it leaves no room for another rate:
-/// then samples are missing.
+/// The rate of a whole file, from that of its first rows and the time from its first row to row number `last`
+/// (from 0). The rate of the first rows is kept if it puts the last one in its place, or if it leaves no room
+/// for another rate: then samples are missing.
 pub(crate) fn rate_to_last_row_hz(first_rows: &Stamps, rate_hz: f64, last: u64, span_s: f64) -> f64 {
     let (off_periods, whole_hz) = (span_s * rate_hz - last as f64, last as f64 / span_s);
     let possible = off_periods.abs() < MIN_MISSING_PERIODS
@@ -157,7 +159,8 @@ pub(crate) fn rate_to_last_row_hz(first_rows: &Stamps, rate_hz: f64, last: u64, 
     if off_periods.abs() > MAX_ROUNDING_PERIODS && span_s > 0.0 && possible { whole_hz } else { rate_hz }
 }
 
-/// Uncertainty of the rate of some rows, as a share: stamps at both ends may be as far off as any, and are rounded.
+/// Uncertainty of the rate of some rows, as a share: stamps at both ends may be as far off as any, and are
+/// rounded.
 fn rate_uncertainty(stamps: &Stamps, rate_hz: f64) -> f64 {
     let off = |row: usize| (stamps.since_s(row, 0) * rate_hz - row as f64).abs();
     let farthest = (1..stamps.len()).map(off).fold(0.0, f64::max);
