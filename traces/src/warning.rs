@@ -1,4 +1,4 @@
-//! Warnings: the analysis went on, but where it stands on weak ground it says so.
+//! Warnings about a result that may be wrong.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Warning {
     /// Stable, lower case, with hyphens.
     pub code: &'static str,
-    /// What was seen, and what one can do about it.
+    /// The observation, and what to do.
     pub message: String,
 }
 

@@ -1,4 +1,4 @@
-//! `frames.csv`.
+//! The table of frames, `frames.csv`.
 
 use super::{FrameEnergy, TrueFrame, outliers};
 use crate::decimal;
@@ -9,7 +9,8 @@ use thiserror::Error;
 
 /// The columns of `frames.csv`, in order. Later versions only add columns at the end.
 ///
-/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a simulator.
+/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a
+/// simulator.
 pub const TABLE_COLUMNS: [&str; 12] = [
     "frame",
     "start_s",
@@ -25,9 +26,10 @@ pub const TABLE_COLUMNS: [&str; 12] = [
     "outlier",
 ];
 
-/// Rows that a thread writes down at once, and how many such batches go to the file at once.
-const ROWS: usize = 4096;
-const BATCHES: usize = 8;
+/// Rows that a thread formats at once.
+const TASK_ROWS: usize = 4096;
+/// Such batches of rows that are written at once.
+const HELD_TASKS: usize = 8;
 /// Bytes of a row, about.
 const ROW_BYTES: usize = 136;
 
@@ -64,7 +66,7 @@ impl FrameTable {
         Self { frames, pixels, truth: Vec::new(), outliers }
     }
 
-    /// Puts what really happened beside each frame (`None` for a frame that never was).
+    /// Adds the ground truth of each frame (`None` for a false one).
     ///
     /// # Errors
     /// [`TableError::Truth`] unless there is one entry per frame.
@@ -85,15 +87,16 @@ impl FrameTable {
         &self.outliers
     }
 
-    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads back the
-    /// same.
+    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads
+    /// back the same.
     ///
     /// # Errors
     /// [`TableError`] if the writer fails.
     pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), TableError> {
         writeln!(out, "{}", TABLE_COLUMNS.join(","))?;
-        // Numbers take longer to write down than to find: many rows at once on every thread, the next while some go to the file.
-        let step = BATCHES * ROWS;
+        // Numbers take longer to write down than to find: many rows at once on every thread, the next while
+        // some go to the file.
+        let step = HELD_TASKS * TASK_ROWS;
         let mut batches = self.batches(0, step);
         for from in (step..self.frames.len() + step).step_by(step) {
             let mut next = Vec::new();
@@ -107,14 +110,14 @@ impl FrameTable {
         Ok(())
     }
 
-    /// Rows as they stand in the file, made side by side.
+    /// The text of all rows, formatted in parallel.
     fn batches(&self, from: usize, to: usize) -> Vec<Vec<u8>> {
         let to = to.min(self.frames.len());
-        let firsts = (from..to).into_par_iter().step_by(ROWS);
-        firsts.map(|first| self.rows(first..to.min(first + ROWS))).collect()
+        let firsts = (from..to).into_par_iter().step_by(TASK_ROWS);
+        firsts.map(|first| self.rows(first..to.min(first + TASK_ROWS))).collect()
     }
 
-    /// Some rows as they stand in the file. No cell needs quotes.
+    /// The text of some rows. No cell needs quotes.
     fn rows(&self, range: Range<usize>) -> Vec<u8> {
         let mut rows = Vec::with_capacity(range.len() * ROW_BYTES);
         for index in range {
