@@ -2,18 +2,17 @@
 
 use std::path::Path;
 
-use pipeline::sampling::SampleSource;
-use pipeline::{Camera, Draw, LensShape, SampleTable, Viewport};
+use pipeline::memory::CacheError;
+use pipeline::{LensShape, SampleTable, Viewport};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::Overrides;
 use workloads::stress::{Size, family};
-use workloads::visibility::Unshaded;
 
 use crate::stress::intervals::Pairs;
 use crate::stress::measure::Work;
 use crate::stress::methods::{SWITCHES, combinations};
-use crate::stress::subject::{Subject, differing};
+use crate::stress::subject::{self, Subject, differing};
 use crate::study::table::{Sheet, Table, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
@@ -169,12 +168,10 @@ impl Study for TileTests {
 }
 
 fn of_family(name: &'static str, value: f64, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
-    let failed = |message: String| RunError::Setting(format!("{name} at {value}: {message}"));
-    let family = family(name).ok_or_else(|| failed("there is no such family".to_owned()))?;
-    let scene = family.scene(value, effort.families, 1).map_err(|error| failed(error.to_string()))?;
-    let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
     let label = format!("{name} at {value}");
-    rows(label, (&scene.camera, scene.viewport), &scene.samples, &draws, effort.pairs, gpu)
+    let family =
+        family(name).ok_or_else(|| RunError::Setting(format!("{label}: there is no such family")))?;
+    subject::on(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
 }
 
 fn of_scene(name: &str, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
@@ -187,25 +184,19 @@ fn of_scene(name: &str, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunE
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk)?;
     let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::Setting("size: none".to_owned()))?;
     let label = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
-    rows(label.into_owned(), (&frame.camera, viewport), &samples, &draws, effort.pairs, gpu)
+    let (camera, spec) = (&frame.camera, &gpu.pipeline);
+    let subject = Subject { camera, viewport, samples: &samples, draws: &draws, spec };
+    let rows = rows(&label, &subject, effort.pairs);
+    rows.map_err(|error| RunError::Setting(format!("{label}: {error}")))
 }
 
-fn rows(
-    scene: String,
-    (camera, viewport): (&Camera, Viewport),
-    samples: &dyn SampleSource,
-    draws: &[Draw<'_>],
-    pairs: u64,
-    gpu: &GpuSpec,
-) -> Result<Vec<Row>, RunError> {
-    let subject = Subject { camera, viewport, samples, draws, spec: &gpu.pipeline };
-    let failed = |error: pipeline::memory::CacheError| RunError::Setting(format!("{scene}: {error}"));
-    let pairs = Pairs::of(&subject, pairs);
-    let (reference, _) = subject.reference().map_err(failed)?;
+fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<Row>, CacheError> {
+    let pairs = Pairs::of(subject, pairs);
+    let (reference, _) = subject.reference()?;
     let row = |(tests, features)| {
         let work = Work::new(&subject.counts(features)?);
         Ok(Row {
-            scene: scene.clone(),
+            scene: scene.to_owned(),
             tests,
             madds_per_triangle: work.madds() as f64 / subject.triangles().max(1) as f64,
             efficiency: work.efficiency().unwrap_or(0.0),
@@ -216,8 +207,7 @@ fn rows(
             on_tightness_front: false,
         })
     };
-    let rows = combinations().into_iter().map(row).collect::<Result<_, _>>().map_err(failed)?;
-    Ok(with_fronts(rows))
+    combinations().into_iter().map(row).collect::<Result<_, _>>().map(with_fronts)
 }
 
 fn with_fronts(mut rows: Vec<Row>) -> Vec<Row> {
