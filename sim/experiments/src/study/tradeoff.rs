@@ -202,7 +202,7 @@ impl Tradeoff {
         };
         // Without a value above zero there is nothing that a logarithm could show.
         let exact = points.iter().all(|point| point.error.value == 0.0);
-        let scale = if exact { Scale::Even } else { Scale::Decades };
+        let scale = if exact { Scale::Listed(vec!["exact".to_owned()]) } else { Scale::Decades };
         let axes = [axis(cost, Scale::Decades, ""), axis(error, scale, "exact")];
         let mut subjects: Vec<&str> = points.iter().map(|point| point.study).collect();
         subjects.dedup();
