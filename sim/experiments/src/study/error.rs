@@ -1,12 +1,12 @@
-//! Each way a chart can fail.
+//! Each way a study can fail.
 
 use output::OutputError;
-use run::GpuError;
+use run::{GpuError, RunError};
 
-/// Why a chart could not be made.
+/// Why a study could not be made.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the variants are the sources, documented there")]
-pub enum ChartError {
+pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] workloads::LoadError),
     #[error(transparent)]
@@ -30,5 +30,14 @@ pub enum ChartError {
     #[error(transparent)]
     Job(#[from] workloads::job::JobError),
     #[error(transparent)]
+    Run(#[from] RunError),
+    #[error(transparent)]
     Output(#[from] OutputError),
+}
+
+impl StudyError {
+    /// The pipeline refused what it was given.
+    pub(crate) fn pipeline(why: impl std::fmt::Display) -> Self {
+        Self::Pipeline(why.to_string())
+    }
 }
