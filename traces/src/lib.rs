@@ -66,9 +66,7 @@ pub mod table;
 pub mod times;
 pub mod trace;
 pub mod units;
-mod warning;
 
 pub use curve::{Curve, CurveBuilder, CurveError};
 pub use metadata::{Mark, MarkKind, Metadata};
 pub use trace::{Trace, TraceError};
-pub use warning::Warning;

@@ -49,11 +49,6 @@ macro_rules! codes {
                 match self { $(Self::$code => $name,)+ }
             }
 
-            /// The code of this name.
-            pub fn named(name: &str) -> Option<Self> {
-                Self::ALL.iter().copied().find(|code| code.name() == name)
-            }
-
             /// When it is reported, in a sentence.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$code => concat!($($line),+).trim_ascii_start(),)+ }

@@ -37,7 +37,7 @@ impl Outcome {
         let chosen = format!(
             "{:?} {}",
             found.method,
-            found.warnings.iter().map(|w| w.code).collect::<Vec<_>>().join(",")
+            found.warnings.iter().map(|w| w.code.name()).collect::<Vec<_>>().join(",")
         );
         Ok(Self {
             f1: score.f1(),

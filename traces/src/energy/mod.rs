@@ -14,4 +14,4 @@ pub use run::{InverseUnits, Pass, RunEnergy, RunError, RunOptions, passes_j};
 pub use statistics::{Pooled, Summary, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole};
 pub(crate) use streaming::Sums;
 pub use streaming::{energies_j, finishes_s, levels_w};
-pub use table::{FrameTable, TABLE_COLUMNS, TableError};
+pub use table::{ExtraColumn, FrameTable, TABLE_COLUMNS, TableError};

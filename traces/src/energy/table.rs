@@ -44,9 +44,28 @@ pub enum TableError {
         /// True frames.
         truths: usize,
     },
+    /// An extra column has another number of cells than there are frames.
+    #[error("column `{name}` has {cells} cells for {frames} frames: give one per frame")]
+    Column {
+        /// Its name.
+        name: &'static str,
+        /// Its cells.
+        cells: usize,
+        /// Measured frames.
+        frames: usize,
+    },
     /// Writing failed.
     #[error("cannot write the table of frames: {0}")]
     Write(#[from] std::io::Error),
+}
+
+/// A column after those of [`TABLE_COLUMNS`]: its name, and a cell for each frame that needs no quotes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtraColumn {
+    /// The name in the header.
+    pub name: &'static str,
+    /// One per frame.
+    pub cells: Vec<String>,
 }
 
 /// Frames on their way to `frames.csv`.
@@ -57,13 +76,14 @@ pub struct FrameTable {
     /// One per frame, or none at all.
     truth: Vec<Option<TrueFrame>>,
     outliers: Vec<bool>,
+    extra: Vec<ExtraColumn>,
 }
 
 impl FrameTable {
     /// A table of measured frames; `pixels` per frame where known.
     pub fn new(frames: Vec<FrameEnergy>, pixels: Option<u64>) -> Self {
         let outliers = outliers(&frames.iter().map(|frame| frame.energy_j).collect::<Vec<_>>());
-        Self { frames, pixels, truth: Vec::new(), outliers }
+        Self { frames, pixels, truth: Vec::new(), outliers, extra: Vec::new() }
     }
 
     /// Adds the ground truth of each frame (`None` for a false one).
@@ -77,6 +97,18 @@ impl FrameTable {
         Ok(Self { truth, ..self })
     }
 
+    /// Adds columns at the end.
+    ///
+    /// # Errors
+    /// [`TableError::Column`] unless each has one cell per frame.
+    pub fn with_columns(self, extra: Vec<ExtraColumn>) -> Result<Self, TableError> {
+        if let Some(column) = extra.iter().find(|column| column.cells.len() != self.frames.len()) {
+            let (name, cells, frames) = (column.name, column.cells.len(), self.frames.len());
+            return Err(TableError::Column { name, cells, frames });
+        }
+        Ok(Self { extra, ..self })
+    }
+
     /// The frames.
     pub fn frames(&self) -> &[FrameEnergy] {
         &self.frames
@@ -87,13 +119,14 @@ impl FrameTable {
         &self.outliers
     }
 
-    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads
+    /// Writes the table as CSV with the header [`TABLE_COLUMNS`] and the names of extra columns; numbers in the shortest form that reads
     /// back the same.
     ///
     /// # Errors
     /// [`TableError`] if the writer fails.
     pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), TableError> {
-        writeln!(out, "{}", TABLE_COLUMNS.join(","))?;
+        let extra = self.extra.iter().map(|column| column.name);
+        writeln!(out, "{}", TABLE_COLUMNS.into_iter().chain(extra).collect::<Vec<_>>().join(","))?;
         // Numbers take longer to write down than to find: many rows at once on every thread, the next while
         // some go to the file.
         let step = HELD_TASKS * TASK_ROWS;
@@ -138,7 +171,9 @@ impl FrameTable {
         cells(out, [per_pixel_j, known(frame.confidence)]);
         let _ = write!(out, ",{}", frame.flags);
         cells(out, [truth.map(|truth| truth.start_s), truth.map(|truth| truth.energy_j)]);
-        let _ = writeln!(out, ",{}", u8::from(self.outliers[index]));
+        let _ = write!(out, ",{}", u8::from(self.outliers[index]));
+        self.extra.iter().for_each(|column| drop(write!(out, ",{}", column.cells[index])));
+        out.push(b'\n');
     }
 }
 
@@ -162,6 +197,22 @@ mod tests {
         flags.insert(Flag::Marked);
         flags.insert(Flag::Last);
         FrameEnergy { start_s: 0.25, end_s: 0.75, energy_j: 0.125, confidence: 1.0, flags }
+    }
+
+    #[test]
+    fn extra_columns_stand_at_the_end_and_need_a_cell_per_frame() {
+        let column = |cells: &[&str]| ExtraColumn {
+            name: "predicted",
+            cells: cells.iter().map(|&cell| cell.to_owned()).collect(),
+        };
+        let table = FrameTable::new(vec![frame(), frame()], None);
+        let mut out = Vec::new();
+        table.clone().with_columns(vec![column(&["1", ""])]).unwrap().write_csv(&mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let ends: Vec<_> = text.lines().map(|line| line.rsplit(',').next().unwrap()).collect();
+        assert_eq!(ends, ["predicted", "1", ""]);
+        let error = table.with_columns(vec![column(&["1"])]).unwrap_err();
+        assert_eq!(error.to_string(), "column `predicted` has 1 cells for 2 frames: give one per frame");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::marks::{Marks, Placement, Window};
 use super::spans::{Sampling, median_duration_s, spans};
 use super::threshold::{MIN_SEPARATION, Rule, Threshold};
 use crate::trace::Trace;
-use crate::warning::Warning;
+use warnings::{Code, Warning};
 
 /// Frames of fewer samples are measured coarsely.
 const MIN_FRAME_SAMPLES: f64 = 50.0;
@@ -80,7 +80,7 @@ pub(crate) fn conclude_at(
 
 fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
     placement.cut.then(|| {
-        Warning::new("window-cut", format!(
+        Warning::new(Code::WindowCut, format!(
             "the marked window reaches beyond the trace and was cut to {:.3} ms before and {:.3} ms after the mark; \
              mark a frame further inside",
             found.window.pre_s * 1e3, found.window.post_s * 1e3))
@@ -89,7 +89,7 @@ fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
 
 fn only_marks(found: &Found) -> Option<Warning> {
     found.starts.iter().all(|start| start.marked).then(|| {
-        Warning::new("only-mark", String::from(
+        Warning::new(Code::OnlyMark, String::from(
             "nothing else in the trace resembles the marked frame: what is reported is the mark to the end mark; mark a \
              more typical frame, or several"))
     })
@@ -99,7 +99,7 @@ fn weak_separation(found: &Found) -> Option<Warning> {
     let threshold = &found.threshold;
     let split = matches!(threshold.rule, Rule::Otsu | Rule::OtsuRegular | Rule::OtsuDistinct);
     (split && threshold.clarity() < 1.0).then(|| {
-        Warning::new("weak-separation", format!(
+        Warning::new(Code::WeakSeparation, format!(
             "frame starts and other minima are not distinct (separation {:.2}, clear above {MIN_SEPARATION}; {:.0} % evenly \
              spaced; mean {:.3e} W^2 below the threshold {:.3e} W^2, {:.3e} W^2 above): starts may be missed or false; \
              mark several frames, or record with V-sync",
@@ -117,7 +117,7 @@ fn irregular(found: &Found) -> Option<Warning> {
     let irregular =
         (long + short) as f64 > MAX_ODD_SHARE * inner.len() as f64 || long_s > MAX_ODD_SHARE * covered_s;
     irregular.then(|| {
-        Warning::new("irregular-spacing", format!(
+        Warning::new(Code::IrregularSpacing, format!(
             "of {} frames {long} are longer than 1.5 median durations ({:.0} % of the time) and {short} shorter than \
              0.5: starts were missed, are false, or the frame time really jumps",
             inner.len(), 100.0 * long_s / covered_s))
@@ -128,7 +128,7 @@ fn many_unsure(found: &Found) -> Option<Warning> {
     let unsure = found.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
     let all = found.frames.len();
     (unsure as f64 > MAX_UNSURE_SHARE * all as f64).then(|| {
-        Warning::new("unsure-frames", format!(
+        Warning::new(Code::UnsureFrames, format!(
             "{unsure} of {all} frames have a confidence below one half: their starts may be those of something else that \
              repeats; look at them before their energies are used, mark several frames, or sample faster"))
     })
@@ -138,7 +138,7 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
     let window_s = found.window.pre_s + found.window.post_s;
     // A tenth of slack: a window of just the period is what default_window gives.
     (found.frames.len() > 1 && window_s > 1.1 * median_s).then(|| {
-        Warning::new("window-longer-than-frame", format!(
+        Warning::new(Code::WindowLongerThanFrame, format!(
             "the window of {:.3} ms is longer than the median frame of {:.3} ms: shorter frames may be missed; shrink it",
             window_s * 1e3, median_s * 1e3))
     })
@@ -147,7 +147,7 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
 fn few_samples(median_s: f64, rate_hz: f64) -> Option<Warning> {
     let samples = median_s * rate_hz;
     (samples < MIN_FRAME_SAMPLES).then(|| {
-        Warning::new("few-samples", format!(
+        Warning::new(Code::FewSamples, format!(
             "the median frame has {samples:.1} samples, fewer than {MIN_FRAME_SAMPLES}: starts and energies are coarse; \
              sample faster"))
     })
@@ -181,7 +181,7 @@ fn uncovered_lengths(power: &[f64], starts: &[f64]) -> Option<usize> {
 pub(super) fn uncovered_work(power: &[f64], starts: &[f64]) -> Option<Warning> {
     let frames = uncovered_lengths(power, starts).filter(|frames| *frames >= MIN_UNCOVERED_LENGTHS)?;
     Some(Warning::new(
-        "uncovered",
+        Code::Uncovered,
         format!(
             "before the first start and after the last frame there is work of about {frames} frames in which none was found: \
          frames are missing there; mark one of them, too"

@@ -2,10 +2,10 @@
 
 use super::marks::{Placed, Placement, Window};
 use super::threshold::Threshold;
-use crate::Warning;
 use core::fmt;
 use core::str::FromStr;
 use serde::Serialize;
+use warnings::Warning;
 
 /// One frame start.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use crate::stats::moments;
 use crate::trace::Trace;
-use crate::warning::Warning;
 use thiserror::Error;
+use warnings::{Code, Warning};
 
 /// Fewest samples of a window.
 const MIN_WINDOW_SAMPLES: usize = 4;
@@ -213,7 +213,7 @@ pub(crate) fn flat_mark<'a>(
 ) -> Option<Warning> {
     let (mark_s, _) = windows.into_iter().find(|(_, window)| is_flat(window, sigma))?;
     Some(Warning::new(
-        "flat-mark",
+        Code::FlatMark,
         format!(
             "around the mark at {mark_s} s power varies by no more than noise, so that any rest resembles it: what is found may be no \
              frames; mark where one begins"

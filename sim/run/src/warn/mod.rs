@@ -30,7 +30,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     let unseen = short.is_some() && measurement.is_mark_alone();
     let explained = simulated.frames.len() == 1 || unseen;
     let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
-    all.extend(of_trace.filter_map(|w| Some(Warning::new(Code::named(w.code)?, w.message.clone()))));
+    all.extend(of_trace.cloned());
     all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(nothing_seen(simulated));
