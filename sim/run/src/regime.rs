@@ -1,8 +1,10 @@
 //! Triangles of a frame in the regimes of the failure catalogue, where tile tests are known to pay little.
 
+use glam::Vec3;
 use pipeline::geometry::Projection;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::{Camera, Draw, Viewport};
+use workloads::scene::NearSpace;
 use workloads::stress::set_up_all;
 
 /// How many triangles of a frame are in each regime. One may be in several.
@@ -22,29 +24,38 @@ pub struct Regime {
     pub blurred: u64,
     /// Those so far or so near that products of their coordinates leave the range of f32.
     pub extreme: u64,
+    /// Those with a corner in view where a step of 32-bit coordinates is coarse for the pixels.
+    pub coarse: u64,
+    /// Triangles in view and in front of the camera that are nearer than the near plane, as a whole or in part.
+    pub cut: u64,
 }
 
 /// A triangle this many times as long as high is a sliver.
 const SLIVER: f64 = 100.0;
 /// Products of three lengths beyond these lose digits or overflow in f32.
 const PRODUCTS: [f64; 2] = [1e-36, 1e37];
+/// A step of 32-bit coordinates is coarse from so many pixels on.
+const COARSE_PX: f64 = 0.25;
 
 impl Regime {
     /// Of a frame with `per_pixel` samples in each pixel.
     pub fn of(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport, per_pixel: u32) -> Self {
         let shear = Projection::new(camera, viewport).shear;
-        let side_px = f64::from(viewport.width().max(viewport.height()));
-        let look = Look { spacing_px: (1.0 / f64::from(per_pixel)).sqrt(), side_px, lens: shear };
-        let mut found = Self::default();
+        let look = Look::new(camera, viewport, per_pixel);
+        let mut found = Self { cut: cut(camera, draws, viewport), ..Self::default() };
+        let mut corners = corners(draws);
+        let mut next = 0;
         for triangle in set_up_all(camera, draws, viewport) {
+            let world = corners.nth((triangle.id - next) as usize).map(|(_, ends)| ends);
+            next = triangle.id + 1;
             if !bounds(&triangle, &shear, viewport).is_empty() {
-                found.add(&triangle, &look);
+                found.add(&triangle, &world.unwrap_or_default(), &look);
             }
         }
         found
     }
 
-    fn add(&mut self, triangle: &Triangle, look: &Look) {
+    fn add(&mut self, triangle: &Triangle, world: &[[Vec3; 3]; 2], look: &Look) {
         let seen = [0.0, 1.0].map(|t| triangle.corners.map(|c| c.at(t).map(f64::from)));
         self.in_view += 1;
         self.extreme += u64::from(look.is_extreme(&seen));
@@ -58,7 +69,28 @@ impl Regime {
         let way = |k: usize| distance(image[0][k], image[1][k]);
         self.fast += u64::from((0..3).any(|k| way(k) > look.side_px));
         self.blurred += u64::from(seen.as_flattened().iter().all(|p| look.blur_px(p[2]) > look.side_px));
+        let depths = seen.as_flattened().iter().map(|p| p[2]);
+        let places = image.as_flattened().iter().zip(world.as_flattened());
+        self.coarse += u64::from(depths.zip(places).any(|(depth, place)| look.is_coarse(depth, place)));
     }
+}
+
+/// The corners of every triangle in world space when the shutter opens and when it closes, in the order of set-up.
+fn corners<'a>(draws: &'a [Draw<'a>]) -> impl Iterator<Item = (&'a Draw<'a>, [[Vec3; 3]; 2])> {
+    let of_draw = |draw: &'a Draw<'a>| {
+        let ends = [draw.geometry.open(), draw.geometry.close()];
+        let at = move |triangle: &[u32; 3]| ends.map(|end| triangle.map(|vertex| end[vertex as usize]));
+        draw.geometry.triangles().iter().map(move |triangle| (draw, at(triangle)))
+    };
+    draws.iter().flat_map(of_draw)
+}
+
+/// How many triangles in view the near plane cuts, or hides.
+fn cut(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport) -> u64 {
+    let aspect = f64::from(viewport.width()) / f64::from(viewport.height());
+    let space = NearSpace::new(camera, aspect, f64::from(camera.near()));
+    let nearest = |(draw, [open, close]): (&Draw<'_>, [[Vec3; 3]; 2])| space.nearest(open, close, draw.cull);
+    corners(draws).filter_map(nearest).count() as u64
 }
 
 /// What decides the regime of a triangle besides itself.
@@ -66,9 +98,34 @@ struct Look {
     spacing_px: f64,
     side_px: f64,
     lens: pipeline::Shear,
+    /// Pixels of a scene unit at depth 1, or at any depth of an orthographic view.
+    scale_px: f64,
+    /// Half of the width and height of the image.
+    half_px: [f64; 2],
+    /// The largest coordinate of the camera.
+    eye: f32,
 }
 
 impl Look {
+    fn new(camera: &Camera, viewport: Viewport, per_pixel: u32) -> Self {
+        let [width, height] = [viewport.width(), viewport.height()].map(f64::from);
+        Self {
+            spacing_px: (1.0 / f64::from(per_pixel)).sqrt(),
+            side_px: width.max(height),
+            lens: Projection::new(camera, viewport).shear,
+            scale_px: 0.5 * height / f64::from(camera.half_height()),
+            half_px: [0.5 * width, 0.5 * height],
+            eye: camera.open().translation.abs().max_element(),
+        }
+    }
+
+    /// Whether a corner, which has a place on the image and one in the world, is in view and may only move there in large steps.
+    fn is_coarse(&self, depth: f64, (image, world): (&[f64; 2], &Vec3)) -> bool {
+        let largest = world.abs().max_element().max(self.eye);
+        let step_px = f64::from(largest.next_up() - largest) * self.scale_px / self.weight(depth);
+        step_px > COARSE_PX && image.iter().zip(self.half_px).all(|(at, half)| at.abs() <= half)
+    }
+
     fn is_tiny(&self, corners: &[[f64; 2]; 3]) -> bool {
         (0..3).all(|k| distance(corners[k], corners[(k + 1) % 3]) < self.spacing_px)
     }

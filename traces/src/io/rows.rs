@@ -67,7 +67,7 @@ impl Rows {
             start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
                 Some((_, found, remedy)) => Err(ReadError::Format { path: path.to_owned(), found, remedy }),
                 None if is_binary(&start) && !start.starts_with(&[0x1f, 0x8b]) => {
-                    let found = "a binary file of a kind that is not read";
+                    let found = "a binary file of an unknown kind";
                     Err(ReadError::Format { path: path.to_owned(), found, remedy: TRACE_FORMATS })
                 }
                 None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),

@@ -18,6 +18,8 @@ pub(super) fn gather(simulated: &Simulated) -> Vec<Warning> {
         fast(simulated),
         blurred(simulated),
         extreme(simulated),
+        coarse(simulated),
+        cut(simulated),
     ]
     .into_iter()
     .flatten()
@@ -97,4 +99,30 @@ fn extreme(simulated: &Simulated) -> Option<Warning> {
              depths; scale the scene to ordinary lengths"
         ),
     ))
+}
+
+fn coarse(simulated: &Simulated) -> Option<Warning> {
+    let which = worst(simulated, 0.0, |regime| regime.coarse)?;
+    Some(Warning::new(
+        Code::CoordinatesCoarse,
+        format!(
+            "{which} have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: they are drawn \
+             out of place; move what the camera sees to the origin, without what is far from it"
+        ),
+    ))
+}
+
+fn cut(simulated: &Simulated) -> Option<Warning> {
+    let frame = simulated.distinct.iter().max_by_key(|frame| frame.regime.cut)?;
+    let (count, frames) =
+        (frame.regime.cut, simulated.distinct.iter().filter(|frame| frame.regime.cut > 0).count());
+    (count > 0).then(|| {
+        let message = format!(
+            "the near plane cuts {count} triangles in front of the camera away, or parts of them (frame {}; some in {frames} of {} \
+             frames): give the camera a smaller `near`, or move it",
+            frame.index,
+            simulated.distinct.len()
+        );
+        Warning::new(Code::NearPlaneCuts, message)
+    })
 }
