@@ -60,7 +60,7 @@ fn converted_files_hold_the_same_and_streaming_finds_the_same() {
         json(folder.path(), &["convert", pair[0], pair[1]]);
     }
     json(folder.path(), &["convert", "v.csv", "--out", "w.csv"]);
-    let [named, last] = ["v.csv", "w.csv"].map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    let [named, last] = ["v.csv", "w.csv"].map(|name| fs::read(folder.path().join(name)).unwrap());
     assert!(named == last, "OUT and --out write the same");
     let both = quintile(folder.path(), &["convert", "v.csv", "w.csv", "--out", "x.csv"]);
     assert_eq!(both.status.code(), Some(2));

@@ -113,9 +113,9 @@ fn coarse(simulated: &Simulated) -> Option<Warning> {
 }
 
 fn cut(simulated: &Simulated) -> Option<Warning> {
-    let frame = simulated.distinct.iter().max_by_key(|frame| frame.regime.cut)?;
+    let (frame, worst) = simulated.observed().max_by_key(|(_, observed)| observed.regime.cut)?;
     let (count, frames) =
-        (frame.regime.cut, simulated.distinct.iter().filter(|frame| frame.regime.cut > 0).count());
+        (worst.regime.cut, simulated.observed().filter(|(_, observed)| observed.regime.cut > 0).count());
     (count > 0).then(|| {
         let message = format!(
             "the near plane cuts {count} triangles in front of the camera away, or parts of them (frame {}; some in {frames} of {} \
