@@ -1,4 +1,4 @@
-//! What cases are drawn from: random numbers and simple bodies.
+//! Random numbers and simple solids for the cases.
 
 use core::f64::consts::TAU;
 
@@ -10,13 +10,13 @@ use crate::collision::Object;
 use crate::scene::Mesh;
 use crate::shapes;
 
-/// Random numbers in order.
-pub(super) struct Draws {
+/// Sequence of random numbers.
+pub(super) struct Rng {
     seed: u64,
     drawn: u64,
 }
 
-impl Draws {
+impl Rng {
     pub fn new(seed: u64) -> Self {
         Self { seed: mix(seed), drawn: 0 }
     }
@@ -34,20 +34,20 @@ impl Draws {
         DVec3::new(self.within(-1.0, 1.0), self.within(-1.0, 1.0), self.within(-1.0, 1.0))
     }
 
-    /// A gap of 1e-7 to 1e-3, or as much overlap.
+    /// A gap of 1e-7 to 1e-3, or a negative one if `overlap`.
     pub fn gap(&mut self, overlap: bool) -> f64 {
         let gap = 10_f64.powf(self.within(-7.0, -3.0));
         if overlap { -gap } else { gap }
     }
 
-    /// Any turn and any size, the same for a whole case.
+    /// A random rotation and scale, the same for all objects of a case.
     pub fn pose(&mut self) -> DMat3 {
         let axis = self.vector().try_normalize().unwrap_or(DVec3::X);
         let turn = DQuat::from_axis_angle(axis, self.within(0.0, TAU));
         DMat3::from_quat(turn) * 10_f64.powf(self.within(-6.0, 6.0))
     }
 
-    /// A case of objects in one pose.
+    /// Makes a case of objects in one pose.
     pub fn case(&mut self, moving: Vec<Moving>, collide: Vec<(usize, usize)>) -> Option<Case> {
         let pose = self.pose();
         let objects = moving.into_iter().map(|moving| moving.posed(&pose)).collect::<Option<Vec<_>>>()?;
@@ -59,20 +59,20 @@ impl Draws {
     }
 }
 
-/// Triangles at both ends of the time.
+/// Triangles at time 0 and time 1.
 #[derive(Default)]
 pub(super) struct Moving(pub Vec<[[DVec3; 3]; 2]>);
 
 impl Moving {
-    /// A mesh with each end made of its points.
+    /// The triangles of a mesh, transformed by one function at each time.
     pub fn new(mesh: &Mesh, open: impl Fn(DVec3) -> DVec3, close: impl Fn(DVec3) -> DVec3) -> Self {
         let at = |vertex: u32| mesh.positions[vertex as usize].as_dvec3();
         let ends = |t: &[u32; 3]| [t.map(|v| open(at(v))), t.map(|v| close(at(v)))];
         Self(mesh.triangles.iter().map(ends).collect())
     }
 
-    /// A mesh that goes straight from one place to another.
-    pub fn going(mesh: &Mesh, from: DVec3, to: DVec3) -> Self {
+    /// A mesh translated from one position to another.
+    pub fn translating(mesh: &Mesh, from: DVec3, to: DVec3) -> Self {
         Self::new(mesh, |p| p + from, |p| p + to)
     }
 
@@ -81,7 +81,7 @@ impl Moving {
         self
     }
 
-    /// The same with both ends moved.
+    /// The triangles translated at both times.
     pub fn moved(self, open: DVec3, close: DVec3) -> Self {
         let moved = |[from, to]: [[DVec3; 3]; 2]| [from.map(|p| p + open), to.map(|p| p + close)];
         Self(self.0.into_iter().map(moved).collect())
@@ -91,7 +91,7 @@ impl Moving {
         self.placed(pose, DVec3::ZERO)
     }
 
-    /// In a pose, its origin at a place.
+    /// The object in a pose, with its origin at `place`.
     pub fn placed(self, pose: &DMat3, place: DVec3) -> Option<Object> {
         let at = |p: DVec3| (*pose * p + place).to_array();
         Object::from_ends(self.0.iter().map(|ends| ends.map(|end| end.map(at))).collect(), 0.0)
