@@ -1,38 +1,38 @@
-//! Light that is reflected once inside a ring.
+//! Light reflected once inside a ring.
 
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::super::Beam;
-use super::super::optics::reflect;
+use crate::caustics::Beam;
+use crate::caustics::optics::reflect;
 
-/// Where the light of a ring comes from.
+/// Light source of a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// From far away along +x: the caustic is a nephroid.
+    /// Parallel light along +x; the caustic is a nephroid.
     Parallel,
-    /// From the point of the ring at angle 0: a cardioid.
+    /// A point of the ring at angle 0; the caustic is a cardioid.
     OnRing,
 }
 
-/// A mirror in the form of an upright cylinder about the y axis, a strip of triangles of it.
+/// A cylindrical mirror around the y axis, as a strip of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MirrorRing {
     /// Radius in metres.
     pub radius_m: f64,
     /// Height of the strip in metres.
     pub height_m: f64,
-    /// Where light comes from.
+    /// Light source.
     pub source: Source,
-    /// The angles between which it is lit, in radians, and in how many parts.
+    /// First and last lit angle, in radians.
     pub angles: [f64; 2],
-    /// Parts.
+    /// Number of segments.
     pub segments: u32,
 }
 
 impl MirrorRing {
-    /// A point of the ring and where light goes from it, level.
+    /// A point of the ring, and the direction of its reflected light, both horizontal.
     fn corner(&self, angle: f64) -> (DVec3, DVec3) {
         let outward = DVec3::new(libm::cos(angle), 0.0, libm::sin(angle));
         let position = self.radius_m * outward;
@@ -43,8 +43,8 @@ impl MirrorRing {
         (position, reflect(incoming, outward))
     }
 
-    /// Two beams for each segment, each up to where its light meets the ring again. Flux is that of a watt per square metre across the
-    /// light, or of a watt per radian seen from the source.
+    /// Two beams per segment, each up to where its light meets the ring again. The source has one watt per
+    /// square metre of cross-section, or one watt per radian.
     pub fn beams(&self) -> Vec<Beam> {
         let angle = |n: u32| {
             let [from, to] = self.angles;
@@ -63,11 +63,11 @@ impl MirrorRing {
         beams
     }
 
-    /// The light between two points, for each metre of height.
+    /// Flux between two points, per metre of height.
     fn across(&self, a: DVec3, b: DVec3) -> f64 {
         match self.source {
             Source::Parallel => (b.z - a.z).abs(),
-            // A chord is seen from the ring under half the angle it has at its middle.
+            // From a point of the ring, a chord subtends half of its central angle.
             Source::OnRing => 0.5 * TAU.min(libm::fabs(libm::atan2(a.cross(b).y, a.dot(b)))),
         }
     }
@@ -77,7 +77,7 @@ impl MirrorRing {
 mod tests {
     use super::*;
 
-    /// Where the light of a thin segment crosses itself: at a fold of its beam, half way up.
+    /// Light source of a ring.
     fn caustic(ring: &MirrorRing) -> Vec<(f64, DVec3)> {
         let beams = ring.beams();
         let focus = |(n, beam): (usize, &Beam)| {
@@ -90,8 +90,8 @@ mod tests {
         beams.iter().enumerate().step_by(2).filter_map(focus).collect()
     }
 
-    /// Mirror circle under parallel light: the nephroid `(R / 4) (3 cos a - cos 3a, 3 sin a - sin 3a)`, its focus at `(R / 2) cos a` along the
-    /// reflected ray, its cusp at `R / 2`.
+    /// Circular mirror in parallel light: the nephroid `(R / 4) (3 cos a - cos 3a, 3 sin a - sin 3a)`, with
+    /// the focus at `(R / 2) cos a` along the reflected ray, and the cusp at `R / 2`.
     #[test]
     fn parallel_light_makes_a_nephroid() {
         let ring = MirrorRing {
@@ -112,8 +112,8 @@ mod tests {
         }
     }
 
-    /// Source on the circle: the cardioid `(2 cos a + cos 2a, 2 sin a + sin 2a) / 3` of the unit circle, its cusp at -1/3, the focus at a
-    /// third of the incoming chord.
+    /// Source on the circle: the cardioid `(2 cos a + cos 2a, 2 sin a + sin 2a) / 3` of the unit circle, with
+    /// its cusp at -1/3, and the focus at a third of the incoming chord.
     #[test]
     fn light_from_the_ring_makes_a_cardioid() {
         let ring = MirrorRing {
@@ -132,7 +132,7 @@ mod tests {
         }
     }
 
-    /// Behind the mirror the light is denser by `1 / |1 - 2 s / (R cos a)|` a way `s` along.
+    /// At a distance `s` from the mirror, the light is denser by `1 / |1 - 2 s / (R cos a)|`.
     #[test]
     fn density_is_that_of_the_closed_form() {
         let ring = MirrorRing {
