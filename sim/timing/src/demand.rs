@@ -1,4 +1,5 @@
-//! What a packet owes each unit of one machine, in cycles. Every level reads the same jobs.
+//! Service demand of packets: the cycles a packet needs at each station of one machine. All levels read the
+//! same demands.
 
 use std::ops::Range;
 
@@ -6,11 +7,11 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit};
 
 use crate::MachineSpec;
 
-/// A station on the way of a packet. The shader cores are two: one on the way of vertices, one on that of pixels.
+/// A station on the path of a packet. The shader cores are two stations, one for vertices and one for pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 #[allow(missing_docs, reason = "the units of the block diagram")]
-pub enum Place {
+pub enum Station {
     Command,
     Vertex,
     Setup,
@@ -23,8 +24,8 @@ pub enum Place {
     Colour,
 }
 
-impl Place {
-    /// Every place in the order of the stream.
+impl Station {
+    /// All stations, in stream order.
     pub const ALL: [Self; 10] = [
         Self::Command,
         Self::Vertex,
@@ -37,10 +38,10 @@ impl Place {
         Self::Pixel,
         Self::Colour,
     ];
-    /// How many places there are.
+    /// Number of stations.
     pub const COUNT: usize = Self::ALL.len();
 
-    /// The unit that stands there.
+    /// Unit at the station.
     pub const fn unit(self) -> Unit {
         match self {
             Self::Command => Unit::Command,
@@ -56,80 +57,80 @@ impl Place {
     }
 }
 
-/// The units that ask the L2 for lines, in the order of its ports.
+/// Clients of the L2, in the order of its ports.
 pub const CLIENTS: [Unit; 4] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour];
 
-/// The port of the texture units.
+/// Port of the texture units.
 pub const TEXTURE_PORT: usize = 2;
 
-/// The port of a client of the L2.
+/// Port of a client of the L2; `None` for other units.
 pub fn port(unit: Unit) -> Option<usize> {
     CLIENTS.iter().position(|&client| client == unit)
 }
 
-/// A packet as the machine sees it.
+/// Service demand of one packet.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Job {
-    /// Whether it goes through the front end (command to set-up) rather than the tiles' way (traversal to colour).
+pub struct ServiceDemand {
+    /// Whether the packet takes the front end (command to set-up) or the tile path (traversal to colour).
     pub front: bool,
-    /// The batch it belongs to.
+    /// Batch number.
     pub batch: u32,
-    /// The last place where it does anything.
-    pub last: Place,
-    /// Cycles it occupies each place for, by place; 0 at the shader cores.
-    pub service: [u32; Place::COUNT],
-    /// Threads of the shader.
+    /// Last station with work.
+    pub last: Station,
+    /// Cycles of service at each station; 0 at the shader cores.
+    pub service: [u32; Station::COUNT],
+    /// Shader threads.
     pub threads: u32,
-    /// Operations of each thread.
+    /// Operations per thread.
     pub ops: u32,
-    /// Bilinear fetches of all threads, and the lines of the texture cache they read.
+    /// Bilinear fetches of all threads, and texture cache lines they read.
     pub texels: [u32; 2],
-    /// The first of its lines, and how many each client asks for, in the order of [`CLIENTS`].
+    /// Index of the first line in the store.
     pub first_line: usize,
-    /// See above.
+    /// Lines requested by each client, in the order of [`CLIENTS`].
     pub lines: [u32; 4],
 }
 
-impl Job {
-    /// Its lines of one client, in the store it was made with.
+impl ServiceDemand {
+    /// Index range of one client's lines in the store.
     pub fn lines_of(&self, port: usize) -> Range<usize> {
         let before: u32 = self.lines[..port].iter().sum();
         let first = self.first_line + before as usize;
         first..first + self.lines[port] as usize
     }
 
-    /// Whether its threads go by the texture units.
+    /// Whether the threads use the texture units.
     pub fn is_textured(&self) -> bool {
         self.texels != [0; 2] || self.lines[TEXTURE_PORT] > 0
     }
 
-    /// Warps of at most `lanes` threads.
+    /// Number of warps of at most `lanes` threads.
     pub fn warps(&self, lanes: u32) -> u32 {
         self.threads.div_ceil(lanes)
     }
 }
 
-/// The share of `whole` that falls to part `part` of `parts`; all shares add up to the whole.
+/// Range of `whole` that belongs to part number `part` of `parts`; the ranges cover `whole` exactly.
 pub fn share(whole: u32, part: u32, parts: u32) -> Range<u32> {
     let up_to = |part: u32| (u64::from(whole) * u64::from(part) / u64::from(parts.max(1))) as u32;
     up_to(part)..up_to(part + 1)
 }
 
-/// Turns packets into jobs.
+/// Builder of service demands from packets.
 #[derive(Clone, Debug)]
-pub struct Jobs {
-    /// Cycles of one event, by place.
-    costs: [Vec<(Event, f64)>; Place::COUNT],
+pub struct DemandBuilder {
+    /// Cycles per event, by station.
+    costs: [Vec<(Event, f64)>; Station::COUNT],
     texel_cycles: [f64; 2],
     batch_triangles: u32,
     batch: u32,
 }
 
-impl Jobs {
-    /// For packets in batches of `batch_triangles` on `machine`.
+impl DemandBuilder {
+    /// A builder for packets in batches of `batch_triangles` on `machine`.
     pub fn new(machine: &MachineSpec, batch_triangles: u32) -> Self {
-        let costs = Place::ALL.map(|place| {
-            let rates = machine.common(place.unit()).rates;
+        let costs = Station::ALL.map(|station| {
+            let rates = machine.common(station.unit()).rates;
             rates.iter().flat_map(|rates| rates.iter()).map(|(event, rate)| (event, rate.recip())).collect()
         });
         let cycles = |event| {
@@ -143,49 +144,54 @@ impl Jobs {
         }
     }
 
-    /// The job of the next packet of the stream; `lines` are its lines, which are kept in `store`.
-    pub fn job(&mut self, packet: &Packet, lines: &[LineAccess], store: &mut Vec<LineAccess>) -> Job {
+    /// Demand of the next packet of the stream. `lines` are appended to `store`, sorted by client.
+    pub fn build(
+        &mut self,
+        packet: &Packet,
+        lines: &[LineAccess],
+        store: &mut Vec<LineAccess>,
+    ) -> ServiceDemand {
         let counts = &packet.counts;
         let front = matches!(packet.kind, PacketKind::Draw | PacketKind::Vertices);
         let batch = self.batch_of(packet, front);
-        let places = if front { Place::Command as usize..3 } else { 3..Place::COUNT };
-        let mut job = Job {
+        let stations = if front { Station::Command as usize..3 } else { 3..Station::COUNT };
+        let mut demand = ServiceDemand {
             front,
             batch,
-            last: if front { Place::Command } else { Place::Traversal },
-            service: [0; Place::COUNT],
+            last: if front { Station::Command } else { Station::Traversal },
+            service: [0; Station::COUNT],
             threads: counts[if front { Event::VertexInvocations } else { Event::PixelInvocations }],
             ops: 0,
             texels: [counts[Event::TextureFetches], counts[Event::TextureLines]],
             first_line: store.len(),
             lines: [0; 4],
         };
-        job.ops = counts[Event::ShaderOps].div_ceil(job.threads.max(1));
+        demand.ops = counts[Event::ShaderOps].div_ceil(demand.threads.max(1));
         if !lines.is_empty() {
-            job.lines = sorted(lines, store);
+            demand.lines = sorted(lines, store);
         }
-        for place in &Place::ALL[places] {
-            let used =
-                counts.uses(place.unit()) || port(place.unit()).is_some_and(|port| job.lines[port] > 0);
+        for station in &Station::ALL[stations] {
+            let used = counts.uses(station.unit())
+                || port(station.unit()).is_some_and(|port| demand.lines[port] > 0);
             if used {
-                job.last = *place;
-                job.service[*place as usize] = self.cycles(*place, counts);
+                demand.last = *station;
+                demand.service[*station as usize] = self.cycles(*station, counts);
             }
         }
-        job
+        demand
     }
 
-    /// Cycles of the texture units for some fetches and lines.
+    /// Cycles of the texture units for `fetches` and `lines`.
     pub fn texture_cycles(&self, fetches: u32, lines: u32) -> u32 {
         let [fetch, line] = self.texel_cycles;
         whole((f64::from(fetches) * fetch).max(f64::from(lines) * line))
     }
 
-    /// Cycles that a packet with `counts` occupies `place` for, lines not counted. The parts of a unit work side by side: the
-    /// slowest sets the pace.
-    fn cycles(&self, place: Place, counts: &PacketCounts) -> u32 {
+    /// Cycles of service at `station` for `counts`, without line requests. The parts of a unit work in
+    /// parallel, so the slowest one counts.
+    fn cycles(&self, station: Station, counts: &PacketCounts) -> u32 {
         let parts =
-            self.costs[place as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);
+            self.costs[station as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);
         whole(parts.fold(0.0, f64::max))
     }
 
@@ -199,7 +205,7 @@ impl Jobs {
     }
 }
 
-/// Puts `lines` into `store`, those of each client side by side in the order of the ports, and counts them.
+/// Append `lines` to `store`, grouped by client in the order of the ports. Returns the number per client.
 fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; 4] {
     CLIENTS.map(|client| {
         let before = store.len();
@@ -208,10 +214,10 @@ fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; 4] {
     })
 }
 
-/// Rounded up, but for what is rounding itself.
+/// Round up, except for excess within rounding error.
 fn whole(cycles: f64) -> u32 {
     let cycles = (cycles - 1e-6).max(0.0);
-    // `ceil` is a call where the processor is taken for an old one.
+    // `f64::ceil` is a function call on x86-64 without SSE4.1.
     let below = cycles as u32;
     below.saturating_add(u32::from(f64::from(below) < cycles))
 }
@@ -228,12 +234,12 @@ mod tests {
     }
 
     #[test]
-    fn the_port_of_the_texture_units_is_theirs() {
+    fn the_texture_port_belongs_to_the_texture_units() {
         assert_eq!(port(Unit::Texture), Some(TEXTURE_PORT));
     }
 
     #[test]
-    fn cycles_round_up_and_not_too_far() {
+    fn cycles_round_up_except_for_rounding_errors() {
         assert_eq!(
             [0.0, 0.2, 1.0, 3.0 * (1.0 / 3.0), 49.0 * (1.0 / 49.0), 2.1].map(whole),
             [0, 1, 1, 1, 1, 3]
