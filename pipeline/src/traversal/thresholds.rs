@@ -1,20 +1,22 @@
-//! Motion and blur too small to matter: how far a triangle is from where it would be drawn without.
+//! Motion and blur thresholds: how far motion and blur move the outline of a triangle on the image.
 //!
-//! The image of a vertex in front of the camera moves monotonically in time on both axes, so it is never farther from its place in
-//! mid-shutter than at an end. On the lens it moves on a line of which the ends are farthest, by `a - s / w`, which is
-//! monotone in `w`; in an orthographic view by `a w - s`, which is, too. The image of a triangle wholly in front of the camera is the hull of those of its vertices, so no point of its
-//! outline moves farther than they do.
+//! The image of a vertex in front of the camera moves monotonically in time on both axes, so its distance
+//! from its mid-shutter image is largest at an end. Over the lens it moves on a line, with the largest
+//! distance at the ends, by `a - s / w`, which is monotone in `w`. In an orthographic view the distance is `a
+//! w - s`, also monotone. The image of a triangle in front of the camera is the hull of the images of its
+//! vertices, so no point of its outline moves farther than they do.
 
 use crate::geometry::{MovingVertex, Shear};
 
-/// Multiply-adds of [`motion_px`]: two quotients for three places of each vertex, the middle of it, and two distances.
+/// Multiply-adds of [`motion_px`]: two quotients for three positions of each vertex, its middle, and two
+/// distances.
 pub const MOTION_MADDS: u32 = 3 * (3 * 2 + 3 + 2 * 4);
 
 /// Multiply-adds of [`blur_px`]: a quotient and a difference for each axis, vertex and end.
 pub const BLUR_MADDS: u32 = 3 * 2 * 2 * 2;
 
-/// The farthest that a vertex is from its image in mid-shutter, in pixels, through a pinhole or from anywhere on the lens; infinite where
-/// one is not in front of the camera.
+/// Largest distance in pixels of a vertex from its mid-shutter image, through a pinhole or from anywhere on
+/// the lens. Infinite if a vertex is not in front of the camera.
 pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
     let weight = |depth: f64| if shear.parallel { 1.0 } else { depth };
     let one = |vertex: &MovingVertex| {
@@ -37,8 +39,8 @@ pub fn motion_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
     vertices.map(one).into_iter().fold(0.0, f64::max)
 }
 
-/// The largest radius of the circle of confusion of a vertex at either end of the shutter, in pixels; infinite where one is not in front of
-/// the camera.
+/// Largest radius in pixels of the circle of confusion of a vertex at either end of the shutter. Infinite if
+/// one is not in front of the camera.
 pub fn blur_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
     let radius = |w: f64, axis: usize| shear.circle(axis, w).abs();
     vertices
@@ -54,7 +56,7 @@ pub fn blur_px(vertices: [&MovingVertex; 3], shear: &Shear) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The vertex where it is in mid-shutter, at rest.
+/// The vertex at its mid-shutter position, still.
 pub fn at_rest(vertex: &MovingVertex) -> MovingVertex {
     let middle = [0, 1, 2].map(|axis| vertex.open[axis] + 0.5 * (vertex.close[axis] - vertex.open[axis]));
     MovingVertex { open: middle, close: middle }
@@ -111,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn at_rest_is_where_it_is_in_mid_shutter() {
+    fn at_rest_is_the_mid_shutter_position() {
         let vertex = MovingVertex { open: [1.0, -2.0, 4.0], close: [3.0, 2.0, 2.0] };
         assert_eq!(at_rest(&vertex), MovingVertex { open: [2.0, 0.0, 3.0], close: [2.0, 0.0, 3.0] });
     }
