@@ -1,7 +1,7 @@
 //! Moving objects made of triangles.
 
 use glam::DVec3;
-use pipeline::conservative::LEAST_UNCERTAINTY;
+use pipeline::conservative::MIN_UNCERTAINTY;
 
 use super::bounds::times_inside;
 use super::bounds::{Bounds, Ends};
@@ -107,7 +107,7 @@ impl Object {
 
     /// Uncertainty for the rasterizer, large enough for products that underflow. The boxes do not need it.
     pub(super) fn raster_uncertainty(&self) -> f64 {
-        self.uncertainty.max(LEAST_UNCERTAINTY)
+        self.uncertainty.max(MIN_UNCERTAINTY)
     }
 
     /// Times at which a triangle may be inside a box of space and time.

@@ -147,7 +147,7 @@ impl<'a> Passes<'a> {
     fn emit_packet(&mut self, packet: &Packet) {
         self.counts += &packet.counts;
         (self.emit)(packet, self.memory.log());
-        self.memory.forget();
+        self.memory.clear_log();
     }
 }
 

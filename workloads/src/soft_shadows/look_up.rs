@@ -56,7 +56,7 @@ pub fn look_up_packets(
         }
         counts += &packet.counts;
         emit(&packet, memory.log());
-        memory.forget();
+        memory.clear_log();
     }
     let mut last = Packet::new(PacketKind::Resolve, 0, 0, u32::MAX);
     memory.finish(image..image + world.viewport.pixels() as u64 * BYTES, &mut last.counts);
