@@ -13,7 +13,7 @@ use pipeline::sampling::SampleSpec;
 use pipeline::{Cull, Draw, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
 use workloads::multiview::{Layout, Rig, Target};
-use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
+use workloads::soft_shadows::{AreaLight, LightSpec, Method, Renderer, ShadowMap};
 use workloads::{Overrides, glossy, soft_shadows};
 
 const RUNS: usize = 3;
@@ -89,7 +89,8 @@ fn shadows(spec: &PipelineSpec) {
         let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
         let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
             time(|| {
-                _ = ShadowMap::new((&light, &draws), 256, &set, (method, spec), &mut |_, _| ()).unwrap();
+                _ = ShadowMap::new(&light, &draws, 256, &set, Renderer { method, spec }, &mut |_, _| ())
+                    .unwrap();
             })
         });
         let what = format!("shadow map, 256x256, {count} places");

@@ -1,4 +1,4 @@
-//! Boxes of space and time, and when a triangle may be inside one.
+//! Boxes of space and time, boxes of time and depth per tile, and when a triangle may be inside a box.
 
 /// Corners of a triangle at time 0 and at time 1.
 pub(super) type Ends = [[[f64; 3]; 3]; 2];
@@ -122,6 +122,62 @@ fn nonnegative_times([from, to]: [f64; 2]) -> [f64; 2] {
     }
 }
 
+/// Times and depths at which an object may be in a tile, in one time bin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TzBox {
+    pub t: [f64; 2],
+    pub z: [f64; 2],
+    /// One of the triangles in the tile.
+    pub triangle: u32,
+}
+
+impl TzBox {
+    const EMPTY: Self = Self { t: NOTHING, z: NOTHING, triangle: 0 };
+
+    /// Intersection with the times `t` and depths `z`.
+    pub fn meet(&self, t: [f64; 2], z: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+        Some([meet(self.t, t)?, meet(self.z, z)?])
+    }
+}
+
+/// Boxes by tile index. Clearing costs as much as filling, since most tiles stay empty.
+#[derive(Default)]
+pub(super) struct TzBuffer {
+    boxes: Vec<TzBox>,
+    used: Vec<u32>,
+}
+
+impl TzBuffer {
+    /// Empties the buffer and makes room for `tiles`.
+    pub fn clear(&mut self, tiles: usize) {
+        for tile in self.used.drain(..) {
+            self.boxes[tile as usize] = TzBox::EMPTY;
+        }
+        if self.boxes.len() < tiles {
+            self.boxes.resize(tiles, TzBox::EMPTY);
+        }
+    }
+
+    /// Grows the box of a tile by another (union, by blending with min and max).
+    pub fn add(&mut self, tile: u32, added: &TzBox) {
+        let known = &mut self.boxes[tile as usize];
+        if known.t[0] > known.t[1] {
+            self.used.push(tile);
+        }
+        *known = TzBox { t: hull(known.t, added.t), z: hull(known.z, added.z), triangle: added.triangle };
+    }
+
+    /// The box of a tile; empty if nothing was added.
+    pub fn at(&self, tile: u32) -> &TzBox {
+        &self.boxes[tile as usize]
+    }
+
+    /// All boxes that are not empty, in the order of the first addition.
+    pub fn used(&self) -> impl Iterator<Item = (u32, &TzBox)> {
+        self.used.iter().map(|&tile| (tile, self.at(tile)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -157,6 +213,24 @@ mod tests {
         assert!(first <= 0.25 && last >= 0.5);
         assert!(times(&ends, &Bounds { time: [0.6, 1.0], ..within }).is_none());
         assert!(times(&ends, &Bounds { space: [[0.0, 1.0], [0.0, 0.25], [0.0, 1.0]], ..within }).is_none());
+    }
+
+    #[test]
+    fn boxes_grow_and_are_empty_after_a_clear() {
+        let mut buffer = TzBuffer::default();
+        buffer.clear(4);
+        buffer.add(2, &TzBox { t: [0.25, 0.5], z: [1.0, 2.0], triangle: 7 });
+        buffer.add(2, &TzBox { t: [0.5, 0.75], z: [0.0, 1.0], triangle: 8 });
+        let found: Vec<_> = buffer.used().map(|(tile, found)| (tile, found.t, found.z)).collect();
+        assert_eq!(found, [(2, [0.25, 0.75], [0.0, 2.0])]);
+        assert_eq!(buffer.at(2).meet([0.75, 1.0], [-1.0, 0.0]), Some([[0.75, 0.75], [0.0, 0.0]]));
+        assert!(
+            buffer.at(2).meet([0.0, 0.2], [-1.0, 3.0]).is_none()
+                && buffer.at(1).meet([0.0, 1.0], [0.0, 1.0]).is_none()
+        );
+        buffer.clear(4);
+        assert_eq!(buffer.used().count(), 0);
+        assert!(buffer.at(2).meet([0.0, 1.0], [0.0, 1.0]).is_none());
     }
 
     proptest! {

@@ -1,6 +1,6 @@
 //! Comparison of two objects in one pass: bounds of the contacts, and triangles that may touch.
 
-use super::bounds::{Bounds, NOTHING, hull, meet};
+use super::bounds::{Bounds, TzBox, TzBuffer};
 use super::pass::{Fragment, FragmentBudget, Part, Pass};
 
 /// Reused buffers.
@@ -207,84 +207,5 @@ impl Comparison<'_> {
         let in_front = both().filter(|(one, other)| other[0] <= one[1]).count() as u64;
         let behind = both().filter(|(one, other)| other[1] >= one[0]).count() as u64;
         Some([in_front, behind])
-    }
-}
-
-/// Times and depths at which an object may be in a tile, in one time bin.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TzBox {
-    pub t: [f64; 2],
-    pub z: [f64; 2],
-    /// One of the triangles in the tile.
-    pub triangle: u32,
-}
-
-impl TzBox {
-    const EMPTY: Self = Self { t: NOTHING, z: NOTHING, triangle: 0 };
-
-    /// Intersection with the times `t` and depths `z`.
-    pub fn meet(&self, t: [f64; 2], z: [f64; 2]) -> Option<[[f64; 2]; 2]> {
-        Some([meet(self.t, t)?, meet(self.z, z)?])
-    }
-}
-
-/// Boxes by tile index. Clearing costs as much as filling, since most tiles stay empty.
-#[derive(Default)]
-pub(super) struct TzBuffer {
-    boxes: Vec<TzBox>,
-    used: Vec<u32>,
-}
-
-impl TzBuffer {
-    /// Empties the buffer and makes room for `tiles`.
-    pub fn clear(&mut self, tiles: usize) {
-        for tile in self.used.drain(..) {
-            self.boxes[tile as usize] = TzBox::EMPTY;
-        }
-        if self.boxes.len() < tiles {
-            self.boxes.resize(tiles, TzBox::EMPTY);
-        }
-    }
-
-    /// Grows the box of a tile by another (union, by blending with min and max).
-    pub fn add(&mut self, tile: u32, added: &TzBox) {
-        let known = &mut self.boxes[tile as usize];
-        if known.t[0] > known.t[1] {
-            self.used.push(tile);
-        }
-        *known = TzBox { t: hull(known.t, added.t), z: hull(known.z, added.z), triangle: added.triangle };
-    }
-
-    /// The box of a tile; empty if nothing was added.
-    pub fn at(&self, tile: u32) -> &TzBox {
-        &self.boxes[tile as usize]
-    }
-
-    /// All boxes that are not empty, in the order of the first addition.
-    pub fn used(&self) -> impl Iterator<Item = (u32, &TzBox)> {
-        self.used.iter().map(|&tile| (tile, self.at(tile)))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn boxes_grow_and_are_empty_after_a_clear() {
-        let mut buffer = TzBuffer::default();
-        buffer.clear(4);
-        buffer.add(2, &TzBox { t: [0.25, 0.5], z: [1.0, 2.0], triangle: 7 });
-        buffer.add(2, &TzBox { t: [0.5, 0.75], z: [0.0, 1.0], triangle: 8 });
-        let found: Vec<_> = buffer.used().map(|(tile, found)| (tile, found.t, found.z)).collect();
-        assert_eq!(found, [(2, [0.25, 0.75], [0.0, 2.0])]);
-        assert_eq!(buffer.at(2).meet([0.75, 1.0], [-1.0, 0.0]), Some([[0.75, 0.75], [0.0, 0.0]]));
-        assert!(
-            buffer.at(2).meet([0.0, 0.2], [-1.0, 3.0]).is_none()
-                && buffer.at(1).meet([0.0, 1.0], [0.0, 1.0]).is_none()
-        );
-        buffer.clear(4);
-        assert_eq!(buffer.used().count(), 0);
-        assert!(buffer.at(2).meet([0.0, 1.0], [0.0, 1.0]).is_none());
     }
 }

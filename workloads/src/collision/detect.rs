@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::compare::{Observer, Scratch};
+use super::contact_probe;
 use super::object::Object;
 use super::pair::Pair;
 use super::reference_frame::InFrame;
 use super::search::{Method, Search, Verdict};
-use super::contact_probe;
 
 /// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]

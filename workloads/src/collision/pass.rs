@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use pipeline::conservative::{Grid, MovingTriangle, Prepared, Rasterizer, Region, View};
 
-use super::bounds::{Bounds, Ends, NOTHING, hull, meet};
-use super::compare::TzBox;
+use super::bounds::{Bounds, Ends, NOTHING, TzBox, hull, meet};
 use super::object::Object;
 
 /// The triangles of an object that may be in the window.

@@ -89,7 +89,7 @@ impl PlainPasses {
         let lists = objects.map(|object| (0..object.len() as u32).collect::<Vec<_>>());
         let parts = [0, 1].map(|which| Part { object: objects[which], list: &lists[which] });
         for axis in 0..3 {
-            let tiling = Tiling { resolution: self.resolution, min_width: min_width };
+            let tiling = Tiling { resolution: self.resolution, min_width };
             let pass = Pass::new(axis, &window, tiling, Fit::Edges);
             let comparison = Comparison { pass: &pass, parts, bins: &[Some(window)] };
             result.overlaps[axis] = self.overlaps(&comparison, &mut result);

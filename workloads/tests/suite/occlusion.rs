@@ -24,7 +24,7 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
     let depths = depths(&wall_scene.camera, &[wall_scene.walls(&Unshaded).unwrap()], &settings).unwrap();
     let sampled = Samples { camera: &wall_scene.camera, settings: &settings, depths: &depths };
     let by_samples: Vec<bool> =
-        wall_scene.boxes.iter().map(|object| sampled.query(object).unwrap().passed == 0).collect();
+        wall_scene.boxes.iter().map(|object| sampled.ask(object).unwrap().passed == 0).collect();
     let projection = Projection::new(&wall_scene.camera, viewport);
     let mut half_covered = 0.0;
     let by_intervals = grids.iter().map(|&(boxes, tile_px)| {
@@ -32,7 +32,7 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
         let pyramid = Pyramid::new(viewport, &samples, &depths, tile_px, grid);
         half_covered = pyramid.half_covered();
         let queries = Queries::new(&pyramid, &projection);
-        wall_scene.boxes.iter().map(|object| queries.query(object).hidden).collect()
+        wall_scene.boxes.iter().map(|object| queries.ask(object).hidden).collect()
     });
     let by_intervals: Vec<Vec<bool>> = by_intervals.collect();
     for hidden in &by_intervals {

@@ -167,10 +167,15 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
         let set = SharedSamples::new(vec![sample; 3]).unwrap();
         let draws = [draw(&open, &close, &triangles)];
         let view = View { camera: &camera, draws: &draws };
-        let seen =
-            depth_pass(&view, viewport, &set, Renderer { method: Method::OnePass, spec: &spec() }, &mut |_, _| ()).unwrap();
-        let world =
-            World::new(&view, viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
+        let seen = depth_pass(
+            &view,
+            viewport,
+            &set,
+            Renderer { method: Method::OnePass, spec: &spec() },
+            &mut |_, _| (),
+        )
+        .unwrap();
+        let world = World::new(&view, viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
         let image = world.image(&set, &seen.samples, Shadows::None);
         let normal = DVec3::new(-f64::from(t), 1.0, 0.0).normalize();
         for (place, pixel) in image.iter().enumerate() {
@@ -192,7 +197,14 @@ fn rays_and_a_fine_map_agree() {
     let viewport = Viewport::new(48, 27).unwrap();
     let (camera, set) = (frame.camera.with_lens(None), set(16, 5));
     let view = View { camera: &camera, draws: &draws };
-    let seen = depth_pass(&view, viewport, &set, Renderer { method: Method::OnePass, spec: &spec() }, &mut |_, _| ()).unwrap();
+    let seen = depth_pass(
+        &view,
+        viewport,
+        &set,
+        Renderer { method: Method::OnePass, spec: &spec() },
+        &mut |_, _| (),
+    )
+    .unwrap();
     let world = World::new(&view, viewport, &light, &[], Vec3::ZERO);
     let map = map(&light, &draws, 512, &set, Method::OnePass);
     let of = |shadows| world.lit_and_unlit(&set, &seen.samples, shadows);

@@ -18,9 +18,9 @@
 //! choosing a cell.
 
 mod cells;
-
 mod grid;
 mod throw;
+mod uncovered;
 
 pub use grid::closer;
 pub use throw::{poisson_disk, poisson_disk_drawn, poisson_disk_with_progress};
@@ -178,4 +178,3 @@ pub(super) fn check_room(radius: f64, dimensions: usize, cells: f64) -> Result<(
 
 #[cfg(test)]
 mod tests;
-mod uncovered;

@@ -136,10 +136,7 @@ fn too_many_points_are_refused_with_a_radius_that_works() {
         let PoissonError::TooMany { least, most, .. } = check::<D>(radius).unwrap_err() else {
             panic!("{radius}")
         };
-        assert!(
-            check::<D>(least).is_ok() && check::<D>(radius_for(most, D)).is_ok(),
-            "{D} {least} {most}"
-        );
+        assert!(check::<D>(least).is_ok() && check::<D>(radius_for(most, D)).is_ok(), "{D} {least} {most}");
         least
     }
     fn check<const D: usize>(radius: f64) -> Result<(), PoissonError> {

@@ -1,8 +1,7 @@
 //! Dart throwing, level by level.
 
-use super::uncovered::{DartProcess, ThrownDarts};
 use super::grid::{Dart, Grid};
-use super::uncovered::{Cube, Place, UncoveredCells};
+use super::uncovered::{Cube, DartProcess, Place, ThrownDarts, UncoveredCells};
 use super::{PoissonDisk, PoissonError, PoissonSpec, span};
 use crate::points::random::Stream;
 
@@ -25,12 +24,12 @@ pub fn poisson_disk<const D: usize>(spec: &PoissonSpec) -> Result<PoissonDisk<D>
 /// As [`poisson_disk`].
 pub fn poisson_disk_with_progress<const D: usize>(
     spec: &PoissonSpec,
-    report_progress: &mut dyn FnMut(usize),
+    progress: &mut dyn FnMut(usize),
 ) -> Result<PoissonDisk<D>, PoissonError> {
     if spec.radius >= span(D, spec.domain) && spec.radius.is_finite() {
         return Ok(one_point(spec));
     }
-    let mut throwing = Throwing::new(spec, report_progress)?;
+    let mut throwing = Throwing::new(spec, progress)?;
     let uncovered = UncoveredCells::all(&throwing.grid);
     throwing.first(&uncovered);
     Ok(throwing.finish(uncovered))
@@ -55,8 +54,8 @@ pub fn poisson_disk_drawn<const D: usize, E>(
     rounds: u32,
     mut draw: impl FnMut(&[Cube<D>]) -> Result<Vec<[f64; D]>, E>,
 ) -> Result<Result<(PoissonDisk<D>, usize), PoissonError>, E> {
-    let report_progress = &mut |_| ();
-    let mut throwing = match Throwing::new(spec, report_progress) {
+    let progress = &mut |_| ();
+    let mut throwing = match Throwing::new(spec, progress) {
         Ok(throwing) => throwing,
         Err(error) => return Ok(Err(error)),
     };
@@ -79,21 +78,21 @@ pub fn poisson_disk_drawn<const D: usize, E>(
 /// State of dart throwing.
 struct Throwing<'a, const D: usize> {
     grid: Grid<D>,
-    report_progress: &'a mut dyn FnMut(usize),
+    progress: &'a mut dyn FnMut(usize),
     seed: u64,
     darts: u64,
     uncovered: u64,
 }
 
 impl<'a, const D: usize> Throwing<'a, D> {
-    fn new(spec: &PoissonSpec, report_progress: &'a mut dyn FnMut(usize)) -> Result<Self, PoissonError> {
+    fn new(spec: &PoissonSpec, progress: &'a mut dyn FnMut(usize)) -> Result<Self, PoissonError> {
         const { assert!(D >= 1 && D <= 4) };
         let least = 64.0 / spec.spacing.per_unit();
         if !(spec.radius >= least && spec.radius <= 0.5) {
             let one = span(D, spec.domain);
             return Err(PoissonError::Radius { radius: spec.radius, least, one });
         }
-        Ok(Self { grid: Grid::new(spec)?, report_progress, seed: spec.seed, darts: 0, uncovered: 0 })
+        Ok(Self { grid: Grid::new(spec)?, progress, seed: spec.seed, darts: 0, uncovered: 0 })
     }
 
     /// Runs level after level until no uncovered cell remains.
@@ -123,7 +122,7 @@ impl<'a, const D: usize> Throwing<'a, D> {
             if let Some(dart) = uncovered.dart(&self.grid, stream, number) {
                 self.keep(&dart);
             }
-            self.report_progress(number);
+            self.report(number);
         }
     }
 
@@ -137,16 +136,16 @@ impl<'a, const D: usize> Throwing<'a, D> {
         free.sort_unstable_by_key(|drop| drop.time);
         for (number, drop) in (0..).zip(&free) {
             self.keep(&drop.dart);
-            self.report_progress(number);
+            self.report(number);
         }
         remaining
     }
 
     /// Reports the number of points at intervals.
     #[inline]
-    fn report_progress(&mut self, dart: u64) {
+    fn report(&mut self, dart: u64) {
         if dart.is_multiple_of(1 << 16) {
-            (self.report_progress)(self.grid.points.len());
+            (self.progress)(self.grid.points.len());
         }
     }
 
@@ -184,8 +183,8 @@ mod tests {
         const SEEDS: u64 = 2000;
         let first = |seed| {
             let spec = PoissonSpec { radius: 0.2, domain: Domain::Torus, seed, spacing: Spacing::Double };
-            let report_progress: &mut dyn FnMut(usize) = &mut |_| ();
-            let mut throwing = Throwing::<2>::new(&spec, report_progress).unwrap();
+            let progress: &mut dyn FnMut(usize) = &mut |_| ();
+            let mut throwing = Throwing::<2>::new(&spec, progress).unwrap();
             let uncovered = UncoveredCells::all(&throwing.grid);
             throwing.level(&uncovered);
             throwing.grid.points[0]
@@ -201,8 +200,8 @@ mod tests {
     #[test]
     fn cells_without_a_free_point_are_counted_and_others_filled() {
         let spec = PoissonSpec { radius: 0.25, domain: Domain::Box, seed: 1, spacing: Spacing::Single };
-        let report_progress: &mut dyn FnMut(usize) = &mut |_| ();
-        let mut throwing = Throwing::<2>::new(&spec, report_progress).unwrap();
+        let progress: &mut dyn FnMut(usize) = &mut |_| ();
+        let mut throwing = Throwing::<2>::new(&spec, progress).unwrap();
         let middle = throwing.grid.dart_at(&[0.5, 0.5]);
         assert!(throwing.keep(&middle) && !throwing.keep(&middle));
         let level = 20;

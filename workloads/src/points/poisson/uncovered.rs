@@ -93,9 +93,9 @@ impl<P: Place, const D: usize> UncoveredCells<P, D> {
 
     /// Halves the cells: keeps those that have no point and that no single disk covers, and throws darts at
     /// them.
-    pub fn halved(&self, grid: &Grid<D>, darts_of: &DartProcess) -> (Self, ThrownDarts<D>) {
+    pub fn halved(&self, grid: &Grid<D>, process: &DartProcess) -> (Self, ThrownDarts<D>) {
         let parts: Vec<_> =
-            self.cells.par_chunks(CHUNK).map(|cells| self.part(grid, darts_of, cells)).collect();
+            self.cells.par_chunks(CHUNK).map(|cells| self.part(grid, process, cells)).collect();
         let mut remaining = Vec::with_capacity(parts.iter().map(|(cells, _)| cells.len()).sum());
         let mut thrown = ThrownDarts::default();
         for (cells, part) in parts {
@@ -106,12 +106,7 @@ impl<P: Place, const D: usize> UncoveredCells<P, D> {
         (Self { level: self.level + 1, cells: remaining }, thrown)
     }
 
-    fn part(
-        &self,
-        grid: &Grid<D>,
-        darts_of: &DartProcess,
-        cells: &[[P; D]],
-    ) -> (Vec<[P; D]>, ThrownDarts<D>) {
+    fn part(&self, grid: &Grid<D>, process: &DartProcess, cells: &[[P; D]]) -> (Vec<[P; D]>, ThrownDarts<D>) {
         let (mut remaining, mut thrown) = (Vec::with_capacity(cells.len()), ThrownDarts::default());
         let (mut of_cell, mut near) = (grid.near(), grid.near());
         let side = 1.0 / (2_u64 << self.level) as f64;
@@ -131,7 +126,7 @@ impl<P: Place, const D: usize> UncoveredCells<P, D> {
                 let low: [f64; D] = std::array::from_fn(|k| low[k] + upper(k) as f64 * side);
                 let child = std::array::from_fn(|k| 2 * parent[k].get() + upper(k));
                 remaining.push(child.map(P::new));
-                darts_of.on(child, side, |time, within| {
+                process.on(child, side, |time, within| {
                     thrown.darts += 1;
                     let dart = grid.dart(cell, slot, std::array::from_fn(|k| low[k] + within[k]));
                     if grid.is_free_among(&near, &dart) {
@@ -222,11 +217,11 @@ mod tests {
 
     #[test]
     fn the_number_of_darts_is_poisson_distributed() {
-        let darts_of = DartProcess::new(Stream::new(3, 0), 0.7);
+        let process = DartProcess::new(Stream::new(3, 0), 0.7);
         let mut counts = [0.0; 4];
         for cell in 0..100_000 {
             let mut count = 0;
-            darts_of.on([cell, 5], 0.25, |_, within| {
+            process.on([cell, 5], 0.25, |_, within| {
                 count += 1;
                 assert!(within.iter().all(|at| (0.0..0.25).contains(at)));
             });

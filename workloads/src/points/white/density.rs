@@ -5,7 +5,6 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-
 /// A density, up to a factor.
 pub trait Density<const D: usize>: Sync {
     /// Density at a point of the unit cube, at least zero.
