@@ -1,12 +1,16 @@
-//! The GPU file.
+//! GPU file, and the check that platform and energy table belong to the GPU.
 
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use activity::spec;
 use pipeline::PipelineSpec;
+use power_model::{EnergyTable, Platform};
 use serde::Deserialize;
 use timing::{Clocks, Machine, MachineSpec, TimingError};
+use warnings::{Code, Warning};
+
+use crate::RunOptions;
 
 /// A GPU. `docs/gpu.md` documents every field.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -171,6 +175,39 @@ impl GpuSpec {
             .validate()
             .map_err(|error| (format!("pipeline.{}", error.field()), format!("`pipeline`: {error}")))
     }
+}
+
+/// A warning where the GPU's file names another platform or energy table than those in use, or none: the watts of a platform
+/// are stated for the size and the clock of one GPU, and nothing scales them.
+pub(super) fn check_pairing(
+    options: &RunOptions,
+    gpu: &GpuSpec,
+    platform: &Platform,
+    table: &EnergyTable,
+) -> Option<Warning> {
+    let in_use = format!("platform `{}` and energy table `{}`", platform.name, table.name());
+    let message = match &gpu.power {
+        None => format!(
+            "no platform belongs to GPU `{}`, so its watts come from {in_use}, which were made for another machine: compare its \
+             cycles and counts, not its watts; or write a platform for it and name that as `power` in the GPU file",
+            gpu.name
+        ),
+        Some(own) if belongs(own, options, platform, table) => return None,
+        Some(own) => format!(
+            "GPU `{}` belongs to platform `{}` and energy table `{}`, and its watts come from {in_use}: they are those of another \
+             machine; leave --platform and --energy out, or choose the GPU that belongs to them (`quintile list`)",
+            gpu.name, own.platform, own.energy
+        ),
+    };
+    Some(Warning::new(Code::PlatformMismatch, message))
+}
+
+/// By the names in the files, or by what was asked for where that is a file itself.
+fn belongs(own: &PowerFiles, options: &RunOptions, platform: &Platform, table: &EnergyTable) -> bool {
+    let is = |own: &str, asked: &Option<PathBuf>, name: &str| {
+        own == name || asked.as_ref().is_none_or(|asked| asked == Path::new(own))
+    };
+    is(&own.platform, &options.platform, &platform.name) && is(&own.energy, &options.energy, table.name())
 }
 
 #[cfg(test)]

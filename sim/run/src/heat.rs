@@ -31,7 +31,8 @@ pub(super) fn write(
     plan: &Plan,
     dir: &OutDir,
     frame: u32,
-    (map, image): (&HeatMap, &[Vec3]),
+    map: &HeatMap,
+    image: &[Vec3],
 ) -> Result<HeatPicture, RunError> {
     let name = heat_name(map.event, frame);
     let png = picture(plan, frame, map, &brightness(image)).png()?;
@@ -70,15 +71,15 @@ fn picture(plan: &Plan, frame: u32, map: &HeatMap, brightness: &[f32]) -> Pictur
         shading: Shading::Clipped,
         brightness,
     };
-    plot.picture(&plan.options.look)
+    plot.picture(&plan.options.plot_style)
 }
 
 /// The most blocks that are drawn; larger pictures would show no more of them.
-const MOST_BLOCKS: usize = 1 << 19;
+const MAX_BLOCKS: usize = 1 << 19;
 
 /// The side of the blocks of pixels that are drawn as one.
 fn block_px(map: &HeatMap) -> u32 {
-    (1..).find(|side| map.samples.len() / (side * side) as usize <= MOST_BLOCKS).unwrap_or(1)
+    (1..).find(|side| map.samples.len() / (side * side) as usize <= MAX_BLOCKS).unwrap_or(1)
 }
 
 /// Blocks of `side` pixels, cut to the image, each with the mean of its pixels.

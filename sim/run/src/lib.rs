@@ -4,39 +4,26 @@
 //! RunOptions -> Plan -> open -> prepare: Distinct -> choose -> Prepared -> run: simulate -> measure -> Outcome -> write
 //! ```
 
-mod again;
-mod checks;
 mod choice;
 pub mod compare;
-mod distinct;
-mod draw;
 mod dry_run;
 mod error;
-mod expected;
-mod facts;
 mod frame;
-mod frame_rows;
 mod gpu;
 mod heat;
-mod limits;
 mod measure;
-mod modelled;
 mod one_frame;
 mod options;
-mod pairing;
 mod pictures;
 mod plan;
 mod provenance;
-mod recorder;
 mod regime;
 mod report;
 mod sampled;
-mod sampling;
 mod simulate;
 mod simulated;
 mod stalls;
 mod summary;
-mod timeline;
 pub mod visibility;
 mod warn;
 mod work;
@@ -45,32 +32,23 @@ mod write;
 use output::progress::Progress;
 use output::{Destination, OutDir};
 
-pub use again::again;
-pub use checks::Checks;
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
-pub use distinct::Distinct;
-pub use dry_run::DryRun;
+pub use dry_run::{DryRun, Expected};
 pub use error::RunError;
-pub use expected::Expected;
 pub use frame::{BIN_PS, CrashedFrame, frames_of};
-pub use frame_rows::FrameRow;
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
-pub use limits::fits_memory;
-pub use measure::Measurement;
-pub use modelled::Modelled;
+pub use measure::{Checks, Measurement, Resolution};
 pub use one_frame::MachineTexts;
-pub use options::{PacingChoice, RunOptions, Wish};
-pub use plan::Plan;
-pub use provenance::{Host, Input, Provenance};
-pub use recorder::Resolution;
+pub use options::{Method, PacingChoice, Requested, RunOptions, Sampling};
+pub use plan::{Plan, fits_memory};
+pub use provenance::{Host, Input, Provenance, again};
 pub use regime::Regime;
-pub use sampled::{Forecast, Glimpse, Preview, Scout, Signatures, taken};
-pub use sampling::{Method, Sampling};
-pub use simulated::{Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated, Taken};
+pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
+pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
 pub use stalls::StallShares;
-pub use summary::{Detection, Figures, Summary};
-pub use work::Work;
+pub use summary::{Detection, Figures, FrameRow, Summary};
+pub use work::{Distinct, Work};
 
 /// Everything a run found out.
 pub struct Outcome {
@@ -99,14 +77,14 @@ pub struct Prepared {
 /// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures.
 pub fn prepare(
     mut plan: Plan,
-    made: Option<Choice>,
+    recorded: Option<Choice>,
     revision: Option<&str>,
     progress: &Progress,
 ) -> Result<Prepared, RunError> {
-    say_camera(&plan, progress);
+    report_camera(&plan, progress);
     let provenance = Provenance::new(&plan, revision)?;
     let distinct = Distinct::new(&plan.work)?;
-    let choice = choice::choose(&mut plan, made, &distinct, progress)?;
+    let choice = choice::choose(&mut plan, recorded, &distinct, progress)?;
     Ok(Prepared { plan, provenance, distinct, choice })
 }
 
@@ -127,14 +105,14 @@ impl Prepared {
         let Self { plan, provenance, distinct, mut choice } = self;
         let simulated = simulate::simulate(&plan, &distinct, &dir, progress)?;
         if let Some(choice) = &mut choice {
-            choice.settle(&simulated);
+            choice.add_prediction_error(&simulated);
         }
         let verified =
             plan.options.verify.then(|| choice::verify(&plan, &simulated, progress)).transpose()?;
         let measurement = measure::measure(&plan, &simulated)?;
         let summary =
             Summary { choice, verified, ..Summary::new(&plan, provenance, &simulated, &measurement) }
-                .warned();
+                .with_choice_warnings();
         let outcome = Outcome { plan, simulated, measurement, summary };
         write::write(&outcome, &dir, progress)?;
         dir.publish()?;
@@ -161,21 +139,11 @@ pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Resul
 }
 
 /// Says in detail which camera sees the scene, before minutes of work are spent on it.
-fn say_camera(plan: &Plan, progress: &Progress) {
+fn report_camera(plan: &Plan, progress: &Progress) {
     let Work::Scene(scene) = &plan.work else { return };
     if let Ok(camera) = scene.camera_used() {
         progress.detail(&format!("camera, {}: --camera '{}'", camera.source, camera.ron));
     }
-}
-
-/// Simulates and measures as [`run`] does, and writes nothing.
-///
-/// # Errors
-/// As [`run`].
-pub fn unwritten(plan: &Plan, progress: &Progress) -> Result<(Simulated, Measurement), RunError> {
-    let simulated = simulate::unwritten(plan, progress)?;
-    let measurement = measure::measure(plan, &simulated)?;
-    Ok((simulated, measurement))
 }
 
 /// The figures that every run draws into `plots/`, and what they show.

@@ -1,16 +1,17 @@
-//! From watts over time to a trace, and back to joules per frame as an analyst would.
+//! Measurement of a run: the power curve is recorded as a trace, and frames and energies are found in the trace.
 
-use power_model::{FramePower, PARTS, Run, pace};
-use traces::device::{Device, Sampled};
+use output::table::si;
+use power_model::{FramePower, PARTS, PacedFrame, Run, pace};
+use serde::Serialize;
+use traces::device::{Device, DeviceSpec, RATES_HZ, Sampled};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
 use traces::frames::{Found, Marks, default_window, find, marked_only};
 use traces::score::{self, Score, TOLERANCE_S};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
-use super::checks::Checks;
-use super::limits::trace_fits;
-use super::recorder::{Resolution, device_spec};
-use super::{Plan, RunError, Simulated};
+use crate::options::DEFAULT_RATE_HZ;
+use crate::plan::trace_fits;
+use crate::{Plan, RunError, Simulated};
 
 /// The trace of a run and what was found in it.
 pub struct Measurement {
@@ -110,4 +111,166 @@ fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {
 pub(super) fn mean_parts_w(run: &Run) -> [f64; PARTS] {
     let length_s = run.end_s - run.start_s;
     run.energy().by_part_j.map(|joules| joules / length_s)
+}
+
+/// Rates that are chosen from where none is given, lowest first. A run with short frames is recorded at a higher one.
+const CHOSEN_RATES_HZ: [f64; 5] = [DEFAULT_RATE_HZ, 100e3, 200e3, 500e3, 1e6];
+/// Work that takes less than this many samples may fall between two of them: its frame may then not be found.
+pub(crate) const MIN_BUSY_SAMPLES: f64 = 2.0;
+/// A start is uncertain by a good part of a sample, so a frame of this many samples is measured to about two percent.
+const MIN_FRAME_SAMPLES: f64 = 50.0;
+/// A higher rate is not chosen where the trace would have more samples than this.
+const MAX_CHOSEN_SAMPLES: f64 = 5e6;
+
+/// How finely frames are recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Resolution {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Whether the rate was raised above the default, because frames are short.
+    pub raised: bool,
+    /// For how long the shortest frame is busy, in seconds.
+    pub shortest_busy_s: f64,
+}
+
+impl Resolution {
+    /// Of the frames of `run`, at the rate asked for or at the lowest that resolves them.
+    pub(super) fn new(asked_hz: Option<f64>, run: &Run) -> Self {
+        let shortest = |of: fn(&PacedFrame) -> f64| run.frames.iter().map(of).fold(f64::INFINITY, f64::min);
+        let shortest_busy_s = shortest(|frame| frame.busy_end_s - frame.start_s);
+        let shortest_frame_s = shortest(|frame| frame.end_s - frame.start_s);
+        let rate_hz =
+            asked_hz.unwrap_or_else(|| chosen_hz(shortest_busy_s, shortest_frame_s, run.curve.end_s()));
+        Self { rate_hz, raised: asked_hz.is_none() && rate_hz > DEFAULT_RATE_HZ, shortest_busy_s }
+    }
+
+    /// Samples while the shortest frame is busy.
+    pub fn samples_in_shortest(&self) -> f64 {
+        self.shortest_busy_s * self.rate_hz
+    }
+
+    /// A sentence about a rate that was raised; nothing where it was not.
+    pub fn raised_line(&self) -> Option<String> {
+        self.raised.then(|| {
+            format!(
+                "recorder: {}, raised from {} because the shortest frame is busy for {} only; --trace-rate sets it",
+                si(self.rate_hz, "Hz"),
+                si(DEFAULT_RATE_HZ, "Hz"),
+                si(self.shortest_busy_s, "s")
+            )
+        })
+    }
+
+    /// The lowest usual rate at which the shortest frame would be resolved; `None` where no recorder is as fast.
+    pub(super) fn needed_hz(&self) -> Option<f64> {
+        let needed_hz = MIN_BUSY_SAMPLES / self.shortest_busy_s;
+        let series =
+            (0..8).flat_map(|decade| [1.0, 2.0, 5.0].map(|step| step * libm::pow(10.0, f64::from(decade))));
+        series.into_iter().find(|rate_hz| *rate_hz >= needed_hz).filter(|rate_hz| RATES_HZ.contains(rate_hz))
+    }
+}
+
+/// The lowest rate that resolves the shortest frame, or the highest that keeps the trace small.
+fn chosen_hz(shortest_busy_s: f64, shortest_frame_s: f64, trace_s: f64) -> f64 {
+    let resolves = |rate_hz: f64| {
+        rate_hz * shortest_busy_s >= MIN_BUSY_SAMPLES && rate_hz * shortest_frame_s >= MIN_FRAME_SAMPLES
+    };
+    let mut chosen_hz = DEFAULT_RATE_HZ;
+    for rate_hz in CHOSEN_RATES_HZ {
+        if resolves(chosen_hz) || rate_hz * trace_s > MAX_CHOSEN_SAMPLES {
+            break;
+        }
+        chosen_hz = rate_hz;
+    }
+    chosen_hz
+}
+
+/// A recorder on the platform's rail whose range fits the peak.
+fn device_spec(plan: &Plan, rate_hz: f64, powers: &[&FramePower]) -> DeviceSpec {
+    let peak_w = powers.iter().map(|power| power.peak_w()).fold(plan.platform.idle_w.value(), f64::max);
+    let spec = DeviceSpec {
+        rate_hz,
+        packet_samples: plan.options.packet_samples,
+        packet_loss: plan.options.packet_loss,
+        seed: plan.options.seed,
+        ..DeviceSpec::fitting(plan.platform.rail.voltage_v.value(), peak_w)
+    };
+    spec.named_by_rate_and_bits()
+}
+
+/// How well the books of a run balance.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Checks {
+    /// |sum of frame energies / integral from the first found start to the end mark - 1|.
+    pub frames_against_integral_relative: f64,
+    /// |sum of true frame energies / integral of the noise-free curve over the frames - 1|.
+    pub parts_against_curve_relative: f64,
+    /// Integral of a trace without noise minus that of the curve, over the recording, in joules.
+    pub noise_free_trace_minus_curve_j: f64,
+    /// How far these may differ by the recorder's quantization, in joules.
+    pub quantization_bound_j: f64,
+}
+
+impl Checks {
+    pub(super) fn new(
+        run: &Run,
+        device: &Device,
+        integral: &PowerIntegral<'_>,
+        found: &Found,
+        frames: &[FrameEnergy],
+    ) -> Result<Self, RunError> {
+        let sum: f64 = frames.iter().map(|frame| frame.energy_j).sum();
+        let first = found.starts.first().map_or(found.end_s, |start| start.time_s);
+        let quiet = device.noise_free();
+        let sampled = quiet.sample(&run.curve, 0.0, run.curve.end_s())?;
+        let trace_j = PowerIntegral::new(&sampled.trace).total_j();
+        let curve_j = run.curve.energy_j(sampled.trace.start_s(), sampled.trace.end_s());
+        Ok(Self {
+            frames_against_integral_relative: relative(sum, integral.energy_j(first, found.end_s)),
+            parts_against_curve_relative: relative(
+                run.energy().total_j(),
+                run.curve.energy_j(run.start_s, run.end_s),
+            ),
+            noise_free_trace_minus_curve_j: trace_j - curve_j,
+            quantization_bound_j: quiet.quantization_energy_bound_j(&sampled).unwrap_or(f64::INFINITY),
+        })
+    }
+}
+
+fn relative(a: f64, b: f64) -> f64 {
+    if a == b { 0.0 } else { (a / b - 1.0).abs() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_frames_are_recorded_faster() {
+        let vsync = |busy_s| chosen_hz(busy_s, 1.0 / 60.0, 1.0);
+        assert_eq!([1e-3, 40e-6, 39e-6, 14e-6, 2e-6, 1e-9].map(vsync), [50e3, 50e3, 100e3, 200e3, 1e6, 1e6]);
+    }
+
+    #[test]
+    fn frames_without_idle_time_need_fifty_samples() {
+        assert_eq!(
+            [2e-3, 1e-3, 0.9e-3, 0.3e-3].map(|frame_s| chosen_hz(frame_s, frame_s, 1.0)),
+            [50e3, 50e3, 100e3, 200e3]
+        );
+    }
+
+    #[test]
+    fn a_long_trace_keeps_its_rate() {
+        assert_eq!(
+            [1.0, 24.0, 26.0, 60.0].map(|trace_s| chosen_hz(14e-6, 1.0 / 60.0, trace_s)),
+            [200e3, 200e3, 100e3, 50e3]
+        );
+    }
+
+    #[test]
+    fn the_rate_that_is_needed_is_one_that_recorders_have() {
+        let needed =
+            |shortest_busy_s| Resolution { rate_hz: 50e3, raised: false, shortest_busy_s }.needed_hz();
+        assert_eq!([14e-6, 1.9e-6, 0.2e-6, 0.1e-6].map(needed), [Some(200e3), Some(2e6), Some(10e6), None]);
+    }
 }

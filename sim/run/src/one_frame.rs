@@ -1,12 +1,11 @@
 //! One small frame on a machine whose files are at hand as text: for tests and fuzz targets of these files.
 
+use output::progress::Progress;
 use power_model::{EnergyTable, Platform};
+use timing::Level;
 use workloads::Overrides;
 
-use super::{Plan, RunError, RunOptions, unwritten};
-use crate::gpu::GpuSpec;
-use output::progress::Progress;
-use timing::Level;
+use crate::{GpuSpec, Plan, RunError, RunOptions, measure, simulate};
 
 /// The files of a machine as RON text; those that are absent are the reference's.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,7 +38,8 @@ impl MachineTexts<'_> {
             Overrides { size: Some((16, 12)), samples: Some(1), frames: Some(0..1), ..Overrides::default() };
         let options = RunOptions { scene: "tiny".into(), overrides, timing: level, ..RunOptions::default() };
         let plan = Plan::resolve(options)?.on(gpu, platform, table)?;
-        let (_, measurement) = unwritten(&plan, &Progress::new(true))?;
+        let simulated = simulate::without_files(&plan, &Progress::new(true))?;
+        let measurement = measure::measure(&plan, &simulated)?;
         Ok(measurement.frames.iter().map(|frame| frame.energy_j).sum())
     }
 }

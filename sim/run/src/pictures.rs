@@ -47,7 +47,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
             picture: frame_energy(outcome, &subject),
         },
     ];
-    plots.extend(stalls::picture(shown.1, &subject, &outcome.plan.options.look).map(|picture| Plot {
+    plots.extend(stalls::picture(shown.1, &subject, &outcome.plan.options.plot_style).map(|picture| Plot {
         stem: "plots/stalls",
         caption: format!("Frame {}: what each unit waited for, and which held it up.", shown.1.index),
         picture,
@@ -79,7 +79,7 @@ fn power_run(outcome: &Outcome, subject: &str) -> Picture {
         true_starts_s: &truth,
         mark_s: Some((mark - window.pre_s, mark + window.post_s)),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }
 
 /// Parts that drew power, in the order in which every picture shows them: what is always there first.
@@ -111,7 +111,7 @@ fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &RunFra
         samples: &samples,
         frame_j: outcome.summary.frames.get(place).map(|row| row.energy_j),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }
 
 fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
@@ -126,7 +126,7 @@ fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
         bin_s: frame.power.bin_s(),
         units: Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(lane).collect(),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }
 
 fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
@@ -146,5 +146,5 @@ fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
         measured_j: MeanSd::of(outcome.measurement.frames.iter().map(|frame| frame.energy_j)),
         pixels: outcome.plan.pixels(),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }

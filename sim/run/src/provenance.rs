@@ -1,14 +1,20 @@
-//! What a run was made from and where: for repeating it.
+//! Provenance of a run (options, input files, program, host), and repeating a run by it.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
 
+use output::dir::sha256_of;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use workloads::scene::CameraUsed;
 
-use super::{Plan, RunError, Work};
-use output::dir::sha256_of;
+use crate::{Choice, Plan, RunError, RunOptions, Work};
+
+/// The version of the form of `summary.json`, described by `docs/summary.schema.json`. Within a version keys may be added; one that
+/// goes, or changes its meaning or unit, makes the next version.
+pub const SCHEMA: u32 = 2;
 
 /// A file that a run was made from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,7 +101,7 @@ fn cpu() -> Option<String> {
 #[derive(Clone, Debug)]
 pub struct Provenance {
     /// What was asked for.
-    pub request: super::RunOptions,
+    pub request: RunOptions,
     /// The files it was made from, by name.
     pub inputs: Vec<Input>,
     /// The camera of a scene; workloads have cameras of their own.
@@ -112,6 +118,85 @@ impl Provenance {
         };
         let inputs = Input::of_plan(plan)?;
         Ok(Self { request: plan.options.clone(), inputs, camera, host: Host::now(revision) })
+    }
+}
+
+/// What of a summary a run is repeated by.
+#[derive(Deserialize)]
+struct Recorded {
+    version: String,
+    request: RunOptions,
+    inputs: Vec<Input>,
+    choice: Option<Choice>,
+    host: Host,
+}
+
+/// The version of the form, and of whatever else there is nothing.
+#[derive(Deserialize)]
+struct Form {
+    schema: u32,
+    #[serde(flatten)]
+    _other: BTreeMap<String, IgnoredAny>,
+}
+
+/// The options of the run that wrote the summary at `path`; with its choice, where `--accuracy` or `--budget` made one.
+///
+/// # Errors
+/// When that is no summary of this version, or, without `force`, when the program (built from `revision`) or an input is another.
+pub fn again(
+    path: &Path,
+    force: bool,
+    revision: Option<&str>,
+) -> Result<(RunOptions, Option<Choice>), RunError> {
+    let name = path.display();
+    let text = fs::read(path).map_err(|source| RunError::Input { path: name.to_string(), source })?;
+    let refuse = |message: String| RunError::Setting(format!("{name}: {message}"));
+    let form: Form = serde_json::from_slice(&text).map_err(|_| {
+        refuse("it is not the summary of a run; give the summary.json that `quintile run` wrote".to_owned())
+    })?;
+    if form.schema != SCHEMA {
+        let message = format!(
+            "its schema is {}, this version reads {SCHEMA}; repeat the run with the version that wrote it, or by its `request`",
+            form.schema
+        );
+        return Err(refuse(message));
+    }
+    let recorded: Recorded = serde_json::from_slice(&text)
+        .map_err(|error| refuse(format!("it is damaged: {error}; get the file again")))?;
+    if !force {
+        recorded.check(revision).map_err(refuse)?;
+    }
+    Ok((recorded.request, recorded.choice))
+}
+
+impl Recorded {
+    /// Refuses what would give other results.
+    fn check(&self, revision: Option<&str>) -> Result<(), String> {
+        let of = |version: &str, revision: Option<&str>| {
+            revision.map_or(version.to_owned(), |revision| format!("{version} ({revision})"))
+        };
+        let (then, now) =
+            (of(&self.version, self.host.revision.as_deref()), of(env!("CARGO_PKG_VERSION"), revision));
+        if then != now {
+            return Err(format!(
+                "Quintile {then} made this run, and this is {now}: results may differ; take that version, or repeat it with --force"
+            ));
+        }
+        self.inputs.iter().try_for_each(|then| self.check_input(then))
+    }
+
+    fn check_input(&self, then: &Input) -> Result<(), String> {
+        let now = Input::now(Path::new(&then.path)).map_err(|error| error.to_string())?;
+        let changed = match (&then.sha256, &now.sha256) {
+            (then, now) if then == now => return Ok(()),
+            (Some(_), None) => format!("is missing; the run was made in {}", self.host.directory),
+            (None, Some(_)) => "was missing when the run was made".to_owned(),
+            _ => "was changed after the run was made".to_owned(),
+        };
+        Err(format!(
+            "its input {} {changed}: put that file as it was, or repeat the run with --force",
+            then.path
+        ))
     }
 }
 

@@ -25,50 +25,50 @@ pub struct Regime {
 }
 
 /// A triangle this many times as long as high is a sliver.
-const SLIVER: f64 = 100.0;
+const MIN_SLIVER_RATIO: f64 = 100.0;
 /// Products of three lengths beyond these lose digits or overflow in f32.
-const PRODUCTS: [f64; 2] = [1e-36, 1e37];
+const F32_PRODUCT_RANGE: [f64; 2] = [1e-36, 1e37];
 
 impl Regime {
     /// Of a frame with `per_pixel` samples in each pixel.
     pub fn of(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport, per_pixel: u32) -> Self {
         let shear = Projection::new(camera, viewport).shear;
         let side_px = f64::from(viewport.width().max(viewport.height()));
-        let look = Look { spacing_px: (1.0 / f64::from(per_pixel)).sqrt(), side_px, lens: shear };
+        let scale = ImageScale { spacing_px: (1.0 / f64::from(per_pixel)).sqrt(), side_px, lens: shear };
         let mut found = Self::default();
         for triangle in set_up_all(camera, draws, viewport) {
             if !bounds(&triangle, &shear, viewport).is_empty() {
-                found.add(&triangle, &look);
+                found.add(&triangle, &scale);
             }
         }
         found
     }
 
-    fn add(&mut self, triangle: &Triangle, look: &Look) {
+    fn add(&mut self, triangle: &Triangle, scale: &ImageScale) {
         let seen = [0.0, 1.0].map(|t| triangle.corners.map(|c| c.at(t).map(f64::from)));
         self.in_view += 1;
-        self.extreme += u64::from(look.is_extreme(&seen));
-        if seen.as_flattened().iter().any(|p| look.weight(p[2]) <= 0.0) {
+        self.extreme += u64::from(scale.is_extreme(&seen));
+        if seen.as_flattened().iter().any(|p| scale.weight(p[2]) <= 0.0) {
             self.behind += 1;
             return;
         }
-        let image = seen.map(|corners| corners.map(|[x, y, w]| [x, y].map(|c| c / look.weight(w))));
-        self.tiny += u64::from(image.iter().all(|corners| look.is_tiny(corners)));
-        self.slivers += u64::from(!look.is_tiny(&image[0]) && is_sliver(&image[0]));
+        let image = seen.map(|corners| corners.map(|[x, y, w]| [x, y].map(|c| c / scale.weight(w))));
+        self.tiny += u64::from(image.iter().all(|corners| scale.is_tiny(corners)));
+        self.slivers += u64::from(!scale.is_tiny(&image[0]) && is_sliver(&image[0]));
         let way = |k: usize| distance(image[0][k], image[1][k]);
-        self.fast += u64::from((0..3).any(|k| way(k) > look.side_px));
-        self.blurred += u64::from(seen.as_flattened().iter().all(|p| look.blur_px(p[2]) > look.side_px));
+        self.fast += u64::from((0..3).any(|k| way(k) > scale.side_px));
+        self.blurred += u64::from(seen.as_flattened().iter().all(|p| scale.blur_px(p[2]) > scale.side_px));
     }
 }
 
 /// What decides the regime of a triangle besides itself.
-struct Look {
+struct ImageScale {
     spacing_px: f64,
     side_px: f64,
     lens: pipeline::Shear,
 }
 
-impl Look {
+impl ImageScale {
     fn is_tiny(&self, corners: &[[f64; 2]; 3]) -> bool {
         (0..3).all(|k| distance(corners[k], corners[(k + 1) % 3]) < self.spacing_px)
     }
@@ -88,7 +88,7 @@ impl Look {
         let largest = |axis: usize| seen.as_flattened().iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
         let (w, half) = (largest(2), 0.5 * self.side_px * self.weight(largest(2)));
         let edge = 2.0 * (largest(0) + half) * (largest(1) + half);
-        edge * w > PRODUCTS[1] || w * self.weight(w) * self.weight(w) < PRODUCTS[0]
+        edge * w > F32_PRODUCT_RANGE[1] || w * self.weight(w) * self.weight(w) < F32_PRODUCT_RANGE[0]
     }
 }
 
@@ -101,7 +101,7 @@ fn is_sliver(corners: &[[f64; 2]; 3]) -> bool {
     let [a, b, c] = corners;
     let twice_area = ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs();
     let longest = (0..3).map(|k| distance(corners[k], corners[(k + 1) % 3])).fold(0.0, f64::max);
-    longest * longest > SLIVER * twice_area
+    longest * longest > MIN_SLIVER_RATIO * twice_area
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use output::perfetto::CounterTrack;
 use output::plot::{Look, Picture, StallLane, StallLanes};
 
 /// Columns of the picture at most.
-const COLUMNS: usize = 128;
+const MAX_COLUMNS: usize = 128;
 
 /// Shares of a unit's time over the frames of a run; with those by unit they add up to 1.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -60,7 +60,7 @@ fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
 pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Picture> {
     let observed = frame.observed()?;
     let stalls = observed.stalls.as_ref()?;
-    let group = stalls.intervals().len().div_ceil(COLUMNS).max(1);
+    let group = stalls.intervals().len().div_ceil(MAX_COLUMNS).max(1);
     let bottlenecks = stalls.bottlenecks();
     let of = |unit: Unit| {
         let shares: Vec<[f64; 3]> = lane(stalls, unit).collect();

@@ -1,25 +1,24 @@
-//! The numbers of `summary.json`: the same bytes for the same input, whatever the machine did meanwhile.
+//! `summary.json`: the numbers of a run. Equal inputs give equal bytes on every machine, except for `host`.
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Unit};
+use activity::{Counts, Event, Unit};
+use output::MeanSd;
+use output::report::Headline;
 use power_model::Energy;
 use serde::Serialize;
 use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
 use warnings::Warning;
 use workloads::scene::CameraUsed;
 
-use super::checks::Checks;
-use super::frame_rows::{FrameRow, hash, rows};
-use super::measure::mean_parts_w;
-use super::modelled::Modelled;
-use super::stalls::{self, StallShares};
-use super::{
-    Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated,
-    Verified, warn,
+use crate::frame::image_name;
+use crate::measure::{Checks, mean_parts_w};
+use crate::provenance::SCHEMA;
+use crate::stalls::{self, StallShares};
+use crate::{
+    Choice, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions, SampledSummary,
+    Simulated, Verified, warn,
 };
-use output::MeanSd;
-use output::report::Headline;
 
 /// A run in numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -85,10 +84,6 @@ pub struct Summary {
     /// The program, the call and the machine. Everything else is the same on every machine.
     pub host: Host,
 }
-
-/// The version of the form of `summary.json`, described by `docs/summary.schema.json`. Within a version keys may be added; one that
-/// goes, or changes its meaning or unit, makes the next version.
-pub const SCHEMA: u32 = 1;
 
 /// Settings as they came to be.
 #[derive(Clone, Debug, Serialize)]
@@ -180,7 +175,7 @@ impl Summary {
     }
 
     /// What was chosen, what was predicted and how wrong it was, in words; nothing where nothing of that was asked for.
-    pub fn judgement(&self) -> Vec<(&'static str, String)> {
+    pub fn accuracy_rows(&self) -> Vec<(&'static str, String)> {
         let mut rows: Vec<(&'static str, String)> = Vec::new();
         rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
         rows.extend(self.sampled.as_ref().map(|sampled| ("predicted", sampled.line())));
@@ -189,8 +184,8 @@ impl Summary {
     }
 
     /// With a warning where what was asked for is not met.
-    pub(super) fn warned(mut self) -> Self {
-        self.warnings.extend(self.choice.iter().flat_map(warn::missed));
+    pub(super) fn with_choice_warnings(mut self) -> Self {
+        self.warnings.extend(self.choice.iter().flat_map(warn::missed_requests));
         self.warnings = Warning::fold(self.warnings);
         self
     }
@@ -284,10 +279,7 @@ fn settings(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Se
         frames: scene.frames.end - scene.frames.start,
         lens_radius: scene.lens_radius,
         focus: scene.focus,
-        pacing: match plan.options.pacing {
-            super::PacingChoice::Vsync => "vsync",
-            super::PacingChoice::Free => "free",
-        },
+        pacing: plan.options.pacing.name(),
         trace_rate_hz: measurement.resolution.rate_hz,
         seed: plan.options.seed,
         triangles: simulated.distinct.first().map_or(0, |frame| frame.triangles),
@@ -318,4 +310,87 @@ fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
         ps as f64 * 1e-12 / time
     };
     Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
+}
+
+/// One frame of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameRow {
+    /// Its number in the scene.
+    pub frame: u32,
+    /// Its image; a frame that was predicted has none.
+    pub image: Option<String>,
+    /// Whether it was predicted from others.
+    pub predicted: bool,
+    /// A hash of its counts, the same at every level of timing; a frame that was predicted has none.
+    pub counts_hash: Option<String>,
+    /// True start in seconds from the start of the recording.
+    pub start_s: f64,
+    /// Cycles of the core clock for which the GPU worked on it.
+    pub cycles: u64,
+    /// For how long the GPU worked on it, in seconds.
+    pub busy_s: f64,
+    /// From start to start, in seconds.
+    pub duration_s: f64,
+    /// True energy in joules.
+    pub energy_j: f64,
+    /// True energy per pixel in joules.
+    pub energy_per_pixel_j: f64,
+    /// True mean power in watts.
+    pub power_w: f64,
+    /// True energy by part in joules; summed in this order it is the frame's, exactly.
+    pub energy_by_part_j: Energy,
+    /// Where it was predicted: the ends of the interval in which its cycles lie.
+    pub cycles_interval: Option<[f64; 2]>,
+    /// The same for its energy, in joules.
+    pub energy_interval_j: Option<[f64; 2]>,
+    /// Energy as measured in the trace, in joules, where the frame was found.
+    pub measured_energy_j: Option<f64>,
+    /// Error of the found start in seconds.
+    pub start_error_s: Option<f64>,
+}
+
+/// A hash of counts that goes on from that of others.
+fn hash(seed: u64, counts: &Counts) -> u64 {
+    Event::ALL.iter().fold(seed, |hash: u64, &event| {
+        pipeline::random::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
+    })
+}
+
+/// The interval of `half` the width around a value.
+fn around(value: f64, half: Option<f64>) -> Option<[f64; 2]> {
+    half.map(|half| [(value - half).max(0.0), value + half])
+}
+
+/// Every frame of the run.
+fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
+    let first = plan.work.settings().frames.start;
+    measurement
+        .run
+        .frames
+        .iter()
+        .zip(measurement.by_true_frame())
+        .zip(simulated.in_order())
+        .zip(first..)
+        .map(|(((paced, measured), known), frame)| {
+            let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
+            FrameRow {
+                frame,
+                image: known.observed().map(|_| format!("{}.png", image_name(frame))),
+                predicted: known.half_widths().is_some(),
+                counts_hash: known.observed().map(|observed| format!("{:016x}", hash(0, &observed.counts))),
+                start_s: paced.start_s,
+                cycles: known.cycles,
+                busy_s: paced.busy_end_s - paced.start_s,
+                duration_s,
+                energy_j,
+                energy_per_pixel_j: energy_j / plan.pixels() as f64,
+                cycles_interval: around(known.cycles as f64, known.half_widths().map(|half| half.cycles)),
+                energy_interval_j: around(energy_j, known.half_widths().map(|half| half.energy_j)),
+                energy_by_part_j: paced.energy,
+                power_w: energy_j / duration_s,
+                measured_energy_j: measured.map(|m| m.energy_j),
+                start_error_s: measured.map(|m| m.start_s - paced.start_s),
+            }
+        })
+        .collect()
 }

@@ -1,9 +1,8 @@
 //! From what the probe found to a choice.
 
-use crate::Sampling;
 use timing::Level;
 
-use super::Wish;
+use crate::{Requested, Sampling};
 
 /// What the probe found, over its frames.
 #[derive(Clone, Debug, Default)]
@@ -66,19 +65,19 @@ pub(super) struct Decision {
 }
 
 /// Fewer frames than these are not worth predicting.
-const FRAMES_WORTH_IT: usize = 20;
+const MIN_FRAMES_TO_PREDICT: usize = 20;
 /// Leaving out dimensions has to save this share of the work.
-const SAVED_WORTH_IT: f64 = 0.1;
+const MIN_SAVED_SHARE: f64 = 0.1;
 /// Previews of a run take about as long as this share of its frames.
-const PREVIEWS: f64 = 0.05;
+const PREVIEWS_TO_FRAMES: f64 = 0.05;
 
 /// Chooses for a run of `frames` that differ.
-pub(super) fn decide(wish: &Wish, findings: &Findings, frames: usize) -> Decision {
-    let decision = match wish.accuracy {
+pub(super) fn decide(requested: &Requested, findings: &Findings, frames: usize) -> Decision {
+    let decision = match requested.accuracy {
         Some(accuracy) => by_accuracy(accuracy, findings, frames),
         None => every(Level::Stepped, findings, frames),
     };
-    match wish.budget_s {
+    match requested.budget_s {
         Some(budget_s) if decision.host_s > budget_s || decision.sampling != Sampling::Every => {
             by_budget(budget_s, decision, findings, frames)
         }
@@ -94,10 +93,10 @@ pub fn cheapest_level(error: impl Fn(Level) -> f64, limit: f64) -> Level {
 /// The cheapest level whose error leaves half of the accuracy to predicting frames; all of it where there are too few.
 /// What dimensions cost comes off first.
 fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
-    let worth_it = findings.saved() >= SAVED_WORTH_IT;
+    let worth_it = findings.saved() >= MIN_SAVED_SHARE;
     let lost = findings.dimensions_error.filter(|lost| worth_it && *lost <= 0.25 * accuracy);
     let left = accuracy - lost.unwrap_or(0.0);
-    let predicts = frames >= FRAMES_WORTH_IT;
+    let predicts = frames >= MIN_FRAMES_TO_PREDICT;
     let limit = if predicts { 0.5 * left } else { left };
     let level = cheapest_level(|level| findings.error(level), limit);
     let target = left - findings.error(level);
@@ -105,8 +104,8 @@ fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
     decision.fewer_dimensions = lost.is_some();
     decision.error += lost.unwrap_or(0.0);
     if predicts {
-        decision.sampling = Sampling::Until { target, most: frames };
-        decision.host_s = some_s(level, Sampling::BEGIN, findings, frames);
+        decision.sampling = Sampling::Until { target, max_frames: frames };
+        decision.host_s = some_s(level, Sampling::FIRST_FRAMES, findings, frames);
     }
     decision
 }
@@ -114,13 +113,13 @@ fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
 /// The most exact that fits: what was chosen, if need be with fewer frames; else every frame, then some, at cheaper levels.
 fn by_budget(budget_s: f64, wanted: Decision, findings: &Findings, frames: usize) -> Decision {
     let fits = |level: Level| {
-        let spare_s = budget_s - PREVIEWS * frames as f64 * findings.frame_s(level);
+        let spare_s = budget_s - PREVIEWS_TO_FRAMES * frames as f64 * findings.frame_s(level);
         (spare_s / findings.frame_s(level).max(f64::MIN_POSITIVE)).floor().clamp(0.0, frames as f64) as usize
     };
     if let Sampling::Until { target, .. } = wanted.sampling
-        && fits(wanted.level) >= Sampling::BEGIN
+        && fits(wanted.level) >= Sampling::FIRST_FRAMES
     {
-        return Decision { sampling: Sampling::Until { target, most: fits(wanted.level) }, ..wanted };
+        return Decision { sampling: Sampling::Until { target, max_frames: fits(wanted.level) }, ..wanted };
     }
     let keep = |decision: Decision| Decision {
         fewer_dimensions: wanted.fewer_dimensions,
@@ -131,12 +130,12 @@ fn by_budget(budget_s: f64, wanted: Decision, findings: &Findings, frames: usize
     if let Some(decision) = exact.into_iter().find(|decision| decision.host_s <= budget_s) {
         return keep(decision);
     }
-    let level = if fits(Level::Packet) >= Sampling::LEAST { Level::Packet } else { Level::Bound };
+    let level = if fits(Level::Packet) >= Sampling::MIN_FRAMES { Level::Packet } else { Level::Bound };
     let whole = every(level, findings, frames);
-    if frames < FRAMES_WORTH_IT || whole.host_s <= budget_s {
+    if frames < MIN_FRAMES_TO_PREDICT || whole.host_s <= budget_s {
         return keep(every(Level::Bound, findings, frames));
     }
-    let count = fits(level).max(Sampling::LEAST);
+    let count = fits(level).max(Sampling::MIN_FRAMES);
     let host_s = some_s(level, count, findings, frames);
     keep(Decision { sampling: Sampling::Count(count), host_s, ..whole })
 }
@@ -153,7 +152,7 @@ fn every(level: Level, findings: &Findings, frames: usize) -> Decision {
 }
 
 fn some_s(level: Level, count: usize, findings: &Findings, frames: usize) -> f64 {
-    findings.frame_s(level) * (count as f64 + PREVIEWS * frames as f64)
+    findings.frame_s(level) * (count as f64 + PREVIEWS_TO_FRAMES * frames as f64)
 }
 
 #[cfg(test)]
@@ -171,14 +170,14 @@ mod tests {
         findings
     }
 
-    fn wish(accuracy: f64, budget_s: f64) -> Wish {
+    fn requested(accuracy: f64, budget_s: f64) -> Requested {
         let given = |value: f64| (value > 0.0).then_some(value);
-        Wish { accuracy: given(accuracy), budget_s: given(budget_s) }
+        Requested { accuracy: given(accuracy), budget_s: given(budget_s) }
     }
 
     #[test]
     fn the_cheapest_level_that_is_good_enough() {
-        let level = |accuracy, frames| decide(&wish(accuracy, 0.0), &findings(), frames).level;
+        let level = |accuracy, frames| decide(&requested(accuracy, 0.0), &findings(), frames).level;
         assert_eq!(
             [0.001, 0.005, 0.09, 0.1].map(|a| level(a, 1)),
             [Level::Stepped, Level::Packet, Level::Packet, Level::Bound]
@@ -189,15 +188,15 @@ mod tests {
 
     #[test]
     fn frames_are_predicted_to_what_the_level_leaves() {
-        let decision = decide(&wish(0.02, 0.0), &findings(), 300);
-        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, most: 300 });
-        assert_eq!(decide(&wish(0.02, 0.0), &findings(), 19).sampling, Sampling::Every);
+        let decision = decide(&requested(0.02, 0.0), &findings(), 300);
+        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, max_frames: 300 });
+        assert_eq!(decide(&requested(0.02, 0.0), &findings(), 19).sampling, Sampling::Every);
     }
 
     #[test]
     fn the_most_exact_that_fits_the_budget() {
         let of = |budget_s| {
-            let decision = decide(&wish(0.0, budget_s), &findings(), 100);
+            let decision = decide(&requested(0.0, budget_s), &findings(), 100);
             (decision.level, decision.sampling)
         };
         assert_eq!(of(120.0), (Level::Stepped, Sampling::Every));
@@ -205,13 +204,13 @@ mod tests {
         assert_eq!(of(11.05), (Level::Packet, Sampling::Count(50)));
         // Not even six frames at `packet`.
         assert_eq!(of(1.6), (Level::Bound, Sampling::Count(9)));
-        assert_eq!(of(0.1), (Level::Bound, Sampling::Count(Sampling::LEAST)));
+        assert_eq!(of(0.1), (Level::Bound, Sampling::Count(Sampling::MIN_FRAMES)));
     }
 
     #[test]
     fn both_take_as_many_frames_as_fit() {
-        let decision = decide(&wish(0.02, 5.05), &findings(), 100);
-        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, most: 20 });
+        let decision = decide(&requested(0.02, 5.05), &findings(), 100);
+        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, max_frames: 20 });
     }
 
     #[test]
@@ -219,11 +218,11 @@ mod tests {
         let with = |error, madds| {
             let mut findings = findings();
             findings.add_dimensions(error, madds);
-            decide(&wish(0.02, 0.0), &findings, 1).fewer_dimensions
+            decide(&requested(0.02, 0.0), &findings, 1).fewer_dimensions
         };
         assert!(with(0.004, [100, 50]));
         assert!(!with(0.006, [100, 50]), "it costs too much of the accuracy");
         assert!(!with(0.001, [100, 95]), "it saves too little");
-        assert!(!decide(&wish(0.02, 0.0), &findings(), 1).fewer_dimensions);
+        assert!(!decide(&requested(0.02, 0.0), &findings(), 1).fewer_dimensions);
     }
 }

@@ -2,8 +2,8 @@
 
 use timing::sampled::{Design, Estimate};
 
-use super::super::simulated::{Quantity, Taken};
 use super::Signatures;
+use crate::{FrameCost, Quantity};
 
 /// How sure an interval is to hold the truth.
 pub const CONFIDENCE: f64 = 0.95;
@@ -17,9 +17,9 @@ pub struct Forecast {
 
 impl Forecast {
     /// From the signatures of all frames and what those that `design` chose took.
-    pub fn new(design: Design, signatures: &Signatures, taken: impl Fn(usize) -> Taken) -> Self {
-        let cycles = Estimate::new(&design, &signatures.cycles, |frame| taken(frame).cycles);
-        let energy = Estimate::new(&design, &signatures.energy_j, |frame| taken(frame).energy_j);
+    pub fn new(design: Design, signatures: &Signatures, cost: impl Fn(usize) -> FrameCost) -> Self {
+        let cycles = Estimate::new(&design, &signatures.cycles, |frame| cost(frame).cycles);
+        let energy = Estimate::new(&design, &signatures.energy_j, |frame| cost(frame).energy_j);
         Self { design, cycles, energy }
     }
 
@@ -44,18 +44,18 @@ impl Forecast {
     }
 
     /// The half-width of the widest interval, relative to its value.
-    pub fn relative(&self) -> f64 {
+    pub fn relative_half_width(&self) -> f64 {
         let all = [self.cycles_per_frame(), self.energy_per_frame_j(), self.busy_power_w(1.0)];
         all.iter().map(|quantity| quantity.relative_half_width).fold(0.0, f64::max)
     }
 
     /// What frame `place` takes, most likely, and half the width of the intervals in which its own values lie.
-    pub fn frame(&self, place: usize) -> [Taken; 2] {
+    pub fn frame(&self, place: usize) -> [FrameCost; 2] {
         let stratum = self.design.stratum_of(place);
         let half = |estimate: &Estimate| estimate.half_width_of_one(stratum, CONFIDENCE);
         [
-            Taken { cycles: self.cycles.predicted(place), energy_j: self.energy.predicted(place) },
-            Taken { cycles: half(&self.cycles), energy_j: half(&self.energy) },
+            FrameCost { cycles: self.cycles.predicted(place), energy_j: self.energy.predicted(place) },
+            FrameCost { cycles: half(&self.cycles), energy_j: half(&self.energy) },
         ]
     }
 

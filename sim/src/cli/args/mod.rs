@@ -21,7 +21,7 @@ pub use info::InfoArgs;
 pub use look::LookArgs;
 pub use messages::MessageArgs;
 pub(super) use messages::color_of;
-pub use run::{BoundArg, PacingArg, RunArgs};
+pub use run::RunArgs;
 pub use samples::SamplesArgs;
 pub use scene::SceneArgs;
 pub use trace::TraceArgs;

@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use activity::{Event, spec::suggestion};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use pipeline::frame::HeatMap;
+use power_model::Bound;
 
 use super::{LookArgs, SceneArgs};
 use crate::cli::parse::{duration, percent, setting, share_below_one};
 use crate::cli::quantity::rate;
-use run::Method;
+use run::{Method, PacingChoice};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -56,8 +58,8 @@ pub struct RunArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub energy: Option<PathBuf>,
     /// Which values of the energy table to use
-    #[arg(long, value_enum, default_value_t)]
-    pub bound: BoundArg,
+    #[arg(long, value_name = "BOUND", default_value = "nominal", value_parser = bound())]
+    pub bound: Bound,
     /// How time is modelled; `quintile chart timing` says how well
     #[arg(long, value_enum, default_value_t)]
     pub timing: Method,
@@ -74,7 +76,7 @@ pub struct RunArgs {
     pub verify: bool,
     /// When the next frame starts
     #[arg(long, value_enum, default_value_t)]
-    pub pacing: PacingArg,
+    pub pacing: PacingChoice,
     /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz or 1MHz [default: 50kHz,
     /// or up to 1MHz where frames are shorter than two samples or, without idle time between them, than fifty]
     #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
@@ -143,26 +145,18 @@ const SETTINGS: [&str; 31] = [
     "font_size",
 ];
 
-/// Which values of the energy table to use.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub enum BoundArg {
-    /// The lowest that sources support
-    Low,
-    /// The most likely
-    #[default]
-    Nominal,
-    /// The highest that sources support
-    High,
-}
-
-/// When the next frame starts.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub enum PacingArg {
-    /// On the next tick of the display
-    #[default]
-    Vsync,
-    /// As soon as the one before is done
-    Free,
+/// Parser of `--bound`: the name of a column of the energy table.
+fn bound() -> impl TypedValueParser<Value = Bound> {
+    let names = [
+        PossibleValue::new("low").help("The lowest that sources support"),
+        PossibleValue::new("nominal").help("The most likely"),
+        PossibleValue::new("high").help("The highest that sources support"),
+    ];
+    PossibleValuesParser::new(names).map(|name| match name.as_str() {
+        "low" => Bound::Low,
+        "high" => Bound::High,
+        _ => Bound::Nominal,
+    })
 }
 
 fn counter(text: &str) -> Result<Event, String> {

@@ -1,23 +1,21 @@
-//! Regimes in which the methods of a run are known to be bad.
+//! Warnings of a run.
 
 use std::collections::BTreeMap;
 
 use activity::{Counts, Event};
+use output::table::si;
 use power_model::PacedFrame;
+use timing::AccuracyWarning;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
 
-use crate::recorder::MIN_BUSY_SAMPLES;
-mod regime;
-
-use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, pairing};
-use output::table::si;
-use timing::AccuracyWarning;
+use crate::measure::MIN_BUSY_SAMPLES;
+use crate::{Choice, Measurement, Observed, Plan, Regime, RunFrame, Simulated, gpu};
 
 /// Every warning of a run, sorted and each once.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.work.warnings().to_vec();
-    all.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+    all.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
     all.extend(of_frames(
         simulated
             .distinct
@@ -40,8 +38,8 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     all.extend(idle_above_busy(plan, simulated));
     all.extend(clipped(measurement));
     all.extend(lost(measurement));
-    all.extend(unsure(simulated));
-    all.extend(regime::gather(simulated));
+    all.extend(wide_intervals(simulated));
+    all.extend(of_regimes(simulated));
     Warning::fold(all)
 }
 
@@ -111,7 +109,7 @@ fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
 }
 
 /// A choice that is not as good, or not as fast, as was asked for.
-pub(crate) fn missed(choice: &Choice) -> Vec<Warning> {
+pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
     let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
     let late = late.map(|(budget_s, expected_s)| {
         let message = format!(
@@ -135,12 +133,12 @@ pub(crate) fn missed(choice: &Choice) -> Vec<Warning> {
 }
 
 /// Intervals wider than this share of their value either way are worth a word.
-const WIDE_PERCENT: f64 = 5.0;
+const MAX_HALF_WIDTH_PERCENT: f64 = 5.0;
 
-fn unsure(simulated: &Simulated) -> Option<Warning> {
+fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
     let sampled = simulated.sampled.as_ref()?;
     let worst = sampled.worst() * 100.0;
-    (worst > WIDE_PERCENT).then(|| {
+    (worst > MAX_HALF_WIDTH_PERCENT).then(|| {
         Warning::new(
             Code::PredictionUnsure,
             format!(
@@ -248,11 +246,105 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
     measurement.trace.losses().map(|losses| Warning::new(Code::PacketsLost, losses))
 }
 
+/// Shares of triangles in view from which a regime is worth a word.
+const TINY_SHARE: f64 = 0.5;
+const SLIVER_OR_BLURRED_SHARE: f64 = 0.25;
+const BEHIND_OR_FAST_SHARE: f64 = 0.1;
+
+/// The warnings of a run, each about the frame that is worst.
+fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
+    [
+        behind(simulated),
+        tiny(simulated),
+        slivers(simulated),
+        fast(simulated),
+        blurred(simulated),
+        extreme(simulated),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// The frame in which most triangles are in a regime, where these are at least `share` of those in view: `of` which, for
+/// example, `12 of 40 triangles in view (frame 3)`.
+fn worst_frame(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
+    let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
+    let (count, all) = (of(&observed.regime), observed.regime.in_view);
+    (count > 0 && count as f64 >= share * all as f64)
+        .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
+}
+
+fn behind(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, BEHIND_OR_FAST_SHARE, |regime| regime.behind)?;
+    Some(Warning::new(
+        Code::BehindCamera,
+        format!(
+            "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
+             or cut large triangles into smaller ones"
+        ),
+    ))
+}
+
+fn tiny(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, TINY_SHARE, |regime| regime.tiny)?;
+    Some(Warning::new(
+        Code::SubSampleTriangles,
+        format!(
+            "{which} are smaller than the spacing of samples: most are hit by none, and tile tests cannot help; use a \
+             coarser mesh, a larger image or more samples"
+        ),
+    ))
+}
+
+fn slivers(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, SLIVER_OR_BLURRED_SHARE, |regime| regime.slivers)?;
+    Some(Warning::new(
+        Code::SliverTriangles,
+        format!(
+            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; mend the mesh \
+             where it was made"
+        ),
+    ))
+}
+
+fn fast(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, BEHIND_OR_FAST_SHARE, |regime| regime.fast)?;
+    Some(Warning::new(
+        Code::FastMotion,
+        format!(
+            "{which} move by more than an image while the shutter is open: few samples see them, the image is noisy, and \
+             a straight way may be far from the true one; use a shorter shutter, a higher frame rate or more samples"
+        ),
+    ))
+}
+
+fn blurred(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, SLIVER_OR_BLURRED_SHARE, |regime| regime.blurred)?;
+    Some(Warning::new(
+        Code::BlurBeyondImage,
+        format!(
+            "{which} are out of focus by more than an image: the lens is too large for this scene; use a smaller --lens \
+             or another --focus"
+        ),
+    ))
+}
+
+fn extreme(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, 0.0, |regime| regime.extreme)?;
+    Some(Warning::new(
+        Code::CoordinatesOutOfRange,
+        format!(
+            "{which} have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at wrong \
+             depths; scale the scene to ordinary lengths"
+        ),
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::GpuSpec;
-    use crate::{Quantity, SampledSummary};
+    use crate::{GpuSpec, Quantity, SampledSummary};
     use timing::streams::failures;
     use timing::{FrameClock, Level, Recorder};
 
@@ -289,9 +381,15 @@ mod tests {
                 busy_power_w: quantity(0.01),
             };
             let (distinct, pictures, heat) = (Vec::new(), Vec::new(), Vec::new());
-            unsure(&Simulated { distinct, frames: vec![0; 36], pictures, heat, sampled: Some(sampled) })
+            wide_intervals(&Simulated {
+                distinct,
+                frames: vec![0; 36],
+                pictures,
+                heat,
+                sampled: Some(sampled),
+            })
         };
-        assert_eq!(of(WIDE_PERCENT), None);
+        assert_eq!(of(MAX_HALF_WIDTH_PERCENT), None);
         let message = of(7.25).map(|warning| warning.to_string()).unwrap_or_default();
         assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
     }
