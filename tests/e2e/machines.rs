@@ -75,7 +75,7 @@ fn files_of_ones_own_name_each_other() {
 #[test]
 fn list_shows_the_pairs() {
     let text = quintile().call(["list"]).stdout;
-    for line in ["[platform iphone_4s, energy table 28nm]", "[no platform belongs to it]"] {
+    for line in ["[platform iphone_4s, energy table 28nm]", "[no platform of its own]"] {
         assert!(text.contains(line), "{text}");
     }
     let listing: Value = serde_json::from_str(&quintile().call(["list", "--json"]).stdout).expect("JSON");

@@ -34,7 +34,7 @@ fn a_folder_that_is_not_there_is_told_before_the_work() {
         let ended = quintile().call(call);
         assert_eq!(ended.code, Some(2), "{call:?}: {}", ended.stderr);
         let folder = inputs.path("no");
-        for says in [&format!("there is no folder {folder};"), "make it, or name a file in one that is there"]
+        for says in [&format!("there is no folder {folder};"), "create it, or name a file in an existing folder"]
         {
             assert!(ended.stderr.contains(says), "{call:?}: {}", ended.stderr);
         }

@@ -87,7 +87,7 @@ fn no_way_of_looking_changes_what_is_seen() {
 fn a_tile_test_that_is_none_is_refused() {
     let ended = quintile().call(["visibility", "a.m5d", "--tests", "edges,hiz"].map(OsStr::new));
     assert_eq!(ended.code, Some(2));
-    assert!(ended.stderr.contains("`hiz` is no tile test"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("unknown tile test `hiz`"), "{}", ended.stderr);
 }
 
 #[test]

@@ -221,7 +221,7 @@ fn wrong_inputs_are_told_from_failures() {
         (&[&start, &end], &["--camera", &typo], 2, &["typo.ron:2:", "`widht`, did you mean `width`?"]),
         (&[&start, &whole], &[], 2, &["a.mts holds both ends", "give it alone"]),
         (&[&strange], &[], 2, &["a.glb: ", "known here: .m5d, .mts"]),
-        (&[&carried], &["--print-camera"], 2, &["a.m5d carries its camera", "leave it out"]),
+        (&[&carried], &["--print-camera"], 2, &["a.m5d has a camera of its own", "leave it out"]),
         (&[&start, &end, &end], &[], 2, &["no more were expected"]),
         (&[], &[], 2, &["<FILE>"]),
         (&[&whole], &["--print-camera", "--camera", &typo], 2, &["--print-camera", "--camera"]),

@@ -13,12 +13,12 @@ use crate::plan::BYTES_PER_SAMPLE;
 use crate::regime::Regime;
 use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, Work, frame, gpu};
 
-/// A run before it starts.
+/// Description of a run before it starts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DryRun {
     /// Name of the scene or of the workload.
     pub scene: String,
-    /// Triangles of the scene; not known of a workload.
+    /// Triangles of the scene; `None` for a workload.
     pub triangles: Option<usize>,
     /// Width and height of the image.
     pub size: [u32; 2],
@@ -26,7 +26,7 @@ pub struct DryRun {
     pub samples: u32,
     /// The sample table.
     pub table: String,
-    /// Frames a second of the scene's time.
+    /// Frames per second of the scene's time.
     pub frame_rate_hz: f64,
     /// Open time of the shutter as a share of the frame period.
     pub shutter: f64,
@@ -34,9 +34,9 @@ pub struct DryRun {
     pub lens_radius: f32,
     /// First frame, and one after the last.
     pub frames: [u32; 2],
-    /// Frames that differ.
+    /// Number of distinct frames.
     pub distinct_frames: usize,
-    /// Frames that are simulated, at least; the others repeat these or are predicted.
+    /// Lower limit of the number of simulated frames; the others are repeated or predicted.
     pub simulated_frames: usize,
     /// Name of the GPU.
     pub gpu: String,
@@ -44,25 +44,25 @@ pub struct DryRun {
     pub platform: String,
     /// Name of the energy table.
     pub energy_table: String,
-    /// The level of timing.
+    /// Timing level.
     pub timing: &'static str,
-    /// When the next frame starts.
+    /// Pacing of frames.
     pub pacing: &'static str,
-    /// Samples a second of the recorder, where that was asked for.
+    /// Samples per second of the recorder, if given.
     pub trace_rate_hz: Option<f64>,
-    /// What was chosen for `--accuracy` or `--budget`.
+    /// Choice for `--accuracy` or `--budget`.
     pub chosen: Option<String>,
-    /// Time and memory; not known of a workload.
+    /// Expected time and memory; `None` for a workload.
     pub expected: Option<Expected>,
-    /// Warnings that are known before the run.
+    /// Warnings found before the run.
     pub warnings: Vec<Warning>,
 }
 
 impl DryRun {
-    /// Of a run that is ready.
+    /// Describes a prepared run.
     ///
     /// # Errors
-    /// When the expected time cannot be found.
+    /// If the expected time cannot be measured.
     pub fn new(prepared: &Prepared) -> Result<Self, RunError> {
         let (plan, settings) = (&prepared.plan, prepared.plan.work.settings());
         let distinct = prepared.distinct.numbers().len();
@@ -96,7 +96,7 @@ impl DryRun {
         })
     }
 
-    /// What would be run, a row for each subject.
+    /// Description as rows of name and value.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let triangles =
             self.triangles.map_or(String::new(), |count| format!(", {} triangles", grouped(count as u64)));
@@ -137,42 +137,44 @@ impl DryRun {
     }
 }
 
-/// What a run is expected to take on this machine. It is no result: nothing of a run depends on it.
+/// Expected time and memory of a run on this host. Results do not depend on them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Expected {
-    /// Seconds by the clock, from now to the last file; good to a factor of two where nothing else runs on the machine.
+    /// Wall-clock seconds to the last file; accurate to a factor of two on an otherwise idle host.
     pub host_s: f64,
-    /// Bytes of memory.
+    /// Memory in bytes.
     pub memory_bytes: u64,
 }
 
-/// Samples of the smaller of two images that the probe draws; the larger one has four times as many.
+/// Samples of the smaller of two probe images; the larger one has four times as many.
 const PROBE_SAMPLES: f64 = 30e3;
-/// Triangles that the probe draws of a frame, evenly chosen.
-const PROBE_TRIANGLES: usize = 20_000;
-/// Seconds for plots, report and other files.
+/// Largest number of triangles of a probe image, chosen at equal steps.
+const MAX_PROBE_TRIANGLES: usize = 20_000;
+/// Time to write plots, report and other files, in seconds.
 const FILES_S: f64 = 0.3;
-/// Seconds for recording, analysing and writing a sample of the trace, and its bytes; see `command.md` for the measurement.
+/// Time to record, analyse and write one trace sample, in seconds. `command.md` has the measurement.
 const TRACE_SAMPLE_S: f64 = 0.9e-6;
+/// Memory of one trace sample in bytes.
 const TRACE_SAMPLE_BYTES: f64 = 70.0;
-/// Previews of a run take about as long as this share of its frames.
-const PREVIEWS_TO_FRAMES: f64 = 0.05;
-/// Bytes of the program with a small scene, and of a triangle of the scene.
+/// Time of a preview over the time of a frame.
+const PREVIEW_TIME_RATIO: f64 = 0.05;
+/// Memory of the program with a small scene, in bytes.
 const PROGRAM_BYTES: u64 = 30_000_000;
+/// Memory of one triangle of the scene in bytes.
 const TRIANGLE_BYTES: u64 = 150;
 
 impl Expected {
-    /// What running `plan` would take on the threads of the current pool; nothing for a workload, whose passes cannot be
-    /// drawn small.
+    /// Expected time and memory of `plan` on the threads of the current pool; `None` for a workload, which cannot be
+    /// reduced.
     ///
     /// # Errors
-    /// When a frame cannot be made or timed.
+    /// If a frame cannot be rendered or timed.
     pub(super) fn new(plan: &Plan, distinct: &Distinct) -> Result<Option<Self>, RunError> {
         let Work::Scene(scene) = &plan.work else { return Ok(None) };
         let (all, differ) = (distinct.groups().len(), distinct.numbers().len());
         let (whole, previews) = match plan.options.sampling {
             Sampling::Every => (differ, 0.0),
-            sampling => (sampling.first(all).min(differ), PREVIEWS_TO_FRAMES * differ as f64),
+            sampling => (sampling.first(all).min(differ), PREVIEW_TIME_RATIO * differ as f64),
         };
         let probe = Probe::new(plan, scene, distinct.numbers()[differ / 2])?;
         let mut frames_s = probe.frame_s(plan.options.timing)? * (whole as f64 + previews);
@@ -190,13 +192,13 @@ impl Expected {
         Ok(Some(Self { host_s, memory_bytes }))
     }
 
-    /// Time and memory in words.
+    /// Time and memory as text.
     pub fn line(&self) -> String {
         format!("about {}, {:.0} MB of memory", duration(self.host_s), self.memory_bytes as f64 / 1e6)
     }
 }
 
-/// A duration as people say it, to two digits.
+/// Duration as text, to two digits.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 1.0 => "a second".to_owned(),
@@ -206,14 +208,14 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// A frame with some of its triangles, to be drawn small.
+/// A frame with part of its triangles, to be rendered at reduced sizes.
 struct Probe<'a> {
     plan: &'a Plan,
     scene: &'a Scene,
     frame: Frame,
-    /// Triangles of the frame for one that is drawn.
+    /// Triangles of the frame per rendered triangle.
     triangle_ratio: f64,
-    /// Processor seconds for making the frame.
+    /// CPU seconds for making the frame.
     made_s: f64,
 }
 
@@ -222,14 +224,14 @@ impl<'a> Probe<'a> {
         let started = ProcessTime::now();
         let mut frame = scene.frame(number)?;
         let made_s = started.elapsed().as_secs_f64();
-        let step = frame.triangle_count().div_ceil(PROBE_TRIANGLES).max(1);
+        let step = frame.triangle_count().div_ceil(MAX_PROBE_TRIANGLES).max(1);
         let all = frame.triangle_count();
         frame.meshes.iter_mut().for_each(|mesh| thin_out(mesh, step));
         let triangle_ratio = all as f64 / frame.triangle_count().max(1) as f64;
         Ok(Self { plan, scene, frame, triangle_ratio, made_s })
     }
 
-    /// Processor seconds for a frame of the run at `level`: `a` for its triangles and `b` for a pixel, from two sizes.
+    /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes.
     fn frame_s(&self, level: Level) -> Result<f64, RunError> {
         let samples = self.plan.pixels() as f64 * f64::from(self.plan.samples.per_pixel());
         let by = (samples / PROBE_SAMPLES).sqrt().max(1.0);
@@ -242,7 +244,7 @@ impl<'a> Probe<'a> {
         Ok(self.made_s + self.triangle_ratio * (a + b * self.plan.pixels() as f64))
     }
 
-    /// Pixels and processor seconds of the frame, drawn `by` times smaller along each axis.
+    /// Pixels and CPU seconds of the frame, rendered `by` times smaller along each axis.
     fn drawn(&self, by: f64, level: Level) -> Result<(f64, f64), RunError> {
         let plan = self.plan;
         let side = |side: u32| ((f64::from(side) / by).ceil() as u32).max(1);
@@ -262,7 +264,7 @@ impl<'a> Probe<'a> {
     }
 }
 
-/// Leaves one in `step` of the triangles.
+/// Keeps one in `step` triangles.
 fn thin_out(mesh: &mut FrameMesh, step: usize) {
     if step > 1 {
         mesh.triangles = mesh.triangles.iter().copied().step_by(step).collect();
@@ -274,7 +276,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn durations_are_as_people_say_them() {
+    fn durations_have_two_digits_and_a_unit() {
         assert_eq!(
             [0.4, 12.4, 99.0, 150.0, 5900.0, 7200.0].map(duration),
             ["a second", "12 s", "99 s", "2 min", "98 min", "2 h"]

@@ -19,22 +19,22 @@ use crate::heat::{self, HeatPicture};
 use crate::regime::Regime;
 use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame, Work};
 
-/// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
+/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
 pub const BIN_PS: u64 = 1_000_000;
-/// Most bins of all frames that are kept, about 200 bytes each; where there would be more they are made longer.
+/// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
 const MAX_TOTAL_BINS: usize = 8_000_000;
-/// Fewest bins of a frame, however many frames there are.
+/// Lower limit of the bins of a frame, for any number of frames.
 pub(super) const MIN_FRAME_BINS: usize = 1024;
 
-/// The most bins of a frame where `frames` are kept.
+/// Largest number of bins of one frame, in a run of `frames`.
 pub(super) fn max_bins_per_frame(frames: usize) -> usize {
     (MAX_TOTAL_BINS / frames.max(1)).max(MIN_FRAME_BINS)
 }
 
-/// Simulates the frames called `numbers` and writes nothing.
+/// Simulates the frames `numbers` without writing files.
 ///
 /// # Errors
-/// When a frame cannot be made or timed.
+/// If a frame cannot be rendered or timed.
 pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Vec<RunFrame>, RunError> {
     let max_bins = max_bins_per_frame(numbers.len());
     let bar = progress.bar("frames", numbers.len() as u64);
@@ -46,43 +46,43 @@ pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Ve
     numbers.par_iter().map(simulate).collect()
 }
 
-/// What a panic carries through the threads, so that it is known which frame it happened in.
+/// Payload of a panic in a worker thread, with the frame that was simulated.
 pub struct CrashedFrame {
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
-    /// What the panic itself carried.
+    /// Payload of the original panic.
     pub panic: Box<dyn Any + Send>,
 }
 
-/// Lets tests of builds with assertions see a crash; elsewhere it is nothing.
+/// Panics in the frame that `QUINTILE_PANIC_IN_FRAME` names: a test hook of debug builds.
 fn panic_if_requested(number: u32) {
     if cfg!(debug_assertions)
-        && std::env::var("QUINTILE_PANIC_IN_FRAME").is_ok_and(|asked| asked == number.to_string())
+        && std::env::var("QUINTILE_PANIC_IN_FRAME").is_ok_and(|frame| frame == number.to_string())
     {
         panic!("a test asked for it");
     }
 }
 
-/// Where frames are simulated.
+/// Simulates frames of a plan and writes their images.
 pub(super) struct FrameSimulator<'a> {
     pub plan: &'a Plan,
     pub distinct: &'a Distinct,
-    /// Where images and heat maps go; nowhere without it.
+    /// Folder of images and heat maps; `None` writes no files.
     pub dir: Option<&'a OutDir>,
-    /// Bins of a frame at most.
+    /// Largest number of timeline bins of a frame.
     pub max_bins: usize,
 }
 
-/// A frame simulated whole.
+/// Result of simulating one frame.
 pub(super) struct SimulatedFrame {
     pub frame: RunFrame,
-    /// Its linear image, where it is wanted.
+    /// Linear image, if it is kept for the report.
     pub picture: Option<Vec<Vec3>>,
     pub heat: Vec<HeatPicture>,
 }
 
 impl FrameSimulator<'_> {
-    /// Simulates the frames of group `group` once and writes the image of each.
+    /// Simulates group `group` once and writes the image of each of its frames.
     pub fn simulate(&self, group: usize, keep_picture: bool) -> Result<SimulatedFrame, RunError> {
         let (plan, dir, number) = (self.plan, self.dir, self.distinct.numbers()[group]);
         let simulate = || {
@@ -109,7 +109,7 @@ fn simulate_frame(
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
         FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let Drawing { drawn, regime, heat } =
+    let Rendered { drawn, regime, heat } =
         draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
     let timed = clock.finish()?;
     let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
@@ -141,7 +141,7 @@ fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {
     timeline.bins.iter().map(|bin| bin.busy_ps.map(share)).collect()
 }
 
-/// The name of a frame's image without its ending.
+/// Path of the image of frame `number`, without extension.
 pub(super) fn image_name(number: u32) -> String {
     format!("images/frame_{number:04}")
 }
@@ -156,38 +156,38 @@ fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result
     Ok(())
 }
 
-/// A frame as it was drawn.
-struct Drawing {
+/// Result of rendering a frame.
+struct Rendered {
     drawn: Drawn,
     regime: Regime,
     heat: Vec<HeatMap>,
 }
 
-/// Draws frame `number`, with heat maps of `events`.
+/// Renders frame `number`, with heat maps of `events`; `emit` receives the packets.
 fn draw(
     plan: &Plan,
     number: u32,
     events: &[Event],
     mut emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Drawing, RunError> {
+) -> Result<Rendered, RunError> {
     match &plan.work {
         Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, events, emit),
         Work::Job { job, .. } => {
             let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
-            Ok(Drawing { drawn, regime: Regime::default(), heat: Vec::new() })
+            Ok(Rendered { drawn, regime: Regime::default(), heat: Vec::new() })
         }
     }
 }
 
-/// Draws from `frame` and from what is the same in all frames. It must not know which frame it draws, because frames with the
-/// same fingerprint are drawn once.
+/// Renders `frame`. The frame number must have no influence: frames with equal fingerprints are rendered
+/// once.
 fn draw_scene(
     plan: &Plan,
     scene: &Scene,
     frame: &Frame,
     events: &[Event],
     emit: impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Drawing, RunError> {
+) -> Result<Rendered, RunError> {
     let draws = frame.draws(scene)?;
     let viewport = plan.viewport;
     let background = scene.background();
@@ -203,5 +203,5 @@ fn draw_scene(
         ..Drawn::default()
     };
     let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
-    Ok(Drawing { drawn, regime, heat })
+    Ok(Rendered { drawn, regime, heat })
 }

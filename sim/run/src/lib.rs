@@ -1,7 +1,7 @@
-//! A run: scene, pipeline, clock, watts, trace, frames, files.
+//! A run: from a scene and a GPU to frames in joules, a power trace and a folder of results.
 //!
 //! ```text
-//! RunOptions -> Plan -> open -> prepare: Distinct -> choose -> Prepared -> run: simulate -> measure -> Outcome -> write
+//! RunOptions -> Plan -> open -> prepare -> Prepared -> run: simulate -> measure -> Outcome -> write
 //! ```
 
 mod choice;
@@ -50,19 +50,20 @@ pub use stalls::StallShares;
 pub use summary::{Detection, Figures, FrameRow, Summary};
 pub use work::{Distinct, Work};
 
-/// Everything a run found out.
+/// Results of a run.
 pub struct Outcome {
-    /// What was asked for.
+    /// Options and loaded inputs.
     pub plan: Plan,
-    /// What the simulator knows.
+    /// Frames as simulated: the ground truth.
     pub simulated: Simulated,
-    /// What the trace says.
+    /// Frames as measured in the power trace.
     pub measurement: Measurement,
-    /// The numbers of `summary.json`.
+    /// Contents of `summary.json`.
     pub summary: Summary,
 }
 
-/// A run with everything loaded, checked and chosen, of which nothing is simulated and nothing written yet.
+/// A run that is ready to start: inputs loaded, options checked, level and frames chosen. Nothing is
+/// simulated or written yet.
 pub struct Prepared {
     plan: Plan,
     provenance: Provenance,
@@ -70,11 +71,12 @@ pub struct Prepared {
     choice: Option<Choice>,
 }
 
-/// Prepares a run: finds the frames that differ, and makes the choices that were left to the program, or those `made` by the run
-/// that is repeated. The program was built from `revision`.
+/// Prepares a run: finds the distinct frames and applies the choice of `--accuracy` and `--budget`. The
+/// choice is `recorded` when a run is repeated, otherwise a probe makes it. `revision` is the git revision of
+/// the program.
 ///
 /// # Errors
-/// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures.
+/// [`RunError`]; [`RunError::is_usage`] separates usage errors from failures.
 pub fn prepare(
     mut plan: Plan,
     recorded: Option<Choice>,
@@ -89,10 +91,10 @@ pub fn prepare(
 }
 
 impl Prepared {
-    /// What the run is expected to take, found by drawing a frame small; nothing for a workload.
+    /// Expected time and memory, from one frame at a reduced size; `None` for a workload.
     ///
     /// # Errors
-    /// When that frame cannot be drawn.
+    /// If that frame cannot be rendered.
     pub fn expected(&self) -> Result<Option<Expected>, RunError> {
         Expected::new(&self.plan, &self.distinct)
     }
@@ -100,7 +102,7 @@ impl Prepared {
     /// Simulates, measures and writes the results into `dir`.
     ///
     /// # Errors
-    /// As [`prepare`]. Earlier results in `dir` are then as they were.
+    /// As [`prepare`]. Earlier results in `dir` then stay unchanged.
     pub fn run(self, mut dir: OutDir, progress: &Progress) -> Result<Outcome, RunError> {
         let Self { plan, provenance, distinct, mut choice } = self;
         let simulated = simulate::simulate(&plan, &distinct, &dir, progress)?;
@@ -123,12 +125,12 @@ impl Prepared {
 /// Locks the folder `out` for the results of `plan`.
 ///
 /// # Errors
-/// As [`Destination::open`]: before any work, where results cannot go there.
+/// As [`Destination::open`], if results cannot be written there.
 pub fn open(plan: &Plan, out: &Destination) -> Result<OutDir, RunError> {
     Ok(out.open([write::claim(plan)])?)
 }
 
-/// Runs the whole line and writes its results into `out`.
+/// Plans, prepares and executes a run; writes its results into `out`.
 ///
 /// # Errors
 /// As [`open`], [`prepare`] and [`Prepared::run`].
@@ -138,7 +140,7 @@ pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Resul
     prepare(plan, None, None, progress)?.run(dir, progress)
 }
 
-/// Says in detail which camera sees the scene, before minutes of work are spent on it.
+/// Prints the camera of a scene under `--verbose`, before the simulation starts.
 fn report_camera(plan: &Plan, progress: &Progress) {
     let Work::Scene(scene) = &plan.work else { return };
     if let Ok(camera) = scene.camera_used() {
@@ -146,7 +148,7 @@ fn report_camera(plan: &Plan, progress: &Progress) {
     }
 }
 
-/// The figures that every run draws into `plots/`, and what they show.
+/// Figures that every run writes into `plots/`: name and description.
 pub const FIGURES: [(&str, &str); 4] = [
     ("power_run", "power over the run with found and true frame starts"),
     ("frame_power", "power over one frame, stacked by part"),

@@ -10,7 +10,7 @@ use timing::Level;
 use workloads::Overrides;
 use workloads::job::OptionSource;
 
-/// The rate of the recorder that the methodology of per-frame energy is described with.
+/// Default rate of the recorder in Hz. The method of per-frame energy is described at this rate.
 pub(crate) const DEFAULT_RATE_HZ: f64 = 50e3;
 
 /// When the next frame starts.
@@ -34,24 +34,24 @@ impl PacingChoice {
     }
 }
 
-/// What the caller wants of a run, instead of a level of timing.
+/// Requested accuracy and time budget; they replace a timing level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Requested {
-    /// The largest relative error of cycles and energy of the run, against every frame at the reference.
+    /// Largest relative error of the run's cycles and energy, compared with every frame at level `stepped`.
     pub accuracy: Option<f64>,
-    /// The longest that simulating may take, in seconds by the clock.
+    /// Time budget of the simulation in seconds of wall-clock time.
     pub budget_s: Option<f64>,
 }
 
 impl Requested {
-    /// Whether anything was asked for.
+    /// Whether an accuracy or a budget is given.
     pub fn is_any(&self) -> bool {
         self.accuracy.is_some() || self.budget_s.is_some()
     }
 }
 
-/// A run as asked for: all that its results depend on but the content of files.
+/// Options of a run. Results depend on these and on the contents of the files they name.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunOptions {
@@ -65,41 +65,43 @@ pub struct RunOptions {
     /// A built-in GPU or a RON file.
     #[serde(serialize_with = "as_text")]
     pub gpu: PathBuf,
-    /// A built-in platform or a RON file; without it the one that belongs to the GPU.
+    /// A built-in platform or a RON file; `None` for the platform of the GPU.
     #[serde(serialize_with = "as_text_if_any")]
     pub platform: Option<PathBuf>,
-    /// A built-in energy table or a RON file; without it the one that belongs to the GPU.
+    /// A built-in energy table or a RON file; `None` for the table of the GPU.
     #[serde(serialize_with = "as_text_if_any")]
     pub energy: Option<PathBuf>,
-    /// Which of the table's values is used.
+    /// Column of the energy table.
     pub bound: Bound,
-    /// How time is modelled.
+    /// Timing level of the simulated frames.
     pub timing: Level,
-    /// How many frames are simulated.
+    /// Which frames are simulated.
     pub sampling: Sampling,
-    /// What is wanted instead: then level and frames are chosen.
+    /// Requested accuracy and budget: if given, a probe chooses `timing` and `sampling`.
     pub requested: Requested,
-    /// Whether the run is held against every frame at the reference.
+    /// Whether every frame is simulated again at level `stepped`, to report the actual error.
     pub verify: bool,
     /// When the next frame starts.
     pub pacing: PacingChoice,
-    /// Samples per second of the recorder; without it 50 kHz, or more where frames are short ([`Resolution`](super::Resolution)).
+    /// Samples per second of the recorder; `None` for 50 kHz, or more if frames are short
+    /// ([`Resolution`](crate::Resolution)).
     pub trace_rate_hz: Option<f64>,
-    /// Samples of the recorder that travel together and are lost together.
+    /// Samples in one packet of the recorder. A packet is lost as a whole.
     pub packet_samples: u32,
-    /// Share of these packets that are lost, 0 to below 1.
+    /// Share of packets that are lost, in [0, 1).
     pub packet_loss: f64,
-    /// Seed of samples, noise and losses.
+    /// Seed of samples, noise and packet losses.
     pub seed: u64,
-    /// Whether images are written as EXR, too.
+    /// Whether images are also written as EXR.
     pub exr: bool,
-    /// Counters whose heat maps are wanted.
+    /// Counters of the heat maps.
     pub heat: Vec<Event>,
-    /// How pictures look.
+    /// Width, title and font size of plots.
     pub plot_style: Look,
 }
 
-/// JSON holds Unicode alone: other bytes of a path are replaced, so that a run does not fail when it writes its summary.
+/// Serializes a path as text. Bytes that are not Unicode are replaced, so that writing the summary cannot
+/// fail.
 fn as_text<S: Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(&path.to_string_lossy())
 }
@@ -134,7 +136,7 @@ impl Default for RunOptions {
     }
 }
 
-/// How the times of a run are found.
+/// Value of `--timing`: a timing level for every frame, or sampled simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Method {
     /// Every unit from cycle to cycle: the reference, slow
@@ -149,7 +151,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// The level of the frames that are simulated.
+    /// Timing level of the simulated frames.
     pub const fn level(self) -> Level {
         match self {
             Self::Stepped => Level::Stepped,
@@ -158,7 +160,7 @@ impl Method {
         }
     }
 
-    /// How many frames are simulated.
+    /// Which frames are simulated.
     pub const fn sampling(self) -> Sampling {
         match self {
             Self::Sampled => Sampling::Some,
@@ -167,35 +169,35 @@ impl Method {
     }
 }
 
-/// How many frames of a run are simulated whole.
+/// Which frames of a run are simulated; the others are predicted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
-    /// All that differ.
+    /// All distinct frames.
     #[default]
     Every,
-    /// One in fifty, at least six.
+    /// One frame in fifty, at least six.
     Some,
-    /// So many.
+    /// This number of frames.
     Count(usize),
-    /// As many as it takes for the relative half-widths of all 95 % intervals to be at most `target`, but no more than `most`.
+    /// Frames are added until the relative half-widths of all 95 % intervals are at most `target`.
     Until {
-        /// Relative half-width.
+        /// Largest relative half-width of an interval.
         target: f64,
-        /// Frames.
+        /// Largest number of simulated frames.
         max_frames: usize,
     },
 }
 
 impl Sampling {
-    /// Frames for one that is simulated.
+    /// Frames of the run per simulated frame.
     const FRAMES_PER_SIMULATED: usize = 50;
-    /// Fewest: one to scale the previews by, and two strata of two or three.
+    /// Smallest number of simulated frames: the pilot frame, and two strata of two or three.
     pub const MIN_FRAMES: usize = 6;
-    /// To begin with where it goes on until it is sure: one, and three strata of two.
+    /// Number of frames in the first round of [`Self::Until`]: the pilot frame, and three strata of two.
     pub const FIRST_FRAMES: usize = 7;
 
-    /// How many of `frames` to begin with.
+    /// Number of frames to simulate first, of a run of `frames`.
     pub fn first(self, frames: usize) -> usize {
         match self {
             Self::Every => frames,
@@ -205,10 +207,11 @@ impl Sampling {
         }
     }
 
-    /// How many next, where `done` of `frames` gave intervals of `relative` half-width; `None` where that is enough.
+    /// Number of frames of the next round, if `done` of `frames` gave intervals of `relative` half-width;
+    /// `None` when finished.
     pub fn next(self, done: usize, frames: usize, relative: f64) -> Option<usize> {
         let Self::Until { target, max_frames } = self else { return None };
-        // A NaN is not enough.
+        // A NaN does not meet the target.
         let enough = relative <= target || done >= frames.min(max_frames);
         let next = if 4 * done > frames { frames } else { 2 * done - 1 };
         (!enough).then(|| next.min(max_frames))
@@ -225,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn it_doubles_until_it_is_sure() {
+    fn frames_double_until_the_target_is_met() {
         let until = Sampling::Until { target: 0.01, max_frames: 300 };
         assert_eq!(until.next(7, 300, 0.02), Some(13));
         assert_eq!(until.next(7, 300, f64::NAN), Some(13));

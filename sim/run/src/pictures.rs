@@ -1,4 +1,4 @@
-//! The plots of a run.
+//! Plots of a run.
 
 use activity::Unit;
 use power_model::Part;
@@ -9,14 +9,14 @@ use output::plot::{
     FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitBusy, UnitLane,
 };
 
-/// A plot with the name of its files and what it shows.
+/// A plot with its file name and caption.
 pub(super) struct Plot {
     pub stem: &'static str,
     pub caption: String,
     pub picture: Picture,
 }
 
-/// Every plot of a run.
+/// All plots of a run.
 pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
     let subject = format!("{} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
     let shown = shown_frame(outcome);
@@ -55,7 +55,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
     plots
 }
 
-/// The frame shown in detail, the marked one or the one next to it that was simulated: its place in the run and what is known of it.
+/// Frame shown in detail: the simulated frame nearest to the marked one, and its index in the run.
 fn shown_frame(outcome: &Outcome) -> (usize, &RunFrame) {
     let middle = outcome.simulated.frames.len() / 2;
     let known = outcome.simulated.in_order().enumerate().filter(|(_, frame)| frame.observed().is_some());
@@ -82,7 +82,7 @@ fn power_run(outcome: &Outcome, subject: &str) -> Picture {
     .picture(&outcome.plan.options.plot_style)
 }
 
-/// Parts that drew power, in the order in which every picture shows them: what is always there first.
+/// Parts that consumed energy, in the order of all plots: overhead first, then units.
 pub(super) fn parts_in_use(outcome: &Outcome) -> Vec<Part> {
     let energy = outcome.measurement.run.energy();
     let (units, overhead): (Vec<Part>, Vec<Part>) = Part::ALL

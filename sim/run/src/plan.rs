@@ -13,35 +13,35 @@ use crate::gpu::GpuSpec;
 use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions, Sampling};
 use crate::{RunError, Work};
 
-/// A run with everything loaded and checked.
+/// Plan of a run: options, and all inputs loaded and checked.
 pub struct Plan {
-    /// What was asked for.
+    /// The options.
     pub options: RunOptions,
-    /// The scene or the job with its settings changed as asked.
+    /// The scene or workload, with the changes of the options applied.
     pub work: Work,
     /// Size of the image.
     pub viewport: Viewport,
-    /// Where and when each pixel looks.
+    /// Sample table.
     pub samples: Box<dyn SampleSource>,
     /// The hardware.
     pub gpu: GpuSpec,
-    /// What surrounds it.
+    /// The platform.
     pub platform: Platform,
-    /// Joules per event.
+    /// Energy table, in joules per event.
     pub table: EnergyTable,
-    /// Table and platform joined.
+    /// Power model of table and platform.
     pub model: PowerModel,
     /// When the next frame starts.
     pub pacing: Pacing,
-    /// The files that all this was read from, by name.
+    /// Input files, sorted by name.
     pub files: Vec<PathBuf>,
 }
 
 impl Plan {
-    /// Loads and checks everything that `options` names.
+    /// Loads and checks all inputs that `options` names.
     ///
     /// # Errors
-    /// The first thing that is missing, broken or makes no sense.
+    /// The first input that is missing or invalid.
     pub fn resolve(options: RunOptions) -> Result<Self, RunError> {
         let (plan, files) = inputs::record(|| Self::load(options));
         Ok(Self { files, ..plan? })
@@ -89,7 +89,7 @@ impl Plan {
     /// The same plan on another GPU, platform and energy table.
     ///
     /// # Errors
-    /// When platform and table do not go together, or what is recorded would be too large.
+    /// If platform and table do not match, or the recording would be too large.
     pub fn on(self, gpu: GpuSpec, platform: Platform, table: EnergyTable) -> Result<Self, RunError> {
         let model = PowerModel::at(&table, &platform, self.options.bound)?;
         let plan = Self { gpu, platform, table, model, ..self };
@@ -107,7 +107,7 @@ impl Plan {
     }
 }
 
-/// What decides how large a run is.
+/// Size of a run, from the parts of a plan.
 fn size_of(
     work: &Work,
     viewport: Viewport,
@@ -126,8 +126,8 @@ fn size_of(
     }
 }
 
-/// What is drawn with its settings changed as asked, and its sample table. A table in a file decides how many samples there
-/// are, unless the caller asked for another number.
+/// Scene or workload with the changes of the options applied, and its sample table. A table in a file sets
+/// the samples per pixel, unless the options do.
 fn work(options: &RunOptions) -> Result<(Work, SampleChoice), RunError> {
     let work = Work::find(&options.scene, &options.overrides, &options.options, options.seed)?;
     let table = SampleChoice::load(&work.settings().table)?;
@@ -152,31 +152,31 @@ fn file_or_name<T, E>(
     }
 }
 
-/// Bytes of memory that the samples of one image may take.
-const SAMPLE_BYTES_LIMIT: u64 = 8 << 30;
-/// Bytes of one stored sample: its depth, its triangle, and what is logged and resolved of it.
+/// Largest memory for the samples of one image, in bytes.
+const MAX_SAMPLE_BYTES: u64 = 8 << 30;
+/// Memory of one sample in bytes: depth, triangle, log entry and resolved colour.
 pub(super) const BYTES_PER_SAMPLE: u64 = 16;
-/// Samples of the trace: about 2.5 GB as CSV, which is written beside the 0.4 GB of Parquet.
-const TRACE_LIMIT: f64 = 5e7;
-/// Frames of one run.
-const FRAMES_LIMIT: u32 = 100_000;
+/// Largest number of trace samples: about 2.5 GB of CSV and 0.4 GB of Parquet.
+const MAX_TRACE_SAMPLES: f64 = 5e7;
+/// Largest number of frames of a run.
+const MAX_FRAMES: u32 = 100_000;
 
-/// Refuses `pixels` of `samples`, each of so many bytes, where they would not fit into memory; `what` begins the message.
+/// Checks that an image of `pixels` with `samples` each fits into memory. `what` begins the message.
 ///
 /// # Errors
-/// [`RunError::Setting`] with what would be needed.
+/// [`RunError::Setting`] with the memory that the image would need.
 pub fn fits_memory(what: &str, pixels: u64, samples: u32, bytes_per_sample: u64) -> Result<(), RunError> {
     let bytes = pixels * u64::from(samples) * bytes_per_sample;
-    let (needed, limit) = (bytes >> 30, SAMPLE_BYTES_LIMIT >> 30);
+    let (needed, limit) = (bytes >> 30, MAX_SAMPLE_BYTES >> 30);
     let message = || {
         format!(
             "{what}: {pixels} pixels of {samples} samples take {needed} GiB, more than {limit} GiB; ask for fewer"
         )
     };
-    if bytes > SAMPLE_BYTES_LIMIT { Err(RunError::Setting(message())) } else { Ok(()) }
+    if bytes > MAX_SAMPLE_BYTES { Err(RunError::Setting(message())) } else { Ok(()) }
 }
 
-/// What decides the size of a run.
+/// Quantities that determine memory and disk space of a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size {
     pub pixels: u64,
@@ -188,20 +188,21 @@ pub(super) struct Size {
 }
 
 impl Size {
-    /// Refuses what would not fit.
+    /// Checks memory, number of frames and length of the trace.
     pub fn check(&self) -> Result<(), RunError> {
         let refuse = |message| Err(RunError::Setting(message));
         fits_memory("size and samples", self.pixels, self.samples, BYTES_PER_SAMPLE)?;
-        if self.frames > FRAMES_LIMIT {
+        if self.frames > MAX_FRAMES {
             return refuse(format!(
-                "frames: {} in one run; at most {FRAMES_LIMIT}, ask for fewer",
+                "frames: {} in one run; at most {MAX_FRAMES}, ask for fewer",
                 self.frames
             ));
         }
         trace_fits(self.recorded_s(), self.trace_rate_hz)
     }
 
-    /// How long the recording is; of frames that follow each other freely, without them.
+    /// Length of the recording in seconds. Frames without V-sync are not counted: their length is unknown
+    /// yet.
     fn recorded_s(&self) -> f64 {
         let frames_s = match self.pacing {
             Pacing::Vsync { rate } => f64::from(self.frames) / rate.value(),
@@ -210,20 +211,20 @@ impl Size {
         frames_s + self.idle_s
     }
 
-    /// Samples of the trace.
+    /// Number of samples of the trace.
     pub fn trace_samples(&self) -> f64 {
         self.recorded_s() * self.trace_rate_hz
     }
 }
 
-/// Refuses a recording of `length_s` where its files would fill the disk.
+/// Checks that a recording of `length_s` stays below [`MAX_TRACE_SAMPLES`].
 pub(super) fn trace_fits(length_s: f64, rate_hz: f64) -> Result<(), RunError> {
     let samples = length_s * rate_hz;
-    if samples <= TRACE_LIMIT {
+    if samples <= MAX_TRACE_SAMPLES {
         return Ok(());
     }
     Err(RunError::Setting(format!(
-        "the trace: {length_s:.0} s at {rate_hz} samples a second are {samples:.1e} samples, more than {TRACE_LIMIT:.0e}; ask \
+        "the trace: {length_s:.0} s at {rate_hz} samples a second are {samples:.1e} samples, more than {MAX_TRACE_SAMPLES:.0e}; ask \
          for fewer frames, a lower --trace-rate, a higher --rate, or less lead_in_s and tail_s in the platform file"
     )))
 }
@@ -248,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_says_what_to_change() {
+    fn errors_of_size_name_the_setting_to_change() {
         assert!(message(Size { pixels: 1 << 28, samples: 256, ..size() }).contains("ask for fewer"));
         assert!(message(Size { frames: 10_000_000, ..size() }).contains("at most 100000"));
         assert!(message(Size { trace_rate_hz: 1e7, frames: 6000, ..size() }).contains("--trace-rate"));

@@ -1,36 +1,36 @@
-//! Triangles of a frame in the regimes of the failure catalogue, where tile tests are known to pay little.
+//! Numbers of triangles in the regimes of the failure catalogue, where tile tests are ineffective.
 
 use pipeline::geometry::Projection;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::{Camera, Draw, Viewport};
 use workloads::stress::set_up_all;
 
-/// How many triangles of a frame are in each regime. One may be in several.
+/// Number of triangles of a frame in each regime. A triangle may be in several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Regime {
-    /// Triangles that set-up lets pass and whose box meets the image.
+    /// Triangles that pass set-up and whose bounding box overlaps the image.
     pub in_view: u64,
-    /// Those that reach to the camera plane or behind it, so that their box is the whole image.
+    /// Triangles that reach the camera plane or go behind it. Their bounding box is the whole image.
     pub behind: u64,
-    /// Those whose image at both ends of the shutter is smaller than the spacing of samples.
+    /// Triangles whose image is smaller than the sample spacing at both ends of the shutter.
     pub tiny: u64,
-    /// Those whose image is a hundred times as long as high when the shutter opens.
+    /// Triangles whose image is a hundred times as long as high when the shutter opens.
     pub slivers: u64,
-    /// Those with a vertex that moves by more than the longer side of the image.
+    /// Triangles with a vertex that moves by more than the longer side of the image.
     pub fast: u64,
-    /// Those out of focus by more than the longer side of the image.
+    /// Triangles with a circle of confusion above the longer side of the image.
     pub blurred: u64,
-    /// Those so far or so near that products of their coordinates leave the range of f32.
+    /// Triangles whose products of coordinates leave the range of f32.
     pub extreme: u64,
 }
 
-/// A triangle this many times as long as high is a sliver.
+/// Smallest ratio of length to height of a sliver.
 const MIN_SLIVER_RATIO: f64 = 100.0;
-/// Products of three lengths beyond these lose digits or overflow in f32.
+/// Range of products of three lengths that keep all digits in f32.
 const F32_PRODUCT_RANGE: [f64; 2] = [1e-36, 1e37];
 
 impl Regime {
-    /// Of a frame with `per_pixel` samples in each pixel.
+    /// Counts the triangles of a frame with `per_pixel` samples per pixel.
     pub fn of(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport, per_pixel: u32) -> Self {
         let shear = Projection::new(camera, viewport).shear;
         let side_px = f64::from(viewport.width().max(viewport.height()));
@@ -61,7 +61,7 @@ impl Regime {
     }
 }
 
-/// What decides the regime of a triangle besides itself.
+/// Image scale that regimes are relative to.
 struct ImageScale {
     spacing_px: f64,
     side_px: f64,
@@ -73,17 +73,17 @@ impl ImageScale {
         (0..3).all(|k| distance(corners[k], corners[(k + 1) % 3]) < self.spacing_px)
     }
 
-    /// The radius of the circle of confusion at depth `w`.
+    /// Radius of the circle of confusion at depth `w`, in pixels.
     fn blur_px(&self, w: f64) -> f64 {
         self.lens.circle(0, w).abs()
     }
 
-    /// What a place on the image is multiplied with for a vertex at this depth.
+    /// Homogeneous weight of a vertex at this depth: 1 for an orthographic camera.
     fn weight(&self, depth: f64) -> f64 {
         if self.lens.parallel { 1.0 } else { depth }
     }
 
-    /// Whether the product of an edge and a depth, both as a sample may see them, leaves the range.
+    /// Whether the product of an edge and a depth leaves the range, for any lens position and time.
     fn is_extreme(&self, seen: &[[[f64; 3]; 3]; 2]) -> bool {
         let largest = |axis: usize| seen.as_flattened().iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
         let (w, half) = (largest(2), 0.5 * self.side_px * self.weight(largest(2)));
@@ -96,7 +96,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
-/// Whether the longest side is so many times the height above it.
+/// Whether the longest side is at least [`MIN_SLIVER_RATIO`] times the height above it.
 fn is_sliver(corners: &[[f64; 2]; 3]) -> bool {
     let [a, b, c] = corners;
     let twice_area = ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs();
@@ -110,7 +110,7 @@ mod tests {
     use workloads::stress::{PER_PIXEL, Size, family};
     use workloads::visibility::Unshaded;
 
-    /// The share of triangles in a regime, of a family at one of its values.
+    /// Share of triangles in a regime, of a stress family at one value.
     fn share(name: &str, value: f64, of: fn(&Regime) -> u64) -> f64 {
         let size = Size { side_px: 64, triangles: 200 };
         let scene = family(name).unwrap().scene(value, size, 1).unwrap();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn families_are_in_their_regimes_at_one_end_and_not_at_the_other() {
+    fn stress_families_reach_their_regimes_at_one_end_only() {
         type Case = (&'static str, f64, f64, fn(&Regime) -> u64);
         let cases: [Case; 6] = [
             ("slivers", 1.0, 1e4, |regime| regime.slivers),

@@ -16,7 +16,7 @@ use crate::heat::heat_name;
 use crate::pictures::{Plot, parts_in_use};
 use crate::{Host, Input, Outcome, RunError};
 
-/// Fills the report.
+/// Collects the contents of the report.
 pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
     let plan = &outcome.plan;
     Ok(Report {
@@ -50,7 +50,7 @@ fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
 fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
     let viewport = outcome.plan.viewport;
     let mut pictures: Vec<_> = outcome.simulated.pictures.iter().collect();
-    // The middle one first, large; the others in order as thumbnails.
+    // The middle image comes first and large; the others follow in order as thumbnails.
     let middle = pictures.len() / 2;
     pictures[..=middle].rotate_right(1);
     let shown = outcome.plan.work.shows();
@@ -110,12 +110,12 @@ fn frames(outcome: &Outcome) -> Vec<FrameRow> {
             power_w: m.power_w(),
         }),
         truth: Some(FrameNumbers { time_s: row.duration_s, energy_j: row.energy_j, power_w: row.power_w }),
-        flags: remarks(row.predicted, measured.map_or("missed".to_owned(), |m| m.flags.to_string())),
+        flags: frame_flags(row.predicted, measured.map_or("missed".to_owned(), |m| m.flags.to_string())),
     })
     .collect()
 }
 
-fn remarks(predicted: bool, flags: String) -> String {
+fn frame_flags(predicted: bool, flags: String) -> String {
     match (predicted, flags.is_empty()) {
         (false, _) => flags,
         (true, true) => "predicted".to_owned(),
@@ -132,7 +132,7 @@ fn units(outcome: &Outcome) -> Vec<UnitRow> {
             doc: unit.doc().to_owned(),
             busy: share,
             modelled: share.is_some(),
-            note: if share.is_some() { "" } else { "nothing in the scene asks for it" }.to_owned(),
+            note: if share.is_some() { "" } else { "not used by the scene" }.to_owned(),
         }
     };
     Unit::ALL.into_iter().map(row).collect()
@@ -156,7 +156,7 @@ fn counters(outcome: &Outcome) -> Vec<CounterRow> {
     Event::ALL.into_iter().map(row).collect()
 }
 
-/// What was run.
+/// Facts below the heading: scene, hardware, model, limits.
 fn facts(outcome: &Outcome) -> Vec<FactRow> {
     let (plan, summary) = (&outcome.plan, &outcome.summary);
     let mut facts = vec![
@@ -184,7 +184,7 @@ fn bound(bound: Bound) -> &'static str {
     }
 }
 
-/// Settings as they came to be.
+/// Settings in use.
 fn settings(outcome: &Outcome) -> Vec<FactRow> {
     let settings = &outcome.summary.settings;
     let device = outcome.measurement.device.spec();
@@ -216,7 +216,7 @@ fn settings(outcome: &Outcome) -> Vec<FactRow> {
     rows
 }
 
-/// The camera of the first frame; of a workload, which has its own, the lens.
+/// Camera of the first frame; for a workload only the lens.
 fn camera(outcome: &Outcome) -> Vec<FactRow> {
     let lens = |radius: f32| match radius > 0.0 {
         true => format!("radius {radius} scene units"),
@@ -249,7 +249,7 @@ fn camera(outcome: &Outcome) -> Vec<FactRow> {
     ]
 }
 
-/// The files that the run was made from.
+/// Input files.
 fn inputs(outcome: &Outcome) -> Vec<FactRow> {
     let row = |input: &Input| FactRow {
         name: input.path.clone(),
@@ -259,7 +259,7 @@ fn inputs(outcome: &Outcome) -> Vec<FactRow> {
     outcome.summary.inputs.iter().map(row).collect()
 }
 
-/// The program, the call and the machine.
+/// Program, command line and host.
 fn host(outcome: &Outcome) -> Vec<FactRow> {
     let Host { command, directory, revision, threads, cores, cpu, system, architecture } =
         &outcome.summary.host;
@@ -280,7 +280,7 @@ fn frame_range(outcome: &Outcome) -> String {
     format!("{} ({}..{})", frames.end - frames.start, frames.start, frames.end)
 }
 
-/// The files beside the report.
+/// Files beside the report, with descriptions.
 fn files(outcome: &Outcome) -> Vec<FileLink> {
     let heat = [(
         "heat/",

@@ -1,4 +1,4 @@
-//! The frames of a run through pipeline, clock and watts.
+//! Simulation of all frames of a run.
 
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::Sampling;
 use output::OutDir;
 use output::progress::Progress;
 
-/// Simulates the frames that the plan asks for, writing the image of each as soon as it is done.
+/// Simulates the frames that the plan requires and writes each image when its frame is done.
 pub(super) fn simulate(
     plan: &Plan,
     distinct: &Distinct,
@@ -18,26 +18,26 @@ pub(super) fn simulate(
 ) -> Result<Simulated, RunError> {
     let max_bins = max_bins_per_frame(distinct.numbers().len());
     let simulator = FrameSimulator { plan, distinct, dir: Some(dir), max_bins };
-    if plan.options.sampling == Sampling::Every || few_differ(distinct, plan.options.sampling) {
+    if plan.options.sampling == Sampling::Every || has_few_distinct(distinct, plan.options.sampling) {
         return every(&simulator, progress);
     }
     sampled::simulate(&simulator, progress)
 }
 
-/// Whether frames repeat so often that simulating all that differ takes no more than predicting some of them.
-fn few_differ(distinct: &Distinct, sampling: Sampling) -> bool {
+/// Whether there are so few distinct frames that prediction would save nothing.
+fn has_few_distinct(distinct: &Distinct, sampling: Sampling) -> bool {
     let (differ, all) = (distinct.numbers().len(), distinct.groups().len());
     differ == 1 || differ < all && differ <= sampling.first(all)
 }
 
-/// Simulates the frames that the plan asks for, each of them, and writes nothing.
+/// Simulates all distinct frames without writing files.
 pub(super) fn without_files(plan: &Plan, progress: &Progress) -> Result<Simulated, RunError> {
     let distinct = &Distinct::new(&plan.work)?;
     let max_bins = max_bins_per_frame(distinct.numbers().len());
     every(&FrameSimulator { plan, distinct, dir: None, max_bins }, progress)
 }
 
-/// Simulates every frame that differs. Pictures are kept of the first, the middle and the last.
+/// Simulates all distinct frames. Keeps the images of the first, the middle and the last.
 fn every(simulator: &FrameSimulator<'_>, progress: &Progress) -> Result<Simulated, RunError> {
     let numbers = simulator.distinct.numbers();
     let middle = numbers[numbers.len() / 2];

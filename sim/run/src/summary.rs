@@ -20,10 +20,10 @@ use crate::{
     Simulated, Verified, warn,
 };
 
-/// A run in numbers.
+/// Contents of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Version of the form of this file.
+    /// Schema version.
     pub schema: u32,
     /// Version of the program.
     pub version: &'static str,
@@ -33,59 +33,59 @@ pub struct Summary {
     pub gpu: String,
     /// Name of the platform.
     pub platform: String,
-    /// Name of the energy table, and which of its values were used.
+    /// Name and column of the energy table.
     pub energy_table: [String; 2],
-    /// What was asked for: all that the results depend on but the content of `inputs`.
+    /// Options of the run. Results depend on these and on the contents of `inputs`.
     pub request: RunOptions,
-    /// The files that the run was made from, by name.
+    /// Input files, sorted by name.
     pub inputs: Vec<Input>,
     /// Settings in use.
     pub settings: SettingsSummary,
-    /// The camera of the first frame; workloads have cameras of their own.
+    /// Camera of the first frame; `None` for workloads.
     pub camera: Option<CameraUsed>,
-    /// What was modelled and what not.
+    /// Dimensions and units that were modelled.
     pub modelled: Modelled,
-    /// Regimes in which the methods are known to be bad.
+    /// Warnings.
     pub warnings: Vec<Warning>,
-    /// Frames as measured in the trace; nothing where no frame was found but the marked one.
+    /// Frames as measured in the trace; `None` if only the marked frame was found.
     pub measured: Option<Figures>,
-    /// Frames as the simulator knows them.
+    /// Frames as simulated: the ground truth.
     pub truth: Option<Figures>,
-    /// How finely the frames were recorded.
+    /// Sampling rate relative to the frames.
     pub recorder: Resolution,
-    /// Found against true frame starts.
+    /// Found frame starts compared with true ones.
     pub detection: Detection,
-    /// Sums that have to agree.
+    /// Consistency checks.
     pub checks: Checks,
-    /// Joules of the run by part, start of the first frame to end of the last.
+    /// Energy by part in joules, from the first frame's start to the last frame's end.
     pub energy_by_part_j: Energy,
-    /// Mean watts of the run by part.
+    /// Mean power by part in watts.
     pub power_by_part_w: BTreeMap<&'static str, f64>,
-    /// Share of the run's frame time for which each unit in use was busy.
+    /// Busy time of each unit in use, as a share of the frames' busy time.
     pub unit_busy: BTreeMap<&'static str, f64>,
-    /// What each unit did and waited for, in shares of its time; where the level of timing knows.
+    /// Busy, idle and stalled shares of each unit's time, if the timing level records stalls.
     pub stalls: BTreeMap<&'static str, StallShares>,
-    /// Samples hit over samples tested.
+    /// Sample test efficiency: samples hit over samples tested.
     pub sample_test_efficiency: Option<f64>,
-    /// What a workload found out, its mean over frames.
+    /// Results of a workload by name, means over frames.
     pub facts: BTreeMap<&'static str, f64>,
-    /// How often each event happened in the frames that were simulated.
+    /// Event counts of the simulated frames.
     pub counts: Counts,
-    /// A hash of the counts of every frame that was simulated: equal runs have equal hashes.
+    /// Hash of the event counts of all simulated frames. Equal runs have equal hashes.
     pub counts_hash: String,
-    /// What was chosen for the accuracy or the time that was asked for.
+    /// Choice for the requested accuracy or time budget.
     pub choice: Option<Choice>,
-    /// Actual errors, where they were asked for.
+    /// Actual errors, with `--verify`.
     pub verified: Option<Verified>,
-    /// Which frames were simulated and how sure the others are, where not all were.
+    /// Simulated frames and confidence intervals of a sampled run.
     pub sampled: Option<SampledSummary>,
-    /// Every frame of the run.
+    /// All frames of the run.
     pub frames: Vec<FrameRow>,
-    /// The program, the call and the machine. Everything else is the same on every machine.
+    /// Program, command line and host. All other keys are equal on every machine.
     pub host: Host,
 }
 
-/// Settings as they came to be.
+/// Settings in use.
 #[derive(Clone, Debug, Serialize)]
 #[allow(missing_docs, reason = "the names say it, documented at their sources")]
 pub struct SettingsSummary {
@@ -106,12 +106,12 @@ pub struct SettingsSummary {
     pub triangles: usize,
 }
 
-/// A table of frames in a few numbers.
+/// Statistics over frames.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Figures {
-    /// How many frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Seconds from start to start.
+    /// Seconds from start to start of the next.
     pub duration_s: Spread,
     /// Joules.
     pub energy_j: Spread,
@@ -119,7 +119,7 @@ pub struct Figures {
     pub energy_per_pixel_j: Spread,
     /// Watts.
     pub power_w: Spread,
-    /// Joules of all frames.
+    /// Energy of all frames in joules.
     pub total_j: f64,
 }
 
@@ -141,7 +141,7 @@ fn scaled(spread: Spread, by: f64) -> Spread {
     Spread { mean: spread.mean * by, deviation: spread.deviation * by, median: spread.median * by }
 }
 
-/// How the frame finder did.
+/// Precision and errors of the found frame starts.
 #[derive(Clone, Debug, Serialize)]
 #[allow(missing_docs, reason = "the terms of information retrieval")]
 pub struct Detection {
@@ -157,7 +157,7 @@ pub struct Detection {
 }
 
 impl Summary {
-    /// The quantities that people compare, measured beside true, mean and standard deviation over frames in SI units.
+    /// Time, energy and power per frame, measured and true: mean and standard deviation in SI units.
     pub fn headline(&self) -> Vec<Headline> {
         let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread| {
             let number = |figures: &Option<Figures>| {
@@ -174,7 +174,7 @@ impl Summary {
         ]
     }
 
-    /// What was chosen, what was predicted and how wrong it was, in words; nothing where nothing of that was asked for.
+    /// Choice, confidence intervals and actual errors as text rows; empty for a plain run.
     pub fn accuracy_rows(&self) -> Vec<(&'static str, String)> {
         let mut rows: Vec<(&'static str, String)> = Vec::new();
         rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
@@ -183,7 +183,7 @@ impl Summary {
         rows
     }
 
-    /// With a warning where what was asked for is not met.
+    /// Adds the warnings about a missed accuracy or budget.
     pub(super) fn with_choice_warnings(mut self) -> Self {
         self.warnings.extend(self.choice.iter().flat_map(warn::missed_requests));
         self.warnings = Warning::fold(self.warnings);
@@ -242,7 +242,7 @@ impl Summary {
     }
 }
 
-/// The mean over frames of each fact that frames know.
+/// Mean over frames of each result of a workload.
 fn facts(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     let mut sums: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
     for fact in simulated.known().flat_map(|frame| &frame.facts) {
@@ -253,7 +253,7 @@ fn facts(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     sums.into_iter().map(|(name, [sum, count])| (name, sum / count)).collect()
 }
 
-/// The true frames in the form of measured ones, for the same statistics.
+/// True frames in the form of measured frames, for the same statistics.
 fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
     let frame = |f: &power_model::PacedFrame| FrameEnergy {
         start_s: f.start_s,
@@ -301,7 +301,7 @@ fn detection(measurement: &Measurement) -> Detection {
     }
 }
 
-/// Busy time over the time of the frames, idle between them not counted.
+/// Busy time of each unit over the busy time of the frames.
 fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     let total = simulated.total();
     let time: f64 = simulated.in_order().map(|frame| frame.power.duration_s()).sum();
@@ -312,24 +312,24 @@ fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
 }
 
-/// One frame of a run.
+/// Frame of a run, in `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameRow {
-    /// Its number in the scene.
+    /// Frame number in the scene.
     pub frame: u32,
-    /// Its image; a frame that was predicted has none.
+    /// Image file; `None` for a predicted frame.
     pub image: Option<String>,
-    /// Whether it was predicted from others.
+    /// Whether the frame was predicted.
     pub predicted: bool,
-    /// A hash of its counts, the same at every level of timing; a frame that was predicted has none.
+    /// Hash of its event counts, equal at every timing level; `None` for a predicted frame.
     pub counts_hash: Option<String>,
     /// True start in seconds from the start of the recording.
     pub start_s: f64,
-    /// Cycles of the core clock for which the GPU worked on it.
+    /// Busy time in cycles of the core clock.
     pub cycles: u64,
-    /// For how long the GPU worked on it, in seconds.
+    /// Busy time in seconds.
     pub busy_s: f64,
-    /// From start to start, in seconds.
+    /// Time to the start of the next frame, in seconds.
     pub duration_s: f64,
     /// True energy in joules.
     pub energy_j: f64,
@@ -337,31 +337,31 @@ pub struct FrameRow {
     pub energy_per_pixel_j: f64,
     /// True mean power in watts.
     pub power_w: f64,
-    /// True energy by part in joules; summed in this order it is the frame's, exactly.
+    /// True energy by part in joules. Summed in this order they give the frame's energy exactly.
     pub energy_by_part_j: Energy,
-    /// Where it was predicted: the ends of the interval in which its cycles lie.
+    /// Ends of the interval of the cycles, for a predicted frame.
     pub cycles_interval: Option<[f64; 2]>,
-    /// The same for its energy, in joules.
+    /// Ends of the interval of the energy in joules, for a predicted frame.
     pub energy_interval_j: Option<[f64; 2]>,
-    /// Energy as measured in the trace, in joules, where the frame was found.
+    /// Energy measured in the trace in joules; `None` if the frame was not found.
     pub measured_energy_j: Option<f64>,
-    /// Error of the found start in seconds.
+    /// Error of the found start in seconds; `None` if the frame was not found.
     pub start_error_s: Option<f64>,
 }
 
-/// A hash of counts that goes on from that of others.
+/// Hash of counts, continued from `seed`.
 fn hash(seed: u64, counts: &Counts) -> u64 {
     Event::ALL.iter().fold(seed, |hash: u64, &event| {
         pipeline::random::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
     })
 }
 
-/// The interval of `half` the width around a value.
+/// Interval of half-width `half` around a value, not below 0.
 fn around(value: f64, half: Option<f64>) -> Option<[f64; 2]> {
     half.map(|half| [(value - half).max(0.0), value + half])
 }
 
-/// Every frame of the run.
+/// All frames of the run.
 fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
     let first = plan.work.settings().frames.start;
     measurement

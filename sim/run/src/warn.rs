@@ -12,7 +12,7 @@ use warnings::{Code, Warning};
 use crate::measure::MIN_BUSY_SAMPLES;
 use crate::{Choice, Measurement, Observed, Plan, Regime, RunFrame, Simulated, gpu};
 
-/// Every warning of a run, sorted and each once.
+/// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.work.warnings().to_vec();
     all.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
@@ -24,14 +24,14 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     ));
     all.extend(measurement.run.warnings.iter().cloned());
     let short = short_frames(measurement);
-    // A run of one frame has no other that could resemble it, and frames too short to be seen resemble nothing.
+    // In a run of one frame, or of frames that are too short, finding only the mark is expected.
     let unseen = short.is_some() && measurement.is_mark_alone();
     let explained = simulated.frames.len() == 1 || unseen;
     let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
     all.extend(of_trace.filter_map(|w| Some(Warning::new(Code::named(w.code)?, w.message.clone()))));
     all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
-    all.extend(nothing_seen(simulated));
+    all.extend(empty_frames(simulated));
     all.extend(start_errors(measurement).filter(|_| short.is_none()));
     all.extend(short);
     all.extend(detection(measurement).filter(|_| !unseen));
@@ -43,7 +43,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     Warning::fold(all)
 }
 
-/// The warnings of single frames: of each code the message of the first frame that has it, with the number of frames where they
+/// Merges warnings of frames by code: the message of the first frame, with the number of frames if messages
 /// differ.
 fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) -> Vec<Warning> {
     let of = frames.len();
@@ -64,7 +64,7 @@ fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) ->
     by_code.into_values().map(joined).collect()
 }
 
-/// Accuracy warnings of the timing level: of each code, the frame with the largest extent.
+/// Accuracy warnings of the timing level: for each code, the frame with the largest extent.
 fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
     let mut worst: Vec<(u32, AccuracyWarning)> = Vec::new();
     let all =
@@ -98,7 +98,7 @@ fn degenerate(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
+fn empty_frames(simulated: &Simulated) -> Option<Warning> {
     let empty = simulated.known().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
     (empty > 0).then(|| {
         Warning::new(
@@ -108,7 +108,7 @@ fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-/// A choice that is not as good, or not as fast, as was asked for.
+/// Warnings about a choice that misses the requested accuracy or the time budget.
 pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
     let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
     let late = late.map(|(budget_s, expected_s)| {
@@ -132,7 +132,7 @@ pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
     late.into_iter().chain(inexact).collect()
 }
 
-/// Intervals wider than this share of their value either way are worth a word.
+/// Relative half-width in percent above which an interval gives a warning.
 const MAX_HALF_WIDTH_PERCENT: f64 = 5.0;
 
 fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
@@ -151,7 +151,7 @@ fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-/// Frames whose work the recorder may miss between two samples, with the remedy and what came of it.
+/// Warning about frames that are busy for less than two samples.
 fn short_frames(measurement: &Measurement) -> Option<Warning> {
     let resolution = &measurement.resolution;
     let frames = &measurement.run.frames;
@@ -195,7 +195,7 @@ fn detection(measurement: &Measurement) -> Option<Warning> {
     })
 }
 
-/// Starts that count as found and yet are so far off that energy moves from frame to frame.
+/// Warning about found starts that are off by more than half of the frame's busy time.
 fn start_errors(measurement: &Measurement) -> Option<Warning> {
     let found = measurement.by_true_frame();
     let off = measurement.run.frames.iter().zip(found).filter_map(|(frame, found)| {
@@ -216,7 +216,7 @@ fn start_errors(measurement: &Measurement) -> Option<Warning> {
     Some(Warning::new(Code::StartError, message))
 }
 
-/// A platform that draws more between frames than while the GPU works.
+/// Warning about a platform whose idle power is above the power of a frame.
 fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
     let idle_w = plan.platform.idle_w.value();
     let busy_w = |frame: &RunFrame| frame.power.energy().total_j() / frame.power.duration_s();
@@ -246,12 +246,15 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
     measurement.trace.losses().map(|losses| Warning::new(Code::PacketsLost, losses))
 }
 
-/// Shares of triangles in view from which a regime is worth a word.
+/// Smallest share of triangles in view for a warning about tiny triangles.
 const TINY_SHARE: f64 = 0.5;
+/// The same for slivers and blur.
 const SLIVER_OR_BLURRED_SHARE: f64 = 0.25;
+/// The same for triangles behind the camera and fast motion.
 const BEHIND_OR_FAST_SHARE: f64 = 0.1;
 
-/// The warnings of a run, each about the frame that is worst.
+/// Warnings about triangles for which tile tests are ineffective, each for the worst frame. Results stay
+/// correct.
 fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
     [
         behind(simulated),
@@ -266,8 +269,8 @@ fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
     .collect()
 }
 
-/// The frame in which most triangles are in a regime, where these are at least `share` of those in view: `of` which, for
-/// example, `12 of 40 triangles in view (frame 3)`.
+/// Frame with the most triangles of a regime, counted by `of`, if they are at least `share` of those in view.
+/// The text is, for example, `12 of 40 triangles in view (frame 3)`.
 fn worst_frame(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
     let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
     let (count, all) = (of(&observed.regime), observed.regime.in_view);
@@ -365,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_intervals_are_told_and_narrow_ones_are_not() {
+    fn only_wide_intervals_give_a_warning() {
         let of = |percent: f64| {
             let relative_half_width = percent / 100.0;
             let quantity =
@@ -394,7 +397,7 @@ mod tests {
         assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
     }
 
-    /// The codes of every stream that breaks a level, where there are any.
+    /// Warning codes of the failure streams at a level.
     fn codes(level: Level) -> Vec<(String, Code)> {
         let mut found = Vec::new();
         for name in ["mobile", "reference", "discrete"] {
@@ -415,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_that_break_a_level_are_warned_about_and_others_are_not() {
+    fn only_failure_streams_give_accuracy_warnings() {
         let rows = ["discrete", "mobile", "reference"]
             .map(|gpu| (format!("row after row on {gpu}"), Code::MemoryRows));
         assert_eq!(codes(Level::Packet), rows);

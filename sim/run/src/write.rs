@@ -14,7 +14,7 @@ use crate::frame::image_name;
 use crate::heat::heat_name;
 use crate::{FIGURES, Outcome, Plan, RunError, pictures, report, stalls};
 
-/// The files that a run may write.
+/// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
     let ends: &[&str] = if plan.options.exr { &["png", "exr"] } else { &["png"] };
     let frames = || plan.work.settings().frames.clone();
@@ -30,7 +30,7 @@ pub(super) fn claim(plan: &Plan) -> Claim {
         .files(["timeline.perfetto-trace", "report.html", SUMMARY])
 }
 
-/// Writes everything but the images, which are there already.
+/// Writes all files except images, which the simulation has written.
 pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Result<(), RunError> {
     let bar = progress.bar("files", 4);
     let trace = &outcome.measurement.trace;
@@ -63,13 +63,14 @@ fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
         }
         let mut plain = Vec::new();
         table.write_csv(&mut plain)?;
-        marked(outcome, &plain, out)
+        with_intervals(outcome, &plain, out)
     })?;
     Ok(())
 }
 
-/// The table with columns that say which frames were predicted, and the ends of the intervals in which their energies lie.
-fn marked(outcome: &Outcome, plain: &[u8], out: &mut dyn Write) -> Result<(), BoxError> {
+/// Writes the table `plain` with three more columns: whether a frame is predicted, and the ends of its energy
+/// interval.
+fn with_intervals(outcome: &Outcome, plain: &[u8], out: &mut dyn Write) -> Result<(), BoxError> {
     let mut reader = csv::Reader::from_reader(plain);
     let mut writer = csv::Writer::from_writer(out);
     let mut header = reader.headers()?.clone();
@@ -95,7 +96,7 @@ fn marked(outcome: &Outcome, plain: &[u8], out: &mut dyn Write) -> Result<(), Bo
 
 const NS: f64 = 1e9;
 
-/// The timeline of a run: frames, the units in use, and power in total and by part.
+/// Timeline for the Perfetto viewer: frames, units in use, total power and power by part.
 fn timeline<'a>(outcome: &'a Outcome, process: &'a str) -> Timeline<'a> {
     let total = outcome.simulated.total();
     let units = Unit::ALL

@@ -44,7 +44,7 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     print(&format!("{}took {:.1} s", text(args, &outcome), started.elapsed().as_secs_f64()))
 }
 
-/// Says how long the run will take, where that can be known.
+/// Prints the expected time of a run of a scene.
 fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunError> {
     if let Some(expected) = prepared.expected()? {
         progress.note(&format!("expected time: {}", expected.line()));
@@ -52,7 +52,7 @@ fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunErro
     Ok(())
 }
 
-/// Prints what would be run and where results would go.
+/// Prints a description of the run and the folder of results.
 fn dry_run(args: &RunArgs, dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
     if args.json {
         return print_json(dry_run, true);
@@ -87,7 +87,7 @@ fn options(args: &RunArgs) -> RunOptions {
     }
 }
 
-/// The summary with the folder it was written to.
+/// Summary with the folder it was written to.
 #[derive(Serialize)]
 struct Printed<'a> {
     out: String,
@@ -95,7 +95,7 @@ struct Printed<'a> {
     summary: &'a Summary,
 }
 
-/// What a run says on a terminal.
+/// Text of a finished run for the terminal.
 fn text(args: &RunArgs, outcome: &Outcome) -> String {
     let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
     let mut lines = vec![
@@ -124,7 +124,7 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
     lines.join("\n")
 }
 
-/// What was chosen, predicted and verified; a line each.
+/// One line each for the choice, the predicted intervals and the actual errors.
 fn accuracy_lines(summary: &Summary) -> String {
     let lines = summary.accuracy_rows().into_iter().map(|(name, value)| format!("{name}: {value}\n"));
     lines.collect()
@@ -144,7 +144,7 @@ fn found(summary: &Summary) -> String {
     )
 }
 
-/// Measured beside true, a row for each quantity.
+/// Table of measured and true values, one row per quantity.
 fn figures(outcome: &Outcome) -> Table {
     let mut table = Table::new(["", "measured in the trace", "simulator's truth"]);
     for row in outcome.summary.headline() {

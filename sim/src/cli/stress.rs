@@ -8,7 +8,7 @@ use output::progress::Progress;
 use output::terminal::Terminal;
 
 pub(super) fn run(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure> {
-    // The folder first: that it cannot be written is better known before the work than after it.
+    // Open the folder first, so that an unwritable one is reported before the work.
     let out = Destination { folder: args.out.clone(), force: args.force };
     let mut dir = out.open([experiments::stress::claim()])?;
     let pool = super::threads(args.threads)?;

@@ -20,45 +20,45 @@ use crate::{Distinct, FrameCost, Plan, Requested, RunError, RunFrame, Sampling, 
 
 pub use decide::cheapest_level;
 
-/// What was chosen, why, and how wrong it is expected to be. Errors are relative.
+/// Choice of level, frames and dimensions, with the expected relative error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Choice {
-    /// The accuracy that was asked for.
+    /// Requested accuracy.
     pub accuracy: Option<f64>,
-    /// The time that was asked for.
+    /// Time budget in seconds.
     pub budget_s: Option<f64>,
-    /// The level of timing.
+    /// Timing level.
     pub level: Level,
-    /// Which frames are simulated; the others are predicted.
+    /// Simulated frames; the others are predicted.
     pub sampling: Sampling,
-    /// The dimensions of each triangle that are drawn.
+    /// Dimensions of the rasterizer in use.
     pub dimensions: Dimensions,
-    /// What the probe found.
+    /// Results of the probe.
     pub probe: ProbeSummary,
-    /// Expected error of cycles and energy of the run by the level and the dimensions, as the probe found it.
+    /// Expected error of cycles and energy due to level and dimensions, from the probe.
     pub level_error: f64,
-    /// Expected error of cycles and energy of the run: that of level and dimensions, and half of the widest interval where frames are
-    /// predicted.
+    /// Expected error of cycles and energy: `level_error`, plus the half-width of the widest interval if
+    /// frames are predicted.
     pub expected_error: f64,
-    /// Whether that is within the accuracy asked for, where one was.
+    /// Whether `expected_error` is within the requested accuracy, if given.
     pub meets_accuracy: Option<bool>,
-    /// Seconds that simulating was expected to take; only where a budget was given, as it is no property of the scene.
+    /// Expected time of the simulation in seconds, only with a budget: it depends on the host.
     pub expected_host_s: Option<f64>,
 }
 
-/// The dimensions of each triangle that are drawn.
+/// Dimensions of the rasterizer in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Dimensions {
-    /// As they are.
+    /// All dimensions.
     All,
-    /// Motion and blur of less than a quarter pixel are left out.
+    /// Motion and blur below a quarter pixel are omitted.
     WithoutSmallBlur,
 }
 
 impl Dimensions {
-    const fn words(self) -> &'static str {
+    const fn description(self) -> &'static str {
         match self {
             Self::All => "all",
             Self::WithoutSmallBlur => "without motion and blur of less than a quarter pixel",
@@ -66,24 +66,24 @@ impl Dimensions {
     }
 }
 
-/// What the probe found. Errors are relative, the worst of its frames, of cycles and energy, against `stepped`.
+/// Results of the probe. Errors are relative to `stepped`: the largest of its frames, of cycles and energy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSummary {
-    /// Frames that were looked at.
+    /// Frames of the probe.
     pub frames: Vec<u32>,
     /// Width and height of the image.
     pub size: [u32; 2],
-    /// The error of each level.
+    /// Error of each timing level.
     pub error: BTreeMap<Level, f64>,
-    /// The error of leaving out dimensions that hardly show, where any triangle has some.
+    /// Error of omitting small motion and blur; `None` if no triangle has any.
     pub dimensions_error: Option<f64>,
-    /// The share of multiply-adds of tests that this saves.
+    /// Share of the tests' multiply-adds that this saves.
     pub dimensions_saved: Option<f64>,
 }
 
-/// Probes the scene, or takes the choice `made` by the run that is repeated, and changes the plan to it; nothing where nothing was
-/// wished.
+/// Chooses by a probe, or takes the `recorded` choice of a repeated run, and changes the plan accordingly.
+/// `None` without a requested accuracy or budget.
 pub(super) fn choose(
     plan: &mut Plan,
     recorded: Option<Choice>,
@@ -129,12 +129,12 @@ fn probed(
 }
 
 impl Choice {
-    /// Adds what is known when frames have been predicted.
+    /// Adds the error of predicted frames and compares with the requested accuracy.
     pub(super) fn add_prediction_error(&mut self, simulated: &Simulated) {
         if let Some(sampled) = &simulated.sampled {
             self.expected_error += sampled.worst();
         }
-        self.meets_accuracy = self.accuracy.map(|asked| self.expected_error <= asked);
+        self.meets_accuracy = self.accuracy.map(|accuracy| self.expected_error <= accuracy);
     }
 
     /// A line for the terminal and the report.
@@ -143,24 +143,24 @@ impl Choice {
             Sampling::Every => "every frame",
             _ => "some frames, the others predicted",
         };
-        let asked =
-            self.accuracy.map(|asked| format!(" of {} % asked for", asked * 100.0)).unwrap_or_default();
+        let requested =
+            self.accuracy.map(|accuracy| format!(" of {} % requested", accuracy * 100.0)).unwrap_or_default();
         let time =
             self.expected_host_s.map(|s| format!(", about {s:.1} s on this machine")).unwrap_or_default();
         format!(
-            "{}, {frames}, dimensions: {}, memory: {}; expected error {:.2} %{asked}{time}",
+            "{}, {frames}, dimensions: {}, memory: {}; expected error {:.2} %{requested}{time}",
             self.level.name(),
-            self.dimensions.words(),
+            self.dimensions.description(),
             memory(self.level),
             self.expected_error * 100.0
         )
     }
 }
 
-/// Motion and blur below this many pixels may be left out.
+/// Largest motion and blur in pixels that may be omitted.
 const MAX_OMITTED_BLUR_PX: f32 = 0.25;
 
-/// The features with thresholds for motion and blur, in an image that is `by` times smaller; never lower than they are.
+/// Raises the thresholds for motion and blur, for an image that is `by` times smaller.
 fn with_blur_thresholds(features: Features, by: f32) -> Features {
     let threshold = MAX_OMITTED_BLUR_PX / by;
     Features {
@@ -178,18 +178,18 @@ fn memory(level: Level) -> &'static str {
     }
 }
 
-/// Actual errors of the run against `stepped`, frame for frame.
+/// Actual relative errors of a run, compared with `stepped` frame by frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Verified {
-    /// Error of the cycles of all frames together.
+    /// Error of the sum of cycles.
     pub cycles_error: f64,
-    /// Error of their energy, idle not counted.
+    /// Error of the sum of energies, without idle time.
     pub energy_error: f64,
     /// Error of mean power while busy.
     pub power_error: f64,
-    /// The larger of the errors of cycles and energy.
+    /// Larger of the errors of cycles and energy.
     pub error: f64,
-    /// The worst error of the cycles of a single frame.
+    /// Largest error of the cycles of a frame.
     pub worst_frame_error: f64,
 }
 
@@ -206,7 +206,7 @@ impl Verified {
     }
 }
 
-/// Simulates every frame that differs once more, at the reference.
+/// Simulates all distinct frames again at the reference level, with all dimensions.
 pub(super) fn verify(plan: &Plan, simulated: &Simulated, progress: &Progress) -> Result<Verified, RunError> {
     let mut options = plan.options.clone();
     (options.timing, options.sampling, options.requested) =
@@ -218,7 +218,7 @@ pub(super) fn verify(plan: &Plan, simulated: &Simulated, progress: &Progress) ->
     Ok(compare(&simulated.distinct, &truth, &simulated.frames))
 }
 
-/// Compares frames found with true ones; `frames` holds for each frame of the run its index in both.
+/// Compares frames with reference frames. `frames` holds the index of each frame of the run in both.
 fn compare(found: &[RunFrame], truth: &[RunFrame], frames: &[usize]) -> Verified {
     let total = |distinct: &[RunFrame]| {
         let costs = frames.iter().map(|&index| distinct[index].cost());

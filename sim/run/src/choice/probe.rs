@@ -1,4 +1,4 @@
-//! A few frames at a reduced size, at every level.
+//! Probe: a few frames at a reduced size, simulated at every timing level.
 
 use std::time::Instant;
 
@@ -13,30 +13,32 @@ use super::decide::Findings;
 use super::{ProbeSummary, with_blur_thresholds};
 use crate::{Distinct, FrameCost, Plan, RunError, frame};
 
-/// Frames that are looked at: the middles of as many equal parts of the run.
+/// Largest number of probed frames: the middles of as many equal parts of the run.
 const MAX_FRAMES: usize = 3;
-/// The image is as many times smaller along each axis as leaves it so wide, and at most [`MAX_REDUCTION`] times.
+/// Width in pixels that images are reduced to, at most by a factor of [`MAX_REDUCTION`].
 const TARGET_WIDTH_PX: u32 = 320;
+/// Largest factor of the reduction along each axis.
 const MAX_REDUCTION: u32 = 4;
 
-/// What was looked at, and what was found.
+/// A finished probe: frames, image size and results.
 pub(super) struct Probe {
     numbers: Vec<u32>,
     viewport: Viewport,
     pub findings: Findings,
 }
 
-/// A frame at one level.
+/// Result of one frame at one level.
 struct ProbedFrame {
     cost: FrameCost,
     counts: Counts,
-    /// Seconds of the host: of the thread in the clock alone, and by the clock on the wall in the pipeline around it.
+    /// CPU seconds of the timing model.
     timing_s: f64,
+    /// Wall-clock seconds of the pipeline.
     pipeline_s: f64,
 }
 
 impl Probe {
-    /// Simulates some of the frames that differ.
+    /// Simulates some of the distinct frames.
     pub fn new(plan: &Plan, distinct: &Distinct, progress: &Progress) -> Result<Self, RunError> {
         let differ = distinct.numbers();
         let some = MAX_FRAMES.min(differ.len());
@@ -52,7 +54,7 @@ impl Probe {
             probe_frame(plan, number, viewport, by, &mut findings)?;
             bar.inc();
         }
-        // Host times are for all frames of the probe; a frame of the run has more pixels.
+        // Host times are sums over the probe's frames, at a reduced size.
         let scale = plan.pixels() as f64 / viewport.pixels() as f64 / some as f64;
         findings.scale_times(scale);
         Ok(Self { numbers, viewport, findings })
@@ -70,7 +72,7 @@ impl Probe {
     }
 }
 
-/// One frame at every level, and once more without dimensions that hardly show.
+/// Simulates a frame at every level, and once more without small motion and blur.
 fn probe_frame(
     plan: &Plan,
     number: u32,
@@ -81,13 +83,13 @@ fn probe_frame(
     let spec = &plan.gpu.pipeline;
     let truth = simulate_frame(plan, number, viewport, spec, Level::Stepped)?;
     for level in Level::ALL {
-        let seen = if level == Level::Stepped {
+        let probed = if level == Level::Stepped {
             None
         } else {
             Some(simulate_frame(plan, number, viewport, spec, level)?)
         };
-        let seen = seen.as_ref().unwrap_or(&truth);
-        findings.add(level, relative_error(&seen.cost, &truth.cost), seen.timing_s, seen.pipeline_s);
+        let probed = probed.as_ref().unwrap_or(&truth);
+        findings.add(level, relative_error(&probed.cost, &truth.cost), probed.timing_s, probed.pipeline_s);
     }
     let thresholds = PipelineSpec { features: with_blur_thresholds(spec.features, by as f32), ..*spec };
     let (exact, reduced) = (
@@ -97,7 +99,7 @@ fn probe_frame(
     if exact.counts != reduced.counts {
         findings.add_dimensions(
             relative_error(&reduced.cost, &exact.cost),
-            [&exact, &reduced].map(|seen| madds(&seen.counts)),
+            [&exact, &reduced].map(|probed| madds(&probed.counts)),
         );
     }
     Ok(())
@@ -140,7 +142,7 @@ fn simulate_frame(
     Ok(ProbedFrame { cost, counts: rendered.counts, timing_s, pipeline_s })
 }
 
-/// The larger of the relative errors of cycles and energy.
+/// Larger of the relative errors of cycles and energy.
 pub(super) fn relative_error(found: &FrameCost, truth: &FrameCost) -> f64 {
     let relative = |found: f64, truth: f64| if found == truth { 0.0 } else { (found / truth - 1.0).abs() };
     relative(found.cycles, truth.cycles).max(relative(found.energy_j, truth.energy_j))

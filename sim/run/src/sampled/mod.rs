@@ -24,18 +24,18 @@ use crate::{Distinct, Origin, Plan, RunError, RunFrame, SampledSummary, Simulate
 pub use forecast::{CONFIDENCE, Forecast};
 pub use preview::{FramePreview, Previewer, Signatures};
 
-/// Every frame at a glance, and one of them whole.
+/// Previews of the frames of a run, and the pilot frame.
 pub struct Previews {
-    /// The preview they were seen at.
+    /// Settings of the previews.
     pub previewer: Previewer,
-    /// The frames at a glance.
+    /// Preview of each frame.
     pub frames: Vec<FramePreview>,
-    /// The place of the frame that previews are scaled by.
+    /// Index of the pilot frame. It is simulated first, and previews are scaled by it.
     pub pilot: usize,
 }
 
 impl Previews {
-    /// Previews the frames called `numbers`.
+    /// Previews the frames `numbers`.
     pub fn new(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Self, RunError> {
         let previewer = Previewer::new(plan)?;
         let bar = progress.bar("previews", numbers.len() as u64);
@@ -48,20 +48,21 @@ impl Previews {
         Ok(Self { previewer, frames, pilot })
     }
 
-    /// The same previews for a run in which frame `place` is drawn as the frame at `groups[place]` of those previewed.
+    /// Previews of all frames of a run, from those of distinct frames: frame `i` belongs to group
+    /// `groups[i]`.
     fn for_frames(self, groups: &[usize]) -> Self {
         let frames: Vec<FramePreview> = groups.iter().map(|&group| self.frames[group]).collect();
         Self { pilot: preview::median(&frames), frames, ..self }
     }
 
-    /// Chooses `count` frames, the pilot among them.
+    /// Chooses `count` frames to simulate, including the pilot.
     pub fn design(&self, signatures: &Signatures, count: usize, seed: u64) -> Design {
         let word = |frame: u64| mix(mix(seed.wrapping_add(0x73A3_7D1E)) ^ frame);
         Design::draw(&signatures.cycles, Some(self.pilot), count, word)
     }
 }
 
-/// Simulates as many frames as the plan asks for and predicts the others.
+/// Simulates the frames that the plan requires and predicts the others.
 pub(super) fn simulate(simulator: &FrameSimulator<'_>, progress: &Progress) -> Result<Simulated, RunError> {
     let (plan, groups) = (simulator.plan, simulator.distinct.groups());
     let previews = Previews::new(plan, simulator.distinct.numbers(), progress)?.for_frames(groups);
@@ -81,8 +82,8 @@ pub(super) fn simulate(simulator: &FrameSimulator<'_>, progress: &Progress) -> R
     Ok(all_frames(plan, simulator.distinct, &previews, &forecast, whole))
 }
 
-/// Simulates the groups of the chosen frames that are not yet known. Pictures are kept of the first and the last of the first
-/// ones.
+/// Simulates the chosen frames that are not simulated yet. The first round keeps the images of its first and
+/// last frame.
 fn simulate_chosen(
     simulator: &FrameSimulator<'_>,
     design: &Design,
@@ -103,31 +104,32 @@ fn simulate_chosen(
     Ok(())
 }
 
-/// Frames are never predicted to take less than this share of what the one they are made from takes.
+/// Smallest ratio of a predicted frame's time and energy to those of the frame it is scaled from.
 const MIN_SCALE: f64 = 0.01;
 
-/// Every frame of the run, simulated or predicted. `whole` holds the groups of frames that were simulated.
+/// All frames of the run, simulated or predicted. `simulated` holds the simulated groups by index.
 fn all_frames(
     plan: &Plan,
     frames: &Distinct,
     previews: &Previews,
     forecast: &Forecast,
-    mut whole: BTreeMap<usize, SimulatedFrame>,
+    mut simulated: BTreeMap<usize, SimulatedFrame>,
 ) -> Simulated {
     let (numbers, groups) = (frames.numbers(), frames.groups());
     let mut distinct: BTreeMap<usize, RunFrame> = BTreeMap::new();
-    for (place, &group) in groups.iter().enumerate().filter(|(_, group)| !whole.contains_key(group)) {
+    for (place, &group) in groups.iter().enumerate().filter(|(_, group)| !simulated.contains_key(group)) {
         distinct.entry(group).or_insert_with(|| {
-            let like = &whole[&groups[nearest(previews, forecast, place)]].frame;
-            predict(numbers[group], previews, forecast, place, like)
+            let nearest = &simulated[&groups[nearest(previews, forecast, place)]].frame;
+            predict(numbers[group], previews, forecast, place, nearest)
         });
     }
     let sampled = summary(plan, frames, previews, forecast);
-    let pictures = whole.iter_mut().filter_map(|(&group, done)| Some((numbers[group], done.picture.take()?)));
+    let pictures =
+        simulated.iter_mut().filter_map(|(&group, done)| Some((numbers[group], done.picture.take()?)));
     let pictures = pictures.collect();
-    let pilot = whole.get_mut(&groups[previews.pilot]);
+    let pilot = simulated.get_mut(&groups[previews.pilot]);
     let heat = pilot.map(|pilot| std::mem::take(&mut pilot.heat)).unwrap_or_default();
-    distinct.extend(whole.into_iter().map(|(group, done)| (group, done.frame)));
+    distinct.extend(simulated.into_iter().map(|(group, done)| (group, done.frame)));
     Simulated {
         distinct: distinct.into_values().collect(),
         frames: groups.to_vec(),
@@ -137,7 +139,7 @@ fn all_frames(
     }
 }
 
-/// The representative of its stratum whose preview is most like that of the frame at `place`.
+/// Simulated frame of the same stratum with the most similar preview.
 fn nearest(previews: &Previews, forecast: &Forecast, place: usize) -> usize {
     let design = forecast.design();
     let apart = |&other: &usize| previews.frames[other].cycles.abs_diff(previews.frames[place].cycles);
@@ -145,27 +147,33 @@ fn nearest(previews: &Previews, forecast: &Forecast, place: usize) -> usize {
     chosen.iter().copied().min_by_key(apart).unwrap_or(previews.pilot)
 }
 
-/// The power curve of `like`, stretched to the time and the energy that are predicted.
-fn predict(number: u32, previews: &Previews, forecast: &Forecast, place: usize, like: &RunFrame) -> RunFrame {
+/// Predicts a frame: the power curve of `nearest`, scaled to the predicted time and energy.
+fn predict(
+    number: u32,
+    previews: &Previews,
+    forecast: &Forecast,
+    place: usize,
+    nearest: &RunFrame,
+) -> RunFrame {
     let [value, half] = forecast.frame(place);
     let share = |predicted: f64, known: f64| (predicted / known.max(f64::MIN_POSITIVE)).max(MIN_SCALE);
-    let time = share(value.cycles, like.cycles as f64);
-    let energy_j = share(value.energy_j, like.power.energy().total_j()) * like.power.energy().total_j();
+    let time = share(value.cycles, nearest.cycles as f64);
+    let energy_j = share(value.energy_j, nearest.power.energy().total_j()) * nearest.power.energy().total_j();
     let preview = &previews.frames[place];
     RunFrame {
         index: number,
         triangles: preview.triangles,
         moving: preview.moving,
         lens: preview.lens,
-        power: like.power.reshaped((like.power.duration_ps() as f64 * time).round() as u64, energy_j),
-        busy_ps: Unit::ALL.map(|unit| (like.busy_ps[unit as usize] as f64 * time).round() as u64),
-        busy: like.busy.clone(),
-        cycles: (like.cycles as f64 * time).round() as u64,
+        power: nearest.power.reshaped((nearest.power.duration_ps() as f64 * time).round() as u64, energy_j),
+        busy_ps: Unit::ALL.map(|unit| (nearest.busy_ps[unit as usize] as f64 * time).round() as u64),
+        busy: nearest.busy.clone(),
+        cycles: (nearest.cycles as f64 * time).round() as u64,
         origin: Origin::Predicted(half),
     }
 }
 
-/// What a sampled run says of itself.
+/// Summary of a sampled run: simulated frames and intervals.
 fn summary(plan: &Plan, frames: &Distinct, previews: &Previews, forecast: &Forecast) -> SampledSummary {
     let (numbers, groups) = (frames.numbers(), frames.groups());
     let chosen: BTreeSet<u32> =

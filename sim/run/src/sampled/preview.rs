@@ -10,13 +10,14 @@ use workloads::SampleChoice;
 
 use crate::{Plan, RunError, RunFrame, frame};
 
-/// The preview is as many times smaller along each axis as leaves it so wide, and at most [`MAX_REDUCTION`] times.
+/// Width in pixels that images are reduced to, at most by a factor of [`MAX_REDUCTION`].
 const TARGET_WIDTH_PX: u32 = 160;
+/// Largest factor of the reduction along each axis.
 const MAX_REDUCTION: u32 = 8;
-/// Bins of a timeline that nobody looks at.
+/// Timeline bins of a preview; only totals are used.
 const TIMELINE_BINS: usize = 64;
 
-/// How frames are looked at before it is known which are simulated.
+/// Renders previews: image size, sample table and timing level.
 pub struct Previewer {
     /// Size of the image.
     pub viewport: Viewport,
@@ -24,25 +25,25 @@ pub struct Previewer {
     level: Level,
 }
 
-/// A frame at a glance.
+/// Preview of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FramePreview {
-    /// Triangles drawn.
+    /// Number of triangles.
     pub triangles: usize,
     /// Whether anything moves while its shutter is open.
     pub moving: bool,
     /// Whether the camera has a lens.
     pub lens: bool,
-    /// How often each event happened in the preview.
+    /// Event counts of the preview.
     pub counts: Counts,
-    /// For how long each unit was busy with it, in picoseconds.
+    /// Busy time of each unit in the preview, in picoseconds.
     pub busy_ps: [u64; Unit::COUNT],
     /// Cycles of the preview.
     pub cycles: u64,
 }
 
 impl Previewer {
-    /// A preview of the frames of `plan`, with one sample in a pixel where the sample table can be had so.
+    /// Settings for the frames of `plan`, with one sample per pixel if the sample table allows it.
     pub fn new(plan: &Plan) -> Result<Self, RunError> {
         let by = (plan.viewport.width() / TARGET_WIDTH_PX).clamp(1, MAX_REDUCTION);
         let [width, height] = [plan.viewport.width(), plan.viewport.height()].map(|side| side.div_ceil(by));
@@ -56,12 +57,12 @@ impl Previewer {
         Ok(Self { viewport, samples, level })
     }
 
-    /// Samples in a pixel.
+    /// Samples per pixel.
     pub fn per_pixel(&self) -> u32 {
         self.samples.per_pixel()
     }
 
-    /// Frame `number` at a glance.
+    /// Renders and times a preview of frame `number`.
     pub fn frame(&self, plan: &Plan, number: u32) -> Result<FramePreview, RunError> {
         let scene = plan.work.scene("predicting frames")?;
         let frame = scene.frame(number)?;
@@ -89,27 +90,29 @@ impl Previewer {
     }
 }
 
-/// About what each frame takes. Only differences between frames matter.
+/// Signatures: estimated cost of each frame from its preview. Only differences between frames matter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signatures {
-    /// A soft maximum of the busy times of the units, in picoseconds.
+    /// Soft maximum of the units' busy times, in picoseconds.
     pub cycles: Vec<f64>,
-    /// Events times their energy, and what goes with time, in joules.
+    /// Energy of events and of elapsed time, in joules.
     pub energy_j: Vec<f64>,
 }
 
 impl Signatures {
-    /// Of the frames seen in `previews`, of which `pilot` is the one at place `at`, simulated whole.
+    /// Signatures of the frames of `previews`. `pilot` is the simulated frame at index `pilot_place`.
     ///
-    /// At a small size other units are the bottleneck, and triangles weigh more beside pixels. So each unit's busy time and each
-    /// event's count is scaled by what it is for the pilot over what it is in the pilot's preview; then the slowest unit decides
-    /// over time (fourth powers are summed, as units overlap without quite hiding each other), and energies add up.
+    /// A small image has other bottlenecks, and triangles cost more relative to pixels. So each unit's busy
+    /// time and each event count is scaled by its ratio between the pilot and the pilot's preview. The time
+    /// is the fourth root of the sum of fourth powers of busy times, because units overlap only in part.
+    /// Energies are added.
     pub fn new(previews: &[FramePreview], pilot_place: usize, pilot: &RunFrame, model: &PowerModel) -> Self {
         let counts = pilot.observed().map_or_else(Counts::default, |observed| observed.counts);
-        let seen = &previews[pilot_place];
-        let by_unit = Unit::ALL.map(|unit| ratio(pilot.busy_ps[unit as usize], seen.busy_ps[unit as usize]));
+        let reference = &previews[pilot_place];
+        let by_unit =
+            Unit::ALL.map(|unit| ratio(pilot.busy_ps[unit as usize], reference.busy_ps[unit as usize]));
         let by_event =
-            Event::ALL.map(|event| ratio(counts[event], seen.counts[event]) * model.event_j(event));
+            Event::ALL.map(|event| ratio(counts[event], reference.counts[event]) * model.event_j(event));
         let slowest = |preview: &FramePreview| {
             let busy = preview.busy_ps.iter().zip(by_unit).map(|(&busy, scale)| busy as f64 * scale);
             busy.map(|busy| (busy * busy) * (busy * busy)).sum::<f64>().sqrt().sqrt()
@@ -125,11 +128,11 @@ impl Signatures {
     }
 }
 
-fn ratio(whole: u64, seen: u64) -> f64 {
-    if seen == 0 { 0.0 } else { whole as f64 / seen as f64 }
+fn ratio(full: u64, preview: u64) -> f64 {
+    if preview == 0 { 0.0 } else { full as f64 / preview as f64 }
 }
 
-/// The place of the frame in the middle by the cycles of its preview, the earlier of two.
+/// Index of the frame with the median cycles of its preview; the earlier of two.
 pub fn median(previews: &[FramePreview]) -> usize {
     let mut order: Vec<usize> = (0..previews.len()).collect();
     order.sort_by_key(|&place| (previews[place].cycles, place));

@@ -16,13 +16,13 @@ pub struct CompareArgs {
     /// The folder or summary.json of a run, a frames.csv, a .png or .exr image, or a folder of images
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// The same of what it is compared with
+    /// The result to compare with, of the same kind
     #[arg(value_name = "B")]
     pub b: PathBuf,
     /// File for the difference of two images: .png, scaled to be seen, or .exr, B minus A in linear light
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Print every value, also those that are equal
+    /// Print every value, including equal ones
     #[arg(long)]
     pub all: bool,
     /// Print as JSON

@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace align` and `quintile trace convert`.
+//! Arguments of `quintile trace align` and `quintile trace convert`.
 
 use std::path::PathBuf;
 
@@ -46,7 +46,7 @@ pub struct ConvertArgs {
     /// File to write: .parquet, .jls (Joulescope), .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace; `-` is standard output
     #[arg(value_name = "OUT")]
     pub out: PathBuf,
-    /// Print what was read, mended and written as JSON
+    /// Print what was read, repaired and written as JSON
     #[arg(long)]
     pub json: bool,
     /// Format of standard output, where OUT is `-` (default: csv)
