@@ -5,7 +5,7 @@ use std::process::Command;
 
 /// What the program is made of, from the root of the repository. A change of these builds the program anew anyway, so that asking git
 /// costs nothing more.
-const SOURCES: [&str; 18] = [
+const SOURCES: [&str; 19] = [
     "Cargo.toml",
     "Cargo.lock",
     "pipeline/src",
@@ -21,6 +21,7 @@ const SOURCES: [&str; 18] = [
     "sim/run/src",
     "sim/src",
     "sim/timing/src",
+    "traces/jls/src",
     "traces/src",
     "workloads/scenes",
     "workloads/src",

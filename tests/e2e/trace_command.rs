@@ -59,6 +59,11 @@ fn converted_files_hold_the_same_and_streaming_finds_the_same() {
     for pair in chain.windows(2) {
         json(folder.path(), &["convert", pair[0], pair[1]]);
     }
+    json(folder.path(), &["convert", "v.csv", "--out", "w.csv"]);
+    let [named, last] = ["v.csv", "w.csv"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    assert!(named == last, "OUT and --out write the same");
+    let both = quintile(folder.path(), &["convert", "v.csv", "w.csv", "--out", "x.csv"]);
+    assert_eq!(both.status.code(), Some(2));
     let of = |args: &[&str]| json(folder.path(), &[args, &MARK[..]].concat())["frames"].clone();
     let first = of(&["frames", "t.parquet", "--method", "squares"]);
     for same in ["v.jls", "v.csv"] {

@@ -57,7 +57,7 @@ const NOT_PROVOKED: [(&str, &str); 20] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 49] = [
+const PROVOKED: [&str; 53] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -67,10 +67,12 @@ const PROVOKED: [&str; 49] = [
     "camera-inside",
     "caustics-coarse",
     "caustics-crossed",
+    "coordinates-coarse",
     "coordinates-far-from-origin",
     "coordinates-out-of-range",
     "coordinates-recentred",
     "degenerate-triangle",
+    "displacement-ignored",
     "emissive-ignored",
     "empty-frame",
     "extension-ignored",
@@ -90,6 +92,7 @@ const PROVOKED: [&str; 49] = [
     "missing-image",
     "missing-material",
     "missing-texcoord",
+    "near-plane-cuts",
     "normal-map-ignored",
     "occlusion-map-ignored",
     "occlusion-small-occluders",
@@ -99,6 +102,7 @@ const PROVOKED: [&str; 49] = [
     "platform-mismatch",
     "points-thin-voids",
     "primitive-dropped",
+    "reflection-ignored",
     "short-frame",
     "sliver-triangles",
     "sub-sample-triangles",
@@ -384,6 +388,30 @@ fn unsupported_material_features() {
     assert_warns(&results, "texture-ignored");
 }
 
+/// Materials of OBJ and glTF files that shine or lie elsewhere, and the same in words that change no picture.
+#[test]
+fn highlights_and_displacements_are_reported_where_they_change_the_picture() {
+    let codes_of = |mtl: &str| {
+        let inputs = Inputs::new();
+        inputs.put("a.mtl", format!("newmtl m\nKd 0.5 0.5 0.5\n{mtl}\n"));
+        let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+        quintile().run(&inputs.put("a.obj", obj), &["--size", "48x32", "--frames", "0..1", "--samples", "2"])
+    };
+    let results = codes_of("Ks 1 1 1\nNs 500\nrefl a.png\ndisp b.png");
+    assert_warns(&results, "reflection-ignored");
+    assert_warns(&results, "displacement-ignored");
+    let glossy = |roughness: f64| {
+        let mut glb = Glb::square();
+        glb.material(json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": roughness}}));
+        run_file("a.glb", glb.bytes(), &[])
+    };
+    assert_warns(&glossy(0.05), "reflection-ignored");
+    for harmless in [codes_of("Ks 0 0 0\nNs 500\nillum 2"), glossy(1.0)] {
+        let codes = harmless.warning_codes();
+        assert!(!codes.iter().any(|code| code.ends_with("-ignored")), "{codes:?}");
+    }
+}
+
 #[test]
 fn coordinates_far_from_the_origin() {
     let far = "v 4000000 0 0\nv 4000001 0 0\nv 4000000 1 0\nf 1 2 3\n";
@@ -403,6 +431,8 @@ fn ignored_parts_of_a_gltf_scene() {
     let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
     glb.json["meshes"][0]["primitives"] = json!([glb.json["meshes"][0]["primitives"][0], points]);
     assert_warns(&run_file("a.glb", glb.bytes(), &[]), "primitive-dropped");
+    let lines = run_file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\nl 2 3\n", &[]);
+    assert_warns(&lines, "primitive-dropped");
     let mut glb = Glb::square();
     let lens = json!({"xmag": 1.0, "ymag": 0.0, "zfar": 10.0, "znear": 0.1});
     glb.json["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
@@ -455,13 +485,20 @@ fn regimes_in_which_tile_tests_are_ineffective() {
     };
     let sphere = |segments: &str| scene(camera, &sphere(segments));
     let (sharp, soft) = (["--lens", "0.1", "--focus", "1"], ["--lens", "100", "--focus", "1"]);
-    let cases: [Regime<'_>; 6] = [
+    let two = |place: &str, near: &str| {
+        let camera = format!("camera: (position: ({place}, 1, 5), target: ({place}, 0, 0), near: {near})");
+        let spheres = ["0", "4e6"].map(|x| format!("(shape: Sphere(radius: 1), position: ({x}, 0, 0))"));
+        scene(&camera, &spheres.join(", "))
+    };
+    let cases: [Regime<'_>; 8] = [
         ("behind-camera", scene(camera, &floor("-1")), &[], sphere("12"), &[]),
         ("sub-sample-triangles", sphere("1000"), &[], sphere("12"), &[]),
         ("sliver-triangles", scene(camera, &thin("0.001")), &[], scene(camera, &thin("1")), &[]),
         ("fast-motion", scene(camera, &moving("2000")), &[], scene(camera, &moving("1")), &[]),
         ("blur-beyond-image", sphere("12"), &soft, sphere("12"), &sharp),
         ("coordinates-out-of-range", boxed("e13"), &[], boxed("e3"), &[]),
+        ("coordinates-coarse", two("4e6", "0.1"), &[], two("0", "0.1"), &[]),
+        ("near-plane-cuts", two("0", "4.5"), &[], two("0", "0.1"), &[]),
     ];
     let small = ["--size", "160x90", "--frames", "0..2", "--samples", "2"];
     let run = |scene: &str, args: &[&str]| {

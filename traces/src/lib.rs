@@ -1,15 +1,22 @@
-//! Power traces, measured or synthetic: sampling them, finding frames in them, and the energy of every frame.
+//! Power traces, recorded or synthetic: reading and sampling them, finding frames in them, and the energy of
+//! every frame.
 //!
-//! Nothing here knows of a simulator. A recording of voltage and current, one marked frame start and the end of the
-//! last frame are enough:
+//! No simulator is needed. A recording of voltage and current, one marked frame start and the end of the last
+//! frame are enough:
 //!
-//! 1. [`io`] reads a [`Trace`] from Parquet or CSV;
-//! 2. [`frames`] finds every frame that begins like the marked one, says how sure it is, and warns where it is not;
-//! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole;
-//! 4. [`score`] compares the outcome with the truth where there is one.
+//! 1. [`io`] reads a [`Trace`] from Parquet, JLS, CSV or TSV, and writes these formats; the crate [`jls`] can be used
+//!    alone;
+//! 2. [`frames`] finds every frame that begins like the marked one, with the confidence of each start, and warns of results
+//!    that may be wrong; [`stream`] does so for files that do not fit into memory;
+//! 3. [`energy`] integrates from start to start by one rule, so that the frames add up to the whole, and evaluates runs,
+//!    passes, idle power, warm-up and outliers;
+//! 4. [`pareto`] compares settings by time and energy, [`align`] puts time stamps of another clock onto a trace, and
+//!    [`score`] compares found frames with the ground truth.
 //!
-//! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace a recorder would have written, and
-//! [`synth`] draws such curves with frames whose starts and energies are known.
+//! The other way round, [`device`] turns a noise-free power [`Curve`] into the trace that a recorder would
+//! have written, and [`synth`] makes such curves with frames whose starts and energies are known. [`units`],
+//! [`times`] and [`table`] read the small files around a measurement; [`pyramid`] gives overviews of long
+//! traces.
 //!
 //! ```
 //! use traces::{device::{Device, DeviceSpec}, energy::PowerIntegral, frames, Curve, CurveBuilder};
@@ -33,11 +40,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What is guaranteed
+//! # Guarantees
 //! - The same input gives the same bytes: noise is a pure function of seed and sample, sums have a fixed order, and
 //!   transcendental functions are those of `libm`.
 //! - Sample `i` starts at `start + i / rate` (left edge) and is the mean over its period, everywhere.
-//! - Input that is not a trace is an error that names file and row, never a panic and never mended silently.
+//! - Input that is not a trace is an error that names file and row; nothing panics, and nothing is repaired silently.
 
 pub mod align;
 pub mod curve;
@@ -46,22 +53,20 @@ pub mod device;
 pub mod energy;
 pub mod frames;
 pub mod io;
-mod median;
 pub mod metadata;
 mod overlap;
 pub mod pareto;
 pub mod pyramid;
 pub mod random;
 pub mod score;
-mod squares;
+mod stats;
 pub mod stream;
-mod sum;
 pub mod synth;
 pub mod table;
+pub mod times;
 pub mod trace;
-mod warning;
+pub mod units;
 
 pub use curve::{Curve, CurveBuilder, CurveError};
 pub use metadata::{Mark, MarkKind, Metadata};
 pub use trace::{Trace, TraceError};
-pub use warning::Warning;

@@ -1,9 +1,9 @@
-//! What a trace file says about itself beside its samples.
+//! Metadata of a trace: its origin and its marks.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a [`Mark`] stands for.
+/// Meaning of a [`Mark`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkKind {
@@ -20,22 +20,22 @@ pub enum MarkKind {
 pub struct Mark {
     /// When, s.
     pub time_s: f64,
-    /// What it stands for.
+    /// Its meaning.
     pub kind: MarkKind,
     /// Free text.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub label: String,
 }
 
-/// Where a trace comes from. Every field may be left out; keys of other programs are kept in `other`.
+/// Origin and marks of a trace. Every field is optional; keys of other programs go into `other`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Metadata {
     /// The instrument.
     pub device: String,
-    /// What was drawn.
+    /// The rendered scene.
     pub scene: String,
-    /// What it was drawn on.
+    /// The GPU or device that rendered it.
     pub platform: String,
     /// Seed of the noise; 0 for a recording.
     pub seed: u64,
@@ -46,4 +46,16 @@ pub struct Metadata {
     /// Everything else found in the file, by key.
     #[serde(flatten)]
     pub other: BTreeMap<String, serde_json::Value>,
+}
+
+impl Metadata {
+    /// The marked frame starts, s, in the order given.
+    pub fn frame_starts_s(&self) -> impl Iterator<Item = f64> + '_ {
+        self.marks.iter().filter(|mark| mark.kind == MarkKind::FrameStart).map(|mark| mark.time_s)
+    }
+
+    /// The marked end of the last frame, s: the last such mark.
+    pub fn end_mark_s(&self) -> Option<f64> {
+        self.marks.iter().rev().find(|mark| mark.kind == MarkKind::End).map(|mark| mark.time_s)
+    }
 }

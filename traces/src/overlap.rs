@@ -1,7 +1,7 @@
 //! Correlation by overlap and save (Oppenheim and Schafer 2010, section 8.7.3), in f32 or f64.
 //!
-//! Templates are real, so two stretches of a signal share a transform, one as its real part and one as its imaginary part
-//! (Press et al. 2007, section 12.3): nothing has to be taken apart in between, and they come out as they went in.
+//! Templates are real, so two blocks of a signal share a transform, one as its real part and one as its
+//! imaginary part (Press et al. 2007, section 12.3), and come out in the same way.
 
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::Zero;
@@ -17,7 +17,7 @@ pub(crate) struct OverlapSave<T: FftNum> {
     block: usize,
 }
 
-/// What a thread works in.
+/// The buffers of a thread.
 #[derive(Default)]
 pub(crate) struct Buffers<T> {
     signal: Vec<Complex<T>>,
@@ -47,8 +47,9 @@ impl<T: FftNum> OverlapSave<T> {
         self.block - self.width + 1
     }
 
-    /// Hands every template's correlation with two blocks, whose first offsets are `from` and a step later, to `take`: in
-    /// real and imaginary parts, cyclic beyond a step. Every pair is worked out alike by whichever thread.
+    /// Hands every template's correlation with two blocks, whose first offsets are `from` and a step later,
+    /// to `take`: in real and imaginary parts, cyclic beyond a step. Every thread computes a pair in the same
+    /// way.
     pub fn pair(
         &self,
         signal: &[T],
@@ -58,7 +59,7 @@ impl<T: FftNum> OverlapSave<T> {
     ) {
         let scratches = [self.forward.get_inplace_scratch_len(), self.inverse.get_inplace_scratch_len()];
         buffers.scratch.resize(scratches[0].max(scratches[1]), Complex::zero());
-        let [first, second] = [from, from + self.step()].map(|from| self.stretch(signal, from));
+        let [first, second] = [from, from + self.step()].map(|from| self.segment(signal, from));
         buffers.signal.clear();
         buffers.signal.extend(first.iter().zip(second).map(|(&re, &im)| Complex { re, im }));
         buffers.signal.extend(first[second.len()..].iter().map(|&re| Complex::from(re)));
@@ -73,7 +74,7 @@ impl<T: FftNum> OverlapSave<T> {
     }
 
     /// The samples of the block whose first offset is `from`, as far as there are any.
-    fn stretch<'a>(&self, signal: &'a [T], from: usize) -> &'a [T] {
+    fn segment<'a>(&self, signal: &'a [T], from: usize) -> &'a [T] {
         &signal[from.min(signal.len())..signal.len().min(from + self.block)]
     }
 }

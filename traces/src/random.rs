@@ -2,8 +2,8 @@
 
 use core::f64::consts::TAU;
 
-/// The odd constant nearest to 2^64 over the golden ratio: SplitMix64's increment (Steele, Lea and Flood 2014,
-/// "Fast splittable pseudorandom number generators", fig. 17).
+/// The odd constant nearest to 2^64 over the golden ratio: SplitMix64's increment (Steele, Lea and Flood
+/// 2014, "Fast splittable pseudorandom number generators", fig. 17).
 pub const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// SplitMix64's output function (same source; constants by Stafford, variant 13).
@@ -13,7 +13,7 @@ pub fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// One stream of numbers, asked for by their counters.
+/// One stream of numbers, by their counters.
 #[derive(Clone, Copy, Debug)]
 pub struct Random {
     key: u64,

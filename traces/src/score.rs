@@ -1,9 +1,9 @@
-//! Found frames against true ones.
+//! Found frames compared with the ground truth.
 
 use crate::energy::{FrameEnergy, TrueFrame};
 use serde::Serialize;
 
-/// The tolerance of `shared/peers/traces/score.py`, s.
+/// Largest timing error of a start that counts as found, s.
 pub const TOLERANCE_S: f64 = 0.5e-3;
 
 /// How well found frames agree with true ones. Counts; the rates are functions of them.
@@ -17,15 +17,15 @@ pub struct Score {
     pub matched: usize,
     /// Found start less true start of each pair, s, in order.
     pub timing_errors_s: Vec<f64>,
-    /// Relative energy error of each pair whose frame also ends right (its end is the next true frame's partner),
-    /// in order.
+    /// Relative energy error of each pair whose frame also ends right (its end is the next true frame's
+    /// partner), in order.
     pub energy_errors: Vec<f64>,
 }
 
 /// Pairs `(found, truth)` of indices, one to one and in order, whose starts differ by at most `tolerance_s`.
-/// Both must be sorted by start. Greedy, earliest first: for intervals of one width on a line no other matching has
-/// more pairs; of several found starts that could take the same true one the nearest does, if the next true start
-/// does not need it.
+/// Both must be sorted by start. Greedy, earliest first: for intervals of one width on a line no other
+/// matching has more pairs; of several found starts that could take the same true one the nearest does, if
+/// the next true start does not need it.
 pub fn pairs(found_s: &[f64], truth_s: &[f64], tolerance_s: f64) -> Vec<(usize, usize)> {
     let (mut f, mut t) = (0, 0);
     let mut pairs = Vec::new();
@@ -85,7 +85,8 @@ pub fn score(found: &[FrameEnergy], truth: &[TrueFrame], tolerance_s: f64) -> Sc
     }
 }
 
-/// The true frame beside each found one, for [`FrameTable::with_truth`](crate::energy::FrameTable::with_truth).
+/// The true frame beside each found one, for
+/// [`FrameTable::with_truth`](crate::energy::FrameTable::with_truth).
 pub fn truth_beside(found: &[FrameEnergy], truth: &[TrueFrame], tolerance_s: f64) -> Vec<Option<TrueFrame>> {
     let found_s: Vec<f64> = found.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = truth.iter().map(|frame| frame.start_s).collect();

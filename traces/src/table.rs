@@ -1,6 +1,6 @@
 //! Small tables of text and numbers, from CSV, TSV or Parquet.
 
-use crate::io::{PackedFile, field_units};
+use crate::io::{PagedFile, field_units};
 use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use std::collections::BTreeMap;
@@ -10,8 +10,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// The most bytes a table may have.
-const LARGEST_BYTES: u64 = 1 << 28;
+/// Largest table, in bytes.
+const MAX_BYTES: u64 = 1 << 28;
 
 /// Why a table cannot be used.
 #[derive(Debug, Error)]
@@ -21,7 +21,7 @@ pub enum TableReadError {
     Absent {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         reason: String,
     },
     /// The file.
@@ -39,7 +39,7 @@ pub enum TableReadError {
         path: PathBuf,
         /// The column.
         column: String,
-        /// What there is.
+        /// The names found.
         found: String,
     },
     /// A value.
@@ -51,7 +51,7 @@ pub enum TableReadError {
         row: usize,
         /// The column.
         column: String,
-        /// What stands there.
+        /// The value found.
         value: String,
     },
 }
@@ -83,7 +83,7 @@ impl Table {
         if there.is_dir() {
             return Err(refuse("it is a folder; name a file in it".to_owned()));
         }
-        if there.len() > LARGEST_BYTES {
+        if there.len() > MAX_BYTES {
             return Err(refuse("a table of settings has to be smaller than 256 MiB".to_owned()));
         }
         let mut bytes = Vec::new();
@@ -100,7 +100,12 @@ impl Table {
         Ok(Self { path: path.to_owned(), names, rows, units })
     }
 
-    /// How many rows there are.
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows.len()
     }
@@ -160,16 +165,16 @@ fn from_text(bytes: &[u8]) -> Result<Content, String> {
 }
 
 fn from_parquet(path: &Path) -> Result<Content, String> {
-    let told = |error: parquet::errors::ParquetError| error.to_string();
+    let reason = |error: parquet::errors::ParquetError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;
-    let file = PackedFile::new(path, file).map_err(told)?;
+    let file = PagedFile::new(path, file).map_err(reason)?;
     check_packing(&file)?;
     // Columns of columns count as one, as they do in a row.
     let names = file.metadata().file_metadata().schema().get_fields();
     let names = names.iter().map(|field| field.name().to_owned()).collect();
     let mut rows = Vec::new();
-    for row in file.get_row_iter(None).map_err(told)? {
-        let row = row.map_err(told)?;
+    for row in file.get_row_iter(None).map_err(reason)? {
+        let row = row.map_err(reason)?;
         let text = |field: &Field| match field {
             Field::Str(text) => text.clone(),
             Field::Null => String::new(),
@@ -181,9 +186,9 @@ fn from_parquet(path: &Path) -> Result<Content, String> {
 }
 
 /// Refuses columns that cannot be unpacked, with what to do.
-fn check_packing(file: &PackedFile) -> Result<(), String> {
+fn check_packing(file: &PagedFile) -> Result<(), String> {
     let chunks = file.metadata().row_groups().iter().flat_map(|group| group.columns());
-    let mut packed = chunks.filter(|chunk| !PackedFile::unpacks(chunk.compression()));
+    let mut packed = chunks.filter(|chunk| !PagedFile::unpacks(chunk.compression()));
     packed.next().map_or(Ok(()), |chunk| {
         let (column, codec) = (chunk.column_path().string(), chunk.compression().to_string());
         let codec = codec.split('(').next().unwrap_or_default();

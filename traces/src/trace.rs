@@ -1,4 +1,4 @@
-//! Voltage and current over time, recorded or synthetic alike.
+//! Voltage and current over time, recorded or synthetic.
 
 use crate::metadata::Metadata;
 use core::ops::Range;
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// The largest |time| a trace may reach, s: its nanoseconds must fit an i64.
 pub const TIME_LIMIT_S: f64 = 9.0e9;
-/// The lowest and highest sample rate, Hz: above it, time stamps in whole nanoseconds could not be told apart.
+/// The lowest and highest sample rate, Hz: above it, time stamps in whole nanoseconds would be equal.
 pub const RATE_LIMITS_HZ: [f64; 2] = [1e-6, 1e8];
 
 /// Why a [`Trace`] cannot be built. Rows count samples from 1.
@@ -49,7 +49,8 @@ pub enum TraceError {
 
 /// Evenly sampled voltage (V) and current (A).
 ///
-/// Sample `i` begins at `start_s + i / rate_hz` (its **left edge**) and is the mean over the period that follows.
+/// Sample `i` begins at `start_s + i / rate_hz` (its **left edge**) and is the mean over the period that
+/// follows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
     voltage_v: Vec<f32>,
@@ -57,7 +58,7 @@ pub struct Trace {
     rate_hz: f64,
     start_s: f64,
     lost: Vec<Range<usize>>,
-    /// Where the trace comes from.
+    /// Origin and marks of the trace.
     pub metadata: Metadata,
 }
 
@@ -85,9 +86,10 @@ impl Trace {
         Ok(Self { voltage_v, current_a, rate_hz, start_s, lost: Vec::new(), metadata })
     }
 
-    /// The same samples, some of which the recorder lost on the way: they are put on the straight line between their neighbours, as
-    /// nothing is known of them, and left out of files. Of `lost`, in order and apart, what is beyond the samples is cut off, and so is
-    /// the first sample, with which a recording begins.
+    /// The same samples, some of which the recorder lost on the way: they are put on the straight line
+    /// between their neighbours, as nothing is known of them, and left out of files. Of `lost`, in order and
+    /// apart, what is beyond the samples is cut off, and so is the first sample, with which a recording
+    /// begins.
     #[must_use]
     pub fn without(mut self, lost: impl IntoIterator<Item = Range<usize>>) -> Self {
         let count = self.samples();
@@ -100,7 +102,7 @@ impl Trace {
         self
     }
 
-    /// Stretches that the recorder lost, in order.
+    /// Segments that the recorder lost, in order.
     pub fn lost(&self) -> &[Range<usize>] {
         &self.lost
     }
@@ -110,7 +112,7 @@ impl Trace {
         lost_samples(&self.lost)
     }
 
-    /// What the recorder lost and from when on, in words; `None` if nothing.
+    /// The losses of the recorder, in words; `None` without any.
     pub fn losses(&self) -> Option<String> {
         losses(&self.lost, |index| self.time_s(index))
     }
@@ -179,12 +181,12 @@ impl Trace {
     }
 }
 
-/// How many samples are in stretches that were lost.
+/// How many samples are in segments that were lost.
 pub(crate) fn lost_samples(lost: &[Range<usize>]) -> usize {
     lost.iter().map(ExactSizeIterator::len).sum()
 }
 
-/// Stretches that were lost, in words; `None` if there are none.
+/// Segments that were lost, in words; `None` if there are none.
 pub(crate) fn losses(lost: &[Range<usize>], time_s: impl Fn(usize) -> f64) -> Option<String> {
     let first = lost.first()?;
     Some(format!(
@@ -234,6 +236,50 @@ pub(crate) fn check_times(samples: u64, rate_hz: f64, start_s: f64) -> Result<()
     Ok(())
 }
 
+/// A span of time that is not part of a trace.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum SpanError {
+    /// It ends before it begins, or at once.
+    #[error("{from_s} s to {to_s} s ends before it begins or has no length; give the earlier time first")]
+    Reversed {
+        /// Begin, s.
+        from_s: f64,
+        /// End, s.
+        to_s: f64,
+    },
+    /// It is not within the trace.
+    #[error("{from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s; give times inside it")]
+    Outside {
+        /// Begin, s.
+        from_s: f64,
+        /// End, s.
+        to_s: f64,
+        /// Start of the trace, s.
+        start_s: f64,
+        /// End of the trace, s.
+        end_s: f64,
+    },
+}
+
+/// Whether a number is between two others, to rounding.
+pub fn is_within([low, high]: [f64; 2], number: f64) -> bool {
+    let rounding = 1e-12 * low.abs().max(high.abs());
+    (low - rounding..=high + rounding).contains(&number)
+}
+
+/// Refuses a span of time that is not within a trace from `start_s` to `end_s`.
+///
+/// # Errors
+/// [`SpanError`] names both.
+pub fn check_span([start_s, end_s]: [f64; 2], [from_s, to_s]: [f64; 2]) -> Result<(), SpanError> {
+    let inside = [from_s, to_s].into_iter().all(|time_s| is_within([start_s, end_s], time_s));
+    match (inside, from_s < to_s) {
+        (true, true) => Ok(()),
+        (true, false) => Err(SpanError::Reversed { from_s, to_s }),
+        (false, _) => Err(SpanError::Outside { from_s, to_s, start_s, end_s }),
+    }
+}
+
 fn check_finite(values: &[f32], channel: &'static str) -> Result<(), TraceError> {
     match values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
         Some((index, &value)) => Err(TraceError::NotFinite { row: index + 1, channel, value }),
@@ -268,5 +314,13 @@ mod tests {
         assert!(message(&[1.0], &[1.0], f64::NAN, 0.0).contains("NaN Hz"));
         assert!(message(&[1.0], &[1.0], 1.0, 1e10).contains("10000000000 s"));
         assert!(message(&[1.0, 1.0], &[1.0, f32::NAN], 1.0, 0.0).contains("row 2: current_A is NaN"));
+    }
+
+    #[test]
+    fn spans_are_within_a_trace_to_rounding() {
+        assert_eq!(check_span([0.0, 0.3], [0.1, 0.1 + 0.2]), Ok(()));
+        assert_eq!(check_span([0.0, 1.0], [0.5, 0.5]), Err(SpanError::Reversed { from_s: 0.5, to_s: 0.5 }));
+        assert!(matches!(check_span([0.0, 1.0], [0.5, 1.1]), Err(SpanError::Outside { .. })));
+        assert!(matches!(check_span([0.0, 1.0], [f64::NAN, 0.5]), Err(SpanError::Outside { .. })));
     }
 }

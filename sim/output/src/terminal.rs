@@ -2,13 +2,11 @@
 
 use std::io::{Write, stderr};
 
-use std::fmt::Display;
-
 use anstream::AutoStream;
 use clap::ColorChoice;
 use clap::builder::Styles;
 use clap::builder::styling::{AnsiColor, Style};
-use warnings::Warning;
+use warnings::{Code, Warning};
 
 /// How much is printed on standard error. Results on standard output do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,7 +63,7 @@ impl Terminal {
     }
 
     /// Prints a warning of this code, unless quiet.
-    pub fn warn_of(&self, code: impl Display, message: &str) {
+    pub fn warn_of(&self, code: Code, message: &str) {
         if self.verbosity >= Verbosity::Normal {
             self.line("warning", AnsiColor::Yellow.on_default().bold(), &format!("[{code}] {message}"));
         }

@@ -1,8 +1,10 @@
 //! Numbers of triangles in the regimes of the failure catalogue, where tile tests are ineffective.
 
+use glam::Vec3;
 use pipeline::geometry::Projection;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::{Camera, Draw, Viewport};
+use workloads::scene::NearSpace;
 use workloads::stress::set_up_all;
 
 /// Number of triangles of a frame in each regime. A triangle may be in several.
@@ -22,29 +24,38 @@ pub struct Regime {
     pub blurred: u64,
     /// Triangles whose products of coordinates leave the range of f32.
     pub extreme: u64,
+    /// Triangles with a corner in view where one step of 32-bit coordinates exceeds [`MAX_STEP_PX`].
+    pub coarse: u64,
+    /// Triangles in front of the camera and in view that the near plane cuts off, as a whole or in part.
+    pub cut: u64,
 }
 
 /// Smallest ratio of length to height of a sliver.
 const MIN_SLIVER_RATIO: f64 = 100.0;
 /// Range of products of three lengths that keep all digits in f32.
 const F32_PRODUCT_RANGE: [f64; 2] = [1e-36, 1e37];
+/// Largest step of 32-bit coordinates in pixels that is accurate enough.
+const MAX_STEP_PX: f64 = 0.25;
 
 impl Regime {
     /// Counts the triangles of a frame with `per_pixel` samples per pixel.
     pub fn of(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport, per_pixel: u32) -> Self {
         let shear = Projection::new(camera, viewport).shear;
-        let side_px = f64::from(viewport.width().max(viewport.height()));
-        let scale = ImageScale { spacing_px: (1.0 / f64::from(per_pixel)).sqrt(), side_px, lens: shear };
-        let mut found = Self::default();
+        let scale = ImageScale::new(camera, viewport, per_pixel);
+        let mut found = Self { cut: cut(camera, draws, viewport), ..Self::default() };
+        let mut corners = corners(draws);
+        let mut next = 0;
         for triangle in set_up_all(camera, draws, viewport) {
+            let world = corners.nth((triangle.id - next) as usize).map(|(_, ends)| ends);
+            next = triangle.id + 1;
             if !bounds(&triangle, &shear, viewport).is_empty() {
-                found.add(&triangle, &scale);
+                found.add(&triangle, &world.unwrap_or_default(), &scale);
             }
         }
         found
     }
 
-    fn add(&mut self, triangle: &Triangle, scale: &ImageScale) {
+    fn add(&mut self, triangle: &Triangle, world: &[[Vec3; 3]; 2], scale: &ImageScale) {
         let seen = [0.0, 1.0].map(|t| triangle.corners.map(|c| c.at(t).map(f64::from)));
         self.in_view += 1;
         self.extreme += u64::from(scale.is_extreme(&seen));
@@ -58,7 +69,28 @@ impl Regime {
         let way = |k: usize| distance(image[0][k], image[1][k]);
         self.fast += u64::from((0..3).any(|k| way(k) > scale.side_px));
         self.blurred += u64::from(seen.as_flattened().iter().all(|p| scale.blur_px(p[2]) > scale.side_px));
+        let depths = seen.as_flattened().iter().map(|p| p[2]);
+        let places = image.as_flattened().iter().zip(world.as_flattened());
+        self.coarse += u64::from(depths.zip(places).any(|(depth, place)| scale.is_coarse(depth, place)));
     }
+}
+
+/// Corners of every triangle in world space at both ends of the shutter, in the order of set-up.
+fn corners<'a>(draws: &'a [Draw<'a>]) -> impl Iterator<Item = (&'a Draw<'a>, [[Vec3; 3]; 2])> {
+    let of_draw = |draw: &'a Draw<'a>| {
+        let ends = [draw.geometry.open(), draw.geometry.close()];
+        let at = move |triangle: &[u32; 3]| ends.map(|end| triangle.map(|vertex| end[vertex as usize]));
+        draw.geometry.triangles().iter().map(move |triangle| (draw, at(triangle)))
+    };
+    draws.iter().flat_map(of_draw)
+}
+
+/// Number of triangles in view that the near plane cuts off, as a whole or in part.
+fn cut(camera: &Camera, draws: &[Draw<'_>], viewport: Viewport) -> u64 {
+    let aspect = f64::from(viewport.width()) / f64::from(viewport.height());
+    let space = NearSpace::new(camera, aspect, f64::from(camera.near()));
+    let nearest = |(draw, [open, close]): (&Draw<'_>, [[Vec3; 3]; 2])| space.nearest(open, close, draw.cull);
+    corners(draws).filter_map(nearest).count() as u64
 }
 
 /// Image scale that regimes are relative to.
@@ -66,9 +98,35 @@ struct ImageScale {
     spacing_px: f64,
     side_px: f64,
     lens: pipeline::Shear,
+    /// Pixels per scene unit at depth 1, or at any depth for an orthographic camera.
+    scale_px: f64,
+    /// Half the width and height of the image in pixels.
+    half_px: [f64; 2],
+    /// Largest absolute coordinate of the camera position.
+    eye: f32,
 }
 
 impl ImageScale {
+    fn new(camera: &Camera, viewport: Viewport, per_pixel: u32) -> Self {
+        let [width, height] = [viewport.width(), viewport.height()].map(f64::from);
+        Self {
+            spacing_px: (1.0 / f64::from(per_pixel)).sqrt(),
+            side_px: width.max(height),
+            lens: Projection::new(camera, viewport).shear,
+            scale_px: 0.5 * height / f64::from(camera.half_height()),
+            half_px: [0.5 * width, 0.5 * height],
+            eye: camera.open().translation.abs().max_element(),
+        }
+    }
+
+    /// Whether a corner, with its positions on the image and in the world, is in view and one step of its
+    /// coordinates exceeds [`MAX_STEP_PX`].
+    fn is_coarse(&self, depth: f64, (image, world): (&[f64; 2], &Vec3)) -> bool {
+        let largest = world.abs().max_element().max(self.eye);
+        let step_px = f64::from(largest.next_up() - largest) * self.scale_px / self.weight(depth);
+        step_px > MAX_STEP_PX && image.iter().zip(self.half_px).all(|(at, half)| at.abs() <= half)
+    }
+
     fn is_tiny(&self, corners: &[[f64; 2]; 3]) -> bool {
         (0..3).all(|k| distance(corners[k], corners[(k + 1) % 3]) < self.spacing_px)
     }

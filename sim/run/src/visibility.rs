@@ -76,8 +76,20 @@ pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
     );
     let empty =
         "no triangle is in view, so no sample can see one; look at the mesh and where the camera points";
+    let coarse = format!(
+        "{} of {} triangles in view have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: \
+         they are drawn out of place; move what the camera sees to the origin",
+        regime.coarse, regime.in_view
+    );
+    let cut = format!(
+        "the near plane cuts {} triangles in front of the camera away, or parts of them; give the camera a smaller `near`, or \
+         move it",
+        regime.cut
+    );
     let found = [
         (regime.extreme > 0).then(|| Warning::new(Code::CoordinatesOutOfRange, extreme)),
+        (regime.coarse > 0).then(|| Warning::new(Code::CoordinatesCoarse, coarse)),
+        (regime.cut > 0).then(|| Warning::new(Code::NearPlaneCuts, cut)),
         (regime.in_view == 0).then(|| Warning::new(Code::EmptyFrame, empty)),
     ];
     found.into_iter().flatten().collect()

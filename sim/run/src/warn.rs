@@ -28,7 +28,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     let unseen = short.is_some() && measurement.is_mark_alone();
     let explained = simulated.frames.len() == 1 || unseen;
     let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
-    all.extend(of_trace.filter_map(|w| Some(Warning::new(Code::named(w.code)?, w.message.clone()))));
+    all.extend(of_trace.cloned());
     all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
     all.extend(empty_frames(simulated));
@@ -263,6 +263,8 @@ fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
         fast(simulated),
         blurred(simulated),
         extreme(simulated),
+        coarse(simulated),
+        cut(simulated),
     ]
     .into_iter()
     .flatten()
@@ -342,6 +344,32 @@ fn extreme(simulated: &Simulated) -> Option<Warning> {
              depths; scale the scene to ordinary lengths"
         ),
     ))
+}
+
+fn coarse(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, 0.0, |regime| regime.coarse)?;
+    Some(Warning::new(
+        Code::CoordinatesCoarse,
+        format!(
+            "{which} have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: they are drawn \
+             out of place; move what the camera sees to the origin, without what is far from it"
+        ),
+    ))
+}
+
+fn cut(simulated: &Simulated) -> Option<Warning> {
+    let (frame, worst) = simulated.observed().max_by_key(|(_, observed)| observed.regime.cut)?;
+    let (count, frames) =
+        (worst.regime.cut, simulated.observed().filter(|(_, observed)| observed.regime.cut > 0).count());
+    (count > 0).then(|| {
+        let message = format!(
+            "the near plane cuts {count} triangles in front of the camera away, or parts of them (frame {}; some in {frames} of {} \
+             frames): give the camera a smaller `near`, or move it",
+            frame.index,
+            simulated.distinct.len()
+        );
+        Warning::new(Code::NearPlaneCuts, message)
+    })
 }
 
 #[cfg(test)]

@@ -1,18 +1,16 @@
 //! Files of a run.
 
-use std::io::Write;
-
 use activity::Unit;
-use output::dir::{BoxError, Claim, OutDir, SUMMARY};
+use output::dir::{Claim, OutDir, SUMMARY};
 use output::perfetto::{self, CounterTrack, FrameSpan, MAX_SLICES, Timeline, UnitTrack, slices_of_bins};
 use output::progress::Progress;
 use power_model::Part;
-use traces::energy::FrameTable;
+use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
 use traces::score::{TOLERANCE_S, truth_beside};
 
 use crate::frame::image_name;
 use crate::heat::heat_name;
-use crate::{FIGURES, Outcome, Plan, RunError, pictures, report, stalls};
+use crate::{FIGURES, FrameRow, Outcome, Plan, RunError, pictures, report, stalls};
 
 /// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
@@ -56,42 +54,37 @@ pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Res
 fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
     let measurement = &outcome.measurement;
     let truth = truth_beside(&measurement.frames, &measurement.truth, TOLERANCE_S);
-    let table = FrameTable::new(measurement.frames.clone(), Some(outcome.plan.pixels())).with_truth(truth)?;
-    dir.write_file("frames.csv", |out| {
-        if outcome.simulated.sampled.is_none() {
-            return Ok(table.write_csv(out)?);
-        }
-        let mut plain = Vec::new();
-        table.write_csv(&mut plain)?;
-        with_intervals(outcome, &plain, out)
-    })?;
+    let table = FrameTable::new(measurement.frames.clone(), Some(outcome.plan.pixels()))
+        .with_truth(truth)?
+        .with_columns(predictions(outcome))?;
+    dir.write_file("frames.csv", |out| Ok(table.write_csv(out)?))?;
     Ok(())
 }
 
-/// Writes the table `plain` with three more columns: whether a frame is predicted, and the ends of its energy
-/// interval.
-fn with_intervals(outcome: &Outcome, plain: &[u8], out: &mut dyn Write) -> Result<(), BoxError> {
-    let mut reader = csv::Reader::from_reader(plain);
-    let mut writer = csv::Writer::from_writer(out);
-    let mut header = reader.headers()?.clone();
-    for column in ["predicted", "predicted_energy_low_J", "predicted_energy_high_J"] {
-        header.push_field(column);
+/// Columns of a sampled run: whether a frame is predicted, and the ends of its energy interval.
+fn predictions(outcome: &Outcome) -> Vec<ExtraColumn> {
+    if outcome.simulated.sampled.is_none() {
+        return Vec::new();
     }
-    writer.write_record(&header)?;
     let measurement = &outcome.measurement;
     let by_truth = measurement.by_true_frame();
-    for (record, found) in reader.records().zip(&measurement.frames) {
-        let mut record = record?;
-        let truth = by_truth.iter().position(|matched| *matched == Some(found));
-        let row = truth.map(|place| &outcome.summary.frames[place]);
-        record.push_field(row.map_or("", |row| if row.predicted { "1" } else { "0" }));
-        let interval = row.and_then(|row| row.energy_interval_j);
-        for end in 0..2 {
-            record.push_field(&interval.map_or(String::new(), |ends| ends[end].to_string()));
-        }
-        writer.write_record(&record)?;
-    }
-    Ok(writer.flush()?)
+    let row = |found: &FrameEnergy| {
+        let truth = by_truth.iter().position(|matched| *matched == Some(found))?;
+        Some(&outcome.summary.frames[truth])
+    };
+    let rows: Vec<Option<&FrameRow>> = measurement.frames.iter().map(row).collect();
+    let column = |name, cell: &dyn Fn(&FrameRow) -> String| {
+        let cells = rows.iter().map(|row| row.map_or_else(String::new, cell)).collect();
+        ExtraColumn { name, cells }
+    };
+    let end = |row: &FrameRow, end: usize| {
+        row.energy_interval_j.map_or(String::new(), |ends| ends[end].to_string())
+    };
+    vec![
+        column("predicted", &|row| u8::from(row.predicted).to_string()),
+        column("predicted_energy_low_J", &|row| end(row, 0)),
+        column("predicted_energy_high_J", &|row| end(row, 1)),
+    ]
 }
 
 const NS: f64 = 1e9;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Failure;
 use super::args::ListArgs;
 use super::terminal::{print, print_json};
+use experiments::catalog::{ALL, CHARTS};
 use run::GpuSpec;
 
 /// Names of all built-in things, each with a description.
@@ -102,8 +103,19 @@ fn listing() -> Listing {
         platforms: power_model::Platform::names().map(platform).collect(),
         energy_tables: power_model::EnergyTable::names().map(table).collect(),
         sample_tables: pipeline::SampleSpec::names().map(|(name, what)| Entry::new(name, what)).collect(),
-        charts: experiments::chart::CHARTS.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
+        charts: charts(),
         workloads: workloads::catalog::names().map(|(name, what)| Entry::new(name, what)).collect(),
         figures: run::FIGURES.iter().map(|(name, what)| Entry::new(*name, *what)).collect(),
     }
+}
+
+/// `all` and the charts, each with its line in small letters as those of everything else.
+fn charts() -> Vec<Entry> {
+    let named = CHARTS.iter().map(|chart| (chart.name, chart.about));
+    let entry = |(name, about): (&str, &str)| {
+        let mut letters = about.chars();
+        let first = letters.next().map(|letter| letter.to_ascii_lowercase());
+        Entry::new(name, first.into_iter().chain(letters).collect::<String>())
+    };
+    std::iter::once(ALL).chain(named).map(entry).collect()
 }

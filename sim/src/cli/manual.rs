@@ -20,7 +20,7 @@ pub(super) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
 pub(super) fn man(args: &ManArgs) -> Result<(), Failure> {
     let mut command = Cli::command();
     command.build();
-    let Some(folder) = &args.folder else {
+    let Some(folder) = args.folder.as_ref().or(args.out.as_ref()) else {
         return print(&String::from_utf8_lossy(
             &page(&command).map_err(|error| failed("manual page", &error))?,
         ));

@@ -16,7 +16,6 @@ mod reproduce;
 mod run;
 mod sample;
 mod samples;
-mod stress;
 mod terminal;
 mod trace;
 mod visibility;
@@ -104,7 +103,7 @@ fn dispatch(cli: &Cli, terminal: &Terminal) -> Result<(), Failure> {
         Command::Ccd(args) => ccd::run(args, terminal),
         Command::Sample(args) => sample::run(args, terminal),
         Command::Samples(args) => samples::run(args),
-        Command::Stress(args) => stress::run(args, terminal),
+        Command::Stress(args) => chart::stress(args, terminal),
         Command::Chart(args) => chart::run(args, terminal),
         Command::Reproduce(args) => reproduce::run(args, terminal),
         Command::Trace(args) => trace::run(args, terminal),

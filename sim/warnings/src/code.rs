@@ -49,11 +49,6 @@ macro_rules! codes {
                 match self { $(Self::$code => $name,)+ }
             }
 
-            /// The code of this name.
-            pub fn named(name: &str) -> Option<Self> {
-                Self::ALL.iter().copied().find(|code| code.name() == name)
-            }
-
             /// When it is reported, in a sentence.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$code => concat!($($line),+).trim_ascii_start(),)+ }
@@ -99,6 +94,10 @@ codes! {
     /// Products of a triangle's coordinates leave the range of 32-bit floats (lengths beyond about 1e10 or
     /// below 1e-12 scene units).
     CoordinatesOutOfRange = "coordinates-out-of-range" in Simulator,
+    /// A corner in view has coordinates whose 32-bit step is larger than a quarter of a pixel there.
+    CoordinatesCoarse = "coordinates-coarse" in Simulator,
+    /// Triangles in view and in front of the camera are nearer than its near plane, as a whole or in part.
+    NearPlaneCuts = "near-plane-cuts" in Simulator,
     /// At `packet` and `bound`: a memory bank opens and closes rows for at least a fifth of the busiest unit's
     /// time.
     MemoryRows = "memory-rows" in Simulator,
@@ -179,6 +178,10 @@ codes! {
     NormalMapIgnored = "normal-map-ignored" in Scene,
     /// A material is metallic, or has a metallic-roughness map.
     MetallicIgnored = "metallic-ignored" in Scene,
+    /// A material has a highlight, a roughness or reflections of its own.
+    ReflectionIgnored = "reflection-ignored" in Scene,
+    /// A material has a displacement map.
+    DisplacementIgnored = "displacement-ignored" in Scene,
     /// A material emits light.
     EmissiveIgnored = "emissive-ignored" in Scene,
     /// A material has an occlusion map.
@@ -191,7 +194,7 @@ codes! {
     FaceColorsIgnored = "face-colors-ignored" in Scene,
     /// A glTF file uses an unsupported extension that changes the picture.
     ExtensionIgnored = "extension-ignored" in Scene,
-    /// Points, lines, or a primitive without positions.
+    /// Points, lines, curves, or a primitive without positions.
     PrimitiveDropped = "primitive-dropped" in Scene,
     /// A camera has no usable numbers.
     CameraIgnored = "camera-ignored" in Scene,

@@ -45,6 +45,18 @@ impl Warning {
         Self { code, message: kind.message(1), count: 1, details: vec![detail.into()], kind: Some(kind) }
     }
 
+    /// The same about as many things as there are `details`, of which only the first are asked for.
+    pub fn about_all(
+        code: Code,
+        thing: &'static str,
+        what: &'static str,
+        details: impl ExactSizeIterator<Item = String>,
+    ) -> Option<Self> {
+        let (kind, count) = (Kind { thing, what }, details.len());
+        let details = details.take(Self::MAX_DETAILS).collect();
+        (count > 0).then(|| Self { code, message: kind.message(count), count, details, kind: Some(kind) })
+    }
+
     /// The same with a number of things it concerns, and which these are.
     #[must_use]
     pub fn with_details(mut self, count: usize, details: impl IntoIterator<Item = String>) -> Self {

@@ -10,33 +10,37 @@ use crate::support::{Inputs, root};
 use cargo_metadata::{Metadata, MetadataCommand};
 
 /// Workspace crates that each crate may use, in builds and in tests.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 12] = [
+    ("warnings", &[]),
     ("activity", &[]),
     ("pipeline", &["activity"]),
-    ("workloads", &["activity", "pipeline"]),
-    ("traces", &[]),
-    ("power-model", &["activity", "traces"]),
-    ("timing", &["activity"]),
-    ("output", &["activity", "pipeline", "power-model", "traces"]),
-    ("run", &["activity", "output", "pipeline", "power-model", "timing", "traces", "workloads"]),
-    (
-        "experiments",
-        &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "workloads"],
-    ),
-    (
-        "sim",
-        &[
-            "activity",
-            "experiments",
-            "output",
-            "pipeline",
-            "power-model",
-            "run",
-            "timing",
-            "traces",
-            "workloads",
-        ],
-    ),
+    ("workloads", &["activity", "pipeline", "warnings"]),
+    ("jls", &[]),
+    ("traces", &["jls", "warnings"]),
+    ("power-model", &["activity", "traces", "warnings"]),
+    ("timing", &["activity", "warnings"]),
+    ("output", &["activity", "pipeline", "power-model", "traces", "warnings"]),
+    ("run", &["activity", "output", "pipeline", "power-model", "timing", "traces", "warnings", "workloads"]),
+    ("experiments", BELOW_EXPERIMENTS),
+    ("sim", &BELOW_COMMAND),
+];
+
+/// What stands below the experiments.
+const BELOW_EXPERIMENTS: &[&str] =
+    &["activity", "output", "pipeline", "power-model", "run", "timing", "traces", "warnings", "workloads"];
+
+/// What stands below the command.
+const BELOW_COMMAND: [&str; 10] = [
+    "activity",
+    "experiments",
+    "output",
+    "pipeline",
+    "power-model",
+    "run",
+    "timing",
+    "traces",
+    "warnings",
+    "workloads",
 ];
 
 fn workspace() -> Metadata {
@@ -77,8 +81,9 @@ fn documented_dependencies_exist() {
         ("pipeline", "activity"),
         ("power-model", "activity"),
         ("power-model", "traces"),
+        ("traces", "jls"),
     ];
-    let of_run = ARROWS[7].1.iter().map(|used| ("run", *used));
+    let of_run = ARROWS[9].1.iter().map(|used| ("run", *used));
     for (name, used) in drawn.into_iter().chain(of_run) {
         assert!(arrows[name].contains(used), "{name} is to use {used}");
     }

@@ -6,7 +6,7 @@ use traces::energy::TrueFrame;
 use traces::frames::Window;
 use traces::{Trace, io};
 
-/// A trace, what the analyst is told of it, and the truth.
+/// A trace, what the analyst is reported of it, and the truth.
 pub struct Case {
     pub dir: String,
     pub name: String,
@@ -31,12 +31,12 @@ pub fn list(dir: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {
 
 impl Case {
     pub fn read(description: &Path) -> Result<Self, Box<dyn Error>> {
-        let told: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(description)?)?;
+        let reported: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(description)?)?;
         let number = |key: &str| {
-            told[key].as_f64().ok_or_else(|| format!("{}: no number {key}", description.display()))
+            reported[key].as_f64().ok_or_else(|| format!("{}: no number {key}", description.display()))
         };
         let mut marks_s = vec![number("mark_s")?];
-        marks_s.extend(told["other_marks_s"].as_array().into_iter().flatten().filter_map(|m| m.as_f64()));
+        marks_s.extend(reported["other_marks_s"].as_array().into_iter().flatten().filter_map(|m| m.as_f64()));
         let parquet = description.with_extension("parquet");
         let trace = if parquet.exists() {
             io::read_parquet(&parquet)?

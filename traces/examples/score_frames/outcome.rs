@@ -37,7 +37,7 @@ impl Outcome {
         let chosen = format!(
             "{:?} {}",
             found.method,
-            found.warnings.iter().map(|w| w.code).collect::<Vec<_>>().join(",")
+            found.warnings.iter().map(|w| w.code.name()).collect::<Vec<_>>().join(",")
         );
         Ok(Self {
             f1: score.f1(),
@@ -94,12 +94,12 @@ fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     let mut counts = (0, 0, 0);
     for (pair, frame) in partner.windows(2).zip(frames) {
         let right = matches!(pair, [Some(a), Some(b)] if *b == a + 1);
-        let told = usize::from(frame.flags.doubted());
+        let reported = usize::from(frame.flags.doubted());
         if right {
-            counts.2 += told;
+            counts.2 += reported;
         } else {
             counts.0 += 1;
-            counts.1 += told;
+            counts.1 += reported;
         }
     }
     counts

@@ -1,4 +1,4 @@
-//! Sampling a curve.
+//! Sampling a noise-free curve.
 
 use super::Device;
 use crate::curve::{Curve, CurveError};
@@ -8,8 +8,8 @@ use crate::random::Random;
 use crate::trace::{Trace, TraceError};
 use thiserror::Error;
 
-/// The most samples: 16 bytes each while they are made.
-const MOST: f64 = (1_u64 << 29) as f64;
+/// Most samples: 16 bytes each while they are made.
+const MAX_SAMPLES: f64 = (1_u64 << 29) as f64;
 
 /// Why a curve cannot be sampled.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -104,14 +104,14 @@ pub(super) struct Channels {
 impl Device {
     /// Samples a curve over the whole periods in `[start_s, end_s]`.
     ///
-    /// Each sample is the exact mean power of its period, low-passed if asked, turned into voltage and current at
-    /// the rail (so that `V I` is the mean power), with noise added and both quantized. The trace's metadata names
-    /// the device and the seed.
+    /// Each sample is the exact mean power of its period, low-passed if so specified, converted to voltage
+    /// and current at the rail (so that `V I` is the mean power), with noise added and both quantized. The
+    /// trace's metadata names the device and the seed.
     ///
     /// # Errors
     /// [`SampleError`]: span outside the curve or too short, rail overloaded.
     pub fn sample(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<Sampled, SampleError> {
-        let count = self.periods([start_s, end_s], [curve.start_s(), curve.end_s()], MOST)?;
+        let count = self.periods([start_s, end_s], [curve.start_s(), curve.end_s()], MAX_SAMPLES)?;
         let mut means_w = curve.sample_means_w(start_s, self.spec.rate_hz, count);
         if let Some(mut low_pass) = self.low_pass() {
             low_pass.apply(&mut means_w);
@@ -126,7 +126,8 @@ impl Device {
         })
     }
 
-    /// Samples a trace as if its power were drawn from the device's rail: what a coarser recorder would have shown.
+    /// Samples a trace as if its power were drawn from the device's rail: what a coarser recorder would have
+    /// shown.
     ///
     /// # Errors
     /// [`SampleError`] as [`Device::sample`].
@@ -138,7 +139,7 @@ impl Device {
         Ok(sampled)
     }
 
-    /// What a trace says of itself once it was recorded by this device.
+    /// The metadata of a trace recorded by this device.
     pub(super) fn metadata(&self, of: Metadata) -> Metadata {
         Metadata { device: self.spec.name.clone(), seed: self.spec.seed, ..of }
     }
@@ -206,8 +207,8 @@ impl Device {
     }
 }
 
-/// One pole with a time constant in samples, started at rest: `y += (1 - exp(-1/tau)) (x - y)`, the step response
-/// of an RC filter taken at sample steps.
+/// One pole with a time constant in samples, started at rest: `y += (1 - exp(-1/tau)) (x - y)`, the step
+/// response of an RC filter taken at sample steps.
 pub(super) struct LowPass {
     share: f64,
     state: Option<f64>,

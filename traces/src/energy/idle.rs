@@ -1,18 +1,58 @@
-//! Idle power: measured, and taken off.
+//! Idle power: measured, and subtracted.
 
-use super::{FrameEnergy, PowerIntegral};
+use super::{FrameEnergy, PowerIntegral, energies_j};
+use crate::io::{TraceHeader, TraceReader, WriteError};
+use thiserror::Error;
 
-/// Idle power to take off.
+/// Idle power to subtract.
 #[derive(Clone, Debug)]
 pub enum Idle<'a> {
-    /// The same at all times, W: the mean over a stretch or a recording. Less noisy.
+    /// The same at all times, W: the mean over a part of the trace or a recording. Less noisy.
     Mean(f64),
-    /// Instant by instant: what an idle recording shows as long after its start (repeated where it is shorter); it takes
-    /// periodic patterns off, and adds the noise of both.
+    /// Instant by instant: the power of an idle recording at the same time after its start (repeated if it is
+    /// shorter). Periodic patterns are subtracted, but the noise of both adds up.
     Instant(PowerIntegral<'a>),
 }
 
-impl Idle<'_> {
+/// An idle recording that ends before the trace does: instants are compared from the starts of both on.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("the idle recording lasts {idle_s} s, the trace {trace_s} s")]
+pub struct IdleTooShort {
+    /// How long the idle recording lasts, s.
+    pub idle_s: f64,
+    /// How long the trace lasts, s.
+    pub trace_s: f64,
+}
+
+impl<'a> Idle<'a> {
+    /// The mean power of a trace from one time to another, s.
+    ///
+    /// # Errors
+    /// [`WriteError::Read`] if the samples cannot be read.
+    pub fn between(trace: &dyn TraceReader, from_s: f64, to_s: f64) -> Result<Self, WriteError> {
+        Ok(Self::Mean(energies_j(trace, &[(from_s, to_s)])?[0] / (to_s - from_s)))
+    }
+
+    /// The mean power of an idle recording.
+    pub fn mean_of(recording: &PowerIntegral<'_>) -> Self {
+        let length_s = recording.trace().end_s() - recording.trace().start_s();
+        Self::Mean(recording.total_j() / length_s)
+    }
+
+    /// An idle recording, instant by instant.
+    ///
+    /// # Errors
+    /// [`IdleTooShort`] if it is shorter than the trace.
+    pub fn instant(recording: PowerIntegral<'a>, trace: &TraceHeader) -> Result<Self, IdleTooShort> {
+        let idle_s = recording.trace().end_s() - recording.trace().start_s();
+        let trace_s = trace.end_s() - trace.start_s;
+        if idle_s >= trace_s * (1.0 - 1e-9) {
+            Ok(Self::Instant(recording))
+        } else {
+            Err(IdleTooShort { idle_s, trace_s })
+        }
+    }
+
     /// Energy of idling from `a_s` to `b_s` of a trace that starts at `start_s`, J.
     pub fn energy_j(&self, start_s: f64, a_s: f64, b_s: f64) -> f64 {
         match self {
@@ -21,7 +61,7 @@ impl Idle<'_> {
         }
     }
 
-    /// Takes the idle energy off every frame.
+    /// Subtracts the idle energy from every frame.
     pub fn take_off(&self, start_s: f64, frames: &mut [FrameEnergy]) {
         for frame in frames {
             frame.energy_j -= self.energy_j(start_s, frame.start_s, frame.end_s);
@@ -67,5 +107,15 @@ mod tests {
         let mut frames = [frame(0.0, 0.5, 3.0)];
         Idle::Mean(2.0).take_off(0.0, &mut frames);
         assert_eq!(frames[0].energy_j, 2.0);
+    }
+
+    #[test]
+    fn an_idle_recording_has_to_be_as_long_as_the_trace() {
+        let (idle, long) = (trace(vec![2.0; 7]), trace(vec![2.0; 8]));
+        assert!(Idle::instant(PowerIntegral::new(&idle), &idle.header()).is_ok());
+        let error = Idle::instant(PowerIntegral::new(&idle), &long.header()).unwrap_err();
+        assert_eq!((error.idle_s, error.trace_s), (0.7, 0.8));
+        let means = [Idle::mean_of(&PowerIntegral::new(&idle)), Idle::between(&long, 0.1, 0.3).unwrap()];
+        assert!(means.iter().all(|idle| (idle.energy_j(0.0, 0.0, 1.0) - 2.0).abs() < 1e-12));
     }
 }

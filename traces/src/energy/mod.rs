@@ -1,22 +1,17 @@
 //! Energy between any two times, and per frame.
 
-mod frame;
 mod idle;
 mod integral;
-mod outliers;
-mod pieces;
-mod pooled;
-mod summary;
+mod run;
+mod statistics;
+mod streaming;
 mod table;
-mod warm_up;
 
-pub use frame::{FrameEnergy, TrueFrame};
-pub use idle::Idle;
-pub use integral::PowerIntegral;
-pub use outliers::outliers;
-pub(crate) use pieces::Sums;
-pub use pieces::{energies_j, finishes_s, levels_w};
-pub use pooled::{Pooled, pooled};
-pub use summary::{Spread, Summary, whole};
-pub use table::{FrameTable, TABLE_COLUMNS, TableError};
-pub use warm_up::{WarmUp, mean_over_discarded, warm_up};
+pub use crate::stats::Spread;
+pub use idle::{Idle, IdleTooShort};
+pub use integral::{FrameEnergy, PowerIntegral, TrueFrame};
+pub use run::{InverseUnits, Pass, RunEnergy, RunError, RunOptions, passes_j};
+pub use statistics::{Pooled, Summary, WarmUp, mean_over_discarded, outliers, pooled, warm_up, whole};
+pub(crate) use streaming::Sums;
+pub use streaming::{energies_j, finishes_s, levels_w};
+pub use table::{ExtraColumn, FrameTable, TABLE_COLUMNS, TableError};

@@ -1,4 +1,4 @@
-//! `frames.csv`.
+//! The table of frames, `frames.csv`.
 
 use super::{FrameEnergy, TrueFrame, outliers};
 use crate::decimal;
@@ -9,7 +9,8 @@ use thiserror::Error;
 
 /// The columns of `frames.csv`, in order. Later versions only add columns at the end.
 ///
-/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a simulator.
+/// Cells are empty where nothing is known: energy per pixel without a number of pixels, truth without a
+/// simulator.
 pub const TABLE_COLUMNS: [&str; 12] = [
     "frame",
     "start_s",
@@ -25,9 +26,10 @@ pub const TABLE_COLUMNS: [&str; 12] = [
     "outlier",
 ];
 
-/// Rows that a thread writes down at once, and how many such batches go to the file at once.
-const ROWS: usize = 4096;
-const BATCHES: usize = 8;
+/// Rows that a thread formats at once.
+const TASK_ROWS: usize = 4096;
+/// Such batches of rows that are written at once.
+const HELD_TASKS: usize = 8;
 /// Bytes of a row, about.
 const ROW_BYTES: usize = 136;
 
@@ -42,9 +44,28 @@ pub enum TableError {
         /// True frames.
         truths: usize,
     },
+    /// An extra column has another number of cells than there are frames.
+    #[error("column `{name}` has {cells} cells for {frames} frames: give one per frame")]
+    Column {
+        /// Its name.
+        name: &'static str,
+        /// Its cells.
+        cells: usize,
+        /// Measured frames.
+        frames: usize,
+    },
     /// Writing failed.
     #[error("cannot write the table of frames: {0}")]
     Write(#[from] std::io::Error),
+}
+
+/// A column after those of [`TABLE_COLUMNS`]: its name, and a cell for each frame that needs no quotes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtraColumn {
+    /// The name in the header.
+    pub name: &'static str,
+    /// One per frame.
+    pub cells: Vec<String>,
 }
 
 /// Frames on their way to `frames.csv`.
@@ -55,16 +76,17 @@ pub struct FrameTable {
     /// One per frame, or none at all.
     truth: Vec<Option<TrueFrame>>,
     outliers: Vec<bool>,
+    extra: Vec<ExtraColumn>,
 }
 
 impl FrameTable {
     /// A table of measured frames; `pixels` per frame where known.
     pub fn new(frames: Vec<FrameEnergy>, pixels: Option<u64>) -> Self {
         let outliers = outliers(&frames.iter().map(|frame| frame.energy_j).collect::<Vec<_>>());
-        Self { frames, pixels, truth: Vec::new(), outliers }
+        Self { frames, pixels, truth: Vec::new(), outliers, extra: Vec::new() }
     }
 
-    /// Puts what really happened beside each frame (`None` for a frame that never was).
+    /// Adds the ground truth of each frame (`None` for a false one).
     ///
     /// # Errors
     /// [`TableError::Truth`] unless there is one entry per frame.
@@ -73,6 +95,18 @@ impl FrameTable {
             return Err(TableError::Truth { frames: self.frames.len(), truths: truth.len() });
         }
         Ok(Self { truth, ..self })
+    }
+
+    /// Adds columns at the end.
+    ///
+    /// # Errors
+    /// [`TableError::Column`] unless each has one cell per frame.
+    pub fn with_columns(self, extra: Vec<ExtraColumn>) -> Result<Self, TableError> {
+        if let Some(column) = extra.iter().find(|column| column.cells.len() != self.frames.len()) {
+            let (name, cells, frames) = (column.name, column.cells.len(), self.frames.len());
+            return Err(TableError::Column { name, cells, frames });
+        }
+        Ok(Self { extra, ..self })
     }
 
     /// The frames.
@@ -85,15 +119,17 @@ impl FrameTable {
         &self.outliers
     }
 
-    /// Writes the table as CSV with the header [`TABLE_COLUMNS`]; numbers in the shortest form that reads back the
-    /// same.
+    /// Writes the table as CSV with the header [`TABLE_COLUMNS`] and the names of extra columns; numbers in the shortest form that reads
+    /// back the same.
     ///
     /// # Errors
     /// [`TableError`] if the writer fails.
     pub fn write_csv<W: Write>(&self, mut out: W) -> Result<(), TableError> {
-        writeln!(out, "{}", TABLE_COLUMNS.join(","))?;
-        // Numbers take longer to write down than to find: many rows at once on every thread, the next while some go to the file.
-        let step = BATCHES * ROWS;
+        let extra = self.extra.iter().map(|column| column.name);
+        writeln!(out, "{}", TABLE_COLUMNS.into_iter().chain(extra).collect::<Vec<_>>().join(","))?;
+        // Numbers take longer to write down than to find: many rows at once on every thread, the next while
+        // some go to the file.
+        let step = HELD_TASKS * TASK_ROWS;
         let mut batches = self.batches(0, step);
         for from in (step..self.frames.len() + step).step_by(step) {
             let mut next = Vec::new();
@@ -107,14 +143,14 @@ impl FrameTable {
         Ok(())
     }
 
-    /// Rows as they stand in the file, made side by side.
+    /// The text of all rows, formatted in parallel.
     fn batches(&self, from: usize, to: usize) -> Vec<Vec<u8>> {
         let to = to.min(self.frames.len());
-        let firsts = (from..to).into_par_iter().step_by(ROWS);
-        firsts.map(|first| self.rows(first..to.min(first + ROWS))).collect()
+        let firsts = (from..to).into_par_iter().step_by(TASK_ROWS);
+        firsts.map(|first| self.rows(first..to.min(first + TASK_ROWS))).collect()
     }
 
-    /// Some rows as they stand in the file. No cell needs quotes.
+    /// The text of some rows. No cell needs quotes.
     fn rows(&self, range: Range<usize>) -> Vec<u8> {
         let mut rows = Vec::with_capacity(range.len() * ROW_BYTES);
         for index in range {
@@ -135,7 +171,9 @@ impl FrameTable {
         cells(out, [per_pixel_j, known(frame.confidence)]);
         let _ = write!(out, ",{}", frame.flags);
         cells(out, [truth.map(|truth| truth.start_s), truth.map(|truth| truth.energy_j)]);
-        let _ = writeln!(out, ",{}", u8::from(self.outliers[index]));
+        let _ = write!(out, ",{}", u8::from(self.outliers[index]));
+        self.extra.iter().for_each(|column| drop(write!(out, ",{}", column.cells[index])));
+        out.push(b'\n');
     }
 }
 
@@ -159,6 +197,22 @@ mod tests {
         flags.insert(Flag::Marked);
         flags.insert(Flag::Last);
         FrameEnergy { start_s: 0.25, end_s: 0.75, energy_j: 0.125, confidence: 1.0, flags }
+    }
+
+    #[test]
+    fn extra_columns_stand_at_the_end_and_need_a_cell_per_frame() {
+        let column = |cells: &[&str]| ExtraColumn {
+            name: "predicted",
+            cells: cells.iter().map(|&cell| cell.to_owned()).collect(),
+        };
+        let table = FrameTable::new(vec![frame(), frame()], None);
+        let mut out = Vec::new();
+        table.clone().with_columns(vec![column(&["1", ""])]).unwrap().write_csv(&mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let ends: Vec<_> = text.lines().map(|line| line.rsplit(',').next().unwrap()).collect();
+        assert_eq!(ends, ["predicted", "1", ""]);
+        let error = table.with_columns(vec![column(&["1"])]).unwrap_err();
+        assert_eq!(error.to_string(), "column `predicted` has 1 cells for 2 frames: give one per frame");
     }
 
     #[test]

@@ -1,22 +1,23 @@
-//! How sure the finder is, and what it has to say about the result as a whole.
+//! Confidence of each start, and warnings about the result as a whole: also about work before the first start
+//! and after the last frame.
 
-use super::flags::Flag;
-use super::found::{Found, FrameStart};
+use super::found::{Flag, Found, FrameStart};
 use super::marks::{Marks, Placement, Window};
 use super::spans::{Sampling, median_duration_s, spans};
-use super::threshold::{DISTINCT, Rule, Threshold};
+use super::threshold::{MIN_SEPARATION, Rule, Threshold};
 use crate::trace::Trace;
-use crate::warning::Warning;
+use warnings::{Code, Warning};
 
-/// A frame of fewer samples is measured coarsely.
-const FEW_SAMPLES: f64 = 50.0;
-/// Share of frames of odd length, by number or by the time they cover, from which the spacing is called irregular.
-const IRREGULAR: f64 = 0.1;
-/// Share of unsure frames from which the whole result is called so.
-const MANY_UNSURE: f64 = 0.1;
+/// Frames of fewer samples are measured coarsely.
+const MIN_FRAME_SAMPLES: f64 = 50.0;
+/// Largest share of frames of odd length, by number or by covered time, of a regular spacing.
+const MAX_ODD_SHARE: f64 = 0.1;
+/// Largest share of frames of low confidence without a warning about the whole result.
+const MAX_UNSURE_SHARE: f64 = 0.1;
 
-/// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest, linear in the logarithm
-/// between; scaled down where neither the populations are distinct nor the starts evenly spaced.
+/// The confidence of a distance (W^2): 1 at or below the mean of the matches, 0 at or above that of the rest,
+/// linear in the logarithm between; scaled down where neither the populations are distinct nor the starts
+/// evenly spaced.
 pub(crate) fn confidence(threshold: &Threshold) -> impl Fn(f64) -> f64 {
     let [low, high] =
         [threshold.matched, threshold.rest].map(|of| libm::log(of.mean_w2.max(f64::MIN_POSITIVE)));
@@ -40,7 +41,7 @@ pub(super) fn conclude(
     conclude_at(trace.rate_hz(), marks, placement, starts, threshold)
 }
 
-/// As [`conclude`], of samples at `rate_hz` that need not be at hand.
+/// As [`conclude`], of samples at `rate_hz` that need not be in memory.
 pub(crate) fn conclude_at(
     rate_hz: f64,
     marks: &Marks,
@@ -79,7 +80,7 @@ pub(crate) fn conclude_at(
 
 fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
     placement.cut.then(|| {
-        Warning::new("window-cut", format!(
+        Warning::new(Code::WindowCut, format!(
             "the marked window reaches beyond the trace and was cut to {:.3} ms before and {:.3} ms after the mark; \
              mark a frame further inside",
             found.window.pre_s * 1e3, found.window.post_s * 1e3))
@@ -88,7 +89,7 @@ fn window_cut(placement: &Placement, found: &Found) -> Option<Warning> {
 
 fn only_marks(found: &Found) -> Option<Warning> {
     found.starts.iter().all(|start| start.marked).then(|| {
-        Warning::new("only-mark", String::from(
+        Warning::new(Code::OnlyMark, String::from(
             "nothing else in the trace resembles the marked frame: what is reported is the mark to the end mark; mark a \
              more typical frame, or several"))
     })
@@ -98,8 +99,8 @@ fn weak_separation(found: &Found) -> Option<Warning> {
     let threshold = &found.threshold;
     let split = matches!(threshold.rule, Rule::Otsu | Rule::OtsuRegular | Rule::OtsuDistinct);
     (split && threshold.clarity() < 1.0).then(|| {
-        Warning::new("weak-separation", format!(
-            "frame starts and other minima are not distinct (separation {:.2}, clear above {DISTINCT}; {:.0} % evenly \
+        Warning::new(Code::WeakSeparation, format!(
+            "frame starts and other minima are not distinct (separation {:.2}, clear above {MIN_SEPARATION}; {:.0} % evenly \
              spaced; mean {:.3e} W^2 below the threshold {:.3e} W^2, {:.3e} W^2 above): starts may be missed or false; \
              mark several frames, or record with V-sync",
             threshold.separation, 100.0 * threshold.regularity, threshold.matched.mean_w2, threshold.value_w2, threshold.rest.mean_w2))
@@ -113,9 +114,10 @@ fn irregular(found: &Found) -> Option<Warning> {
     let covered_s: f64 = inner.iter().map(|frame| frame.end_s - frame.start_s).sum();
     // From 0.0, as the sum of nothing is -0.0 and would be printed so.
     let long_s = odd(Flag::Long).fold(0.0, |sum, frame| sum + (frame.end_s - frame.start_s));
-    let irregular = (long + short) as f64 > IRREGULAR * inner.len() as f64 || long_s > IRREGULAR * covered_s;
+    let irregular =
+        (long + short) as f64 > MAX_ODD_SHARE * inner.len() as f64 || long_s > MAX_ODD_SHARE * covered_s;
     irregular.then(|| {
-        Warning::new("irregular-spacing", format!(
+        Warning::new(Code::IrregularSpacing, format!(
             "of {} frames {long} are longer than 1.5 median durations ({:.0} % of the time) and {short} shorter than \
              0.5: starts were missed, are false, or the frame time really jumps",
             inner.len(), 100.0 * long_s / covered_s))
@@ -125,8 +127,8 @@ fn irregular(found: &Found) -> Option<Warning> {
 fn many_unsure(found: &Found) -> Option<Warning> {
     let unsure = found.frames.iter().filter(|frame| frame.flags.contains(Flag::Unsure)).count();
     let all = found.frames.len();
-    (unsure as f64 > MANY_UNSURE * all as f64).then(|| {
-        Warning::new("unsure-frames", format!(
+    (unsure as f64 > MAX_UNSURE_SHARE * all as f64).then(|| {
+        Warning::new(Code::UnsureFrames, format!(
             "{unsure} of {all} frames have a confidence below one half: their starts may be those of something else that \
              repeats; look at them before their energies are used, mark several frames, or sample faster"))
     })
@@ -136,7 +138,7 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
     let window_s = found.window.pre_s + found.window.post_s;
     // A tenth of slack: a window of just the period is what default_window gives.
     (found.frames.len() > 1 && window_s > 1.1 * median_s).then(|| {
-        Warning::new("window-longer-than-frame", format!(
+        Warning::new(Code::WindowLongerThanFrame, format!(
             "the window of {:.3} ms is longer than the median frame of {:.3} ms: shorter frames may be missed; shrink it",
             window_s * 1e3, median_s * 1e3))
     })
@@ -144,11 +146,47 @@ fn window_too_long(found: &Found, median_s: f64) -> Option<Warning> {
 
 fn few_samples(median_s: f64, rate_hz: f64) -> Option<Warning> {
     let samples = median_s * rate_hz;
-    (samples < FEW_SAMPLES).then(|| {
-        Warning::new("few-samples", format!(
-            "the median frame has {samples:.1} samples, fewer than {FEW_SAMPLES}: starts and energies are coarse; \
+    (samples < MIN_FRAME_SAMPLES).then(|| {
+        Warning::new(Code::FewSamples, format!(
+            "the median frame has {samples:.1} samples, fewer than {MIN_FRAME_SAMPLES}: starts and energies are coarse; \
              sample faster"))
     })
+}
+
+/// Least work without a start that gives a warning, in usual lengths of a frame.
+const MIN_UNCOVERED_LENGTHS: usize = 3;
+/// A segment is busy above this share of the way from the lowest power to the mean within frames.
+const BUSY_LEVEL: f64 = 0.5;
+/// Segments per usual length of a frame; the lowest power is that of a segment.
+const SEGMENTS_PER_LENGTH: usize = 20;
+
+/// Work beyond the starts, in usual lengths of a frame; places are in samples and in order. `None` for fewer
+/// than three starts.
+fn uncovered_lengths(power: &[f64], starts: &[f64]) -> Option<usize> {
+    let (&first, &last) = starts.first().zip(starts.last())?;
+    let mut gaps: Vec<f64> = starts.windows(2).map(|two| two[1] - two[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let usual = (*gaps.get(gaps.len() / 2).filter(|_| gaps.len() > 1)? as usize).max(1);
+    let place = |position: f64| (position.max(0.0) as usize).min(power.len());
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
+    let lowest =
+        power.chunks_exact((usual / SEGMENTS_PER_LENGTH).max(1)).map(mean).fold(f64::INFINITY, f64::min);
+    let busy_w = lowest + BUSY_LEVEL * (mean(&power[place(first)..place(last)]) - lowest);
+    let (before, after) = (&power[..place(first)], &power[place(last + usual as f64)..]);
+    let busy = before.rchunks_exact(usual).chain(after.chunks_exact(usual)).filter(|of| mean(of) > busy_w);
+    Some(busy.count())
+}
+
+/// The warning, where there is much.
+pub(super) fn uncovered_work(power: &[f64], starts: &[f64]) -> Option<Warning> {
+    let frames = uncovered_lengths(power, starts).filter(|frames| *frames >= MIN_UNCOVERED_LENGTHS)?;
+    Some(Warning::new(
+        Code::Uncovered,
+        format!(
+            "before the first start and after the last frame there is work of about {frames} frames in which none was found: \
+         frames are missing there; mark one of them, too"
+        ),
+    ))
 }
 
 #[cfg(test)]
@@ -177,5 +215,36 @@ mod tests {
             found.warnings.iter().any(|warning| warning.code == "unsure-frames")
         };
         assert!(!warned(0) && !warned(2) && warned(3));
+    }
+}
+
+#[cfg(test)]
+mod uncovered_tests {
+    use super::*;
+
+    /// Idle of 500 samples, frames of 100, busy for 70, and idle again.
+    fn power(frames: usize) -> Vec<f64> {
+        let work = (0..100 * frames).map(|i| if i % 100 < 70 { 3.0 } else { 1.0 });
+        [1.0; 500].into_iter().chain(work).chain([1.0; 500]).collect()
+    }
+
+    fn starts(from: usize, to: usize) -> Vec<f64> {
+        (from..to).map(|frame| 500.0 + 100.0 * frame as f64).collect()
+    }
+
+    #[test]
+    fn frames_left_out_at_either_end_are_counted() {
+        let power = power(40);
+        assert_eq!(uncovered_lengths(&power, &starts(0, 40)), Some(0));
+        assert_eq!(uncovered_lengths(&power, &starts(7, 40)), Some(7));
+        assert_eq!(uncovered_lengths(&power, &starts(7, 30)), Some(17));
+        assert_eq!(uncovered_lengths(&power, &starts(0, 2)), None);
+    }
+
+    #[test]
+    fn one_frame_more_or_less_is_no_matter() {
+        let power = power(40);
+        assert!(uncovered_work(&power, &starts(1, 39)).is_none());
+        assert!(uncovered_work(&power, &starts(0, 37)).unwrap().message.contains("about 3 frames"));
     }
 }

@@ -1,10 +1,11 @@
-//! What the finder found.
+//! The result of the frame finder: starts, frames, their flags, and the method.
 
-use super::flags::Flags;
 use super::marks::{Placed, Placement, Window};
-use super::method::Method;
 use super::threshold::Threshold;
-use crate::Warning;
+use core::fmt;
+use core::str::FromStr;
+use serde::Serialize;
+use warnings::Warning;
 
 /// One frame start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,11 +29,11 @@ pub struct FrameSpan {
     pub end_s: f64,
     /// The lower confidence of its two ends (of its start for the last frame).
     pub confidence: f64,
-    /// What is remarkable about it.
+    /// Its flags.
     pub flags: Flags,
 }
 
-/// What the finder found.
+/// The result of the frame finder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The starts, in order.
@@ -47,11 +48,12 @@ pub struct Found {
     pub window: Window,
     /// Which minima were taken, and why.
     pub threshold: Threshold,
-    /// Where the result stands on weak ground.
+    /// Warnings about the result.
     pub warnings: Vec<Warning>,
 }
 
-/// The least distance between two frame starts, in samples: half the window, as no frame is shorter than that.
+/// The least distance between two frame starts, in samples: half the window, as no frame is shorter than
+/// that.
 pub(super) fn spacing(window_samples: usize) -> usize {
     (window_samples / 2).max(1)
 }
@@ -64,4 +66,175 @@ pub(super) fn marked_starts(placement: &Placement, profile: &[f64]) -> Vec<Frame
         marked: true,
     };
     placement.marks.iter().map(start).collect()
+}
+
+/// One remark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flag {
+    /// The frame whose start was marked.
+    Marked,
+    /// It ends at the end mark, not at a found start.
+    Last,
+    /// More than 1.5 times the median duration: perhaps two frames with a start missed between them.
+    Long,
+    /// Less than half the median duration: perhaps part of a frame.
+    Short,
+    /// Confidence below one half.
+    Unsure,
+    /// Over 1.6 times as long as the frames around it: starts in between may have been missed.
+    Merged,
+    /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
+    Split,
+    /// Its length deviates from the even period of its neighbours: one of its ends may be misplaced.
+    Odd,
+    /// It has fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of
+    /// it and more.
+    Coarse,
+}
+
+impl Flag {
+    /// Every flag, in the order in which they are written.
+    pub const ALL: [Self; 9] = [
+        Self::Marked,
+        Self::Last,
+        Self::Long,
+        Self::Short,
+        Self::Unsure,
+        Self::Merged,
+        Self::Split,
+        Self::Odd,
+        Self::Coarse,
+    ];
+
+    /// Flags of frames whose ends may be misplaced.
+    pub const DOUBTS: [Self; 7] =
+        [Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split, Self::Odd, Self::Coarse];
+
+    /// The word in the `flags` column.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Marked => "marked",
+            Self::Last => "last",
+            Self::Long => "long",
+            Self::Short => "short",
+            Self::Unsure => "unsure",
+            Self::Merged => "merged",
+            Self::Split => "split",
+            Self::Odd => "odd",
+            Self::Coarse => "coarse",
+        }
+    }
+
+    fn bit(self) -> u16 {
+        1 << self as u16
+    }
+}
+
+/// A set of [`Flag`]s; shown as their names joined by `+`, empty if there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(u16);
+
+impl Flags {
+    /// Adds a flag.
+    pub fn insert(&mut self, flag: Flag) {
+        self.0 |= flag.bit();
+    }
+
+    /// Whether a flag is set.
+    pub fn contains(self, flag: Flag) -> bool {
+        self.0 & flag.bit() != 0
+    }
+
+    /// Whether any of [`Flag::DOUBTS`] is set.
+    pub fn doubted(self) -> bool {
+        Flag::DOUBTS.iter().any(|flag| self.contains(*flag))
+    }
+}
+
+impl fmt::Display for Flags {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for flag in Flag::ALL.into_iter().filter(|flag| self.contains(*flag)) {
+            write!(f, "{separator}{}", flag.name())?;
+            separator = "+";
+        }
+        Ok(())
+    }
+}
+
+/// How frame starts are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Sum of squared differences to the marked window, threshold, local minima (Paper III).
+    SumOfSquares,
+    /// The same by z-normalized distance: likeness of shape, whatever the level and the scale of power.
+    Normalized,
+    /// The sequence of starts with the most evidence: similar to several templates, by shape and by squares,
+    /// to each other, and at an even period.
+    Tracking,
+    /// Tracking. With fewer than 20 samples in the window, the most even of tracking, the sum of squares and
+    /// normalized; with fewer than 8 the sum of squares. Also the sum of squares for fewer than 16 frames, or
+    /// more than 16 million samples without a warning.
+    #[default]
+    Auto,
+}
+
+impl Method {
+    /// All of them, in order.
+    pub const ALL: [Self; 4] = [Self::SumOfSquares, Self::Normalized, Self::Tracking, Self::Auto];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SumOfSquares => "squares",
+            Self::Normalized => "normalized",
+            Self::Tracking => "tracking",
+            Self::Auto => "auto",
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = || Self::ALL.map(Self::name).join(", ");
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == text)
+            .ok_or_else(|| format!("no method {text}: choose one of {}", names()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_print_in_a_fixed_order() {
+        let mut flags = Flags::default();
+        assert_eq!(flags.to_string(), "");
+        flags.insert(Flag::Unsure);
+        flags.insert(Flag::Last);
+        assert_eq!(flags.to_string(), "last+unsure");
+        assert!(flags.contains(Flag::Last) && !flags.contains(Flag::Long));
+    }
+
+    #[test]
+    fn every_name_is_read_back_and_others_are_refused_with_the_choice() {
+        for method in Method::ALL {
+            assert_eq!(method.to_string().parse(), Ok(method));
+        }
+        assert_eq!(
+            "dtw".parse::<Method>(),
+            Err("no method dtw: choose one of squares, normalized, tracking, auto".to_owned())
+        );
+    }
 }

@@ -1,10 +1,12 @@
-//! What the user points at.
+//! Marked frame starts and their windows, and the warning about a window without a signal.
 
+use crate::stats::moments;
 use crate::trace::Trace;
 use thiserror::Error;
+use warnings::{Code, Warning};
 
-/// The fewest samples a window may have: fewer tell nothing apart.
-const LEAST_SAMPLES: usize = 4;
+/// Fewest samples of a window.
+const MIN_WINDOW_SAMPLES: usize = 4;
 
 /// A mark or window that cannot be used on this trace.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -20,7 +22,7 @@ pub enum MarkError {
         /// Its value, s.
         value_s: f64,
     },
-    /// A marked start is outside the trace, or so near its ends that no usable window is left.
+    /// A marked start is outside the trace, or too near its ends for a usable window.
     #[error(
         "the frame start marked at {mark_s} s has no window in the trace ({start_s} s to {end_s} s): \
          mark a frame further inside"
@@ -76,11 +78,11 @@ pub fn default_window(period_hint_s: f64, rate_hz: f64) -> Window {
 /// Marked frame starts, the window around them and where the last frame ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marks {
-    /// Marked starts of frames, s; usually one. With several, a stretch is as near as its nearest window.
+    /// Marked starts of frames, s; usually one. With several, a segment is as near as its nearest window.
     pub starts_s: Vec<f64>,
-    /// What is compared around each.
+    /// The window that is compared around each.
     pub window: Window,
-    /// Where the last frame ends, s: starts found from here on are left out.
+    /// End of the last frame, s: starts from here on are dropped.
     pub end_s: f64,
 }
 
@@ -110,12 +112,13 @@ impl Marks {
         Self { starts_s: vec![start_s], window, end_s }
     }
 
-    /// Puts the windows on the samples of a trace, cutting them where the trace ends.
+    /// Places the windows on the samples of a trace, cut at its ends.
     pub(super) fn place(&self, trace: &Trace) -> Result<Placement, MarkError> {
         self.place_on(trace.start_s(), trace.rate_hz(), trace.samples() as u64)
     }
 
-    /// As [`Marks::place`], on samples that need not be at hand. An end mark may be infinite: the end of the samples.
+    /// As [`Marks::place`], on samples that need not be in memory. An end mark may be infinite: the end of
+    /// the samples.
     pub(crate) fn place_on(&self, start_s: f64, rate_hz: f64, samples: u64) -> Result<Placement, MarkError> {
         let room = Room { start_s, rate_hz, samples: samples as f64 };
         self.check(&room)?;
@@ -125,7 +128,7 @@ impl Marks {
         let room_after = room.samples - self.starts_s.iter().map(|&s| centre(s)).fold(0.0, f64::max);
         let pre = wanted[0].min(room_before);
         let post = wanted[1].min(room_after);
-        if pre + post < LEAST_SAMPLES as f64 {
+        if pre + post < MIN_WINDOW_SAMPLES as f64 {
             return Err(self.no_room(&room, wanted[0] + wanted[1]));
         }
         let place = |&mark_s: &f64| {
@@ -141,7 +144,7 @@ impl Marks {
     }
 
     fn no_room(&self, room: &Room, wanted_samples: f64) -> MarkError {
-        if wanted_samples < LEAST_SAMPLES as f64 {
+        if wanted_samples < MIN_WINDOW_SAMPLES as f64 {
             let window_s = self.window.pre_s + self.window.post_s;
             return MarkError::TooShort { window_s, rate_hz: room.rate_hz };
         }
@@ -175,7 +178,7 @@ impl Marks {
     }
 }
 
-/// Where samples lie in time.
+/// The time base of samples.
 struct Room {
     start_s: f64,
     rate_hz: f64,
@@ -192,10 +195,47 @@ impl Room {
     }
 }
 
+/// Standard errors above the deviation of the noise from which a window is more than noise.
+const MIN_STANDARD_ERRORS: f64 = 3.0;
+
+/// Whether a window varies by no more than the noise of a sample, `sigma`: the deviation of `n` samples of
+/// noise is known to one part in `sqrt(2 n)`.
+fn is_flat(window: &[f64], sigma: f64) -> bool {
+    let most = sigma * (1.0 + MIN_STANDARD_ERRORS / libm::sqrt(2.0 * window.len() as f64));
+    moments(window).deviation <= most
+}
+
+/// The warning, where one of some marked windows, each with where its mark is (s), is flat in noise of
+/// deviation `sigma`.
+pub(crate) fn flat_mark<'a>(
+    windows: impl IntoIterator<Item = (f64, &'a [f64])>,
+    sigma: f64,
+) -> Option<Warning> {
+    let (mark_s, _) = windows.into_iter().find(|(_, window)| is_flat(window, sigma))?;
+    Some(Warning::new(
+        Code::FlatMark,
+        format!(
+            "around the mark at {mark_s} s power varies by no more than noise, so that any rest resembles it: what is found may be no \
+             frames; mark where one begins"
+        ),
+    ))
+}
+
+/// [`flat_mark`] of a trace in memory.
+pub(super) fn flat_mark_of(power: &[f64], placement: &Placement, sigma: f64) -> Option<Warning> {
+    let windows = placement
+        .marks
+        .iter()
+        .filter_map(|mark| Some((mark.mark_s, power.get(mark.first..mark.first + placement.samples)?)));
+    flat_mark(windows, sigma)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::matched::noise_variance;
     use crate::metadata::Metadata;
+    use crate::random::Random;
 
     const WINDOW: Window = Window { pre_s: 0.1, post_s: 0.4 };
 
@@ -245,5 +285,18 @@ mod tests {
             message(Marks::one(2.999, Window { pre_s: 0.0, post_s: 0.5 }, 3.0))
                 .contains("mark a frame further inside")
         );
+    }
+
+    #[test]
+    fn noise_is_flat_and_an_edge_in_as_much_noise_is_not() {
+        let random = Random::new(5, 0);
+        let noise: Vec<f64> = (0..5000).map(|at| random.normals(at).0).collect();
+        let sigma = libm::sqrt(noise_variance(&noise));
+        let flat = noise.chunks_exact(250).filter(|window| is_flat(window, sigma)).count();
+        assert_eq!(flat, 20);
+        let edge = |window: &[f64]| -> Vec<f64> {
+            window.iter().enumerate().map(|(at, watts)| watts + if at < 50 { 0.0 } else { 3.0 }).collect()
+        };
+        assert!(noise.chunks_exact(250).all(|window| !is_flat(&edge(window), sigma)));
     }
 }

@@ -1,22 +1,23 @@
 //! Starts by distance to the marked windows alone: threshold and local minima.
+//!
+//! The first frame of a free-running recording is searched separately: nothing was drawn before it, so the
+//! part of the window before the mark differs.
 
-use super::correlate::squares;
-use super::flat::flat_mark_of;
-use super::found::{Found, FrameStart, marked_starts, spacing};
-use super::marks::{MarkError, Marks, Placement};
-use super::method::Method;
-use super::minima::spaced_minima;
-use super::normalized::normalized;
-use super::regularity::regularity;
+use super::assess;
+use super::assess::confidence;
+use super::found::{Found, FrameStart, Method, marked_starts, spacing};
+use super::marks::{MarkError, Marks, Placement, flat_mark_of};
+use super::periodicity::regularity;
+use super::profile::{normalized, spaced_minima, squares, summed_squared_difference};
+use super::refine::align;
 use super::threshold::{Threshold, choose};
-use super::{assess, refine};
-use crate::median::median;
+use crate::stats::upper_median;
 use crate::trace::Trace;
 
 /// How far, in samples, refinement may move a start from the lowest offset of the profile.
-pub(super) const REACH: usize = 2;
-/// How many values a median over the whole trace is taken from.
-const MEDIAN_OF: usize = 65_536;
+pub(super) const MAX_REFINEMENT_SAMPLES: usize = 2;
+/// Most values that a median over the whole trace is taken from.
+const MAX_MEDIAN_VALUES: usize = 65_536;
 
 /// A local minimum of the profile.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +39,7 @@ impl View<'_> {
     fn start_near(&self, candidate: &Candidate, mark: usize, confidence: impl Fn(f64) -> f64) -> FrameStart {
         let mark = &self.placement.marks[mark];
         let template = &self.power[mark.first..mark.first + self.placement.samples];
-        let aligned = refine::align(self.power, template, candidate.offset, REACH);
+        let aligned = align(self.power, template, candidate.offset, MAX_REFINEMENT_SAMPLES);
         FrameStart {
             time_s: mark.mark_s + (aligned - mark.first as f64) * self.trace.period_s(),
             distance_w2: candidate.distance_w2,
@@ -79,7 +80,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
 
     let mut starts = marked_starts(&placement, &profile);
     let view = View { trace, power: &power, placement: &placement, threshold: &threshold };
-    let confidence = assess::confidence(&threshold);
+    let confidence = confidence(&threshold);
     for candidate in candidates.iter().filter(|candidate| candidate.distance_w2 < threshold.value_w2) {
         let mark = nearest.get(candidate.offset).copied().unwrap_or(0);
         starts.push(view.start_near(candidate, mark, &confidence));
@@ -96,7 +97,7 @@ pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: Method) -> Resu
     Ok(Found { method, ..found })
 }
 
-/// The minima that could be starts, the marks and their surroundings left out.
+/// The minima that could be starts, without the marks and their surroundings.
 fn candidates(profile: &[f64], placement: &Placement, spacing: usize) -> Vec<Candidate> {
     let beside_marks =
         |offset: &usize| placement.marks.iter().all(|mark| mark.first.abs_diff(*offset) >= spacing);
@@ -150,7 +151,8 @@ pub(crate) fn misalignment_w2(power: &[f64], placement: &Placement) -> f64 {
 }
 
 /// Variance of the sensor noise, W^2, from the median step between neighbours: `median |p[i+1] - p[i]|` is
-/// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a median.
+/// `0.6745 sqrt(2) sigma` for white Gaussian noise, and steps of the signal, being rare, hardly move a
+/// median.
 pub(super) fn noise_variance(power: &[f64]) -> f64 {
     let steps = power.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let sigma = noise_deviation(median_of(steps, power.len().saturating_sub(1)));
@@ -162,8 +164,62 @@ pub(crate) fn noise_deviation(median_step: f64) -> f64 {
     median_step / (0.674_489_75 * core::f64::consts::SQRT_2)
 }
 
-/// The (upper) median of at most [`MEDIAN_OF`] of `count` values, evenly picked; 0 for none.
+/// The (upper) median of at most [`MAX_MEDIAN_VALUES`] of `count` values, evenly picked; 0 for none.
 fn median_of(values: impl Iterator<Item = f64>, count: usize) -> f64 {
-    let mut picked: Vec<f64> = values.step_by(count.div_ceil(MEDIAN_OF).max(1)).collect();
-    median(&mut picked)
+    let mut picked: Vec<f64> = values.step_by(count.div_ceil(MAX_MEDIAN_VALUES).max(1)).collect();
+    upper_median(&mut picked)
+}
+
+/// Farthest the first frame may begin before the first start found, in median gaps.
+const MAX_LEAD_GAPS: f64 = 1.6;
+/// A match leaves less than this share of the contrast between the template and steady power.
+const MAX_MATCH_SHARE: f64 = 0.5;
+
+impl View<'_> {
+    /// One more start before the first one found, matched only by what follows the mark, with the threshold
+    /// (and the reported distance) in proportion to the compared part. `None` if nothing there is near
+    /// enough.
+    pub(super) fn start_after_idle(&self, starts: &[FrameStart], spacing: usize) -> Option<FrameStart> {
+        let gap_s = median_gap_s(starts)?;
+        let first = self.trace.position(starts.first()?.time_s);
+        let from = (first - MAX_LEAD_GAPS * gap_s * self.trace.rate_hz()).max(0.0) as usize;
+        let to = (first - spacing as f64).max(0.0) as usize;
+        let lead = |mark: &super::marks::Placed| libm::round(mark.anchor) as usize;
+        let found = self.placement.marks.iter().filter_map(|mark| {
+            let template = &self.power[mark.first + lead(mark)..mark.first + self.placement.samples];
+            let segment = self.power.get(from..to + template.len())?;
+            let profile = summed_squared_difference(segment, template);
+            let (near, &distance) = profile.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1))?;
+            let distance_w2 = distance * self.placement.samples as f64 / template.len() as f64;
+            let offset = align(self.power, template, from + near, MAX_REFINEMENT_SAMPLES)
+                - (mark.first + lead(mark)) as f64;
+            let time_s = mark.mark_s + offset * self.trace.period_s();
+            let inside = near > 0 && near + 1 < profile.len();
+            let stands_out = distance < MAX_MATCH_SHARE * self.contrast_w2(mark.first, lead(mark), template);
+            (inside && stands_out && distance_w2 < self.threshold.value_w2).then_some((time_s, distance_w2))
+        });
+        let (time_s, distance_w2) = found.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(FrameStart {
+            time_s,
+            distance_w2,
+            confidence: confidence(self.threshold)(distance_w2),
+            marked: false,
+        })
+    }
+
+    /// How much what follows the mark differs from the steady power before it, W^2: where that is nothing,
+    /// idle alone resembles it. Unbounded where the window has nothing before the mark.
+    fn contrast_w2(&self, first: usize, lead: usize, template: &[f64]) -> f64 {
+        if lead == 0 {
+            return f64::INFINITY;
+        }
+        let before = self.power[first..first + lead].iter().sum::<f64>() / lead as f64;
+        template.iter().map(|power| (power - before) * (power - before)).sum()
+    }
+}
+
+/// The median distance between neighbours, s; `None` for fewer than two starts.
+fn median_gap_s(starts: &[FrameStart]) -> Option<f64> {
+    let mut gaps: Vec<f64> = starts.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
+    (!gaps.is_empty()).then(|| upper_median(&mut gaps))
 }

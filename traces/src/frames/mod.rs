@@ -1,53 +1,32 @@
-//! Frame starts from one marked frame (the thesis' Paper III, section 3.1): a window of power around the mark is
-//! compared with every stretch of the trace by summed squared difference; a threshold chosen from the trace itself
-//! tells starts from the rest, and where it cannot, the result carries a [`Warning`](crate::Warning).
+//! Frame starts from one marked frame (the thesis' Paper III, section 3.1). A window of power around the mark
+//! is compared with every window of the trace by summed squared difference. A threshold chosen from the trace
+//! itself separates starts from the rest; where it cannot, the result carries a [`Warning`](warnings::Warning).
 
-mod alike;
-mod alternate;
 mod assess;
-mod auto;
-mod beat;
-mod correlate;
 mod find;
-mod first;
-mod flags;
-mod flat;
 mod found;
-mod lock;
+mod idle_gap;
 mod marks;
 mod matched;
-mod method;
-mod minima;
-mod normalized;
+mod periodicity;
 pub mod profile;
-mod propose;
 mod refine;
 mod register;
-mod regularity;
-mod rest;
-mod settle;
 mod spans;
-mod split;
-mod stretch;
+mod split_frames;
+mod start_refinement;
 mod threshold;
 mod track;
 mod tracked;
-mod uncovered;
-mod unrested;
+mod vsync;
 
-pub use find::{Options, find, find_with, marked_only};
-pub use flags::{Flag, Flags};
-pub use found::{Found, FrameSpan, FrameStart};
-pub use marks::{MarkError, Marks, Window, default_window};
-pub use method::Method;
-pub use propose::{Proposal, propose};
-pub use threshold::{Population, Rule, Threshold};
-
-// For the analysis of files in pieces.
 pub(crate) use assess::{conclude_at, confidence};
-pub(crate) use flat::flat_mark;
-pub(crate) use marks::{Placed, Placement};
+pub use find::{Options, Proposal, find, find_with, marked_only, propose};
+pub use found::{Flag, Flags, Found, FrameSpan, FrameStart, Method};
+pub use marks::{MarkError, Marks, Window, default_window};
+pub(crate) use marks::{Placed, Placement, flat_mark};
 pub(crate) use matched::{misalignment_w2, noise_deviation, start_after_idle};
+pub(crate) use periodicity::regularity;
 pub(crate) use refine::vertex;
-pub(crate) use regularity::regularity;
 pub(crate) use threshold::choose;
+pub use threshold::{Population, Rule, Threshold};

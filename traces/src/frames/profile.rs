@@ -1,13 +1,19 @@
-//! The distance of a template to every stretch of a trace.
+//! Distance profiles: the distance of a template to every window of a trace, by summed squares or by shape,
+//! and its minima.
+//!
+//! Narrow templates are summed directly, wide ones correlated by the Fourier transform, block by block.
 
-/// Offsets handled at once: their sums stay in registers while the template streams by.
+use crate::overlap::{Buffers, OverlapSave};
+use rayon::prelude::*;
+
+/// Offsets computed together: their sums stay in registers while the template is read once.
 const LANES: usize = 16;
 
 /// Summed squared difference `d[k] = sum over j of (power[k + j] - template[j])^2`, in W^2 for powers in W.
 ///
-/// One value per offset at which the template fits, `power.len() - template.len() + 1`; none if it does not fit or
-/// is empty. Terms are added in the order of the template, so the result does not depend on how it is blocked.
-/// Time: `O(n m)`, `O(n)` memory.
+/// One value per offset at which the template fits, `power.len() - template.len() + 1`; none if it does not
+/// fit or is empty. Terms are added in the order of the template, so the result does not depend on how it is
+/// blocked. Time: `O(n m)`, `O(n)` memory.
 pub fn summed_squared_difference(power: &[f64], template: &[f64]) -> Vec<f64> {
     let width = template.len();
     if width == 0 || power.len() < width {
@@ -31,8 +37,8 @@ pub fn summed_squared_difference(power: &[f64], template: &[f64]) -> Vec<f64> {
 /// [`LANES`] successive offsets; `power` is `LANES - 1` longer than the template.
 fn lanes(power: &[f64], template: &[f64]) -> [f64; LANES] {
     let mut sums = [0.0; LANES];
-    for (stretch, &reference) in power.windows(LANES).zip(template) {
-        for (sum, &value) in sums.iter_mut().zip(stretch) {
+    for (segment, &reference) in power.windows(LANES).zip(template) {
+        for (sum, &value) in sums.iter_mut().zip(segment) {
             let difference = value - reference;
             *sum += difference * difference;
         }
@@ -40,9 +46,138 @@ fn lanes(power: &[f64], template: &[f64]) -> [f64; LANES] {
     sums
 }
 
-/// The summed squared difference of two stretches of the same length.
+/// The summed squared difference of two segments of the same length.
 pub(super) fn difference(power: &[f64], template: &[f64]) -> f64 {
     power.iter().zip(template).map(|(&value, &reference)| (value - reference) * (value - reference)).sum()
+}
+
+/// Least length of a block: long enough that little is computed twice, short enough to stay in the caches.
+const MIN_BLOCK_SAMPLES: usize = 1 << 14;
+
+/// Wider templates are correlated by transforms, narrower ones summed directly.
+const MAX_DIRECT_SAMPLES: usize = 48;
+
+/// Summed squared difference at every offset, W^2, by whichever way is faster. By transforms it is exact to
+/// about 1e-13 of the template's and the segment's own squares.
+pub(super) fn squares(power: &[f64], template: &[f64]) -> Vec<f64> {
+    let width = template.len();
+    if width < MAX_DIRECT_SAMPLES || power.len() < width {
+        return summed_squared_difference(power, template);
+    }
+    // Rounding goes with the numbers' size, so both are taken about the template's mean.
+    let mean = template.iter().sum::<f64>() / width as f64;
+    let centred: Vec<f64> = template.iter().map(|watts| watts - mean).collect();
+    let own: f64 = centred.iter().map(|x| x * x).sum();
+    let signal: Vec<f64> = power.iter().map(|watts| watts - mean).collect();
+    let mut profile = Correlator::new(&centred).correlate(&signal);
+    let square = |x: &f64| x * x;
+    profile.par_chunks_mut(RESTART_OFFSETS).enumerate().for_each(|(index, profile)| {
+        // The running sum starts anew in every chunk, so that its rounding does not grow with the trace.
+        let from = index * RESTART_OFFSETS;
+        let mut sum: f64 = signal[from..from + width].iter().map(square).sum();
+        for (k, value) in profile.iter_mut().enumerate() {
+            *value = (sum + own - 2.0 * *value).max(0.0);
+            sum += signal.get(from + k + width).map_or(0.0, square) - square(&signal[from + k]);
+        }
+    });
+    profile
+}
+
+/// Offsets after which a running sum begins anew.
+const RESTART_OFFSETS: usize = 1 << 14;
+
+/// One template, ready to be correlated with whole traces.
+pub(super) struct Correlator {
+    overlap: OverlapSave<f64>,
+    width: usize,
+}
+
+impl Correlator {
+    /// Prepares a template.
+    pub fn new(template: &[f64]) -> Self {
+        let block = (8 * template.len()).next_power_of_two().max(MIN_BLOCK_SAMPLES);
+        Self { overlap: OverlapSave::new(&[template.to_vec()], 1.0, block), width: template.len() }
+    }
+
+    /// `c[k] = sum over j of signal[k + j] template[j]`, at every offset at which the template fits.
+    pub fn correlate(&self, signal: &[f64]) -> Vec<f64> {
+        let Some(last) = signal.len().checked_sub(self.width) else { return Vec::new() };
+        let mut out = vec![0.0; last + 1];
+        let step = self.overlap.step();
+        out.par_chunks_mut(2 * step).enumerate().for_each_init(Buffers::default, |buffers, (index, out)| {
+            let (first, second) = out.split_at_mut(step.min(out.len()));
+            self.overlap.pair(signal, 2 * step * index, buffers, |_, pair| {
+                first.iter_mut().zip(pair).for_each(|(to, pair)| *to = pair.re);
+                second.iter_mut().zip(pair).for_each(|(to, pair)| *to = pair.im);
+            });
+        });
+        out
+    }
+}
+
+/// Least norm of a window, as a share of the template's: steady power then resembles nothing.
+const MIN_NORM_SHARE: f64 = 0.05;
+
+/// z-normalized squared distance (Goldin and Kanellakis 1995; Mueen's MASS) at every offset, in W^2: `2 |q|^2 (1 - r)`, with `r` the
+/// correlation coefficient and `|q|` the template's norm about its mean. It is what the summed squared difference would be had the
+/// segment the template's mean and norm: neither idle power nor a factor on power changes it.
+pub(super) fn normalized(power: &[f64], template: &[f64]) -> Vec<f64> {
+    let width = template.len();
+    if width == 0 || power.len() < width {
+        return Vec::new();
+    }
+    let mean = template.iter().sum::<f64>() / width as f64;
+    let centred: Vec<f64> = template.iter().map(|watts| watts - mean).collect();
+    let own = libm::sqrt(centred.iter().map(|x| x * x).sum());
+    let signal: Vec<f64> = power.iter().map(|watts| watts - mean).collect();
+    let mut profile = Correlator::new(&centred).correlate(&signal);
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (k, value) in profile.iter_mut().enumerate() {
+        if k % RESTART_NORM_OFFSETS == 0 {
+            sum = signal[k..k + width].iter().sum();
+            squares = signal[k..k + width].iter().map(|x| x * x).sum();
+        }
+        let norm = libm::sqrt((squares - sum * sum / width as f64).max(0.0)).max(MIN_NORM_SHARE * own);
+        let r = *value / (norm * own).max(f64::MIN_POSITIVE);
+        *value = 2.0 * own * own * (1.0 - r).max(0.0);
+        let (gone, next) = (signal[k], signal.get(k + width).copied().unwrap_or(0.0));
+        sum += next - gone;
+        squares += next * next - gone * gone;
+    }
+    profile
+}
+
+/// Offsets after which running sums begin anew, so that rounding does not grow with the trace.
+const RESTART_NORM_OFFSETS: usize = 1 << 14;
+
+/// Offsets that are lowest within less than `spacing` on either side, in order and at least `spacing` apart.
+///
+/// On a plateau the first offset stands for its neighbours, so that a level without any structure still
+/// yields one candidate per `spacing` (the threshold needs to see such levels).
+pub(super) fn spaced_minima(profile: &[f64], spacing: usize) -> Vec<usize> {
+    let spacing = spacing.max(1);
+    let mut found: Vec<usize> = Vec::new();
+    for (block, values) in profile.chunks(spacing).enumerate() {
+        let offset = block * spacing + first_lowest(values);
+        let value = profile[offset];
+        let before = &profile[(offset + 1).saturating_sub(spacing)..offset];
+        let after = &profile[offset + 1..profile.len().min(offset + spacing)];
+        let tied = found.last().is_some_and(|&last| offset - last < spacing);
+        if !tied && before.iter().chain(after).all(|&other| other >= value) {
+            found.push(offset);
+        }
+    }
+    found
+}
+
+fn first_lowest(values: &[f64]) -> usize {
+    let mut lowest = 0;
+    for (index, value) in values.iter().enumerate() {
+        if *value < values[lowest] {
+            lowest = index;
+        }
+    }
+    lowest
 }
 
 #[cfg(test)]
@@ -71,6 +206,103 @@ mod tests {
                 }
                 prop_assert_eq!(value, sum);
             }
+        }
+    }
+
+    fn noise(samples: usize, level: f64) -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state * 48_271 % 2_147_483_647;
+            state as f64 / 2_147_483_647.0
+        };
+        (0..samples).map(|_| level + next()).collect()
+    }
+
+    #[test]
+    fn oracle_transforms_agree_with_the_definition_over_many_blocks_and_levels() {
+        for level in [0.0, 300.0] {
+            let power = noise(3 * MIN_BLOCK_SAMPLES + 77, level);
+            let template = &power[5000..5250];
+            let (fast, exact) = (squares(&power, template), summed_squared_difference(&power, template));
+            assert_eq!(fast.len(), exact.len());
+            for (fast, exact) in fast.iter().zip(&exact) {
+                assert!((fast - exact).abs() < 1e-9, "{fast} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() {
+        let power = noise(5 * MIN_BLOCK_SAMPLES, 3.0);
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| squares(&power, &power[100..350]))
+        };
+        assert_eq!(on(1), on(3));
+    }
+
+    proptest! {
+        #[test]
+        fn property_any_lengths(samples in 1_usize..400, width in 1_usize..120) {
+            let power = noise(samples, 2.0);
+            let template = noise(width, 2.5);
+            let (fast, exact) = (squares(&power, &template), summed_squared_difference(&power, &template));
+            prop_assert_eq!(fast.len(), exact.len());
+            for (fast, exact) in fast.iter().zip(&exact) {
+                prop_assert!((fast - exact).abs() < 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn analytic_offset_and_factor_change_nothing_and_steady_power_resembles_nothing() {
+        let template: Vec<f64> = (0..60).map(|i| f64::from(i * i % 17)).collect();
+        let other = template.iter().map(|watts| 40.0 + 0.3 * watts);
+        let power: Vec<f64> = core::iter::repeat_n(40.0, 80).chain(other).chain([40.0; 80]).collect();
+        let profile = normalized(&power, &template);
+        let mean = template.iter().sum::<f64>() / 60.0;
+        let own: f64 = template.iter().map(|x| (x - mean) * (x - mean)).sum();
+        assert!(profile[80] < 1e-9 * own, "{}", profile[80]);
+        assert!((profile[0] - 2.0 * own).abs() < 1e-9 * own);
+    }
+
+    proptest! {
+        #[test]
+        fn oracle_it_is_the_squared_distance_of_normalized_windows(
+            power in prop::collection::vec(0.0..9.0_f64, 60..200), at in 0_usize..20,
+        ) {
+            let template = &power[at..at + 30];
+            let scaled = |window: &[f64]| {
+                let mean = window.iter().sum::<f64>() / 30.0;
+                let norm = window.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>().sqrt();
+                (window.iter().map(|x| (x - mean) / norm).collect::<Vec<_>>(), norm)
+            };
+            let (q, own) = scaled(template);
+            for (k, value) in normalized(&power, template).into_iter().enumerate() {
+                let (x, _) = scaled(&power[k..k + 30]);
+                let exact: f64 = q.iter().zip(&x).map(|(a, b)| (a - b) * (a - b)).sum();
+                prop_assert!((value - own * own * exact).abs() < 1e-9 * own * own);
+            }
+        }
+    }
+
+    #[test]
+    fn the_lower_of_two_near_minima_wins_and_plateaus_count() {
+        assert_eq!(spaced_minima(&[5.0, 1.0, 5.0, 0.0, 5.0, 5.0, 5.0, 2.0, 5.0], 3), [3, 7]);
+        assert_eq!(spaced_minima(&[4.0; 7], 3), [0, 3, 6]);
+        assert_eq!(spaced_minima(&[], 3), [0_usize; 0]);
+    }
+
+    proptest! {
+        #[test]
+        fn oracle_each_is_the_lowest_around_and_none_is_missed(
+            profile in prop::collection::vec(0.0..1.0_f64, 1..200), spacing in 1_usize..30,
+        ) {
+            // Distinct values (almost surely), so ties do not matter here.
+            let naive: Vec<usize> = (0..profile.len())
+                .filter(|&k| (0..profile.len()).all(|o| o == k || o.abs_diff(k) >= spacing || profile[o] > profile[k]))
+                .collect();
+            prop_assert_eq!(spaced_minima(&profile, spacing), naive);
         }
     }
 }

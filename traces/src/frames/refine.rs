@@ -1,13 +1,18 @@
-//! Frame starts finer than a sample.
+//! Alignment finer than a sample, also between two frames at different clocks.
+//!
+//! After a clock step the same draws take longer or shorter: the power after the start of one frame is that
+//! of the other, scaled in time. Compared without scaling, the two fit best up to a sixth of the window away
+//! from the start. So the earlier frame is scaled about its start by one ratio after another, and the shift
+//! is taken from the best ratio.
 
 use super::profile::difference;
 use core::ops::RangeInclusive;
 
-/// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared difference within
-/// `reach` of it and the vertex of the parabola through it and its two neighbours.
+/// The best alignment near offset `near`, in samples, fractional: the minimum of the summed squared
+/// difference within `reach` of it and the vertex of the parabola through it and its two neighbours.
 ///
-/// For a signal smooth on the scale of a sample the difference is a parabola near its minimum, and the result exact;
-/// for a single sharp edge it is off by up to a tenth of a sample, alike to both sides (tests show both).
+/// For a signal smooth on the scale of a sample the difference is a parabola near its minimum, and the result
+/// exact; for a single sharp edge it is off by up to a tenth of a sample, to either side (tests show both).
 pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) -> f64 {
     let Some(last) = power.len().checked_sub(template.len()) else { return near as f64 };
     let at = |offset: usize| difference(&power[offset..offset + template.len()], template);
@@ -25,7 +30,7 @@ pub(super) fn align(power: &[f64], template: &[f64], near: usize, reach: usize) 
     best as f64 + vertex(at(best - 1), lowest, at(best + 1))
 }
 
-/// Where in a range of shifts the residual is least, looked at in steps and then about the best of them.
+/// The shift of the least residual in a range, searched in steps and then around the best of them.
 pub(super) fn nearest(shifts: RangeInclusive<usize>, step: usize, residual: impl Fn(usize) -> f64) -> usize {
     let (first, last) = shifts.into_inner();
     let least = |from: usize, to: usize, step: usize| {
@@ -36,7 +41,8 @@ pub(super) fn nearest(shifts: RangeInclusive<usize>, step: usize, residual: impl
     if step == 1 { rough } else { least(first.max(rough.saturating_sub(step)), last.min(rough + step), 1) }
 }
 
-/// Where the parabola through three equally spaced values is lowest, relative to the middle one, within half a step.
+/// The vertex of the parabola through three equally spaced values, relative to the middle one, within half a
+/// step.
 pub(crate) fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     let curvature = before - 2.0 * middle + after;
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
@@ -47,6 +53,102 @@ pub(super) fn between(power: &[f64], place: f64) -> Option<f64> {
     let whole = libm::floor(place);
     let (a, b) = (power.get(whole as usize)?, power.get(whole as usize + 1)?);
     (place >= 0.0).then(|| a + (place - whole) * (b - a))
+}
+
+/// Step of the time scales that are tried: powers of this, up and down.
+const RATIO_STEP: f64 = 1.06;
+/// Largest power: the clocks of a device lie within a factor of two.
+const MAX_POWER: i32 = 11;
+/// Distance, in samples, of the shifts that are tried first.
+const COARSE_STEP_SAMPLES: usize = 3;
+
+/// The best fit of a scaled segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ScaledFit {
+    /// How much longer things take in the later frame.
+    pub ratio: f64,
+    /// How much later than its place the start of the later frame lies, samples.
+    pub shift: f64,
+    /// Unexplained share of the variance, at the best gain.
+    pub unexplained: f64,
+    /// Second difference of that share over the shift, per squared sample.
+    pub curvature: f64,
+}
+
+/// Two frames to be aligned, by where their starts are thought to be, and what of them is compared: `before`
+/// and `after` samples of the later one, for shifts up to `reach`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScaledPair<'a> {
+    pub power: &'a [f64],
+    pub starts: [usize; 2],
+    pub before: usize,
+    pub after: usize,
+    pub reach: usize,
+}
+
+impl ScaledPair<'_> {
+    /// The ratio and the shift that leave least unexplained; `None` where the trace ends too early or nothing
+    /// fits best.
+    pub fn best(&self) -> Option<ScaledFit> {
+        let fits = (-MAX_POWER..=MAX_POWER)
+            .filter_map(|power| Some((power, self.fit(libm::pow(RATIO_STEP, f64::from(power)))?)));
+        let (power, fit) = fits.min_by(|a, b| a.1.unexplained.total_cmp(&b.1.unexplained))?;
+        // What fits best by the greatest ratio would fit better by a greater one.
+        (power.abs() < MAX_POWER).then_some(fit)
+    }
+
+    /// The fit of clocks that are the same.
+    pub fn unscaled(&self) -> Option<ScaledFit> {
+        self.fit(1.0)
+    }
+
+    /// The part of the later frame that is compared at any shift.
+    fn searched(&self) -> Option<&[f64]> {
+        let first = self.starts[1].checked_sub(self.before + self.reach)?;
+        self.power.get(first..self.starts[1] + self.after + self.reach)
+    }
+
+    /// The surroundings of the start of the earlier frame, scaled about it, of mean 0.
+    fn scaled(&self, ratio: f64) -> Option<Vec<f64>> {
+        let value = |index: usize| {
+            let place = self.starts[0] as f64 + (index as f64 - self.before as f64) / ratio;
+            between(self.power, place)
+        };
+        let mut values = (0..self.before + self.after).map(value).collect::<Option<Vec<f64>>>()?;
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter_mut().for_each(|watts| *watts -= mean);
+        Some(values)
+    }
+
+    /// The best shift at one ratio.
+    fn fit(&self, ratio: f64) -> Option<ScaledFit> {
+        let (segment, template) = (self.searched()?, self.scaled(ratio)?);
+        let own: f64 = template.iter().map(|x| x * x).sum();
+        let unlike = |shift: usize| unexplained(&template, own, &segment[shift..shift + template.len()]);
+        let last = (2 * self.reach).checked_sub(1)?;
+        let at = nearest(1..=last, COARSE_STEP_SAMPLES, unlike);
+        let [left, middle, right] = [at - 1, at, at + 1].map(unlike);
+        let curvature = left - 2.0 * middle + right;
+        (middle <= left.min(right) && curvature > 0.0).then(|| ScaledFit {
+            ratio,
+            shift: at as f64 - self.reach as f64 + vertex(left, middle, right),
+            unexplained: middle,
+            curvature,
+        })
+    }
+}
+
+/// One less the squared correlation coefficient of a template (of mean 0 and squares `own`) and a segment; 1
+/// where they are opposed.
+fn unexplained(template: &[f64], own: f64, segment: &[f64]) -> f64 {
+    let (mut sum, mut squares, mut inner) = (0.0, 0.0, 0.0);
+    for (t, x) in template.iter().zip(segment) {
+        sum += x;
+        squares += x * x;
+        inner += t * x;
+    }
+    let variance = squares - sum * sum / segment.len() as f64;
+    if inner <= 0.0 || variance <= 0.0 || own <= 0.0 { 1.0 } else { 1.0 - inner * inner / (variance * own) }
 }
 
 #[cfg(test)]
@@ -102,5 +204,50 @@ mod tests {
     #[test]
     fn a_flat_stretch_moves_nothing() {
         assert_eq!(align(&[1.0; 50], &[1.0; 10], 20, 2), 20.0);
+    }
+
+    /// Draws of many lengths from sample 300 on, every one longer by a ratio, after a rest.
+    fn frame(ratio: f64, gain: f64) -> Vec<f64> {
+        let edges = [0.0, 7.0, 12.0, 31.0, 40.0, 66.0, 71.0, 95.0, 130.0, 170.0, 400.0];
+        let heights = [0.3, 1.0, 0.5, 0.8, 0.4, 0.9, 0.6, 0.7, 0.5, 0.8];
+        let power = |at: f64| {
+            let draw = edges.windows(2).position(|e| (e[0] * ratio..e[1] * ratio).contains(&at));
+            0.2 + gain * draw.map_or(0.0, |draw| heights[draw])
+        };
+        // Sample 300 is the first of the frame; each is the mean of ten places.
+        (0..600)
+            .map(|i| (0..10).map(|k| power(f64::from(i) - 300.0 + 0.1 * f64::from(k))).sum::<f64>() / 10.0)
+            .collect()
+    }
+
+    #[test]
+    fn analytic_a_frame_at_another_clock_is_aligned_at_its_start_and_its_ratio_is_found() {
+        for (ratio, gain) in [(1.0 / 0.58, 0.4), (0.72, 1.6), (1.0, 1.0)] {
+            let power = [frame(1.0, 1.0), frame(ratio, gain)].concat();
+            for thought in [880, 900, 925] {
+                let pair =
+                    ScaledPair { power: &power, starts: [300, thought], before: 20, after: 110, reach: 60 };
+                let fit = pair.best().unwrap();
+                let off = fit.shift - (900.0 - thought as f64);
+                assert!((fit.ratio / ratio - 1.0).abs() < 0.05, "{ratio}: {fit:?}");
+                assert!(off.abs() < 1.0 && fit.unexplained < 0.1, "{ratio} {thought}: {fit:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn compared_as_they_are_frames_of_unlike_clocks_are_unlike_or_misplaced() {
+        let power = [frame(1.0, 1.0), frame(1.0 / 0.58, 0.4)].concat();
+        let pair = ScaledPair { power: &power, starts: [300, 900], before: 20, after: 110, reach: 60 };
+        let (plain, best) = (pair.unscaled().unwrap(), pair.best().unwrap());
+        assert!(plain.unexplained > 3.0 * best.unexplained && plain.shift.abs() > 5.0, "{plain:?} {best:?}");
+    }
+
+    #[test]
+    fn steady_power_and_the_ends_of_a_trace_have_no_fit() {
+        let pair = |starts| ScaledPair { power: &[1.0; 300], starts, before: 5, after: 50, reach: 20 };
+        assert_eq!(pair([100, 200]).best(), None);
+        assert_eq!(pair([100, 10]).best(), None);
+        assert_eq!(pair([100, 290]).best(), None);
     }
 }

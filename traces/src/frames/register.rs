@@ -1,44 +1,49 @@
-//! Starts finer than a sample: each is aligned with its neighbours, and all alignments are reconciled by least squares.
+//! Registration of starts finer than a sample: each is aligned with its neighbours, and all alignments are
+//! reconciled by least squares.
 //!
-//! A window of the marked frame is a poor ruler where content changes, as draws after the start move. Two frames in a row differ
-//! little, and least right after the start. So the shift of each frame against its next few is measured by what lies about the
-//! start, and positions `x_i` are chosen to fit all of them: minimize `sum w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with
-//! `c_i` the position by template and marks held fixed. It is solved by Gauss-Seidel sweeps. An edge just where the compared stretch
-//! ends enters at some shifts only and pulls the result by up to a quarter of a sample (a test shows it).
+//! Where content changes, the window of the marked frame is a poor reference, as draws after the start move. Successive
+//! frames differ little, and least right after the start. So the shift of each frame against its next few is measured
+//! around the start, and positions `x_i` are chosen to fit all shifts: minimize
+//! `sum w_ij (x_j - x_i - s_ij)^2 + sum u (x_i - c_i)^2`, with `c_i` the position by template and marks fixed, by Gauss-Seidel
+//! sweeps. An edge just at the end of the compared window enters some shifts only and pulls the result by up to a quarter of
+//! a sample (a test shows it).
 
-use super::refine::{nearest, vertex};
-use super::stretch::Pair;
+use super::refine::{ScaledPair, nearest, vertex};
 use rayon::prelude::*;
 
-/// How many frames on are those that each is aligned with. The near ones are most alike; the far ones keep errors from adding up
-/// along the trace.
+/// Distances, in frames, of the frames that each is aligned with. Near ones are most similar; far ones keep
+/// errors from adding up along the trace.
 const LAGS: [usize; 8] = [1, 2, 3, 4, 8, 16, 32, 64];
-/// Greatest shift tried, as a share of the window, and at least so many samples: where the clock has stepped, a template fits best
-/// up to a sixth of its length after the start off.
-const SHIFT: f64 = 0.12;
-const LEAST_SHIFT: usize = 6;
-/// At most about so many shifts are tried, and then all those between the best one's neighbours.
-const TRIED: usize = 64;
+/// Largest shift tried, as a share of the window: at a clock step, a template fits best up to a sixth of its
+/// length behind the start.
+const MAX_SHIFT_SHARE: f64 = 0.12;
+/// Lower limit of the largest shift, in samples.
+const MIN_MAX_SHIFT_SAMPLES: usize = 6;
+/// About the most shifts tried coarsely; then all those between the neighbours of the best one.
+const MAX_COARSE_SHIFTS: usize = 64;
 /// Shares of the window before and after the start that are compared.
-const SHARES: [f64; 2] = [0.02, 0.2];
-/// Least number of samples compared after the start, and half as many before, as the offset to be mended may put the edge there.
-const LEAST: usize = 8;
+const COMPARED_SHARES: [f64; 2] = [0.02, 0.2];
+/// Fewest samples compared after the start, and half as many before, since the offset to be corrected may put
+/// the edge there.
+const MIN_COMPARED_SAMPLES: usize = 8;
 /// Weight of a position by template, per squared sample.
-const TEMPLATE: f64 = 0.05;
+const TEMPLATE_WEIGHT: f64 = 0.05;
 /// A shift that leaves more than this share of the variance unexplained is not used.
-const UNLIKE: f64 = 0.7;
+const MAX_UNEXPLAINED: f64 = 0.7;
+/// Gauss-Seidel sweeps.
 const SWEEPS: usize = 200;
 
-/// Lags up to which frames of unlike clocks are aligned.
-const NEAR: usize = 8;
-/// Frames that leave more than this share of the variance unexplained may be of unlike clocks,
-const POOR: f64 = 0.15;
-/// and are if drawing one out in time leaves less than this share of that,
-const BETTER: f64 = 0.5;
-/// by a ratio farther from 1 than this.
-const UNLIKE_CLOCKS: f64 = 0.05;
-/// Shares of the window before and after the start that are compared then, and the greatest shift.
-const STRETCHED: [f64; 3] = [0.04, 0.4, 0.24];
+/// Largest lag, in frames, at which frames of different clocks are aligned.
+const MAX_CLOCK_LAG: usize = 8;
+/// Frames that leave more than this share of the variance unexplained may be at different clocks.
+const POOR_UNEXPLAINED: f64 = 0.15;
+/// They are, if scaling one in time leaves less than this share of that variance.
+const MAX_SCALED_RATIO: f64 = 0.5;
+/// The ratio of the clocks must differ from 1 by more than this.
+const MIN_CLOCK_DEVIATION: f64 = 0.05;
+/// Shares of the window before and after the start that are compared at different clocks, and the largest
+/// shift.
+const SCALED_SHARES: [f64; 3] = [0.04, 0.4, 0.24];
 
 /// A measured shift of a later frame against an earlier one: with `m` the moves from their offsets,
 /// `m_later = ratio m_earlier + shift`.
@@ -53,8 +58,8 @@ struct Link {
     weight: f64,
 }
 
-/// Positions of windows, samples, from their offsets (in order). `anchor` is where in a window of `width` samples the start is;
-/// windows for which `fixed` is true keep their offset.
+/// Positions of windows, samples, from their offsets (in order). `anchor` is where in a window of `width`
+/// samples the start is; windows for which `fixed` is true keep their offset.
 pub(super) fn register(
     power: &[f64],
     offsets: &[usize],
@@ -62,60 +67,67 @@ pub(super) fn register(
     anchor: usize,
     width: usize,
 ) -> Vec<f64> {
-    let before = ((SHARES[0] * width as f64) as usize).max(LEAST / 2).min(anchor);
-    let after = ((SHARES[1] * width as f64) as usize).max(LEAST).min(width - anchor.min(width - 1));
+    let before = ((COMPARED_SHARES[0] * width as f64) as usize).max(MIN_COMPARED_SAMPLES / 2).min(anchor);
+    let after = ((COMPARED_SHARES[1] * width as f64) as usize)
+        .max(MIN_COMPARED_SAMPLES)
+        .min(width - anchor.min(width - 1));
     let (skip, length) = (anchor - before, before + after);
-    let reach = ((SHIFT * width as f64) as usize).max(LEAST_SHIFT);
+    let reach = ((MAX_SHIFT_SHARE * width as f64) as usize).max(MIN_MAX_SHIFT_SAMPLES);
     let of_frame = |earlier: usize| {
         let later = LAGS.into_iter().map(move |lag| earlier + lag).filter(|later| *later < offsets.len());
         later.filter_map(move |later| {
-            let (ratio, shift, weight) = (later - earlier <= NEAR)
-                .then(|| stretched(power, [offsets[earlier], offsets[later]], anchor, width))
+            let (ratio, shift, weight) = (later - earlier <= MAX_CLOCK_LAG)
+                .then(|| scaled(power, [offsets[earlier], offsets[later]], anchor, width))
                 .flatten()
                 .or_else(|| shift(power, [offsets[earlier] + skip, offsets[later] + skip], length, reach))?;
             Some(Link { earlier, later, ratio, shift, weight })
         })
     };
     let links: Vec<Link> = (0..offsets.len()).into_par_iter().flat_map_iter(of_frame).collect();
-    let most = (STRETCHED[2] * width as f64).max(reach as f64);
+    let most = (SCALED_SHARES[2] * width as f64).max(reach as f64);
     let moves = reconcile(&links, fixed, most);
     offsets.iter().zip(moves).map(|(&offset, by)| offset as f64 + by).collect()
 }
 
-/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly of unlike clocks.
-fn stretched(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
-    let [before, after, reach] = STRETCHED.map(|share| (share * width as f64) as usize);
+/// Ratio, shift and its inverse variance where two frames, by the offsets of their windows, are clearly at
+/// different clocks.
+fn scaled(power: &[f64], offsets: [usize; 2], anchor: usize, width: usize) -> Option<(f64, f64, f64)> {
+    let [before, after, reach] = SCALED_SHARES.map(|share| (share * width as f64) as usize);
     let starts = offsets.map(|offset| offset + anchor);
-    let pair = Pair { power, starts, before, after, reach: reach.max(LEAST_SHIFT) };
-    let plain = pair.plain()?;
-    let fit = (plain.unlike > POOR).then(|| pair.best()).flatten()?;
-    let clear = fit.unlike < BETTER * plain.unlike && (fit.ratio - 1.0).abs() > UNLIKE_CLOCKS;
-    let variance = 2.0 * fit.unlike / (before + after) as f64 / fit.curvature + 1.0;
+    let pair = ScaledPair { power, starts, before, after, reach: reach.max(MIN_MAX_SHIFT_SAMPLES) };
+    let plain = pair.unscaled()?;
+    let fit = (plain.unexplained > POOR_UNEXPLAINED).then(|| pair.best()).flatten()?;
+    let clear = fit.unexplained < MAX_SCALED_RATIO * plain.unexplained
+        && (fit.ratio - 1.0).abs() > MIN_CLOCK_DEVIATION;
+    let variance = 2.0 * fit.unexplained / (before + after) as f64 / fit.curvature + 1.0;
     clear.then_some((fit.ratio, fit.shift, 1.0 / variance))
 }
 
-/// How much later than at `b` the stretch at `a` is found again, in samples, and the inverse variance of that; after a ratio of 1.
+/// How much later than at `b` the segment at `a` is found again, in samples, and the inverse variance of
+/// that; after a ratio of 1.
 fn shift(power: &[f64], [a, b]: [usize; 2], length: usize, reach: usize) -> Option<(f64, f64, f64)> {
     let template = power.get(a..a + length)?;
     let from = b.checked_sub(reach)?;
-    let stretch = power.get(from..b + reach + length)?;
-    let residual = |shift: usize| unlike(&stretch[shift..shift + length], template);
+    let segment = power.get(from..b + reach + length)?;
+    let residual = |shift: usize| unexplained(&segment[shift..shift + length], template);
     let last = 2 * reach - 1;
-    let at = nearest(1..=last, (last - 1).div_ceil(TRIED).max(1), residual);
+    let at = nearest(1..=last, (last - 1).div_ceil(MAX_COARSE_SHIFTS).max(1), residual);
     let [left, middle, right] = [at - 1, at, at + 1].map(residual);
     let curvature = left - 2.0 * middle + right;
-    if middle > left.min(right) || curvature <= 0.0 || middle > UNLIKE * unlike(template, &vec![0.0; length])
+    if middle > left.min(right)
+        || curvature <= 0.0
+        || middle > MAX_UNEXPLAINED * unexplained(template, &vec![0.0; length])
     {
         return None;
     }
-    // Of a parabola `c d^2 / 2` with noise of variance v a sample in each stretch, the vertex has about variance 2 v / c; the floor is the
-    // parabola's own error on sharp edges.
+    // Of a parabola `c d^2 / 2` with noise of variance v a sample in each segment, the vertex has about
+    // variance 2 v / c; the floor is the parabola's own error on sharp edges.
     let variance = 2.0 * middle / length as f64 / curvature + 0.01;
     Some((1.0, at as f64 - reach as f64 + vertex(left, middle, right), 1.0 / variance))
 }
 
-/// Summed squared difference of two stretches beyond their difference in mean.
-fn unlike(a: &[f64], b: &[f64]) -> f64 {
+/// Summed squared difference of two segments beyond their difference in mean.
+fn unexplained(a: &[f64], b: &[f64]) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
     for (x, y) in a.iter().zip(b) {
         sum += x - y;
@@ -136,7 +148,7 @@ fn reconcile(links: &[Link], fixed: &[bool], reach: f64) -> Vec<f64> {
     for _ in 0..SWEEPS {
         let mut largest = 0.0_f64;
         for node in (0..fixed.len()).filter(|&node| !fixed[node]) {
-            let (mut sum, mut weights) = (0.0, TEMPLATE);
+            let (mut sum, mut weights) = (0.0, TEMPLATE_WEIGHT);
             for &(other, ratio, shift, weight) in &of[node] {
                 sum += weight * (ratio * moves[other] + shift);
                 weights += weight;
@@ -163,7 +175,8 @@ mod tests {
             .collect()
     }
 
-    /// The worst deviation from the mean error over pulses of `length` samples off the grid, one of them fixed.
+    /// The worst deviation from the mean error over pulses of `length` samples off the grid, one of them
+    /// fixed.
     fn worst_error(length: f64) -> f64 {
         let at: Vec<f64> = (0..30).map(|i| 50.0 + 80.37 * f64::from(i)).collect();
         let power = pulses(&at, length, 2600);
@@ -181,19 +194,21 @@ mod tests {
 
     #[test]
     fn analytic_one_sharp_edge_is_found_as_well_as_by_one_alignment() {
-        // A single alignment is off by up to 0.13 of a sample (`refine`); errors do not add up over the links.
+        // A single alignment is off by up to 0.13 of a sample (`refine`); errors do not add up over the
+        // links.
         assert!(worst_error(30.0) < 0.13, "{}", worst_error(30.0));
     }
 
     #[test]
     fn known_limit_a_second_edge_at_the_end_of_the_stretch_costs_up_to_a_quarter_of_a_sample() {
-        // The stretch compared ends 12 samples after the start; an edge there enters at some shifts only.
+        // The segment compared ends 12 samples after the start; an edge there enters at some shifts only.
         assert!(worst_error(13.4) < 0.25, "{}", worst_error(13.4));
     }
 
     #[test]
     fn a_stretch_that_is_off_by_a_tenth_of_the_window_is_brought_back() {
-        // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends tell.
+        // 15 of 60 frames were found 20 of 250 samples late, as after a clock step; links across its ends
+        // show it.
         let at: Vec<f64> = (0..60).map(|i| 100.0 + 400.37 * f64::from(i)).collect();
         let draws: Vec<f64> = at.iter().flat_map(|a| [a + 27.0, a + 58.0]).collect();
         let (frames, draws) = (pulses(&at, 90.0, 24_400), pulses(&draws, 9.0, 24_400));

@@ -1,27 +1,28 @@
-//! The frames between starts, and what is remarkable about each.
+//! The frames between starts, and their flags.
 
-use super::beat;
-use super::flags::{Flag, Flags};
-use super::found::{FrameSpan, FrameStart};
-use crate::median::median;
+use super::found::{Flag, Flags, FrameSpan, FrameStart};
+use super::periodicity;
+use crate::stats::upper_median;
 
 /// A frame longer than this many usual lengths may be two; one shorter than the inverse, part of one.
-const TWICE: f64 = 1.6;
-/// A length that differs from the usual one by more than this share of it, and by more than so many times what the lengths around do,
-/// is odd.
-const ODD: [f64; 2] = [0.1, 6.0];
-/// In a window of fewer samples many things look like a start, and the beat alone tells which is one.
-const COARSE: usize = 20;
-/// With fewer yet, a start may be a sample off, and even gaps have to agree within half a sample.
-const COARSEST: usize = 8;
-/// Where fewer of the gaps than this are even nothing is sure, in windows of fewer than so many samples.
-const MOSTLY: [(usize, f64); 2] = [(COARSE, 0.9), (50, 0.6)];
-/// Where the median gap is less than so many windows there is no room for what tells a start from the middle of a frame.
-const ROOM: f64 = 1.2;
-/// What is left of the confidence where window and beat say nothing.
-const LEFT: f64 = 0.4;
-/// A frame of fewer samples is coarse: half of one, which is as near as its ends are known, is a thirtieth of it.
-const COARSE_FRAME: f64 = 16.0;
+const MAX_LENGTH_RATIO: f64 = 1.6;
+/// A length is odd if it differs from the usual one by more than this share of it, and by more than this many
+/// times the usual difference nearby.
+const ODD_LIMITS: [f64; 2] = [0.1, 6.0];
+/// In windows of fewer samples many things resemble a start, and only the period decides.
+const COARSE_WINDOW_SAMPLES: usize = 20;
+/// In windows of fewer samples a start may be a sample off, and even gaps must agree within half a sample.
+const MIN_WINDOW_SAMPLES: usize = 8;
+/// In windows of fewer samples than the first, confidence is lowered where less than the second, a share of
+/// the gaps, is even.
+const MIN_EVEN_SHARES: [(usize, f64); 2] = [(COARSE_WINDOW_SAMPLES, 0.9), (50, 0.6)];
+/// At a median gap of fewer windows, nothing distinguishes a start from the middle of a frame.
+const MIN_GAP_WINDOWS: f64 = 1.2;
+/// Confidence factor where window and period decide nothing.
+const COARSE_CONFIDENCE: f64 = 0.4;
+/// Frames of fewer samples are coarse: half a sample, the uncertainty of their ends, is a thirtieth of the
+/// frame.
+const COARSE_FRAME_SAMPLES: f64 = 16.0;
 
 /// How finely a window is sampled.
 #[derive(Clone, Copy, Debug)]
@@ -51,17 +52,18 @@ pub(super) fn spans(starts: &[FrameStart], end_s: f64, sampling: Sampling) -> Ve
             flags,
         });
     }
-    doubt_coarse(&mut frames, sampling);
+    lower_coarse_confidence(&mut frames, sampling);
     for frame in frames.iter_mut().filter(|frame| frame.confidence < 0.5) {
         frame.flags.insert(Flag::Unsure);
     }
-    for frame in
-        frames.iter_mut().filter(|frame| (frame.end_s - frame.start_s) * sampling.rate_hz < COARSE_FRAME)
+    for frame in frames
+        .iter_mut()
+        .filter(|frame| (frame.end_s - frame.start_s) * sampling.rate_hz < COARSE_FRAME_SAMPLES)
     {
         frame.flags.insert(Flag::Coarse);
     }
     flag_lengths(&mut frames);
-    flag_beside_others(&mut frames);
+    flag_unusual(&mut frames);
     frames
 }
 
@@ -71,23 +73,29 @@ fn lengths_s(frames: &[FrameSpan]) -> Vec<f64> {
     inner.iter().map(|frame| frame.end_s - frame.start_s).collect()
 }
 
-/// In a coarse window lowers the confidence of what breaks the beat; of everything where there is none.
-fn doubt_coarse(frames: &mut [FrameSpan], sampling: Sampling) {
-    let Some((_, mostly)) = MOSTLY.into_iter().find(|(samples, _)| sampling.window < *samples) else {
+/// Lowers confidence in coarse windows: of frames off the period, or of all frames if there is no period.
+fn lower_coarse_confidence(frames: &mut [FrameSpan], sampling: Sampling) {
+    let Some((_, mostly)) = MIN_EVEN_SHARES.into_iter().find(|(samples, _)| sampling.window < *samples)
+    else {
         return;
     };
     let lengths_s = lengths_s(frames);
-    let most_s = if sampling.window < COARSEST { 0.5 / sampling.rate_hz } else { f64::INFINITY };
-    let mut even = beat::even(&lengths_s, most_s);
+    let most_s = if sampling.window < MIN_WINDOW_SAMPLES { 0.5 / sampling.rate_hz } else { f64::INFINITY };
+    let mut even = periodicity::even_gaps(&lengths_s, most_s);
     let many = even.iter().filter(|even| **even).count() as f64;
-    let crowded = median(&mut lengths_s.clone()) * sampling.rate_hz < ROOM * sampling.window as f64;
-    if many < mostly * even.len() as f64 || crowded && sampling.window < COARSE {
+    let crowded =
+        upper_median(&mut lengths_s.clone()) * sampling.rate_hz < MIN_GAP_WINDOWS * sampling.window as f64;
+    if many < mostly * even.len() as f64 || crowded && sampling.window < COARSE_WINDOW_SAMPLES {
         even.fill(false);
-    } else if sampling.window >= COARSE {
+    } else if sampling.window >= COARSE_WINDOW_SAMPLES {
         return;
     }
     even.push(even.last().copied().unwrap_or(false));
-    frames.iter_mut().zip(even).filter(|(_, even)| !even).for_each(|(frame, _)| frame.confidence *= LEFT);
+    frames
+        .iter_mut()
+        .zip(even)
+        .filter(|(_, even)| !even)
+        .for_each(|(frame, _)| frame.confidence *= COARSE_CONFIDENCE);
 }
 
 fn flag_lengths(frames: &mut [FrameSpan]) {
@@ -102,26 +110,29 @@ fn flag_lengths(frames: &mut [FrameSpan]) {
     }
 }
 
-/// Flags frames that are about as long as several of those around them, or only with a neighbour as long as one, or break their beat.
-fn flag_beside_others(frames: &mut [FrameSpan]) {
+/// Flags frames about as long as several of their neighbours, as a part of one, or of odd length.
+fn flag_unusual(frames: &mut [FrameSpan]) {
     let lengths_s = lengths_s(frames);
-    for ((frame, length_s), usual_s) in frames.iter_mut().zip(&lengths_s).zip(beat::usual(&lengths_s)) {
+    for ((frame, length_s), usual_s) in
+        frames.iter_mut().zip(&lengths_s).zip(periodicity::usual_gaps(&lengths_s))
+    {
         let Some([usual_s, others_s]) = usual_s else { continue };
-        if *length_s > TWICE * usual_s {
+        if *length_s > MAX_LENGTH_RATIO * usual_s {
             frame.flags.insert(Flag::Merged);
-        } else if length_s * TWICE < usual_s {
+        } else if length_s * MAX_LENGTH_RATIO < usual_s {
             frame.flags.insert(Flag::Split);
-        } else if (length_s - usual_s).abs() > (ODD[0] * usual_s).max(ODD[1] * others_s) {
+        } else if (length_s - usual_s).abs() > (ODD_LIMITS[0] * usual_s).max(ODD_LIMITS[1] * others_s) {
             frame.flags.insert(Flag::Odd);
         }
     }
 }
 
-/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if alone.
+/// Median duration of the frames between found starts, s: the last one, cut by the end mark, counts only if
+/// alone.
 pub(super) fn median_duration_s(frames: &[FrameSpan]) -> Option<f64> {
     let counted = if frames.len() > 1 { &frames[..frames.len() - 1] } else { frames };
     let mut durations: Vec<f64> = counted.iter().map(|frame| frame.end_s - frame.start_s).collect();
-    (!durations.is_empty()).then(|| median(&mut durations))
+    (!durations.is_empty()).then(|| upper_median(&mut durations))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Files that are whole or not there.
+//! Files that are written whole or not at all.
 
 use super::WriteError;
 use super::unfinished::{self, Unfinished};
@@ -8,12 +8,13 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on any
-/// failure the temporary file is removed and what stood at `path` before is untouched. A link is followed, so that it stays one.
+/// Writes a file under a temporary name in the same folder and renames it once it is complete and on disk; on
+/// any failure the temporary file is removed and what stood at `path` before is untouched. A link is
+/// followed, so that it stays one.
 ///
 /// # Errors
-/// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`]. What is there and is no file (a folder, a device)
-/// is left alone.
+/// [`WriteError`] with the path; what `fill` returned is in [`WriteError::Content`]. Something other
+/// than a file (a folder, a device) is left alone.
 pub fn write_file<E>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
@@ -34,7 +35,8 @@ where
     Ok(())
 }
 
-/// Finds out whether a file could be written at `path` by making the temporary one and removing it: before long work, not after it.
+/// Checks whether a file can be written at `path`, by creating the temporary one and removing it: before long
+/// work, not after it.
 ///
 /// # Errors
 /// As [`write_file`].
@@ -55,7 +57,7 @@ fn temporary(path: &Path) -> io::Result<(Unfinished, File)> {
     Ok((unfinished, file))
 }
 
-/// As [`write_file`], for samples: what is wrong with where they come from is told as it is, by the name of that file alone.
+/// As [`write_file`], for samples: errors of their source name that file alone.
 pub(super) fn write_trace(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteError>,
@@ -73,7 +75,7 @@ pub(super) fn write_trace(
     unread.map_or(written, |error| Err(WriteError::Read(error)))
 }
 
-/// Where a file called `path` is or is to be.
+/// The place of a file called `path`, links followed.
 fn destination(path: &Path) -> Result<PathBuf, WriteError> {
     match fs::metadata(path) {
         Ok(there) if !there.is_file() => Err(WriteError::NoName { path: path.to_owned() }),

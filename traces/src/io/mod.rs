@@ -1,38 +1,80 @@
-//! Trace files.
+//! Trace files: one file or folder per format, with its reader and its writer.
 //!
-//! [`read`] takes any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces what does not fit
-//! into memory. [`csv`], [`parquet`] and [`jls`] write, and the first two read by the native names alone; what they write is a
-//! [`Source`]: a trace in memory, or a [`Recording`], a file of any length.
+//! [`read`] reads any of them, as [`ReadOptions`] say: Parquet, JLS, CSV, TSV, gzip. [`Rows`] reads in pieces
+//! what does not fit into memory. [`save`] and the modules [`csv`], [`parquet`] and [`jls`] write a
+//! [`TraceReader`]: a trace in memory, or a [`Recording`], a file of any length.
 
 pub mod atomic;
 mod columns;
 pub mod csv;
+mod description;
 mod error;
-mod header;
 pub mod jls;
-mod options;
 pub mod parquet;
 mod read;
 mod recording;
 mod repair;
 mod rows;
-mod source;
-mod timing;
+mod samples;
+mod save;
+mod sum_of_rails;
+mod time_base;
 pub mod unfinished;
 
 pub use error::{ReadError, WriteError};
-pub use options::ReadOptions;
-pub use read::{Loaded, read, read_csv, read_parquet};
+pub use read::{Loaded, open, read, read_csv, read_parquet};
 pub use recording::Recording;
 pub use repair::Repair;
-pub use rows::{Rows, SumOfRails, rail_of_sums};
+pub use rows::Rows;
 #[cfg(test)]
-pub(crate) use source::Cut;
-pub use source::{Heading, Sink, Source, Stretch};
+pub(crate) use samples::SplitTrace;
+pub use samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
+pub use save::{FORMATS, save};
+pub use sum_of_rails::{SumOfRails, rail_of_sums};
+
+pub(crate) use columns::RowBatch;
+pub(crate) use parquet::{PagedFile, field_units};
+pub(crate) use time_base::{Stamps, all_apart, grid, rate_of_steps_hz, rate_to_last_row_hz};
 
 /// The names of the columns that files are written with; read without regard to case.
-pub const COLUMNS: [&str; 4] = ["time_ns", "time_s", "voltage_V", "current_A"];
+pub const COLUMNS: [&str; 4] = [TIME_NS, TIME_S, VOLTAGE_V, CURRENT_A];
+pub(crate) const TIME_NS: &str = "time_ns";
+pub(crate) const TIME_S: &str = "time_s";
+pub(crate) const VOLTAGE_V: &str = "voltage_V";
+pub(crate) const CURRENT_A: &str = "current_A";
+pub(crate) const POWER_W: &str = "power_W";
 
-pub(crate) use jls::crc32c;
-pub(crate) use rows::{Chunk, PackedFile, field_units};
-pub(crate) use timing::{Stamps, all_apart, grid, rounded_rate_hz};
+/// How to read a file. By default all rails that the names of the columns show are added up, and nothing is
+/// repaired.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// Rails to add up, by name; all of them if empty.
+    pub rails: Vec<String>,
+    /// The column of times, by name or by number from 1; by default found by its name.
+    pub time: Option<String>,
+    /// The column of voltages, likewise.
+    pub voltage: Option<String>,
+    /// The column of currents, likewise.
+    pub current: Option<String>,
+    /// A column of powers in place of voltage and current, likewise.
+    pub power: Option<String>,
+    /// Voltage by specification, V, in place of a measured one.
+    pub fixed_voltage_v: Option<f64>,
+    /// Samples per second, in place of the rate in the file and of its times, Hz.
+    pub rate_hz: Option<f64>,
+    /// Left edge of the first sample of a file without times, s.
+    pub start_s: Option<f64>,
+    /// Delimiter between the fields of a text; by default guessed from its first line.
+    pub delimiter: Option<u8>,
+    /// Whether the first line of a text holds names; by default it does unless all its fields are numbers.
+    pub header: Option<bool>,
+    /// Whether to repair non-finite values, unsorted rows and missing samples.
+    pub repair: bool,
+}
+
+impl ReadOptions {
+    /// Whether columns are chosen by hand, so that their names need no meaning.
+    fn by_hand(&self) -> bool {
+        self.voltage.is_some() || self.current.is_some() || self.power.is_some()
+    }
+}

@@ -1,49 +1,72 @@
-//! A whole file into memory.
+//! Reading a whole file.
 
-use super::repair::{Columns, Repair, mend};
-use super::rows::{Chunk, Rows};
-use super::timing::{self, Stamps};
-use super::{ReadError, ReadOptions};
+use super::columns::RowBatch;
+use super::recording::Recording;
+use super::repair::{Columns, Repair, repair_rows};
+use super::rows::Rows;
+use super::samples::TraceReader;
+use super::time_base::Stamps;
+use super::{ReadError, ReadOptions, time_base};
 use crate::trace::Trace;
 use std::path::Path;
 
 /// Rows read at once.
-const PIECE: usize = 1 << 18;
+const PIECE_ROWS: usize = 1 << 18;
 
-/// A trace and what was mended in it.
+/// A trace and its repairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// The trace.
     pub trace: Trace,
-    /// What was mended; always empty unless [`ReadOptions::repair`] asked for it.
+    /// The repairs; always empty without [`ReadOptions::repair`].
     pub repairs: Vec<Repair>,
 }
 
-/// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), told apart by their first bytes.
+/// Reads a trace from Parquet, JLS, CSV or TSV (the latter also with gzip), by their first bytes.
 ///
 /// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
+/// [`ReadError`] names the file, the row and what to do.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     load(Rows::open(path, options)?)
 }
 
-/// Reads a CSV file, and its description if there is one at [`csv::description_path`](super::csv::description_path) or
-/// [`csv::sidecar_path`](super::csv::sidecar_path).
-///
-/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if the
-/// description states the rate. Without a description the rate is that of the time stamps.
+/// Opens a trace of any length: as a [`Recording`], or in memory where it has to be repaired, as repairs
+/// depend on all of it. Also returns the repairs.
 ///
 /// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
+/// As [`read`].
+pub fn open(path: &Path, options: &ReadOptions) -> Result<(Box<dyn TraceReader>, Vec<Repair>), ReadError> {
+    match Recording::open(path, options) {
+        Ok(recording) => {
+            let repairs = recording.repairs().to_vec();
+            Ok((Box::new(recording), repairs))
+        }
+        Err(_) if options.repair => {
+            let Loaded { trace, repairs } = read(path, options)?;
+            Ok((Box::new(trace), repairs))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Reads a CSV file, and its description if there is one at
+/// [`csv::description_path`](super::csv::description_path) or
+/// [`csv::sidecar_path`](super::csv::sidecar_path).
+///
+/// Columns are found by name without regard to case, in any order among others; `time_s` may be missing if
+/// the description states the rate. Without a description the rate is that of the time stamps.
+///
+/// # Errors
+/// [`ReadError`] names the file, the row and what to do.
 pub fn read_csv(path: &Path) -> Result<Trace, ReadError> {
     Ok(load(Rows::csv(path, &ReadOptions::default(), false)?)?.trace)
 }
 
-/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64) and
-/// `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
+/// Reads a trace from columns found by name without regard to case: `voltage_V` and `current_A` (f32 or f64)
+/// and `time_ns` (i64) or `time_s` (f32 or f64); the times may be missing if the description states the rate.
 ///
 /// # Errors
-/// [`ReadError`] names the file, the row and how to mend it.
+/// [`ReadError`] names the file, the row and what to do.
 pub fn read_parquet(path: &Path) -> Result<Trace, ReadError> {
     Ok(load(Rows::parquet(path, &ReadOptions::default())?)?.trace)
 }
@@ -55,27 +78,27 @@ fn load(mut rows: Rows) -> Result<Loaded, ReadError> {
     if read == 0 {
         return Err(ReadError::Empty { path });
     }
-    rows.header.check_rows(&path, read as u64)?;
+    rows.description.check_rows(&path, read as u64)?;
     let mut repairs: Vec<Repair> = rows.repair().into_iter().collect();
-    let mut header = std::mem::take(&mut rows.header);
-    if rows.mends() {
-        repairs.extend(mend(&path, &mut columns, &mut header)?);
+    let mut description = std::mem::take(&mut rows.description);
+    if rows.repairs_input() {
+        repairs.extend(repair_rows(&path, &mut columns, &mut description)?);
     }
     let Columns { stamps, voltage_v, current_a } = columns;
-    let grid = timing::grid(&path, &stamps, &header)?;
-    if !rows.mends() {
-        header.check_end(&path)?;
+    let grid = time_base::grid(&path, &stamps, &description)?;
+    if !rows.repairs_input() {
+        description.check_end(&path)?;
     }
-    let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, header.metadata)
+    let trace = Trace::new(voltage_v, current_a, grid.rate_hz, grid.start_s, description.metadata)
         .map_err(|error| ReadError::trace(&path, error))?;
     Ok(Loaded { trace, repairs })
 }
 
 fn gather(rows: &mut Rows) -> Result<Columns, ReadError> {
     let mut all = Columns { stamps: Stamps::Absent, voltage_v: Vec::new(), current_a: Vec::new() };
-    let mut chunk = Chunk::default();
-    while rows.append(PIECE, &mut chunk, &mut all.voltage_v, &mut all.current_a)? > 0 {
-        match (&mut all.stamps, &chunk.stamps) {
+    let mut batch = RowBatch::default();
+    while rows.append(PIECE_ROWS, &mut batch, &mut all.voltage_v, &mut all.current_a)? > 0 {
+        match (&mut all.stamps, &batch.stamps) {
             (Stamps::Nanoseconds(all), Stamps::Nanoseconds(more)) => all.extend_from_slice(more),
             (Stamps::Seconds(all), Stamps::Seconds(more)) => all.extend_from_slice(more),
             (all, more) => *all = more.clone(),

@@ -1,29 +1,30 @@
-//! Mending on request. Whatever is mended is told.
+//! Repair of input, if requested: sort rows, fill gaps and non-finite values. Every repair is reported.
 
 use super::ReadError;
-use super::header::Header;
-use super::timing::{Stamps, rounded_rate_hz};
+use super::description::Description;
+use super::time_base::{Stamps, usual_rate_hz};
 use serde::Serialize;
 use std::path::Path;
 
-/// How far a stamp may be off its place, in sample periods, to count as there.
-const OFF: f64 = 0.25;
-/// A repair that would make the trace longer than this many times is refused.
-const LONGER: usize = 16;
+/// Largest distance of a stamp from its place in the time base, in sample periods.
+const MAX_OFFSET_PERIODS: f64 = 0.25;
+/// Largest factor by which a repair may lengthen a trace.
+const MAX_GROWTH: usize = 16;
 
-/// All rows of a file as they stand in it.
+/// All rows of a file, as they are in it.
 pub(super) struct Columns {
     pub stamps: Stamps,
     pub voltage_v: Vec<f32>,
     pub current_a: Vec<f32>,
 }
 
-/// Something that was mended.
+/// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or `resampled`.
+    /// `cut-signals`, `uneven-rows`, `dropped-rows`, `sorted-rows`, `filled-values`, `filled-gap` or
+    /// `resampled`.
     pub code: &'static str,
-    /// The first row (from 1, as rows stand in the file; after sorting, as they stand then).
+    /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,
     /// When, s; by rate and start where the file has no times.
     pub time_s: f64,
@@ -33,32 +34,32 @@ pub struct Repair {
     pub message: String,
 }
 
-/// Mends rows in place: drops those without a time, sorts them, fills what is not finite from its neighbours, and puts
-/// samples where some are missing.
-pub(super) fn mend(
+/// Repairs rows in place: drops those without a time, sorts them, fills non-finite values from their
+/// neighbours, and adds missing samples.
+pub(super) fn repair_rows(
     path: &Path,
     columns: &mut Columns,
-    header: &mut Header,
+    description: &mut Description,
 ) -> Result<Vec<Repair>, ReadError> {
-    let mut told = Vec::new();
+    let mut repairs = Vec::new();
     let times = seconds(&columns.stamps);
-    let mut times = times.map(|times| order(times, columns, &mut told));
-    let time_s = |row: usize| times.as_ref().map_or_else(|| header.time_s(row), |times| times[row]);
-    fill(path, "voltage_V", &mut columns.voltage_v, &time_s, &mut told)?;
-    fill(path, "current_A", &mut columns.current_a, &time_s, &mut told)?;
+    let mut times = times.map(|times| order(times, columns, &mut repairs));
+    let time_s = |row: usize| times.as_ref().map_or_else(|| description.time_s(row), |times| times[row]);
+    fill(path, "voltage_V", &mut columns.voltage_v, &time_s, &mut repairs)?;
+    fill(path, "current_A", &mut columns.current_a, &time_s, &mut repairs)?;
     if let Some(times) = &mut times
         && times.len() > 1
     {
-        space(path, times, columns, header, &mut told)?;
+        space(path, times, columns, description, &mut repairs)?;
     }
-    lengthen(path, columns, times.as_mut(), header, &mut told)?;
-    if !told.is_empty() {
-        header.samples = None;
+    lengthen(path, columns, times.as_mut(), description, &mut repairs)?;
+    if !repairs.is_empty() {
+        description.samples = None;
         if let Some(times) = times {
             columns.stamps = Stamps::Seconds(times);
         }
     }
-    Ok(told)
+    Ok(repairs)
 }
 
 fn seconds(stamps: &Stamps) -> Option<Vec<f64>> {
@@ -66,7 +67,7 @@ fn seconds(stamps: &Stamps) -> Option<Vec<f64>> {
 }
 
 /// Drops rows without a time or with one that was there before, and sorts the rest.
-fn order(times: Vec<f64>, columns: &mut Columns, told: &mut Vec<Repair>) -> Vec<f64> {
+fn order(times: Vec<f64>, columns: &mut Columns, repairs: &mut Vec<Repair>) -> Vec<f64> {
     let mut rows: Vec<usize> = (0..times.len()).filter(|&row| times[row].is_finite()).collect();
     let unsorted = rows.windows(2).position(|pair| times[pair[1]] < times[pair[0]]).map(|at| rows[at + 1]);
     rows.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
@@ -80,18 +81,18 @@ fn order(times: Vec<f64>, columns: &mut Columns, told: &mut Vec<Repair>) -> Vec<
     if let Some(row) = unsorted {
         let message = format!("rows were sorted by time; row {} was the first out of order", row + 1);
         let count = rows.len() as u64;
-        told.push(Repair { code: "sorted-rows", row: row as u64 + 1, time_s: times[row], count, message });
+        repairs.push(Repair { code: "sorted-rows", row: row as u64 + 1, time_s: times[row], count, message });
     }
     if dropped.is_some() || unsorted.is_some() {
         columns.voltage_v = rows.iter().map(|&row| columns.voltage_v[row]).collect();
         columns.current_a = rows.iter().map(|&row| columns.current_a[row]).collect();
     }
-    told.splice(0..0, dropped);
+    repairs.splice(0..0, dropped);
     rows.iter().map(|&row| times[row]).collect()
 }
 
-/// Tells of rows without a time and of those that repeat one. The place is the first of them; where it has no time, that of
-/// the last row before which has one, else of the first after.
+/// Reports rows without a time and those that repeat one. The place is the first of them; where it has no
+/// time, that of the last row before which has one, else of the first after.
 fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
     let count = times.iter().filter(|time| !time.is_finite()).count() + repeats.len();
     let lost = times.iter().position(|time| !time.is_finite());
@@ -106,13 +107,13 @@ fn dropped(times: &[f64], repeats: &[usize]) -> Option<Repair> {
     Some(Repair { code: "dropped-rows", row, time_s, count: count as u64, message })
 }
 
-/// Puts the straight line between its neighbours in place of every stretch that is not finite.
+/// Replaces non-finite values by the straight line between their neighbours.
 fn fill(
     path: &Path,
     name: &str,
     values: &mut [f32],
     time_s: &dyn Fn(usize) -> f64,
-    told: &mut Vec<Repair>,
+    repairs: &mut Vec<Repair>,
 ) -> Result<(), ReadError> {
     let mut from = 0;
     while let Some(first) = values[from..].iter().position(|value| !value.is_finite()).map(|at| from + at) {
@@ -132,7 +133,7 @@ fn fill(
         let time_s = time_s(first);
         let message =
             format!("{name}: {} values from row {} ({time_s} s) on were not finite", end - first, first + 1);
-        told.push(Repair {
+        repairs.push(Repair {
             code: "filled-values",
             row: first as u64 + 1,
             time_s,
@@ -144,36 +145,42 @@ fn fill(
     Ok(())
 }
 
-/// Puts the rows on an even grid of times; between rows, on the straight line.
+/// Resamples the rows to an even time base, by straight lines between rows.
 fn space(
     path: &Path,
     times: &mut Vec<f64>,
     columns: &mut Columns,
-    header: &mut Header,
-    told: &mut Vec<Repair>,
+    description: &mut Description,
+    repairs: &mut Vec<Repair>,
 ) -> Result<(), ReadError> {
-    let rate_hz = header.rate_hz.unwrap_or_else(|| usual_rate_hz(times));
+    let rate_hz = description.rate_hz.unwrap_or_else(|| usual_rate_hz(times));
     let start_s = times[0];
     let place = |time: f64| (time - start_s) * rate_hz;
-    let even = times.iter().enumerate().all(|(row, &time)| (place(time) - row as f64).abs() <= OFF);
+    let even =
+        times.iter().enumerate().all(|(row, &time)| (place(time) - row as f64).abs() <= MAX_OFFSET_PERIODS);
     if even {
         return Ok(());
     }
     let slots = libm::round(place(times[times.len() - 1])) + 1.0;
-    if !(slots >= 1.0 && slots <= (LONGER * times.len()) as f64) {
+    if !(slots >= 1.0 && slots <= (MAX_GROWTH * times.len()) as f64) {
         let reason = format!(
             "filling it evenly at {rate_hz} Hz would take {slots:.0} samples for {} rows",
             times.len()
         );
         return Err(ReadError::Repair { path: path.to_owned(), reason });
     }
-    let off = times.iter().filter(|&&time| (place(time) - libm::round(place(time))).abs() > OFF).count();
+    let off = times
+        .iter()
+        .filter(|&&time| (place(time) - libm::round(place(time))).abs() > MAX_OFFSET_PERIODS)
+        .count();
     if off > 0 {
-        let row =
-            times.iter().position(|&time| (place(time) - libm::round(place(time))).abs() > OFF).unwrap_or(0);
+        let row = times
+            .iter()
+            .position(|&time| (place(time) - libm::round(place(time))).abs() > MAX_OFFSET_PERIODS)
+            .unwrap_or(0);
         let message =
             format!("{off} rows, the first of them {}, were off an even rate of {rate_hz} Hz", row + 1);
-        told.push(Repair {
+        repairs.push(Repair {
             code: "resampled",
             row: row as u64 + 1,
             time_s: times[row],
@@ -185,7 +192,7 @@ fn space(
         let missing = libm::round(place(pair[1])) - libm::round(place(pair[0])) - 1.0;
         if missing >= 1.0 {
             let message = format!("after row {} ({} s) {missing:.0} samples were missing", row + 1, pair[0]);
-            told.push(Repair {
+            repairs.push(Repair {
                 code: "filled-gap",
                 row: row as u64 + 1,
                 time_s: pair[0],
@@ -195,57 +202,43 @@ fn space(
         }
     }
     let grid: Vec<f64> = (0..slots as usize).map(|slot| start_s + slot as f64 / rate_hz).collect();
-    columns.voltage_v = interpolated(times, &columns.voltage_v, &grid, OFF / rate_hz);
-    columns.current_a = interpolated(times, &columns.current_a, &grid, OFF / rate_hz);
+    columns.voltage_v = interpolated(times, &columns.voltage_v, &grid, MAX_OFFSET_PERIODS / rate_hz);
+    columns.current_a = interpolated(times, &columns.current_a, &grid, MAX_OFFSET_PERIODS / rate_hz);
     *times = grid;
-    header.rate_hz = Some(rate_hz);
+    description.rate_hz = Some(rate_hz);
     Ok(())
 }
 
-/// Puts samples like the last one where the recorder lost the end.
+/// Repeats the last sample where the recorder lost the end.
 fn lengthen(
     path: &Path,
     columns: &mut Columns,
     times: Option<&mut Vec<f64>>,
-    header: &Header,
-    told: &mut Vec<Repair>,
+    description: &Description,
+    repairs: &mut Vec<Repair>,
 ) -> Result<(), ReadError> {
     let rows = columns.voltage_v.len();
-    let Some(lost) = header.lost_at_end.filter(|lost| *lost > 0 && rows > 0) else { return Ok(()) };
+    let Some(lost) = description.lost_at_end.filter(|lost| *lost > 0 && rows > 0) else { return Ok(()) };
     let longer = usize::try_from(lost).ok().map(|lost| rows.saturating_add(lost));
-    let Some(longer) = longer.filter(|longer| *longer <= LONGER.saturating_mul(rows)) else {
+    let Some(longer) = longer.filter(|longer| *longer <= MAX_GROWTH.saturating_mul(rows)) else {
         let reason = format!("{lost} samples are said to be lost after {rows} rows");
         return Err(ReadError::Repair { path: path.to_owned(), reason });
     };
     let time_s = match times {
         Some(times) => {
-            let (last_s, rate_hz) = (times[rows - 1], header.rate_hz.unwrap_or_else(|| usual_rate_hz(times)));
+            let (last_s, rate_hz) =
+                (times[rows - 1], description.rate_hz.unwrap_or_else(|| usual_rate_hz(times)));
             times.extend((1..=lost).map(|after| last_s + after as f64 / rate_hz));
             last_s
         }
-        None => header.time_s(rows - 1),
+        None => description.time_s(rows - 1),
     };
     for values in [&mut columns.voltage_v, &mut columns.current_a] {
         values.resize(longer, values[rows - 1]);
     }
     let message = format!("after the last row ({time_s} s) {lost} samples were missing");
-    told.push(Repair { code: "filled-gap", row: rows as u64, time_s, count: lost, message });
+    repairs.push(Repair { code: "filled-gap", row: rows as u64, time_s, count: lost, message });
     Ok(())
-}
-
-/// The rate that all rows agree on, those with missing samples between them too. The usual step alone would not do: where
-/// stamps are rounded, it is off by up to that much, which adds up over the rows.
-fn usual_rate_hz(times: &[f64]) -> f64 {
-    let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
-    let mut sorted: Vec<f64> = steps().collect();
-    let middle = sorted.len() / 2;
-    let usual_s = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let (sum_s, count) = steps()
-        .filter(|step_s| (step_s / usual_s - 1.0).abs() < 0.5)
-        .fold((0.0, 0.0), |(sum_s, count), step_s| (sum_s + step_s, count + 1.0));
-    let period_s = sum_s / count;
-    let periods: f64 = steps().map(|step_s| libm::round(step_s / period_s).max(1.0)).sum();
-    rounded_rate_hz(periods, times[times.len() - 1] - times[0], f64::INFINITY)
 }
 
 /// Values at the grid's times: a row's own within `near_s`, else on the line between the rows around.
@@ -276,28 +269,28 @@ mod tests {
             .collect()
     }
 
-    fn mended(times: Vec<f64>, spoilt: usize) -> (Vec<Repair>, Columns, Header) {
+    fn repaired(times: Vec<f64>, spoilt: usize) -> (Vec<Repair>, Columns, Description) {
         let mut current_a: Vec<f32> = (0..times.len()).map(|row| row as f32).collect();
         current_a[spoilt] = f32::NAN;
         let mut columns =
             Columns { voltage_v: vec![1.0; times.len()], current_a, stamps: Stamps::Seconds(times) };
-        let mut header = Header::default();
-        let told = mend(Path::new("t.csv"), &mut columns, &mut header).unwrap();
-        (told, columns, header)
+        let mut description = Description::default();
+        let repairs = repair_rows(Path::new("t.csv"), &mut columns, &mut description).unwrap();
+        (repairs, columns, description)
     }
 
     #[test]
     fn rounded_stamps_of_an_even_rate_stay_as_they_are() {
-        let (told, columns, _) = mended(rounded(0..0), 777);
-        assert_eq!(told.iter().map(|repair| repair.code).collect::<Vec<_>>(), ["filled-values"]);
+        let (repairs, columns, _) = repaired(rounded(0..0), 777);
+        assert_eq!(repairs.iter().map(|repair| repair.code).collect::<Vec<_>>(), ["filled-values"]);
         assert!(columns.current_a.iter().enumerate().all(|(row, amps)| *amps == row as f32));
     }
 
     #[test]
     fn a_gap_in_rounded_stamps_is_filled_with_as_many_as_are_missing() {
-        let (told, columns, header) = mended(rounded(5000..5100), 3);
-        assert_eq!(header.rate_hz, Some(44_100.0));
-        let gaps: Vec<_> = told.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
+        let (repairs, columns, description) = repaired(rounded(5000..5100), 3);
+        assert_eq!(description.rate_hz, Some(44_100.0));
+        let gaps: Vec<_> = repairs.iter().map(|repair| (repair.code, repair.row, repair.count)).collect();
         assert_eq!(gaps, [("filled-values", 4, 1), ("filled-gap", 5000, 100)]);
         assert_eq!((columns.current_a.len(), columns.current_a[19_999]), (20_000, 19_899.0));
     }

@@ -1,6 +1,6 @@
 //! Unfinished files of this process, which an interrupt removes.
 //!
-//! The handler of a signal is given nothing, so it has to find them in a list of the whole process.
+//! A signal handler has no arguments, so it finds them in a list of the whole process.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -17,7 +17,8 @@ pub struct List {
 
 static LIST: Mutex<List> = Mutex::new(List { last: 0, removers: BTreeMap::new() });
 
-/// Something that is removed when this is dropped, or when the process is interrupted, unless it was finished before.
+/// Something that is removed when this is dropped, or when the process is interrupted, unless it was finished
+/// before.
 pub struct Unfinished {
     number: u64,
 }
@@ -57,14 +58,15 @@ fn list() -> MutexGuard<'static, List> {
     LIST.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Does `work` while an interrupt waits: makes a file that belongs to something unfinished, or takes steps that belong together.
-/// `work` must not make or drop an [`Unfinished`].
+/// Does `work` while an interrupt waits: makes a file that belongs to something unfinished, or takes steps
+/// that belong together. `work` must not make or drop an [`Unfinished`].
 pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     let _held = list();
     work()
 }
 
-/// Removes everything unfinished. While the result is held, nothing new is begun: hold it until the process ends.
+/// Removes everything unfinished. While the result is held, nothing new is begun: hold it until the process
+/// ends.
 pub fn remove_all() -> MutexGuard<'static, List> {
     let mut list = list();
     std::mem::take(&mut list.removers).into_values().for_each(|remove| remove());

@@ -1,28 +1,28 @@
-//! The lowest level, block by block as a file is read.
+//! Building the lowest level, block by block as a file is read.
 
 use super::{BLOCK, Entry, Pyramid};
-use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, rounded_rate_hz};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, rate_of_steps_hz};
 use crate::stream::clock;
 use std::path::Path;
 
 /// Rows read at once.
-const ROWS: usize = 1 << 20;
-/// How far a step between two stamps may be off a period, in periods.
-const STEP_OFF: f64 = 0.5;
+const PIECE_ROWS: usize = 1 << 20;
+/// Largest difference between a step of two stamps and a period, in periods.
+const MAX_STEP_OFFSET: f64 = 0.5;
 
 pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, ReadError> {
     let mut clock = clock(path, options)?;
     let mut rows = Rows::open(path, options)?;
     // Texts do not say how many rows they have: the rate is then that of the first rows until all are read.
-    let mut steps = (clock.samples.is_none() && rows.header.rate_hz.is_none()).then(Steps::default);
-    let mut chunk = Chunk::default();
+    let mut steps = (clock.samples.is_none() && rows.description.rate_hz.is_none()).then(Steps::default);
+    let mut batch = RowBatch::default();
     let (mut voltage_v, mut current_a) = (Vec::new(), Vec::new());
     let (mut base, mut samples) = (Vec::new(), 0);
     loop {
-        let read = rows.append(ROWS, &mut chunk, &mut voltage_v, &mut current_a)? as u64;
+        let read = rows.append(PIECE_ROWS, &mut batch, &mut voltage_v, &mut current_a)? as u64;
         match &mut steps {
-            Some(steps) => steps.check(path, &chunk.stamps, samples, clock.rate_hz)?,
-            None => clock.check(path, &chunk.stamps, samples)?,
+            Some(steps) => steps.check(path, &batch.stamps, samples, clock.rate_hz)?,
+            None => clock.check(path, &batch.stamps, samples)?,
         }
         rows.check_finite(&voltage_v, &current_a, base.len() as u64 * BLOCK)?;
         samples += read;
@@ -35,8 +35,8 @@ pub(super) fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, Rea
             break;
         }
     }
-    rows.header.check_rows(path, samples)?;
-    rows.header.check_end(path)?;
+    rows.description.check_rows(path, samples)?;
+    rows.description.check_end(path)?;
     clock.rate_hz = steps.and_then(|steps| steps.rate_hz(samples)).unwrap_or(clock.rate_hz);
     Ok(Pyramid::of_blocks(clock, samples, base))
 }
@@ -49,7 +49,7 @@ pub(super) fn blocks<'a>(
     both.map(|(v, i)| Entry::of_samples(v, i))
 }
 
-/// Stamps, each held against the one before.
+/// Stamps, each compared with the one before.
 #[derive(Default)]
 struct Steps {
     first_s: Option<f64>,
@@ -67,7 +67,7 @@ impl Steps {
                 return Err(ReadError::Unsorted { path: path(), row, time_s, before_s });
             } else {
                 let off_periods = (time_s - before_s) * rate_hz - 1.0;
-                if off_periods.abs() > STEP_OFF {
+                if off_periods.abs() > MAX_STEP_OFFSET {
                     return Err(ReadError::Uneven { path: path(), row, time_s, off_periods, rate_hz });
                 }
             }
@@ -79,7 +79,7 @@ impl Steps {
     /// The rate of all stamps.
     fn rate_hz(&self, samples: u64) -> Option<f64> {
         let (first_s, periods) = (self.first_s?, samples.checked_sub(1)? as f64);
-        (periods > 0.0).then(|| rounded_rate_hz(periods, self.before_s - first_s, f64::INFINITY))
+        (periods > 0.0).then(|| rate_of_steps_hz(periods, self.before_s - first_s))
     }
 }
 
@@ -98,7 +98,8 @@ mod tests {
     fn what_no_trace_is_made_of_is_named_with_its_row_and_mended_on_request() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.csv");
-        let (told, mended) = (ReadOptions::default(), ReadOptions { repair: true, ..ReadOptions::default() });
+        let (plain, repair) =
+            (ReadOptions::default(), ReadOptions { repair: true, ..ReadOptions::default() });
         let even = |row: u32| f64::from(row) / 1000.0;
         for (at, says) in [
             (
@@ -112,14 +113,14 @@ mod tests {
         ] as [(fn(u32) -> f64, &str); 2]
         {
             write(&path, text((0..3000).map(|row| (at(row), 1.0)))).unwrap();
-            let message = Pyramid::build(&path, &told).unwrap_err().to_string();
+            let message = Pyramid::build(&path, &plain).unwrap_err().to_string();
             assert!(message.contains(says), "{message}");
             let (built, trace) =
-                (Pyramid::build(&path, &mended).unwrap(), crate::io::read(&path, &mended).unwrap().trace);
+                (Pyramid::build(&path, &repair).unwrap(), crate::io::read(&path, &repair).unwrap().trace);
             assert_eq!((built.start_s(), built.end_s()), (trace.start_s(), trace.end_s()));
         }
         write(&path, text((0..3000).map(|row| (even(row), 1.0)))).unwrap();
-        assert_eq!(Pyramid::build(&path, &told).unwrap().end_s(), 3.0);
+        assert_eq!(Pyramid::build(&path, &plain).unwrap().end_s(), 3.0);
     }
 
     #[test]

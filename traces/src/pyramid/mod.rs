@@ -1,28 +1,29 @@
-//! Overviews of any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks of blocks,
-//! and so on, made once and kept in a file beside the trace.
+//! Overviews at any zoom without reading the samples again: lowest, highest and mean power of blocks, blocks
+//! of blocks, and so on, built once and kept in a file beside the trace. Columns narrower than blocks come
+//! from the samples themselves.
 
 mod build;
-mod kept;
-mod samples;
+mod cache;
 
-use crate::io::{ReadError, ReadOptions, read};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows, read};
+use crate::pyramid::cache::Found;
 use crate::stream::Clock;
 use crate::trace::Trace;
-use kept::Found;
+use core::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Samples in a block of the lowest level: 12 bytes for 64 samples, with all levels above 0.2 bytes a sample, 2.5 % of
 /// the 8 bytes of voltage and current.
 pub const BLOCK: u64 = 64;
-/// Blocks of a level in one of the next.
-const FAN: usize = 16;
-/// Blocks a column is made of at least, where the level below has them.
-const PER_COLUMN: u64 = 4;
+/// Blocks of a level that make one of the next.
+const FANOUT: usize = 16;
+/// Fewest blocks of a column, if the level below has as many.
+const MIN_BLOCKS_PER_COLUMN: u64 = 4;
 const ENTRY_BYTES: u64 = 12;
-/// How near an edge of a sample a time counts as there, in samples.
-const EDGE: f64 = 1e-6;
+/// Distance from an edge of a sample within which a time counts as on it, in samples.
+const EDGE_SAMPLES: f64 = 1e-6;
 
-/// A stretch of time and the powers in it, W.
+/// A segment of time and the powers in it, W.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
     /// Its begin, s.
@@ -57,10 +58,10 @@ pub struct Pyramid {
 #[derive(Debug)]
 enum Store {
     Memory(Vec<Vec<Entry>>),
-    File(kept::Kept),
+    File(cache::Kept),
 }
 
-/// Where the pyramid of a trace is kept.
+/// The cache file of the pyramid of a trace.
 pub fn pyramid_path(trace: &Path) -> PathBuf {
     let mut name = trace.as_os_str().to_owned();
     name.push(".pyramid");
@@ -68,33 +69,34 @@ pub fn pyramid_path(trace: &Path) -> PathBuf {
 }
 
 impl Pyramid {
-    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say; else made
-    /// anew and kept, if the folder lets itself be written to.
+    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say;
+    /// else made anew and kept, if the folder lets itself be written to.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
     pub fn of_file(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        match kept::kept(&pyramid_path(path), kept::stamp(path, options)) {
+        match cache::kept(&pyramid_path(path), cache::stamp(path, options)) {
             Found::Whole(pyramid) => Ok(pyramid),
             Found::Other => Self::anew(path, options),
             Found::Damaged => Ok(Self { was_damaged: true, ..Self::anew(path, options)? }),
         }
     }
 
-    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say; else made anew and not
-    /// kept.
+    /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say;
+    /// else made anew and not kept.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
     pub fn look(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        match kept::kept(&pyramid_path(path), kept::stamp(path, options)) {
+        match cache::kept(&pyramid_path(path), cache::stamp(path, options)) {
             Found::Whole(pyramid) => Ok(pyramid),
             Found::Other => Self::build(path, options),
             Found::Damaged => Ok(Self { was_damaged: true, ..Self::build(path, options)? }),
         }
     }
 
-    /// Whether the pyramid that was kept was damaged, as far as was seen when it was opened, so that this was made in its place.
+    /// Whether the pyramid that was kept was damaged, as far as was seen when it was opened, so that this was
+    /// made in its place.
     pub fn was_damaged(&self) -> bool {
         self.was_damaged
     }
@@ -104,14 +106,15 @@ impl Pyramid {
     /// # Errors
     /// [`ReadError`] if the trace cannot be read.
     pub fn anew(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
-        let stamp = kept::stamp(path, options);
+        let stamp = cache::stamp(path, options);
         let pyramid = Self::build(path, options)?;
         // Without it the next look takes as long as this one; that is all.
-        let _ = kept::keep(&pyramid, &pyramid_path(path), stamp);
+        let _ = cache::keep(&pyramid, &pyramid_path(path), stamp);
         Ok(pyramid)
     }
 
-    /// Reads a whole trace, in pieces; one that is to be mended at once, as the places of its samples depend on all of them.
+    /// Reads a whole trace, in pieces; at once if it is to be repaired, as the places of its samples then
+    /// depend on all of them.
     ///
     /// # Errors
     /// [`ReadError`] if the trace cannot be read, or its samples are not even or finite.
@@ -132,8 +135,8 @@ impl Pyramid {
 
     fn of_blocks(clock: Clock, samples: u64, base: Vec<Entry>) -> Self {
         let mut levels = vec![base];
-        while levels[levels.len() - 1].len() > FAN {
-            levels.push(levels[levels.len() - 1].chunks(FAN).map(Entry::of_entries).collect());
+        while levels[levels.len() - 1].len() > FANOUT {
+            levels.push(levels[levels.len() - 1].chunks(FANOUT).map(Entry::of_entries).collect());
         }
         Self { clock, samples, store: Store::Memory(levels), was_damaged: false }
     }
@@ -148,15 +151,15 @@ impl Pyramid {
         self.clock.time_s(self.samples as f64)
     }
 
-    /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64 samples.
-    /// Lowest and highest are those of all samples within (as f32), none missed. `None` where what was kept cannot be read or is
-    /// damaged: it is to be made [anew](Pyramid::anew).
+    /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64
+    /// samples. Lowest and highest are those of all samples within (as f32), none missed. `None` where what
+    /// was kept cannot be read or is damaged: it is to be made [anew](Pyramid::anew).
     pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Vec<Column>> {
         let (from, to) = self.places(from_s, to_s);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
         let (mut level, mut size) = (0, BLOCK);
-        while size * FAN as u64 * PER_COLUMN <= wanted {
-            (level, size) = (level + 1, size * FAN as u64);
+        while size * FANOUT as u64 * MIN_BLOCKS_PER_COLUMN <= wanted {
+            (level, size) = (level + 1, size * FANOUT as u64);
         }
         let per_column = wanted.div_ceil(size).max(1);
         let (first, last) = (from / size, to.div_ceil(size));
@@ -174,7 +177,7 @@ impl Pyramid {
         let place = |time_s: f64| {
             let (at, whole) = (self.clock.position(time_s), libm::round(self.clock.position(time_s)));
             // Times of samples are rounded; what is an edge but for that is one.
-            let at = if (at - whole).abs() < EDGE { whole } else { at };
+            let at = if (at - whole).abs() < EDGE_SAMPLES { whole } else { at };
             at.clamp(0.0, self.samples as f64)
         };
         (place(from_s) as u64, libm::ceil(place(to_s)) as u64)
@@ -236,10 +239,69 @@ impl Entry {
     }
 }
 
+impl Pyramid {
+    /// As [`Pyramid::columns`] of a file, but where columns are narrower than blocks, from its samples: those
+    /// before are passed over, which takes texts as long as reading them.
+    ///
+    /// # Errors
+    /// [`ReadError`] if samples cannot be read.
+    pub fn columns_of_file(
+        &self,
+        (path, options): (&Path, &ReadOptions),
+        (from_s, to_s): (f64, f64),
+        columns: usize,
+    ) -> Result<Option<Vec<Column>>, ReadError> {
+        let Some(range) = self.few(from_s, to_s, columns) else {
+            return Ok(self.columns(from_s, to_s, columns));
+        };
+        let mut rows = Rows::open(path, options)?;
+        rows.skip(range.start)?;
+        let (mut batch, mut voltage_v, mut current_a) = (RowBatch::default(), Vec::new(), Vec::new());
+        let wanted = (range.end - range.start) as usize;
+        while voltage_v.len() < wanted {
+            let missing = wanted - voltage_v.len();
+            if rows.append(missing, &mut batch, &mut voltage_v, &mut current_a)? == 0 {
+                return Err(ReadError::Changed { path: path.to_owned() });
+            }
+        }
+        rows.check_finite(&voltage_v, &current_a, range.start)?;
+        Ok(Some(self.of_samples(range.start, [&voltage_v, &current_a], columns)))
+    }
+
+    /// As [`Pyramid::columns_of_file`], of a trace in memory.
+    pub fn columns_of_trace(
+        &self,
+        trace: &Trace,
+        (from_s, to_s): (f64, f64),
+        columns: usize,
+    ) -> Option<Vec<Column>> {
+        let Some(range) = self.few(from_s, to_s, columns) else { return self.columns(from_s, to_s, columns) };
+        let within = range.start as usize..range.end as usize;
+        let channels = [&trace.voltage_v()[within.clone()], &trace.current_a()[within]];
+        Some(self.of_samples(range.start, channels, columns))
+    }
+
+    /// The samples of a segment, if they are fewer than as many blocks would hold as there are to be columns.
+    fn few(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Range<u64>> {
+        let (from, to) = self.places(from_s, to_s);
+        (to > from && to - from < columns as u64 * BLOCK).then_some(from..to)
+    }
+
+    fn of_samples(&self, first: u64, [voltage_v, current_a]: [&[f32]; 2], columns: usize) -> Vec<Column> {
+        let per_column = voltage_v.len().div_ceil(columns.max(1)).max(1);
+        let both = voltage_v.chunks(per_column).zip(current_a.chunks(per_column)).enumerate();
+        let column = |(index, (volts, amps)): (usize, (&[f32], &[f32]))| {
+            let begin = first + (index * per_column) as u64;
+            self.column(begin, begin + volts.len() as u64, Entry::of_samples(volts, amps))
+        };
+        both.map(column).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::parquet;
+    use crate::io::{csv, parquet};
     use crate::metadata::Metadata;
     use std::fs;
 
@@ -272,5 +334,30 @@ mod tests {
         }
         fs::write(&path, b"changed").unwrap();
         assert!(Pyramid::of_file(&path, &options).is_err());
+    }
+
+    #[test]
+    fn a_short_stretch_shows_every_sample() {
+        let amps: Vec<f32> = (0..5000_u16).map(|i| f32::from(i % 97)).collect();
+        let trace = Trace::new(vec![2.0; 5000], amps.clone(), 1e3, 1.0, Default::default()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let options = ReadOptions::default();
+        for name in ["t.parquet", "t.csv"] {
+            let path = folder.path().join(name);
+            match name {
+                "t.csv" => csv::save(&trace, &path).unwrap(),
+                _ => parquet::save(&trace, &path).unwrap(),
+            }
+            let pyramid = Pyramid::of_file(&path, &options).unwrap();
+            let look =
+                |columns| pyramid.columns_of_file((&path, &options), (3.0, 3.1), columns).unwrap().unwrap();
+            let each: Vec<f32> = look(1000).iter().map(|column| column.mean_w).collect();
+            let powers: Vec<f32> = amps[2000..2100].iter().map(|amps| 2.0 * amps).collect();
+            assert_eq!(each, powers);
+            let pairs = look(50);
+            assert_eq!((pairs.len(), pairs[0].from_s, pairs[49].to_s), (50, 3.0, 3.1));
+            assert_eq!((pairs[1].low_w, pairs[1].high_w), (powers[2], powers[3]));
+            assert_eq!(pyramid.columns_of_trace(&trace, (3.0, 3.1), 50).unwrap(), pairs);
+        }
     }
 }

@@ -1,17 +1,12 @@
-//! When samples were taken, before all of them have been seen.
+//! The time base of a file, before all of its samples have been read.
 
-use crate::io::{Chunk, ReadError, ReadOptions, Rows, Stamps, all_apart, grid};
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, all_apart, grid, rate_to_last_row_hz};
 use std::path::Path;
 
-/// Rows from which the rate is first taken.
+/// Rows from which the rate is first estimated.
 const FIRST_ROWS: usize = 1001;
-/// How far a stamp may be off its place, in sample periods.
-const OFF: f64 = 0.25;
-/// A rate from the first rows is kept if it puts the last row right by this share of a period.
-const SNAP: f64 = 0.05;
-/// No sample is missing where the last one is off by less than this many periods.
-const STEP: f64 = 0.5;
-
+/// Largest distance of a stamp from its place, in sample periods.
+const MAX_OFFSET_PERIODS: f64 = 0.25;
 /// Evenly spaced samples in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
@@ -34,22 +29,22 @@ impl Clock {
         self.start_s + position / self.rate_hz
     }
 
-    /// Holds stamps against their places; `first` is the row of the first of them, from 0.
+    /// Refuses stamps that are not in their places; `first` is the row of the first of them, from 0.
     pub(crate) fn check(&self, path: &Path, stamps: &Stamps, first: u64) -> Result<(), ReadError> {
         if let Stamps::Nanoseconds(times) = stamps
             && let [a, b, ..] = times[..]
         {
             // Equal steps and both ends in place: so is all between.
             if all_apart(times, b.wrapping_sub(a))
-                && self.off(stamps, 0, first).abs() <= OFF
-                && self.off(stamps, times.len() - 1, first).abs() <= OFF
+                && self.off(stamps, 0, first).abs() <= MAX_OFFSET_PERIODS
+                && self.off(stamps, times.len() - 1, first).abs() <= MAX_OFFSET_PERIODS
             {
                 return Ok(());
             }
         }
         match (0..stamps.len())
             .map(|row| (row, self.off(stamps, row, first)))
-            .find(|(_, off)| off.is_nan() || off.abs() > OFF)
+            .find(|(_, off)| off.is_nan() || off.abs() > MAX_OFFSET_PERIODS)
         {
             Some((row, off_periods)) => Err(ReadError::Uneven {
                 path: path.to_owned(),
@@ -74,37 +69,24 @@ impl Clock {
 pub fn clock(path: &Path, options: &ReadOptions) -> Result<Clock, ReadError> {
     let mut rows = Rows::open(path, options)?;
     let samples = rows.count();
-    let mut chunk = Chunk::default();
-    if rows.next(FIRST_ROWS, &mut chunk)? == 0 {
+    let mut batch = RowBatch::default();
+    if rows.next(FIRST_ROWS, &mut batch)? == 0 {
         return Err(ReadError::Empty { path: path.to_owned() });
     }
-    let stated = rows.header.rate_hz.is_some();
-    let first = grid(path, &chunk.stamps, &rows.header)?;
+    let stated = rows.description.rate_hz.is_some();
+    let first = grid(path, &batch.stamps, &rows.description)?;
     let mut clock = Clock { start_s: first.start_s, rate_hz: first.rate_hz, samples };
     let Some(last) = samples.filter(|&n| !stated && n > FIRST_ROWS as u64).map(|n| n - 1) else {
         return Ok(clock);
     };
-    let (start_s, doubt) = (chunk.stamps.time_s(0), doubt(&chunk.stamps, clock.rate_hz));
+    let first_rows = std::mem::take(&mut batch);
     let mut rows = Rows::open(path, options)?;
     rows.skip(last)?;
-    if rows.next(1, &mut chunk)? == 1 {
-        let span_s = chunk.stamps.time_s(0) - start_s;
-        let (off_periods, whole_hz) = (span_s * clock.rate_hz - last as f64, last as f64 / span_s);
-        // What the first rows do not leave open is no other rate: samples are missing, and where the check will tell.
-        let open = off_periods.abs() < STEP || (whole_hz / clock.rate_hz - 1.0).abs() <= doubt;
-        if off_periods.abs() > SNAP && span_s > 0.0 && open {
-            clock.rate_hz = whole_hz;
-        }
+    if rows.next(1, &mut batch)? == 1 {
+        let span_s = batch.stamps.time_s(0) - first_rows.stamps.time_s(0);
+        clock.rate_hz = rate_to_last_row_hz(&first_rows.stamps, clock.rate_hz, last, span_s);
     }
     Ok(clock)
-}
-
-/// By what share the rate of some rows may be wrong: stamps at both ends may be as far off as any, and are rounded.
-fn doubt(stamps: &Stamps, rate_hz: f64) -> f64 {
-    let off = |row: usize| (stamps.since_s(row, 0) * rate_hz - row as f64).abs();
-    let farthest = (1..stamps.len()).map(off).fold(0.0, f64::max);
-    let rounded = if matches!(stamps, Stamps::Nanoseconds(_)) { 1.5e-9 * rate_hz } else { SNAP };
-    2.0 * (farthest + rounded) / stamps.len().saturating_sub(1).max(1) as f64
 }
 
 #[cfg(test)]
@@ -124,27 +106,27 @@ mod tests {
         let path = folder.path().join("t.parquet");
         let trace =
             Trace::new(vec![1.0; samples], vec![1.0; samples], rate_hz, 0.0, Metadata::default()).unwrap();
-        // The description, which states the rate, is left out.
+        // Without a description, which would state the rate.
         let rows = trace.without(lost);
         let json = parquet::bare(&rows, &path);
         json.unwrap();
         let clock = clock(&path, &ReadOptions::default()).unwrap();
         let mut rows = Rows::open(&path, &ReadOptions::default()).unwrap();
-        let mut chunk = Chunk::default();
-        rows.next(samples, &mut chunk).unwrap();
-        (clock, clock.check(&path, &chunk.stamps, 0))
+        let mut batch = RowBatch::default();
+        rows.next(samples, &mut batch).unwrap();
+        (clock, clock.check(&path, &batch.stamps, 0))
     }
 
     #[test]
     fn a_rate_that_nanoseconds_round_is_that_of_the_whole_but_a_gap_changes_none() {
         for rate_hz in [44_117.65, 1e6 / 3.0, 3e5 / 7.0] {
             let (clock, even) = clock_of(30_000, rate_hz, None);
-            assert!((clock.rate_hz / rate_hz - 1.0).abs() < SNAP / 3e4 && even.is_ok(), "{clock:?} {even:?}");
+            assert!((clock.rate_hz / rate_hz - 1.0).abs() < 0.05 / 3e4 && even.is_ok(), "{clock:?} {even:?}");
         }
         for lost in [5000..5001, 5000..5100, 20_000..29_000] {
-            let (clock, told) = clock_of(30_000, 1e4, Some(lost.clone()));
+            let (clock, result) = clock_of(30_000, 1e4, Some(lost.clone()));
             assert_eq!(clock.rate_hz, 1e4);
-            let message = told.unwrap_err().to_string();
+            let message = result.unwrap_err().to_string();
             let says = format!("row {}: time", lost.start + 1);
             assert!(message.contains(&says), "{message}");
         }

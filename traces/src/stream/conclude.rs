@@ -7,9 +7,8 @@ use crate::frames::{
     FrameStart, MarkError, Marks, Placement, choose, conclude_at, confidence, flat_mark, misalignment_w2,
     noise_deviation, regularity, start_after_idle,
 };
-use crate::median::median;
 use crate::metadata::Metadata;
-use crate::sum::PairSum;
+use crate::stats::{PairSum, upper_median};
 use crate::trace::Trace;
 use rayon::prelude::*;
 
@@ -25,7 +24,7 @@ pub(super) fn conclude(
     let clock = Clock { samples: Some(gathered.samples), ..plan.clock };
     let trace_end_s = clock.time_s(gathered.samples as f64);
     let marks = Marks { end_s: marks.end_s.min(trace_end_s), ..marks.clone() };
-    let sigma_w = noise_deviation(median(&mut gathered.steps_w));
+    let sigma_w = noise_deviation(upper_median(&mut gathered.steps_w));
     let threshold = plan.threshold(&mut gathered, sigma_w);
     let mut starts = plan.marked(&gathered);
     let view = Starter { plan: &plan, threshold };
@@ -73,7 +72,8 @@ impl Starter<'_> {
         (start, candidate.sum_w)
     }
 
-    /// The first frame, after idle, if it lies in what was kept of the beginning. The marks' windows are put behind it.
+    /// The first frame, after idle, if it lies in what was kept of the beginning. The marks' windows are put
+    /// behind it.
     fn first(&self, starts: &[Summed], gathered: &mut Gathered) -> Option<Summed> {
         let starts: Vec<FrameStart> = starts.iter().map(|(start, _)| *start).collect();
         let head = &mut gathered.head;
@@ -107,7 +107,7 @@ impl Plan {
         let candidates = &gathered.candidates;
         let distances: Vec<f64> = candidates.par_iter().map(|candidate| candidate.distance_w2).collect();
         let noise_w2 = 2.0 * self.placement.samples as f64 * sigma_w * sigma_w;
-        let background_w2 = median(&mut gathered.distances_w2);
+        let background_w2 = upper_median(&mut gathered.distances_w2);
         let span = match (candidates.first(), candidates.last()) {
             (Some(first), Some(last)) => (last.offset - first.offset) as usize,
             _ => 0,
@@ -122,7 +122,7 @@ impl Plan {
         })
     }
 
-    /// Where each mark is, s, and the powers about it.
+    /// The time of each mark, s, and the powers around it.
     fn windows(&self) -> impl Iterator<Item = (f64, &[f64])> {
         let marks = self.placement.marks.iter().map(|mark| mark.mark_s);
         marks.zip(self.templates.iter().map(Vec::as_slice))

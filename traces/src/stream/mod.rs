@@ -1,27 +1,23 @@
-//! Frames of a file that need not fit into memory: one pass, in pieces, on all threads.
+//! Frames of a file of any length: one pass, in pieces, on all threads.
 //!
-//! The method is the sum of squares of [`frames`](crate::frames), the same minima and the same threshold. What differs:
-//! offsets are screened by a transform in f32, and the distance of every minimum, its place finer than a sample and the
-//! energy up to there are worked out in f64 while its samples are at hand. No step depends on how many threads there are.
+//! The method is the sum of squares of [`frames`](crate::frames), with the same minima and the same
+//! threshold. Here, offsets are screened by a transform in f32; the distance of every minimum, its place
+//! finer than a sample and the energy up to there are computed in f64 while its samples are in memory. No
+//! step depends on the number of threads.
 
 mod clock;
 mod conclude;
-mod error;
-mod minima;
 mod pass;
 mod piece;
 mod screen;
-mod template;
-mod workspace;
-
-pub use clock::{Clock, clock};
-pub use error::StreamError;
 
 use crate::energy::FrameEnergy;
-use crate::frames::{Found, Marks};
-use crate::io::{ReadOptions, Rows};
+use crate::frames::{Found, MarkError, Marks};
+use crate::io::{ReadError, ReadOptions, Rows};
 use crate::metadata::Metadata;
+pub use clock::{Clock, clock};
 use std::path::Path;
+use thiserror::Error;
 
 /// Frames of a file with their energies.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,12 +30,12 @@ pub struct Streamed {
     pub clock: Clock,
     /// Energy of the whole trace, J.
     pub total_j: f64,
-    /// What the file says of itself.
+    /// The metadata of the file.
     pub metadata: Metadata,
 }
 
-/// Finds frames by the sum of squares and takes their energies. An infinite `marks.end_s` stands for the end of the
-/// file.
+/// Finds frames by the sum of squares and takes their energies. An infinite `marks.end_s` stands for the end
+/// of the file.
 ///
 /// # Errors
 /// [`StreamError`] if the file cannot be read, its samples are not even or finite, or the marks are not in it.
@@ -48,10 +44,113 @@ pub fn find(path: &Path, options: &ReadOptions, marks: &Marks) -> Result<Streame
     let plan = pass::Plan::new(path, options, marks, clock)?;
     let mut rows = Rows::open(path, options)?;
     let gathered = plan.gather(&mut rows)?;
-    rows.header.check_rows(path, gathered.samples)?;
-    rows.header.check_end(path)?;
-    Ok(conclude::conclude(plan, marks, gathered, rows.header.metadata)?)
+    rows.description.check_rows(path, gathered.samples)?;
+    rows.description.check_end(path)?;
+    Ok(conclude::conclude(plan, marks, gathered, rows.description.metadata)?)
+}
+
+/// Why a file could not be analysed.
+#[derive(Debug, Error)]
+pub enum StreamError {
+    /// The file.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The marks.
+    #[error(transparent)]
+    Mark(#[from] MarkError),
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::CurveBuilder;
+    use crate::device::{Device, DeviceSpec};
+    use crate::energy::PowerIntegral;
+    use crate::frames::{Marks, Method, Options, Window, default_window, find_with};
+    use crate::io::{ReadOptions, parquet};
+    use crate::trace::Trace;
+
+    /// Frames whose length and content vary, over more than one piece.
+    fn trace(frames: u32) -> Trace {
+        let mut builder = CurveBuilder::new(0.0).unwrap();
+        builder.push(0.05, 5.0).unwrap();
+        for frame in 0..frames {
+            for draw in 0..40_u32 {
+                builder.push(2e-4 + 1e-7 * f64::from(frame % 17), 8.0 + f64::from(draw * 37 % 29)).unwrap();
+            }
+            builder.push(1.5e-3 + 1e-4 * f64::from(frame * 7 % 13), 5.0).unwrap();
+        }
+        builder.push(0.02, 5.0).unwrap();
+        let curve = builder.build().unwrap();
+        Device::new(DeviceSpec::default()).unwrap().sample(&curve, 0.0, curve.end_s()).unwrap().trace
+    }
+
+    #[test]
+    fn oracle_streamed_frames_are_those_found_in_memory_and_add_up() {
+        let trace = trace(3000);
+        assert!(trace.samples() > 1 << 20);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        parquet::save(&trace, &path).unwrap();
+        let window = default_window(0.01, trace.rate_hz());
+        let found = find_with(&trace, &Marks::one(0.05, window, trace.end_s()), &Options::default()).unwrap();
+        let marks = Marks {
+            starts_s: vec![found.starts[100].time_s, found.starts[2000].time_s],
+            window,
+            end_s: f64::INFINITY,
+        };
+        let in_memory = Marks { end_s: trace.end_s(), ..marks.clone() };
+        let expected = find_with(&trace, &in_memory, &Options { method: Method::SumOfSquares }).unwrap();
+        let streamed = find(&path, &ReadOptions::default(), &marks).unwrap();
+        assert_eq!(streamed.found.starts.len(), expected.starts.len());
+        assert!((streamed.found.threshold.value_w2 / expected.threshold.value_w2 - 1.0).abs() < 1e-2);
+        let integral = PowerIntegral::new(&trace);
+        for (ours, theirs) in streamed.energies.iter().zip(integral.frames(&expected)) {
+            assert!((ours.start_s - theirs.start_s).abs() < 1e-8, "{ours:?} {theirs:?}");
+            assert!(
+                (ours.energy_j - integral.energy_j(ours.start_s, ours.end_s)).abs() < 1e-10 * ours.energy_j
+            );
+            assert_eq!(ours.flags, theirs.flags);
+        }
+        let sum: f64 = streamed.energies.iter().map(|frame| frame.energy_j).sum();
+        let whole = integral.energy_j(streamed.energies[0].start_s, trace.end_s());
+        assert!((sum / whole - 1.0).abs() < 1e-12);
+        assert!((streamed.total_j / integral.total_j() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_same_for_one_thread_and_for_several() {
+        let trace = trace(500);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        parquet::save(&trace, &path).unwrap();
+        let marks = Marks::one(0.05, default_window(0.01, trace.rate_hz()), f64::INFINITY);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| find(&path, &ReadOptions::default(), &marks).unwrap())
+        };
+        assert!(on(1) == on(3));
+    }
+
+    #[test]
+    fn a_mark_in_the_rest_between_frames_is_told_as_in_memory() {
+        let trace = trace(300);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        parquet::save(&trace, &path).unwrap();
+        let warned = |mark_s: f64, window: Window| {
+            let marks = Marks::one(mark_s, window, trace.end_s());
+            let options = Options { method: Method::SumOfSquares };
+            let [ours, theirs] = [
+                find(&path, &ReadOptions::default(), &marks).unwrap().found,
+                find_with(&trace, &marks, &options).unwrap(),
+            ]
+            .map(|found| found.warnings.into_iter().find(|warning| warning.code == "flat-mark"));
+            assert_eq!(ours, theirs);
+            ours.is_some()
+        };
+        // Before the first frame there is idle power alone.
+        assert!(warned(0.02, Window { pre_s: 5e-3, post_s: 20e-3 }));
+        assert!(!warned(0.05, default_window(0.01, trace.rate_hz())));
+    }
+}

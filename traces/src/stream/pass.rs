@@ -1,48 +1,46 @@
-//! The one pass over the file.
+//! The one pass over the file, and the buffers of its threads.
 
 use super::StreamError;
 use super::clock::Clock;
-use super::minima::minima;
-use super::piece::Piece;
-use super::screen::Screen;
-use super::template::{difference, powers, templates};
-use super::workspace::{Workspace, Workspaces};
+use super::piece::{Piece, difference, powers, templates};
+use super::screen::{Buffers, Screen, minima};
 use crate::frames::{Marks, Placed, Placement, vertex};
-use crate::io::{Chunk, ReadError, ReadOptions, Rows};
-use crate::sum::PairSum;
+use crate::io::{ReadError, ReadOptions, RowBatch, Rows};
+use crate::stats::PairSum;
 use core::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// Rows read at once.
-const ROWS: usize = 1 << 20;
-/// Rows decoded at once: they are looked at again while they are in the second cache.
-const BATCH: usize = 1 << 16;
-/// Offsets a thread takes at once, about.
-const TASK: usize = 1 << 16;
-/// How far around the lowest offset of the screen the lowest exact one may lie, and one more for its neighbours.
-const REACH: usize = 2;
-/// Samples kept beside what offsets need: for energies at starts that lie finer than a sample.
-const MARGIN: usize = 8;
-/// Samples at the beginning that are kept: the first frame is looked for in them again.
-pub(super) const HEAD: usize = 1 << 21;
-/// How many values medians are taken from, about.
-const MEDIAN_OF: u64 = 65_536;
+const PIECE_ROWS: usize = 1 << 20;
+/// Rows decoded at once: they are used again while they are in the second cache.
+const BATCH_ROWS: usize = 1 << 16;
+/// About the offsets that a thread handles at once.
+const TASK_OFFSETS: usize = 1 << 16;
+/// Farthest the lowest exact offset may lie from that of the screen, with one more for its neighbours.
+const MAX_REFINEMENT_SAMPLES: usize = 2;
+/// Samples kept beside what offsets need: for energies at starts between samples.
+const MARGIN_SAMPLES: usize = 8;
+/// Samples at the beginning that are kept: the first frame is searched in them again.
+pub(super) const HEAD_SAMPLES: usize = 1 << 21;
+/// About the most values that medians are taken from.
+const MAX_MEDIAN_VALUES: u64 = 65_536;
 
 /// A minimum of the profile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     pub offset: u64,
-    /// Where the template lies best, in samples.
+    /// The best position of the template, in samples.
     pub aligned: f64,
     pub distance_w2: f64,
-    /// Sum of all powers (W) up to the start it stands for.
+    /// Sum of all powers (W) up to its start.
     pub sum_w: PairSum,
     pub mark: u32,
 }
 
-/// What a pass gathers.
+/// The result of a pass.
 #[derive(Default)]
 pub(super) struct Gathered {
     /// All but those beside marks.
@@ -53,13 +51,13 @@ pub(super) struct Gathered {
     pub distances_w2: Vec<f64>,
     pub steps_w: Vec<f64>,
     pub head: Piece,
-    /// Sums at the positions asked for.
+    /// Sums at the requested positions.
     pub sums_w: Vec<Option<PairSum>>,
     pub total_w: PairSum,
     pub samples: u64,
 }
 
-/// What does not change on the way.
+/// The parameters of a pass.
 pub(super) struct Plan {
     pub clock: Clock,
     pub placement: Placement,
@@ -84,14 +82,14 @@ impl Plan {
         let mut positions: Vec<f64> = marks.starts_s.iter().map(|&mark_s| clock.position(mark_s)).collect();
         positions.push(clock.position(marks.end_s));
         let spacing = (placement.samples / 2).max(1);
-        let stride = clock.samples.map_or(1024, |samples| samples.div_ceil(MEDIAN_OF).max(1));
+        let stride = clock.samples.map_or(1024, |samples| samples.div_ceil(MAX_MEDIAN_VALUES).max(1));
         Ok(Self { clock, placement, templates, spacing, mean_w, screen, stride, positions })
     }
 
     pub fn gather(&self, rows: &mut Rows) -> Result<Gathered, ReadError> {
         let mut gathered = Gathered { sums_w: vec![None; self.positions.len()], ..Gathered::default() };
-        let (mut piece, mut chunk, mut coming) = (Piece::default(), Chunk::default(), Piece::default());
-        let mut read = self.read(rows, &mut chunk, &mut piece)?;
+        let (mut piece, mut batch, mut coming) = (Piece::default(), RowBatch::default(), Piece::default());
+        let mut read = self.read(rows, &mut batch, &mut piece)?;
         let (mut from, mut fresh, workspaces) = (0, 0, Workspaces::new());
         loop {
             self.look_up(&piece, &mut gathered);
@@ -102,11 +100,11 @@ impl Plan {
                 (gathered.total_w, gathered.samples) = (piece.sum_to(piece.end() as f64), piece.end());
                 return Ok(gathered);
             }
-            coming.begin_with(&piece, to.saturating_sub((self.spacing + MARGIN) as u64));
+            coming.begin_with(&piece, to.saturating_sub((self.spacing + MARGIN_SAMPLES) as u64));
             let old = coming.len();
             // The next rows are decoded while these are searched.
             let (next, ()) = rayon::join(
-                || self.read(rows, &mut chunk, &mut coming),
+                || self.read(rows, &mut batch, &mut coming),
                 || {
                     gathered.keep_head(&piece, fresh);
                     self.search(&piece, from..to, &workspaces, &mut gathered);
@@ -118,15 +116,15 @@ impl Plan {
     }
 
     /// Appends the next rows of the file to a piece; how many there were.
-    fn read(&self, rows: &mut Rows, chunk: &mut Chunk, piece: &mut Piece) -> Result<usize, ReadError> {
+    fn read(&self, rows: &mut Rows, batch: &mut RowBatch, piece: &mut Piece) -> Result<usize, ReadError> {
         let mut read = 0;
-        while read < ROWS {
+        while read < PIECE_ROWS {
             let end = piece.end();
-            let now = rows.append(BATCH, chunk, &mut piece.voltage_v, &mut piece.current_a)?;
+            let now = rows.append(BATCH_ROWS, batch, &mut piece.voltage_v, &mut piece.current_a)?;
             if now == 0 {
                 break;
             }
-            self.clock.check(rows.path(), &chunk.stamps, end)?;
+            self.clock.check(rows.path(), &batch.stamps, end)?;
             piece.add_up();
             read += now;
         }
@@ -143,11 +141,11 @@ impl Plan {
         }
     }
 
-    /// The offset up to which all samples are at hand, those of neighbours within the spacing too.
+    /// The offset up to which all samples are in memory, those of neighbours within the spacing too.
     fn ready(&self, piece: &Piece, last: bool) -> u64 {
         let all = self.all(piece);
         let spacing = self.spacing as u64;
-        if last { all } else { all.saturating_sub(spacing + MARGIN as u64) / spacing * spacing }
+        if last { all } else { all.saturating_sub(spacing + MARGIN_SAMPLES as u64) / spacing * spacing }
     }
 
     /// The offset after the last at which a window lies in the piece.
@@ -159,13 +157,14 @@ impl Plan {
     fn search(&self, piece: &Piece, range: Range<u64>, workspaces: &Workspaces, gathered: &mut Gathered) {
         let Range { start: from, end: to } = range;
         let (all, spacing) = (self.all(piece), self.spacing as u64);
-        let task = (TASK as u64).div_ceil(spacing) * spacing;
+        let task = (TASK_OFFSETS as u64).div_ceil(spacing) * spacing;
         let tasks = to.saturating_sub(from).div_ceil(task);
         let one = |index: usize| {
             let begin = from + index as u64 * task;
             workspaces.with(|workspace| self.task(piece, begin, to.min(begin + task), all, workspace))
         };
-        // One by one, as who has read the next rows comes late and takes of what is left.
+        // One by one, as the thread that reads the next rows joins late and takes some of the remaining
+        // tasks.
         let found: Vec<Found> = (0..tasks as usize).into_par_iter().with_max_len(1).map(one).collect();
         for found in found {
             gathered.distances_w2.extend(found.distances_w2);
@@ -220,7 +219,7 @@ impl Plan {
 
     fn candidate(&self, piece: &Piece, offset: u64, all: u64, power_w: &mut Vec<f64>) -> Candidate {
         // All samples of this offset and of those that may be better, and one more on either side.
-        let reach = REACH as u64 + 1;
+        let reach = MAX_REFINEMENT_SAMPLES as u64 + 1;
         let low = offset.saturating_sub(reach).max(piece.base);
         let high = (offset + reach).min(all - 1);
         let place = |offset: u64| (offset - piece.base) as usize;
@@ -255,7 +254,7 @@ fn centre(voltage_v: &[f32], current_a: &[f32], mean_w: f32, into: &mut [f32]) {
     }
 }
 
-/// What one task finds.
+/// The result of one task.
 #[derive(Default)]
 struct Found {
     candidates: Vec<Candidate>,
@@ -265,7 +264,7 @@ struct Found {
 
 impl Gathered {
     fn keep_head(&mut self, piece: &Piece, fresh: usize) {
-        let room = HEAD - self.head.len();
+        let room = HEAD_SAMPLES - self.head.len();
         let take = fresh..piece.len().min(fresh + room);
         self.head.voltage_v.extend_from_slice(&piece.voltage_v[take.clone()]);
         self.head.current_a.extend_from_slice(&piece.current_a[take]);
@@ -278,4 +277,29 @@ fn check_finite(rows: &Rows, piece: &Piece) -> Result<(), ReadError> {
         return Ok(());
     }
     rows.check_finite(&piece.voltage_v, &piece.current_a, piece.base)
+}
+
+/// The buffers of a thread: the signal and the profile of one task.
+#[derive(Default)]
+pub(super) struct Workspace {
+    pub signal: Vec<f32>,
+    pub profile: Vec<f32>,
+    /// Powers about one offset, W.
+    pub power_w: Vec<f64>,
+    pub buffers: Buffers,
+}
+
+/// One for each thread, not made anew for each piece.
+pub(super) struct Workspaces(Vec<Mutex<Workspace>>);
+
+impl Workspaces {
+    pub fn new() -> Self {
+        Self((0..rayon::current_num_threads()).map(|_| Mutex::default()).collect())
+    }
+
+    /// Does something in that of the thread it is called by.
+    pub fn with<T>(&self, work: impl FnOnce(&mut Workspace) -> T) -> T {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        work(&mut self.0[thread % self.0.len()].lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }

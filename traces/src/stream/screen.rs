@@ -1,12 +1,13 @@
-//! The distance of the nearest template to every stretch, in f32: good enough to tell where minima are.
+//! The distance of the nearest template to every window, in f32: exact enough to show where minima are; and
+//! these minima, piece by piece.
 
+use crate::overlap;
+use crate::overlap::OverlapSave;
 use multiversion::multiversion;
 use rustfft::num_complex::Complex;
 
-use crate::overlap::{self, OverlapSave};
-
-/// Least length of a transform: its arrays stay in the first cache, or nearly so.
-const LEAST_BLOCK: usize = 1 << 12;
+/// Least length of a transform: its arrays nearly stay in the first cache.
+const MIN_BLOCK_SAMPLES: usize = 1 << 12;
 
 /// Templates of one width, ready to be compared.
 pub(super) struct Screen {
@@ -16,7 +17,7 @@ pub(super) struct Screen {
     width: usize,
 }
 
-/// What a thread works in.
+/// The buffers of a thread.
 #[derive(Default)]
 pub(super) struct Buffers {
     overlap: overlap::Buffers<f32>,
@@ -27,7 +28,7 @@ impl Screen {
     /// Prepares templates of equal width, W less the mean that signals will have taken off, too.
     pub fn new(centred: &[Vec<f64>]) -> Self {
         let width = centred.first().map_or(1, Vec::len);
-        let block = (16 * width).next_power_of_two().max(LEAST_BLOCK);
+        let block = (16 * width).next_power_of_two().max(MIN_BLOCK_SAMPLES);
         let own = centred.iter().map(|template| template.iter().map(|x| x * x).sum()).collect();
         // The factor is that of the cross term.
         Self { overlap: OverlapSave::new(centred, -2.0, block), own, width }
@@ -51,8 +52,8 @@ impl Screen {
     }
 }
 
-/// Lowers values to the distances that their cross terms, one part of each number, and the sums of squares up to each sample
-/// make.
+/// Lowers values to the distances that their cross terms, one part of each number, and the sums of squares up
+/// to each sample make.
 #[multiversion(targets("x86_64+avx2"))]
 fn lower(
     values: &mut [f32],
@@ -70,16 +71,16 @@ fn lower(
     }
 }
 
-/// Samples that are summed up by themselves: one sum of all would wait for itself at every sample.
-const GROUP: usize = 8;
+/// Samples that are summed by themselves: a single sum would wait for itself at every sample.
+const GROUP_SAMPLES: usize = 8;
 
 /// Sums of the squares before each sample, and of all.
 #[multiversion(targets("x86_64+avx2"))]
 fn running_squares(signal: &[f32], squares: &mut Vec<f64>) {
     squares.resize(signal.len() + 1, 0.0);
     squares[0] = 0.0;
-    let (groups, rest) = signal.as_chunks::<GROUP>();
-    let (sums, rest_sums) = squares[1..].as_chunks_mut::<GROUP>();
+    let (groups, rest) = signal.as_chunks::<GROUP_SAMPLES>();
+    let (sums, rest_sums) = squares[1..].as_chunks_mut::<GROUP_SAMPLES>();
     let mut sum = 0.0;
     for (group, sums) in groups.iter().zip(sums) {
         sum = add_up(group, sum, sums);
@@ -96,6 +97,60 @@ fn add_up(group: &[f32], before: f64, sums: &mut [f64]) -> f64 {
         *to = before + own;
     }
     before + own
+}
+
+/// Offsets in `from..to` of `profile` (which begins before `from` and reaches beyond `to`) that are lowest
+/// within less than `spacing` on either side; `from` is a multiple of `spacing` in the whole. Of ties, the
+/// first of each segment of `spacing`; who joins segments drops those nearer than `spacing` to the one
+/// before.
+pub(super) fn minima(profile: &[f32], from: usize, to: usize, spacing: usize, mut take: impl FnMut(usize)) {
+    let mut block = from;
+    while block < to {
+        let values = &profile[block..to.min(block + spacing)];
+        let least = lowest(values);
+        if let Some(at) = first(values, least) {
+            let offset = block + at;
+            let before = &profile[(offset + 1).saturating_sub(spacing)..offset];
+            let after = &profile[offset + 1..profile.len().min(offset + spacing)];
+            if least <= lowest(before) && least <= lowest(after) {
+                take(offset);
+            }
+        }
+        block += spacing;
+    }
+}
+
+/// Values that are compared together: as many as the compiler keeps in few registers.
+const LANES: usize = 16;
+
+/// The lowest value; infinity of none.
+#[multiversion(targets("x86_64+avx2"))]
+fn lowest(values: &[f32]) -> f32 {
+    let less = |a: f32, b: f32| if b < a { b } else { a };
+    let mut lanes = [f32::INFINITY; LANES];
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    // The last lanes once more, rather than the rest one by one.
+    let again = values.last_chunk::<LANES>().filter(|_| !rest.is_empty());
+    for chunk in chunks.iter().chain(again) {
+        for (low, &value) in lanes.iter_mut().zip(chunk) {
+            *low = less(*low, value);
+        }
+    }
+    let few = if chunks.is_empty() { rest } else { &[] };
+    few.iter().copied().chain(lanes).fold(f32::INFINITY, less)
+}
+
+/// The first index of a value.
+#[multiversion(targets("x86_64+avx2"))]
+fn first(values: &[f32], value: f32) -> Option<usize> {
+    let (chunks, _) = values.as_chunks::<LANES>();
+    // Without a way out from within a chunk.
+    let without = chunks
+        .iter()
+        .take_while(|chunk| !chunk.iter().fold(false, |any, &other| any | (other == value)))
+        .count();
+    let from = without * LANES;
+    Some(from + values[from..].iter().position(|&other| other == value)?)
 }
 
 #[cfg(test)]
@@ -117,6 +172,21 @@ mod tests {
                 let exact = templates.iter().map(exact).fold(f64::INFINITY, f64::min);
                 assert!((f64::from(value) - exact).abs() < 2e-2 + 1e-5 * exact, "{offset}: {value} {exact}");
             }
+        }
+    }
+
+    #[test]
+    fn oracle_by_comparing_all() {
+        let profile: Vec<f32> = (0..5000_u32).map(|i| (i * 7919 % 4999) as f32).collect();
+        for spacing in [1, 2, 7, 40, 125] {
+            let (from, to) = (spacing * 3, 4000);
+            let mut found = Vec::new();
+            minima(&profile, from, to, spacing, |offset| found.push(offset));
+            let alone = |k: &usize| {
+                let around = (k + 1).saturating_sub(spacing)..(k + spacing).min(profile.len());
+                around.filter(|other| other != k).all(|other| profile[other] > profile[*k])
+            };
+            assert_eq!(found, (from..to).filter(alone).collect::<Vec<_>>(), "{spacing}");
         }
     }
 }

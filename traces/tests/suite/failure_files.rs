@@ -82,7 +82,7 @@ fn what_contradicts_a_file_or_may_mean_another_number_is_refused() {
 }
 
 #[test]
-fn a_rate_that_contradicts_the_times_is_refused_also_where_they_are_to_be_mended() {
+fn a_rate_that_contradicts_the_times_is_refused_also_where_they_are_to_be_repaired() {
     let rows: String = (0..500).map(|i| format!("{},1,2\n", f64::from(i) / 1000.0)).collect();
     let (_folder, path) = in_folder("a.csv", format!("time_s,voltage_V,current_A\n{rows}").as_bytes());
     for repair in [false, true] {
@@ -90,7 +90,7 @@ fn a_rate_that_contradicts_the_times_is_refused_also_where_they_are_to_be_mended
         for rate_hz in [2000.0, 500.0, 1002.0] {
             let error = io::read(&path, &of(rate_hz)).unwrap_err();
             says(&error, &[&format!("a rate of {rate_hz} Hz was asked for"), "column time_s it is 1000 Hz"]);
-            assert!(matches!(error, ReadError::Asked { .. }));
+            assert!(matches!(error, ReadError::Conflict { .. }));
         }
         assert_eq!(io::read(&path, &of(1000.0)).unwrap().trace.samples(), 500);
     }
@@ -294,7 +294,7 @@ fn a_compression_that_is_not_read_is_named_with_the_mend() {
 }
 
 #[test]
-fn missing_values_are_filled_by_repair_and_told_with_their_place() {
+fn missing_values_are_filled_by_repair_and_reported_with_their_place() {
     use Values::{Float, Maybe};
     let times = Maybe(vec![Some(0.0), Some(0.5), Some(1.0), None, Some(2.0), Some(2.5)]);
     let voltage = Maybe(vec![Some(1.0), None, Some(3.0), Some(1.0), Some(5.0), None]);
@@ -304,9 +304,9 @@ fn missing_values_are_filled_by_repair_and_told_with_their_place() {
     let options = ReadOptions { repair: true, ..ReadOptions::default() };
     let loaded = io::read(&path, &options).unwrap();
     assert_eq!(loaded.trace.voltage_v(), [1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
-    let told: Vec<_> = loaded.repairs.iter().map(|r| (r.code, r.row, r.time_s, r.count)).collect();
+    let reported: Vec<_> = loaded.repairs.iter().map(|r| (r.code, r.row, r.time_s, r.count)).collect();
     assert_eq!(
-        told,
+        reported,
         [
             ("dropped-rows", 4, 1.0, 1),
             ("filled-values", 2, 0.5, 1),
@@ -317,14 +317,14 @@ fn missing_values_are_filled_by_repair_and_told_with_their_place() {
 }
 
 #[test]
-fn surplus_fields_that_repair_drops_are_told_with_their_place() {
+fn surplus_fields_that_repair_drops_are_reported_with_their_place() {
     let rows = "time_s,voltage_V,current_A\n0,1,1\n0.5,1,2,9\n1,1,3\n1.5,1,4,9,9\n";
     let (_folder, path) = in_folder("surplus.csv", rows.as_bytes());
     let options = ReadOptions { repair: true, ..ReadOptions::default() };
-    let told = io::read(&path, &options).unwrap().repairs;
-    assert_eq!(io::Recording::open(&path, &options).unwrap().repairs(), told);
-    let [told] = &told[..] else { panic!("{told:?}") };
-    assert_eq!((told.code, told.row, told.time_s, told.count), ("uneven-rows", 2, 0.5, 2));
+    let reported = io::read(&path, &options).unwrap().repairs;
+    assert_eq!(io::Recording::open(&path, &options).unwrap().repairs(), reported);
+    let [reported] = &reported[..] else { panic!("{reported:?}") };
+    assert_eq!((reported.code, reported.row, reported.time_s, reported.count), ("uneven-rows", 2, 0.5, 2));
 }
 
 #[test]
@@ -400,7 +400,7 @@ impl std::io::Write for Full {
 }
 
 #[test]
-fn a_disk_is_told_to_be_full_wherever_it_fills_up() {
+fn a_full_disk_is_reported_wherever_it_fills_up() {
     let ramp: Vec<f32> = (0..30_000_u16).map(f32::from).collect();
     let trace = Trace::new(ramp.clone(), ramp, 50e3, 0.0, Metadata::default()).unwrap();
     let of = |writes: &dyn Fn(&mut Full) -> Result<(), io::WriteError>| {

@@ -77,11 +77,11 @@ fn a_clock_and_frames_in_pieces_are_those_of_the_whole() {
 fn lost_samples_are_named_with_their_row_and_filled_on_request() {
     let path = foreign("pyjls_gaps.jls");
     refused(&path, &ReadOptions::default(), &["row 501: ", "NaN, not a finite number"]);
-    let mended = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
-    assert_eq!((mended.trace.samples(), mended.repairs.is_empty()), (1000, false));
-    let place = mended.trace.time_s(500);
-    assert!(place > 0.0 && mended.repairs.iter().any(|repair| (repair.row, repair.time_s) == (501, place)));
-    assert!(mended.trace.current_a().iter().all(|value| value.is_finite()));
+    let repaired = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
+    assert_eq!((repaired.trace.samples(), repaired.repairs.is_empty()), (1000, false));
+    let place = repaired.trace.time_s(500);
+    assert!(place > 0.0 && repaired.repairs.iter().any(|repair| (repair.row, repair.time_s) == (501, place)));
+    assert!(repaired.trace.current_a().iter().all(|value| value.is_finite()));
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn numbers_that_jump_are_named_with_their_row() {
 }
 
 #[test]
-fn signals_that_make_up_no_rows_are_told_apart() {
+fn signals_that_make_up_no_rows_are_refused_by_name() {
     let path = foreign("pyjls_rates.jls");
     refused(
         &path,
@@ -168,7 +168,7 @@ fn a_recording_that_was_not_closed_says_what_mends_it() {
 }
 
 #[test]
-fn a_recording_that_was_cut_and_mended_gives_what_all_its_signals_have() {
+fn a_recording_that_was_cut_and_repaired_gives_what_all_its_signals_have() {
     // What pyjls finds in them: current and voltage (m2_*.npz of `make_jls.py`'s reader).
     for (name, current, voltage) in
         [("pyjls_mended_19000.jls", 960, 640), ("pyjls_mended_44500.jls", 2560, 1920)]
@@ -183,8 +183,8 @@ fn a_recording_that_was_cut_and_mended_gives_what_all_its_signals_have() {
             ],
         );
         let loaded = read(&path, &ReadOptions { repair: true, ..ReadOptions::default() }).unwrap();
-        let told: Vec<_> = loaded.repairs.iter().map(|repair| (repair.code, repair.count)).collect();
-        assert_eq!(told, [("cut-signals", current as u64 - voltage as u64)]);
+        let reported: Vec<_> = loaded.repairs.iter().map(|repair| (repair.code, repair.count)).collect();
+        assert_eq!(reported, [("cut-signals", current as u64 - voltage as u64)]);
         let last_s = loaded.trace.time_s(voltage - 1);
         assert!((loaded.repairs[0].time_s - last_s).abs() < 1e-9, "{:?}", loaded.repairs);
         assert_eq!(bits(loaded.trace.voltage_v()), bits(&whole.voltage_v()[..voltage]));

@@ -175,8 +175,8 @@ fn utc_entries_say_when_the_first_and_last_sample_were_taken() {
         let last = (2.5 * second + 5000.0 / 999.5 * second).round() as u64;
         assert_eq!(pairs, [(0, 5 << 29), (5000, last)]);
         let summary = of(0x3c).next().unwrap().payload;
-        let told: Vec<_> = [16, 32].map(|at| (long(summary, at), long(summary, at + 8))).to_vec();
-        assert_eq!(told, pairs);
+        let reported: Vec<_> = [16, 32].map(|at| (long(summary, at), long(summary, at + 8))).to_vec();
+        assert_eq!(reported, pairs);
         let places: Vec<_> = of(0x3a).map(|chunk| chunk.at).collect();
         let index = of(0x3b).next().unwrap();
         assert_eq!([24, 40].map(|at| long(index.payload, at)).to_vec(), places);

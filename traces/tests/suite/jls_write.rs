@@ -93,7 +93,7 @@ fn a_file_that_pyjls_reads_stays_as_it_is() {
 }
 
 #[test]
-fn a_recording_without_samples_is_told_to_be_empty() {
+fn a_recording_without_samples_is_reported_as_empty() {
     let mut bytes = Cursor::new(Vec::new());
     jls::Writer::new(&mut bytes, 1e3, 0.0, &Metadata::default()).unwrap().finish().unwrap();
     let message = read_bytes(&bytes.into_inner(), false).unwrap_err().to_string();
@@ -107,10 +107,10 @@ fn lost_samples_are_missing_and_filled_on_request() {
         let message = read_bytes(&written(&trace), false).unwrap_err().to_string();
         let row = lost[0].start + 1;
         assert!(message.contains(&format!("row {row}: voltage_V is NaN")), "{message}");
-        let mended = read_bytes(&written(&trace), true).unwrap();
-        assert_eq!((mended.samples(), mended.start_s()), (20_000, 1.25));
+        let repaired = read_bytes(&written(&trace), true).unwrap();
+        assert_eq!((repaired.samples(), repaired.start_s()), (20_000, 1.25));
         // Between stretches nothing is changed, and in them it is the line that the trace in memory has.
-        for (index, pair) in mended.current_a().iter().zip(trace.current_a()).enumerate() {
+        for (index, pair) in repaired.current_a().iter().zip(trace.current_a()).enumerate() {
             let near = lost.iter().any(|lost| lost.contains(&index));
             assert!(pair.0 == pair.1 || near && (pair.0 - pair.1).abs() < 1e-5, "{index}: {pair:?}");
         }
@@ -196,7 +196,7 @@ fn edited(bytes: &[u8], text: &str, by: &str) -> Vec<u8> {
 }
 
 #[test]
-fn notes_of_other_programs_are_passed_over_and_wrong_descriptions_told() {
+fn notes_of_other_programs_are_passed_over_and_wrong_descriptions_reported() {
     let bytes = written(&trace(500));
     let plain = read_bytes(&edited(&bytes, "{\"trace\":", "{\"tracf\":"), false).unwrap();
     // What is left is what any recorder writes.

@@ -144,7 +144,7 @@ fn several_marks_are_all_exact_and_help_each_other() {
 }
 
 fn codes(found: &Found) -> Vec<&'static str> {
-    found.warnings.iter().map(|warning| warning.code).collect()
+    found.warnings.iter().map(|warning| warning.code.name()).collect()
 }
 
 #[test]

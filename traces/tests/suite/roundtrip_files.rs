@@ -2,7 +2,9 @@
 
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use traces::io::{Heading, Sink, Source, Stretch, WriteError, csv, parquet, read_csv, read_parquet};
+use traces::io::{
+    TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError, csv, parquet, read_csv, read_parquet,
+};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
 fn metadata() -> Metadata {
@@ -56,30 +58,30 @@ proptest! {
     }
 }
 
-/// A trace whose stretches are handed on in other pieces.
+/// A trace whose chunks are handed on in other pieces.
 struct Cut<'a>(&'a Trace, &'a [usize]);
 
 struct Cutter<'a> {
-    into: &'a mut dyn Sink,
+    into: &'a mut dyn TraceWriter,
     sizes: std::iter::Cycle<std::slice::Iter<'a, usize>>,
 }
 
-impl Source for Cut<'_> {
-    fn heading(&self) -> Heading {
-        self.0.heading()
+impl TraceReader for Cut<'_> {
+    fn header(&self) -> TraceHeader {
+        self.0.header()
     }
 
-    fn pour(&self, sink: &mut dyn Sink) -> Result<(), WriteError> {
-        self.0.pour(&mut Cutter { into: sink, sizes: self.1.iter().cycle() })
+    fn read_into(&self, writer: &mut dyn TraceWriter) -> Result<(), WriteError> {
+        self.0.read_into(&mut Cutter { into: writer, sizes: self.1.iter().cycle() })
     }
 }
 
-impl Sink for Cutter<'_> {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
+impl TraceWriter for Cutter<'_> {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
         let mut from = 0;
-        while from < stretch.len() {
-            let to = stretch.len().min(from + self.sizes.next().unwrap());
-            self.into.take(&stretch.part(from, to))?;
+        while from < chunk.len() {
+            let to = chunk.len().min(from + self.sizes.next().unwrap());
+            self.into.write(&chunk.part(from, to))?;
             from = to;
         }
         Ok(())
@@ -87,7 +89,7 @@ impl Sink for Cutter<'_> {
 }
 
 /// The bytes of every format.
-fn written(trace: &dyn Source) -> Vec<Vec<u8>> {
+fn written(trace: &dyn TraceReader) -> Vec<Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
     let path = |end: &str| folder.path().join(format!("t.{end}"));
     parquet::save(trace, &path("parquet")).unwrap();
@@ -123,7 +125,7 @@ fn pieces_across_row_groups_with_losses_at_their_ends_give_the_same_bytes() {
     let group = 1 << 20;
     for lost in [group - 10..group + 20, group..group + 1, 100_000..group, group - 1..group + 400_000] {
         let trace = trace(group + 400_000, 50e3, 0.3).without([lost]);
-        let bytes = |trace: &dyn Source| {
+        let bytes = |trace: &dyn TraceReader| {
             let mut bytes = Vec::new();
             parquet::write(trace, &mut bytes).unwrap();
             bytes

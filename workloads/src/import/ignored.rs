@@ -42,6 +42,24 @@ pub(super) fn texture(material: &str, why: &str) -> Warning {
     Warning::about(Code::MissingImage, "texture", "not read: the material's colour is used alone", detail)
 }
 
+/// A material that is metallic.
+pub(super) fn metallic(material: &str) -> Warning {
+    let what = "drawn as matt ones with a faint highlight";
+    about_material(Code::MetallicIgnored, "metallic material", what, material)
+}
+
+/// A material with a highlight, a roughness or reflections of its own.
+pub(super) fn reflection(material: &str) -> Warning {
+    let what = "with a highlight or reflections of its own: every surface has the same faint highlight";
+    about_material(Code::ReflectionIgnored, "material", what, material)
+}
+
+/// A material with a displacement map.
+pub(super) fn displacement(material: &str) -> Warning {
+    let what = "ignored: surfaces stay where they are";
+    about_material(Code::DisplacementIgnored, "displacement map", what, material)
+}
+
 /// A file whose faces have colours of their own.
 pub(super) fn face_colors(path: &Path) -> Warning {
     let what = "with colours for faces, which are drawn without them";

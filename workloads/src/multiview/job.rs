@@ -117,8 +117,8 @@ impl MultiView {
     fn rig(&self, frame: &Frame) -> Result<Rig, LoadError> {
         let lens = frame.camera.lens().map(|lens| lens.focus());
         let focus = self.options.focus.or(lens).ok_or_else(|| {
-            let message = "the scene has no lens and so no depth at which views agree: give one".to_owned();
-            LoadError::Setting { setting: "focus", message }
+            let message = "the scene has no lens and so no depth at which views agree: give that depth with --focus or `--set focus=`";
+            LoadError::Setting { setting: "focus", message: message.to_owned() }
         })?;
         Rig::new(&frame.camera, focus, &self.options.layout(), self.settings.samples, self.seed)
     }

@@ -134,8 +134,8 @@ pub struct SceneCamera {
     pub rig: Rig,
     /// How much it sees; `None` for a field of view of 40 degrees (60 for a camera that is placed inside).
     pub view: Option<View>,
-    /// Depth in scene units below which nothing is seen; `None` for a thousandth of the distance of the
-    /// target (a quarter of the nearest vertex's depth for a fitted camera).
+    /// Depth in scene units below which nothing is seen; `None` for a thousandth of the depth of the target (a quarter of
+    /// the nearest vertex's depth for a fitted camera), or less where something nearer is in view.
     pub near: Option<f64>,
 }
 
@@ -220,16 +220,11 @@ impl SceneCamera {
         }
     }
 
-    /// Depth of what a lens is focused on by itself: the target, or `centre` for a camera without one.
-    pub(super) fn subject_depth(&self, stand: &Stand, (pose, at): (&Pose, Instant), centre: DVec3) -> f64 {
-        let target = match &self.rig {
-            Rig::LookAt(sight) => match &sight.aim {
-                Aim::At(target) => Some(target.at(at) - pose.origin),
-                Aim::Along(_) => None,
-            },
-            Rig::Node(_) | Rig::Fitted(_) => None,
-        };
-        stand.depth(target.unwrap_or(centre))
+    /// Depth of the target of a camera that has one.
+    pub(super) fn target_depth(&self, stand: &Stand, (pose, at): (&Pose, Instant)) -> Option<f64> {
+        let Rig::LookAt(sight) = &self.rig else { return None };
+        let Aim::At(target) = &sight.aim else { return None };
+        Some(stand.depth(target.at(at) - pose.origin))
     }
 
     /// Whether a track moves it; a camera on a node moves if the node does.
@@ -240,12 +235,21 @@ impl SceneCamera {
     }
 }
 
-/// The pipeline's camera between two stands.
+/// Where a camera is while one frame's shutter is open.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Standing {
+    pub open: Stand,
+    pub close: Stand,
+    /// Depth in scene units below which nothing is seen.
+    pub near: f64,
+    /// Depth in scene units of what a lens is focused on by itself.
+    pub focus: f64,
+}
+
+/// The pipeline's camera that stands so.
 pub(super) fn between(
-    open: &Stand,
-    close: &Stand,
+    Standing { open, close, near, .. }: &Standing,
     view: View,
-    near: f64,
     lens: Option<(f32, f64)>,
 ) -> Result<Camera, String> {
     let describe = |error: &dyn std::fmt::Display| error.to_string();
@@ -253,7 +257,7 @@ pub(super) fn between(
         Some((radius, focus)) => Some(Lens::new(radius, focus as f32).map_err(|e| describe(&e))?),
         None => None,
     };
-    let camera = view.camera(open.pose(), near as f32).map_err(|e| describe(&e))?;
+    let camera = view.camera(open.pose(), *near as f32).map_err(|e| describe(&e))?;
     let camera = camera.moving(open.pose(), close.pose()).map_err(|e| describe(&e))?;
     Ok(camera.with_lens(lens))
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::Scene;
-use super::camera::{Aim, LookAt, Rig, Side, View, tan_half};
+use super::camera::{Aim, LookAt, Rig, Side, Standing, View, tan_half};
 use super::camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
 use super::frame::{FrameError, Interval};
 use super::node::movers;
@@ -98,18 +98,19 @@ impl Scene {
     /// [`FrameError::Camera`] when it looks nowhere in the first frame.
     pub fn camera_used(&self) -> Result<CameraUsed, FrameError> {
         let first = self.interval(self.settings.frames.start);
-        let (stand, _, near, subject) = self.stands(&first)?;
+        let Standing { open: stand, near, focus, .. } =
+            self.standing_before(&first, &self.frame_meshes(&first)?)?;
         let eye = stand.eye + self.origin;
         let (fov_deg, view_height) = match self.sees() {
             View::Perspective { tan_half_height } => (Some(field_of_view(tan_half_height)), None),
             View::Orthographic { half_height } => (None, Some(2.0 * half_height)),
         };
-        let focus = self.focus(subject);
+        let focus = self.focus(focus);
         let described = CameraSpec {
             position: Some(eye.to_array()),
             fov_deg,
             view_height,
-            near: Some(near),
+            near: self.camera.near.or((!self.near_may_change()).then_some(near)),
             lens_radius: Some(self.settings.lens_radius),
             focus: (focus.is_finite() && focus > 0.0).then_some(focus),
             ..CameraSpec::default()
@@ -129,6 +130,11 @@ impl Scene {
             ron: description.to_ron_line(),
             exact: exact && fov_deg.is_none_or(|fov| (0.1..=175.0).contains(&fov)),
         })
+    }
+
+    /// Whether the near depth of another frame may yield to something else than that of the first.
+    fn near_may_change(&self) -> bool {
+        self.placed.is_none() && self.moving.contains(&true)
     }
 
     fn source_used(&self) -> CameraSource {

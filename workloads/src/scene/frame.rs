@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::Scene;
 use super::deform::{Carriage, Pose};
 use super::mesh::{Instance, Mesh, Normals, smooth_normals};
+use super::near::NearSpace;
 
 /// A scene between the opening and the closing of one frame's shutter: everything that changes from frame to frame.
 ///
@@ -104,6 +105,15 @@ impl FrameMesh {
     /// Whether nothing of the mesh moves while the shutter is open.
     pub fn is_still(&self) -> bool {
         Arc::ptr_eq(&self.open, &self.close)
+    }
+
+    /// Depth of the nearest point of the mesh in `space`.
+    pub(super) fn nearest(&self, space: &NearSpace) -> Option<f64> {
+        let corners = |triangle: &[u32; 3], end: &[Vec3]| triangle.map(|vertex| end[vertex as usize]);
+        let nearest = |triangle| {
+            space.nearest(corners(triangle, &self.open), corners(triangle, &self.close), Cull::None)
+        };
+        self.triangles.iter().filter_map(nearest).min_by(f64::total_cmp)
     }
 
     fn draw<'a>(&'a self, scene: &'a Scene) -> Result<Draw<'a>, FrameError> {

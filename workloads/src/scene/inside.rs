@@ -6,6 +6,7 @@
 //!
 //! Candidates for the camera stand over the floors that vertical lines cross, at eye height below the ceiling. From each, rays
 //! go out in all directions; the camera takes the place and the level direction in which its view is deepest on the average.
+//! Where the front sides of a scene enclose no place, as those of a room modelled from outside, both sides count.
 
 use std::f64::consts::TAU;
 
@@ -43,8 +44,34 @@ const FLOORS: usize = 16;
 /// Eye height, in heights of the room.
 const EYE: f64 = 0.45;
 
-/// The room that a camera keeps to every side, in lengths of the diagonal of the scene.
-const CLEARANCE: f64 = 0.01;
+/// What is demanded of a camera's place.
+#[derive(Clone, Copy, Debug)]
+struct Demands {
+    /// Whether both sides of a surface are seen. The place must be outside of all closed parts in the room then.
+    two_sided: bool,
+    /// Room to every side, in lengths of the diagonal of the scene.
+    clearance: f64,
+    /// Room in view, in the same lengths; floors and ceilings do not count.
+    ahead: f64,
+}
+
+/// Demands in their order: the first that any place meets decide.
+const DEMANDS: [Demands; 4] = [
+    Demands { two_sided: false, clearance: 0.01, ahead: 0.04 },
+    Demands { two_sided: false, clearance: 0.01, ahead: 0.0 },
+    Demands { two_sided: true, clearance: 0.03, ahead: 0.08 },
+    Demands { two_sided: true, clearance: 0.01, ahead: 0.0 },
+];
+
+/// Surfaces stand upright whose normal rises less.
+const UPRIGHT: f64 = 0.7;
+
+/// How many of these are tried where a camera is placed unasked.
+const UNASKED: usize = 2;
+
+/// Level rays that decide whether a place is in a closed part, and surfaces that each crosses at most.
+const CROSSING_RAYS: usize = 15;
+const MAX_CROSSINGS: usize = 64;
 
 /// Level directions in which a camera may look.
 const TURNS: usize = 32;
@@ -89,25 +116,44 @@ impl Inside {
         if enclosed < ENCLOSED && !anyway {
             return None;
         }
-        let around = candidates(&rays).into_iter().map(|eye| Around::new(&rays, eye, &directions));
-        let (mut best, mut deepest) = (None, 0.0);
-        for around in around.filter(|around| around.is_clear(CLEARANCE * diagonal)) {
-            for turn in 0..TURNS {
-                let depth = around.depth(level(turn), &directions);
-                if depth > deepest {
-                    (best, deepest) = (Some((around.eye, turn, around.is_enclosed())), depth);
-                }
-            }
-        }
-        let (eye, direction, is_enclosed) = match best {
-            Some((eye, turn, is_enclosed)) => (eye, level(turn), is_enclosed),
+        let demands = &DEMANDS[..if anyway { DEMANDS.len() } else { UNASKED }];
+        let best = Best::find(&rays, &directions, demands, diagonal);
+        let (eye, direction) = match &best {
+            Some(best) => (best.eye, level(best.turn)),
             None if !anyway => return None,
-            None => (low + 0.5 * (high - low), along_the_longer_side(high - low), false),
+            None => (low + DVec3::new(0.5, EYE, 0.5) * (high - low), along_the_longer_side(high - low)),
         };
         let ahead = rays.first(eye, direction, 0.0).map_or(0.5 * diagonal, |hit| hit.distance);
         let fit = fit(eye, direction, ahead.max(1e-3 * diagonal))?;
-        let is_room = enclosed >= ENCLOSED && is_enclosed && deepest >= DEPTH * diagonal;
+        let is_room = enclosed >= ENCLOSED
+            && best.is_some_and(|best| best.is_enclosed && best.depth >= DEPTH * diagonal);
         (is_room || anyway).then_some(Self { fit, enclosed, is_room })
+    }
+}
+
+/// The place from which the view is deepest.
+#[derive(Clone, Copy)]
+struct Best {
+    eye: DVec3,
+    turn: usize,
+    depth: f64,
+    is_enclosed: bool,
+}
+
+impl Best {
+    /// The best place by the first of `demands` that any place meets.
+    fn find(rays: &Rays, directions: &[DVec3], demands: &[Demands], diagonal: f64) -> Option<Self> {
+        let mut best = vec![None; demands.len()];
+        let any_side = demands.iter().any(|demands| demands.two_sided);
+        for (eye, over_a_front) in candidates(rays).into_iter().filter(|(_, front)| *front || any_side) {
+            let around = Around::new(rays, eye, directions);
+            for (demands, best) in demands.iter().zip(&mut best) {
+                if demands.two_sided || over_a_front {
+                    around.improve(best, rays, directions, demands, diagonal);
+                }
+            }
+        }
+        best.into_iter().flatten().next()
     }
 }
 
@@ -170,8 +216,8 @@ fn within([a, b, c]: [DVec3; 3], point: usize) -> DVec3 {
     a + u * (b - a) + v * (c - a)
 }
 
-/// Eyes over the floors.
-fn candidates(rays: &Rays) -> Vec<DVec3> {
+/// Eyes over the floors, and whether a floor shows its front.
+fn candidates(rays: &Rays) -> Vec<(DVec3, bool)> {
     let [low, high] = rays.bounds();
     let place =
         |line: usize, axis: usize| low[axis] + (line as f64 + 0.5) / GRID as f64 * (high[axis] - low[axis]);
@@ -179,16 +225,17 @@ fn candidates(rays: &Rays) -> Vec<DVec3> {
     lines.flat_map(|[x, z]| over_the_floors(rays, x, z)).collect()
 }
 
-/// Eyes over each floor that the vertical line through `x` and `z` crosses: surfaces that look up, with room above.
-fn over_the_floors(rays: &Rays, x: f64, z: f64) -> Vec<DVec3> {
+/// Eyes over each floor that the vertical line through `x` and `z` crosses: level surfaces with room above, and whether they
+/// look up.
+fn over_the_floors(rays: &Rays, x: f64, z: f64) -> Vec<(DVec3, bool)> {
     let [low, high] = rays.bounds();
     let (height, mut ceiling) = (high.y - low.y, high.y);
     let (mut eyes, mut from) = (Vec::new(), high.y + 0.01 * height);
     for _ in 0..FLOORS {
         let Some(hit) = rays.first(DVec3::new(x, from, z), DVec3::NEG_Y, 1e-9 * height) else { break };
         let at = from - hit.distance;
-        if hit.front && hit.normal.y > 0.5 && ceiling - at > 0.02 * height {
-            eyes.push(DVec3::new(x, at + EYE * (ceiling - at), z));
+        if hit.normal.y.abs() > 0.5 && ceiling - at > 0.02 * height {
+            eyes.push((DVec3::new(x, at + EYE * (ceiling - at), z), hit.front));
         }
         (from, ceiling) = (at, at);
     }
@@ -200,8 +247,36 @@ impl Around {
         Self { eye, hits: directions.iter().map(|along| rays.first(eye, *along, 0.0)).collect() }
     }
 
-    fn is_clear(&self, room: f64) -> bool {
-        self.hits.iter().flatten().all(|hit| hit.distance >= room)
+    /// Takes the place and its deepest direction as the best if the view is deeper and `demands` are met.
+    fn improve(
+        &self,
+        best: &mut Option<Best>,
+        rays: &Rays,
+        directions: &[DVec3],
+        demands: &Demands,
+        diagonal: f64,
+    ) {
+        let clearance = demands.clearance * diagonal;
+        if self.hits.iter().flatten().any(|hit| hit.distance < clearance) {
+            return;
+        }
+        let limit = best.map_or(0.0, |best| best.depth);
+        let ahead = demands.ahead * diagonal;
+        let is_blocked =
+            |turn| rays.first(self.eye, level(turn), 0.0).is_some_and(|hit| hit.distance < ahead);
+        let (mut turn, mut depth) = (0, limit);
+        for new in 0..TURNS {
+            let seen = self.depth(level(new), directions, demands.two_sided, ahead);
+            if seen > depth && !is_blocked(new) {
+                (turn, depth) = (new, seen);
+            }
+        }
+        if depth > limit
+            && rays.is_clear(self.eye, clearance)
+            && !(demands.two_sided && is_in_a_part(rays, self.eye))
+        {
+            *best = Some(Best { eye: self.eye, turn, depth, is_enclosed: self.is_enclosed() });
+        }
     }
 
     /// Whether front sides are seen in most directions, and back sides in few.
@@ -213,13 +288,35 @@ impl Around {
         share(true) >= SEEN[0] && share(false) <= SEEN[1]
     }
 
-    /// Mean depth of the view along `direction`; what is open, or a back side, has none.
-    fn depth(&self, direction: DVec3, directions: &[DVec3]) -> f64 {
+    /// Mean depth of the view along `direction`; what is open, or a back side that does not count, has none. Zero where
+    /// something upright is nearer than `ahead`.
+    fn depth(&self, direction: DVec3, directions: &[DVec3], two_sided: bool, ahead: f64) -> f64 {
         let seen = directions.iter().zip(&self.hits).filter(|(along, _)| along.dot(direction) >= CONE);
-        let depth = |hit: &Option<Hit>| hit.filter(|hit| hit.front).map_or(0.0, |hit| hit.distance);
-        let [sum, count] = seen.fold([0.0, 0.0], |[sum, count], (_, hit)| [sum + depth(hit), count + 1.0]);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (_, hit) in seen {
+            if hit.is_some_and(|hit| hit.distance < ahead && hit.normal.y.abs() < UPRIGHT) {
+                return 0.0;
+            }
+            sum += hit.filter(|hit| hit.front || two_sided).map_or(0.0, |hit| hit.distance);
+            count += 1.0;
+        }
         sum / f64::max(count, 1.0)
     }
+}
+
+/// Whether a point is in a closed part of a scene whose outermost surface is the room: most level rays from there cross an even
+/// number of surfaces.
+fn is_in_a_part(rays: &Rays, point: DVec3) -> bool {
+    let is_even = |turn: usize| {
+        let angle = TAU * (turn as f64 + 0.3) / CROSSING_RAYS as f64;
+        let along = DVec3::new(libm::cos(angle), 0.01, libm::sin(angle));
+        let (mut beyond, mut crossed) = (0.0, 0);
+        while let Some(hit) = rays.first(point, along, beyond).filter(|_| crossed < MAX_CROSSINGS) {
+            (beyond, crossed) = (hit.distance * (1.0 + 1e-9), crossed + 1);
+        }
+        crossed % 2 == 0
+    };
+    2 * (0..CROSSING_RAYS).filter(|turn| is_even(*turn)).count() > CROSSING_RAYS
 }
 
 #[cfg(test)]
@@ -297,6 +394,36 @@ mod tests {
         let rooms = [sides(LOW, HIGH, true, false), sides([-9.0, 3.5, -2.0], [9.0, 6.5, 2.0], true, false)];
         let eye = Inside::find(rooms.concat(), false).unwrap().fit.stand.eye;
         assert!(eye.y > 4.5 && eye.y < 5.5, "the longer room is above: {eye}");
+    }
+
+    /// A room with a pillar to its ceiling, or with thin columns, all faces to the outside.
+    #[test]
+    fn a_room_modelled_from_outside_has_a_place_between_its_parts() {
+        let room = sides([0.0; 3], [10.0, 3.0, 8.0], false, false);
+        let pillar = sides([4.0, 0.0, 3.0], [6.0, 3.0, 5.0], false, false);
+        let columns = (0..9).flat_map(|i| {
+            let (x, z) = (2.5 * f64::from(i % 3 + 1), 2.0 * f64::from(i / 3 + 1));
+            sides([x - 0.02, 0.0, z - 0.02], [x + 0.02, 3.0, z + 0.02], false, false)
+        });
+        let columns: Vec<_> = columns.collect();
+        for parts in [pillar, columns] {
+            let all = [room.clone(), parts.clone()].concat();
+            assert_eq!(Inside::find(all.clone(), false), None, "not unasked");
+            let stand = Inside::find(all, true).unwrap().fit.stand;
+            assert!((stand.eye.y - 0.45 * 3.0).abs() < 1e-9, "{}", stand.eye);
+            let [x, z] = [stand.eye.x, stand.eye.z];
+            let apart = |part: &[[DVec3; 3]]| {
+                let corners = part.as_flattened();
+                let [low, high] = [DVec3::min as fn(_, _) -> _, DVec3::max]
+                    .map(|choose| corners.iter().copied().reduce(choose).unwrap());
+                let gap = |at: f64, low: f64, high: f64| (low - at).max(at - high).max(0.0);
+                gap(x, low.x, high.x).hypot(gap(z, low.z, high.z))
+            };
+            assert!(parts.chunks(12).all(|part| apart(part) > 0.3), "{}", stand.eye);
+            let rays = Rays::new([room.clone(), parts].concat());
+            let ahead = rays.first(stand.eye, stand.forward, 0.0).unwrap().distance;
+            assert!(ahead > 1.0, "{} looks at something {ahead} ahead", stand.eye);
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod info;
 pub(crate) mod inside;
 pub(crate) mod measure;
 mod mesh;
+mod near;
 mod node;
 mod parts;
 mod rays;
@@ -38,6 +39,7 @@ pub use info::{
     CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
 };
 pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
+pub use near::NearSpace;
 pub use node::{Channels, Local, Motion, Node, Spin, Trs, world_poses};
 pub use parts::{DEFAULT_BACKGROUND, Parts};
 pub(crate) use rays::hit;
@@ -47,7 +49,7 @@ pub(crate) use track::{rotation, unit_quat};
 
 use crate::error::LoadError;
 use crate::material::{Light, Material, SurfaceShader};
-use camera::{Stand, between};
+use camera::{Standing, between};
 use deform::Pose;
 use frame::Interval;
 use inside::Inside;
@@ -90,6 +92,12 @@ pub struct Scene {
 
 /// Vertices and triangles of all instances together: a small file that asks for more is broken.
 const MOST: usize = 100_000_000;
+
+/// The automatic near depth, in depths of the camera's target.
+const NEAR: f64 = 1e-3;
+
+/// How far the automatic near depth yields to what is in view, in its own size.
+const LEAST_NEAR: f64 = 1e-3;
 
 impl Scene {
     /// Makes `parts` renderable: checks the settings, fits the camera, places the light. The first clip plays
@@ -152,7 +160,7 @@ impl Scene {
         let measured = self.measure().map_err(|error| self.broken(error.to_string()))?;
         (self.centre, self.placed) = measured;
         let first = self.interval(self.own_frames.start);
-        let (stand, ..) = self.stands(&first).map_err(|error| self.broken(error.to_string()))?;
+        let stand = self.standing(&first).map_err(|error| self.broken(error.to_string()))?.open;
         let axes = [stand.right, stand.up, stand.forward].map(|axis| axis.as_vec3());
         let toward = self.light.toward.unwrap_or_else(|| over_the_shoulder(axes[0], axes[1], axes[2]));
         let light = Light { toward: Some(toward), ..self.light };
@@ -210,9 +218,13 @@ impl Scene {
     /// [`FrameError`] when something leaves the range of numbers.
     pub fn frame(&self, index: u32) -> Result<Frame, FrameError> {
         let interval = self.interval(index);
-        let meshes = (0..self.graph.instances.len()).map(|instance| self.frame_mesh(&interval, instance));
-        let meshes = meshes.collect::<Result<Vec<_>, _>>()?;
-        Ok(Frame { camera: self.frame_camera(&interval)?, meshes })
+        let meshes = self.frame_meshes(&interval)?;
+        let camera = self.camera_at(&interval, &self.standing_before(&interval, &meshes)?)?;
+        Ok(Frame { camera, meshes })
+    }
+
+    fn frame_meshes(&self, interval: &Interval) -> Result<Vec<FrameMesh>, FrameError> {
+        (0..self.graph.instances.len()).map(|instance| self.frame_mesh(interval, instance)).collect()
     }
 
     fn frame_mesh(&self, interval: &Interval, index: usize) -> Result<FrameMesh, FrameError> {
@@ -239,10 +251,11 @@ impl Scene {
         Interval { frame, open, middle, close }
     }
 
-    /// Where the camera stands at both ends, the near depth, and what it is focused on.
-    fn stands(&self, interval: &Interval) -> Result<(Stand, Stand, f64, f64), FrameError> {
+    /// Where the camera stands, and the depths that follow from where it looks.
+    fn standing(&self, interval: &Interval) -> Result<Standing, FrameError> {
         if let Some(Placed { fit, .. }) = &self.placed {
-            return Ok((fit.stand, fit.stand, fit.near, fit.focus));
+            let near = self.camera.near.unwrap_or(fit.near);
+            return Ok(Standing { open: fit.stand, close: fit.stand, near, focus: fit.focus });
         }
         let [open_at, _, close_at] = self.instants(interval.frame);
         let ends = [(&interval.open, open_at), (&interval.close, close_at)];
@@ -252,10 +265,31 @@ impl Scene {
                     .to_owned();
             return Err(FrameError::Camera { frame: interval.frame, message });
         };
-        let subject = self.camera.subject_depth(&open, (&interval.open, open_at), self.centre);
-        let distance = open.eye.distance(self.centre).max(subject);
-        let near = self.camera.near.unwrap_or(1e-3 * distance.max(1e-3));
-        Ok((open, close, near, subject.max(2.0 * near)))
+        let (near, focus) = match self.camera.target_depth(&open, (&interval.open, open_at)) {
+            Some(depth) => (NEAR * depth, depth),
+            None => {
+                let depth = open.depth(self.centre);
+                let near = NEAR * open.eye.distance(self.centre).max(1e-3);
+                (near, depth.max(2.0 * self.camera.near.unwrap_or(near)))
+            }
+        };
+        Ok(Standing { open, close, near: self.camera.near.unwrap_or(near), focus })
+    }
+
+    /// Where the camera stands in a frame of `meshes`: a near depth that nobody gave yields to what is in view.
+    fn standing_before(&self, interval: &Interval, meshes: &[FrameMesh]) -> Result<Standing, FrameError> {
+        let standing = self.standing(interval)?;
+        if self.camera.near.is_some() {
+            return Ok(standing);
+        }
+        let camera = self.camera_at(interval, &standing)?;
+        let aspect = f64::from(self.settings.width) / f64::from(self.settings.height);
+        let space = NearSpace::new(&camera, aspect, f64::from(camera.near()));
+        let near = meshes
+            .iter()
+            .filter_map(|mesh| mesh.nearest(&space))
+            .fold(standing.near, |near, depth| near.min(0.5 * depth));
+        Ok(Standing { near: near.max(LEAST_NEAR * standing.near), ..standing })
     }
 
     /// How much the camera sees.
@@ -268,11 +302,10 @@ impl Scene {
         self.settings.focus.unwrap_or(subject as f32)
     }
 
-    fn frame_camera(&self, interval: &Interval) -> Result<pipeline::Camera, FrameError> {
-        let (open, close, near, subject) = self.stands(interval)?;
+    fn camera_at(&self, interval: &Interval, standing: &Standing) -> Result<pipeline::Camera, FrameError> {
         let radius = self.settings.lens_radius;
-        let lens = (radius > 0.0).then(|| (radius, f64::from(self.focus(subject))));
-        between(&open, &close, self.sees(), near, lens).map_err(|message| {
+        let lens = (radius > 0.0).then(|| (radius, f64::from(self.focus(standing.focus))));
+        between(standing, self.sees(), lens).map_err(|message| {
             let message = format!(
                 "{message}: coordinates of {} are too large for numbers of 32 bits, or too small; scale the scene",
                 self.name

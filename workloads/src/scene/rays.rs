@@ -103,6 +103,40 @@ impl Rays {
     }
 }
 
+impl Rays {
+    /// Whether no triangle is nearer to `point` than `room`.
+    pub fn is_clear(&self, point: DVec3, room: f64) -> bool {
+        let mut open = vec![(0, 0, self.triangles.len())];
+        while let Some((node, first, end)) = open.pop() {
+            let [low, high] = self.boxes[node];
+            if point.distance_squared(point.clamp(low.min(high), high.max(low))) >= room * room {
+                continue;
+            }
+            if 2 * node + 2 < self.boxes.len() {
+                let middle = first + (end - first) / 2;
+                open.extend([(2 * node + 1, first, middle), (2 * node + 2, middle, end)]);
+            } else if self.triangles[first..end].iter().any(|triangle| nearest(point, triangle) < room) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// How far a point is from a triangle.
+fn nearest(point: DVec3, triangle: &[DVec3; 3]) -> f64 {
+    let along = normal(triangle);
+    if let Some((steps, _)) = hit(point, along, triangle) {
+        return steps.abs() * along.length();
+    }
+    let of_edge = |k: usize| {
+        let (from, edge) = (triangle[k], triangle[(k + 1) % 3] - triangle[k]);
+        let part = ((point - from).dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        point.distance(from + part * edge)
+    };
+    (0..3).map(of_edge).fold(f64::INFINITY, f64::min)
+}
+
 /// Twice the area of a triangle, along its normal.
 pub(super) fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (*b - *a).cross(*c - *a)
@@ -179,6 +213,27 @@ mod tests {
                 let expected = all.filter(|at| *at > 1e-9).min_by(f64::total_cmp);
                 assert_eq!(rays.first(from, to, 1e-9).map(|hit| hit.distance), expected, "{count}");
             }
+        }
+    }
+
+    #[test]
+    fn the_tree_finds_the_nearest_triangle() {
+        let triangles = strewn(300);
+        let rays = Rays::new(triangles.clone());
+        for [corner, ..] in strewn(100) {
+            let point = 0.9 * corner + 0.05;
+            let distance =
+                triangles.iter().map(|triangle| nearest(point, triangle)).fold(f64::INFINITY, f64::min);
+            assert!(rays.is_clear(point, 0.999 * distance) && !rays.is_clear(point, 1.001 * distance));
+        }
+        let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for (point, expected) in [
+            ([0.25, 0.25, -2.0], 2.0),
+            ([2.0, 0.0, 0.0], 1.0),
+            ([0.5, -3.0, 4.0], 5.0),
+            ([1.0, 1.0, 0.0], 0.5_f64.sqrt()),
+        ] {
+            assert!((nearest(DVec3::from(point), &triangle) - expected).abs() < 1e-12, "{point:?}");
         }
     }
 

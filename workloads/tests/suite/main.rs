@@ -3,6 +3,7 @@
 
 mod analytic;
 mod builtin;
+mod cameras;
 mod caustics;
 mod collision;
 mod common;

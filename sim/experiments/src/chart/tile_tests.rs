@@ -2,24 +2,23 @@
 
 use std::path::Path;
 
-use pipeline::sampling::SampleSource;
-use pipeline::{Camera, Draw, LensShape, SampleTable, Viewport};
+use pipeline::memory::CacheError;
+use pipeline::{LensShape, SampleTable, Viewport};
 use rayon::prelude::*;
 use serde::Serialize;
 use workloads::Overrides;
 use workloads::stress::{Size, family};
-use workloads::visibility::Unshaded;
 
-use super::front::front;
 use crate::stress::intervals::Pairs;
 use crate::stress::measure::Work;
 use crate::stress::methods::{SWITCHES, combinations};
-use crate::stress::subject::{Subject, differing};
-use output::dir::BoxError;
-use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series};
+use crate::stress::subject::{self, Subject, differing};
+use crate::study::table::{Sheet, Table, fixed, plain, share};
+use crate::study::tradeoff::{Metric, TradeoffPoint, front};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
 use output::progress::Progress;
-use output::table::Table;
-use output::{Claim, OutDir, OutputError};
 use run::GpuSpec;
 use run::RunError;
 
@@ -60,6 +59,17 @@ pub struct Row {
     pub on_tightness_front: bool,
 }
 
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// How large the scenes of families are.
+    pub families: Size,
+    /// Pixels of scenes, across and down.
+    pub size: (u32, u32),
+    /// Pairs of triangle and tile whose true box is found.
+    pub pairs: u64,
+}
+
 /// The whole chart.
 #[derive(Clone, Debug, Serialize)]
 pub struct TileTests {
@@ -67,40 +77,105 @@ pub struct TileTests {
     pub rows: Vec<Row>,
 }
 
-/// Measures the families, the built-in scenes and those named in `files`.
-///
-/// # Errors
-/// When a scene cannot be loaded or made.
-pub fn tile_tests(files: &[String], quick: bool, progress: &Progress) -> Result<TileTests, RunError> {
-    let gpu = GpuSpec::load("reference")?;
-    let scenes = SCENES.map(str::to_owned);
-    let bar = progress.bar("scenes", (FAMILIES.len() + scenes.len() + files.len()) as u64);
-    let families = FAMILIES.par_iter().map(|&(name, value)| {
-        let rows = of_family(name, value, quick, &gpu);
-        bar.inc();
-        rows
-    });
-    let loaded = scenes.par_iter().chain(files).map(|name| {
-        let rows = of_scene(name, quick, &gpu);
-        bar.inc();
-        rows
-    });
-    let rows: Vec<Vec<Row>> = families.chain(loaded).collect::<Result<_, RunError>>()?;
-    Ok(TileTests { rows: rows.into_iter().flatten().collect() })
+impl Study for TileTests {
+    const NAME: &'static str = "tile-tests";
+    const ABOUT: &'static str =
+        "Every combination of tile tests: efficiency and tightness over multiply-adds";
+    const PICTURES: &'static [&'static str] = &["plots/tile_tests_efficiency", "plots/tile_tests_tightness"];
+    const FILES: &'static [&'static str] = &["tile_tests.csv", "tile_tests.json"];
+    const TAKES_SCENES: bool = true;
+
+    type Effort = Effort;
+    const FULL: Effort = Effort { families: Size::FULL, size: (320, 180), pairs: 400 };
+    const QUICK: Effort = Effort { families: Size::QUICK, size: (160, 90), pairs: 60 };
+
+    fn measure(effort: Effort, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let gpu = GpuSpec::load("reference")?;
+        let scenes = SCENES.map(str::to_owned);
+        let bar = progress.bar("scenes", (FAMILIES.len() + scenes.len() + files.len()) as u64);
+        let families = FAMILIES.par_iter().map(|&(name, value)| {
+            let rows = of_family(name, value, &effort, &gpu);
+            bar.inc();
+            rows
+        });
+        let loaded = scenes.par_iter().chain(files).map(|name| {
+            let rows = of_scene(name, &effort, &gpu);
+            bar.inc();
+            rows
+        });
+        let rows: Vec<Vec<Row>> = families.chain(loaded).collect::<Result<_, RunError>>()?;
+        Ok(Self { rows: rows.into_iter().flatten().collect() })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let scenes = self.rows.chunk_by(|a, b| a.scene == b.scene).count();
+        let subject = format!(
+            "multiply-adds of tile and sample tests for a triangle, over the least of each scene; means over {scenes} scenes; named: the \
+             frontier, each test alone, none and all"
+        );
+        let panel = self.panel("efficiency over the best (%)", |row| row.efficiency);
+        let title = "Which tile tests pay: efficiency";
+        to.chart("plots/tile_tests_efficiency", [title, &subject], vec![panel])?;
+        let panel = self.panel("tightness over the best (%)", |row| row.tightness);
+        let title = "Which tile tests pay: tightness";
+        to.chart("plots/tile_tests_tightness", [title, &subject], vec![panel])
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let best = |row: &&Row| row.on_efficiency_front || row.on_tightness_front;
+        let fronts = Table::of(self.rows.iter().filter(best))
+            .shown("scene", |row| row.scene.as_str(), plain)
+            .shown("tests", |row| row.tests.as_str(), plain)
+            .shown("madds per triangle", |row| row.madds_per_triangle, fixed(0))
+            .shown("efficiency", |row| row.efficiency, share(1))
+            .shown("tightness", |row| row.tightness, share(2))
+            .shown("best in", |row| row.best_in(), plain)
+            .after(format!("\n{}; {} samples lost\n", key(), self.samples_lost()));
+        let rows = Table::of(&self.rows)
+            .data("scene", |row| row.scene.as_str())
+            .data("tests", |row| row.tests.as_str())
+            .data("madds_per_triangle", |row| row.madds_per_triangle)
+            .data("efficiency", |row| row.efficiency)
+            .data("tightness", |row| row.tightness)
+            .data("truth", |row| row.truth)
+            .data("samples_lost", |row| row.samples_lost)
+            .data("on_efficiency_front", |row| row.on_efficiency_front)
+            .data("on_tightness_front", |row| row.on_tightness_front)
+            .csv("tile_tests.csv");
+        vec![fronts.sheet(), rows.sheet()]
+    }
+
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        // Of combinations that cost and gain the same, the first.
+        let same = |a: &&Row, b: &&Row| {
+            (&a.scene, a.madds_per_triangle, a.efficiency) == (&b.scene, b.madds_per_triangle, b.efficiency)
+        };
+        let mut front: Vec<&Row> = self.rows.iter().filter(|row| row.on_efficiency_front).collect();
+        front.dedup_by(|a, b| same(a, b));
+        let point = |row: &Row| {
+            let wasted = Metric::new("share of tested samples that miss", "", 1.0 - row.efficiency);
+            let cost = Metric::new("multiply-adds a triangle", "", row.madds_per_triangle);
+            let subject = format!("samples of a triangle ({})", row.scene);
+            TradeoffPoint::new(subject, ["tile tests", &row.tests], [wasted, cost])
+        };
+        front.into_iter().map(point).collect()
+    }
+
+    fn fault(&self) -> Option<String> {
+        let lost = self.samples_lost();
+        (lost > 0).then(|| format!("{lost} samples were lost: a test is not conservative; please report it"))
+    }
 }
 
-fn of_family(name: &'static str, value: f64, quick: bool, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
-    let failed = |message: String| RunError::Setting(format!("{name} at {value}: {message}"));
-    let family = family(name).ok_or_else(|| failed("there is no such family".to_owned()))?;
-    let size = if quick { Size::QUICK } else { Size::FULL };
-    let scene = family.scene(value, size, 1).map_err(|error| failed(error.to_string()))?;
-    let draws = [scene.draw(&Unshaded).map_err(|error| failed(error.to_string()))?];
+fn of_family(name: &'static str, value: f64, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
     let label = format!("{name} at {value}");
-    rows(label, (&scene.camera, scene.viewport), &scene.samples, &draws, quick, gpu)
+    let family =
+        family(name).ok_or_else(|| RunError::Setting(format!("{label}: there is no such family")))?;
+    subject::on(family, value, (effort.families, 1), gpu, |subject| rows(&label, subject, effort.pairs))
 }
 
-fn of_scene(name: &str, quick: bool, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
-    let size = if quick { (160, 90) } else { (320, 180) };
+fn of_scene(name: &str, effort: &Effort, gpu: &GpuSpec) -> Result<Vec<Row>, RunError> {
+    let size = effort.size;
     let overrides = Overrides { size: Some(size), samples: Some(4), ..Overrides::default() };
     let scene = workloads::load(name)?.with_overrides(&overrides)?;
     let frames = scene.settings().frames.clone();
@@ -109,25 +184,19 @@ fn of_scene(name: &str, quick: bool, gpu: &GpuSpec) -> Result<Vec<Row>, RunError
     let samples = SampleTable::low_discrepancy(4, 1, LensShape::Disk)?;
     let viewport = Viewport::new(size.0, size.1).ok_or_else(|| RunError::Setting("size: none".to_owned()))?;
     let label = Path::new(name).file_name().map_or(name.into(), |file| file.to_string_lossy());
-    rows(label.into_owned(), (&frame.camera, viewport), &samples, &draws, quick, gpu)
+    let (camera, spec) = (&frame.camera, &gpu.pipeline);
+    let subject = Subject { camera, viewport, samples: &samples, draws: &draws, spec };
+    let rows = rows(&label, &subject, effort.pairs);
+    rows.map_err(|error| RunError::Setting(format!("{label}: {error}")))
 }
 
-fn rows(
-    scene: String,
-    (camera, viewport): (&Camera, Viewport),
-    samples: &dyn SampleSource,
-    draws: &[Draw<'_>],
-    quick: bool,
-    gpu: &GpuSpec,
-) -> Result<Vec<Row>, RunError> {
-    let subject = Subject { camera, viewport, samples, draws, spec: &gpu.pipeline };
-    let failed = |error: pipeline::memory::CacheError| RunError::Setting(format!("{scene}: {error}"));
-    let pairs = Pairs::of(&subject, if quick { 60 } else { 400 });
-    let (reference, _) = subject.reference().map_err(failed)?;
+fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<Row>, CacheError> {
+    let pairs = Pairs::of(subject, pairs);
+    let (reference, _) = subject.reference()?;
     let row = |(tests, features)| {
         let work = Work::new(&subject.counts(features)?);
         Ok(Row {
-            scene: scene.clone(),
+            scene: scene.to_owned(),
             tests,
             madds_per_triangle: work.madds() as f64 / subject.triangles().max(1) as f64,
             efficiency: work.efficiency().unwrap_or(0.0),
@@ -138,8 +207,7 @@ fn rows(
             on_tightness_front: false,
         })
     };
-    let rows = combinations().into_iter().map(row).collect::<Result<_, _>>().map_err(failed)?;
-    Ok(with_fronts(rows))
+    combinations().into_iter().map(row).collect::<Result<_, _>>().map(with_fronts)
 }
 
 fn with_fronts(mut rows: Vec<Row>) -> Vec<Row> {
@@ -157,43 +225,8 @@ impl TileTests {
         self.rows.iter().map(|row| row.samples_lost).sum()
     }
 
-    /// What is printed: the fronts.
-    pub fn text(&self) -> String {
-        let mut table =
-            Table::new(["scene", "tests", "madds per triangle", "efficiency", "tightness", "best in"]);
-        for row in self.rows.iter().filter(|row| row.on_efficiency_front || row.on_tightness_front) {
-            let best = match (row.on_efficiency_front, row.on_tightness_front) {
-                (true, true) => "both",
-                (true, false) => "efficiency",
-                _ => "tightness",
-            };
-            table.row([
-                row.scene.clone(),
-                row.tests.clone(),
-                format!("{:.0}", row.madds_per_triangle),
-                format!("{:.1} %", 100.0 * row.efficiency),
-                format!("{:.2} %", 100.0 * row.tightness),
-                best.to_owned(),
-            ]);
-        }
-        format!("{table}\n{}; {} samples lost\n", key(), self.samples_lost())
-    }
-
-    /// Writes the pictures, `tile_tests.csv` and `tile_tests.json`.
-    ///
-    /// # Errors
-    /// [`OutputError`] with the file and the cause.
-    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
-        let titles = ["Which tile tests pay: efficiency", "efficiency over the best (%)"];
-        self.picture(titles, |row| row.efficiency, look).write(dir, "plots/tile_tests_efficiency")?;
-        let titles = ["Which tile tests pay: tightness", "tightness over the best (%)"];
-        self.picture(titles, |row| row.tightness, look).write(dir, "plots/tile_tests_tightness")?;
-        dir.write_file("tile_tests.csv", |out| self.csv(out))?;
-        dir.write_json("tile_tests.json", self)
-    }
-
     /// Every combination as one point: cost and gain over those of the best of each scene, means over scenes.
-    fn picture(&self, [title, up]: [&str; 2], of: fn(&Row) -> f64, look: &Look) -> Picture {
+    fn panel(&self, up: &str, of: fn(&Row) -> f64) -> ChartPanel {
         let means = self.means(of);
         let front = front(&means.iter().map(|mean| (mean.cost, mean.gain)).collect::<Vec<_>>());
         let point = |mean: &Mean, name: String| (mean.cost, 100.0 * mean.gain, name);
@@ -220,16 +253,11 @@ impl TileTests {
             )
             .painted(Paint::Like(1)),
         ];
-        let scenes = self.rows.chunk_by(|a, b| a.scene == b.scene).count();
-        let subject = format!(
-            "multiply-adds of tile and sample tests for a triangle, over the least of each scene; means over {scenes} scenes; named: the \
-             frontier, each test alone, none and all"
-        );
         let axes = [
             AxisSpec { name: "cost over the least".to_owned(), scale: Scale::Decades, ..AxisSpec::default() },
             AxisSpec { name: up.to_owned(), scale: Scale::FromZero, ..AxisSpec::default() },
         ];
-        Chart::new(title, &subject, vec![ChartPanel::over("", axes, series)]).picture(look)
+        ChartPanel::over("", axes, series)
     }
 
     /// Cost and gain of every combination, over the least cost and the greatest gain of each scene: geometric and arithmetic means.
@@ -249,11 +277,15 @@ impl TileTests {
         };
         (0..combinations).map(mean).collect()
     }
+}
 
-    fn csv(&self, out: &mut (dyn std::io::Write + Send)) -> Result<(), BoxError> {
-        let mut csv = csv::Writer::from_writer(out);
-        self.rows.iter().try_for_each(|row| csv.serialize(row))?;
-        Ok(csv.flush()?)
+impl Row {
+    fn best_in(&self) -> &'static str {
+        match (self.on_efficiency_front, self.on_tightness_front) {
+            (true, true) => "both",
+            (true, false) => "efficiency",
+            _ => "tightness",
+        }
     }
 }
 
@@ -275,12 +307,6 @@ fn words(letters: &str) -> String {
     on.map(|switch| switch.name).collect::<Vec<_>>().join(" + ")
 }
 
-/// The files of the chart.
-pub fn claim() -> Claim {
-    let plots = ["plots/tile_tests_efficiency", "plots/tile_tests_tightness"];
-    Claim::new("chart tile-tests").plots(plots).files(["tile_tests.csv", "tile_tests.json"])
-}
-
 /// What the letters mean.
 fn key() -> String {
     SWITCHES.map(|switch| format!("{} = {}", switch.letter, switch.name)).join(", ")
@@ -289,11 +315,14 @@ fn key() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::Done;
+    use output::OutDir;
+    use output::plot::Look;
 
     #[test]
     fn every_combination_is_held_against_none_and_the_best_is_marked() {
         let gpu = GpuSpec::load("reference").unwrap();
-        let rows = of_family("speed", 0.1, true, &gpu).unwrap();
+        let rows = of_family("speed", 0.1, &TileTests::QUICK, &gpu).unwrap();
         assert_eq!(rows.len(), 1 << SWITCHES.len());
         assert!(rows.iter().all(|row| row.samples_lost == 0 && row.tightness <= 1.0 + 1e-9));
         let least = rows.iter().map(|row| row.madds_per_triangle).fold(f64::INFINITY, f64::min);
@@ -301,10 +330,11 @@ mod tests {
         assert!(cheapest.on_efficiency_front && cheapest.tests != "-", "{cheapest:?}");
         let chart = TileTests { rows };
         let out = tempfile::tempdir().unwrap();
-        OutDir::with(out.path(), claim(), |dir| chart.write(dir, &Look::default())).unwrap().unwrap();
+        let make = |dir: &OutDir| Done::new(&chart, dir, &Look::default()).unwrap();
+        let done = OutDir::with(out.path(), TileTests::claim(), make).unwrap();
         let csv = std::fs::read_to_string(out.path().join("tile_tests.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + (1 << SWITCHES.len()));
         assert!(csv.starts_with("scene,tests,madds_per_triangle"));
-        assert!(chart.text().contains("s = side_planes") && out.path().join("tile_tests.json").exists());
+        assert!(done.text.contains("s = side_planes") && out.path().join("tile_tests.json").exists());
     }
 }

@@ -28,10 +28,10 @@ impl Figure {
         Self::of(name, [title, subject], ChartPanel::over("", axes, series))
     }
 
-    /// Points in a plane, distances the same across and up.
-    pub(super) fn plane(name: &'static str, title: &str, subject: &str, series: Vec<Series>) -> Self {
-        let axes = ["x", "y"].map(|name| AxisSpec::even(name, ""));
-        Self::of(name, [title, subject], ChartPanel::over("", axes, series).equal())
+    /// Points in a plane with two axes of these names, distances the same across and up.
+    pub(super) fn plane(name: &'static str, titles: [&str; 2], axes: [&str; 2], series: Vec<Series>) -> Self {
+        let axes = axes.map(|name| AxisSpec::even(name, ""));
+        Self::of(name, titles, ChartPanel::over("", axes, series).equal())
     }
 
     /// One panel.

@@ -157,6 +157,29 @@ impl<T: Debug + PartialEq> Setting<T> {
     }
 }
 
+/// Declares the settings of rows. A line is a field, the type of its value, and the check that every value of it has to pass. Before
+/// them is what a row says whatever comes out.
+macro_rules! row_settings {
+    ($($(#[$doc:meta])* $row:ident { $($field:ident: $type:ty, $check:ident($($would_do:expr),+);)+ })+) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct $row {
+            pub about: About,
+            $(pub $field: Setting<$type>,)+
+        }
+
+        impl $row {
+            /// Checks every value; `row` is its name in the file.
+            fn check(&self, row: &str) -> Result<(), String> {
+                $(self.$field.$check(&format!("{row}.{}", stringify!($field)), $($would_do),+)?;)+
+                Ok(())
+            }
+        }
+    )+};
+}
+pub(super) use row_settings;
+
 /// All settings of a paper.
 pub trait PaperSettings: DeserializeOwned {
     /// The committed file, from the root of the repository.

@@ -6,76 +6,289 @@
 //! - [`intervals`]: the boxes of tile tests against that.
 //! - [`measure`]: all of it for one value of a family.
 //! - [`choice`]: `auto` against every fixed choice of tests.
-//! - [`report`]: every row, as table, CSV and pictures.
+//! - [`Report`]: every row, as a study with tables, CSV and pictures.
 
 pub mod choice;
 pub mod intervals;
 pub mod measure;
 pub mod methods;
 mod picture;
-pub mod report;
 pub mod subject;
 pub mod sweep;
+#[cfg(test)]
+mod tests;
 pub mod truth;
 
 use rayon::prelude::*;
+use serde::{Serialize, Serializer};
 use workloads::stress::{Family, Size, families, family};
 
-use choice::{Choices, Trial};
+use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
+use crate::study::{Gallery, Study, StudyError};
+use choice::{Choice, Choices, Trial};
 use measure::Row;
+use methods::METHODS;
+use output::dir::SUMMARY;
 use output::progress::Progress;
-pub use report::Report;
-use run::GpuSpec;
-use run::RunError;
-pub use write::claim;
+use output::table::grouped;
+use output::{Claim, OutputError};
+use run::{GpuSpec, RunError};
 
 /// The seed of the scenes.
 const SEED: u64 = 1;
 
-/// Sweeps the family called `only`, or all of them.
+/// The family called `name`.
 ///
 /// # Errors
-/// When there is no such family, or a scene cannot be made.
-pub fn stress(only: Option<&str>, quick: bool, progress: &Progress) -> Result<Report, RunError> {
-    let chosen = choose(only)?;
-    let size = if quick { Size::QUICK } else { Size::FULL };
-    let gpu = GpuSpec::load("reference")?;
-    let cases: Vec<(&'static Family, f64)> = chosen
-        .iter()
-        .flat_map(|&family| family.sweep(quick).iter().map(move |&value| (family, value)))
-        .collect();
-    let bar = progress.bar("values", cases.len() as u64);
-    let measured: Vec<(Vec<Row>, Option<Trial>)> = cases
-        .par_iter()
-        .map(|&(family, value)| {
-            let rows = measure::measure(family, value, size, &gpu, &methods::METHODS)?;
+/// When there is no such family; names those there are.
+pub fn family_named(name: &str) -> Result<&'static Family, RunError> {
+    let unknown = || {
+        let names: Vec<_> = families().map(|family| family.name).collect();
+        RunError::Setting(format!("no family called `{name}`; there are {}", names.join(", ")))
+    };
+    family(name).ok_or_else(unknown)
+}
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// One family; all where there is none.
+    pub only: Option<&'static Family>,
+    /// Fewer values, and smaller scenes.
+    pub quick: bool,
+}
+
+/// Everything a sweep found out.
+pub struct Report {
+    /// The families swept.
+    pub families: Vec<&'static Family>,
+    /// How large their scenes are.
+    pub size: Size,
+    /// A row for each family, value and method, in this order.
+    pub rows: Vec<Row>,
+    /// `auto` against every fixed choice of tests.
+    pub auto: Choices,
+}
+
+/// What goes into `summary.json`.
+#[derive(Serialize)]
+pub struct Summary<'a> {
+    /// Samples lost over all rows: must be none.
+    pub samples_lost: u64,
+    /// Boxes over all rows that leave out what truly touches: must be none.
+    pub pairs_wrong: u64,
+    /// Side of the images in pixels.
+    pub side_px: u32,
+    /// `auto` against the best fixed choice of tests.
+    pub auto: &'a Choices,
+    /// Every row.
+    pub rows: &'a [Row],
+}
+
+/// As JSON a report is its summary.
+impl Serialize for Report {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary().serialize(serializer)
+    }
+}
+
+impl Study for Report {
+    const NAME: &'static str = "stress";
+    const ABOUT: &'static str =
+        "Each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, cost";
+    /// Several for each family.
+    const PICTURES: &'static [&'static str] = &[];
+    const FILES: &'static [&'static str] = &["stress.csv", "auto.csv", SUMMARY];
+
+    type Effort = Effort;
+    const FULL: Effort = Effort { only: None, quick: false };
+    const QUICK: Effort = Effort { only: None, quick: true };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let quick = effort.quick;
+        let chosen = effort.only.map_or_else(|| families().collect(), |family| vec![family]);
+        let size = if quick { Size::QUICK } else { Size::FULL };
+        let gpu = GpuSpec::load("reference")?;
+        let values =
+            |&family: &&'static Family| family.sweep(quick).iter().map(move |&value| (family, value));
+        let cases: Vec<(&'static Family, f64)> = chosen.iter().flat_map(values).collect();
+        let bar = progress.bar("values", cases.len() as u64);
+        let measure = |&(family, value): &(&'static Family, f64)| {
+            let rows = measure::measure(family, value, size, &gpu, &METHODS)?;
             // Every combination of tests on a million triangles would take longer than all the rest.
             let held = family.sweep(true).contains(&value);
             let trial = held.then(|| choice::trial(family, value, size, SEED, &gpu)).transpose()?;
             bar.inc();
             Ok((rows, trial))
-        })
-        .collect::<Result<_, RunError>>()?;
-    let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
-    let trials: Vec<Trial> = trials.into_iter().flatten().collect();
-    Ok(Report {
-        families: chosen,
-        size,
-        rows: rows.into_iter().flatten().collect(),
-        auto: Choices::new(&trials),
-    })
+        };
+        let measured: Vec<(Vec<Row>, Option<Trial>)> =
+            cases.par_iter().map(measure).collect::<Result<_, RunError>>()?;
+        let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
+        let trials: Vec<Trial> = trials.into_iter().flatten().collect();
+        let (rows, auto) = (rows.into_iter().flatten().collect(), Choices::new(&trials));
+        Ok(Self { families: chosen, size, rows, auto })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        if self.families.len() > 1 {
+            to.add(&stem("matrix"), &picture::matrix(self, to.look()))?;
+            to.add(&stem("auto"), &picture::auto(&self.auto, to.look()))?;
+        }
+        for family in &self.families {
+            let stem = stem(family.name);
+            for measure in &picture::MEASURES {
+                let picture = picture::family(self, family, measure, to.look());
+                to.add(&format!("{stem}{}", measure.stem), &picture)?;
+            }
+            to.add(&format!("{stem}_intervals"), &picture::intervals(self, family, to.look()))?;
+        }
+        Ok(())
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let shown = match self.families[..] {
+            [family] => self.of_family(family),
+            _ => self.overview(),
+        };
+        vec![shown, self.row_sheet(), choice_sheet(self.auto.families.iter().chain(&self.auto.values))]
+    }
+
+    fn fault(&self) -> Option<String> {
+        let fault = "a test is not conservative: samples were lost or boxes are too small; please report it";
+        (!self.is_clean()).then(|| fault.to_owned())
+    }
+
+    fn claim() -> Claim {
+        let endings = || picture::MEASURES.iter().map(|measure| measure.stem).chain(["_intervals"]);
+        let families = families()
+            .flat_map(|family| endings().map(move |ending| format!("{}{ending}", stem(family.name))));
+        let plots = families.chain(["matrix", "auto"].map(stem));
+        Claim::new(Self::NAME).plots(plots).files(Self::FILES.iter().copied())
+    }
 }
 
-fn choose(only: Option<&str>) -> Result<Vec<&'static Family>, RunError> {
-    let Some(name) = only else { return Ok(families().collect()) };
-    let unknown = || {
-        let names: Vec<_> = families().map(|family| family.name).collect();
-        RunError::Setting(format!("no family called `{name}`; there are {}", names.join(", ")))
-    };
-    Ok(vec![family(name).ok_or_else(unknown)?])
+/// The path of a picture without its ending.
+fn stem(name: &str) -> String {
+    format!("plots/stress_{}", name.replace('-', "_"))
 }
 
-mod write;
+impl Report {
+    /// What goes into `summary.json`.
+    pub fn summary(&self) -> Summary<'_> {
+        Summary {
+            samples_lost: self.rows.iter().map(|row| row.samples_lost).sum(),
+            pairs_wrong: self.rows.iter().map(|row| row.intervals.pairs_wrong).sum(),
+            side_px: self.size.side_px,
+            auto: &self.auto,
+            rows: &self.rows,
+        }
+    }
 
-#[cfg(test)]
-mod tests;
+    /// Whether no method lost a sample and no box left anything out.
+    pub fn is_clean(&self) -> bool {
+        let summary = self.summary();
+        summary.samples_lost == 0 && summary.pairs_wrong == 0
+    }
+
+    /// The rows of one family.
+    pub fn of(&self, family: &Family) -> impl Iterator<Item = &Row> + use<'_> {
+        let name = family.name;
+        self.rows.iter().filter(move |row| row.family == name)
+    }
+
+    /// The largest cost over the best of `method` on `family`; `first` looks at the harmless value only.
+    pub fn over_best(&self, family: &Family, method: &str, first: bool) -> Option<f64> {
+        let rows = self.of(family).filter(|row| row.method == method);
+        rows.take(if first { 1 } else { usize::MAX }).map(|row| row.over_best).reduce(f64::max)
+    }
+
+    /// What is printed below the table.
+    fn below(&self) -> String {
+        let (summary, rows) = (self.summary(), self.rows.len());
+        format!(
+            "\n{} samples lost and {} boxes too small in {rows} sweeps of {} pixels a side\n{}",
+            summary.samples_lost,
+            summary.pairs_wrong,
+            self.size.side_px,
+            self.auto.text()
+        )
+    }
+
+    /// The cost of every method at the worst value of each family.
+    fn overview(&self) -> Sheet {
+        let table = Table::of(&self.families)
+            .shown("family", |family| family.name, plain)
+            .before("Cost over that of the best method, at the worst value of each family.\n\n")
+            .after(self.below());
+        let method = |table: Table<_>, method: &methods::Method| {
+            let cost = |family: &&&'static Family| self.over_best(family, method.name, false);
+            table.shown(method.name, cost, optional(fixed(2)))
+        };
+        METHODS.iter().fold(table, method).sheet()
+    }
+
+    /// Every number of one family.
+    fn of_family(&self, family: &Family) -> Sheet {
+        let of = |count: u64, row: &Row| count as f64 / row.intervals.pairs.max(1) as f64;
+        Table::of(self.of(family))
+            .shown(family.parameter, |row| row.value, plain)
+            .shown("method", |row| row.method, plain)
+            .shown("lost", |row| row.samples_lost, plain)
+            .shown("efficiency", |row| row.work.efficiency(), optional(share(1)))
+            .shown("tile madds", |row| row.work.tile_madds, grouped)
+            .shown("sample madds", |row| row.work.sample_madds, grouped)
+            .shown("over best", |row| row.over_best, fixed(2))
+            .shown("tiles kept", |row| of(row.intervals.pairs_kept, row), share(1))
+            .shown("true", |row| of(row.intervals.pairs_touching, row), share(1))
+            .shown("t width", |row| row.intervals.t_width, share(1))
+            .shown("true", |row| row.intervals.t_true, share(1))
+            .shown("u width", |row| row.intervals.u_width, share(1))
+            .shown("true", |row| row.intervals.u_true, share(1))
+            .shown("truth", |row| row.truth, plain)
+            .before(format!("{}: {}\n\n", family.name, family.what))
+            .after(self.below())
+            .sheet()
+    }
+
+    fn row_sheet(&self) -> Sheet {
+        Table::of(&self.rows)
+            .data("family", |row| row.family)
+            .data("value", |row| row.value)
+            .data("method", |row| row.method)
+            .data("triangles", |row| row.triangles)
+            .data("samples_lost", |row| row.samples_lost)
+            .data("held_against", |row| row.held_against)
+            .data("samples_tested", |row| row.work.samples_tested)
+            .data("samples_hit", |row| row.work.samples_hit)
+            .data("tile_madds", |row| row.work.tile_madds)
+            .data("sample_madds", |row| row.work.sample_madds)
+            .data("over_best", |row| row.over_best)
+            .data("truth", |row| row.truth)
+            .data("pairs", |row| row.intervals.pairs)
+            .data("pairs_touching", |row| row.intervals.pairs_touching)
+            .data("pairs_kept", |row| row.intervals.pairs_kept)
+            .data("pairs_wrong", |row| row.intervals.pairs_wrong)
+            .data("u_width", |row| row.intervals.u_width)
+            .data("v_width", |row| row.intervals.v_width)
+            .data("t_width", |row| row.intervals.t_width)
+            .data("u_true", |row| row.intervals.u_true)
+            .data("v_true", |row| row.intervals.v_true)
+            .data("t_true", |row| row.intervals.t_true)
+            .data("tightness", |row| row.intervals.tightness)
+            .csv("stress.csv")
+            .sheet()
+    }
+}
+
+fn choice_sheet<'a>(choices: impl Iterator<Item = &'a Choice>) -> Sheet {
+    Table::of(choices)
+        .data("family", |choice| choice.family)
+        .data("value", |choice| choice.value)
+        .data("auto_madds", |choice| choice.auto_madds)
+        .data("best", |choice| choice.best.as_str())
+        .data("best_madds", |choice| choice.best_madds)
+        .data("all_madds", |choice| choice.all_madds)
+        .data("over_best", |choice| choice.over_best)
+        .csv("auto.csv")
+        .sheet()
+}

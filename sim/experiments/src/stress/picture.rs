@@ -2,10 +2,10 @@
 
 use workloads::stress::Family;
 
+use super::Report;
 use super::choice::{Choice, Choices};
 use super::measure::Row;
 use super::methods::{METHODS, Method};
-use super::report::Report;
 use output::plot::{Chart, ChartPanel, Look, Mark, Matrix, MatrixPanel, Paint, Picture, Scale, Series};
 
 /// Cost over that of the best method, by method and family: at the first and at the worst value.

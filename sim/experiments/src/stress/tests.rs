@@ -16,6 +16,10 @@ fn with<T>(scene: &StressScene, run: impl FnOnce(&Subject<'_>) -> T) -> T {
     run(&Subject { camera, viewport, samples, draws: &draws, spec: &gpu.pipeline })
 }
 
+fn text(report: &Report) -> String {
+    report.tables()[0].text().unwrap()
+}
+
 #[test]
 fn no_box_leaves_out_what_truly_touches() {
     for family in families() {
@@ -65,7 +69,7 @@ fn lost_samples_are_counted_and_the_report_is_not_clean() {
     let gpu = GpuSpec::load("reference").unwrap();
     let rows = measure::measure(family, 0.1, SIZE, &gpu, &METHODS).unwrap();
     let mut report = Report { families: vec![family], size: SIZE, rows, auto: Choices::default() };
-    assert!(report.is_clean(), "{}", report.text());
+    assert!(report.is_clean(), "{}", text(&report));
     assert_eq!(report.rows[0].held_against, "brute force");
     let scene = family.scene(0.1, SIZE, 1).unwrap();
     let mut other = scene.clone();
@@ -76,7 +80,7 @@ fn lost_samples_are_counted_and_the_report_is_not_clean() {
     assert!(lost > 0);
     report.rows[3].samples_lost = lost;
     assert!(!report.is_clean());
-    assert!(report.text().contains(&format!("{lost} samples lost")), "{}", report.text());
+    assert!(text(&report).contains(&format!("{lost} samples lost")), "{}", text(&report));
 }
 
 #[test]
@@ -106,7 +110,7 @@ fn auto_is_as_good_as_the_best_fixed_choice_on_a_family() {
 
 #[test]
 fn an_unknown_family_is_told_with_the_known_ones() {
-    let error = choose(Some("splinters")).err().unwrap();
+    let error = family_named("splinters").err().unwrap();
     assert!(error.is_usage());
     assert!(error.to_string().contains("splinters") && error.to_string().contains("slivers"), "{error}");
 }

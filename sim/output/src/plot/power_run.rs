@@ -45,7 +45,7 @@ impl PowerRun<'_> {
         let cut = match shown {
             Some(shown) if shown.power_w.len() < self.power_w.len() => {
                 format!(
-                    " – shown: the {} with frames of {}",
+                    " – {} of {} shown",
                     si(shown.end_s() - shown.start_s, "s"),
                     si(self.end_s() - self.start_s, "s")
                 )
@@ -289,7 +289,7 @@ mod tests {
         let shown = run.shown().unwrap();
         let frames_s = 0.3 - 0.25 + 0.0167;
         assert!(frames_s > 0.6 * (shown.end_s() - shown.start_s), "{} to {}", shown.start_s, shown.end_s());
-        assert!(run.picture(&Look::default()).svg().unwrap().contains("with frames of 567 ms"));
+        assert!(run.picture(&Look::default()).svg().unwrap().contains(" of 567 ms shown"));
         let short = PowerRun { power_w: &power_w[..5000], start_s: 0.24, ..run };
         assert_eq!(short.shown().unwrap().power_w.len(), 5000, "frames all over are shown with all there is");
     }

@@ -2,9 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::LookArgs;
+use experiments::catalog::{ALL, CHARTS};
+use experiments::study::Entry;
 
 /// Arguments of `stress`.
 #[derive(Debug, Args)]
@@ -39,7 +42,7 @@ pub struct StressArgs {
     Results are in DIR: pictures as SVG and PNG, NAME.csv, NAME.json and NAME.md.")]
 pub struct ChartArgs {
     /// Which chart
-    #[arg(value_enum, value_name = "NAME")]
+    #[arg(value_parser = charts(), value_name = "NAME")]
     pub chart: ChartArg,
     /// Another scene for `sampled`, `tile-tests` or `timing`, by name or file; may be given several times
     #[arg(long, value_name = "SCENE")]
@@ -64,35 +67,21 @@ pub struct ChartArgs {
     pub look: LookArgs,
 }
 
-/// The charts there are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+/// A chart, or all of them.
+#[derive(Clone, Copy, Debug)]
 pub enum ChartArg {
-    /// Every chart, the failure catalogue of `quintile stress`, and `index.html`: speed against accuracy on one page
+    /// Every chart and the failure catalogue.
     All,
-    /// Shader executions and images of caustics, by how beams are bounded, and where beams fail
-    Caustics,
-    /// Pairs kept in vain by collision detection, over resolution, bins of time and cost, and where it fails
-    Collision,
-    /// Frame starts found and energy error, by method, over sampling rate, noise, bits and host time
-    Frames,
-    /// Glossy reflection and refraction: error over samples, contact hardening, lenses too wide
-    Glossy,
-    /// Time of the visibility engine over triangles, samples a pixel and blur, with exponents
-    Growth,
-    /// Hidden objects found over tests and bytes, by intervals and by samples, and where occluders are too small
-    Occlusion,
-    /// Points of all kinds: quality over points a second, spectra, and where it fails
-    Points,
-    /// Frames predicted from few: errors, how often intervals hold the truth, host time
-    Sampled,
-    /// Image error over samples per pixel and over host time, for every sample table
-    Sampling,
-    /// Soft shadows: error over places on the light, one pass against accumulation, and the bias
-    Shadows,
-    /// Every combination of tile tests: efficiency and tightness over multiply-adds
-    TileTests,
-    /// Every level of timing: error against the reference over host time
-    Timing,
-    /// Stereo and multi-view: shader runs over views and caches, one pass against its rivals
-    Views,
+    /// One chart.
+    One(&'static Entry),
+}
+
+/// The names of the charts, each with its line of help.
+fn charts() -> impl TypedValueParser<Value = ChartArg> {
+    let values = CHARTS.iter().map(|chart| (chart.name, chart.about));
+    let values = std::iter::once(ALL).chain(values).map(|(name, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(values).map(|name: String| {
+        let chart = CHARTS.iter().find(|chart| chart.name == name);
+        chart.map_or(ChartArg::All, ChartArg::One)
+    })
 }

@@ -10,7 +10,7 @@ use output::terminal::{Terminal, Verbosity};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Messages")]
 pub struct MessageArgs {
-    /// Print errors only: no warnings, notes or progress bars
+    /// Print results and errors only: no warnings, notes or progress bars
     #[arg(short, long, global = true)]
     pub quiet: bool,
     /// Print details of warnings and of the work

@@ -92,6 +92,9 @@ pub struct ManArgs {
     /// Folder for the pages of all commands, such as quintile-run.1; without it the main page is printed
     #[arg(value_name = "DIR")]
     pub folder: Option<PathBuf>,
+    /// The same as DIR
+    #[arg(long, value_name = "FOLDER", conflicts_with = "folder")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of `list`.

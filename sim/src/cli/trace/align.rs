@@ -4,13 +4,13 @@ use std::io::Write;
 
 use serde_json::json;
 use traces::align::{AlignError, Alignment};
-use traces::io::Heading;
+use traces::io::TraceHeader;
 use traces::io::atomic::write_file;
+use traces::times::read_times;
+use traces::trace::is_within;
 
-use super::energy::is_within;
 use super::failure::wrong;
 use super::report;
-use super::times::times;
 use crate::cli::Failure;
 use crate::cli::args::trace::AlignArgs;
 use crate::cli::outputs::may_hold_results;
@@ -24,8 +24,8 @@ impl From<AlignError> for Failure {
     }
 }
 
-/// Refuses an anchor at a time that the trace does not have.
-fn check_anchor((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Failure> {
+/// Refuses an anchor at a time outside the trace.
+fn check_anchor((stamp_s, time_s): (f64, f64), trace: &TraceHeader) -> Result<(), Failure> {
     let (start_s, end_s) = (trace.start_s, trace.end_s());
     if is_within([start_s, end_s], time_s) {
         return Ok(());
@@ -35,32 +35,32 @@ fn check_anchor((stamp_s, time_s): (f64, f64), trace: &Heading) -> Result<(), Fa
     )))
 }
 
-/// By what share the clock of stamps may run off that of the trace; clocks of computers are off by far less.
-const SLOPE_OFF: f64 = 0.02;
+/// Largest deviation of the clock of the stamps from that of the trace, as a share; clocks of computers deviate far less.
+const MAX_CLOCK_DEVIATION: f64 = 0.02;
 
-/// Tells of anchors that are likely wrong: stamps in another unit, or of another recording.
+/// Warns of anchors that are likely wrong: stamps in another unit, or of another recording.
 fn warn_of_anchors(anchors: [(f64, f64); 2], alignment: &Alignment, sorted: &[f64], terminal: &Terminal) {
-    let told = |what: String| {
+    let warn = |what: String| {
         terminal.warn_of(Code::AnchorsOff, &format!("{what}; look at --anchor STAMP=TIME"));
     };
-    if (alignment.scale - 1.0).abs() > SLOPE_OFF {
-        told(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
+    if (alignment.scale - 1.0).abs() > MAX_CLOCK_DEVIATION {
+        warn(format!("by the anchors, a second of the stamps lasts {} s of the trace", alignment.scale));
     }
     let (first, last) = (sorted[0], sorted[sorted.len() - 1]);
     for (stamp, _) in anchors {
         if !is_within([first, last], stamp) {
-            told(format!("stamp {stamp} s of an anchor is beyond those of the file, {first} s to {last} s"));
+            warn(format!("stamp {stamp} s of an anchor is beyond those of the file, {first} s to {last} s"));
         }
     }
 }
 
 pub(super) fn run(args: &AlignArgs, terminal: &Terminal) -> Result<(), Failure> {
     may_hold_results(("--out", args.out.as_deref()), [args.stamps.as_path(), &args.input.trace])?;
-    let mut stamps = times(&args.stamps)?;
+    let mut stamps = read_times(&args.stamps)?;
     stamps.sort_by(f64::total_cmp);
     let alignment = match args.anchor[..] {
         [a, b] => {
-            let trace = args.input.source(terminal)?.0.heading();
+            let trace = args.input.source(terminal)?.0.header();
             [a, b].iter().try_for_each(|anchor| check_anchor(*anchor, &trace))?;
             let alignment = Alignment::by_anchors(a, b)?;
             warn_of_anchors([a, b], &alignment, &stamps, terminal);

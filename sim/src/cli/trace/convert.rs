@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use traces::io::{Heading, Sink, Source, Stretch, WriteError, atomic, csv, jls, parquet};
+use traces::io::{self, FORMATS, TraceChunk, TraceHeader, TraceReader, TraceWriter, WriteError, atomic, csv};
 
 use super::failure::wrong;
 use super::report;
@@ -14,16 +14,18 @@ use crate::cli::terminal::print_json;
 use output::perfetto::{self, CounterTrack, MAX_POINTS, Thinner, Timeline};
 use output::terminal::Terminal;
 
-/// Bytes of a row of CSV, about; larger files than this many are announced.
+/// About the bytes of a row of CSV. Files of more than [`LARGE_BYTES`] are announced.
 const ROW_BYTES: u64 = 50;
 const LARGE_BYTES: u64 = 1 << 30;
+/// The ending of files for the viewer of Perfetto.
+const PERFETTO: &str = ".perfetto-trace";
 
 pub(super) fn run(args: &ConvertArgs, terminal: &Terminal) -> Result<(), Failure> {
     check(&args.out)?;
     may_be_saved("OUT", &args.out, [args.input.trace.as_path()])?;
     let (trace, repairs) = args.input.source(terminal)?;
     save(&*trace, &args.out, terminal)?;
-    let Heading { samples, rate_hz, .. } = trace.heading();
+    let TraceHeader { samples, rate_hz, .. } = trace.header();
     if args.json {
         let out = args.out.display().to_string();
         return print_json(
@@ -40,14 +42,15 @@ fn name(path: &Path) -> String {
 
 /// Refuses a file of unknown kind before anything is read.
 pub(super) fn check(path: &Path) -> Result<(), Failure> {
-    let known = [".parquet", ".jls", ".csv", ".tsv", ".csv.gz", ".tsv.gz", ".perfetto-trace"];
+    let known = [&FORMATS[..], &[PERFETTO]].concat();
     if known.iter().any(|end| name(path).ends_with(end)) {
         return Ok(());
     }
     Err(wrong(format!("{}: its ending is none of {}", path.display(), known.join(", "))))
 }
 
-/// Refuses what [`save`] could not write, or would write over: an input, or a description that is not that of an older `out`.
+/// Refuses a file that [`save`] could not write, or that would overwrite an input, or a description that is not that of an
+/// older `out`.
 pub(super) fn may_be_saved<'a>(
     flag: &str,
     out: &Path,
@@ -64,7 +67,7 @@ pub(super) fn may_be_saved<'a>(
     })
 }
 
-/// The file that tells what a text does not.
+/// The description beside a text.
 fn description_path(out: &Path) -> Option<PathBuf> {
     let name = name(out);
     let plain = name.trim_end_matches(".gz");
@@ -72,40 +75,31 @@ fn description_path(out: &Path) -> Option<PathBuf> {
     text.then(|| csv::description_path(out))
 }
 
-/// Writes a trace in the format its name asks for, in pieces: each format has a `save` of its own, whose writer is a [`Sink`].
-pub(super) fn save(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
-    let name = name(path);
-    let plain = name.trim_end_matches(".gz");
-    if name.ends_with(".parquet") {
-        return Ok(parquet::save(trace, path)?);
-    }
-    if name.ends_with(".jls") {
-        return Ok(jls::save(trace, path)?);
-    }
-    if name.ends_with(".perfetto-trace") {
+/// Writes a trace, in pieces, in the format of its ending.
+pub(super) fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
+    if name(path).ends_with(PERFETTO) {
         return perfetto(trace, path, terminal);
     }
-    let bytes = trace.heading().samples * ROW_BYTES;
-    if bytes > LARGE_BYTES {
+    let bytes = trace.header().samples * ROW_BYTES;
+    if description_path(path).is_some() && bytes > LARGE_BYTES {
         terminal.note(&format!(
             "{}: about {:.1} GB as text; Parquet takes a tenth",
             path.display(),
             bytes as f64 * 1e-9
         ));
     }
-    let delimiter = if plain.ends_with(".tsv") { b'\t' } else { b',' };
-    Ok(csv::save_as(trace, path, delimiter, name.ends_with(".gz"))?)
+    Ok(io::save(trace, path)?)
 }
 
-/// A counter track of the power, thinned out to what the viewer holds.
-fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
-    let heading = trace.heading();
-    let mut extremes = PowerExtremes(Thinner::new(heading.samples, MAX_POINTS));
-    trace.pour(&mut extremes)?;
-    let start_ns = heading.time_ns(0);
-    let place = |(index, watts): (u64, f64)| ((heading.time_ns(index) - start_ns).unsigned_abs(), watts);
+/// Writes a counter track of the power, thinned out to as many points as the viewer holds.
+fn perfetto(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
+    let header = trace.header();
+    let mut extremes = PowerExtremes(Thinner::new(header.samples, MAX_POINTS));
+    trace.read_into(&mut extremes)?;
+    let start_ns = header.time_ns(0);
+    let place = |(index, watts): (u64, f64)| ((header.time_ns(index) - start_ns).unsigned_abs(), watts);
     let points: Vec<(u64, f64)> = extremes.0.kept().into_iter().map(place).collect();
-    let (kept, samples) = (points.len() as u64, heading.samples);
+    let (kept, samples) = (points.len() as u64, header.samples);
     if kept < samples {
         terminal.note(&format!("{}: {kept} of {samples} samples kept, extremes among them", path.display()));
     }
@@ -117,9 +111,9 @@ fn perfetto(trace: &dyn Source, path: &Path, terminal: &Terminal) -> Result<(), 
 /// Keeps the extremes of the power of a trace.
 struct PowerExtremes(Thinner);
 
-impl Sink for PowerExtremes {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
-        stretch.powers_w().for_each(|watts| self.0.push(watts));
+impl TraceWriter for PowerExtremes {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        chunk.powers_w().for_each(|watts| self.0.push(watts));
         Ok(())
     }
 }

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use serde_json::json;
-use traces::Trace;
 use traces::energy::{
-    FrameEnergy, Idle, Pooled, PowerIntegral, Spread, energies_j, finishes_s, levels_w, outliers, pooled,
-    warm_up, whole,
+    FrameEnergy, Idle, IdleTooShort, Pass, Pooled, PowerIntegral, RunEnergy, RunError, RunOptions, Spread,
+    energies_j, passes_j, pooled, whole,
 };
-use traces::io::{Heading, Repair, Source};
+use traces::io::{Repair, TraceHeader, TraceReader};
+use traces::trace::check_span;
 
 use super::failure::wrong;
 use crate::cli::Failure;
@@ -18,16 +18,13 @@ use output::table::counted;
 use output::terminal::Terminal;
 use warnings::Code;
 
-/// Samples from which the lowest power is taken, about.
-const LEVELS: u64 = 65_536;
-
 pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure> {
     passes_differ(&args.pass)?;
     let recording = args.idle_trace.as_ref().map(|path| args.input.load_other(path, terminal)).transpose()?;
     let recording = recording.as_ref().map(|(recording, _)| PowerIntegral::new(recording));
     if args.from.is_some() || args.to.is_some() {
         let (trace, repairs) = args.input.source(terminal)?;
-        return stretch(args, (&*trace, &repairs), recording.as_ref());
+        return span_energy(args, (&*trace, &repairs), recording.as_ref());
     }
     let (first, repairs, of_file) = one_run(args, &args.input.trace, recording.as_ref(), terminal)?;
     let pixels = args.find.pixels.or(of_file);
@@ -35,8 +32,7 @@ pub(super) fn run(args: &EnergyArgs, terminal: &Terminal) -> Result<(), Failure>
     for path in &args.run {
         runs.push(one_run(args, path, recording.as_ref(), terminal)?.0);
     }
-    let energies: Vec<Vec<f64>> =
-        runs.iter().map(|run| run.kept.iter().map(|f| f.energy_j).collect()).collect();
+    let energies: Vec<Vec<f64>> = runs.iter().map(|run| run.run.energies_j()).collect();
     let pool = pooled(&energies).ok_or_else(|| wrong("no frame is left; discard fewer"))?;
     if args.json {
         let runs: Vec<_> = runs.iter().map(Run::json).collect();
@@ -60,17 +56,17 @@ fn pooled_text(pool: &Pooled, pixels: Option<u64>) -> String {
 }
 
 /// Energy between two times.
-fn stretch(
+fn span_energy(
     args: &EnergyArgs,
-    (trace, repairs): (&dyn Source, &[Repair]),
+    (trace, repairs): (&dyn TraceReader, &[Repair]),
     recording: Option<&PowerIntegral<'_>>,
 ) -> Result<(), Failure> {
-    let heading = trace.heading();
+    let header = trace.header();
     let idle = idle(args, trace, recording)?;
-    let (from_s, to_s) = (args.from.unwrap_or(heading.start_s), args.to.unwrap_or(heading.end_s()));
-    check(&heading, from_s, to_s, "--from and --to")?;
+    let (from_s, to_s) = (args.from.unwrap_or(header.start_s), args.to.unwrap_or(header.end_s()));
+    check(&header, from_s, to_s, "--from and --to")?;
     let total_j = energies_j(trace, &[(from_s, to_s)])?[0];
-    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(heading.start_s, from_s, to_s));
+    let idle_j = idle.map_or(0.0, |idle| idle.energy_j(header.start_s, from_s, to_s));
     let (energy_j, power_w) = (total_j - idle_j, (total_j - idle_j) / (to_s - from_s));
     if args.json {
         return print_json(
@@ -82,79 +78,40 @@ fn stretch(
     print(&format!("{from_s} s to {to_s} s: {energy_j:.6} J, {power_w:.4} W (idle taken off: {idle_j:.6} J)"))
 }
 
-fn check(trace: &Heading, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
-    check_within((trace.start_s, trace.end_s()), (from_s, to_s), what)
-}
-
-/// Whether a number is between two others, to rounding.
-pub(super) fn is_within([low, high]: [f64; 2], number: f64) -> bool {
-    let rounding = 1e-12 * low.abs().max(high.abs());
-    (low - rounding..=high + rounding).contains(&number)
-}
-
-/// Refuses a stretch that is not within a trace.
-pub(super) fn check_within(
-    (start_s, end_s): (f64, f64),
-    (from_s, to_s): (f64, f64),
-    what: &str,
-) -> Result<(), Failure> {
-    let extent = [start_s, end_s];
-    let inside = is_within(extent, from_s) && is_within(extent, to_s);
-    match (inside, from_s < to_s) {
-        (true, true) => Ok(()),
-        (true, false) => Err(wrong(format!(
-            "{what}: {from_s} s to {to_s} s ends before it begins or has no length; give the earlier time first"
-        ))),
-        (false, _) => Err(wrong(format!(
-            "{what}: {from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s; give times inside it"
-        ))),
-    }
+fn check(trace: &TraceHeader, from_s: f64, to_s: f64, what: &str) -> Result<(), Failure> {
+    check_span([trace.start_s, trace.end_s()], [from_s, to_s])
+        .map_err(|error| wrong(format!("{what}: {error}")))
 }
 
 fn idle<'a>(
     args: &EnergyArgs,
-    trace: &dyn Source,
+    trace: &dyn TraceReader,
     recording: Option<&PowerIntegral<'a>>,
 ) -> Result<Option<Idle<'a>>, Failure> {
     if let Some((from_s, to_s)) = args.idle {
-        check(&trace.heading(), from_s, to_s, "--idle")?;
-        return Ok(Some(Idle::Mean(energies_j(trace, &[(from_s, to_s)])?[0] / (to_s - from_s))));
+        check(&trace.header(), from_s, to_s, "--idle")?;
+        return Ok(Some(Idle::between(trace, from_s, to_s)?));
     }
     if let Some(recording) = recording {
-        let length_s = recording.trace().end_s() - recording.trace().start_s();
         return Ok(Some(match args.idle_by {
-            IdleBy::Mean => Idle::Mean(recording.total_j() / length_s),
-            IdleBy::Instant => {
-                covers(recording.trace(), &trace.heading())?;
-                Idle::Instant(recording.clone())
-            }
+            IdleBy::Mean => Idle::mean_of(recording),
+            IdleBy::Instant => Idle::instant(recording.clone(), &trace.header()).map_err(too_short)?,
         }));
     }
     Ok(args.idle_w.map(Idle::Mean))
 }
 
-/// Refuses an idle recording that ends before the trace does: instants are compared from the starts of both on.
-fn covers(idle: &Trace, trace: &Heading) -> Result<(), Failure> {
-    let [idle_s, trace_s] = [idle.end_s() - idle.start_s(), trace.end_s() - trace.start_s];
-    if idle_s >= trace_s * (1.0 - 1e-9) {
-        return Ok(());
-    }
-    Err(wrong(format!(
-        "--idle-by instant: the idle recording lasts {idle_s} s, the trace {trace_s} s; record it as long, or take --idle-by mean"
-    )))
+fn too_short(error: IdleTooShort) -> Failure {
+    wrong(format!("--idle-by instant: {error}; record it as long, or take --idle-by mean"))
 }
 
-/// Frames of one run and what was made of them.
+/// A run and its passes.
 struct Run {
-    kept: Vec<FrameEnergy>,
-    discarded: usize,
-    clearness: f64,
-    outliers: usize,
-    old: Spread,
+    run: RunEnergy,
     passes: Vec<(String, Spread)>,
 }
 
-/// One recording: its frames, what was mended in it, and the pixels of its frames if it says so.
+/// One recording: its frames, its repairs, and the pixels of its frames if it states them.
 fn one_run(
     args: &EnergyArgs,
     path: &Path,
@@ -163,97 +120,35 @@ fn one_run(
 ) -> Result<(Run, Vec<Repair>, Option<u64>), Failure> {
     let (found, trace) = args.find.frames_and_samples(&args.input, path, terminal)?;
     found.warn(terminal);
-    let mut frames = whole(&found.energies).to_vec();
-    let (trace, start_s) = (&*trace, trace.heading().start_s);
+    let (trace, frames) = (&*trace, whole(&found.energies).to_vec());
     let idle = idle(args, trace, recording)?;
-    let idle_j = |a_s: f64, b_s: f64| idle.as_ref().map_or(0.0, |idle| idle.energy_j(start_s, a_s, b_s));
-    let all: Vec<f64> = frames.iter().map(|frame| frame.energy_j).collect();
-    let warm = warm_up(&all);
-    let discarded = match args.discard {
-        Discard::Count(count) => count,
-        Discard::Auto => warm.frames,
+    let options = RunOptions {
+        discard: match args.discard {
+            Discard::Count(count) => Some(count),
+            Discard::Auto => None,
+        },
+        drop_outliers: args.drop_outliers,
+        busy_above_w: args.busy_above,
     };
-    let out = outliers(&all);
-    let count = out.iter().skip(discarded).filter(|out| **out).count();
-    let old = begin_to_finish(args, trace, &frames)?.into_iter();
-    let old: Vec<f64> = old.map(|((a_s, b_s), energy_j)| energy_j - idle_j(a_s, b_s)).collect();
-    if let Some(idle) = &idle {
-        idle.take_off(start_s, &mut frames);
-    }
-    let keep = |index: usize| index >= discarded && !(args.drop_outliers && out[index]);
-    let kept: Vec<FrameEnergy> =
-        frames.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, f)| *f).collect();
-    let old: Vec<f64> = old.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, j)| j).collect();
-    let none = || {
-        wrong(format!(
+    let run = RunEnergy::of(trace, frames, idle.as_ref(), &options).map_err(run_failure)?;
+    args.pass.iter().try_for_each(|mark| within_frames(mark, &run.frames, terminal))?;
+    let passes: Vec<Pass> =
+        args.pass.iter().map(|(name, begin_s)| Pass { name: name.clone(), begin_s: *begin_s }).collect();
+    let passes = passes_j(trace, &run.frames, &passes, idle.as_ref())?;
+    Ok((Run { run, passes }, found.repairs, found.metadata.pixels))
+}
+
+fn run_failure(error: RunError) -> Failure {
+    match error {
+        RunError::Read(error) => error.into(),
+        RunError::NoFrames { frames, discarded } => wrong(format!(
             "of {} none is left after {discarded} are discarded; discard fewer",
-            counted(frames.len(), "frame")
-        ))
-    };
-    let old = Spread::of(&old).ok_or_else(none)?;
-    args.pass.iter().try_for_each(|mark| within_frames(mark, &kept, terminal))?;
-    let passes = passes(args, trace, &kept, &idle_j)?;
-    let run = Run { kept, discarded, clearness: warm.clearness, outliers: count, old, passes };
-    Ok((run, found.repairs, found.metadata.pixels))
-}
-
-/// A span of time, s.
-type Span = (f64, f64);
-
-/// From when to when each frame's work goes on, and its energy, J: the old method.
-fn begin_to_finish(
-    args: &EnergyArgs,
-    trace: &dyn Source,
-    frames: &[FrameEnergy],
-) -> Result<Vec<(Span, f64)>, Failure> {
-    let busy_w = match args.busy_above {
-        Some(watts) => watts,
-        None => busy_above(levels_w(trace, LEVELS)?, frames),
-    };
-    let finishes_s = finishes_s(trace, frames, busy_w)?;
-    let spans: Vec<Span> = frames.iter().map(|frame| frame.start_s).zip(finishes_s).collect();
-    let energies = energies_j(trace, &spans)?;
-    Ok(spans.into_iter().zip(energies).collect())
-}
-
-/// A tenth of the way from the lowest to the mean power of the frames.
-fn busy_above(mut powers: Vec<f64>, frames: &[FrameEnergy]) -> f64 {
-    powers.sort_by(f64::total_cmp);
-    let low = powers[powers.len() / 20];
-    let mean = frames.iter().map(FrameEnergy::power_w).sum::<f64>() / frames.len().max(1) as f64;
-    low + 0.1 * (mean - low).max(0.0)
-}
-
-/// Energy of each pass, from its mark to the next one, or to the end of the frame; what is before the first is a pass
-/// of its own, so that they add up.
-fn passes(
-    args: &EnergyArgs,
-    trace: &dyn Source,
-    frames: &[FrameEnergy],
-    idle_j: &dyn Fn(f64, f64) -> f64,
-) -> Result<Vec<(String, Spread)>, Failure> {
-    let mut marks = args.pass.clone();
-    if marks.is_empty() {
-        return Ok(Vec::new());
+            counted(frames, "frame")
+        )),
     }
-    marks.sort_by(|a, b| a.1.total_cmp(&b.1));
-    if marks[0].1 > 0.0 {
-        marks.insert(0, ("before".to_owned(), 0.0));
-    }
-    let span = &|index: usize, frame: &FrameEnergy| {
-        let at = |mark: &(String, f64)| (frame.start_s + mark.1).min(frame.end_s);
-        (at(&marks[index]), marks.get(index + 1).map_or(frame.end_s, at))
-    };
-    // Pass by pass, and all at once: the samples may have to be read anew for each question.
-    let of_pass = |index: usize| frames.iter().map(move |frame| span(index, frame));
-    let spans: Vec<Span> = (0..marks.len()).flat_map(of_pass).collect();
-    let less_idle = |(energy_j, (a_s, b_s)): (f64, &Span)| energy_j - idle_j(*a_s, *b_s);
-    let energies: Vec<f64> = energies_j(trace, &spans)?.into_iter().zip(&spans).map(less_idle).collect();
-    let spreads = energies.chunks(frames.len()).map(Spread::of);
-    Ok(marks.iter().zip(spreads).filter_map(|((name, _), spread)| Some((name.clone(), spread?))).collect())
 }
 
-/// Refuses two passes of one name, whose energies could not be told apart.
+/// Refuses two passes of one name.
 fn passes_differ(passes: &[(String, f64)]) -> Result<(), Failure> {
     let mut names: Vec<&str> = passes.iter().map(|(name, _)| name.as_str()).collect();
     names.sort_unstable();
@@ -263,7 +158,7 @@ fn passes_differ(passes: &[(String, f64)]) -> Result<(), Failure> {
     }
 }
 
-/// Refuses a pass that begins in no frame, and tells of one that begins in some alone.
+/// Refuses a pass that begins in no frame, and warns of one that begins in some frames only.
 fn within_frames(
     (name, begins_s): &(String, f64),
     frames: &[FrameEnergy],
@@ -291,27 +186,27 @@ fn within_frames(
 
 impl Run {
     fn json(&self) -> serde_json::Value {
-        let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
+        let (run, energies) = (&self.run, self.run.energies_j());
         let passes: Vec<_> =
             self.passes.iter().map(|(name, j)| json!({ "pass": name, "energy_J": j })).collect();
         json!({
-            "frames": self.kept.len(), "discarded": self.discarded, "warm_up_clearness": self.clearness,
-            "outliers": self.outliers, "energy_J": Spread::of(&energies), "begin_to_finish_J": self.old,
+            "frames": run.frames.len(), "discarded": run.discarded, "warm_up_clearness": run.warm_up_clearness,
+            "outliers": run.outliers, "energy_J": Spread::of(&energies), "begin_to_finish_J": run.begin_to_finish_j,
             "passes": passes, "energies_J": energies,
         })
     }
 
     fn text(&self) -> String {
-        let energies: Vec<f64> = self.kept.iter().map(|frame| frame.energy_j).collect();
-        let spread = Spread::of(&energies).unwrap_or_default();
+        let run = &self.run;
+        let spread = Spread::of(&run.energies_j()).unwrap_or_default();
         let mut text = format!(
             "{} ({} discarded, {}): {:.4} mJ/frame start to start (deviation {:.4}), {:.4} mJ begin to finish\n",
-            counted(self.kept.len(), "frame"),
-            self.discarded,
-            counted(self.outliers, "outlier"),
+            counted(run.frames.len(), "frame"),
+            run.discarded,
+            counted(run.outliers, "outlier"),
             spread.mean * 1e3,
             spread.deviation * 1e3,
-            self.old.mean * 1e3
+            run.begin_to_finish_j.mean * 1e3
         );
         for (name, spread) in &self.passes {
             text +=

@@ -1,24 +1,33 @@
-//! Errors of traces as failures of the command: what was asked wrongly, and what failed.
+//! Errors of the library as failures of the command, with exit codes: 2 for wrong arguments, 1 for the rest.
 
 use traces::frames::MarkError;
 use traces::io::{ReadError, WriteError};
 use traces::stream::StreamError;
+use traces::times::TimesError;
 
 use crate::cli::Failure;
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        let asked = matches!(
+        let wrong = matches!(
             error,
-            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Asked { .. }
+            ReadError::MissingColumn { .. } | ReadError::Format { .. } | ReadError::Conflict { .. }
         ) || matches!(&error, ReadError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
-        Self { message: error.to_string(), code: if asked { 2 } else { 1 } }
+        Self { message: error.to_string(), code: if wrong { 2 } else { 1 } }
     }
 }
 
 impl From<MarkError> for Failure {
     fn from(error: MarkError) -> Self {
         Self { message: error.to_string(), code: 2 }
+    }
+}
+
+impl From<TimesError> for Failure {
+    fn from(error: TimesError) -> Self {
+        let failed =
+            matches!(error, TimesError::Io { .. } | TimesError::Folder { .. } | TimesError::Empty { .. });
+        Self { message: error.to_string(), code: if failed { 1 } else { 2 } }
     }
 }
 
@@ -41,7 +50,7 @@ impl From<WriteError> for Failure {
     }
 }
 
-/// A mistake of the caller.
+/// Wrong arguments.
 pub(super) fn wrong(message: impl Into<String>) -> Failure {
     Failure { message: message.into(), code: 2 }
 }

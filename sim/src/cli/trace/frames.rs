@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use traces::energy::{FrameTable, Summary, whole};
+use traces::energy::{FrameTable, InverseUnits, Summary, whole};
 use traces::frames::{Rule, Threshold};
 
 use super::failure::wrong;
@@ -175,32 +175,28 @@ fn reason(threshold: &Threshold) -> String {
     }
 }
 
-/// Inverse units from the mean energy, and what their own average would wrongly be (Paper II).
+/// Inverse units as JSON, with the average that would be wrong (Paper II).
 fn inverse_units(table: &FrameTable, pixels: Option<u64>) -> Value {
-    let energies: Vec<f64> = table.frames().iter().map(|frame| frame.energy_j).collect();
-    let count = energies.len() as f64;
-    let right = count / energies.iter().sum::<f64>();
-    let naive = energies.iter().map(|j| 1.0 / j).sum::<f64>() / count;
-    let pixels = pixels.map(|pixels| pixels as f64);
+    let units = InverseUnits::of(table.frames(), pixels);
     json!({
-        "frames_per_J": right, "pixels_per_J": pixels.map(|pixels| pixels * right),
-        "wrong_mean_of_frames_per_J": naive,
+        "frames_per_J": units.frames_per_j, "pixels_per_J": units.pixels_per_j,
+        "wrong_mean_of_frames_per_J": units.wrong_mean_of_frames_per_j,
         "warning": "inverse units cannot be averaged: the mean of frames per joule is not the inverse of the mean energy",
     })
 }
 
 fn inverse_text(table: &FrameTable, pixels: Option<u64>, terminal: &Terminal) -> String {
-    let units = inverse_units(table, pixels);
+    let units = InverseUnits::of(table.frames(), pixels);
     terminal.warn_of(
         Code::InverseUnits,
         "inverse units cannot be averaged; these are inverses of the mean energy (Paper II)",
     );
-    let number = |key: &str| units[key].as_f64().unwrap_or(f64::NAN);
-    let per_pixel =
-        units["pixels_per_J"].as_f64().map_or(String::new(), |p| format!(", {:.3} Mpixels/J", p * 1e-6));
+    let number = |value: f64| if value.is_finite() { value } else { f64::NAN };
+    let per_pixel = units.pixels_per_j.filter(|value| value.is_finite());
+    let per_pixel = per_pixel.map_or(String::new(), |p| format!(", {:.3} Mpixels/J", p * 1e-6));
     format!(
         "inverse: {:.4} frames/J{per_pixel} (the mean of the inverses would be {:.4}, which is wrong)",
-        number("frames_per_J"),
-        number("wrong_mean_of_frames_per_J")
+        number(units.frames_per_j),
+        number(units.wrong_mean_of_frames_per_j)
     )
 }

@@ -1,27 +1,27 @@
-//! Reading a trace, its marks and its frames as asked for.
+//! Reading a trace, its marks and its frames, by the arguments.
 
 use std::fs;
 use std::path::Path;
 
 use traces::energy::{FrameEnergy, PowerIntegral};
 use traces::frames::{Found, Marks, Method, Options, Proposal, Window, find_with, propose};
-use traces::io::{ReadOptions, Recording, Repair, Rows, Source, rail_of_sums, read};
+use traces::io::{ReadOptions, Recording, Repair, Rows, TraceReader, open, rail_of_sums, read};
 use traces::stream;
+use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
-use traces::{MarkKind, Metadata, Trace};
+use traces::{Metadata, Trace};
 
 use super::failure::wrong;
 use super::pipes::shown;
-use super::times::times;
 use crate::cli::Failure;
 use crate::cli::args::trace::{FindArgs, InputArgs};
 use output::terminal::Terminal;
 use warnings::Code;
 
 /// Traces of more samples are read in pieces.
-const LONG: u64 = 1 << 24;
-/// So are texts of more bytes.
-const LONG_BYTES: u64 = 1 << 30;
+const MAX_SAMPLES_IN_MEMORY: u64 = 1 << 24;
+/// Texts of more bytes are read in pieces.
+const MAX_BYTES_IN_MEMORY: u64 = 1 << 30;
 
 impl InputArgs {
     pub(super) fn options(&self) -> Result<ReadOptions, Failure> {
@@ -53,7 +53,7 @@ impl InputArgs {
         })
     }
 
-    /// The whole trace in memory; what was mended is told.
+    /// The whole trace in memory. Repairs are reported.
     pub(super) fn load(&self, terminal: &Terminal) -> Result<(Trace, Vec<Repair>), Failure> {
         self.load_other(&self.trace, terminal)
     }
@@ -70,27 +70,15 @@ impl InputArgs {
         Ok((loaded.trace, loaded.repairs))
     }
 
-    /// The trace as a source of samples, read in pieces; one that has to be mended is in memory, as what is mended depends
-    /// on all of it. What was mended is told.
-    pub(super) fn source(&self, terminal: &Terminal) -> Result<(Box<dyn Source>, Vec<Repair>), Failure> {
-        match Recording::open(&self.trace, &self.options()?) {
-            Ok(recording) => {
-                self.warn_of_sums(&self.trace, terminal)?;
-                let repairs = recording.repairs().to_vec();
-                note_repairs(&self.trace, &repairs, terminal);
-                Ok((Box::new(recording), repairs))
-            }
-            Err(_) if self.repair => {
-                let (trace, repairs) = self.load(terminal)?;
-                Ok((Box::new(trace), repairs))
-            }
-            Err(error) => Err(error.into()),
-        }
+    /// The trace, of any length: read in pieces, or in memory where it has to be repaired. Repairs are reported.
+    pub(super) fn source(&self, terminal: &Terminal) -> Result<(Box<dyn TraceReader>, Vec<Repair>), Failure> {
+        let (trace, repairs) = open(&self.trace, &self.options()?)?;
+        self.warn_of_sums(&self.trace, terminal)?;
+        note_repairs(&self.trace, &repairs, terminal);
+        Ok((trace, repairs))
     }
-}
 
-impl InputArgs {
-    /// Tells where a rail is added to those that it is the sum of.
+    /// Warns of a rail that is added to those that it is the sum of.
     pub(super) fn warn_of_sums(&self, path: &Path, terminal: &Terminal) -> Result<(), Failure> {
         if !self.rail.is_empty() {
             return Ok(());
@@ -110,7 +98,7 @@ fn note_repairs(path: &Path, repairs: &[Repair], terminal: &Terminal) {
     }
 }
 
-/// Frames, however they were found.
+/// Frames, found in memory or in pieces.
 pub(super) struct Frames {
     pub found: Found,
     pub energies: Vec<FrameEnergy>,
@@ -151,7 +139,7 @@ impl FindArgs {
         input: &InputArgs,
         path: &Path,
         terminal: &Terminal,
-    ) -> Result<(Frames, Box<dyn Source>), Failure> {
+    ) -> Result<(Frames, Box<dyn TraceReader>), Failure> {
         if self.streams(input, path)? {
             let recording = Recording::open(path, &input.options()?)?;
             return Ok((self.in_pieces(input, path, terminal)?, Box::new(recording)));
@@ -186,7 +174,8 @@ impl FindArgs {
         }
         let rows = Rows::open(path, &input.options()?)?;
         let bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
-        Ok(self.stream || rows.count().map_or(bytes > LONG_BYTES, |count| count > LONG))
+        Ok(self.stream
+            || rows.count().map_or(bytes > MAX_BYTES_IN_MEMORY, |count| count > MAX_SAMPLES_IN_MEMORY))
     }
 
     fn in_pieces(&self, input: &InputArgs, path: &Path, terminal: &Terminal) -> Result<Frames, Failure> {
@@ -196,7 +185,7 @@ impl FindArgs {
         }
         let rows = Rows::open(path, &options)?;
         let starts_s = self.marks(rows.metadata())?;
-        let end_s = self.end.or_else(|| end_mark(rows.metadata())).unwrap_or(f64::INFINITY);
+        let end_s = self.end.or_else(|| rows.metadata().end_mark_s()).unwrap_or(f64::INFINITY);
         let marks = Marks { starts_s, window: self.window_s(), end_s };
         let streamed = stream::find(path, &options, &marks)?;
         input.warn_of_sums(path, terminal)?;
@@ -234,7 +223,7 @@ impl FindArgs {
             Some(proposal) => vec![proposal.mark_s],
             None => self.marks(&trace.metadata)?,
         };
-        let end_s = self.end.or_else(|| end_mark(&trace.metadata)).unwrap_or(trace.end_s());
+        let end_s = self.end.or_else(|| trace.metadata.end_mark_s()).unwrap_or(trace.end_s());
         let marks = Marks { starts_s, window: self.window_s(), end_s };
         Ok((find_with(trace, &marks, &Options { method: self.method })?, proposal))
     }
@@ -247,11 +236,10 @@ impl FindArgs {
     fn marks(&self, metadata: &Metadata) -> Result<Vec<f64>, Failure> {
         let mut marks = self.mark.clone();
         if let Some(path) = &self.mark_file {
-            marks.extend(times(path)?);
+            marks.extend(read_times(path)?);
         }
         if marks.is_empty() {
-            let of_file = metadata.marks.iter().filter(|mark| mark.kind == MarkKind::FrameStart);
-            marks.extend(of_file.map(|mark| mark.time_s));
+            marks.extend(metadata.frame_starts_s());
         }
         if marks.is_empty() {
             return Err(wrong("no frame start is marked: give --mark SECONDS, --mark-file FILE or --auto"));
@@ -260,8 +248,4 @@ impl FindArgs {
         marks.dedup();
         Ok(marks)
     }
-}
-
-fn end_mark(metadata: &Metadata) -> Option<f64> {
-    metadata.marks.iter().rev().find(|mark| mark.kind == MarkKind::End).map(|mark| mark.time_s)
 }

@@ -10,8 +10,6 @@ mod pareto;
 mod pipes;
 mod plot;
 mod sample;
-mod times;
-mod units;
 
 use super::Failure;
 use super::args::trace::{TraceArgs, TraceCommand};

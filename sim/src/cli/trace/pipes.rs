@@ -50,6 +50,7 @@ impl Pipes {
             }
             TraceCommand::Convert(args) => {
                 pipes.input(&mut args.input.trace)?;
+                args.out = args.last.take().or(args.named.take()).unwrap_or_default();
                 args.piped =
                     pipes.output(&mut args.out, args.format.map(|format| format.name()), "csv", args.json)?;
             }

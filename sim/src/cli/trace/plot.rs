@@ -7,8 +7,8 @@ use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral, Spread, mean_over_discarded};
 use traces::io::{ReadError, ReadOptions};
 use traces::pyramid::{Column, Pyramid, pyramid_path};
+use traces::trace::check_span;
 
-use super::energy::check_within;
 use super::failure::wrong;
 use super::pipes::shown as name_of;
 use super::report;
@@ -73,7 +73,8 @@ pub(super) fn write(picture: &Picture, path: &Path, ending: Ending) -> Result<()
 
 fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<(f64, f64), Failure> {
     let (from_s, to_s) = (args.from.unwrap_or(start_s), args.to.unwrap_or(end_s));
-    check_within((start_s, end_s), (from_s, to_s), "--from and --to")?;
+    check_span([start_s, end_s], [from_s, to_s])
+        .map_err(|error| wrong(format!("--from and --to: {error}")))?;
     Ok((from_s.max(start_s), to_s.min(end_s)))
 }
 

@@ -3,7 +3,7 @@
 use serde_json::json;
 use traces::device::{Device, DeviceSpec, Peaks, RATES_HZ};
 use traces::energy::energies_j;
-use traces::io::Source;
+use traces::io::TraceReader;
 
 use super::convert::{check, may_be_saved, save};
 use super::failure::wrong;
@@ -39,16 +39,16 @@ pub(super) fn run(args: &SampleArgs, terminal: &Terminal) -> Result<(), Failure>
         terminal.warn_of(Code::PacketsLost, &format!("{losses}; --repair fills them"));
     }
     save(&sampled, &args.out, terminal)?;
-    let heading = sampled.heading();
-    let before_j = energies_j(&*trace, &[(heading.start_s, heading.end_s())])?[0];
+    let header = sampled.header();
+    let before_j = energies_j(&*trace, &[(header.start_s, header.end_s())])?[0];
     let after_j = sampled.energy_j;
     // A trace of no energy has no relative error.
     let error = (before_j != 0.0).then(|| after_j / before_j - 1.0);
-    let samples = heading.samples;
+    let samples = header.samples;
     if args.json {
         return print_json(
             &json!({ "samples": samples, "device": device.spec(), "energy_J": before_j, "sampled_energy_J": after_j,
-                "relative_error": error, "lost_samples": heading.lost_samples, "clipped_currents": sampled.clipped_currents,
+                "relative_error": error, "lost_samples": header.lost_samples, "clipped_currents": sampled.clipped_currents,
                 "clipped_voltages": sampled.clipped_voltages }),
             true,
         );

@@ -1,28 +1,32 @@
-//! Frames at another clock than the mark's, looked for again.
+//! Frames at another clock than the mark's, searched again.
 //!
-//! Templates follow content that changes slowly; at a clock step everything changes at once, and the sequence may go on evenly in
-//! another phase of the frame. So where neighbours become unlike, frames of both sides are aligned with the earlier ones drawn out in
-//! time ([`stretch`](super::super::stretch)), over the whole of a period. Outwards from the mark, each stretch between two such places
-//! is held against the last one that is known to be right. Where it lies elsewhere, one of its frames, put right, is worth a mark.
+//! Templates follow content that changes slowly. At a clock step everything changes at once, and the sequence
+//! may go on at the same period in another phase of the frame. So where neighbours differ, frames of both
+//! sides are aligned over a whole period, the earlier ones [scaled in time](crate::frames::refine). Outwards
+//! from the mark, each segment between two such changes is compared with the last one known to be right. If
+//! it lies elsewhere, one of its frames is corrected and used like a mark.
 
-use super::super::stretch::{Fit, Pair};
-use crate::median::median;
+use crate::frames::refine::{ScaledFit, ScaledPair};
+use crate::stats::upper_median;
 
-/// Neighbours are unlike if they leave this many times as much unexplained as neighbours usually do, and at least this share.
-const UNLIKE: [f64; 2] = [2.0, 0.06];
-/// At most so many such places are looked at: the most unlike.
-const MOST: usize = 200;
-/// Ratios of clocks agree within this share of themselves; so far from 1 clocks are not the same.
-const SAME: f64 = 0.09;
-/// What is off by less than this share is not misplaced: that is for finer alignment, and small errors must not add up on the way.
-const MISPLACED: f64 = 0.1;
-/// The share of the window before the start that is compared, and after it, of a beginning.
-const BEFORE: f64 = 0.1;
-const BEGINNING: f64 = 0.6;
-/// An alignment leaves at most this share of what is left where the stretch was thought to be.
-const BETTER: f64 = 0.5;
+/// Neighbours differ if they leave at least this many times the usual unexplained variance, and at least this
+/// share.
+const UNLIKE_LIMITS: [f64; 2] = [2.0, 0.06];
+/// Most changes that are examined: those of the largest difference.
+const MAX_CHANGES: usize = 200;
+/// Ratios of clocks agree within this share; clocks differ if their ratio is farther from 1.
+const MAX_CLOCK_DEVIATION: f64 = 0.09;
+/// Least misplacement that is corrected here, as a share: smaller ones are left to finer alignment, and must
+/// not add up on the way.
+const MIN_MISPLACEMENT: f64 = 0.1;
+/// Share of the window before the start that is compared.
+const BEFORE_SHARE: f64 = 0.1;
+/// Share of the window after the start that a beginning has.
+const BEGINNING_SHARE: f64 = 0.6;
+/// Largest share of the unexplained variance at the assumed place that a better alignment leaves.
+const MAX_IMPROVED_SHARE: f64 = 0.5;
 
-/// How frames of both sides of a step are held against each other.
+/// How frames of both sides of a step are compared.
 struct Comparison {
     /// Which frames are aligned: how many from the step on the known side, and how many on the other.
     pairs: &'static [[usize; 2]],
@@ -33,7 +37,7 @@ struct Comparison {
     /// How much after the start is compared.
     after: After,
     /// An alignment leaves at most this share of the variance.
-    alike: f64,
+    max_unexplained: f64,
 }
 
 /// How much after a start is compared: a share of the window, or of a period.
@@ -42,26 +46,26 @@ enum After {
     Period(f64),
 }
 
-/// The beginnings of the nearest frames: they lie closest to each other in content.
+/// The beginnings of the nearest frames, whose content differs least.
 const NEAREST: Comparison = Comparison {
     pairs: &[[1, 1], [1, 2], [2, 1], [2, 2]],
     agree: 3,
     within: 0.03,
-    after: After::Window(BEGINNING),
-    alike: 0.3,
+    after: After::Window(BEGINNING_SHARE),
+    max_unexplained: 0.3,
 };
-/// Nearly whole frames, for where beginnings are too much like something else in the frame: by noise, at a slow clock. The nearest frames
-/// are left out, as the clock may have stepped in the midst of one.
+/// Nearly whole frames, for beginnings that resemble another part of the frame (in noise, at a slow clock).
+/// The nearest frames are left out, as the clock may have stepped within one.
 const WHOLE: Comparison = Comparison {
     pairs: &[[2, 2], [2, 3], [3, 2], [3, 3], [3, 4], [4, 3]],
     agree: 4,
     within: 0.06,
     after: After::Period(0.8),
-    alike: 0.5,
+    max_unexplained: 0.5,
 };
 
-/// Offsets of windows of starts, put right, one for each stretch of `starts` that lies elsewhere; `anchor` is the place of the start in a
-/// window of `width` samples.
+/// Offsets of windows of starts, put right, one for each segment of `starts` that lies elsewhere; `anchor` is
+/// the place of the start in a window of `width` samples.
 pub(super) fn misplaced(
     power: &[f64],
     starts: &[usize],
@@ -95,32 +99,34 @@ impl View<'_> {
     /// Starts whose next one is unlike them, in order.
     fn steps(&self) -> Vec<usize> {
         let reach = self.share(0.12);
-        let unlike = |index: usize| {
-            let fit = self.pair([index, index + 1], 0, reach).plain();
-            fit.map_or(1.0, |fit| fit.unlike)
+        let remainder = |index: usize| {
+            let fit = self.pair([index, index + 1], 0, reach).unscaled();
+            fit.map_or(1.0, |fit| fit.unexplained)
         };
-        let unlike: Vec<f64> = (0..self.starts.len().saturating_sub(1)).map(unlike).collect();
-        let usual = median(&mut unlike.clone());
-        let limit = (UNLIKE[0] * usual).max(UNLIKE[1]);
-        let mut steps: Vec<usize> = (0..unlike.len()).filter(|&index| unlike[index] > limit).collect();
-        steps.sort_by(|a, b| unlike[*b].total_cmp(&unlike[*a]));
-        steps.truncate(MOST);
+        let unexplained: Vec<f64> = (0..self.starts.len().saturating_sub(1)).map(remainder).collect();
+        let usual = upper_median(&mut unexplained.clone());
+        let limit = (UNLIKE_LIMITS[0] * usual).max(UNLIKE_LIMITS[1]);
+        let mut steps: Vec<usize> =
+            (0..unexplained.len()).filter(|&index| unexplained[index] > limit).collect();
+        steps.sort_by(|a, b| unexplained[*b].total_cmp(&unexplained[*a]));
+        steps.truncate(MAX_CHANGES);
         steps.sort_unstable();
         steps
     }
 
-    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step can be told.
+    /// From step to step away from a mark, each by the starts on this side and on that, as long as every step
+    /// can be resolved.
     fn walk(&self, steps: impl Iterator<Item = [usize; 2]>, way: isize, found: &mut Vec<usize>) {
         let mut moved = 0;
         for [here, there] in steps {
             let by = |comparison| self.moved(comparison, [here, there], moved, way);
             let near = by(&NEAREST);
             let Some((at, by)) = near.or_else(|| by(&WHOLE)) else { return };
-            let misplaced = by.unsigned_abs() > self.share(MISPLACED);
+            let misplaced = by.unsigned_abs() > self.share(MIN_MISPLACEMENT);
             moved = if misplaced { by } else { 0 };
             if misplaced {
                 found.extend(self.starts[at].checked_add_signed(by));
-                // From where it takes whole frames to tell, the sequence had better be followed anew.
+                // Where only whole frames decide, the sequence is better tracked again from there.
                 if near.is_none() {
                     return;
                 }
@@ -128,8 +134,9 @@ impl View<'_> {
         }
     }
 
-    /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say that they should: the start
-    /// that fits best, and by how many samples. `None` where the two sides do not agree on one ratio of clocks and one place.
+    /// How far the starts from `there` on, in the way given, lie from where those up to `here`, moved, say
+    /// that they should: the start that fits best, and by how many samples. `None` where the two sides do not
+    /// agree on one ratio of clocks and one place.
     fn moved(
         &self,
         comparison: &Comparison,
@@ -137,7 +144,7 @@ impl View<'_> {
         moved: isize,
         way: isize,
     ) -> Option<(usize, isize)> {
-        let fits: Vec<(usize, Fit)> = comparison
+        let fits: Vec<(usize, ScaledFit)> = comparison
             .pairs
             .iter()
             .filter_map(|[back, on]| {
@@ -146,40 +153,44 @@ impl View<'_> {
                 Some((to, self.fit(comparison, from, to, moved)?))
             })
             .collect();
-        let shift = median(&mut fits.iter().map(|(_, fit)| fit.shift).collect::<Vec<_>>());
-        let ratio = median(&mut fits.iter().map(|(_, fit)| fit.ratio).collect::<Vec<_>>());
+        let shift = upper_median(&mut fits.iter().map(|(_, fit)| fit.shift).collect::<Vec<_>>());
+        let ratio = upper_median(&mut fits.iter().map(|(_, fit)| fit.ratio).collect::<Vec<_>>());
         let within = self.share(comparison.within) as f64;
-        let near = |(_, fit): &&(usize, Fit)| {
-            (fit.shift - shift).abs() <= within && (fit.ratio / ratio - 1.0).abs() < SAME
+        let near = |(_, fit): &&(usize, ScaledFit)| {
+            (fit.shift - shift).abs() <= within && (fit.ratio / ratio - 1.0).abs() < MAX_CLOCK_DEVIATION
         };
-        let agreed: Vec<&(usize, Fit)> = fits.iter().filter(near).collect();
-        let best = agreed.iter().min_by(|a, b| a.1.unlike.total_cmp(&b.1.unlike))?;
+        let agreed: Vec<&(usize, ScaledFit)> = fits.iter().filter(near).collect();
+        let best = agreed.iter().min_by(|a, b| a.1.unexplained.total_cmp(&b.1.unexplained))?;
         (agreed.len() >= comparison.agree).then(|| (best.0, libm::round(best.1.shift) as isize))
     }
 
-    /// The fit of a start to another over a period, if it is a good one, and either at hand or at another clock and much better than
-    /// what is at hand.
-    fn fit(&self, comparison: &Comparison, from: usize, to: usize, moved: isize) -> Option<Fit> {
+    /// The fit of a start to another over a period, if it is a good one, and either at the assumed place, or
+    /// at another clock and much better than there.
+    fn fit(&self, comparison: &Comparison, from: usize, to: usize, moved: isize) -> Option<ScaledFit> {
         let period = self.period(to)?;
         let after = match comparison.after {
             After::Window(share) => self.share(share),
             After::Period(share) => (share * period as f64) as usize,
         };
-        let best = |reach: usize| Pair { after, ..self.pair([from, to], moved, reach) }.best();
+        let best = |reach: usize| ScaledPair { after, ..self.pair([from, to], moved, reach) }.best();
         let fit = best(period / 2)?;
-        let at_hand = libm::fabs(fit.shift) <= self.share(MISPLACED) as f64;
-        let better = || best(self.share(MISPLACED)).is_none_or(|near| fit.unlike < BETTER * near.unlike);
-        let good = fit.unlike < comparison.alike && (at_hand || (fit.ratio - 1.0).abs() > SAME && better());
+        let in_place = libm::fabs(fit.shift) <= self.share(MIN_MISPLACEMENT) as f64;
+        let better = || {
+            best(self.share(MIN_MISPLACEMENT))
+                .is_none_or(|near| fit.unexplained < MAX_IMPROVED_SHARE * near.unexplained)
+        };
+        let good = fit.unexplained < comparison.max_unexplained
+            && (in_place || (fit.ratio - 1.0).abs() > MAX_CLOCK_DEVIATION && better());
         good.then_some(fit)
     }
 
     /// The beginnings of two frames.
-    fn pair(&self, starts: [usize; 2], moved: isize, reach: usize) -> Pair<'_> {
+    fn pair(&self, starts: [usize; 2], moved: isize, reach: usize) -> ScaledPair<'_> {
         let place =
             |start: usize| self.starts.get(start).map_or(usize::MAX / 2, |offset| offset + self.anchor);
-        let [before, after] = [BEFORE, BEGINNING].map(|share| self.share(share));
+        let [before, after] = [BEFORE_SHARE, BEGINNING_SHARE].map(|share| self.share(share));
         let starts = [place(starts[0]).saturating_add_signed(moved), place(starts[1])];
-        Pair { power: self.power, starts, before, after, reach }
+        ScaledPair { power: self.power, starts, before, after, reach }
     }
 
     /// The shorter of the gaps beside a start.
@@ -202,7 +213,8 @@ mod tests {
     const ANCHOR: usize = 50;
     const WIDTH: usize = 250;
 
-    /// Power of frames of 300 samples at clock 1, of as many of 480 at another: each a rest of 40 samples and draws that differ.
+    /// Power of frames of 300 samples at clock 1, of as many of 480 at another: each a rest of 40 samples and
+    /// draws that differ.
     fn trace(frames: usize, seed: u32) -> (Vec<f64>, Vec<usize>) {
         let height = |draw: u32| 0.3 + f64::from((draw * 7919 + seed * 104_729) % 97) / 97.0;
         let (mut power, mut starts) = (Vec::new(), Vec::new());
@@ -218,7 +230,7 @@ mod tests {
         (power, starts)
     }
 
-    /// Starts of which those at the other clock are found so many samples late.
+    /// Starts of which those at the other clock are found late, in samples.
     fn late(right: &[usize], by: usize) -> Vec<usize> {
         right.iter().enumerate().map(|(i, start)| if i < 12 { *start } else { start + by }).collect()
     }

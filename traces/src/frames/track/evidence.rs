@@ -1,20 +1,20 @@
-//! How much more likely a candidate is a start than not: the linear discriminant of two normal populations (Fisher 1936).
+//! Evidence for a candidate: the linear discriminant of two normal populations, starts and others (Fisher 1936).
 
 use super::Candidate;
 
-/// Logarithms of the distance by shape and by summed squares.
+/// Number of features: logarithms of the distance by shape and by summed squares.
 pub(super) const FEATURES: usize = 2;
-/// A single candidate says no more than this for itself, and no more than that against, in nats: content and clock may have changed.
-const BOUNDS: [f64; 2] = [-4.0, 10.0];
-/// Where power levels have changed, no more than this against: an even beat of frames that are alike weighs as much.
-const CHANGED: f64 = -3.0;
-/// What a mark weighs.
-const MARKED: f64 = 1e3;
-/// Variance added to each feature, as a share of its variance over all candidates. The more for the summed squares, which follow
-/// idle power and clock as well.
+/// Least and greatest evidence of a single candidate, in nats: content and clock may have changed.
+const EVIDENCE_LIMITS: [f64; 2] = [-4.0, 10.0];
+/// Least evidence where power levels have changed, in nats: an even period of similar frames weighs as much.
+const MIN_CHANGED_EVIDENCE: f64 = -3.0;
+/// Weight of a mark, in nats.
+const MARK_WEIGHT: f64 = 1e3;
+/// Variance added to each feature, as a share of its variance over all candidates; more for the summed
+/// squares, which depend on idle power and clock as well.
 const SHRINKAGE: [f64; FEATURES] = [0.2, 0.4];
 
-/// What a candidate is an example of.
+/// The class of an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Label {
     Start,
@@ -32,8 +32,8 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// From examples. A feature by which starts are farther than the rest is left out: nearer is never less likely. Where power
-    /// levels have changed, shape alone speaks, and less.
+    /// From examples. A feature by which starts are farther than the rest is left out: nearer is never less
+    /// likely. Where power levels have changed, shape alone speaks, and less.
     pub fn learn(candidates: &[Candidate], labels: &[Label], levels_changed: bool) -> Self {
         let of = |label: Label| -> Vec<[f64; FEATURES]> {
             let labelled = candidates.iter().zip(labels).filter(|(_, l)| **l == label);
@@ -57,7 +57,7 @@ impl Evidence {
         } else {
             discriminant(pooled, apart)
         };
-        let least = if levels_changed { CHANGED } else { BOUNDS[0] };
+        let least = if levels_changed { MIN_CHANGED_EVIDENCE } else { EVIDENCE_LIMITS[0] };
         let middle = (0..FEATURES).map(|i| direction[i] * 0.5 * (m1[i] + m0[i])).sum();
         Self { direction, middle, least }
     }
@@ -65,10 +65,10 @@ impl Evidence {
     /// The evidence for one candidate, nats.
     pub fn weight(&self, candidate: &Candidate, marks: &[usize]) -> f64 {
         if marks.contains(&candidate.offset) {
-            return MARKED;
+            return MARK_WEIGHT;
         }
         let along: f64 = self.direction.iter().zip(&candidate.features).map(|(a, b)| a * b).sum();
-        (along - self.middle).clamp(self.least, BOUNDS[1])
+        (along - self.middle).clamp(self.least, EVIDENCE_LIMITS[1])
     }
 }
 
@@ -125,7 +125,7 @@ mod tests {
         let weight = |features| evidence.weight(&candidates(&[features])[0], &[]);
         assert!(weight([0.0, 3.0]) > 1.0 && weight([1.4, 4.0]) < -1.0);
         assert_eq!((weight([-900.0, 3.0]), weight([900.0, 3.0])), (10.0, -4.0));
-        assert_eq!(evidence.weight(&candidates(&[[0.0, 0.0]])[0], &[0]), MARKED);
+        assert_eq!(evidence.weight(&candidates(&[[0.0, 0.0]])[0], &[0]), MARK_WEIGHT);
     }
 
     #[test]
@@ -145,7 +145,7 @@ mod tests {
         let evidence = Evidence::learn(&candidates(&features), &labels, true);
         let weight = |features| evidence.weight(&candidates(&[features])[0], &[]);
         assert_eq!(weight([0.2, -5.0]), weight([0.2, 5.0]));
-        assert_eq!(weight([900.0, 0.0]), CHANGED);
+        assert_eq!(weight([900.0, 0.0]), MIN_CHANGED_EVIDENCE);
     }
 
     #[test]

@@ -1,8 +1,8 @@
-//! Writing.
+//! Writing the native format.
 
-use crate::io::header::{self, KEYS};
-use crate::io::source::{Heading, Sink, Source, Stretch};
-use crate::io::{WriteError, atomic};
+use crate::io::description::KEYS;
+use crate::io::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
+use crate::io::{CURRENT_A, TIME_NS, VOLTAGE_V, WriteError, atomic, description};
 use parquet::basic::{Compression, Encoding, Repetition, Type as Physical};
 use parquet::data_type::{DataType, FloatType, Int64Type};
 use parquet::errors::ParquetError;
@@ -18,43 +18,44 @@ use std::sync::Arc;
 const GROUP_ROWS: u64 = 1 << 20;
 /// The columns, in order.
 const FIELDS: [(&str, Physical); 3] =
-    [("time_ns", Physical::INT64), ("voltage_V", Physical::FLOAT), ("current_A", Physical::FLOAT)];
+    [(TIME_NS, Physical::INT64), (VOLTAGE_V, Physical::FLOAT), (CURRENT_A, Physical::FLOAT)];
 
-/// Writes a trace, one row group after the other. The same trace gives the same bytes, whatever pieces it comes in.
+/// Writes a trace, one row group after the other. The same trace gives the same bytes, whatever pieces it
+/// comes in.
 ///
-/// Times are delta encoded, values a dictionary of the device's codes (byte planes where there are too many), both
-/// compressed with Snappy, which needs no C.
+/// Times are delta encoded, values a dictionary of the device's codes (byte planes where there are too many),
+/// both compressed with Snappy, which needs no C.
 ///
 /// # Errors
 /// [`WriteError`] if a mark is not finite, the writer fails, or the samples cannot be read.
-pub fn write<W: Write + Send>(trace: &dyn Source, out: W) -> Result<(), WriteError> {
-    let heading = trace.heading();
-    let json = header::to_json(&heading, false)?;
-    write_described(trace, heading, json, out)
+pub fn write<W: Write + Send>(trace: &dyn TraceReader, out: W) -> Result<(), WriteError> {
+    let header = trace.header();
+    let json = description::to_json(&header, false)?;
+    write_described(trace, header, json, out)
 }
 
 /// Writes a file, whole or not at all.
 ///
 /// # Errors
 /// [`WriteError`] names the file.
-pub fn save(trace: &dyn Source, path: &Path) -> Result<(), WriteError> {
+pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
     atomic::write_trace(path, |out| write(trace, out))
 }
 
 /// Without a description, as others write: rate and number of rows are then not stated.
 #[cfg(test)]
-pub(crate) fn bare(trace: &dyn Source, path: &Path) -> Result<(), WriteError> {
-    atomic::write_trace(path, |out| write_described(trace, trace.heading(), "{}".to_owned(), out))
+pub(crate) fn bare(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
+    atomic::write_trace(path, |out| write_described(trace, trace.header(), "{}".to_owned(), out))
 }
 
 fn write_described<W: Write + Send>(
-    trace: &dyn Source,
-    heading: Heading,
+    trace: &dyn TraceReader,
+    header: TraceHeader,
     json: String,
     out: W,
 ) -> Result<(), WriteError> {
-    let mut writer = Writer::new(heading, json, out).map_err(encode)?;
-    trace.pour(&mut writer)?;
+    let mut writer = Writer::new(header, json, out).map_err(encode)?;
+    trace.read_into(&mut writer)?;
     writer.finish().map_err(encode)
 }
 
@@ -65,17 +66,18 @@ fn encode(error: ParquetError) -> WriteError {
 /// A file being written: the rows of one group are held until it is full.
 struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
-    heading: Heading,
-    /// Number of the group at hand, as the numbers of samples have it: of groups that were lost whole nothing is written.
+    header: TraceHeader,
+    /// Number of the current group, by the numbers of its samples: groups that were lost whole are not
+    /// written.
     group: u64,
     times_ns: Vec<i64>,
     voltage_v: Vec<f32>,
     current_a: Vec<f32>,
 }
 
-impl<W: Write + Send> Sink for Writer<W> {
-    fn take(&mut self, stretch: &Stretch<'_>) -> Result<(), WriteError> {
-        let mut rest = *stretch;
+impl<W: Write + Send> TraceWriter for Writer<W> {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        let mut rest = *chunk;
         while !rest.is_empty() && !rest.lost {
             let group = rest.first / GROUP_ROWS;
             if group != self.group {
@@ -85,7 +87,7 @@ impl<W: Write + Send> Sink for Writer<W> {
             let room = ((group + 1) * GROUP_ROWS - rest.first) as usize;
             let now = rest.part(0, rest.len().min(room));
             self.times_ns
-                .extend((now.first..now.first + now.len() as u64).map(|row| self.heading.time_ns(row)));
+                .extend((now.first..now.first + now.len() as u64).map(|row| self.header.time_ns(row)));
             self.voltage_v.extend_from_slice(now.voltage_v);
             self.current_a.extend_from_slice(now.current_a);
             rest = rest.part(now.len(), rest.len());
@@ -95,10 +97,10 @@ impl<W: Write + Send> Sink for Writer<W> {
 }
 
 impl<W: Write + Send> Writer<W> {
-    fn new(heading: Heading, json: String, out: W) -> Result<Self, ParquetError> {
+    fn new(header: TraceHeader, json: String, out: W) -> Result<Self, ParquetError> {
         let file = SerializedFileWriter::new(out, Arc::new(schema()?), Arc::new(properties(json)))?;
         let (times_ns, voltage_v, current_a) = Default::default();
-        Ok(Self { file, heading, group: 0, times_ns, voltage_v, current_a })
+        Ok(Self { file, header, group: 0, times_ns, voltage_v, current_a })
     }
 
     fn write_group(&mut self) -> Result<(), ParquetError> {

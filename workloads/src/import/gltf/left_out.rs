@@ -73,14 +73,15 @@ fn maps(described: &Described, name: &str) -> Vec<Warning> {
     let emissive = described.emissive_factor.0.iter().any(|channel| *channel > 0.0);
     let metallic = surface.metallic_factor.0 > 0.0 && surface.metallic_roughness_texture.is_none();
     let rough = surface.metallic_roughness_texture.is_some();
-    let matt = "drawn as matt ones with a faint highlight";
+    let glossy = surface.metallic_factor.0 <= 0.0 && surface.roughness_factor.0 < 1.0 && !rough;
     let gloss = "ignored: every surface has the same faint highlight";
     let shaded = "ignored: nothing darkens the corners";
     let found = [
         normal.then(|| ignored::normal_map(name)),
         emissive.then(|| ignored::emissive(name)),
         occlusion.then(|| about_material(Code::OcclusionMapIgnored, "occlusion map", shaded, name)),
-        metallic.then(|| about_material(Code::MetallicIgnored, "metallic material", matt, name)),
+        metallic.then(|| ignored::metallic(name)),
+        glossy.then(|| ignored::reflection(name)),
         rough.then(|| about_material(Code::MetallicIgnored, "metallic-roughness map", gloss, name)),
     ];
     found.into_iter().flatten().collect()

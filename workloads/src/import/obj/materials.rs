@@ -105,8 +105,11 @@ impl Textures {
         let name = &described.name;
         let left_out = [
             described.cut_out.then(|| ignored::cut_out(name)),
-            (described.opacity < 1.0 && !described.cut_out).then(|| ignored::blended(name)),
+            (described.is_see_through() && !described.cut_out).then(|| ignored::blended(name)),
             described.bumpy.then(|| ignored::normal_map(name)),
+            described.displaced.then(|| ignored::displacement(name)),
+            (described.metallic > 0.0).then(|| ignored::metallic(name)),
+            described.shines().then(|| ignored::reflection(name)),
             described.emissive.then(|| ignored::emissive(name)),
         ];
         warnings.extend(left_out.into_iter().flatten());

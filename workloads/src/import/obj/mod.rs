@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use glam::Vec2;
+use warnings::{Code, Warning};
 
 use super::soup::Soup;
 use crate::error::LoadError;
@@ -18,6 +19,14 @@ pub(crate) use statements::{Face, statements};
 pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let found = statements(path)?;
     let mut soup = geometry(&found);
+    let lines = found.dropped.iter().map(|line| format!("{}, line {line}", path.display()));
+    let what = "not drawn: only faces are";
+    soup.warnings.extend(Warning::about_all(
+        Code::PrimitiveDropped,
+        "point, line or curve element",
+        what,
+        lines,
+    ));
     if !found.materials.is_empty() {
         materials::dress(&mut soup, &found, path)?;
     }
@@ -83,6 +92,15 @@ mod tests {
         assert_eq!((soup.colors[0], soup.colors[2]), (Vec3::X, Vec3::Z));
         assert_eq!(soup.normals, [Vec3::Z; 4]);
         assert!(soup.looks.materials.is_empty() && soup.warnings.is_empty());
+    }
+
+    #[test]
+    fn points_and_lines_are_reported_on_one_line() {
+        let warnings = soup("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\np 1\np 2\n").warnings;
+        let [dropped] = &warnings[..] else { panic!("{warnings:?}") };
+        let text = dropped.to_string();
+        assert!(text.starts_with("[primitive-dropped] 3 point, line or curve elements not drawn"), "{text}");
+        assert!(text.contains("line 5, and 2 more"), "{text}");
     }
 
     #[test]

@@ -21,8 +21,30 @@ pub(super) struct Described {
     pub cut_out: bool,
     /// Whether there is a normal or bump map.
     pub bumpy: bool,
-    /// Whether it sheds light (`Ke`).
+    /// Whether there is a displacement map.
+    pub displaced: bool,
+    /// Whether it sheds light (`Ke`, `map_Ke`).
     pub emissive: bool,
+    /// `Pm`: how metallic it is.
+    pub metallic: f32,
+    shine: Shine,
+}
+
+/// What a material says about its highlight, its reflections and the light that it lets through.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Shine {
+    /// `Ks` is not black; `None` where it is not given.
+    specular: Option<bool>,
+    /// Whether there is a `map_Ks` or `map_Ns`.
+    mapped: bool,
+    /// `refl`, or a coat.
+    reflects: bool,
+    /// `Pr`.
+    roughness: Option<f32>,
+    /// `Tf` is neither white, which filters nothing, nor black.
+    filters: bool,
+    /// `illum`: 0 and 1 have no highlight.
+    model: Option<u8>,
 }
 
 /// A texture and its options.
@@ -59,17 +81,44 @@ impl Described {
     fn statement(&mut self, word: &str, rest: &str) -> Result<(), String> {
         match word {
             "Kd" => self.color = color(rest)?,
-            "Ke" => self.emissive = color(rest)?.is_some_and(|c| c.iter().any(|channel| *channel > 0.0)),
+            "Ke" => self.emissive = color(rest)?.is_some_and(is_bright),
+            "Ks" => self.shine.specular = Some(color(rest)?.is_some_and(is_bright)),
+            "Tf" => self.shine.filters = color(rest)?.is_some_and(|c| is_bright(c) && c != [1.0; 3]),
+            "illum" => self.shine.model = rest.parse().ok(),
+            "Pm" => self.metallic = number(rest)?,
+            "Pr" => self.shine.roughness = Some(number(rest)?),
+            "Pc" | "Ps" => self.shine.reflects |= color(rest)?.is_some_and(is_bright),
             "d" => self.opacity = opacity(rest)?,
             "Tr" => self.opacity = 1.0 - opacity(rest)?,
             "map_Kd" => self.texture = Some(Map::new(rest)?),
             "map_d" => self.cut_out = true,
+            "map_Ke" => self.emissive = true,
+            "map_Ks" | "map_Ns" | "map_Pr" => self.shine.mapped = true,
+            "map_Pm" => self.metallic = 1.0,
+            "refl" => self.shine.reflects = true,
+            "disp" => self.displaced = true,
             "bump" | "norm" => self.bumpy = true,
             _ if word.eq_ignore_ascii_case("map_bump") => self.bumpy = true,
             _ => {}
         }
         Ok(())
     }
+
+    /// Whether it has another highlight than every surface has, or reflections.
+    pub fn shines(&self) -> bool {
+        let Shine { specular, mapped, reflects, roughness, model, .. } = self.shine;
+        let has_highlight = !matches!(model, Some(0 | 1)) && specular.unwrap_or(mapped);
+        has_highlight || reflects || self.metallic <= 0.0 && roughness.is_some_and(|rough| rough < 1.0)
+    }
+
+    /// Whether what is behind it shows.
+    pub fn is_see_through(&self) -> bool {
+        self.opacity < 1.0 || self.shine.filters
+    }
+}
+
+fn is_bright(color: [f32; 3]) -> bool {
+    color.iter().any(|channel| *channel > 0.0)
 }
 
 /// One number for grey, or three; nothing for a spectrum or another colour space.
@@ -175,6 +224,38 @@ mod tests {
             (true, true, false, 1.0)
         );
         assert_eq!((found[2].emissive, found[2].opacity, found[2].color), (true, 0.5, None));
+    }
+
+    #[test]
+    fn only_what_changes_the_picture_shines_or_shows_what_is_behind() {
+        let of = |text: &str| {
+            let found = parse(&format!("newmtl a\n{text}\n")).unwrap();
+            (found[0].shines(), found[0].is_see_through())
+        };
+        for harmless in [
+            "Ks 0 0 0\nNs 500\nillum 2",
+            "Ks 1 1 1\nillum 1",
+            "Ns 10",
+            "Tf 1 1 1",
+            "Tf 0 0 0",
+            "Pr 1",
+            "illum 2",
+        ] {
+            assert_eq!(of(harmless), (false, false), "{harmless}");
+        }
+        for shiny in [
+            "Ks 1 1 1",
+            "Ks 0.5\nNs 10\nillum 2",
+            "map_Ks a.png",
+            "refl -type sphere a.png",
+            "Pr 0.2",
+            "Pc 0.5",
+        ] {
+            assert_eq!(of(shiny), (true, false), "{shiny}");
+        }
+        for clear in ["d 0.5", "Tr 0.5", "Tf 0.2 0.9 0.2"] {
+            assert_eq!(of(clear), (false, true), "{clear}");
+        }
     }
 
     #[test]

@@ -43,6 +43,8 @@ pub(crate) struct Statements {
     pub materials: Vec<String>,
     /// Files of materials.
     pub libraries: Vec<String>,
+    /// Lines of the file with points, lines, curves and curved surfaces, which are not drawn.
+    pub dropped: Vec<usize>,
 }
 
 /// The most of anything in one file.
@@ -127,10 +129,17 @@ impl Reading {
             "f" => self.face(rest)?,
             "usemtl" => self.use_material(rest.trim()),
             "mtllib" => found.libraries.push(rest.trim().to_owned()),
+            "p" | "l" | "curv" | "curv2" | "surf" => found.dropped.push(self.line),
             _ => {}
         }
         let found = &self.statements;
-        let counts = [found.positions.len(), found.uvs.len(), found.normals.len(), found.faces.len()];
+        let counts = [
+            found.positions.len(),
+            found.uvs.len(),
+            found.normals.len(),
+            found.faces.len(),
+            found.dropped.len(),
+        ];
         if counts.iter().all(|count| *count <= MOST) {
             Ok(())
         } else {
@@ -169,6 +178,9 @@ impl Reading {
         let corners = rest.split_ascii_whitespace().map(|word| self.corner(word));
         let corners = corners.collect::<Result<Vec<_>, _>>()?;
         // Two corners are an edge and no face.
+        if (1..3).contains(&corners.len()) {
+            self.statements.dropped.push(self.line);
+        }
         let fan = corners.windows(2).skip(1);
         let face = |pair: &[Corner]| Face {
             line: self.line,
@@ -284,6 +296,7 @@ mod tests {
         assert_eq!((first[0].uv, first[0].normal), (Some(0), Some(0)));
         assert_eq!((first[1].uv, first[1].normal), (None, Some(0)));
         assert_eq!((first[2].uv, first[2].normal), (Some(0), None));
+        assert_eq!(found.dropped, [11, 12]);
     }
 
     #[test]

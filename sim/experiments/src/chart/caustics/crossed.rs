@@ -7,7 +7,7 @@ use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, Squares, cro
 
 use super::Effort;
 use super::view::{SQUARE_PX, above, from_the_side, water};
-use crate::chart::ChartError;
+use crate::study::StudyError;
 use output::progress::Bar;
 
 /// Depth of the water in metres: half of all beams fold above the floor.
@@ -58,7 +58,7 @@ struct Bench {
 }
 
 /// Every pleat of every number of triangles.
-pub(super) fn measure(effort: &Effort, bar: &Bar) -> Result<Vec<Crossed>, ChartError> {
+pub(super) fn measure(effort: &Effort, bar: &Bar) -> Result<Vec<Crossed>, StudyError> {
     let mut rows = Vec::new();
     for &cells in effort.pleated_cells {
         let bench = Bench::new(effort, cells)?;
@@ -75,7 +75,7 @@ fn floor() -> Floor {
 }
 
 impl Bench {
-    fn new(effort: &Effort, cells: u32) -> Result<Self, ChartError> {
+    fn new(effort: &Effort, cells: u32) -> Result<Self, StudyError> {
         let surface = Water { overshoot: OVERSHOOT, depth_m: DEPTH_M, ..water(cells, SLOPE) };
         let middle = DVec3::new(1.5, -0.6 * DEPTH_M, 1.0);
         let aside = from_the_side(middle, DEPTH_M, effort.sweep_px)?;

@@ -3,20 +3,13 @@
 use workloads::caustics::{CROSSED, Method};
 
 use super::{CausticsChart, Coarse, Crossed};
-use output::plot::{Chart, ChartPanel, Look, Picture, Scale, Series};
-use output::table::Table;
+use output::plot::{ChartPanel, Scale, Series};
 
 const CROSSING: &str = "length of beams for which their sides cross (%)";
 
 /// Errors over the number of triangles and over how much sides cross, and what bodies lose there.
-pub(super) fn picture(chart: &CausticsChart, look: &Look) -> Picture {
-    let subject = format!(
-        "light on the floor in squares of 8x8 pixels against {} photons, refracted at the waves themselves; for crossed sides the light and the number of \
-         triangles stay the same, they only stand ever more along the light",
-        chart.effort.rays * chart.effort.rays
-    );
-    let panels = vec![coarse(chart), error(chart), lost(chart), useful(chart)];
-    Chart::new("Where caustics fail: coarse surfaces and crossed sides", &subject, panels).picture(look)
+pub(super) fn panels(chart: &CausticsChart) -> Vec<ChartPanel> {
+    vec![coarse(chart), error(chart), lost(chart), useful(chart)]
 }
 
 fn coarse(chart: &CausticsChart) -> ChartPanel {
@@ -76,21 +69,4 @@ fn useful(chart: &CausticsChart) -> ChartPanel {
     let curves = Method::ALL.into_iter().enumerate().map(of).collect();
     let title = format!("use, {most} squares along a side");
     over_crossing(&title, "share of executions that find light", curves)
-}
-
-/// The sweep over crossed sides, as it is printed.
-pub(super) fn table(chart: &CausticsChart) -> Table {
-    let mut table = Table::new([
-        "cells", "pleat", "crossed", "floor", "noise", "volume", "missing", "lost", "moving", "refined",
-        "hull", "prism", "warns",
-    ]);
-    for row in &chart.crossed {
-        let mut cells = vec![row.cells.to_string(), row.pleat.to_string(), format!("{:.4}", row.crossing)];
-        cells.extend([row.floor_error, row.noise, row.volume_error].map(|error| format!("{error:.4}")));
-        cells.extend([row.missing, row.lost].map(|part| format!("{part:.5}")));
-        cells.extend(row.useful.map(|useful| format!("{useful:.3}")));
-        cells.push(if row.warned { "yes" } else { "no" }.to_owned());
-        table.row(cells);
-    }
-    table
 }

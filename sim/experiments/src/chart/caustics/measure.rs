@@ -8,7 +8,7 @@ use workloads::caustics::{Floor, Light, Method, Picture, SQUARES, Squares, cross
 
 use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, aside_of, water};
 use super::{CausticsChart, Coarse, Effort, Row, crossed};
-use crate::chart::ChartError;
+use crate::study::StudyError;
 use output::progress::{Bar, Progress};
 
 /// Slopes of the oceans that get coarser.
@@ -39,7 +39,7 @@ pub fn ocean(
     [slope, depth_m]: [f64; 2],
     size: [u32; 2],
     progress: &Progress,
-) -> Result<Ocean, ChartError> {
+) -> Result<Ocean, StudyError> {
     let water = Water { depth_m, ..water(cells, slope) };
     let (beams, eye) = (water.beams(0.0), aside_of(depth_m, size)?);
     let bar = progress.bar("ocean", 4);
@@ -57,7 +57,7 @@ pub fn ocean(
     })
 }
 
-pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, ChartError> {
+pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsChart, StudyError> {
     let ocean = ocean(effort.ocean_cells, [SLOPE, DEPTH_M], effort.ocean_px, progress)?;
     let steps = effort.slopes.len() * 4
         + COARSE_SLOPES.len() * effort.coarse_cells.len()
@@ -77,7 +77,7 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<CausticsCha
 }
 
 /// Every method on one surface: the light in the volume.
-fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Result<Vec<Row>, ChartError> {
+fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Result<Vec<Row>, StudyError> {
     let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
     let ours = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
     let crossing = crossing(&beams);
@@ -106,7 +106,7 @@ fn by_method(effort: &Effort, slope: f64, thread: &ThreadPool, bar: &Bar) -> Res
 }
 
 /// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the light on the floor.
-fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, ChartError> {
+fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
     let eye = above(effort.floor_px)?;
     let squares = Squares { eye: &eye, side_px: SQUARE_PX };
     let floor = Floor { height_m: -DEPTH_M };

@@ -3,20 +3,19 @@
 mod crossed;
 mod failures;
 mod measure;
-mod tables;
 pub(crate) mod view;
 
 use serde::Serialize;
 use workloads::caustics::Method;
 
-use super::ChartError;
-use output::OutDir;
-use output::plot::Look;
+use crate::study::table::{Sheet, Table, fixed, millis, plain};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Look, Picture, Scale, Series, Shading};
 use output::progress::Progress;
 
 pub use crossed::Crossed;
 pub use measure::{Ocean, ocean};
-pub use tables::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -43,37 +42,6 @@ pub struct Effort {
     pub floor_px: u32,
     /// Times are medians of so many.
     pub repeats: usize,
-}
-
-impl Effort {
-    /// The chart of the book.
-    pub const FULL: Self = Self {
-        ocean_cells: 255,
-        ocean_px: [512, 288],
-        sweep_cells: 24,
-        sweep_px: [128, 72],
-        slopes: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0],
-        coarse_cells: &[8, 16, 32, 64, 128],
-        pleated_cells: &[24, 48, 96],
-        pleats: &[0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
-        rays: 2400,
-        floor_px: 512,
-        repeats: 3,
-    };
-    /// A look in seconds.
-    pub const QUICK: Self = Self {
-        ocean_cells: 48,
-        ocean_px: [192, 108],
-        sweep_cells: 10,
-        sweep_px: [64, 36],
-        slopes: &[0.02, 0.1, 0.4, 1.0],
-        coarse_cells: &[8, 16, 32, 64],
-        pleated_cells: &[32],
-        pleats: &[0.0, 0.05, 0.2, 0.5],
-        rays: 1000,
-        floor_px: 192,
-        repeats: 1,
-    };
 }
 
 /// One method on one surface.
@@ -129,28 +97,270 @@ pub struct CausticsChart {
     pub crossed: Vec<Crossed>,
 }
 
-/// Measures the chart and writes it into `dir`.
-///
-/// # Errors
-/// [`ChartError`], above all when `dir` cannot be written to.
-pub fn chart(
-    effort: Effort,
-    dir: &OutDir,
-    look: &Look,
-    progress: &Progress,
-) -> Result<CausticsChart, ChartError> {
-    let chart = measure::measure(effort, progress)?;
-    tables::write(&chart, dir, look)?;
-    Ok(chart)
+/// Short names of the methods, in the order of [`Method::ALL`].
+const KEYS: [&str; 4] = ["moving", "refined", "hull", "prism"];
+/// What the maps of the methods are called, in the order of [`Method::ALL`].
+const MAPS: [&str; 4] =
+    ["caustics_map_moving", "caustics_map_refined", "caustics_map_hull", "caustics_map_prism"];
+
+impl Study for CausticsChart {
+    const NAME: &'static str = "caustics";
+    const ABOUT: &'static str =
+        "Shader executions and images of caustics, by how beams are bounded, and where beams fail";
+    const PICTURES: &'static [&'static str] =
+        &["caustics", "caustics_failures", MAPS[0], MAPS[1], MAPS[2], MAPS[3]];
+    const FILES: &'static [&'static str] = &["caustics.csv", "caustics.json"];
+
+    type Effort = Effort;
+    const FULL: Effort = Effort {
+        ocean_cells: 255,
+        ocean_px: [512, 288],
+        sweep_cells: 24,
+        sweep_px: [128, 72],
+        slopes: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0],
+        coarse_cells: &[8, 16, 32, 64, 128],
+        pleated_cells: &[24, 48, 96],
+        pleats: &[0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+        rays: 2400,
+        floor_px: 512,
+        repeats: 3,
+    };
+    const QUICK: Effort = Effort {
+        ocean_cells: 48,
+        ocean_px: [192, 108],
+        sweep_cells: 10,
+        sweep_px: [64, 36],
+        slopes: &[0.02, 0.1, 0.4, 1.0],
+        coarse_cells: &[8, 16, 32, 64],
+        pleated_cells: &[32],
+        pleats: &[0.0, 0.05, 0.2, 0.5],
+        rays: 1000,
+        floor_px: 192,
+        repeats: 1,
+    };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        measure::measure(effort, progress)
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let subject = format!(
+            "light in the water under {} generator triangles; the image is the same by every method",
+            2 * self.effort.sweep_cells * self.effort.sweep_cells
+        );
+        to.chart("caustics", ["Caustics: beams and bodies about them", &subject], self.costs())?;
+        let title = "Where caustics fail: coarse surfaces and crossed sides";
+        let subject = format!(
+            "light on the floor in squares of 8x8 pixels against {} photons, refracted at the waves themselves; for crossed sides the light and the number of \
+             triangles stay the same, they only stand ever more along the light",
+            self.effort.rays * self.effort.rays
+        );
+        to.chart("caustics_failures", [title, &subject], failures::panels(self))?;
+        let mut maps = Method::ALL.into_iter().zip(MAPS);
+        maps.try_for_each(|(method, stem)| to.add(stem, &self.ocean.map(method, to.look())))
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let (ocean, yes_no) = (&self.ocean, |yes: bool| if yes { "yes" } else { "no" }.to_owned());
+        let pixels = f64::from(ocean.size[0] * ocean.size[1]);
+        let methods = Table::of(Method::ALL.into_iter().enumerate())
+            .shown("ocean", |(_, method)| method.name(), plain)
+            .shown("executions", |(place, _)| ocean.executions[*place], plain)
+            .shown("a pixel", |(place, _)| ocean.executions[*place] as f64 / pixels, fixed(1))
+            .shown("most", |(place, _)| ocean.most[*place], plain)
+            .shown("of the prism's", |(place, _)| ocean.of_the_prism(*place), fixed(3))
+            .before(format!("{} volumes\n", ocean.volumes));
+        let sweep = Table::of(&self.rows)
+            .shown("slope", |row| row.slope, plain)
+            .shown("crossed", |row| row.crossing, fixed(4))
+            .shown("method", |row| row.method.name(), plain)
+            .shown("executions", |row| row.executions, plain)
+            .shown("find light", |row| row.useful, fixed(3))
+            .shown("CPU ms", |row| row.cpu_s, millis(1));
+        let coarse = Table::of(&self.coarse)
+            .shown("slope", |row| row.slope, plain)
+            .shown("cells", |row| row.cells, plain)
+            .shown("crossed", |row| row.crossing, fixed(4))
+            .shown("error", |row| row.error, fixed(3))
+            .shown("warns", |row| row.warned, yes_no);
+        let mut crossed = Table::of(&self.crossed)
+            .shown("cells", |row| row.cells, plain)
+            .shown("pleat", |row| row.pleat, plain)
+            .shown("crossed", |row| row.crossing, fixed(4))
+            .shown("floor", |row| row.floor_error, fixed(4))
+            .shown("noise", |row| row.noise, fixed(4))
+            .shown("volume", |row| row.volume_error, fixed(4))
+            .shown("missing", |row| row.missing, fixed(5))
+            .shown("lost", |row| row.lost, fixed(5));
+        for (place, method) in KEYS.into_iter().enumerate() {
+            crossed = crossed.shown(method, |row| row.useful[place], fixed(3));
+        }
+        let crossed = crossed.shown("warns", |row| row.warned, yes_no).after("\n");
+        vec![methods.sheet(), sweep.sheet(), coarse.sheet(), crossed.sheet(), self.lines()]
+    }
+
+    /// The first promise that was found broken.
+    fn fault(&self) -> Option<String> {
+        let other = self.rows.iter().find(|row| row.difference > 0.0).map(|row| row.method.name());
+        let pleated =
+            self.crossed.iter().find(|row| row.difference > 0.0).map(|_| "a body about pleated beams");
+        let name = other.or(pleated)?;
+        Some(format!("{name} draws another image than the moving triangles; please report it"))
+    }
+}
+
+/// A line of `caustics.csv`: what a sweep has of a surface and a method.
+#[derive(Default)]
+struct Line {
+    sweep: &'static str,
+    slope_or_pleat: f64,
+    cells: u32,
+    crossing: f64,
+    method: &'static str,
+    executions: Option<u64>,
+    useful: Option<f64>,
+    difference: Option<f64>,
+    cpu_s: Option<f64>,
+    error: Option<f64>,
+}
+
+impl Line {
+    fn of_slope(row: &Row, cells: u32) -> Self {
+        let place = Method::ALL.iter().position(|method| *method == row.method).unwrap_or(0);
+        Self {
+            sweep: "slope",
+            slope_or_pleat: row.slope,
+            cells,
+            crossing: row.crossing,
+            method: KEYS[place],
+            executions: Some(row.executions),
+            useful: Some(row.useful),
+            difference: Some(row.difference),
+            cpu_s: Some(row.cpu_s),
+            error: None,
+        }
+    }
+
+    fn of_cells(row: &Coarse) -> Self {
+        let (sweep, method, error) = ("cells", KEYS[0], Some(row.error));
+        let (slope_or_pleat, cells, crossing) = (row.slope, row.cells, row.crossing);
+        Self { sweep, slope_or_pleat, cells, crossing, method, error, ..Self::default() }
+    }
+
+    fn of_pleat(row: &Crossed) -> [Self; 4] {
+        [0, 1, 2, 3].map(|place| Self {
+            sweep: "pleat",
+            slope_or_pleat: row.pleat,
+            cells: row.cells,
+            crossing: row.crossing,
+            method: KEYS[place],
+            executions: Some(row.executions[place]),
+            useful: Some(row.useful[place]),
+            difference: Some(row.difference),
+            cpu_s: None,
+            error: Some(row.floor_error),
+        })
+    }
+}
+
+impl CausticsChart {
+    /// All sweeps in one file.
+    fn lines(&self) -> Sheet {
+        let slopes = self.rows.iter().map(|row| Line::of_slope(row, self.effort.sweep_cells));
+        let lines = slopes.chain(self.coarse.iter().map(Line::of_cells));
+        Table::of(lines.chain(self.crossed.iter().flat_map(Line::of_pleat)))
+            .data("sweep", |line| line.sweep)
+            .data("slope_or_pleat", |line| line.slope_or_pleat)
+            .data("cells", |line| line.cells)
+            .data("crossing", |line| line.crossing)
+            .data("method", |line| line.method)
+            .data("executions", |line| line.executions)
+            .data("useful", |line| line.useful)
+            .data("difference", |line| line.difference)
+            .data("cpu_s", |line| line.cpu_s)
+            .data("error", |line| line.error)
+            .csv("caustics.csv")
+            .sheet()
+    }
+
+    fn costs(&self) -> Vec<ChartPanel> {
+        let by_method = |of: fn(&Row) -> f64| {
+            let curve = |method: Method| {
+                let rows = self.rows.iter().filter(move |row| row.method == method);
+                Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
+            };
+            Method::ALL.map(curve).into()
+        };
+        let panel = |title: &str, up: &str, of| {
+            ChartPanel::new(title, ["slope of the waves (root mean square)", up], by_method(of))
+                .on(Scale::Decades, Scale::Even)
+        };
+        vec![
+            panel("cost", "shader executions", |row| row.executions as f64),
+            panel("use", "share of executions that find light", |row| row.useful),
+            panel("cost", "CPU time (ms)", |row| 1e3 * row.cpu_s),
+        ]
+    }
+}
+
+/// Pixels along a side of a rectangle of a map.
+const MAP_PX: u32 = 4;
+
+impl Ocean {
+    /// Executions of a method at every pixel (Fig. 8), in colours that are the same for all methods.
+    pub fn map(&self, method: Method, look: &Look) -> Picture {
+        let place = Method::ALL.iter().position(|known| *known == method).unwrap_or(0);
+        let values = (0..self.runs.len()).flat_map(|place| self.tiles(place)).map(|tile| tile.value);
+        HeatMapPlot {
+            title: &format!("Shader executions of a pixel: {}", method.name()),
+            subject: &format!(
+                "{} volumes under waves, {}x{} pixels; {} executions in all, {:.2} of the prism's; the same colours for all methods",
+                self.volumes,
+                self.size[0],
+                self.size[1],
+                self.executions[place],
+                self.of_the_prism(place)
+            ),
+            label: "executions",
+            size: self.size,
+            tiles: &self.tiles(place),
+            shading: Shading::UpTo(values.fold(0.0, f64::max)),
+            brightness: &[],
+        }
+        .picture(look)
+    }
+
+    /// Executions of the method at `place` over those of the prism.
+    fn of_the_prism(&self, place: usize) -> f64 {
+        self.executions[place] as f64 / self.executions[3] as f64
+    }
+
+    /// Means over squares of pixels of the executions of the method at `place`.
+    fn tiles(&self, place: usize) -> Vec<HeatTile> {
+        let ([width, height], runs) = (self.size, &self.runs[place]);
+        let mean = |x: u32, y: u32| {
+            let size = [MAP_PX.min(width - x), MAP_PX.min(height - y)];
+            let rows = (y..y + size[1]).map(|row| (row * width + x) as usize);
+            let sum: u64 = rows
+                .flat_map(|first| &runs[first..first + size[0] as usize])
+                .map(|runs| u64::from(*runs))
+                .sum();
+            HeatTile { origin: [x, y], size, value: sum as f64 / f64::from(size[0] * size[1]) }
+        };
+        let rows = (0..height).step_by(MAP_PX as usize);
+        rows.flat_map(|y| (0..width).step_by(MAP_PX as usize).map(move |x| (x, y)))
+            .map(|(x, y)| mean(x, y))
+            .collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::written;
 
     #[test]
     fn the_files_are_all_there_and_agree() {
-        let folder = tempfile::tempdir().unwrap();
         let least = Effort {
             ocean_cells: 6,
             ocean_px: [48, 27],
@@ -164,11 +374,7 @@ mod tests {
             floor_px: 48,
             repeats: 1,
         };
-        let chart = OutDir::with(folder.path(), claim(), |dir| {
-            chart(least, dir, &Look::default(), &Progress::new(true))
-        })
-        .unwrap()
-        .unwrap();
+        let (folder, chart, done) = written::<CausticsChart>(least);
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("caustics.json")).unwrap();
         assert_eq!(json["rows"].as_array().unwrap().len(), 2 * 4);
@@ -178,11 +384,9 @@ mod tests {
         let [straight, crossed] = [&chart.crossed[0], &chart.crossed[1]];
         assert!(crossed.crossing > straight.crossing + 0.02);
         assert!(chart.crossed.iter().all(|row| row.difference == 0.0 && row.floor_error > row.noise));
-        assert!(
-            read("caustics.svg").contains("moving") && folder.path().join("caustics_map_prism.png").exists()
-        );
+        assert!(read("caustics.svg").contains("moving"));
         assert!(chart.rows.iter().all(|row| row.difference == 0.0), "the same image by every method");
-        assert!(chart.text().contains("convex hull"));
+        assert!(done.text.contains("convex hull"));
         for slope in 0..2 {
             let of = |method: usize| chart.rows[4 * slope + method].executions;
             assert!(of(0) <= of(1) && of(0) <= of(2) && of(2) <= of(3));

@@ -4,7 +4,7 @@ use glam::DVec3;
 use workloads::caustics::Eye;
 use workloads::caustics::generator::Ocean;
 
-use crate::chart::ChartError;
+use crate::study::StudyError;
 
 /// Side and depth of the water and its longest waves, in metres.
 pub(crate) const SIDE_M: f64 = 16.0;
@@ -22,26 +22,26 @@ pub(crate) fn water(cells: u32, slope: f64) -> Ocean {
 }
 
 /// All of the water from the side, a little above and askew.
-pub(crate) fn aside(size: [u32; 2]) -> Result<Eye, ChartError> {
+pub(crate) fn aside(size: [u32; 2]) -> Result<Eye, StudyError> {
     aside_of(DEPTH_M, size)
 }
 
 /// The same for water of another depth.
-pub(crate) fn aside_of(depth_m: f64, size: [u32; 2]) -> Result<Eye, ChartError> {
+pub(crate) fn aside_of(depth_m: f64, size: [u32; 2]) -> Result<Eye, StudyError> {
     from_the_side(DVec3::new(0.6, -0.5 * depth_m, 0.3), 6.5, size)
 }
 
 /// Water about `middle`, `reach` metres up and down.
-pub(super) fn from_the_side(middle: DVec3, reach: f64, size: [u32; 2]) -> Result<Eye, ChartError> {
+pub(super) fn from_the_side(middle: DVec3, reach: f64, size: [u32; 2]) -> Result<Eye, StudyError> {
     let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
     eye([from, middle, DVec3::Y], reach, size)
 }
 
 /// The middle of the floor from above.
-pub(crate) fn above(side: u32) -> Result<Eye, ChartError> {
+pub(crate) fn above(side: u32) -> Result<Eye, StudyError> {
     eye([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.3 * SIDE_M, [side; 2])
 }
 
-fn eye(place: [DVec3; 3], reach: f64, size: [u32; 2]) -> Result<Eye, ChartError> {
-    Eye::new(place, reach, size).ok_or_else(|| ChartError::Pipeline("a view without extent".to_owned()))
+fn eye(place: [DVec3; 3], reach: f64, size: [u32; 2]) -> Result<Eye, StudyError> {
+    Eye::new(place, reach, size).ok_or_else(|| StudyError::Pipeline("a view without extent".to_owned()))
 }

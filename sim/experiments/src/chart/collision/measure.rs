@@ -4,8 +4,8 @@ use cpu_time::ThreadTime;
 use workloads::collision::families::{Case, slide, triangles_boxes_touch};
 use workloads::collision::{Search, candidates, detect};
 
-use super::super::ChartError;
 use super::{Effort, Row, Set, Slide, Way};
+use crate::study::StudyError;
 use output::progress::Progress;
 
 /// Whether a case is one of many objects, as an index.
@@ -25,7 +25,7 @@ pub(super) fn pairs(cases: &[Case]) -> [[usize; 2]; 2] {
 }
 
 /// All cases by one way, on a thread of its own so that its time is its own.
-pub(super) fn row(way: &Way, set: Set, cases: &[Case]) -> Result<Row, ChartError> {
+pub(super) fn row(way: &Way, set: Set, cases: &[Case]) -> Result<Row, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(|| {
         let (mut vain, mut missed, mut candidates) = ([0; 2], 0, 0);

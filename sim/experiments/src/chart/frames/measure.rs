@@ -10,7 +10,7 @@ use traces::score::{TOLERANCE_S, score, true_beside_found};
 use traces::synth::{Recording, Scenario, Scene};
 
 use super::{Effort, Way};
-use crate::chart::ChartError;
+use crate::study::StudyError;
 
 /// Places of the marks, as shares of the frames; where one is asked for, it is the first.
 const MARKED: [f64; 5] = [0.4, 0.1, 0.25, 0.6, 0.85];
@@ -43,14 +43,14 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    pub fn new(scenario: &Scenario, effort: &Effort) -> Result<Self, ChartError> {
+    pub fn new(scenario: &Scenario, effort: &Effort) -> Result<Self, StudyError> {
         let scene = |&seed: &u64| Ok((seed, scenario.scene(effort.frames, seed)?));
-        let scenes = effort.seeds.iter().map(scene).collect::<Result<_, ChartError>>()?;
+        let scenes = effort.seeds.iter().map(scene).collect::<Result<_, StudyError>>()?;
         Ok(Self { name: scenario.name, scenes })
     }
 
     /// By each method, the outcome with each seed.
-    pub fn analyse(&self, recording: &Recording) -> Result<Vec<(Way, Vec<Outcome>)>, ChartError> {
+    pub fn analyse(&self, recording: &Recording) -> Result<Vec<(Way, Vec<Outcome>)>, StudyError> {
         let mut of = Way::ALL.map(|way| (way, Vec::new()));
         for (seed, scene) in &self.scenes {
             let trace = scene.record(&Recording { seed: *seed, ..*recording })?;
@@ -63,7 +63,7 @@ impl Subject {
 }
 
 /// Marks some frames, finds the others and holds them against the truth.
-fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, ChartError> {
+fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<Outcome, StudyError> {
     let (count, method) = match way {
         Way::Squares => (1, Method::SumOfSquares),
         Way::Normalized => (1, Method::Normalized),

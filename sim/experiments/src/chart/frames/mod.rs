@@ -4,21 +4,19 @@
 //! and the outcome is held against the truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
 
 mod measure;
-mod tables;
-#[cfg(test)]
-mod tests;
 
 use serde::Serialize;
 use traces::synth::{Recording, SCENARIOS};
 
-use super::ChartError;
-use output::OutDir;
-use output::plot::Look;
+use crate::study::table::{Sheet, Table, optional, plain, share};
+use crate::study::tradeoff::{Metric, TradeoffPoint};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{ChartPanel, Mark, Paint, Scale, Series};
 use output::progress::Progress;
 
 pub use measure::Outcome;
 use measure::{Subject, joined};
-pub use tables::claim;
 
 /// A method fails where its F1 is below this.
 pub const FAILS_BELOW: f64 = 0.9;
@@ -36,25 +34,6 @@ pub struct Effort {
     pub bits: &'static [u32],
     /// Seeds of scenes and noise.
     pub seeds: &'static [u64],
-}
-
-impl Effort {
-    /// The chart of the book.
-    pub const FULL: Self = Self {
-        frames: 200,
-        rates_hz: &[1e3, 2e3, 5e3, 10e3, 20e3, 50e3, 200e3, 1e6],
-        snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
-        bits: &[4, 6, 8, 10, 12, 14, 16],
-        seeds: &[1, 2],
-    };
-    /// A look.
-    pub const QUICK: Self = Self {
-        frames: 60,
-        rates_hz: &[2e3, 10e3, 50e3],
-        snrs_db: &[40.0, 10.0, 0.0],
-        bits: &[6, 10, 14],
-        seeds: &[1],
-    };
 }
 
 /// How frames are looked for.
@@ -166,9 +145,118 @@ pub struct FramesChart {
     pub rows: Vec<Row>,
 }
 
+impl Study for FramesChart {
+    const NAME: &'static str = "frames";
+    const ABOUT: &'static str =
+        "Frame starts found and energy error, by method, over sampling rate, noise, bits and host time";
+    const PICTURES: &'static [&'static str] = &["frames_rate", "frames_noise", "frames_bits", "frames_time"];
+    const FILES: &'static [&'static str] = &["frames.csv", "frames.md", "frames.json"];
+    const SHOWS_TIME: bool = true;
+
+    type Effort = Effort;
+    const FULL: Effort = Effort {
+        frames: 200,
+        rates_hz: &[1e3, 2e3, 5e3, 10e3, 20e3, 50e3, 200e3, 1e6],
+        snrs_db: &[40.0, 30.0, 20.0, 10.0, 5.0, 0.0],
+        bits: &[4, 6, 8, 10, 12, 14, 16],
+        seeds: &[1, 2],
+    };
+    const QUICK: Effort = Effort {
+        frames: 60,
+        rates_hz: &[2e3, 10e3, 50e3],
+        snrs_db: &[40.0, 10.0, 0.0],
+        bits: &[6, 10, 14],
+        seeds: &[1],
+    };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let subjects = SCENARIOS.iter().map(|scenario| Subject::new(scenario, &effort));
+        let subjects: Vec<Subject> = subjects.collect::<Result<_, _>>()?;
+        let settings = Axis::ALL.into_iter().flat_map(|axis| {
+            axis.recordings(&effort).into_iter().map(move |(value, recording)| (axis, value, recording))
+        });
+        let settings: Vec<(Axis, f64, Recording)> = settings.collect();
+        let bar = progress.bar("recordings", (settings.len() * subjects.len()) as u64);
+        let mut rows = Vec::new();
+        // One after another: host times are part of what is measured.
+        for (axis, value, recording) in settings {
+            for subject in &subjects {
+                for (way, outcomes) in subject.analyse(&recording)? {
+                    let outcome = joined(&outcomes);
+                    let fails = outcome.f1 < FAILS_BELOW;
+                    rows.push(Row { axis, value, scene: subject.name, way, outcome, fails });
+                }
+                bar.inc();
+            }
+        }
+        Ok(Self { effort, rows })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let subject = format!(
+            "means over {} scenes of {} frames, {} of each; 50 kHz, 30 dB and 14 bits where not said otherwise",
+            SCENARIOS.len(),
+            self.effort.frames,
+            self.effort.seeds.len()
+        );
+        for axis in Axis::ALL {
+            let (title, x, unit) = match axis {
+                Axis::Rate => ("Frames found over sampling rate", "sampling rate, kHz", 1e3),
+                Axis::Noise => ("Frames found over signal to noise", "signal to noise, dB", 1.0),
+                Axis::Bits => ("Frames found over resolution", "bits", 1.0),
+            };
+            let values: Vec<String> =
+                self.values(axis).into_iter().map(|value| format!("{}", value / unit)).collect();
+            let panels = [self.found(axis), self.energy(axis)].map(|panel| panel.along(x, &values));
+            to.chart(&format!("frames_{}", axis.name()), [title, &subject], panels.into())?;
+        }
+        let panels = vec![self.host_time(), self.found_over_time()];
+        to.chart("frames_time", ["Host time of finding frames", &subject], panels)
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let rows = Table::of(&self.rows)
+            .data("axis", |row| row.axis.name())
+            .data("value", |row| row.value)
+            .data("scene", |row| row.scene)
+            .data("method", |row| row.way.name())
+            .data("f1", |row| row.outcome.f1)
+            .data("fails", |row| row.fails)
+            .data("energy_error", |row| row.outcome.energy_error)
+            .data("wrong", |row| row.outcome.wrong)
+            .data("wrong_flagged", |row| row.outcome.wrong_flagged)
+            .data("right", |row| row.outcome.right)
+            .data("right_flagged", |row| row.outcome.right_flagged)
+            .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
+            .csv("frames.csv");
+        vec![self.by_scene(), self.by_value(), rows.sheet()]
+    }
+
+    /// Every method at each ratio of signal to noise, over all scenes.
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        let at = |snr_db: f64, way: Way| {
+            let mean = |of: fn(&Outcome) -> Option<f64>| self.mean(Axis::Noise, snr_db, way, of);
+            let cost = mean(|o| Some(o.host_s_per_1e6));
+            let f1 =
+                mean(|o| Some(o.f1)).map(|f1| Metric::new("starts wrong or missed (1 - F1)", "", 1.0 - f1));
+            let energy = mean(|o| o.energy_error);
+            let energy =
+                energy.map(|share| Metric::new("median error of a frame's energy", "%", 100.0 * share));
+            let point = |error: Metric| {
+                let cost = Metric::new("host time of a million samples", "s", cost?);
+                let subject = format!("frames of a trace ({})", Axis::Noise.shown(snr_db));
+                Some(TradeoffPoint::new(subject, [way.name(), ""], [error.beside(0.0), cost]))
+            };
+            [f1, energy].into_iter().flatten().filter_map(point).collect::<Vec<_>>()
+        };
+        let values = self.values(Axis::Noise).into_iter();
+        values.flat_map(|snr_db| Way::ALL.map(|way| at(snr_db, way))).flatten().collect()
+    }
+}
+
 impl FramesChart {
     /// The values along an axis, in order.
-    pub(super) fn values(&self, axis: Axis) -> Vec<f64> {
+    fn values(&self, axis: Axis) -> Vec<f64> {
         let mut values: Vec<f64> =
             self.rows.iter().filter(|row| row.axis == axis).map(|row| row.value).collect();
         values.dedup();
@@ -181,48 +269,114 @@ impl FramesChart {
     }
 
     /// The mean over scenes of what each has; `None` where none has it.
-    pub(super) fn mean(
-        &self,
-        axis: Axis,
-        value: f64,
-        way: Way,
-        of: fn(&Outcome) -> Option<f64>,
-    ) -> Option<f64> {
+    fn mean(&self, axis: Axis, value: f64, way: Way, of: fn(&Outcome) -> Option<f64>) -> Option<f64> {
         let values: Vec<f64> = self.at(axis, value, way).filter_map(|row| of(&row.outcome)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
+
+    /// A curve over the places of the values, without those at which nothing is known.
+    fn along(&self, axis: Axis, way: Way, of: fn(&Outcome) -> Option<f64>) -> Series {
+        let means = self.values(axis).into_iter().map(|value| self.mean(axis, value, way, of)).enumerate();
+        Series::curve(way.name(), means.filter_map(|(place, mean)| Some((place as f64, mean?))))
+    }
+
+    /// F1, with the line below which a method fails.
+    fn found(&self, axis: Axis) -> ChartPanel {
+        let last = self.values(axis).len().saturating_sub(1) as f64;
+        let limit = Series::new("fails below", Mark::Line(vec![(0.0, FAILS_BELOW), (last, FAILS_BELOW)]));
+        let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, |o| Some(o.f1)));
+        let series = curves.chain([limit.painted(Paint::Ink)]).collect();
+        ChartPanel::new("", ["", "F1 of starts within 0.5 ms"], series).on(Scale::Even, Scale::FromZero)
+    }
+
+    fn energy(&self, axis: Axis) -> ChartPanel {
+        let percent: fn(&Outcome) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
+        let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, percent)).collect();
+        ChartPanel::new("", ["", "median energy error (%)"], curves)
+    }
+
+    fn host_time(&self) -> ChartPanel {
+        let of = |way: Way| self.timed(way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
+        let axes = ["sampling rate, Hz", "host seconds for a million samples"];
+        let curves = Way::ALL.map(|way| Series::curve(way.name(), of(way)));
+        ChartPanel::new("time over sampling rate", axes, curves.into())
+    }
+
+    fn found_over_time(&self) -> ChartPanel {
+        let curve = |way: Way| {
+            let mut points: Vec<(f64, f64)> =
+                self.timed(way).into_iter().map(|(_, host_s, f1)| (host_s, f1)).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Series::curve(way.name(), points)
+        };
+        let axes = ["host seconds for a million samples", "F1"];
+        ChartPanel::new("F1 over time, a dot for each rate", axes, Way::ALL.map(curve).into())
+    }
+
+    /// Rate, host seconds for a million samples, and F1.
+    fn timed(&self, way: Way) -> Vec<(f64, f64, f64)> {
+        let point = |rate_hz: f64| {
+            let mean = |of| self.mean(Axis::Rate, rate_hz, way, of);
+            Some((rate_hz, mean(|o| Some(o.host_s_per_1e6))?, mean(|o| Some(o.f1))?))
+        };
+        self.values(Axis::Rate).into_iter().filter_map(point).collect()
+    }
+
+    /// Mean F1 by axis, value and method; a star where it fails, and on how many of the scenes it does.
+    fn by_value(&self) -> Sheet {
+        let each =
+            Axis::ALL.into_iter().flat_map(|axis| self.values(axis).into_iter().map(move |at| (axis, at)));
+        let mut table = Table::of(each).shown("axis", |(axis, _)| axis.name(), plain).shown(
+            "value",
+            |(axis, value)| axis.shown(*value),
+            plain,
+        );
+        for way in Way::ALL {
+            table = table.shown(way.name(), |(axis, value)| self.cell(*axis, *value, way), plain);
+        }
+        let energy = |axis, value| self.mean(axis, value, Way::Auto, |o| o.energy_error);
+        let flagged = |axis, value, flagged: fn(&Outcome) -> usize, all: fn(&Outcome) -> usize| {
+            let sum = |of: fn(&Outcome) -> usize| -> usize {
+                self.at(axis, value, Way::Auto).map(|row| of(&row.outcome)).sum()
+            };
+            format!("{} of {}", sum(flagged), sum(all))
+        };
+        let wrong = |(axis, value): &(Axis, f64)| flagged(*axis, *value, |o| o.wrong_flagged, |o| o.wrong);
+        let right = |(axis, value): &(Axis, f64)| flagged(*axis, *value, |o| o.right_flagged, |o| o.right);
+        table
+            .detail("energy error, auto", |(axis, value)| energy(*axis, *value), optional(share(3)))
+            .detail("wrong frames flagged", wrong, plain)
+            .detail("right ones flagged", right, plain)
+            .in_book()
+            .after(format!("*: mean F1 below {FAILS_BELOW}; in brackets how many scenes are below\n"))
+            .sheet()
+    }
+
+    /// F1 with the number of scenes that fail; marked where the mean does.
+    fn cell(&self, axis: Axis, value: f64, way: Way) -> String {
+        let f1 = self.mean(axis, value, way, |o| Some(o.f1)).unwrap_or(0.0);
+        let failed = self.at(axis, value, way).filter(|row| row.fails).count();
+        let mark = if f1 < FAILS_BELOW { "*" } else { "" };
+        let told = if failed == 0 { String::new() } else { format!(" ({failed})") };
+        format!("{f1:.3}{mark}{told}")
+    }
+
+    /// F1 of every scene at the usual rate; a star where a method fails.
+    fn by_scene(&self) -> Sheet {
+        let usual = self.values(Axis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
+        let at = |way: Way| self.at(Axis::Rate, usual, way).collect::<Vec<_>>();
+        let f1 = |row: &Row| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
+        let mut table =
+            Table::of(at(Way::Auto).into_iter().enumerate()).detail("scene", |(_, row)| row.scene, plain);
+        for way in Way::ALL {
+            let rows = at(way);
+            table = table.detail(way.name(), |(place, _)| f1(rows[*place]), plain);
+        }
+        let table =
+            table.detail("energy error, auto", |(_, row)| row.outcome.energy_error, optional(share(3)));
+        table.in_book().sheet()
+    }
 }
 
-/// Measures the chart and writes it into `dir`.
-///
-/// # Errors
-/// [`ChartError`], above all when `dir` cannot be written to.
-pub fn chart(
-    effort: Effort,
-    dir: &OutDir,
-    look: &Look,
-    progress: &Progress,
-) -> Result<FramesChart, ChartError> {
-    let subjects: Vec<Subject> =
-        SCENARIOS.iter().map(|scenario| Subject::new(scenario, &effort)).collect::<Result<_, _>>()?;
-    let settings = Axis::ALL.into_iter().flat_map(|axis| {
-        axis.recordings(&effort).into_iter().map(move |(value, recording)| (axis, value, recording))
-    });
-    let settings: Vec<(Axis, f64, Recording)> = settings.collect();
-    let bar = progress.bar("recordings", (settings.len() * subjects.len()) as u64);
-    let mut rows = Vec::new();
-    // One after another: host times are part of what is measured.
-    for (axis, value, recording) in settings {
-        for subject in &subjects {
-            for (way, outcomes) in subject.analyse(&recording)? {
-                let outcome = joined(&outcomes);
-                let fails = outcome.f1 < FAILS_BELOW;
-                rows.push(Row { axis, value, scene: subject.name, way, outcome, fails });
-            }
-            bar.inc();
-        }
-    }
-    let chart = FramesChart { effort, rows };
-    tables::write(&chart, dir, look)?;
-    Ok(chart)
-}
+#[cfg(test)]
+mod tests;

@@ -11,8 +11,9 @@ use workloads::accumulation::{Rays, SharedSamples};
 use workloads::glossy::{Effect, Lobe, Map, receiver, stage};
 use workloads::{Frame, Scene};
 
-use super::{ChartError, Effort, ROUGHNESS};
+use super::{Effort, ROUGHNESS};
 use crate::chart::image::{White, errors, mean_square};
+use crate::study::StudyError;
 use run::GpuSpec;
 
 /// One number of samples.
@@ -85,7 +86,7 @@ impl Bench {
     ///
     /// # Errors
     /// None that is expected.
-    pub fn new(effect: (&'static str, Effect), effort: Effort) -> Result<Self, ChartError> {
+    pub fn new(effect: (&'static str, Effect), effort: Effort) -> Result<Self, StudyError> {
         let scene = stage(effect.1 != Effect::Reflection)?;
         let frame = scene.frame(0)?;
         Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort, radius: ROUGHNESS })
@@ -97,13 +98,13 @@ impl Bench {
         Self { radius, ..self }
     }
 
-    fn map(&self, radius: f64, texels: u32) -> Result<Map, ChartError> {
+    fn map(&self, radius: f64, texels: u32) -> Result<Map, StudyError> {
         let world = self.frame.camera.open().inverse();
         let eye: (DVec3, DVec3) = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
         Ok(Map::new(&receiver(), eye, self.effect.1, radius, texels)?)
     }
 
-    fn draws(&self) -> Result<Vec<Draw<'_>>, ChartError> {
+    fn draws(&self) -> Result<Vec<Draw<'_>>, StudyError> {
         let draws = self.frame.draws(&self.scene)?;
         Ok(draws.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect())
     }
@@ -112,11 +113,11 @@ impl Bench {
     ///
     /// # Errors
     /// When the map cannot be.
-    pub fn reference(&self, radius: f64) -> Result<Vec<Vec3>, ChartError> {
+    pub fn reference(&self, radius: f64) -> Result<Vec<Vec3>, StudyError> {
         self.by_rays(&self.map(radius, self.effort.texels)?, Lobe::Lens)
     }
 
-    fn by_rays(&self, map: &Map, lobe: Lobe) -> Result<Vec<Vec3>, ChartError> {
+    fn by_rays(&self, map: &Map, lobe: Lobe) -> Result<Vec<Vec3>, StudyError> {
         let seeds = 0..u64::from(self.effort.reference_tables);
         let tables = seeds.map(|seed| SampleTable::new(&SampleSpec::default(), 256, REFERENCE_SEED + seed));
         let tables = tables.collect::<Result<Vec<_>, _>>()?;
@@ -131,7 +132,7 @@ impl Bench {
     ///
     /// # Errors
     /// When the hardware cannot be built.
-    pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<Row, ChartError> {
+    pub fn row(&self, samples: u32, reference: &[Vec3]) -> Result<Row, StudyError> {
         let (map, draws) = (self.map(self.radius, self.effort.texels)?, self.draws()?);
         let look = (&self.gpu.pipeline, self.scene.background());
         let table = SampleTable::new(&SampleSpec::default(), samples, 1)?;
@@ -160,7 +161,7 @@ impl Bench {
     ///
     /// # Errors
     /// When the hardware cannot be built.
-    pub fn blurs(&self) -> Result<Vec<Blur>, ChartError> {
+    pub fn blurs(&self) -> Result<Vec<Blur>, StudyError> {
         let map = self.map(self.radius, 64)?;
         let table =
             SampleTable::new(&SampleSpec { lens: LensShape::Square, ..SampleSpec::default() }, 64, 1)?;
@@ -168,7 +169,7 @@ impl Bench {
             let y = height as f32;
             let corners =
                 [[0.0, -99.0], [99.0, -99.0], [99.0, 99.0], [0.0, 99.0]].map(|[x, z]| Vec3::new(x, y, z));
-            let refused = |error: pipeline::DrawError| ChartError::Pipeline(error.to_string());
+            let refused = |error: pipeline::DrawError| StudyError::Pipeline(error.to_string());
             let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2], [0, 2, 3]]).map_err(refused)?;
             let draws = [Draw { geometry, shader: &White, cull: Cull::None }];
             let look = (&self.gpu.pipeline, Vec3::ZERO);
@@ -180,7 +181,7 @@ impl Bench {
     }
 
     /// Lenses up to four times as wide as the receiver.
-    pub(super) fn wides(&self) -> Result<Vec<Wide>, ChartError> {
+    pub(super) fn wides(&self) -> Result<Vec<Wide>, StudyError> {
         let half = receiver().half;
         let half = half[0].min(half[1]);
         let wide = |&over_half: &f64| {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use workloads::stress::{Size, Soup, StressError, StressScene};
 
 use super::{Base, Effort, Kind};
-use crate::chart::ChartError;
+use crate::study::StudyError;
 
 /// One measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -42,11 +42,11 @@ pub(super) struct Timer<'a> {
 }
 
 impl<'a> Timer<'a> {
-    pub fn new(effort: &'a Effort) -> Result<Self, ChartError> {
+    pub fn new(effort: &'a Effort) -> Result<Self, StudyError> {
         Ok(Self { effort, thread: ThreadPoolBuilder::new().num_threads(1).build()? })
     }
 
-    pub fn point(&self, trial: Base, kind: Kind) -> Result<Point, ChartError> {
+    pub fn point(&self, trial: Base, kind: Kind) -> Result<Point, StudyError> {
         let [motion_px, defocus_px] = kind.blur_px(trial.blur_px);
         let size = Size { side_px: self.effort.side_px, triangles: trial.triangles };
         let scene = Soup { size, layers: LAYERS, motion_px, defocus_px }.scene(SEED)?;
@@ -62,8 +62,8 @@ impl<'a> Timer<'a> {
         })
     }
 
-    fn time(&self, scene: &StressScene, samples: u32) -> Result<(f64, Tally), ChartError> {
-        let refused = |what: &str| ChartError::Pipeline(what.to_owned());
+    fn time(&self, scene: &StressScene, samples: u32) -> Result<(f64, Tally), StudyError> {
+        let refused = |what: &str| StudyError::Pipeline(what.to_owned());
         let samples = HashedSamples::new(SEED, self.effort.side_px, samples, LensShape::Disk)
             .ok_or_else(|| refused("1 to 256 samples a pixel"))?;
         // One array twice is a still mesh.

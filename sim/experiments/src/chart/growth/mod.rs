@@ -4,18 +4,18 @@
 //! of some repeats. Samples are made and sorted before, as they may be before any triangle is known.
 
 mod measure;
-mod tables;
 
 use serde::Serialize;
 
-use super::ChartError;
 use super::fit::{exponent, upper_half};
-use output::OutDir;
-use output::plot::Look;
+use crate::study::table::{Sheet, Table, fixed, millis, optional, plain};
+use crate::study::{Gallery, Study, StudyError};
+use measure::LAYERS;
+use output::OutputError;
+use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 
 pub use measure::Point;
-pub use tables::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -43,27 +43,6 @@ pub struct Base {
     pub samples: u32,
     /// Pixels of motion, or of the circle of confusion.
     pub blur_px: f64,
-}
-
-impl Effort {
-    /// The chart of the book.
-    pub const FULL: Self = Self {
-        side_px: 256,
-        repeats: 5,
-        triangles: &[1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000],
-        samples: &[1, 2, 4, 8, 16, 32, 64, 128, 256],
-        blur_px: &[0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0],
-        base: Base { triangles: 10_000, samples: 16, blur_px: 16.0 },
-    };
-    /// A look in seconds.
-    pub const QUICK: Self = Self {
-        side_px: 128,
-        repeats: 3,
-        triangles: &[1_000, 3_000, 10_000, 30_000, 100_000],
-        samples: &[1, 4, 16, 64],
-        blur_px: &[0.0, 1.0, 4.0, 16.0, 64.0],
-        base: Base { triangles: 3_000, samples: 16, blur_px: 16.0 },
-    };
 }
 
 /// What grows.
@@ -174,41 +153,120 @@ impl Kind {
     }
 }
 
-/// Measures the chart and writes it into `dir`.
-///
-/// # Errors
-/// [`ChartError`], above all when `dir` cannot be written to.
-pub fn chart(
-    effort: Effort,
-    dir: &OutDir,
-    look: &Look,
-    progress: &Progress,
-) -> Result<GrowthChart, ChartError> {
-    let chart = measure(effort, progress)?;
-    tables::write(&chart, dir, look)?;
-    Ok(chart)
+impl Study for GrowthChart {
+    const NAME: &'static str = "growth";
+    const ABOUT: &'static str =
+        "Time of the visibility engine over triangles, samples a pixel and blur, with exponents";
+    const PICTURES: &'static [&'static str] = &["growth"];
+    const FILES: &'static [&'static str] = &["growth.csv", "growth.md", "growth.json"];
+
+    type Effort = Effort;
+    const FULL: Effort = Effort {
+        side_px: 256,
+        repeats: 5,
+        triangles: &[1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000],
+        samples: &[1, 2, 4, 8, 16, 32, 64, 128, 256],
+        blur_px: &[0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0],
+        base: Base { triangles: 10_000, samples: 16, blur_px: 16.0 },
+    };
+    const QUICK: Effort = Effort {
+        side_px: 128,
+        repeats: 3,
+        triangles: &[1_000, 3_000, 10_000, 30_000, 100_000],
+        samples: &[1, 4, 16, 64],
+        blur_px: &[0.0, 1.0, 4.0, 16.0, 64.0],
+        base: Base { triangles: 3_000, samples: 16, blur_px: 16.0 },
+    };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let curves = || Sweep::ALL.into_iter().flat_map(|sweep| Kind::ALL.map(|kind| (sweep, kind)));
+        // What stands still has no blur to sweep.
+        let curves = || curves().filter(|curve| *curve != (Sweep::Blur, Kind::Still));
+        let steps: usize = curves().map(|(sweep, _)| sweep.trials(&effort).len()).sum();
+        let (bar, timer) = (progress.bar("growth", steps as u64), measure::Timer::new(&effort)?);
+        let row = |(sweep, kind): (Sweep, Kind)| {
+            let point = |trial: Base| {
+                let point = timer.point(trial, kind);
+                bar.inc();
+                point
+            };
+            let points = sweep.trials(&effort).into_iter().map(point).collect::<Result<_, _>>()?;
+            Ok(Row::new(sweep, kind, points))
+        };
+        let rows = curves().map(row).collect::<Result<_, StudyError>>()?;
+        Ok(Self { effort, rows })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let panels = Sweep::ALL.map(|sweep| self.panel(sweep)).into();
+        to.chart("growth", ["Time of the visibility engine", &self.subject()], panels)
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let exponents = Table::of(&self.rows)
+            .shown("growing", |row| row.sweep.name(), plain)
+            .shown("what blurs", |row| row.kind.name(), plain)
+            .shown("exponent of time", |row| row.exponent, optional(fixed(2)))
+            .shown("of sample tests", |row| row.tests_exponent, optional(fixed(2)))
+            .shown("fitted", |row| row.fitted(), optional(|(low, high)| format!("{low:.0} to {high:.0}")))
+            .shown("ms, first", |row| row.points.first().map(|point| point.cpu_s), optional(millis(2)))
+            .shown("ms, last", |row| row.points.last().map(|point| point.cpu_s), optional(millis(2)))
+            .in_book()
+            .after(format!("\n{}\n", self.subject()));
+        let each = self.rows.iter().flat_map(|row| row.points.iter().map(move |point| (row, point)));
+        let points = Table::of(each)
+            .data("sweep", |(row, _)| row.sweep.name())
+            .data("kind", |(row, _)| row.kind.name())
+            .data("exponent", |(row, _)| row.exponent)
+            .data("fitted_from", |(row, _)| row.fitted_from)
+            .data("triangles", |(_, point)| point.triangles)
+            .data("samples_per_pixel", |(_, point)| point.samples_per_pixel)
+            .data("motion_px", |(_, point)| point.motion_px)
+            .data("defocus_px", |(_, point)| point.defocus_px)
+            .data("cpu_s", |(_, point)| point.cpu_s)
+            .data("sample_tests", |(_, point)| point.sample_tests)
+            .data("hits", |(_, point)| point.hits)
+            .csv("growth.csv");
+        vec![exponents.sheet(), points.sheet()]
+    }
 }
 
-/// Measures without writing.
-///
-/// # Errors
-/// [`ChartError`] when a scene cannot be made or no thread started.
-pub fn measure(effort: Effort, progress: &Progress) -> Result<GrowthChart, ChartError> {
-    let curves = || Sweep::ALL.into_iter().flat_map(|sweep| Kind::ALL.map(|kind| (sweep, kind)));
-    // What stands still has no blur to sweep.
-    let curves = || curves().filter(|curve| *curve != (Sweep::Blur, Kind::Still));
-    let steps: usize = curves().map(|(sweep, _)| sweep.trials(&effort).len()).sum();
-    let (bar, timer) = (progress.bar("growth", steps as u64), measure::Timer::new(&effort)?);
-    let row = |(sweep, kind): (Sweep, Kind)| {
-        let point = |trial: Base| {
-            let point = timer.point(trial, kind);
-            bar.inc();
-            point
+impl GrowthChart {
+    fn subject(&self) -> String {
+        let (side, repeats) = (self.effort.side_px, self.effort.repeats);
+        format!(
+            "CPU time of one thread, median of {repeats}; {side}x{side} pixels, triangles cover them {LAYERS} times; \
+             numbers are exponents, fitted over the upper half of each axis"
+        )
+    }
+
+    fn panel(&self, sweep: Sweep) -> ChartPanel {
+        let base = &self.effort.base;
+        let (triangles, samples, blur) = (
+            format!("{} triangles", base.triangles),
+            format!("{} samples a pixel", base.samples),
+            format!("blur {} px", base.blur_px),
+        );
+        let (across, title) = match sweep {
+            Sweep::Triangles => ("triangles", format!("{samples}, {blur}")),
+            Sweep::Samples => ("samples a pixel", format!("{triangles}, {blur}")),
+            Sweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
         };
-        let points = sweep.trials(&effort).into_iter().map(point).collect::<Result<_, _>>()?;
-        Ok(Row::new(sweep, kind, points))
-    };
-    Ok(GrowthChart { effort, rows: curves().map(row).collect::<Result<_, ChartError>>()? })
+        let scale = if sweep == Sweep::Triangles { Scale::Decades } else { Scale::Doublings };
+        let curves = Kind::ALL.map(|kind| self.curve(sweep, kind)).into();
+        ChartPanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
+    }
+
+    /// A curve without points where there is none, so that the others keep their colours.
+    fn curve(&self, sweep: Sweep, kind: Kind) -> Series {
+        let row = self.rows.iter().find(|row| row.sweep == sweep && row.kind == kind);
+        let points = row.iter().flat_map(|row| &row.points);
+        let note = row.and_then(|row| row.exponent).map_or(String::new(), |p| format!("{p:.2}"));
+        Series {
+            note,
+            ..Series::curve(kind.name(), points.map(|point| (sweep.of(point), 1e3 * point.cpu_s)))
+        }
+    }
 }
 
 impl Row {
@@ -222,6 +280,12 @@ impl Row {
         };
         let (time, tests) = (fit(|point| point.cpu_s), fit(|point| point.sample_tests as f64));
         Self { sweep, kind, exponent: time, tests_exponent: tests, fitted_from, points }
+    }
+
+    /// The least and the greatest value that exponents are fitted over.
+    fn fitted(&self) -> Option<(f64, f64)> {
+        let fitted = self.points.iter().map(|point| self.sweep.of(point)).filter(|x| *x >= self.fitted_from);
+        fitted.clone().reduce(f64::min).zip(fitted.reduce(f64::max))
     }
 }
 

@@ -10,7 +10,7 @@ use workloads::occlusion::{Answer, Pyramid, Queries, Samples, Seen, Yard, YardSp
 use workloads::visibility::Unshaded;
 
 use super::{Effort, Kind, OcclusionChart, Row};
-use crate::chart::ChartError;
+use crate::study::StudyError;
 use output::progress::{Bar, Progress};
 use run::GpuSpec;
 
@@ -67,8 +67,8 @@ pub(crate) struct Drawn {
     pub seen: Vec<Seen>,
 }
 
-fn refused(error: CacheError) -> ChartError {
-    ChartError::Pipeline(error.to_string())
+fn refused(error: CacheError) -> StudyError {
+    StudyError::Pipeline(error.to_string())
 }
 
 impl Drawn {
@@ -76,14 +76,14 @@ impl Drawn {
     ///
     /// # Errors
     /// When there is no such yard or image.
-    pub fn new(size: [u32; 2], yard: &YardSpec, samples: u32) -> Result<Self, ChartError> {
-        let yard = yard.yard().ok_or_else(|| ChartError::Pipeline("a yard".to_owned()))?;
+    pub fn new(size: [u32; 2], yard: &YardSpec, samples: u32) -> Result<Self, StudyError> {
+        let yard = yard.yard().ok_or_else(|| StudyError::Pipeline("a yard".to_owned()))?;
         let gpu = GpuSpec::load("reference")?;
         let viewport = Viewport::new(size[0], size[1])
-            .ok_or_else(|| ChartError::Pipeline("an image without area".to_owned()))?;
+            .ok_or_else(|| StudyError::Pipeline("an image without area".to_owned()))?;
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
-        let walls = yard.walls(&Unshaded).map_err(|error| ChartError::Pipeline(error.to_string()))?;
+        let walls = yard.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?;
         let depths = depths(&yard.camera, &[walls], &settings).map_err(refused)?;
         let queries = Samples { camera: &yard.camera, settings: &settings, depths: &depths };
         let seen = yard.boxes.par_iter().map(|object| queries.ask(object));
@@ -168,7 +168,7 @@ fn by_samples(yards: &[Drawn], like: Row) -> Row {
     row(like, &all.collect::<Vec<_>>())
 }
 
-pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionChart, ChartError> {
+pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionChart, StudyError> {
     let bar = progress.bar("occlusion", (3 * effort.samples.len() + effort.slats.len()) as u64);
     let mut chart =
         OcclusionChart { effort, intervals: Vec::new(), samples: Vec::new(), failing: Vec::new() };
@@ -196,7 +196,7 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionCh
     Ok(chart)
 }
 
-fn drawn(effort: &Effort, kind: Kind, slats: u32, samples: u32, bar: &Bar) -> Result<Vec<Drawn>, ChartError> {
+fn drawn(effort: &Effort, kind: Kind, slats: u32, samples: u32, bar: &Bar) -> Result<Vec<Drawn>, StudyError> {
     let gaps = if slats > 1 { GAPS } else { 0.0 };
     let drawn = |seed| {
         let yard = YardSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };

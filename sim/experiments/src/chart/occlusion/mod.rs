@@ -1,17 +1,18 @@
 //! `quintile chart occlusion`: what is found hidden, and what that costs, over boxes of lens and time, tiles and samples.
 
 mod measure;
-mod tables;
 
 use serde::Serialize;
+use workloads::occlusion::HALF_COVERED;
 
-use super::ChartError;
-use output::OutDir;
-use output::plot::Look;
+use crate::study::table::{Sheet, Table, fixed, optional, plain};
+use crate::study::tradeoff::{Metric, TradeoffPoint};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 
 pub(crate) use measure::Drawn;
-pub use tables::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -28,27 +29,6 @@ pub struct Effort {
     pub tiles: &'static [u32],
     /// Slats that a wall is made of where methods fail.
     pub slats: &'static [u32],
-}
-
-impl Effort {
-    /// The chart of the book.
-    pub const FULL: Self = Self {
-        size: [192, 108],
-        boxes: 96,
-        yards: 3,
-        samples: &[16, 32, 64],
-        tiles: &[4, 8, 16, 32],
-        slats: &[1, 2, 4, 8, 16, 32, 64],
-    };
-    /// A look in seconds.
-    pub const QUICK: Self = Self {
-        size: [128, 72],
-        boxes: 48,
-        yards: 1,
-        samples: &[16, 64],
-        tiles: &[4, 8, 16],
-        slats: &[1, 4, 16],
-    };
 }
 
 /// What blurs.
@@ -113,6 +93,10 @@ impl Row {
     pub fn rate(&self) -> f64 {
         if self.hidden == 0 { 0.0 } else { self.found as f64 / self.hidden as f64 }
     }
+
+    fn way(&self) -> String {
+        self.boxes.map_or("samples".to_owned(), |[u, v, t]| format!("{u}x{v}x{t}"))
+    }
 }
 
 /// Everything the chart found.
@@ -128,51 +112,170 @@ pub struct OcclusionChart {
     pub failing: Vec<Row>,
 }
 
-/// Measures the chart and writes it into `dir`.
-///
-/// # Errors
-/// [`ChartError`], above all when `dir` cannot be written to.
-pub fn chart(
-    effort: Effort,
-    dir: &OutDir,
-    look: &Look,
-    progress: &Progress,
-) -> Result<OcclusionChart, ChartError> {
-    let chart = measure(effort, progress)?;
-    tables::write(&chart, dir, look)?;
-    Ok(chart)
+impl Study for OcclusionChart {
+    const NAME: &'static str = "occlusion";
+    const ABOUT: &'static str = "Hidden objects found over tests and bytes, by intervals and by samples, and where occluders are too small";
+    const PICTURES: &'static [&'static str] = &["occlusion", "occlusion_failures"];
+    const FILES: &'static [&'static str] = &["occlusion.csv", "occlusion.json"];
+
+    type Effort = Effort;
+    const FULL: Effort = Effort {
+        size: [192, 108],
+        boxes: 96,
+        yards: 3,
+        samples: &[16, 32, 64],
+        tiles: &[4, 8, 16, 32],
+        slats: &[1, 2, 4, 8, 16, 32, 64],
+    };
+    const QUICK: Effort = Effort {
+        size: [128, 72],
+        boxes: 48,
+        yards: 1,
+        samples: &[16, 64],
+        tiles: &[4, 8, 16],
+        slats: &[1, 4, 16],
+    };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        measure::measure(effort, progress)
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let samples = self.effort.samples[0];
+        let title = "Occlusion queries: by intervals and by samples";
+        let subject = format!(
+            "share of hidden boxes that are found, over bytes of stored depth read for each box that is asked for; {samples} samples a pixel, sampled queries 16 to 64; \
+             dots of a tile from few boxes of lens and time to many"
+        );
+        to.chart("occlusion", [title, &subject], Kind::ALL.map(|kind| self.rates(kind)).into())?;
+        let title = "Where occlusion queries fail: many small occluders";
+        let subject = format!(
+            "walls of more and narrower slats, {:.0} % of a wall being gaps; motion, {samples} samples a pixel, 8 boxes of time. Marked: where a \
+             run with {}-pixel tiles warns (occlusion-small-occluders)",
+            100.0 * measure::GAPS,
+            measure::FAILING_TILES[0]
+        );
+        to.chart("occlusion_failures", [title, &subject], self.failures())
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let rows = Table::of(self.rows())
+            .column("kind", "blur", |row| row.kind.name(), plain)
+            .column("slats", "slats", |row| row.slats, plain)
+            .column("samples", "samples", |row| row.samples, plain)
+            .column("tile_px", "tile", |row| row.tile_px, optional(plain))
+            .column("boxes", "boxes", |row| row.way(), plain)
+            .data("objects", |row| row.objects)
+            .shown("hidden", |row| format!("{} of {}", row.hidden, row.objects), plain)
+            .data("hidden", |row| row.hidden)
+            .shown("found", |row| format!("{} ({:.3})", row.found, row.rate()), plain)
+            .data("found", |row| row.found)
+            .data("wrong", |row| row.wrong)
+            .data("half_covered", |row| row.half_covered)
+            .column("tests", "tests", |row| row.tests, fixed(0))
+            .column("bytes", "bytes", |row| row.bytes, fixed(0))
+            .column("madds", "multiply-adds", |row| row.madds, fixed(0))
+            .csv("occlusion.csv")
+            .after(
+                "\ncosts are means over all objects; a query by intervals ends where an object is seen to be visible\n",
+            );
+        vec![rows.sheet()]
+    }
+
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        let point = |row: &Row| {
+            let method = row.tile_px.map_or("sampled queries".to_owned(), |px| format!("{px}-pixel tiles"));
+            let level = match row.boxes {
+                Some(_) => format!("{} boxes, {} samples a pixel", row.way(), row.samples),
+                None => format!("{} samples a pixel", row.samples),
+            };
+            let missed = Metric::new("share of hidden objects not found", "", 1.0 - row.rate()).beside(0.0);
+            let cost = Metric::new("depth read for an object", "bytes", row.bytes);
+            TradeoffPoint::new(
+                format!("hidden objects ({})", row.kind.name()),
+                [&method, &level],
+                [missed, cost],
+            )
+        };
+        self.intervals.iter().chain(&self.samples).map(point).collect()
+    }
+
+    /// Whether anything that a sample sees was called hidden.
+    fn fault(&self) -> Option<String> {
+        let wrong: u64 = self.rows().map(|row| row.wrong).sum();
+        (wrong > 0).then(|| format!("{wrong} objects that are seen were called hidden; please report it"))
+    }
 }
 
-/// Measures without writing.
-///
-/// # Errors
-/// [`ChartError`] when a yard cannot be drawn.
-pub fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionChart, ChartError> {
-    measure::measure(effort, progress)
+impl OcclusionChart {
+    fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.intervals.iter().chain(&self.samples).chain(&self.failing)
+    }
+
+    fn rates(&self, kind: Kind) -> ChartPanel {
+        let of_tile = |&tile: &u32| {
+            let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
+            let mut points: Vec<_> = rows.map(|row| (row.bytes, row.rate())).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Series::curve(format!("{tile}-pixel tiles"), points)
+        };
+        let mut curves: Vec<Series> = self.effort.tiles.iter().map(of_tile).collect();
+        let sampled = self.samples.iter().filter(|row| row.kind == kind && row.boxes.is_none());
+        curves.push(Series::curve("sampled queries", sampled.map(|row| (row.bytes, row.rate()))));
+        ChartPanel::new(kind.name(), ["bytes of depth read for a box", "share found"], curves)
+            .on(Scale::Decades, Scale::Even)
+    }
+
+    /// Walls of more and more slats: what is found, and why not more is.
+    fn failures(&self) -> Vec<ChartPanel> {
+        let panel = |title: &str, up: &str, of: fn(&Row) -> f64, ways: &[Option<u32>]| {
+            let curve = |tile_px: &Option<u32>| {
+                let rows = self.failing.iter().filter(|row| row.tile_px == *tile_px);
+                let name = tile_px.map_or("sampled queries".to_owned(), |px| format!("{px}-pixel tiles"));
+                Series::curve(name, rows.map(|row| (f64::from(row.slats), of(row))))
+            };
+            ChartPanel::new(title, ["slats of a wall", up], ways.iter().map(curve).collect())
+                .on(Scale::Doublings, Scale::Even)
+                .failing(self.warned().map(|slats| slats..f64::INFINITY), "a run warns")
+        };
+        let [small, large] = measure::FAILING_TILES.map(Some);
+        vec![
+            panel("what is found", "share of hidden boxes found", Row::rate, &[small, large, None]),
+            panel(
+                "tiles that most samples but not all find covered",
+                "share of tiles",
+                |row| row.half_covered,
+                &[small, large],
+            ),
+        ]
+    }
+
+    /// The number of slats from which on a run with the smaller tiles warns.
+    fn warned(&self) -> Option<f64> {
+        let small = Some(measure::FAILING_TILES[0]);
+        let warned = |row: &&Row| row.tile_px == small && row.half_covered > HALF_COVERED;
+        self.failing.iter().find(warned).map(|row| f64::from(row.slats))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::written;
 
     #[test]
-    fn the_files_are_all_there_and_nothing_seen_is_called_hidden() {
-        let folder = tempfile::tempdir().unwrap();
+    fn nothing_seen_is_called_hidden() {
         let least =
             Effort { size: [64, 36], boxes: 24, yards: 1, samples: &[4, 8], tiles: &[8], slats: &[1, 8] };
-        let chart = OutDir::with(folder.path(), claim(), |dir| {
-            chart(least, dir, &Look::default(), &Progress::new(true))
-        })
-        .unwrap()
-        .unwrap();
+        let (folder, chart, done) = written::<OcclusionChart>(least);
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read("occlusion.json")).unwrap();
         let rows = chart.intervals.len() + chart.samples.len() + chart.failing.len();
         assert_eq!(json["intervals"].as_array().unwrap().len(), chart.intervals.len());
         assert_eq!(read("occlusion.csv").lines().count(), 1 + rows);
-        assert!(read("occlusion.svg").contains("motion") && folder.path().join("occlusion.png").exists());
+        assert!(read("occlusion.svg").contains("motion"));
         assert!(chart.fault().is_none(), "{:?}", chart.fault());
-        assert!(chart.intervals.iter().any(|row| row.found > 0) && chart.text().contains("1x1x16"));
+        assert!(chart.intervals.iter().any(|row| row.found > 0) && done.text.contains("1x1x16"));
         let sampled = chart.samples.iter().find(|row| row.boxes.is_none()).unwrap();
         let interval = chart.samples.iter().find(|row| row.boxes.is_some()).unwrap();
         assert!(sampled.bytes > interval.bytes && sampled.rate() == 1.0);

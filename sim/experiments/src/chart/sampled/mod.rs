@@ -1,16 +1,16 @@
 //! `quintile chart sampled`: frames predicted from few against all of them simulated, and how often intervals hold the truth.
 
 mod measure;
-mod tables;
 
 use serde::Serialize;
 
 use super::quantiles::quantiles;
+use crate::study::table::{Sheet, Table, fixed, percent, plain};
+use crate::study::tradeoff::{Metric, TradeoffPoint};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Series};
 use output::progress::Progress;
-use output::table::Table;
-use run::RunError;
-
-pub use tables::claim;
 
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -23,13 +23,6 @@ pub struct Effort {
     pub samples: u32,
     /// Choices of representatives for each animation.
     pub seeds: u64,
-}
-
-impl Effort {
-    /// Hundreds of frames: minutes.
-    pub const FULL: Self = Self { frames: 300, size: (640, 360), samples: 8, seeds: 100 };
-    /// Fewer and smaller ones: seconds.
-    pub const QUICK: Self = Self { frames: 100, size: (320, 180), samples: 4, seeds: 100 };
 }
 
 /// The quantities that are predicted.
@@ -113,20 +106,93 @@ pub struct SampledChart {
     pub trials: Vec<Trial>,
 }
 
-/// Measures the built-in animation and the scenes called `scenes`, which have to be animated.
-///
-/// # Errors
-/// When a scene cannot be loaded or is still.
-pub fn sampled(scenes: &[String], effort: Effort, progress: &Progress) -> Result<SampledChart, RunError> {
-    let (mut costs, mut trials) = (Vec::new(), Vec::new());
-    for scene in std::iter::once("default").chain(scenes.iter().map(String::as_str)) {
-        let measured = measure::animation(scene, effort, progress)?;
-        costs.push(measured.0);
-        trials.extend(measured.1);
+impl Study for SampledChart {
+    const NAME: &'static str = "sampled";
+    const ABOUT: &'static str =
+        "Frames predicted from few: errors, how often intervals hold the truth, host time";
+    const PICTURES: &'static [&'static str] = &["sampled"];
+    const FILES: &'static [&'static str] = &["sampled.csv", "sampled.md", "sampled.json"];
+    /// They have to be animated.
+    const TAKES_SCENES: bool = true;
+
+    type Effort = Effort;
+    /// Hundreds of frames: minutes.
+    const FULL: Effort = Effort { frames: 300, size: (640, 360), samples: 8, seeds: 100 };
+    const QUICK: Effort = Effort { frames: 100, size: (320, 180), samples: 4, seeds: 100 };
+
+    fn measure(effort: Effort, scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let (mut costs, mut trials) = (Vec::new(), Vec::new());
+        for scene in std::iter::once("default").chain(scenes.iter().map(String::as_str)) {
+            let measured = measure::animation(scene, effort, progress)?;
+            costs.push(measured.0);
+            trials.extend(measured.1);
+        }
+        let of = |quantity: &'static str| figures(quantity, &trials);
+        let figures = QUANTITIES.into_iter().chain(["all"]).map(of).collect();
+        Ok(Self { effort, figures, costs, trials })
     }
-    let of = |quantity: &'static str| figures(quantity, &trials);
-    let figures = QUANTITIES.into_iter().chain(["all"]).map(of).collect();
-    Ok(SampledChart { effort, figures, costs, trials })
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let subject = "each point a choice of representatives; the truth is inside the interval of those below the line";
+        let panels = QUANTITIES.into_iter().map(|quantity| self.panel(quantity)).collect();
+        to.chart("sampled", ["Frames predicted from few", subject], panels)
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let figures = Table::of(&self.figures)
+            .shown("quantity", |f| f.quantity, plain)
+            .shown("trials", |f| f.trials, plain)
+            .shown("inside", |f| f.inside_percent, percent(1))
+            .shown("error: median", |f| f.error_median_percent, percent(2))
+            .shown("95 %", |f| f.error_p95_percent, percent(2))
+            .shown("worst", |f| f.error_worst_percent, percent(2))
+            .shown("half-width: median", |f| f.half_width_median_percent, percent(2));
+        let seconds = |s: f64| format!("{s:.2} s");
+        let costs = Table::of(&self.costs)
+            .shown("animation", |cost| cost.scene.as_str(), plain)
+            .shown("frames", |cost| cost.frames, plain)
+            .shown("simulated", |cost| cost.simulated, plain)
+            .shown("all", |cost| cost.all_s, seconds)
+            .shown("sampled", |cost| cost.sampled_s, seconds)
+            .shown("times less host time", |cost| cost.times_faster, fixed(1));
+        let trials = Table::of(&self.trials)
+            .data("scene", |trial| trial.scene.as_str())
+            .data("seed", |trial| trial.seed)
+            .data("simulated", |trial| trial.simulated)
+            .data("quantity", |trial| trial.quantity)
+            .data("truth", |trial| trial.truth)
+            .data("value", |trial| trial.value)
+            .data("low", |trial| trial.interval[0])
+            .data("high", |trial| trial.interval[1])
+            .data("error_percent", |trial| trial.error_percent)
+            .data("half_width_percent", |trial| trial.half_width_percent)
+            .data("inside", |trial| trial.inside)
+            .csv("sampled.csv");
+        vec![figures.in_book().sheet(), costs.in_book().sheet(), trials.sheet()]
+    }
+
+    /// The median error of each quantity, beside the host time of simulating all frames.
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        let point = |cost: &Cost, quantity: &'static str| {
+            let trials = self.trials.iter().filter(|t| t.scene == cost.scene && t.quantity == quantity);
+            let error = quantiles(trials.map(|trial| trial.error_percent.abs()))(0.5);
+            let relative = Metric::new("host time relative to the reference", "", 1.0 / cost.times_faster);
+            let level = format!("{} of {} frames simulated", cost.simulated, cost.frames);
+            let metrics =
+                [Metric::new(median_error_of(quantity), "%", error).beside(0.0), relative.beside(1.0)];
+            TradeoffPoint::new(format!("an animation ({})", cost.scene), ["sampled", &level], metrics)
+        };
+        self.costs.iter().flat_map(|cost| QUANTITIES.map(|quantity| point(cost, quantity))).collect()
+    }
+}
+
+/// What the median error of a quantity is called.
+fn median_error_of(quantity: &str) -> &'static str {
+    match quantity {
+        "cycles" => "median error of cycles",
+        "energy" => "median error of energy",
+        _ => "median error of power",
+    }
 }
 
 fn figures(quantity: &'static str, trials: &[Trial]) -> Figures {
@@ -146,46 +212,22 @@ fn figures(quantity: &'static str, trials: &[Trial]) -> Figures {
 }
 
 impl SampledChart {
-    /// Errors and intervals by quantity.
-    pub fn text(&self) -> Table {
-        let mut table = Table::new([
-            "quantity",
-            "trials",
-            "inside",
-            "error: median",
-            "95 %",
-            "worst",
-            "half-width: median",
-        ]);
-        for f in &self.figures {
-            let percent = |value: f64| format!("{value:.2} %");
-            table.row([
-                f.quantity.to_owned(),
-                f.trials.to_string(),
-                format!("{:.1} %", f.inside_percent),
-                percent(f.error_median_percent),
-                percent(f.error_p95_percent),
-                percent(f.error_worst_percent),
-                percent(f.half_width_median_percent),
-            ]);
+    /// Errors of a quantity over half-widths of intervals.
+    fn panel(&self, quantity: &'static str) -> ChartPanel {
+        let axis =
+            |name: &str| AxisSpec { name: name.to_owned(), zero: "exact".to_owned(), ..AxisSpec::default() };
+        let trials: Vec<&Trial> = self.trials.iter().filter(|trial| trial.quantity == quantity).collect();
+        let widths = || trials.iter().map(|trial| trial.half_width_percent).filter(|width| *width > 0.0);
+        let ends = [widths().reduce(f64::min), widths().reduce(f64::max)];
+        let equal = ends.into_iter().flatten().map(|width| (width, width)).collect();
+        let mut series =
+            vec![Series::new("error as large as the half-width", Mark::Line(equal)).painted(Paint::Ink)];
+        for (number, trials) in trials.chunk_by(|a, b| a.scene == b.scene).enumerate() {
+            let dot = |trial: &&Trial| (trial.half_width_percent, trial.error_percent.abs(), String::new());
+            let dots = Mark::Dots(trials.iter().map(dot).collect());
+            series.push(Series::new(&trials[0].scene, dots).painted(Paint::Like(number)));
         }
-        table
-    }
-
-    /// What it cost, a row for each animation.
-    pub fn cost_text(&self) -> Table {
-        let mut table =
-            Table::new(["animation", "frames", "simulated", "all", "sampled", "times less host time"]);
-        for cost in &self.costs {
-            table.row([
-                cost.scene.clone(),
-                cost.frames.to_string(),
-                cost.simulated.to_string(),
-                format!("{:.2} s", cost.all_s),
-                format!("{:.2} s", cost.sampled_s),
-                format!("{:.1}", cost.times_faster),
-            ]);
-        }
-        table
+        let axes = [axis("half-width of the 95 % interval (%)"), axis("error (%)")];
+        ChartPanel::over(quantity, axes, series)
     }
 }

@@ -7,8 +7,9 @@ use serde::Serialize;
 
 use super::measure::{Point, image, point, reference, sweep, table};
 use super::stages::{Fence, Stage};
-use super::{ChartError, Effort, Row, fitted};
+use super::{Effort, Row, fitted};
 use crate::chart::image::{errors, mean_square, neighbours};
+use crate::study::StudyError;
 use output::progress::Bar;
 
 /// Regimes in which the default table is no better than others.
@@ -46,7 +47,7 @@ pub(super) fn measure(
     references: &[Vec<Vec3>],
     effort: &Effort,
     bar: &Bar,
-) -> Result<Failures, ChartError> {
+) -> Result<Failures, StudyError> {
     let every_number = every_number(&stages[0], &references[0], effort)?;
     bar.inc();
     let many_edges = many_edges(effort)?;
@@ -60,7 +61,7 @@ fn names() -> impl Iterator<Item = &'static str> {
     SampleSpec::names().map(|(name, _)| name)
 }
 
-fn every_number(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Row>, ChartError> {
+fn every_number(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Row>, StudyError> {
     let row = |table| {
         let counts = (1..=effort.every_up_to).into_par_iter();
         let points = counts.map(|n| point(stage, table, n, reference, effort));
@@ -70,7 +71,7 @@ fn every_number(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Ve
     ["owen", "random", "jittered"].into_iter().map(row).collect()
 }
 
-fn many_edges(effort: &Effort) -> Result<Vec<Row>, ChartError> {
+fn many_edges(effort: &Effort) -> Result<Vec<Row>, StudyError> {
     // Every pixel is like every other: a small image does.
     let stage = Stage::Fence(Fence::new([32, 18])?);
     let reference = reference(&stage, effort)?;
@@ -81,7 +82,7 @@ fn many_edges(effort: &Effort) -> Result<Vec<Row>, ChartError> {
     names().map(row).collect()
 }
 
-fn shared(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Shared>, ChartError> {
+fn shared(stage: &Stage, reference: &[Vec3], effort: &Effort) -> Result<Vec<Shared>, StudyError> {
     let row = |name| {
         let image = image(stage, &*table(name, SHARED_SAMPLES, 1)?)?;
         let errors = errors(&image, reference);

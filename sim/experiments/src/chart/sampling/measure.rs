@@ -8,9 +8,10 @@ use pipeline::{SampleSpec, SampleTable, Settings};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::Effort;
 use super::stages::Stage;
-use super::{ChartError, Effort};
 use crate::chart::image::{errors, mean_square};
+use crate::study::StudyError;
 use run::GpuSpec;
 
 /// One measurement.
@@ -28,28 +29,28 @@ pub struct Point {
 const REFERENCE_SEED: u64 = 1_000;
 
 /// The table called `name`.
-pub(super) fn table(name: &str, samples: u32, seed: u64) -> Result<Box<dyn SampleSource>, ChartError> {
+pub(super) fn table(name: &str, samples: u32, seed: u64) -> Result<Box<dyn SampleSource>, StudyError> {
     let spec = SampleSpec::named(name).unwrap_or_default();
     Ok(Box::new(SampleTable::new(&spec, samples, seed)?))
 }
 
 /// An image of the stage.
-pub(super) fn image(stage: &Stage, samples: &dyn SampleSource) -> Result<Vec<Vec3>, ChartError> {
+pub(super) fn image(stage: &Stage, samples: &dyn SampleSource) -> Result<Vec<Vec3>, StudyError> {
     let gpu = GpuSpec::load("reference")?;
     stage
         .draw(|camera, draws, viewport, background| {
             let settings = Settings { spec: &gpu.pipeline, viewport, samples, background };
             pipeline::render(camera, draws, &settings, |_| ()).map(|rendered| rendered.image)
         })?
-        .map_err(|error| ChartError::Pipeline(error.to_string()))
+        .map_err(|error| StudyError::Pipeline(error.to_string()))
 }
 
 /// The mean of several images of the default table with seeds of their own.
-pub(super) fn reference(stage: &Stage, effort: &Effort) -> Result<Vec<Vec3>, ChartError> {
+pub(super) fn reference(stage: &Stage, effort: &Effort) -> Result<Vec<Vec3>, StudyError> {
     let frames = (0..effort.reference_frames).into_par_iter().map(|frame| {
         image(stage, &*table("owen", effort.reference_samples, REFERENCE_SEED + u64::from(frame))?)
     });
-    let frames: Vec<Vec<Vec3>> = frames.collect::<Result<_, ChartError>>()?;
+    let frames: Vec<Vec<Vec3>> = frames.collect::<Result<_, StudyError>>()?;
     let mean = |pixel: usize| {
         let sum: DVec3 = frames.iter().map(|image: &Vec<Vec3>| image[pixel].as_dvec3()).sum();
         (sum / frames.len() as f64).as_vec3()
@@ -64,7 +65,7 @@ pub(super) fn point(
     samples_per_pixel: u32,
     reference: &[Vec3],
     effort: &Effort,
-) -> Result<Point, ChartError> {
+) -> Result<Point, StudyError> {
     let (mut squares, mut host_s) = (0.0, f64::INFINITY);
     for seed in 1..=u64::from(effort.seeds) {
         let table = table(name, samples_per_pixel, seed)?;
@@ -82,7 +83,7 @@ pub(super) fn sweep(
     name: &str,
     reference: &[Vec3],
     effort: &Effort,
-) -> Result<Vec<Point>, ChartError> {
+) -> Result<Vec<Point>, StudyError> {
     let counts = (0..=effort.most_samples.ilog2()).map(|power| 1 << power);
     counts.map(|count| point(stage, name, count, reference, effort)).collect()
 }

@@ -7,21 +7,21 @@
 mod failures;
 mod measure;
 mod stages;
-mod tables;
 
 use glam::Vec3;
 use pipeline::SampleSpec;
 use serde::Serialize;
 
-use super::ChartError;
 use super::fit::exponent;
-use output::OutDir;
-use output::plot::Look;
+use crate::study::table::{Sheet, Table, fixed, optional, plain};
+use crate::study::tradeoff::{Metric, TradeoffPoint};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{ChartPanel, Scale, Series};
 use output::progress::Progress;
 
 pub use failures::{Failures, Shared};
 pub use measure::Point;
-pub use tables::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -43,27 +43,6 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// The chart of the book.
-    pub const FULL: Self = Self {
-        scene: ("default", 18),
-        size: [96, 54],
-        most_samples: 256,
-        reference_frames: 16,
-        reference_samples: 256,
-        seeds: 1,
-        every_up_to: 40,
-    };
-    /// A look in seconds.
-    pub const QUICK: Self = Self {
-        size: [48, 27],
-        most_samples: 32,
-        reference_frames: 4,
-        reference_samples: 96,
-        seeds: 1,
-        every_up_to: 17,
-        ..Self::FULL
-    };
-
     /// Samples per pixel of the reference.
     pub fn reference(&self) -> u32 {
         self.reference_frames * self.reference_samples
@@ -99,41 +78,160 @@ pub struct SamplingChart {
     pub failures: Failures,
 }
 
-/// Measures the chart and writes it into `dir`.
-///
-/// # Errors
-/// [`ChartError`], above all when `dir` cannot be written to.
-pub fn chart(
-    effort: Effort,
-    dir: &OutDir,
-    look: &Look,
-    progress: &Progress,
-) -> Result<SamplingChart, ChartError> {
-    let chart = measure(effort, progress)?;
-    tables::write(&chart, dir, look)?;
-    Ok(chart)
+impl Study for SamplingChart {
+    const NAME: &'static str = "sampling";
+    const ABOUT: &'static str =
+        "Image error over samples per pixel and over host time, for every sample table";
+    const PICTURES: &'static [&'static str] = &["sampling_error", "sampling_time", "sampling_failures"];
+    const FILES: &'static [&'static str] = &["sampling.csv", "sampling.md", "sampling.json"];
+    const SHOWS_TIME: bool = true;
+
+    type Effort = Effort;
+    const FULL: Effort = Effort {
+        scene: ("default", 18),
+        size: [96, 54],
+        most_samples: 256,
+        reference_frames: 16,
+        reference_samples: 256,
+        seeds: 1,
+        every_up_to: 40,
+    };
+    const QUICK: Effort = Effort {
+        size: [48, 27],
+        most_samples: 32,
+        reference_frames: 4,
+        reference_samples: 96,
+        seeds: 1,
+        every_up_to: 17,
+        ..Self::FULL
+    };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let stages = stages::scenes(&effort)?;
+        let references = stages.iter().map(|stage| measure::reference(stage, &effort));
+        let references: Vec<Vec<Vec3>> = references.collect::<Result<_, _>>()?;
+        let tables: Vec<&str> = SampleSpec::names().map(|(name, _)| name).collect();
+        let bar = progress.bar("sampling", ((stages.len() * tables.len()) + failures::STEPS) as u64);
+        let mut rows = Vec::new();
+        for (stage, reference) in stages.iter().zip(&references) {
+            for &table in &tables {
+                let points = measure::sweep(stage, table, reference, &effort)?;
+                rows.push(Row { scene: stage.name(), table, exponent: fitted(&points), points });
+                bar.inc();
+            }
+        }
+        let failures = failures::measure(&stages, &references, &effort, &bar)?;
+        Ok(Self { effort, reference_samples_per_pixel: effort.reference(), rows, failures })
+    }
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let [width, height] = self.effort.size;
+        let subject = format!(
+            "RMSE in linear light against {} samples per pixel, {width}x{height} pixels; exponents fitted from {FIT_FROM} samples on",
+            self.reference_samples_per_pixel
+        );
+        let over_samples = panels(&self.rows, "samples per pixel", true, Point::samples);
+        to.chart("sampling_error", ["Image error over samples per pixel", &subject], over_samples)?;
+        let over_time = panels(&self.rows, "host seconds a frame", false, |point| point.host_s);
+        to.chart("sampling_time", ["Image error over host time", &subject], over_time)?;
+        to.chart("sampling_failures", ["Where sampling fails", &subject], self.failures())
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let exponents = self.rows.iter().chain(&self.failures.many_edges);
+        let most = format!("RMSE at {} samples", self.effort.most_samples);
+        let rmse = |point: Option<&Point>| point.map(|point| point.rmse);
+        let mut exponents = Table::of(exponents)
+            .shown("scene", |row| row.scene, plain)
+            .shown("table", |row| row.table, plain)
+            .shown("exponent", |row| row.exponent, optional(fixed(2)))
+            .shown("RMSE at 1 sample", |row| rmse(row.points.first()), optional(fixed(5)))
+            .shown(&most, |row| rmse(row.points.last()), optional(fixed(5)))
+            .shown("seconds then", |row| row.points.last().map(|point| point.host_s), optional(fixed(2)));
+        for (place, point) in self.rows[0].points.iter().enumerate() {
+            let heading = format!("n = {}", point.samples_per_pixel);
+            exponents = exponents.detail(&heading, |row| rmse(row.points.get(place)), optional(fixed(4)));
+        }
+        let shared = Table::of(&self.failures.shared)
+            .detail("table", |row| row.table, plain)
+            .detail("samples", |row| row.samples_per_pixel, plain)
+            .detail("RMSE", |row| row.rmse, fixed(4))
+            .detail("correlation of neighbours' errors", |row| row.neighbour_correlation, fixed(2));
+        let points = Table::of(self.points())
+            .data("chart", |(chart, ..)| *chart)
+            .data("scene", |(_, row, _)| row.scene)
+            .data("table", |(_, row, _)| row.table)
+            .data("samples_per_pixel", |(.., point)| point.samples_per_pixel)
+            .data("rmse", |(.., point)| point.rmse)
+            .data("host_s", |(.., point)| point.host_s)
+            .csv("sampling.csv");
+        vec![exponents.in_book().sheet(), shared.in_book().sheet(), points.sheet()]
+    }
+
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        let point = |(row, point): (&Row, &Point)| {
+            let level = format!("{} samples a pixel", point.samples_per_pixel);
+            let metrics = [Metric::rmse(point.rmse), Metric::host_s(point.host_s)];
+            TradeoffPoint::new(format!("an image ({})", row.scene), [row.table, &level], metrics)
+        };
+        let all = self.rows.iter().flat_map(|row| row.points.iter().map(move |point| (row, point)));
+        all.map(point).collect()
+    }
 }
 
-/// Measures without writing.
-///
-/// # Errors
-/// [`ChartError`] when a scene cannot be drawn.
-pub fn measure(effort: Effort, progress: &Progress) -> Result<SamplingChart, ChartError> {
-    let stages = stages::scenes(&effort)?;
-    let references = stages.iter().map(|stage| measure::reference(stage, &effort));
-    let references: Vec<Vec<Vec3>> = references.collect::<Result<_, _>>()?;
-    let tables: Vec<&str> = SampleSpec::names().map(|(name, _)| name).collect();
-    let bar = progress.bar("sampling", ((stages.len() * tables.len()) + failures::STEPS) as u64);
-    let mut rows = Vec::new();
-    for (stage, reference) in stages.iter().zip(&references) {
-        for &table in &tables {
-            let points = measure::sweep(stage, table, reference, &effort)?;
-            rows.push(Row { scene: stage.name(), table, exponent: fitted(&points), points });
-            bar.inc();
-        }
+impl SamplingChart {
+    /// Every measurement with the part of the chart that it is for.
+    fn points(&self) -> impl Iterator<Item = (&'static str, &Row, &Point)> {
+        let groups = [
+            ("error", &self.rows),
+            ("every_number", &self.failures.every_number),
+            ("many_edges", &self.failures.many_edges),
+        ];
+        let rows = groups.into_iter().flat_map(|(name, rows)| rows.iter().map(move |row| (name, row)));
+        rows.flat_map(|(name, row)| row.points.iter().map(move |point| (name, row, point)))
     }
-    let failures = failures::measure(&stages, &references, &effort, &bar)?;
-    Ok(SamplingChart { effort, reference_samples_per_pixel: effort.reference(), rows, failures })
+
+    fn failures(&self) -> Vec<ChartPanel> {
+        let scaled = |p: &Point| {
+            let n = p.samples();
+            (n, p.rmse * n.sqrt())
+        };
+        // In the order of the tables' colours everywhere; those not shown here keep their place.
+        let every = |name: &str| self.failures.every_number.iter().find(|row| row.table == name);
+        let named = self.failures.many_edges.iter().map(|row| row.table);
+        let curves = named
+            .map(|name| every(name).map_or_else(|| Series::curve(name, []), |row| curve(row, false, scaled)));
+        let axes = ["samples per pixel", "RMSE x root of samples"];
+        let numbers = ChartPanel::new("motion, every number of samples", axes, curves.collect())
+            .on(Scale::Doublings, Scale::Decades);
+        let fence = panels(&self.failures.many_edges, "samples per pixel", true, Point::samples);
+        let fence = fence
+            .into_iter()
+            .map(|panel| ChartPanel { title: "16 edges in a pixel (fence)".to_owned(), ..panel });
+        std::iter::once(numbers).chain(fence).collect()
+    }
+}
+
+impl Point {
+    fn samples(&self) -> f64 {
+        f64::from(self.samples_per_pixel)
+    }
+}
+
+/// A panel for each scene.
+fn panels(rows: &[Row], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
+    let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
+    let scale = if doubling { Scale::Doublings } else { Scale::Decades };
+    let panel = |rows: &[Row]| {
+        let curves = rows.iter().map(|row| curve(row, doubling, |p| (x(p), p.rmse))).collect();
+        ChartPanel::new(rows[0].scene, [across, "RMSE"], curves).on(scale.clone(), Scale::Decades)
+    };
+    scenes.map(panel).collect()
+}
+
+fn curve(row: &Row, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
+    let note = row.exponent.filter(|_| noted).map_or(String::new(), |p| format!("{p:.2}"));
+    Series { note, ..Series::curve(row.table, row.points.iter().map(place)) }
 }
 
 /// The exponent of error over samples per pixel.

@@ -4,8 +4,9 @@ use glam::{Affine3A, Vec3};
 use pipeline::{Camera, Cull, Draw, Geometry, Lens, Viewport};
 use workloads::{Frame, Overrides, Scene};
 
-use super::{ChartError, Effort};
+use super::Effort;
 use crate::chart::image::White;
+use crate::study::StudyError;
 
 /// Something to draw.
 pub(super) enum Stage {
@@ -24,9 +25,9 @@ pub(super) struct SceneStage {
 }
 
 /// The scenes of the chart.
-pub(super) fn scenes(effort: &Effort) -> Result<Vec<Stage>, ChartError> {
+pub(super) fn scenes(effort: &Effort) -> Result<Vec<Stage>, StudyError> {
     let ([width, height], (file, frame)) = (effort.size, effort.scene);
-    let scene = |name, lens_radius, shutter| -> Result<Stage, ChartError> {
+    let scene = |name, lens_radius, shutter| -> Result<Stage, StudyError> {
         let size = Some((width, height));
         let overrides = Overrides { size, lens_radius, shutter, ..Overrides::default() };
         let scene = workloads::load(file)?.with_overrides(&overrides)?;
@@ -40,9 +41,9 @@ pub(super) fn scenes(effort: &Effort) -> Result<Vec<Stage>, ChartError> {
     ])
 }
 
-fn viewport(size: Option<(u32, u32)>) -> Result<Viewport, ChartError> {
+fn viewport(size: Option<(u32, u32)>) -> Result<Viewport, StudyError> {
     let (width, height) = size.unwrap_or_default();
-    Viewport::new(width, height).ok_or_else(|| ChartError::Pipeline(format!("an image of {width}x{height}")))
+    Viewport::new(width, height).ok_or_else(|| StudyError::Pipeline(format!("an image of {width}x{height}")))
 }
 
 impl Stage {
@@ -58,7 +59,7 @@ impl Stage {
     pub fn draw<T>(
         &self,
         render: impl FnOnce(&Camera, &[Draw<'_>], Viewport, Vec3) -> T,
-    ) -> Result<T, ChartError> {
+    ) -> Result<T, StudyError> {
         match self {
             Self::Scene(stage) => {
                 let draws = stage.frame.draws(&stage.scene)?;
@@ -85,7 +86,7 @@ const SLIDE: f32 = 9.3;
 
 impl Fence {
     /// The fence before an image of `size` pixels.
-    pub fn new(size: [u32; 2]) -> Result<Self, ChartError> {
+    pub fn new(size: [u32; 2]) -> Result<Self, StudyError> {
         let viewport = viewport(Some((size[0], size[1])))?;
         let (half_width, half_height) = (0.5 * size[0] as f32, 0.5 * size[1] as f32);
         let margin = 16.0;
@@ -108,8 +109,8 @@ impl Fence {
     fn draw<T>(
         &self,
         render: impl FnOnce(&Camera, &[Draw<'_>], Viewport, Vec3) -> T,
-    ) -> Result<T, ChartError> {
-        let refused = |error: &dyn std::fmt::Display| ChartError::Pipeline(error.to_string());
+    ) -> Result<T, StudyError> {
+        let refused = |error: &dyn std::fmt::Display| StudyError::Pipeline(error.to_string());
         let tan_half_height = 0.5 * self.viewport.height() as f32;
         let camera = Camera::new(Affine3A::IDENTITY, tan_half_height, 0.25).map_err(|e| refused(&e))?;
         // Focused at depth 1: at depth 2 the circle of confusion is 3 pixels across.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::chart::image::neighbours;
+use crate::study::written;
 
 /// Small enough for a test.
 const SMALL: Effort = Effort {
@@ -22,7 +23,7 @@ fn row<'a>(rows: &'a [Row], scene: &str, table: &str) -> &'a Row {
 
 #[test]
 fn random_converges_as_theory_says_and_the_default_faster() {
-    let chart = measure(SMALL, &Progress::new(true)).unwrap();
+    let chart = SamplingChart::measure(SMALL, &[], &Progress::new(true)).unwrap();
     for scene in ["motion", "defocus", "motion and defocus"] {
         // Independent samples: the error of the mean falls with the root of their number.
         let random = row(&chart.rows, scene, "random").exponent.unwrap();
@@ -43,7 +44,7 @@ fn random_converges_as_theory_says_and_the_default_faster() {
 fn the_numbers_do_not_depend_on_threads() {
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let chart = pool.install(|| measure(LEAST, &Progress::new(true))).unwrap();
+        let chart = pool.install(|| SamplingChart::measure(LEAST, &[], &Progress::new(true))).unwrap();
         let errors = chart.rows.iter().flat_map(|row| &row.points).map(|point| point.rmse.to_bits());
         errors.collect::<Vec<_>>()
     };
@@ -61,12 +62,7 @@ fn equal_errors_are_alike_and_alternating_ones_opposite() {
 
 #[test]
 fn the_files_are_all_there_and_agree() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("sampling_old.png"), b"stale").unwrap();
-    let chart =
-        OutDir::with(folder.path(), claim(), |dir| chart(LEAST, dir, &Look::default(), &Progress::new(true)))
-            .unwrap()
-            .unwrap();
+    let (folder, chart, _) = written::<SamplingChart>(LEAST);
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let json: serde_json::Value = serde_json::from_str(&read("sampling.json")).unwrap();
     assert_eq!(json["rows"].as_array().unwrap().len(), chart.rows.len());
@@ -74,10 +70,8 @@ fn the_files_are_all_there_and_agree() {
     let (three, five, two) = (3, 5, 2);
     // Header; scene, table, samples; numbers of samples one by one; the fence.
     assert_eq!(read("sampling.csv").lines().count(), 1 + three * five * two + three * two + five * two);
-    assert!(read("sampling.md").contains("| motion | `owen` |"));
-    for stem in ["sampling_error", "sampling_time", "sampling_failures"] {
+    assert!(read("sampling.md").contains("| motion | owen |"));
+    for stem in SamplingChart::PICTURES {
         assert!(read(&format!("{stem}.svg")).ends_with("</svg>\n"));
-        assert!(folder.path().join(format!("{stem}.png")).exists());
     }
-    assert!(folder.path().join("sampling_old.png").exists(), "a file that no chart wrote is gone");
 }

@@ -11,8 +11,9 @@ use workloads::accumulation::SharedSamples;
 use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap, Shadows, World, see, stage};
 use workloads::{Frame, Overrides, Scene};
 
-use super::{ChartError, Effort};
+use super::Effort;
 use crate::chart::image::{errors, mean_square, neighbours};
+use crate::study::StudyError;
 use run::GpuSpec;
 
 /// What a map took.
@@ -80,7 +81,7 @@ pub(super) struct Bench<'a> {
 }
 
 impl Stage {
-    pub fn new(effort: &Effort) -> Result<Self, ChartError> {
+    pub fn new(effort: &Effort) -> Result<Self, StudyError> {
         let size = Some((effort.size[0], effort.size[1]));
         let scene = stage()?.with_overrides(&Overrides { size, ..Overrides::default() })?;
         let frame = scene.frame(1)?;
@@ -88,7 +89,7 @@ impl Stage {
         Ok(Self { effort: *effort, scene, frame, light, gpu: GpuSpec::load("reference")? })
     }
 
-    pub fn with<T>(&self, run: impl FnOnce(&Bench<'_>) -> Result<T, ChartError>) -> Result<T, ChartError> {
+    pub fn with<T>(&self, run: impl FnOnce(&Bench<'_>) -> Result<T, StudyError>) -> Result<T, StudyError> {
         let draws: Vec<_> = self
             .frame
             .draws(&self.scene)?
@@ -99,7 +100,7 @@ impl Stage {
             self.frame.meshes.iter().map(|mesh| self.scene.materials()[mesh.material].base_color).collect();
         let [width, height] = self.effort.size;
         let viewport = Viewport::new(width, height)
-            .ok_or_else(|| ChartError::Pipeline("an image of no size".to_owned()))?;
+            .ok_or_else(|| StudyError::Pipeline("an image of no size".to_owned()))?;
         let seen_by = (&self.frame.camera, &draws[..]);
         let world = World::new(seen_by, viewport, &self.light, &albedos, self.scene.background());
         run(&Bench { stage: self, draws: &draws, world, viewport })
@@ -121,7 +122,7 @@ impl Bench<'_> {
     }
 
     /// The mean of several tables, every sample asking by rays.
-    pub fn reference(&self) -> Result<Vec<Vec3>, ChartError> {
+    pub fn reference(&self) -> Result<Vec<Vec3>, StudyError> {
         let tables = self.stage.effort.reference_tables;
         let mut sum = vec![Vec3::ZERO; self.viewport.pixels()];
         for seed in 0..u64::from(tables) {
@@ -132,15 +133,15 @@ impl Bench<'_> {
         Ok(sum)
     }
 
-    fn by_rays(&self, samples: &dyn SampleSource) -> Result<Vec<Vec3>, ChartError> {
+    fn by_rays(&self, samples: &dyn SampleSource) -> Result<Vec<Vec3>, StudyError> {
         let settings =
             Settings { spec: self.spec(), viewport: self.viewport, samples, background: Vec3::ZERO };
         let seen = pipeline::frame::visibility(&self.stage.frame.camera, self.draws, &settings)
-            .map_err(|error| ChartError::Pipeline(error.to_string()))?;
+            .map_err(|error| StudyError::Pipeline(error.to_string()))?;
         Ok(self.world.image(samples, &seen, Shadows::Rays))
     }
 
-    fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), ChartError> {
+    fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), StudyError> {
         let started = Instant::now();
         let subject = (&self.stage.light, self.draws);
         let map =
@@ -152,7 +153,7 @@ impl Bench<'_> {
     }
 
     /// Both maps over a set of so many places, and the image of one of them.
-    pub fn row(&self, points: u32, reference: &[Vec3]) -> Result<Row, ChartError> {
+    pub fn row(&self, points: u32, reference: &[Vec3]) -> Result<Row, StudyError> {
         let set = SharedSamples::interleaved(&SampleSpec::default(), points, 1)?;
         let (map, one_pass) = self.map(&set, Method::OnePass)?;
         let (other, accumulation) = self.map(&set, Method::Accumulation)?;
@@ -171,14 +172,14 @@ impl Bench<'_> {
         })
     }
 
-    fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, ChartError> {
+    fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
         let subject = (&self.stage.frame.camera, self.draws);
         let how = (Method::OnePass, self.spec());
         Ok(see(subject, self.viewport, set, how, &mut |_, _| ())?.samples)
     }
 
     /// Wrong shadows over the bias.
-    pub fn biases(&self) -> Result<Vec<Bias>, ChartError> {
+    pub fn biases(&self) -> Result<Vec<Bias>, StudyError> {
         let set = SharedSamples::interleaved(&SampleSpec::default(), BIAS_POINTS, 1)?;
         let (map, seen) = (self.map(&set, Method::OnePass)?.0, self.seen(&set)?);
         let truth = self.world.lit_and_unlit(&set, &seen, Shadows::Rays);

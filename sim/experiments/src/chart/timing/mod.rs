@@ -2,20 +2,22 @@
 
 mod added;
 mod animations;
-mod failure_output;
 mod failures;
 mod measure;
 mod picture;
 mod subjects;
-mod tables;
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::quantiles::quantiles;
+use crate::study::table::{Sheet, Table, fixed, percent, plain};
+use crate::study::tradeoff::{Metric, TradeoffPoint};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{Matrix, MatrixPanel};
 use output::progress::Progress;
-use output::table::Table;
 use run::GpuSpec;
 use run::RunError;
 use timing::Level;
@@ -24,7 +26,6 @@ pub use added::AddedRow;
 pub use animations::AnimationRow;
 pub use failures::{Chosen, FailedLevel, FailureRow, RateRow};
 pub use measure::Row;
-pub use tables::claim;
 
 /// GPUs in the chart: small, integrated, large.
 const GPUS: [&str; 3] = ["mobile", "reference", "discrete"];
@@ -94,37 +95,84 @@ pub struct TimingChart {
     pub rates: Vec<RateRow>,
 }
 
-/// Measures built-in scenes, families of triangles and the scenes in `files`.
-///
-/// # Errors
-/// When a scene cannot be loaded or a GPU fails.
-pub fn timing(files: &[String], quick: bool, progress: &Progress) -> Result<TimingChart, RunError> {
-    let gpus: Vec<GpuSpec> = GPUS.iter().map(GpuSpec::load).collect::<Result<_, _>>()?;
-    let subjects = subjects::all(files, quick)?;
-    let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
-    // One after another: host times are part of what is measured.
-    let (mut rows, mut added, mut reference) = (Vec::new(), Vec::new(), measure::Speed::default());
-    for subject in &subjects {
-        for gpu in &gpus {
-            let stream = subject.stream(gpu)?;
-            rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
-            added.extend(added::rows(subject, gpu)?);
-            bar.inc();
+impl Study for TimingChart {
+    const NAME: &'static str = "timing";
+    const ABOUT: &'static str = "Every level of timing: error against the reference over host time";
+    const PICTURES: &'static [&'static str] = &["timing", "timing_failures"];
+    const FILES: &'static [&'static str] =
+        &["timing.csv", "timing_points.csv", "timing_failures.csv", "timing.md", "timing.json"];
+    const TAKES_SCENES: bool = true;
+    const SHOWS_TIME: bool = true;
+
+    type Effort = Quick;
+    const FULL: Quick = Quick(false);
+    const QUICK: Quick = Quick(true);
+
+    fn measure(Quick(quick): Quick, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let gpus: Vec<GpuSpec> = GPUS.iter().map(GpuSpec::load).collect::<Result<_, _>>()?;
+        let subjects = subjects::all(files, quick)?;
+        let bar = progress.bar("scenes", (subjects.len() * gpus.len()) as u64);
+        // One after another: host times are part of what is measured.
+        let (mut rows, mut added, mut reference) = (Vec::new(), Vec::new(), measure::Speed::default());
+        for subject in &subjects {
+            for gpu in &gpus {
+                let stream = subject.stream(gpu)?;
+                rows.extend(measure::rows(subject.name(), gpu, &stream, &mut reference)?);
+                added.extend(added::rows(subject, gpu)?);
+                bar.inc();
+            }
         }
+        let animations = animated(files, &gpus, quick, progress)?;
+        let of = |level: Level| (level.name(), figures(level, &rows, &added));
+        Ok(Self {
+            quick,
+            levels: Level::ALL.into_iter().map(of).collect(),
+            reference: reference.figures(),
+            animations,
+            rows,
+            added,
+            failures: failures::failures(&gpus)?,
+            rates: failures::rates()?,
+        })
     }
-    let animations = animated(files, &gpus, quick, progress)?;
-    let levels = Level::ALL.into_iter().map(|level| (level.name(), figures(level, &rows, &added))).collect();
-    Ok(TimingChart {
-        quick,
-        levels,
-        reference: reference.figures(),
-        animations,
-        rows,
-        added,
-        failures: failures::failures(&gpus)?,
-        rates: failures::rates()?,
-    })
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        to.add("timing", &self.picture(to.look()))?;
+        to.add("timing_failures", &self.failure_matrix().picture(to.look()))
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        vec![
+            self.level_sheet(),
+            self.row_sheet(),
+            self.point_sheet(),
+            self.failure_sheet(),
+            self.stream_sheet(),
+            self.rate_sheet(),
+        ]
+    }
+
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        let both = |(level, f): (&&'static str, &Figures)| {
+            let cost = Metric::new("host time relative to the reference", "", 1.0 / f.speedup_over_stepped);
+            let errors = [
+                Metric::new("median error of cycles", "%", f.cycle_error_median_percent),
+                Metric::new("median error of energy", "%", f.energy_error_median_percent),
+                Metric::new("worst error of cycles", "%", f.cycle_error_worst_percent),
+                Metric::new("worst error of energy", "%", f.energy_error_worst_percent),
+            ];
+            errors.map(|error| {
+                let metrics = [error.beside(0.0), cost.beside(1.0)];
+                TradeoffPoint::new("time of a frame", [*level, ""], metrics)
+            })
+        };
+        self.levels.iter().flat_map(both).collect()
+    }
 }
+
+/// Whether a preview will do.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Quick(bool);
 
 /// Every scene that is animated, on every GPU.
 fn animated(
@@ -170,38 +218,185 @@ fn figures(level: Level, rows: &[Row], added: &[AddedRow]) -> Figures {
     }
 }
 
+/// The levels that can fail.
+const LEVELS: [Level; 2] = [Level::Packet, Level::Bound];
+
+/// Shows an error with its sign.
+fn signed(decimals: usize) -> impl Fn(f64) -> String {
+    move |value| format!("{value:+.decimals$} %")
+}
+
 impl TimingChart {
-    /// The levels as a table for the terminal and the book.
-    pub fn text(&self) -> Table {
-        let mut table = Table::new([
-            "level",
-            "cycles: median",
-            "95 %",
-            "worst",
-            "energy: median",
-            "worst",
-            "power shape",
-            "times as fast",
-            "adds to a run",
-        ]);
-        for (name, f) in &self.levels {
-            let percent = |value: f64| format!("{value:.2} %");
-            table.row([
-                (*name).to_owned(),
-                percent(f.cycle_error_median_percent),
-                percent(f.cycle_error_p95_percent),
-                percent(f.cycle_error_worst_percent),
-                percent(f.energy_error_median_percent),
-                percent(f.energy_error_worst_percent),
-                percent(f.power_shape_error_percent),
-                format!("{:.1}", f.speedup_over_stepped),
-                if *name == Level::Stepped.name() {
-                    "-".to_owned()
-                } else {
-                    format!("{:.0} %", f.added_percent)
-                },
-            ]);
+    /// The levels in a few numbers.
+    fn level_sheet(&self) -> Sheet {
+        let below = format!(
+            "the reference: {:.1} million unit-cycles, {:.2} million cycles a second\n",
+            self.reference.unit_cycles_per_s / 1e6,
+            self.reference.cycles_per_s / 1e6
+        );
+        let added = |(name, f): &(&&'static str, &Figures)| match **name == Level::Stepped.name() {
+            true => "-".to_owned(),
+            false => format!("{:.0} %", f.added_percent),
+        };
+        Table::of(&self.levels)
+            .shown("level", |(name, _)| **name, plain)
+            .shown("cycles: median", |(_, f)| f.cycle_error_median_percent, percent(2))
+            .shown("95 %", |(_, f)| f.cycle_error_p95_percent, percent(2))
+            .shown("worst", |(_, f)| f.cycle_error_worst_percent, percent(2))
+            .shown("energy: median", |(_, f)| f.energy_error_median_percent, percent(2))
+            .shown("worst", |(_, f)| f.energy_error_worst_percent, percent(2))
+            .shown("power shape", |(_, f)| f.power_shape_error_percent, percent(2))
+            .shown("times as fast", |(_, f)| f.speedup_over_stepped, fixed(1))
+            .detail("least", |(_, f)| f.speedup_over_stepped_least, fixed(1))
+            .shown("adds to a run", added, plain)
+            .detail("worst", |(_, f)| f.added_worst_percent, percent(0))
+            .in_book()
+            .after(below)
+            .sheet()
+    }
+
+    /// Every scene on every GPU at every level but the reference.
+    fn row_sheet(&self) -> Sheet {
+        Table::of(&self.rows)
+            .data("scene", |row| row.scene.as_str())
+            .data("gpu", |row| row.gpu.as_str())
+            .data("level", |row| row.level.name())
+            .data("packets", |row| row.packets)
+            .data("cycles", |row| row.cycles)
+            .data("stepped_cycles", |row| row.stepped_cycles)
+            .data("cycle_error_percent", |row| row.cycle_error_percent)
+            .data("energy_error_percent", |row| row.energy_error_percent)
+            .data("busy_error_percent", |row| row.busy_error_percent)
+            .data("power_shape_error_percent", |row| row.power_shape_error_percent)
+            .data("busiest", |row| row.busiest.0)
+            .data("busiest_share", |row| row.busiest.1)
+            .data("host_s", |row| row.host_s)
+            .data("written_s", |row| row.written_s)
+            .data("speedup_over_stepped", |row| row.speedup_over_stepped)
+            .detail("scene", |row| row.scene.as_str(), plain)
+            .detail("GPU", |row| row.gpu.as_str(), plain)
+            .detail("level", |row| row.level.name(), plain)
+            .detail("cycles", |row| row.stepped_cycles, plain)
+            .detail("error", |row| row.cycle_error_percent, signed(2))
+            .detail("energy", |row| row.energy_error_percent, signed(2))
+            .detail("busiest", |row| format!("{} {:.0} %", row.busiest.0, row.busiest.1 * 100.0), plain)
+            .detail("times as fast", |row| row.speedup_over_stepped, fixed(1))
+            .csv("timing.csv")
+            .in_book()
+            .sheet()
+    }
+
+    /// The points of the picture.
+    fn point_sheet(&self) -> Sheet {
+        let animations = self.animations.iter().map(|row| {
+            let of = ["animation, drawn and timed", &row.scene, &row.gpu, row.level];
+            (of, row.seed, row.relative_host, row.cycle_error_percent)
+        });
+        let frames = self.rows.iter().map(|row| {
+            let of = ["frame, timing alone", &row.scene, &row.gpu, row.level.name()];
+            (of, None, 1.0 / row.speedup_over_stepped, row.cycle_error_percent)
+        });
+        Table::of(animations.chain(frames))
+            .data("kind", |(of, ..)| of[0])
+            .data("scene", |(of, ..)| of[1])
+            .data("gpu", |(of, ..)| of[2])
+            .data("level", |(of, ..)| of[3])
+            .data("seed", |(_, seed, ..)| *seed)
+            .data("relative_host_time", |(.., host, _)| *host)
+            .data("cycle_error_percent", |(.., error)| *error)
+            .csv("timing_points.csv")
+            .sheet()
+    }
+
+    /// Streams that break levels, a row for each level.
+    fn failure_sheet(&self) -> Sheet {
+        let each = self.failures.iter().flat_map(|row| row.levels.iter().map(move |found| (row, found)));
+        Table::of(each)
+            .data("stream", |(row, _)| row.stream)
+            .data("gpu", |(row, _)| row.gpu.as_str())
+            .data("stepped_cycles", |(row, _)| row.stepped_cycles)
+            .data("level", |(_, (level, _))| **level)
+            .data("cycle_error_percent", |(_, (_, found))| found.cycle_error_percent)
+            .data("energy_error_percent", |(_, (_, found))| found.energy_error_percent)
+            .data("warns", |(_, (_, found))| found.warns.join(" "))
+            .csv("timing_failures.csv")
+            .sheet()
+    }
+
+    /// Streams that break levels, a row for each.
+    fn stream_sheet(&self) -> Sheet {
+        let error = |level: Level| {
+            move |row: &&FailureRow| {
+                row.levels.get(level.name()).map_or(0.0, |found| found.cycle_error_percent)
+            }
+        };
+        let warns = |row: &&FailureRow| {
+            let levels = row.levels.iter();
+            let each = levels
+                .flat_map(|(level, found)| found.warns.iter().map(move |code| format!("{code} at {level}")));
+            each.collect::<Vec<_>>().join(", ")
+        };
+        let mut table = Table::of(&self.failures)
+            .detail("stream", |row| row.stream, plain)
+            .detail("GPU", |row| row.gpu.as_str(), plain)
+            .detail("cycles", |row| row.stepped_cycles, plain)
+            .detail("packet", error(LEVELS[0]), signed(1))
+            .detail("bound", error(LEVELS[1]), signed(1))
+            .detail("warns", warns, plain);
+        let asked: Vec<f64> = self
+            .failures
+            .first()
+            .map_or(Vec::new(), |row| row.chosen.iter().map(|chosen| chosen.asked_percent).collect());
+        for (place, asked) in asked.into_iter().enumerate() {
+            table = table.detail(&format!("{asked} %"), |row| row.chosen[place].level.name(), plain);
         }
-        table
+        table.in_book().sheet()
+    }
+
+    /// Rates of the large GPU beside those of a card.
+    fn rate_sheet(&self) -> Sheet {
+        let of =
+            |level: Level| move |row: &&RateRow| row.giga_per_s.get(level.name()).copied().unwrap_or(0.0);
+        let [stepped, packet, bound] = Level::ALL;
+        Table::of(&self.rates)
+            .detail("rate", |row| row.rate, plain)
+            .detail("stepped", |row| format!("{:.1} G{}", of(stepped)(row), row.unit), plain)
+            .detail("packet", of(packet), fixed(1))
+            .detail("bound", of(bound), fixed(1))
+            .detail("card", |row| row.card, plain)
+            .in_book()
+            .sheet()
+    }
+
+    /// Errors in cycles, a block for each level, streams by GPUs.
+    fn failure_matrix(&self) -> Matrix<'_> {
+        let mut gpus: Vec<&str> = Vec::new();
+        let mut streams: Vec<&str> = Vec::new();
+        for row in &self.failures {
+            if !gpus.contains(&row.gpu.as_str()) {
+                gpus.push(&row.gpu);
+            }
+            if !streams.contains(&row.stream) {
+                streams.push(row.stream);
+            }
+        }
+        let error = |gpu: &str, stream: &str, level: Level| {
+            let row = self.failures.iter().find(|row| row.gpu == gpu && row.stream == stream)?;
+            row.levels.get(level.name()).map(|found| found.cycle_error_percent.abs())
+        };
+        let panel = |level: Level| MatrixPanel {
+            name: level.name(),
+            rows: gpus
+                .iter()
+                .map(|&gpu| (gpu, streams.iter().map(|stream| error(gpu, stream, level)).collect()))
+                .collect(),
+        };
+        Matrix {
+            title: "Where levels of timing fail",
+            subject: "error in cycles against stepped, in percent",
+            scale: ["1 % and less", "32 % and more"],
+            columns: streams.clone(),
+            panels: LEVELS.map(panel).into(),
+        }
     }
 }

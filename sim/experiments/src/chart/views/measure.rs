@@ -3,15 +3,17 @@
 use std::time::Instant;
 
 use activity::Event;
-use glam::Vec3;
-use pipeline::{CacheSpec, Draw, PipelineSpec, Replacement, Viewport};
+use glam::{Vec3, Vec4};
+use pipeline::{
+    CacheSpec, Draw, PipelineSpec, Replacement, Shader, ShaderCost, ShadingPoint, Texture, Viewport,
+};
 use serde::Serialize;
 use workloads::multiview::{Layout, Rig, Target, Views};
 use workloads::{Frame, Overrides, Scene};
 
-use super::gloss::Gloss;
-use super::{ChartError, SAMPLES, line, stereo};
+use super::{SAMPLES, line, stereo};
 use crate::chart::image::{errors, mean_square};
+use crate::study::StudyError;
 use run::GpuSpec;
 
 /// What a way of rendering all views took.
@@ -106,7 +108,7 @@ impl Bench {
     ///
     /// # Errors
     /// When it cannot be loaded, or has no lens to say what is in focus.
-    pub fn new((name, number): (&str, u32), size: [u32; 2]) -> Result<Self, ChartError> {
+    pub fn new((name, number): (&str, u32), size: [u32; 2]) -> Result<Self, StudyError> {
         Self::with_shutter((name, number), size, None)
     }
 
@@ -118,8 +120,8 @@ impl Bench {
         (name, number): (&str, u32),
         [width, height]: [u32; 2],
         shutter: Option<f64>,
-    ) -> Result<Self, ChartError> {
-        let refused = |why: &str| ChartError::Pipeline(why.to_owned());
+    ) -> Result<Self, StudyError> {
+        let refused = |why: &str| StudyError::Pipeline(why.to_owned());
         let size = Some((width, height));
         let scene =
             workloads::load(name)?.with_overrides(&Overrides { size, shutter, ..Overrides::default() })?;
@@ -134,7 +136,7 @@ impl Bench {
         f64::from(self.focus)
     }
 
-    fn rig(&self, layout: &Layout, samples: u32) -> Result<Rig, ChartError> {
+    fn rig(&self, layout: &Layout, samples: u32) -> Result<Rig, StudyError> {
         let strips = layout.overlap.max(1);
         let per_strip = (samples / strips).min(256 / layout.strips());
         Ok(Rig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
@@ -145,7 +147,7 @@ impl Bench {
     }
 
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.
-    pub(super) fn row(&self, views: u32) -> Result<Row, ChartError> {
+    pub(super) fn row(&self, views: u32) -> Result<Row, StudyError> {
         let layout = if views == 2 { stereo() } else { line(views) };
         let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
         let draws = self.frame.draws(&self.scene)?;
@@ -156,7 +158,7 @@ impl Bench {
             let host_s = started.elapsed().as_secs_f64();
             let counts = &views.counts;
             let invocations = counts[Event::PixelInvocations];
-            Ok::<_, ChartError>(Run {
+            Ok::<_, StudyError>(Run {
                 passes: views.passes,
                 invocations,
                 over_one_view: invocations as f64 / one as f64,
@@ -181,7 +183,7 @@ impl Bench {
         layout: &Layout,
         draws: &[Draw<'_>],
         to: &Target<'_>,
-    ) -> Result<u64, ChartError> {
+    ) -> Result<u64, StudyError> {
         let (_, counts) = rig.view((layout.views as usize - 1) / 2, draws, to, &mut |_, _| ())?;
         Ok(counts[Event::PixelInvocations].max(1))
     }
@@ -195,7 +197,7 @@ impl Bench {
         layout: Layout,
         (policy, replacement): (&'static str, Replacement),
         entries: u32,
-    ) -> Result<Cached, ChartError> {
+    ) -> Result<Cached, StudyError> {
         let cache = CacheSpec { replacement, ..CacheSpec::lru(entries, 4) };
         let lanes = self.lanes(layout, cache, SAMPLES)?;
         let pixels = self.viewport.pixels() as f64;
@@ -213,7 +215,7 @@ impl Bench {
     ///
     /// # Errors
     /// When the cache cannot be built.
-    pub fn lanes(&self, layout: Layout, shading_cache: CacheSpec, samples: u32) -> Result<Lanes, ChartError> {
+    pub fn lanes(&self, layout: Layout, shading_cache: CacheSpec, samples: u32) -> Result<Lanes, StudyError> {
         let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
         let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
         let draws = self.frame.draws(&self.scene)?;
@@ -224,7 +226,7 @@ impl Bench {
     }
 
     /// The error of two views at the ends of a camera line, shaded for its middle.
-    pub(super) fn angle(&self, baseline: f64) -> Result<Angle, ChartError> {
+    pub(super) fn angle(&self, baseline: f64) -> Result<Angle, StudyError> {
         let spacing = baseline * self.focus();
         let layout = Layout::stereo(spacing, (0.4 * spacing).min(0.02));
         let (rig, to) = (self.rig(&layout, SAMPLES)?, self.target(&self.gpu.pipeline));
@@ -236,9 +238,36 @@ impl Bench {
             let found = rig.one_pass(&draws, &to, &mut |_, _| ())?.images;
             let truth = rig.own_cameras(&draws, &to)?;
             let pixels = |images: &[Vec<Vec3>]| images.concat();
-            Ok::<_, ChartError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())
+            Ok::<_, StudyError>(mean_square(&errors(&pixels(&found), &pixels(&truth))).sqrt())
         };
         let degrees = rig.degrees();
         Ok(Angle { baseline, degrees, rmse_matt: error(None)?, rmse_shiny: error(Some(EXPONENT))? })
+    }
+}
+
+/// A shader made independent of the direction to the viewer, with a highlight of its own on top where there is one.
+struct Gloss<'a> {
+    looks: &'a dyn Shader,
+    /// Exponent of the highlight (Blinn 1977).
+    exponent: Option<i32>,
+}
+
+/// From the scene towards its lamp.
+const TOWARD: Vec3 = Vec3::new(0.36, 0.80, 0.48);
+
+impl Shader for Gloss<'_> {
+    fn cost(&self) -> ShaderCost {
+        self.looks.cost()
+    }
+
+    fn texture(&self) -> Option<&Texture> {
+        self.looks.texture()
+    }
+
+    fn shade(&self, at: &ShadingPoint, texel: Vec4) -> Vec3 {
+        let matt = self.looks.shade(&ShadingPoint { to_camera: at.normal, ..*at }, texel);
+        let half = (TOWARD + at.to_camera).normalize_or_zero();
+        let glint = self.exponent.map_or(0.0, |exponent| at.normal.dot(half).max(0.0).powi(exponent));
+        matt + Vec3::splat(glint)
     }
 }

@@ -3,21 +3,20 @@
 //! What is shaded once serves all views, the lens and the shutter. The measure is pixel shader lanes run, over those that one of the
 //! views takes alone on the same hardware.
 
-mod gloss;
 mod measure;
-mod tables;
 
 use pipeline::Replacement;
 use serde::Serialize;
-use workloads::multiview::Layout;
+use workloads::multiview::{Layout, MOST_DEG, MOST_RUNS};
 
-use super::ChartError;
-use output::OutDir;
-use output::plot::Look;
+use crate::study::table::{Sheet, Table, fixed, plain};
+use crate::study::tradeoff::{Metric, TradeoffPoint};
+use crate::study::{Gallery, Study, StudyError};
+use output::OutputError;
+use output::plot::{ChartPanel, Scale, Series};
 use output::progress::{Bar, Progress};
 
 pub use measure::{Angle, Bench, Cached, Lanes, Row, Run};
-pub use tables::claim;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -32,25 +31,6 @@ pub struct Effort {
     pub entries: &'static [u32],
     /// Lengths of the camera line over the distance of what is in focus, for view-dependent shading.
     pub baselines: &'static [f64],
-}
-
-impl Effort {
-    /// The chart of the book.
-    pub const FULL: Self = Self {
-        scene: ("default", 18),
-        size: [320, 180],
-        views: &[1, 2, 7, 9, 64],
-        entries: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
-        baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
-    };
-    /// A look in seconds.
-    pub const QUICK: Self = Self {
-        size: [128, 72],
-        views: &[1, 2, 7, 64],
-        entries: &[4, 16, 64, 256, 1024, 16_384],
-        baselines: &[0.05, 0.4],
-        ..Self::FULL
-    };
 }
 
 /// Samples for each view of a pixel (thesis, Paper VI, section 8).
@@ -106,42 +86,107 @@ fn layouts(focus: f64) -> [(&'static str, Layout); 3] {
     [("two views", stereo()), ("seven views", line(7)), ("seven views far apart", far)]
 }
 
-/// Measures the chart and writes it into `dir`.
-///
-/// # Errors
-/// [`ChartError`], above all when `dir` cannot be written to.
-pub fn chart(
-    effort: Effort,
-    dir: &OutDir,
-    look: &Look,
-    progress: &Progress,
-) -> Result<ViewsChart, ChartError> {
-    let chart = measure(effort, progress)?;
-    tables::write(&chart, dir, look)?;
-    Ok(chart)
-}
+impl Study for ViewsChart {
+    const NAME: &'static str = "views";
+    const ABOUT: &'static str =
+        "Stereo and multi-view: shader runs over views and caches, one pass against its rivals";
+    const PICTURES: &'static [&'static str] = &["views_cost", "views_cache", "views_failures"];
+    const FILES: &'static [&'static str] = &["views.csv", "views_cache.csv", "views.json"];
 
-/// Measures without writing.
-///
-/// # Errors
-/// [`ChartError`] when the scene cannot be drawn.
-pub fn measure(effort: Effort, progress: &Progress) -> Result<ViewsChart, ChartError> {
-    let steps = effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
-    let bar = progress.bar("views", steps as u64);
-    let bench = Bench::new(effort.scene, effort.size)?;
-    let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
-    let rows = rows.collect::<Result<_, _>>()?;
-    let mut caches = Vec::new();
-    for (name, layout) in layouts(bench.focus()) {
-        let each = POLICIES
-            .into_iter()
-            .flat_map(|policy| effort.entries.iter().map(move |&entries| (policy, entries)));
-        let rows = each.map(|(policy, entries)| ticked(bench.cached(layout, policy, entries), &bar));
-        caches.push(Case { name, rows: rows.collect::<Result<_, _>>()? });
+    type Effort = Effort;
+    const FULL: Effort = Effort {
+        scene: ("default", 18),
+        size: [320, 180],
+        views: &[1, 2, 7, 9, 64],
+        entries: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16_384],
+        baselines: &[0.02, 0.05, 0.1, 0.2, 0.4, 0.8],
+    };
+    const QUICK: Effort = Effort {
+        size: [128, 72],
+        views: &[1, 2, 7, 64],
+        entries: &[4, 16, 64, 256, 1024, 16_384],
+        baselines: &[0.05, 0.4],
+        ..Self::FULL
+    };
+
+    fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
+        let steps = effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + effort.baselines.len();
+        let bar = progress.bar("views", steps as u64);
+        let bench = Bench::new(effort.scene, effort.size)?;
+        let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
+        let rows = rows.collect::<Result<_, _>>()?;
+        let mut caches = Vec::new();
+        for (name, layout) in layouts(bench.focus()) {
+            let each = POLICIES
+                .into_iter()
+                .flat_map(|policy| effort.entries.iter().map(move |&entries| (policy, entries)));
+            let rows = each.map(|(policy, entries)| ticked(bench.cached(layout, policy, entries), &bar));
+            caches.push(Case { name, rows: rows.collect::<Result<_, _>>()? });
+        }
+        let angles = effort.baselines.iter().map(|&baseline| ticked(bench.angle(baseline), &bar));
+        let angles = angles.collect::<Result<_, _>>()?;
+        Ok(Self { effort, rows, caches, angles })
     }
-    let angles = effort.baselines.iter().map(|&baseline| ticked(bench.angle(baseline), &bar));
-    let angles = angles.collect::<Result<_, _>>()?;
-    Ok(ViewsChart { effort, rows, caches, angles })
+
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
+        let [width, height] = self.effort.size;
+        let subject =
+            format!("{}, {width}x{height} pixels a view, 8 samples each where they fit", self.effort.scene.0);
+        to.chart("views_cost", ["Many views: one pass against its rivals", &subject], self.costs())?;
+        let title = "Pixel shader lanes of one pass over the shading cache";
+        let marked = format!(
+            "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
+        );
+        let caches = self.caches.iter().map(Case::panel).collect();
+        to.chart("views_cache", [title, &marked], caches)?;
+        let title = "Where one pass fails: shading that depends on who looks";
+        to.chart("views_failures", [title, &subject], vec![self.failures()])
+    }
+
+    fn tables(&self) -> Vec<Sheet> {
+        let each = self.rows.iter().flat_map(|row| runs(row).map(|(method, run)| (row, method, run)));
+        let runs = Table::of(each)
+            .column("views", "views", |(row, ..)| row.views, plain)
+            .data("samples_per_view", |(row, ..)| row.samples_per_view)
+            .column("method", "method", |(_, method, _)| *method, plain)
+            .column("passes", "passes", |(.., run)| run.passes, plain)
+            .data("invocations", |(.., run)| run.invocations)
+            .column("over_one_view", "lanes over one view", |(.., run)| run.over_one_view, fixed(3))
+            .column("vertices", "vertices", |(.., run)| run.vertices, plain)
+            .data("dram_bytes", |(.., run)| run.dram_bytes)
+            .column("host_s", "host s", |(.., run)| run.host_s, fixed(3));
+        let cached = self.caches.iter().flat_map(|case| case.rows.iter().map(|row| (case.name, row)));
+        let caches = Table::of(cached)
+            .column("case", "views", |(case, _)| *case, plain)
+            .data("views", |(_, row)| row.views)
+            .column("policy", "policy", |(_, row)| row.policy, plain)
+            .column("entries", "entries", |(_, row)| row.entries, plain)
+            .column("invocations_per_pixel", "lanes a pixel", |(_, row)| row.invocations_per_pixel, fixed(3))
+            .data("one_view_per_pixel", |(_, row)| row.one_view_per_pixel)
+            .column(
+                "increase",
+                "over one view",
+                |(_, row)| row.increase,
+                |increase| format!("{:+.1} %", 100.0 * increase),
+            );
+        let angles = Table::of(&self.angles)
+            .shown("camera line over distance", |angle| angle.baseline, plain)
+            .shown("RMSE matt", |angle| angle.rmse_matt, fixed(4))
+            .shown("RMSE with a highlight", |angle| angle.rmse_shiny, fixed(4));
+        vec![runs.csv("views.csv").sheet(), caches.csv("views_cache.csv").sheet(), angles.sheet()]
+    }
+
+    /// No method has an error of its own besides that of shading for the middle of the line.
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        let point = |row: &Row, method: &str, run: &Run| {
+            let cost = Metric::new("shader runs over those of one view", "", run.over_one_view);
+            let metrics =
+                [Metric::new("error of many views", "", 0.0), cost.beside(row.view_by_view.over_one_view)];
+            TradeoffPoint::new(format!("{} views", row.views), [method, ""], metrics)
+        };
+        let each = self.rows.iter().flat_map(|row| runs(row).map(|(method, run)| point(row, method, run)));
+        each.collect()
+    }
 }
 
 fn ticked<T>(done: T, bar: &Bar) -> T {
@@ -149,9 +194,76 @@ fn ticked<T>(done: T, bar: &Bar) -> T {
     done
 }
 
+fn runs(row: &Row) -> [(&'static str, &Run); 3] {
+    [("one pass", &row.one_pass), ("view by view", &row.view_by_view), ("accumulation", &row.accumulation)]
+}
+
+impl ViewsChart {
+    fn costs(&self) -> Vec<ChartPanel> {
+        let panel = |title: &str, up: &str, of: fn(&Run) -> f64| {
+            let curve = |method: usize| {
+                let points = self.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1)));
+                Series::curve(runs(&self.rows[0])[method].0, points)
+            };
+            ChartPanel::new(title, ["views", up], (0..3).map(curve).collect())
+                .on(Scale::Doublings, Scale::Decades)
+        };
+        vec![
+            panel("pixel shader lanes", "over those of one view", |run| run.over_one_view),
+            panel("vertex shader runs", "runs", |run| run.vertices as f64),
+            panel("memory", "bytes", |run| run.dram_bytes as f64),
+            panel("host", "seconds", |run| run.host_s),
+        ]
+    }
+
+    /// Errors over the length of the camera line.
+    fn failures(&self) -> ChartPanel {
+        let of =
+            |error: fn(&Angle) -> f64| self.angles.iter().map(move |angle| (angle.baseline, error(angle)));
+        let curves = vec![
+            Series::curve("shading that is the same for all", of(|angle| angle.rmse_matt)),
+            Series::curve("with a highlight", of(|angle| angle.rmse_shiny)),
+        ];
+        let axes = [
+            "length of the camera line over the distance of what is in focus",
+            "RMSE against cameras of their own",
+        ];
+        // Close to the angle from which on a run warns, angles grow with the line.
+        let off = |angle: &&Angle| (angle.degrees / MOST_DEG).ln().abs();
+        let nearest = self.angles.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+        let warned = nearest.map(|angle| angle.baseline * MOST_DEG / angle.degrees..f64::INFINITY);
+        let panel = ChartPanel::new("error of the outer views", axes, curves);
+        panel.failing(warned, "a run warns: view-dependent-shading")
+    }
+}
+
+impl Case {
+    /// Caches in which what is in use at a time has no room are marked.
+    fn panel(&self) -> ChartPanel {
+        let curve = |(policy, _): &(&'static str, _)| {
+            let rows = self.rows.iter().filter(|cached| cached.policy == *policy);
+            let points = rows.map(|cached| (f64::from(cached.entries), cached.invocations_per_pixel));
+            Series::curve(*policy, points)
+        };
+        let axes = ["entries of the shading cache", "lanes of all views for a pixel of one"];
+        ChartPanel::new(self.name, axes, POLICIES.iter().map(curve).collect())
+            .on(Scale::Doublings, Scale::Even)
+            .failing(self.too_small().map(|entries| 0.0..entries), "a run warns")
+    }
+
+    /// The most entries with which the shader runs so much more often than with the largest cache that a run warns.
+    fn too_small(&self) -> Option<f64> {
+        let rows = || self.rows.iter().filter(|cached| cached.policy == POLICIES[0].0);
+        let least = rows().map(|cached| cached.invocations_per_pixel).reduce(f64::min)?;
+        let small = rows().filter(|cached| cached.invocations_per_pixel > MOST_RUNS * least);
+        small.map(|cached| f64::from(cached.entries)).reduce(f64::max)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::written;
 
     const LEAST: Effort = Effort {
         scene: ("tiny", 1),
@@ -163,7 +275,7 @@ mod tests {
 
     #[test]
     fn one_pass_shades_less_than_its_rivals_and_errs_more_on_a_longer_line() {
-        let chart = measure(LEAST, &Progress::new(true)).unwrap();
+        let (_folder, chart, _) = written::<ViewsChart>(LEAST);
         for row in &chart.rows[1..] {
             assert!(row.one_pass.over_one_view < row.view_by_view.over_one_view, "{row:?}");
             assert!(row.one_pass.over_one_view < row.accumulation.over_one_view, "{row:?}");
@@ -177,19 +289,5 @@ mod tests {
         let (near, far) = (&chart.angles[0], &chart.angles[1]);
         // No highlight is in sight in `tiny`: what shininess adds is the chart's matter.
         assert!(far.rmse_matt > near.rmse_matt && far.rmse_shiny > near.rmse_shiny, "{near:?} {far:?}");
-    }
-
-    #[test]
-    fn the_files_are_all_there() {
-        let folder = tempfile::tempdir().unwrap();
-        let effort = Effort { views: &[1, 2], entries: &[64], baselines: &[0.1], ..LEAST };
-        OutDir::with(folder.path(), claim(), |dir| {
-            chart(effort, dir, &Look::default(), &Progress::new(true))
-        })
-        .unwrap()
-        .unwrap();
-        for file in ["views.csv", "views.json", "views_cost.svg", "views_cache.png", "views_failures.svg"] {
-            assert!(folder.path().join(file).exists(), "{file}");
-        }
     }
 }

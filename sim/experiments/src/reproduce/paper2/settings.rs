@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::settings::{About, PaperSettings, Setting};
+use super::super::settings::{About, PaperSettings, Setting, row_settings};
 
 /// The file.
 #[derive(Clone, Debug, Deserialize)]
@@ -26,21 +26,17 @@ pub(super) struct Work {
     pub seed: Setting<u64>,
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Passes {
-    pub about: About,
-    pub frame_nj: Setting<f64>,
-    pub g_buffer_nj: Setting<f64>,
-    pub lighting_nj: Setting<f64>,
-    pub same: Setting<f64>,
-}
+row_settings! {
+    Passes {
+        frame_nj: f64, within(0.0..=1e9);
+        g_buffer_nj: f64, within(0.0..=1e9);
+        lighting_nj: f64, within(0.0..=1e9);
+        same: f64, within(0.0..=1.0);
+    }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Inverses {
-    pub about: About,
-    pub same: Setting<f64>,
+    Inverses {
+        same: f64, within(0.0..=1.0);
+    }
 }
 
 impl PaperSettings for Settings {
@@ -51,15 +47,8 @@ impl PaperSettings for Settings {
         self.work.pc_frames.within("work.pc_frames", 1..=36)?;
         self.work.recorded_frames.within("work.recorded_frames", 8..=10_000)?;
         self.work.seed.within("work.seed", 0..=u64::MAX)?;
-        for (name, setting) in [
-            ("ii_1.frame_nj", &self.ii_1.frame_nj),
-            ("ii_1.g_buffer_nj", &self.ii_1.g_buffer_nj),
-            ("ii_1.lighting_nj", &self.ii_1.lighting_nj),
-        ] {
-            setting.within(name, 0.0..=1e9)?;
-        }
-        self.ii_1.same.within("ii_1.same", 0.0..=1.0)?;
-        self.ii_2.same.within("ii_2.same", 0.0..=1.0)
+        self.ii_1.check("ii_1")?;
+        self.ii_2.check("ii_2")
     }
 }
 

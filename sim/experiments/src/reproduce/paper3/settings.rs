@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::settings::{About, PaperSettings, Setting};
+use super::super::settings::{About, PaperSettings, Setting, row_settings};
 
 /// The file.
 #[derive(Clone, Debug, Deserialize)]
@@ -32,60 +32,50 @@ pub(super) struct Work {
     pub repeats: Setting<u64>,
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Finding {
-    pub about: About,
-    pub marked: Setting<usize>,
-    pub found_vsync: Setting<f64>,
-    pub found_free: Setting<f64>,
-    pub within_ms: Setting<f64>,
+row_settings! {
+    Finding {
+        marked: usize, within(1..=8);
+        found_vsync: f64, within(0.0..=1.0);
+        found_free: f64, within(0.0..=1.0);
+        within_ms: f64, within(0.001..=10.0);
+    }
+
+    Sums {
+        same: f64, within(0.0..=1.0);
+    }
+
+    WarmUp {
+        frames: u32, within(1..=1000);
+        planted_s: f64, within(0.1..=4.0);
+        near: f64, within(0.0..=100.0);
+        recorded: usize, within(150..=10_000);
+    }
+
+    BlockingPhone {
+        waiting_w: f64, within(0.0..=10.0);
+        idle_w: f64, within(0.01..=10.0);
+        edge: f64, within(0.01..=1.0);
+    }
+
+    BlockingPc {
+        with_mj: (f64, f64), must(energy, ENERGY);
+        without_mj: (f64, f64), must(energy, ENERGY);
+        waiting_w: f64, within(0.0..=100.0);
+        background_w: f64, within(0.0..=100.0);
+    }
+
+    Disturbance {
+        extra_w: f64, within(0.0..=10.0);
+        frames: (usize, usize), must(|(low, high)| low <= high, "fewest and most");
+        shorts: u64, within(2..=1000);
+    }
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Sums {
-    pub about: About,
-    pub same: Setting<f64>,
+fn energy((mean, deviation): &(f64, f64)) -> bool {
+    *mean > 0.0 && *deviation > 0.0
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WarmUp {
-    pub about: About,
-    pub frames: Setting<u32>,
-    pub planted_s: Setting<f64>,
-    pub near: Setting<f64>,
-    pub recorded: Setting<usize>,
-}
-
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct BlockingPhone {
-    pub about: About,
-    pub waiting_w: Setting<f64>,
-    pub idle_w: Setting<f64>,
-    pub edge: Setting<f64>,
-}
-
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct BlockingPc {
-    pub about: About,
-    pub with_mj: Setting<(f64, f64)>,
-    pub without_mj: Setting<(f64, f64)>,
-    pub waiting_w: Setting<f64>,
-    pub background_w: Setting<f64>,
-}
-
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Disturbance {
-    pub about: About,
-    pub extra_w: Setting<f64>,
-    pub frames: Setting<(usize, usize)>,
-    pub shorts: Setting<u64>,
-}
+const ENERGY: &str = "a mean and a deviation above 0";
 
 impl PaperSettings for Settings {
     const FILE: &str = "sim/experiments/papers/paper3.ron";
@@ -93,16 +83,12 @@ impl PaperSettings for Settings {
 
     fn check(&self) -> Result<(), String> {
         self.work.check()?;
-        self.iii_1.check()?;
-        self.iii_2.same.within("iii_2.same", 0.0..=1.0)?;
-        self.iii_3.check()?;
-        self.iii_4.waiting_w.within("iii_4.waiting_w", 0.0..=10.0)?;
-        self.iii_4.idle_w.within("iii_4.idle_w", 0.01..=10.0)?;
-        self.iii_4.edge.within("iii_4.edge", 0.01..=1.0)?;
-        self.iii_5.check()?;
-        self.iii_6.extra_w.within("iii_6.extra_w", 0.0..=10.0)?;
-        self.iii_6.frames.must("iii_6.frames", |(low, high)| low <= high, "fewest and most")?;
-        self.iii_6.shorts.within("iii_6.shorts", 2..=1000)
+        self.iii_1.check("iii_1")?;
+        self.iii_2.check("iii_2")?;
+        self.iii_3.check("iii_3")?;
+        self.iii_4.check("iii_4")?;
+        self.iii_5.check("iii_5")?;
+        self.iii_6.check("iii_6")
     }
 }
 
@@ -113,34 +99,6 @@ impl Work {
         self.recorded_frames.within("work.recorded_frames", 24..=10_000)?;
         self.still_frames.within("work.still_frames", 200..=10_000)?;
         self.repeats.within("work.repeats", 1..=1000)
-    }
-}
-
-impl Finding {
-    fn check(&self) -> Result<(), String> {
-        self.marked.within("iii_1.marked", 1..=8)?;
-        self.found_vsync.within("iii_1.found_vsync", 0.0..=1.0)?;
-        self.found_free.within("iii_1.found_free", 0.0..=1.0)?;
-        self.within_ms.within("iii_1.within_ms", 0.001..=10.0)
-    }
-}
-
-impl WarmUp {
-    fn check(&self) -> Result<(), String> {
-        self.frames.within("iii_3.frames", 1..=1000)?;
-        self.planted_s.within("iii_3.planted_s", 0.1..=4.0)?;
-        self.near.within("iii_3.near", 0.0..=100.0)?;
-        self.recorded.within("iii_3.recorded", 150..=10_000)
-    }
-}
-
-impl BlockingPc {
-    fn check(&self) -> Result<(), String> {
-        let energy = |(mean, deviation): &(f64, f64)| *mean > 0.0 && *deviation > 0.0;
-        self.with_mj.must("iii_5.with_mj", energy, "a mean and a deviation above 0")?;
-        self.without_mj.must("iii_5.without_mj", energy, "a mean and a deviation above 0")?;
-        self.waiting_w.within("iii_5.waiting_w", 0.0..=100.0)?;
-        self.background_w.within("iii_5.background_w", 0.0..=100.0)
     }
 }
 

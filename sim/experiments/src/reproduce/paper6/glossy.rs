@@ -4,13 +4,13 @@ use workloads::glossy::Effect;
 
 use super::Task;
 use super::settings::Glossy;
-use crate::chart::ChartError;
 use crate::chart::glossy::{Bench, Blur, Effort as Size, Row as Measured};
 use crate::reproduce::band::Cases;
 use crate::reproduce::figure::line;
 use crate::reproduce::row::{Row, numbers};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
+use crate::study::StudyError;
 use run::RunError;
 
 /// Errors of the map by few and by many samples, of reflection and of refraction, and blurs by height.
@@ -20,7 +20,7 @@ struct Found {
 }
 
 impl Found {
-    fn new(row: &Glossy, form: Form, [radius, index]: [f64; 2]) -> Result<Self, ChartError> {
+    fn new(row: &Glossy, form: Form, [radius, index]: [f64; 2]) -> Result<Self, StudyError> {
         let (few, many) = *row.samples.get(form);
         let size = Size {
             texels: *row.texels.get(form),
@@ -28,7 +28,7 @@ impl Found {
             reference_tables: *row.reference_tables.get(form),
         };
         let bench = |effect| Bench::new(effect, size).map(|bench| bench.with_radius(radius));
-        let errors = |effect| -> Result<[Measured; 2], ChartError> {
+        let errors = |effect| -> Result<[Measured; 2], StudyError> {
             let bench = bench(effect)?;
             let reference = bench.reference(radius)?;
             Ok([bench.row(few, &reference)?, bench.row(many, &reference)?])

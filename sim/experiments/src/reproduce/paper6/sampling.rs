@@ -103,11 +103,13 @@ pub(super) fn torus(task: &Task<'_>) -> Result<Done, RunError> {
 /// Figure 9: the samples near a plane through the axis.
 fn slice(found: &Covered) -> Figure {
     let near = found.points.iter().filter(|[_, y, _]| (y - 0.5).abs() < 0.01);
-    Figure::lines(
+    Figure::plane(
         "VI_fig9",
-        "Samples in a torus drawn as moving triangles (Paper VI, Figure 9)",
-        "those within 0.01 of a plane through its axis",
-        [("x", ""), ("t", "")],
+        [
+            "Samples in a torus drawn as moving triangles (Paper VI, Figure 9)",
+            "those within 0.01 of a plane through its axis",
+        ],
+        ["x", "t"],
         vec![dots("samples", near.map(|[x, _, t]| (*x, *t)).collect())],
     )
 }
@@ -206,8 +208,11 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
     let shown = flat.found.points.iter().filter(|[x, y]| *x < 40.0 * radius && *y < 20.0 * radius);
     let figure = Figure::plane(
         "VI_fig11",
-        "Maximal points that keep their distance (Paper VI, Figure 11)",
-        &format!("a corner of the unit square, r = {radius}"),
+        [
+            "Maximal points that keep their distance (Paper VI, Figure 11)",
+            &format!("a corner of the unit square, r = {radius}"),
+        ],
+        ["x", "y"],
         vec![dots("points", shown.map(|[x, y]| (*x, *y)).collect())],
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use workloads::collision::Method;
 
-use super::super::settings::{About, Form, PaperSettings, Setting};
+use super::super::settings::{About, Form, PaperSettings, Setting, row_settings};
 
 /// Width and height of an image in pixels.
 pub(super) type Size = (u32, u32);
@@ -36,16 +36,182 @@ pub(super) struct Settings {
     pub vi_16: Culling,
 }
 
-/// VI-1.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Missed {
-    pub about: About,
-    pub methods: Setting<Vec<Method>>,
-    pub resolution_px: Setting<u32>,
-    pub cases_of_each_family: Setting<usize>,
-    pub seed: Setting<u64>,
-    pub public_scenes: Setting<Vec<PublicScene>>,
+row_settings! {
+    /// VI-1.
+    Missed {
+        methods: Vec<Method>, must(|methods| !methods.is_empty(), "a list of one or more");
+        resolution_px: u32, within(1..=1024);
+        cases_of_each_family: usize, within(1..=1000);
+        seed: u64, within(0..=u64::MAX);
+        public_scenes: Vec<PublicScene>, must(|_| true, "a list");
+    }
+
+    /// VI-2; `cases` are names of those in `objects`.
+    Dodged {
+        methods: Vec<Method>, must(|methods| !methods.is_empty(), "a list of one or more");
+        resolution_px: u32, within(1..=1024);
+        objects: Vec<TwoObjects>, must(
+            |objects| objects.iter().all(TwoObjects::is_possible),
+            "shapes above 0 at places and turns that are numbers"
+        );
+        cases: String, must(|name| !name.is_empty(), "the name of one of `objects`");
+    }
+
+    /// VI-3.
+    Tighter {
+        resolution_px: u32, within(1..=1024);
+        cases_of_each_family: usize, within(1..=1000);
+        seed: u64, within(0..=u64::MAX);
+    }
+
+    /// VI-4.
+    Rate {
+        boxes_in_t: Vec<u32>, must(|list| list.len() > 1 && counts(list, 16), "two counts or more, each 1 to 16");
+        tile_px: u32, must(tile, TILE);
+        motion_m: f32, within(0.0..=100.0);
+        yards: u64, within(1..=100);
+        asked: u32, within(1..=10_000);
+        size_px: Size, must(image, IMAGE);
+        samples: u32, within(1..=256);
+    }
+
+    /// VI-5.
+    Cost {
+        samples: Vec<u32>, must(|list| !list.is_empty() && counts(list, 256), "counts of 1 to 256");
+        objects: Asked, must(|_| true, "all or hidden");
+        boxes_charged: f64, within(0.0..=1.0);
+        far_fewer: f64, within(1.0..=1e6);
+        tile_px: u32, must(tile, TILE);
+        yards: u64, within(1..=100);
+        asked: u32, within(1..=10_000);
+        size_px: Size, must(image, IMAGE);
+    }
+
+    /// VI-6.
+    Executions {
+        cells: u32, within(1..=1000);
+        dark_red: u32, within(1..=1_000_000);
+        slope: f64, within(0.0..=2.0);
+        depth_m: f64, within(0.1..=100.0);
+        size_px: Size, must(image, IMAGE);
+    }
+
+    /// VI-7.
+    Lost {
+        slope: f64, within(0.0..=2.0);
+        pleat: f64, within(0.0..=0.9);
+        cells: u32, within(1..=200);
+        size_px: Size, must(image, IMAGE);
+        turned_beams: u32, within(1..=100_000);
+        turned_floors: Vec<f64>, must(|list| list.iter().all(|height| height.abs() <= 1.0), "heights of -1 to 1");
+        turned_px: Size, must(image, IMAGE);
+        seed: u64, within(0..=u64::MAX);
+    }
+
+    /// VI-8.
+    TorusCount {
+        seed: u64, within(0..=u64::MAX);
+        ring: f64, within(0.1..=0.4);
+        tube: f64, within(0.01..=0.1 + 0.05);
+        side_px: u32, within(8..=4096);
+        samples: u32, within(1..=256);
+        standard_errors: f64, within(0.0..=100.0);
+        least_samples: f64, within(0.0..=1e12);
+    }
+
+    /// VI-9.
+    Darts {
+        radius_2d: f64, within(0.005..=0.5);
+        radius_3d: f64, within(0.01..=0.5);
+        rounds: u32, within(1..=8);
+        side_px: u32, within(8..=4096);
+        samples: u32, within(1..=256);
+        places: u64, within(1..=1_000_000_000);
+        seed: u64, within(0..=u64::MAX);
+    }
+
+    /// VI-10.
+    Noise {
+        sets: u64, within(1..=1000);
+        points: usize, within(100..=100_000_000);
+        cells: (u64, u64, u64, u64), must(
+            |(a, b, c, d)| [a, b, c, d].iter().all(|count| (2..=64).contains(*count)),
+            "2 to 64 each"
+        );
+        fits: (f64, f64), must(
+            |(low, high)| 0.0 <= *low && low < high && *high <= 1.0,
+            "two shares, in order"
+        );
+    }
+
+    /// VI-11.
+    Glossy {
+        samples: (u32, u32), must(
+            |(few, many)| 0 < *few && few < many && *many <= 256,
+            "two counts up to 256, in order"
+        );
+        lens_radius: f64, within(0.001..=10.0);
+        index: f64, within(1.0..=3.0);
+        texels: u32, within(4..=512);
+        reference_tables: u32, within(1..=256);
+        blur_off: (f64, f64), must(|(part, units)| *part >= 0.0 && *units >= 0.0, "two numbers from 0 on");
+    }
+
+    /// VI-12.
+    Shadows {
+        places: u32, within(1..=256);
+        size_px: Size, must(image, IMAGE);
+        frame: u32, within(0..=1000);
+    }
+
+    /// VI-13 and VI-14; `scene` has a name and a frame.
+    Views {
+        increase_percent: f64, within(0.0..=1e4);
+        within_points: f64, within(0.0..=1e4);
+        entries: u32, within(1..=1 << 20);
+        samples: u32, must(|count| [2, 4, 8, 16, 32].contains(count), "2, 4, 8, 16 or 32");
+        eyes: f64, within(1e-4..=10.0);
+        size_px: Size, must(image, IMAGE);
+        lens_over_eyes: f64, within(0.001..=0.5);
+        shutter: f64, within(0.0..=1.0);
+        scene: (String, u32), must(|(scene, _)| !scene.is_empty(), "a name and a frame");
+        quads: u32, must(entries, ENTRIES);
+        ways: u32, must(|ways| ways.is_power_of_two() && *ways <= 16, "a power of two up to 16");
+        policy: Policy, must(|_| true, "lru or fifo");
+        overlap: u32, within(0..=2);
+        views: u32, within(2..=16);
+        curve_entries: Vec<u32>, must(
+            |list| !list.is_empty() && list.iter().all(entries),
+            "powers of two from 16 to 1048576"
+        );
+    }
+
+    /// VI-15.
+    Depths {
+        mode: Mode, must(|_| true, "standard or conservative");
+        triangles: Triangles, must(|_| true, "catalogue or random");
+        planes: Planes, must(|_| true, "shutter or tile");
+        tile_px: u32, must(|side| tile(side) && *side >= 2, "a power of two from 2 to 32");
+        conservative_tile_px: u32, must(tile, TILE);
+        points: u32, within(10..=1_000_000);
+        random_triangles: u32, within(2..=1_000_000);
+        values_of_each_family: usize, within(1..=100);
+        of_each_scene: usize, within(1..=1000);
+        side_px: u32, must(|side| [16, 32, 64, 128].contains(side), "16, 32, 64 or 128");
+        seed: u64, within(0..=u64::MAX);
+    }
+
+    /// VI-16.
+    Culling {
+        hardware: Vec<Hardware>, must(
+            |list| !list.is_empty() && list.iter().all(Hardware::is_possible),
+            "one or more, with 1 to 16 boxes along u, v and t"
+        );
+        values_of_each_family: usize, within(1..=100);
+        side_px: u32, must(|side| [16, 32, 64, 128].contains(side), "16, 32, 64 or 128");
+        triangles: u32, within(1..=10_000);
+        seed: u64, within(0..=u64::MAX);
+    }
 }
 
 /// A public scene with what is known of it.
@@ -56,18 +222,6 @@ pub(super) struct PublicScene {
     pub objects: usize,
     /// Pairs that collide.
     pub collide: usize,
-}
-
-/// VI-2.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Dodged {
-    pub about: About,
-    pub methods: Setting<Vec<Method>>,
-    pub resolution_px: Setting<u32>,
-    /// Names of those in `objects`.
-    pub cases: Setting<String>,
-    pub objects: Setting<Vec<TwoObjects>>,
 }
 
 /// Two objects that move.
@@ -103,45 +257,6 @@ pub(super) enum Shape {
     },
 }
 
-/// VI-3.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Tighter {
-    pub about: About,
-    pub resolution_px: Setting<u32>,
-    pub cases_of_each_family: Setting<usize>,
-    pub seed: Setting<u64>,
-}
-
-/// VI-4.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Rate {
-    pub about: About,
-    pub boxes_in_t: Setting<Vec<u32>>,
-    pub tile_px: Setting<u32>,
-    pub motion_m: Setting<f32>,
-    pub yards: Setting<u64>,
-    pub asked: Setting<u32>,
-    pub size_px: Setting<Size>,
-    pub samples: Setting<u32>,
-}
-
-/// VI-5.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Cost {
-    pub about: About,
-    pub samples: Setting<Vec<u32>>,
-    pub objects: Setting<Asked>,
-    pub boxes_charged: Setting<f64>,
-    pub far_fewer: Setting<f64>,
-    pub tile_px: Setting<u32>,
-    pub yards: Setting<u64>,
-    pub asked: Setting<u32>,
-    pub size_px: Setting<Size>,
-}
-
 /// The objects over which costs are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -151,142 +266,12 @@ pub(super) enum Asked {
     Hidden,
 }
 
-/// VI-6.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Executions {
-    pub about: About,
-    pub cells: Setting<u32>,
-    pub dark_red: Setting<u32>,
-    pub slope: Setting<f64>,
-    pub depth_m: Setting<f64>,
-    pub size_px: Setting<Size>,
-}
-
-/// VI-7.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Lost {
-    pub about: About,
-    pub slope: Setting<f64>,
-    pub pleat: Setting<f64>,
-    pub cells: Setting<u32>,
-    pub size_px: Setting<Size>,
-    pub turned_beams: Setting<u32>,
-    pub turned_floors: Setting<Vec<f64>>,
-    pub turned_px: Setting<Size>,
-    pub seed: Setting<u64>,
-}
-
-/// VI-8.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct TorusCount {
-    pub about: About,
-    pub seed: Setting<u64>,
-    pub ring: Setting<f64>,
-    pub tube: Setting<f64>,
-    pub side_px: Setting<u32>,
-    pub samples: Setting<u32>,
-    pub standard_errors: Setting<f64>,
-    pub least_samples: Setting<f64>,
-}
-
-/// VI-9.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Darts {
-    pub about: About,
-    pub radius_2d: Setting<f64>,
-    pub radius_3d: Setting<f64>,
-    pub rounds: Setting<u32>,
-    pub side_px: Setting<u32>,
-    pub samples: Setting<u32>,
-    pub places: Setting<u64>,
-    pub seed: Setting<u64>,
-}
-
-/// VI-10.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Noise {
-    pub about: About,
-    pub sets: Setting<u64>,
-    pub points: Setting<usize>,
-    pub cells: Setting<(u64, u64, u64, u64)>,
-    pub fits: Setting<(f64, f64)>,
-}
-
-/// VI-11.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Glossy {
-    pub about: About,
-    pub samples: Setting<(u32, u32)>,
-    pub lens_radius: Setting<f64>,
-    pub index: Setting<f64>,
-    pub texels: Setting<u32>,
-    pub reference_tables: Setting<u32>,
-    pub blur_off: Setting<(f64, f64)>,
-}
-
-/// VI-12.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Shadows {
-    pub about: About,
-    pub places: Setting<u32>,
-    pub size_px: Setting<Size>,
-    pub frame: Setting<u32>,
-}
-
-/// VI-13 and VI-14.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Views {
-    pub about: About,
-    pub increase_percent: Setting<f64>,
-    pub within_points: Setting<f64>,
-    pub entries: Setting<u32>,
-    pub samples: Setting<u32>,
-    pub eyes: Setting<f64>,
-    pub size_px: Setting<Size>,
-    pub lens_over_eyes: Setting<f64>,
-    pub shutter: Setting<f64>,
-    /// Name and frame.
-    pub scene: Setting<(String, u32)>,
-    pub quads: Setting<u32>,
-    pub ways: Setting<u32>,
-    pub policy: Setting<Policy>,
-    pub overlap: Setting<u32>,
-    pub views: Setting<u32>,
-    pub curve_entries: Setting<Vec<u32>>,
-}
-
 /// Which entry of a full set makes room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Policy {
     Lru,
     Fifo,
-}
-
-/// VI-15.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Depths {
-    pub about: About,
-    pub mode: Setting<Mode>,
-    pub triangles: Setting<Triangles>,
-    pub planes: Setting<Planes>,
-    pub tile_px: Setting<u32>,
-    pub conservative_tile_px: Setting<u32>,
-    pub points: Setting<u32>,
-    pub random_triangles: Setting<u32>,
-    pub values_of_each_family: Setting<usize>,
-    pub of_each_scene: Setting<usize>,
-    pub side_px: Setting<u32>,
-    pub seed: Setting<u64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -315,18 +300,6 @@ pub(super) enum Planes {
     Tile,
 }
 
-/// VI-16.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Culling {
-    pub about: About,
-    pub hardware: Setting<Vec<Hardware>>,
-    pub values_of_each_family: Setting<usize>,
-    pub side_px: Setting<u32>,
-    pub triangles: Setting<u32>,
-    pub seed: Setting<u64>,
-}
-
 /// What is switched on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -348,51 +321,36 @@ pub(super) enum Bound {
     LocalPlanes,
 }
 
-/// Sizes that an image may have.
-fn image(size: &Size) -> bool {
-    [size.0, size.1].iter().all(|side| (8..=4096).contains(side))
-}
-
-const IMAGE: &str = "8 to 4096 pixels across and down";
-
 impl PaperSettings for Settings {
     const FILE: &str = "sim/experiments/papers/paper6.ron";
     const TEXT: &str = include_str!("../../../papers/paper6.ron");
 
     fn check(&self) -> Result<(), String> {
-        self.vi_1.check()?;
-        self.vi_2.check()?;
-        self.vi_3.check()?;
-        self.vi_4.check()?;
-        self.vi_5.check()?;
-        self.vi_6.check()?;
-        self.vi_7.check()?;
-        self.vi_8.check()?;
-        self.vi_9.check()?;
-        self.vi_10.check()?;
-        self.vi_11.check()?;
-        self.vi_12.check()?;
+        self.vi_1.check("vi_1")?;
+        self.vi_2.check("vi_2")?;
+        self.vi_2.check_cases("vi_2")?;
+        self.vi_3.check("vi_3")?;
+        self.vi_4.check("vi_4")?;
+        self.vi_5.check("vi_5")?;
+        self.vi_6.check("vi_6")?;
+        self.vi_7.check("vi_7")?;
+        self.vi_8.check("vi_8")?;
+        self.vi_9.check("vi_9")?;
+        self.vi_10.check("vi_10")?;
+        self.vi_11.check("vi_11")?;
+        self.vi_12.check("vi_12")?;
         self.vi_13.check("vi_13")?;
+        self.vi_13.check_quads("vi_13")?;
         self.vi_14.check("vi_14")?;
-        self.vi_15.check()?;
-        self.vi_16.check()
+        self.vi_14.check_quads("vi_14")?;
+        self.vi_15.check("vi_15")?;
+        self.vi_16.check("vi_16")
     }
 }
 
-impl Missed {
-    fn check(&self) -> Result<(), String> {
-        self.methods.must("vi_1.methods", |methods| !methods.is_empty(), "a list of one or more")?;
-        self.resolution_px.within("vi_1.resolution_px", 1..=1024)?;
-        self.cases_of_each_family.within("vi_1.cases_of_each_family", 1..=1000)?;
-        self.seed.within("vi_1.seed", 0..=u64::MAX)?;
-        self.public_scenes.must("vi_1.public_scenes", |_| true, "a list")
-    }
-}
-
-impl Dodged {
-    fn check(&self) -> Result<(), String> {
-        self.methods.must("vi_2.methods", |methods| !methods.is_empty(), "a list of one or more")?;
-        self.resolution_px.within("vi_2.resolution_px", 1..=1024)?;
+impl TwoObjects {
+    /// Whether both are somewhere and have a size.
+    fn is_possible(&self) -> bool {
         let finite = |(x, y, z): &Point| [x, y, z].iter().all(|at| at.abs() <= 1e6);
         let fits = |shape: &Shape| match shape {
             Shape::Cuboid(x, y, z) => [x, y, z].iter().all(|side| **side > 0.0 && **side <= 1e6),
@@ -403,24 +361,46 @@ impl Dodged {
         let good = |one: &Moving| {
             finite(&one.from) && finite(&one.to) && one.turned_deg.abs() <= 360.0 && fits(&one.shape)
         };
-        let both = |two: &TwoObjects| good(&two.first) && good(&two.second);
-        self.objects.must(
-            "vi_2.objects",
-            |objects| objects.iter().all(both),
-            "shapes above 0 at places and turns that are numbers",
-        )?;
-        let known = |name: &String| self.objects.get(Form::Full).iter().any(|two| two.name == *name);
-        self.cases.must("vi_2.cases", known, "the name of one of `objects`")
+        good(&self.first) && good(&self.second)
     }
 }
 
-impl Tighter {
-    fn check(&self) -> Result<(), String> {
-        self.resolution_px.within("vi_3.resolution_px", 1..=1024)?;
-        self.cases_of_each_family.within("vi_3.cases_of_each_family", 1..=1000)?;
-        self.seed.within("vi_3.seed", 0..=u64::MAX)
+impl Hardware {
+    fn is_possible(&self) -> bool {
+        let (u, v, t) = self.boxes;
+        counts(&[u, v, t], 16)
     }
 }
+
+impl Dodged {
+    /// Checks that every case is one of the objects.
+    fn check_cases(&self, row: &str) -> Result<(), String> {
+        let known = |name: &String| self.objects.get(Form::Full).iter().any(|two| two.name == *name);
+        self.cases.must(&format!("{row}.cases"), known, "the name of one of `objects`")
+    }
+}
+
+impl Views {
+    /// Checks that entries of a quad and entries of a result agree.
+    fn check_quads(&self, row: &str) -> Result<(), String> {
+        let stated = *self.entries.get(Form::Full);
+        let of_entries = |quads: &u32| entries(quads) && (*quads == stated || 4 * quads == stated);
+        self.quads.must(&format!("{row}.quads"), of_entries, ENTRIES)
+    }
+}
+
+/// Whether all counts are 1 to `most`.
+fn counts(list: &[u32], most: u32) -> bool {
+    list.iter().all(|count| (1..=most).contains(count))
+}
+
+/// Entries that a shading cache may have.
+fn entries(count: &u32) -> bool {
+    count.is_power_of_two() && (16..=1 << 20).contains(count)
+}
+
+const ENTRIES: &str =
+    "a power of two: `entries`, or a quarter of them where an entry is one result of a quad";
 
 /// Sides of tiles that the hardware takes.
 fn tile(side: &u32) -> bool {
@@ -429,179 +409,12 @@ fn tile(side: &u32) -> bool {
 
 const TILE: &str = "a power of two from 1 to 32";
 
-impl Rate {
-    fn check(&self) -> Result<(), String> {
-        let counts = |list: &Vec<u32>| list.len() > 1 && list.iter().all(|count| (1..=16).contains(count));
-        self.boxes_in_t.must("vi_4.boxes_in_t", counts, "two counts or more, each 1 to 16")?;
-        self.tile_px.must("vi_4.tile_px", tile, TILE)?;
-        self.motion_m.within("vi_4.motion_m", 0.0..=100.0)?;
-        self.yards.within("vi_4.yards", 1..=100)?;
-        self.asked.within("vi_4.asked", 1..=10_000)?;
-        self.size_px.must("vi_4.size_px", image, IMAGE)?;
-        self.samples.within("vi_4.samples", 1..=256)
-    }
+/// Sizes that an image may have.
+fn image(size: &Size) -> bool {
+    [size.0, size.1].iter().all(|side| (8..=4096).contains(side))
 }
 
-impl Cost {
-    fn check(&self) -> Result<(), String> {
-        let counts = |list: &Vec<u32>| !list.is_empty() && list.iter().all(|count| (1..=256).contains(count));
-        self.samples.must("vi_5.samples", counts, "counts of 1 to 256")?;
-        self.objects.must("vi_5.objects", |_| true, "all or hidden")?;
-        self.boxes_charged.within("vi_5.boxes_charged", 0.0..=1.0)?;
-        self.far_fewer.within("vi_5.far_fewer", 1.0..=1e6)?;
-        self.tile_px.must("vi_5.tile_px", tile, TILE)?;
-        self.yards.within("vi_5.yards", 1..=100)?;
-        self.asked.within("vi_5.asked", 1..=10_000)?;
-        self.size_px.must("vi_5.size_px", image, IMAGE)
-    }
-}
-
-impl Executions {
-    fn check(&self) -> Result<(), String> {
-        self.cells.within("vi_6.cells", 1..=1000)?;
-        self.dark_red.within("vi_6.dark_red", 1..=1_000_000)?;
-        self.slope.within("vi_6.slope", 0.0..=2.0)?;
-        self.depth_m.within("vi_6.depth_m", 0.1..=100.0)?;
-        self.size_px.must("vi_6.size_px", image, IMAGE)
-    }
-}
-
-impl Lost {
-    fn check(&self) -> Result<(), String> {
-        self.slope.within("vi_7.slope", 0.0..=2.0)?;
-        self.pleat.within("vi_7.pleat", 0.0..=0.9)?;
-        self.cells.within("vi_7.cells", 1..=200)?;
-        self.size_px.must("vi_7.size_px", image, IMAGE)?;
-        self.turned_beams.within("vi_7.turned_beams", 1..=100_000)?;
-        let low = |list: &Vec<f64>| list.iter().all(|height| (-1.0..=1.0).contains(height));
-        self.turned_floors.must("vi_7.turned_floors", low, "heights of -1 to 1")?;
-        self.turned_px.must("vi_7.turned_px", image, IMAGE)?;
-        self.seed.within("vi_7.seed", 0..=u64::MAX)
-    }
-}
-
-impl TorusCount {
-    fn check(&self) -> Result<(), String> {
-        self.seed.within("vi_8.seed", 0..=u64::MAX)?;
-        self.ring.within("vi_8.ring", 0.1..=0.4)?;
-        self.tube.within("vi_8.tube", 0.01..=0.1 + 0.05)?;
-        self.side_px.within("vi_8.side_px", 8..=4096)?;
-        self.samples.within("vi_8.samples", 1..=256)?;
-        self.standard_errors.within("vi_8.standard_errors", 0.0..=100.0)?;
-        self.least_samples.within("vi_8.least_samples", 0.0..=1e12)
-    }
-}
-
-impl Darts {
-    fn check(&self) -> Result<(), String> {
-        self.radius_2d.within("vi_9.radius_2d", 0.005..=0.5)?;
-        self.radius_3d.within("vi_9.radius_3d", 0.01..=0.5)?;
-        self.rounds.within("vi_9.rounds", 1..=8)?;
-        self.side_px.within("vi_9.side_px", 8..=4096)?;
-        self.samples.within("vi_9.samples", 1..=256)?;
-        self.places.within("vi_9.places", 1..=1_000_000_000)?;
-        self.seed.within("vi_9.seed", 0..=u64::MAX)
-    }
-}
-
-impl Noise {
-    fn check(&self) -> Result<(), String> {
-        self.sets.within("vi_10.sets", 1..=1000)?;
-        self.points.within("vi_10.points", 100..=100_000_000)?;
-        let cells =
-            |(a, b, c, d): &(u64, u64, u64, u64)| [a, b, c, d].iter().all(|count| (2..=64).contains(*count));
-        self.cells.must("vi_10.cells", cells, "2 to 64 each")?;
-        self.fits.must(
-            "vi_10.fits",
-            |(low, high)| 0.0 <= *low && low < high && *high <= 1.0,
-            "two shares, in order",
-        )
-    }
-}
-
-impl Glossy {
-    fn check(&self) -> Result<(), String> {
-        let counts = |(few, many): &(u32, u32)| 0 < *few && few < many && *many <= 256;
-        self.samples.must("vi_11.samples", counts, "two counts up to 256, in order")?;
-        self.lens_radius.within("vi_11.lens_radius", 0.001..=10.0)?;
-        self.index.within("vi_11.index", 1.0..=3.0)?;
-        self.texels.within("vi_11.texels", 4..=512)?;
-        self.reference_tables.within("vi_11.reference_tables", 1..=256)?;
-        self.blur_off.must(
-            "vi_11.blur_off",
-            |(part, units)| *part >= 0.0 && *units >= 0.0,
-            "two numbers from 0 on",
-        )
-    }
-}
-
-impl Shadows {
-    fn check(&self) -> Result<(), String> {
-        self.places.within("vi_12.places", 1..=256)?;
-        self.size_px.must("vi_12.size_px", image, IMAGE)?;
-        self.frame.within("vi_12.frame", 0..=1000)
-    }
-}
-
-impl Views {
-    fn check(&self, row: &str) -> Result<(), String> {
-        let name = |field: &str| format!("{row}.{field}");
-        self.increase_percent.within(&name("increase_percent"), 0.0..=1e4)?;
-        self.within_points.within(&name("within_points"), 0.0..=1e4)?;
-        self.entries.within(&name("entries"), 1..=1 << 20)?;
-        let samples = |count: &u32| [2, 4, 8, 16, 32].contains(count);
-        self.samples.must(&name("samples"), samples, "2, 4, 8, 16 or 32")?;
-        self.eyes.within(&name("eyes"), 1e-4..=10.0)?;
-        self.size_px.must(&name("size_px"), image, IMAGE)?;
-        self.lens_over_eyes.within(&name("lens_over_eyes"), 0.001..=0.5)?;
-        self.shutter.within(&name("shutter"), 0.0..=1.0)?;
-        self.scene.must(&name("scene"), |(scene, _)| !scene.is_empty(), "a name and a frame")?;
-        let entries = |count: &u32| count.is_power_of_two() && (16..=1 << 20).contains(count);
-        let stated = *self.entries.get(Form::Full);
-        let of_entries = |quads: &u32| entries(quads) && (*quads == stated || 4 * quads == stated);
-        let would_do =
-            "a power of two: `entries`, or a quarter of them where an entry is one result of a quad";
-        self.quads.must(&name("quads"), of_entries, would_do)?;
-        self.ways.must(
-            &name("ways"),
-            |ways| ways.is_power_of_two() && *ways <= 16,
-            "a power of two up to 16",
-        )?;
-        self.policy.must(&name("policy"), |_| true, "lru or fifo")?;
-        self.overlap.within(&name("overlap"), 0..=2)?;
-        self.views.within(&name("views"), 2..=16)?;
-        let all = |list: &Vec<u32>| !list.is_empty() && list.iter().all(entries);
-        self.curve_entries.must(&name("curve_entries"), all, "powers of two from 16 to 1048576")
-    }
-}
-
-impl Depths {
-    fn check(&self) -> Result<(), String> {
-        self.mode.must("vi_15.mode", |_| true, "standard or conservative")?;
-        self.triangles.must("vi_15.triangles", |_| true, "catalogue or random")?;
-        self.planes.must("vi_15.planes", |_| true, "shutter or tile")?;
-        self.tile_px.must("vi_15.tile_px", |side| tile(side) && *side >= 2, "a power of two from 2 to 32")?;
-        self.conservative_tile_px.must("vi_15.conservative_tile_px", tile, TILE)?;
-        self.points.within("vi_15.points", 10..=1_000_000)?;
-        self.random_triangles.within("vi_15.random_triangles", 2..=1_000_000)?;
-        self.values_of_each_family.within("vi_15.values_of_each_family", 1..=100)?;
-        self.of_each_scene.within("vi_15.of_each_scene", 1..=1000)?;
-        self.side_px.must("vi_15.side_px", |side| [16, 32, 64, 128].contains(side), "16, 32, 64 or 128")?;
-        self.seed.within("vi_15.seed", 0..=u64::MAX)
-    }
-}
-
-impl Culling {
-    fn check(&self) -> Result<(), String> {
-        let boxes = |(u, v, t): &(u32, u32, u32)| [u, v, t].iter().all(|count| (1..=16).contains(*count));
-        let all = |list: &Vec<Hardware>| !list.is_empty() && list.iter().all(|one| boxes(&one.boxes));
-        self.hardware.must("vi_16.hardware", all, "one or more, with 1 to 16 boxes along u, v and t")?;
-        self.values_of_each_family.within("vi_16.values_of_each_family", 1..=100)?;
-        self.side_px.must("vi_16.side_px", |side| [16, 32, 64, 128].contains(side), "16, 32, 64 or 128")?;
-        self.triangles.within("vi_16.triangles", 1..=10_000)?;
-        self.seed.within("vi_16.seed", 0..=u64::MAX)
-    }
-}
+const IMAGE: &str = "8 to 4096 pixels across and down";
 
 #[cfg(test)]
 mod tests {

@@ -5,13 +5,13 @@ use workloads::multiview::Layout;
 
 use super::Task;
 use super::settings::{Policy, Size, Views};
-use crate::chart::ChartError;
 use crate::chart::views::{Bench, Lanes};
 use crate::reproduce::band::{Band, Cases};
 use crate::reproduce::figure::{level, line, over_doublings};
 use crate::reproduce::row::{Row, With, numbers};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
+use crate::study::StudyError;
 use output::plot::Series;
 use run::RunError;
 
@@ -55,7 +55,7 @@ impl Point {
     }
 
     /// Lanes of all views and of one, for `views` that are two lenses apart or `overlap` steps of a line.
-    fn lanes(&self, [views, overlap]: [u32; 2]) -> Result<Lanes, ChartError> {
+    fn lanes(&self, [views, overlap]: [u32; 2]) -> Result<Lanes, StudyError> {
         let aperture = self.lens_over_eyes * self.eyes;
         let layout = match overlap {
             0 => Layout { views, ..Layout::stereo(self.eyes, aperture) },

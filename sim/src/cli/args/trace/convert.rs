@@ -44,7 +44,13 @@ pub struct ConvertArgs {
     #[command(flatten)]
     pub input: InputArgs,
     /// File to write: .parquet, .jls (Joulescope), .csv, .tsv, .csv.gz, .tsv.gz or .perfetto-trace; `-` is standard output
-    #[arg(value_name = "OUT")]
+    #[arg(value_name = "OUT", required_unless_present = "named")]
+    pub last: Option<PathBuf>,
+    /// The same as OUT
+    #[arg(long = "out", id = "named", value_name = "FILE", conflicts_with = "last")]
+    pub named: Option<PathBuf>,
+    /// The file to write, however it was given.
+    #[arg(skip)]
     pub out: PathBuf,
     /// Print what was read, repaired and written as JSON
     #[arg(long)]

@@ -1,0 +1,63 @@
+//! The list of studies.
+
+use crate::chart::caustics::CausticsChart;
+use crate::chart::collision::CollisionChart;
+use crate::chart::frames::FramesChart;
+use crate::chart::glossy::GlossyChart;
+use crate::chart::growth::GrowthChart;
+use crate::chart::occlusion::OcclusionChart;
+use crate::chart::points::PointsChart;
+use crate::chart::sampled::SampledChart;
+use crate::chart::sampling::SamplingChart;
+use crate::chart::shadows::ShadowsChart;
+use crate::chart::tile_tests::TileTests;
+use crate::chart::timing::TimingChart;
+use crate::chart::views::ViewsChart;
+use crate::stress::Report;
+use crate::study::Entry;
+
+/// The charts of the book.
+pub static CHARTS: [Entry; 13] = [
+    Entry::of::<CausticsChart>(),
+    Entry::of::<CollisionChart>(),
+    Entry::of::<FramesChart>(),
+    Entry::of::<GlossyChart>(),
+    Entry::of::<GrowthChart>(),
+    Entry::of::<OcclusionChart>(),
+    Entry::of::<PointsChart>(),
+    Entry::of::<SampledChart>(),
+    Entry::of::<SamplingChart>(),
+    Entry::of::<ShadowsChart>(),
+    Entry::of::<TileTests>(),
+    Entry::of::<TimingChart>(),
+    Entry::of::<ViewsChart>(),
+];
+
+/// The failure catalogue, which has a command of its own.
+pub static STRESS: Entry = Entry::of::<Report>();
+
+/// Name and one line of `chart all`.
+pub const ALL: (&str, &str) = (
+    "all",
+    "Every chart, the failure catalogue of `quintile stress`, and `index.html`: speed against accuracy on one page",
+);
+
+/// The charts and the failure catalogue.
+pub fn all() -> impl Iterator<Item = &'static Entry> {
+    CHARTS.iter().chain([&STRESS])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_study_has_a_name_of_its_own_and_one_line() {
+        let mut names: Vec<&str> = all().map(|study| study.name).collect();
+        assert!(CHARTS.is_sorted_by_key(|chart| chart.name), "in the order of the help");
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), CHARTS.len() + 1);
+        assert!(all().all(|study| !study.about.is_empty() && !study.about.contains('\n')));
+    }
+}

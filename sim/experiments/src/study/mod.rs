@@ -1,0 +1,224 @@
+//! Studies: something is measured, drawn and written in one go. A chart of the book and the failure catalogue are studies.
+//!
+//! - [`Study`]: what a study is; [`Entry`]: one of them in a list.
+//! - [`table`]: tables whose columns are declared once.
+//! - [`tradeoff`]: speed against accuracy, the same few numbers for every method.
+//! - [`index`]: one page of all studies.
+
+mod error;
+pub mod index;
+pub mod table;
+pub mod tradeoff;
+
+use std::time::Instant;
+
+use output::plot::{Chart, ChartPanel, Look, Picture};
+use output::progress::Progress;
+use output::{Claim, OutDir, OutputError};
+use serde::Serialize;
+
+pub use error::StudyError;
+use table::Sheet;
+use tradeoff::TradeoffPoint;
+
+/// The result of a study: measured once, then drawn, written and printed. As JSON it is everything that was found.
+pub trait Study: Serialize + Sized {
+    /// Its name on the command line.
+    const NAME: &'static str;
+    /// What it shows, in one line.
+    const ABOUT: &'static str;
+    /// Paths of its pictures, without endings.
+    const PICTURES: &'static [&'static str];
+    /// Its other files: CSV, Markdown for the book where there is one, and JSON, which is written last.
+    const FILES: &'static [&'static str];
+    /// Whether other scenes than its own can be given.
+    const TAKES_SCENES: bool = false;
+    /// Whether the time it took is printed.
+    const SHOWS_TIME: bool = false;
+    /// How much is measured.
+    type Effort;
+    /// The study of the book.
+    const FULL: Self::Effort;
+    /// A preview in seconds.
+    const QUICK: Self::Effort;
+
+    /// Measures, on `scenes` besides its own where it takes any.
+    ///
+    /// # Errors
+    /// [`StudyError`] when a scene cannot be loaded or drawn, or the hardware cannot be built.
+    fn measure(effort: Self::Effort, scenes: &[String], progress: &Progress) -> Result<Self, StudyError>;
+
+    /// Draws its pictures.
+    ///
+    /// # Errors
+    /// Those of the folder.
+    fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError>;
+
+    /// Its tables, in the order in which they are printed.
+    fn tables(&self) -> Vec<Sheet>;
+
+    /// Its methods and their levels between speed and accuracy.
+    fn tradeoff(&self) -> Vec<TradeoffPoint> {
+        Vec::new()
+    }
+
+    /// A promise that was found broken.
+    fn fault(&self) -> Option<String> {
+        None
+    }
+
+    /// The files it may write.
+    fn claim() -> Claim {
+        Claim::new(format!("chart {}", Self::NAME)).plots(Self::PICTURES).files(Self::FILES.iter().copied())
+    }
+}
+
+/// The pictures of a study on their way into its folder.
+#[derive(Debug)]
+pub struct Gallery<'a> {
+    dir: &'a OutDir,
+    look: &'a Look,
+}
+
+impl Gallery<'_> {
+    /// How pictures look.
+    pub fn look(&self) -> &Look {
+        self.look
+    }
+
+    /// Writes a picture as `stem`.
+    ///
+    /// # Errors
+    /// Those of the folder.
+    pub fn add(&self, stem: &str, picture: &Picture) -> Result<(), OutputError> {
+        picture.write(self.dir, stem)
+    }
+
+    /// Draws panels under a title and a line on what they show, and writes them as `stem`.
+    ///
+    /// # Errors
+    /// Those of the folder.
+    pub fn chart(&self, stem: &str, titles: [&str; 2], panels: Vec<ChartPanel>) -> Result<(), OutputError> {
+        let [title, subject] = titles;
+        self.add(stem, &Chart::new(title, subject, panels).picture(self.look))
+    }
+}
+
+/// What a study is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Whether a preview will do.
+    pub quick: bool,
+    /// Scenes besides its own.
+    pub scenes: &'a [String],
+    /// The folder for its files.
+    pub dir: &'a OutDir,
+    /// How pictures look.
+    pub look: &'a Look,
+    /// Where progress is shown.
+    pub progress: &'a Progress,
+}
+
+/// A study that is measured, drawn and written.
+#[derive(Clone, Debug)]
+pub struct Done {
+    /// Its tables and what else is to be said of it, in whole lines.
+    pub text: String,
+    /// Everything it found.
+    pub json: String,
+    /// Its methods and their levels between speed and accuracy.
+    pub tradeoff: Vec<TradeoffPoint>,
+    /// A promise that it found broken.
+    pub fault: Option<String>,
+}
+
+impl Done {
+    /// Draws and writes what a study found into `dir`.
+    ///
+    /// # Errors
+    /// Those of the folder.
+    pub fn new<S: Study>(found: &S, dir: &OutDir, look: &Look) -> Result<Self, OutputError> {
+        let sheets = found.tables();
+        write(found, &sheets, dir, look)?;
+        let texts: Vec<String> = sheets.iter().filter_map(Sheet::text).collect();
+        // What was written as JSON can be printed as JSON.
+        let json = serde_json::to_string_pretty(found).unwrap_or_default();
+        let tradeoff = found.tradeoff().into_iter().map(|point| point.of(S::NAME)).collect();
+        Ok(Self { text: texts.join("\n"), json, tradeoff, fault: found.fault() })
+    }
+}
+
+fn write<S: Study>(found: &S, sheets: &[Sheet], dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+    found.draw(&Gallery { dir, look })?;
+    for sheet in sheets {
+        sheet.csv_file().map_or(Ok(()), |file| dir.write_file(file, |out| sheet.write_csv(out)))?;
+    }
+    let named = |ending: &str| S::FILES.iter().find(|file| file.ends_with(ending));
+    if let Some(file) = named(".md") {
+        let book: Vec<String> = sheets.iter().filter_map(Sheet::markdown).collect();
+        dir.write_file(file, |out| Ok(out.write_all(book.join("\n").as_bytes())?))?;
+    }
+    named(".json").map_or(Ok(()), |file| dir.write_json(file, found))
+}
+
+/// A study in a list of studies.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub about: &'static str,
+    /// Whether other scenes than its own can be given.
+    pub takes_scenes: bool,
+    claim: fn() -> Claim,
+    run: fn(&Request<'_>) -> Result<Done, StudyError>,
+}
+
+impl Entry {
+    /// The entry of a study.
+    pub const fn of<S: Study>() -> Self {
+        Self { name: S::NAME, about: S::ABOUT, takes_scenes: S::TAKES_SCENES, claim: S::claim, run: run::<S> }
+    }
+
+    /// The files it may write.
+    pub fn claim(&self) -> Claim {
+        (self.claim)()
+    }
+
+    /// Measures, draws and writes it.
+    ///
+    /// # Errors
+    /// [`StudyError`], above all when the folder cannot be written to.
+    pub fn run(&self, request: &Request<'_>) -> Result<Done, StudyError> {
+        (self.run)(request)
+    }
+}
+
+fn run<S: Study>(request: &Request<'_>) -> Result<Done, StudyError> {
+    let started = Instant::now();
+    let effort = if request.quick { S::QUICK } else { S::FULL };
+    let scenes = if S::TAKES_SCENES { request.scenes } else { &[] };
+    let found = S::measure(effort, scenes, request.progress)?;
+    let mut done = Done::new(&found, request.dir, request.look)?;
+    if S::SHOWS_TIME {
+        done.text += &format!("took {:.1} s\n", started.elapsed().as_secs_f64());
+    }
+    Ok(done)
+}
+
+/// Measures a study and checks that all of its files are there, in a folder that lives as long as the first result.
+#[cfg(test)]
+pub(crate) fn written<S: Study>(effort: S::Effort) -> (tempfile::TempDir, S, Done) {
+    let folder = tempfile::tempdir().unwrap();
+    let foreign = folder.path().join(format!("{}_old.png", S::NAME));
+    std::fs::write(&foreign, b"mine").unwrap();
+    let found = S::measure(effort, &[], &Progress::new(true)).unwrap();
+    let make = |dir: &OutDir| Done::new(&found, dir, &Look::default()).unwrap();
+    let done = OutDir::with(folder.path(), S::claim(), make).unwrap();
+    let pictures = S::PICTURES.iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
+    for file in pictures.chain(S::FILES.iter().map(|file| (*file).to_owned())) {
+        assert!(folder.path().join(&file).exists(), "{file}");
+    }
+    assert!(foreign.exists(), "a file that no study wrote is gone");
+    (folder, found, done)
+}

@@ -1,0 +1,274 @@
+//! Speed against accuracy, the same few numbers for every method of every study.
+
+use output::plot::{AxisSpec, Chart, ChartPanel, Look, Mark, Paint, Picture, Scale, Series};
+use output::table::digits;
+use output::{Claim, OutDir, OutputError};
+use serde::Serialize;
+
+use super::table::{Sheet, Table, plain};
+
+/// A measured quantity of which less is better, beside that of the reference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Metric {
+    /// Its name, for example `RMSE`.
+    pub name: &'static str,
+    /// Its unit; empty for a number without one.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// That of the reference, where it is known.
+    pub reference: Option<f64>,
+}
+
+impl Metric {
+    /// A quantity whose reference is not known.
+    pub const fn new(name: &'static str, unit: &'static str, value: f64) -> Self {
+        Self { name, unit, value, reference: None }
+    }
+
+    /// Root mean squared error of an image in linear light.
+    pub const fn rmse(value: f64) -> Self {
+        Self::new("RMSE", "", value)
+    }
+
+    /// Seconds of the host.
+    pub const fn host_s(value: f64) -> Self {
+        Self::new("host time", "s", value)
+    }
+
+    /// The same beside that of the reference.
+    #[must_use]
+    pub const fn beside(self, reference: f64) -> Self {
+        Self { reference: Some(reference), ..self }
+    }
+
+    /// Name and unit, as an axis has them.
+    fn label(&self) -> String {
+        if self.unit.is_empty() { self.name.to_owned() } else { format!("{} ({})", self.name, self.unit) }
+    }
+
+    /// Value and unit.
+    pub fn shown(&self) -> String {
+        format!("{} {}", digits(self.value), self.unit).trim_end().to_owned()
+    }
+}
+
+/// A level of a method: how wrong it is and what it costs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TradeoffPoint {
+    /// The study that measured it.
+    pub study: &'static str,
+    /// What is found, for example `time of a frame`.
+    pub subject: String,
+    /// The method, for example `packet`.
+    pub method: String,
+    /// Its level, for example `16 samples a pixel`; empty where it has one alone.
+    pub level: String,
+    /// How wrong it is.
+    pub error: Metric,
+    /// What it costs.
+    pub cost: Metric,
+}
+
+impl TradeoffPoint {
+    /// A method at a level, its error and its cost.
+    pub fn new(subject: impl Into<String>, [method, level]: [&str; 2], [error, cost]: [Metric; 2]) -> Self {
+        let (subject, method, level) = (subject.into(), method.to_owned(), level.to_owned());
+        Self { study: "", subject, method, level, error, cost }
+    }
+
+    /// The same point, measured by a study.
+    #[must_use]
+    pub(super) fn of(self, study: &'static str) -> Self {
+        Self { study, ..self }
+    }
+
+    /// Whether both are of the same quantities.
+    fn is_comparable(&self, other: &Self) -> bool {
+        let names = |point: &Self| [point.error.name, point.error.unit, point.cost.name, point.cost.unit];
+        names(self) == names(other)
+    }
+
+    /// Whether both find the same, measured in the same quantities: one of them may be better.
+    fn competes_with(&self, other: &Self) -> bool {
+        (self.study, &self.subject) == (other.study, &other.subject) && self.is_comparable(other)
+    }
+
+    /// Whether it is nowhere worse than the other and somewhere better.
+    fn dominates(&self, other: &Self) -> bool {
+        let [a, b] = [self, other].map(|point| (point.cost.value, point.error.value));
+        a.0 <= b.0 && a.1 <= b.1 && a != b
+    }
+}
+
+/// For each (cost, gain) whether it is Pareto-optimal: no other costs no more and gains no less, one of the two strictly.
+pub fn front(points: &[(f64, f64)]) -> Vec<bool> {
+    let dominates = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 >= b.1 && a != b;
+    points.iter().map(|point| !points.iter().any(|other| dominates(other, point))).collect()
+}
+
+/// The points of many studies.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Tradeoff {
+    /// Study by study.
+    pub points: Vec<TradeoffPoint>,
+}
+
+/// The path of the picture, without ending.
+pub const PICTURE: &str = "tradeoff";
+
+impl Tradeoff {
+    /// Its files.
+    pub fn add_to(claim: Claim) -> Claim {
+        claim.plots([PICTURE]).files(["tradeoff.csv", "tradeoff.md", "tradeoff.json"])
+    }
+
+    /// Whether no point of the same subject dominates this one.
+    pub fn is_optimal(&self, point: &TradeoffPoint) -> bool {
+        !self.points.iter().any(|other| other.competes_with(point) && other.dominates(point))
+    }
+
+    /// All numbers.
+    pub fn sheet(&self) -> Sheet {
+        Table::of(&self.points)
+            .column("study", "study", |point| point.study, plain)
+            .column("subject", "what is found", |point| point.subject.as_str(), plain)
+            .column("method", "method", |point| point.method.as_str(), plain)
+            .column("level", "level", |point| point.level.as_str(), plain)
+            .column("error_metric", "error", |point| point.error.name, plain)
+            .data("error_unit", |point| point.error.unit)
+            .data("error", |point| point.error.value)
+            .shown("", |point| point.error.shown(), plain)
+            .data("reference_error", |point| point.error.reference)
+            .column("cost_metric", "cost", |point| point.cost.name, plain)
+            .data("cost_unit", |point| point.cost.unit)
+            .data("cost", |point| point.cost.value)
+            .shown("", |point| point.cost.shown(), plain)
+            .data("reference_cost", |point| point.cost.reference)
+            .column(
+                "pareto",
+                "optimal",
+                |point| self.is_optimal(point),
+                |yes| if yes { "yes" } else { "" }.to_owned(),
+            )
+            .in_book()
+            .sheet()
+    }
+
+    /// Writes picture and numbers.
+    ///
+    /// # Errors
+    /// Those of the folder.
+    pub fn write(&self, dir: &OutDir, look: &Look) -> Result<(), OutputError> {
+        let sheet = self.sheet();
+        self.picture(look).write(dir, PICTURE)?;
+        dir.write_file("tradeoff.csv", |out| sheet.write_csv(out))?;
+        let book = sheet.markdown().unwrap_or_default();
+        dir.write_file("tradeoff.md", |out| Ok(out.write_all(book.as_bytes())?))?;
+        dir.write_json("tradeoff.json", &sheet)
+    }
+
+    /// A panel for each pair of quantities, a series for each method.
+    pub fn picture(&self, look: &Look) -> Picture {
+        let subject = "each point a level of a method; lower and further left is better; lines: Pareto fronts, one for \
+                       each thing that is found";
+        Chart::new("Speed against accuracy of every method", subject, self.panels()).picture(look)
+    }
+
+    fn panels(&self) -> Vec<ChartPanel> {
+        groups(self.points.iter(), TradeoffPoint::is_comparable)
+            .iter()
+            .map(|points| self.panel(points))
+            .collect()
+    }
+
+    fn panel(&self, points: &[&TradeoffPoint]) -> ChartPanel {
+        let fronts = groups(points.iter().copied(), TradeoffPoint::competes_with);
+        let fronts: Vec<Vec<(f64, f64)>> = fronts.iter().map(|points| self.front(points)).collect();
+        let lines = fronts.into_iter().filter(|front| front.len() > 1);
+        let lines = lines.map(|front| Series::new("", Mark::Steps(front)).painted(Paint::Grey));
+        let methods = groups(points.iter().copied(), |a, b| a.method == b.method);
+        let dots = methods.iter().enumerate().map(|(place, points)| {
+            let place_of = |point: &&TradeoffPoint| (point.cost.value, point.error.value, String::new());
+            let dots = Mark::Dots(points.iter().map(place_of).collect());
+            Series::new(points[0].method.as_str(), dots).painted(Paint::Like(place))
+        });
+        let [error, cost] = [&points[0].error, &points[0].cost];
+        let axis = |metric: &Metric, scale, zero: &str| AxisSpec {
+            name: metric.label(),
+            scale,
+            zero: zero.to_owned(),
+            ..AxisSpec::default()
+        };
+        // Without a value above zero there is nothing that a logarithm could show.
+        let exact = points.iter().all(|point| point.error.value == 0.0);
+        let scale = if exact { Scale::Listed(vec!["exact".to_owned()]) } else { Scale::Decades };
+        let axes = [axis(cost, Scale::Decades, ""), axis(error, scale, "exact")];
+        let mut subjects: Vec<&str> = points.iter().map(|point| point.study).collect();
+        subjects.dedup();
+        ChartPanel::over(&subjects.join(", "), axes, lines.chain(dots).collect())
+    }
+
+    /// The Pareto front of points that compete, from the cheapest on.
+    fn front(&self, points: &[&TradeoffPoint]) -> Vec<(f64, f64)> {
+        let optimal = points.iter().filter(|point| self.is_optimal(point));
+        let mut front: Vec<(f64, f64)> = optimal.map(|point| (point.cost.value, point.error.value)).collect();
+        front.sort_by(|a, b| a.0.total_cmp(&b.0));
+        front.dedup();
+        front
+    }
+}
+
+/// Points that are alike together, in the order of the first of each group.
+fn groups<'a>(
+    points: impl Iterator<Item = &'a TradeoffPoint>,
+    alike: impl Fn(&TradeoffPoint, &TradeoffPoint) -> bool,
+) -> Vec<Vec<&'a TradeoffPoint>> {
+    let mut groups: Vec<Vec<&TradeoffPoint>> = Vec::new();
+    for point in points {
+        match groups.iter_mut().find(|group| alike(group[0], point)) {
+            Some(group) => group.push(point),
+            None => groups.push(vec![point]),
+        }
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(subject: &str, method: &str, error: f64, host_s: f64) -> TradeoffPoint {
+        TradeoffPoint::new(subject, [method, ""], [Metric::rmse(error), Metric::host_s(host_s)])
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_dominates() {
+        let points = [(1.0, 0.1), (2.0, 0.5), (2.0, 0.4), (3.0, 0.5), (4.0, 0.9), (4.0, 0.9)];
+        assert_eq!(front(&points), [true, true, false, false, true, true]);
+        assert!(front(&[]).is_empty());
+    }
+
+    #[test]
+    fn only_points_of_one_subject_and_the_same_quantities_compete() {
+        let exact = TradeoffPoint { error: Metric::new("wrong", "%", 0.0), ..point("a", "other", 0.0, 0.1) };
+        let points = vec![
+            point("a", "fast", 0.4, 1.0),
+            point("a", "slow", 0.5, 2.0),
+            point("b", "slow", 0.5, 2.0),
+            point("a", "slow", 0.1, 4.0),
+            exact,
+        ];
+        let all = Tradeoff { points };
+        let optimal: Vec<bool> = all.points.iter().map(|point| all.is_optimal(point)).collect();
+        assert_eq!(optimal, [true, false, true, true, true]);
+        let panels = all.panels();
+        let names = |panel: &ChartPanel| {
+            panel.series.iter().map(|series| series.name.clone()).filter(|name| !name.is_empty()).collect()
+        };
+        let names: Vec<Vec<String>> = panels.iter().map(names).collect();
+        assert_eq!(names, [vec!["fast", "slow"], vec!["other"]]);
+        let svg = all.picture(&Look::default()).svg().unwrap();
+        assert!(svg.contains("RMSE") && svg.contains("host time (s)") && svg.contains("wrong (%)"));
+    }
+}

@@ -1,0 +1,143 @@
+//! `quintile chart` and `quintile stress`: studies, opened, made, written and printed.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Map, Value};
+
+use super::Failure;
+use super::args::{ChartArg, ChartArgs, StressArgs};
+use super::terminal::{print, print_json};
+use experiments::catalog::{CHARTS, all};
+use experiments::stress::{Effort, Report, family_named};
+use experiments::study::index::{self, Index, Section};
+use experiments::study::{Done, Entry, Request, Study, StudyError};
+use output::plot::Look;
+use output::progress::Progress;
+use output::terminal::Terminal;
+use output::{Destination, OutDir, OutputError};
+use run::RunError;
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Output(error) => error.into(),
+            StudyError::Run(error) => error.into(),
+            error => Self { message: error.to_string(), code: 1 },
+        }
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        RunError::from(error).into()
+    }
+}
+
+pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> {
+    let takes_scenes = !matches!(args.chart, ChartArg::One(chart) if !chart.takes_scenes);
+    if !args.scene.is_empty() && !takes_scenes {
+        return Err(Failure { message: scene_not_taken(), code: 2 });
+    }
+    // What can be known to be wrong is reported before minutes of work.
+    let out = Destination { folder: args.out.clone(), force: args.force };
+    let mut dir = match args.chart {
+        ChartArg::All => out.open(all().map(Entry::claim).chain([index::claim()])),
+        ChartArg::One(chart) => out.open([chart.claim()]),
+    }?;
+    for scene in &args.scene {
+        workloads::load(scene).map_err(RunError::from)?;
+    }
+    let pool = super::threads(args.threads)?;
+    let (look, progress) = (args.look.look(), Progress::on(terminal, args.json));
+    let make = |study: &Entry, dir: &OutDir| {
+        let request =
+            Request { quick: args.quick, scenes: &args.scene, dir, look: &look, progress: &progress };
+        Ok(study.run(&request)?)
+    };
+    match args.chart {
+        ChartArg::All => pool.install(|| run_all(args, &mut dir, &look, make)),
+        ChartArg::One(chart) => {
+            let done = pool.install(|| make(chart, &dir))?;
+            dir.publish()?;
+            show(&done, args.json, &args.out)
+        }
+    }
+}
+
+fn scene_not_taken() -> String {
+    let takers: Vec<String> =
+        CHARTS.iter().filter(|chart| chart.takes_scenes).map(|chart| format!("`{}`", chart.name)).collect();
+    let (last, others) = takers.split_last().map_or(("", &[][..]), |(last, others)| (last, others));
+    format!("--scene goes with `chart all`, {} and {last}; leave it out", others.join(", "))
+}
+
+/// Prints a study that is written.
+fn show(done: &Done, json: bool, out: &Path) -> Result<(), Failure> {
+    match json {
+        true => print(&done.json)?,
+        false => print(&format!("{}results: {}", done.text, out.display()))?,
+    }
+    done.fault.clone().map_or(Ok(()), |message| Err(Failure { message, code: 1 }))
+}
+
+/// Makes every study and the page; a broken promise of one does not keep the others.
+fn run_all(
+    args: &ChartArgs,
+    dir: &mut OutDir,
+    look: &Look,
+    make: impl Fn(&Entry, &OutDir) -> Result<Done, Failure>,
+) -> Result<(), Failure> {
+    let (mut json, mut faults) = (Map::new(), Vec::new());
+    let mut page = Index { command: command(args), ..Index::default() };
+    for (at, study) in all().enumerate() {
+        page.missing = all().skip(at + 1).map(|study| study.name.to_owned()).collect();
+        if !args.json {
+            print(&format!("{}:", study.name))?;
+        }
+        let started = Instant::now();
+        let Done { text, json: found, tradeoff, fault } = make(study, dir)?;
+        if !args.json {
+            print(&text)?;
+        }
+        json.insert(study.name.to_owned(), serde_json::from_str(&found).unwrap_or(Value::Null));
+        faults.extend(fault.map(|fault| format!("{}: {fault}", study.name)));
+        let files = dir.publish()?;
+        let (name, about) = (study.name.to_owned(), study.about.to_owned());
+        let took_s = started.elapsed().as_secs_f64();
+        page.sections.push(Section { name, about, text, took_s, ..Section::default() }.with_files(files));
+        page.tradeoff.points.extend(tradeoff);
+        // After each, so that what there is can be looked at while the next one runs.
+        page.write(dir, look).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
+        dir.publish()?;
+    }
+    match args.json {
+        true => print_json(&Value::Object(json), true)?,
+        false => print(&format!("results: {}", args.out.join("index.html").display()))?,
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Failure { message: faults.join("; "), code: 1 }) }
+}
+
+/// The command as one would type it again.
+fn command(args: &ChartArgs) -> String {
+    let mut words = vec!["quintile chart all".to_owned()];
+    words.extend(args.scene.iter().map(|scene| format!("--scene {scene}")));
+    words.extend(args.quick.then(|| "--quick".to_owned()));
+    words.push(format!("--out {}", args.out.display()));
+    words.join(" ")
+}
+
+/// `quintile stress`: the failure catalogue, or one family of it.
+pub(super) fn stress(args: &StressArgs, terminal: &Terminal) -> Result<(), Failure> {
+    // The folder first: that it cannot be written is better known before the work than after it.
+    let out = Destination { folder: args.out.clone(), force: args.force };
+    let mut dir = out.open([Report::claim()])?;
+    let pool = super::threads(args.threads)?;
+    let progress = Progress::on(terminal, args.json);
+    let only = args.family.as_deref().map(family_named).transpose()?;
+    let effort = Effort { only, quick: args.quick };
+    let report = pool.install(|| Report::measure(effort, &[], &progress))?;
+    let done = Done::new(&report, &dir, &args.look.look())?;
+    dir.publish()?;
+    show(&done, args.json, &args.out)
+}

@@ -1,0 +1,321 @@
+//! Statistics of frames: summaries, pooled runs, outliers, and the warm-up after launch.
+
+use super::{FrameEnergy, Spread};
+use crate::frames::{Flag, Flags};
+use crate::stats::about_mean;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Summary of a table of frames. Averages are over frames; for joules per pixel divide by the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// How many frames.
+    pub frames: usize,
+    /// Sum of the energies, J.
+    pub total_j: f64,
+    /// Energy per frame, J.
+    pub energy_j: Spread,
+    /// Duration of a frame, s.
+    pub duration_s: Spread,
+    /// Mean power of a frame, W; each frame counts once, however long.
+    pub power_w: Spread,
+    /// All energy over all time, W.
+    pub overall_power_w: f64,
+}
+
+impl Summary {
+    /// The summary of some frames; `None` for no frames.
+    pub fn of(frames: &[FrameEnergy]) -> Option<Self> {
+        let spread =
+            |value: fn(&FrameEnergy) -> f64| Spread::of(&frames.iter().map(value).collect::<Vec<_>>());
+        let total_j: f64 = frames.iter().map(|frame| frame.energy_j).sum();
+        let total_s: f64 = frames.iter().map(FrameEnergy::duration_s).sum();
+        Some(Self {
+            frames: frames.len(),
+            total_j,
+            overall_power_w: if total_s > 0.0 { total_j / total_s } else { 0.0 },
+            energy_j: spread(|frame| frame.energy_j)?,
+            duration_s: spread(FrameEnergy::duration_s)?,
+            power_w: spread(FrameEnergy::power_w)?,
+        })
+    }
+}
+
+/// The frames without an incomplete last one, which ends with the trace or at an end mark and is much longer
+/// or shorter than the others.
+pub fn whole(frames: &[FrameEnergy]) -> &[FrameEnergy] {
+    let cut = |flags: Flags| {
+        flags.contains(Flag::Last) && (flags.contains(Flag::Long) || flags.contains(Flag::Short))
+    };
+    match frames.split_last() {
+        Some((last, others)) if cut(last.flags) && !others.is_empty() => others,
+        _ => frames,
+    }
+}
+
+/// Several runs, pooled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Pooled {
+    /// How many runs.
+    pub runs: usize,
+    /// How many values in all.
+    pub values: usize,
+    /// Mean of all values.
+    pub mean: f64,
+    /// `sqrt(sum (n_i - 1) s_i^2 / sum (n_i - 1))`: the spread within runs, whatever lies between them.
+    pub deviation: f64,
+}
+
+/// Mean and pooled standard deviation of runs; `None` where there is no value.
+pub fn pooled(runs: &[Vec<f64>]) -> Option<Pooled> {
+    let runs: Vec<&Vec<f64>> = runs.iter().filter(|run| !run.is_empty()).collect();
+    let values: usize = runs.iter().map(|run| run.len()).sum();
+    if values == 0 {
+        return None;
+    }
+    let squares: f64 = runs.iter().map(|run| about_mean(run).1).sum();
+    let freedom = values - runs.len();
+    let deviation = if freedom > 0 { libm::sqrt(squares / freedom as f64) } else { 0.0 };
+    let mean = runs.iter().flat_map(|run| run.iter()).sum::<f64>() / values as f64;
+    Some(Pooled { runs: runs.len(), values, mean, deviation })
+}
+
+/// Frames on either side that show what is usual.
+const NEIGHBOURS: usize = 15;
+/// Values that a thread handles at once.
+const TASK_VALUES: usize = 4096;
+/// Deviations from which a frame is an outlier, and from which one beside an outlier is: a disturbance of
+/// several frames covers the outermost ones only in part.
+const OUTLIER_DEVIATIONS: [f64; 2] = [5.0, 2.5];
+/// Least deviation, as a share of the median: equal frames differ by rounding alone.
+const MIN_DEVIATION: f64 = 1e-3;
+/// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
+const MAD_TO_DEVIATION: f64 = 1.4826;
+
+/// Whether each of `values` is an outlier among its neighbours: off their median by several of their median
+/// absolute deviations (Hampel 1974). Fewer than five values have none.
+pub fn outliers(values: &[f64]) -> Vec<bool> {
+    if values.len() < 5 {
+        return vec![false; values.len()];
+    }
+    let tasks = (0..values.len()).into_par_iter().step_by(TASK_VALUES);
+    let deviations: Vec<f64> = tasks.flat_map_iter(|from| deviations(values, from)).collect();
+    let mut out: Vec<bool> = deviations.iter().map(|z| z.abs() > OUTLIER_DEVIATIONS[0]).collect();
+    let core = out.clone();
+    for index in 0..values.len() {
+        let beside = [index.checked_sub(1), Some(index + 1)].into_iter().flatten();
+        let same_way = |other: usize| deviations.get(other).is_some_and(|z| z * deviations[index] > 0.0);
+        out[index] |= deviations[index].abs() > OUTLIER_DEVIATIONS[1]
+            && beside.into_iter().any(|other| core.get(other) == Some(&true) && same_way(other));
+    }
+    out
+}
+
+/// Deviation of each value of one task from its neighbours, in their deviations.
+fn deviations(values: &[f64], from: usize) -> impl Iterator<Item = f64> + '_ {
+    let mut around = Around::new(values, from);
+    (from..values.len().min(from + TASK_VALUES)).map(move |index| {
+        around.go_to(index);
+        let (usual, spread) = around.usual_and_spread();
+        (values[index] - usual) / spread
+    })
+}
+
+/// The neighbours of a value, sorted: moving on by one value exchanges one.
+struct Around<'a> {
+    values: &'a [f64],
+    from: usize,
+    sorted: Vec<f64>,
+}
+
+impl<'a> Around<'a> {
+    fn new(values: &'a [f64], index: usize) -> Self {
+        let width = (2 * NEIGHBOURS + 1).min(values.len());
+        let from = index.saturating_sub(NEIGHBOURS).min(values.len() - width);
+        let mut sorted = values[from..from + width].to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        Self { values, from, sorted }
+    }
+
+    fn go_to(&mut self, index: usize) {
+        let width = self.sorted.len();
+        while self.from < index.saturating_sub(NEIGHBOURS).min(self.values.len() - width) {
+            let [old, new] = [self.values[self.from], self.values[self.from + width]];
+            let place = |sorted: &[f64], value: f64| sorted.partition_point(|x| x.total_cmp(&value).is_lt());
+            self.sorted.remove(place(&self.sorted, old));
+            self.sorted.insert(place(&self.sorted, new), new);
+            self.from += 1;
+        }
+    }
+
+    /// The median, and what the median absolute deviation from it says of the standard deviation.
+    fn usual_and_spread(&self) -> (f64, f64) {
+        let middle = self.sorted.len() / 2;
+        let usual = self.sorted[middle];
+        // The nearest half of all, from the middle outwards.
+        let (mut below, mut above) = (self.sorted[..middle].iter().rev(), self.sorted[middle + 1..].iter());
+        let mut next = [below.next(), above.next()].map(|value| apart(value, usual));
+        let mut farthest = 0.0;
+        for _ in 0..middle {
+            let side = usize::from(next[1] < next[0]);
+            farthest = next[side];
+            next[side] = apart(if side == 0 { below.next() } else { above.next() }, usual);
+        }
+        (usual, (MAD_TO_DEVIATION * farthest).max(MIN_DEVIATION * usual.abs()).max(f64::MIN_POSITIVE))
+    }
+}
+
+/// How far off a value is; beyond all if there is none.
+fn apart(value: Option<&f64>, usual: f64) -> f64 {
+    value.map_or(f64::INFINITY, |value| (value - usual).abs())
+}
+
+/// Least change of the mean that counts, in its standard errors.
+const MIN_STANDARD_ERRORS: f64 = 5.0;
+
+/// The end of the warm-up.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WarmUp {
+    /// Frames to discard; 0 where there is no clear change.
+    pub frames: usize,
+    /// Mean of the frames before the change less that of those after it, J.
+    pub excess_j: f64,
+    /// The same in standard errors.
+    pub clearness: f64,
+}
+
+/// The frame at which the mean energy changes, by least squares of two levels (Hinkley 1970, eq. 2.2), looked
+/// for in the first half. It is the knee of [`mean_over_discarded`].
+pub fn warm_up(energies_j: &[f64]) -> WarmUp {
+    let none = WarmUp { frames: 0, excess_j: 0.0, clearness: 0.0 };
+    let count = energies_j.len();
+    if count < 8 {
+        return none;
+    }
+    let total: f64 = energies_j.iter().sum();
+    let (mut before, mut best) = (0.0, (0.0, 0));
+    for split in 1..=count / 2 {
+        before += energies_j[split - 1];
+        let apart = before / split as f64 - (total - before) / (count - split) as f64;
+        let between = split as f64 * (count - split) as f64 / count as f64 * apart * apart;
+        if between > best.0 {
+            best = (between, split);
+        }
+    }
+    let split = best.1;
+    if split == 0 {
+        return none;
+    }
+    let (early, late) = energies_j.split_at(split);
+    let [(early_j, early_squares), (late_j, late_squares)] = [early, late].map(about_mean);
+    let excess_j = early_j - late_j;
+    let variance = (early_squares + late_squares) / (count - 2) as f64;
+    let error_j = libm::sqrt(variance * (1.0 / split as f64 + 1.0 / (count - split) as f64));
+    let clearness = excess_j / error_j.max(1e-12 * late_j.abs()).max(f64::MIN_POSITIVE);
+    // A split after one frame is that frame's own oddness.
+    WarmUp {
+        frames: if clearness > MIN_STANDARD_ERRORS && split > 1 { split } else { 0 },
+        excess_j,
+        clearness,
+    }
+}
+
+/// Mean energy of the frames left when the first `d` are discarded, J, for each `d` that leaves one.
+pub fn mean_over_discarded(energies_j: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut means: Vec<f64> = energies_j
+        .iter()
+        .rev()
+        .enumerate()
+        .map(|(index, energy_j)| {
+            sum += energy_j;
+            sum / (index + 1) as f64
+        })
+        .collect();
+    means.reverse();
+    means
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::upper_median;
+
+    #[test]
+    fn mean_deviation_and_median_of_known_numbers() {
+        let spread = Spread::of(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]).unwrap();
+        assert_eq!((spread.mean, spread.median), (5.0, 4.5));
+        assert!((spread.deviation - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert_eq!(Spread::of(&[3.0]), Some(Spread { mean: 3.0, deviation: 0.0, median: 3.0 }));
+        assert_eq!(Spread::of(&[]), None);
+        assert_eq!(Summary::of(&[]), None);
+    }
+
+    #[test]
+    fn a_difference_between_runs_does_not_widen_the_pool() {
+        let pool = pooled(&[vec![1.0, 2.0, 3.0], vec![11.0, 12.0, 13.0], vec![]]).unwrap();
+        assert_eq!((pool.runs, pool.values, pool.mean, pool.deviation), (2, 6, 7.0, 1.0));
+        assert_eq!(pooled(&[vec![]]), None);
+    }
+
+    #[test]
+    fn a_million_frames_take_no_longer_than_their_number_says() {
+        // Taking the mean anew for each of them once took minutes.
+        let run: Vec<f64> = (0..1_000_000).map(|i| f64::from(i % 2)).collect();
+        let pool = pooled(&[run]).unwrap();
+        assert!(pool.mean == 0.5 && (pool.deviation - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_disturbance_over_three_frames_is_found_with_its_edges() {
+        let mut values: Vec<f64> = (0..100).map(|i| 10.0 + 0.1 * f64::from(i * 37 % 11) / 11.0).collect();
+        values[50] += 0.15;
+        values[51] += 1.0;
+        values[52] += 0.3;
+        let found: Vec<usize> =
+            outliers(&values).iter().enumerate().filter(|(_, out)| **out).map(|(index, _)| index).collect();
+        assert_eq!(found, [50, 51, 52]);
+    }
+
+    #[test]
+    fn oracle_windows_that_go_along_are_those_taken_anew() {
+        for count in [5, 6, 30, 31, 32, 2 * TASK_VALUES + 3] {
+            let values: Vec<f64> = (0..count).map(|i| ((i * 7919) % 101) as f64 / 7.0 - 3.0).collect();
+            let tasks = (0..count).step_by(TASK_VALUES);
+            let found: Vec<f64> = tasks.flat_map(|from| deviations(&values, from)).collect();
+            let width = (2 * NEIGHBOURS + 1).min(count);
+            for (index, found) in found.into_iter().enumerate() {
+                let from = index.saturating_sub(NEIGHBOURS).min(count - width);
+                let mut around = values[from..from + width].to_vec();
+                let usual = upper_median(&mut around);
+                around.iter_mut().for_each(|value| *value = (*value - usual).abs());
+                let spread = (MAD_TO_DEVIATION * upper_median(&mut around))
+                    .max(MIN_DEVIATION * usual.abs())
+                    .max(f64::MIN_POSITIVE);
+                assert_eq!(found, (values[index] - usual) / spread, "{index} of {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn slow_drift_and_equal_values_have_none() {
+        let drift: Vec<f64> = (0..200).map(|i| 5.0 + 0.01 * f64::from(i) + 0.02 * f64::from(i % 3)).collect();
+        assert!(outliers(&drift).iter().chain(&outliers(&[1.0; 50])).all(|out| !out));
+        assert_eq!(outliers(&[1.0, 9.0]), [false, false]);
+    }
+
+    #[test]
+    fn the_step_is_found_under_noise_and_none_is_invented() {
+        let noise = |i: usize| 0.02 * ((i * 7919 % 101) as f64 / 101.0 - 0.5);
+        let frames: Vec<f64> = (0..300).map(|i| 1.0 + if i < 48 { 0.03 } else { 0.0 } + noise(i)).collect();
+        assert_eq!(warm_up(&frames).frames, 48);
+        let steady: Vec<f64> = (0..300).map(|i| 1.0 + noise(i)).collect();
+        assert_eq!(warm_up(&steady).frames, 0);
+        assert_eq!(warm_up(&[1.0; 3]).frames, 0);
+    }
+
+    #[test]
+    fn means_over_what_is_left() {
+        assert_eq!(mean_over_discarded(&[4.0, 2.0, 1.0]), [7.0 / 3.0, 1.5, 1.0]);
+    }
+}

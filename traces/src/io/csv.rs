@@ -1,0 +1,437 @@
+//! Interchange: CSV with the header `time_s,voltage_V,current_A`, no comment lines, and a JSON file beside
+//! it. CSV and TSV of other programs are read, too.
+
+use super::columns::{Layout, Picked, RowBatch, layout};
+use super::description::{Description, to_json};
+use super::samples::{TraceChunk, TraceHeader, TraceReader, TraceWriter};
+use super::time_base::Stamps;
+use super::{CURRENT_A, ReadError, ReadOptions, Repair, TIME_S, VOLTAGE_V, WriteError, atomic};
+use crate::decimal;
+use ::csv::{ByteRecord, Reader, ReaderBuilder};
+use flate2::Compression;
+use flate2::read::MultiGzDecoder;
+use flate2::write::GzEncoder;
+use rayon::prelude::*;
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Another place of the description of a CSV file: the same name ending in `.json`.
+pub fn sidecar_path(path: &Path) -> PathBuf {
+    path.with_extension("json")
+}
+
+/// The place where [`save_as`] writes the description of a file: its whole name and `.json`, which no other
+/// file shares.
+pub fn description_path(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
+}
+
+/// The places of a description, in the order in which they are tried: [`description_path`], then
+/// [`sidecar_path`], also without `.gz`.
+pub(crate) fn description_paths(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let inner = path.with_extension("");
+    let unpacked = inner.extension().is_some().then(|| sidecar_path(&inner));
+    [description_path(path), sidecar_path(path)].into_iter().chain(unpacked)
+}
+
+/// The delimiter of a text, by its first line: a tab or a semicolon if it has any, else a comma.
+pub(crate) fn delimiter(text: &[u8]) -> u8 {
+    let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    [b'\t', b';'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',')
+}
+
+/// Rows that a thread formats at once.
+const TASK_ROWS: usize = 1 << 12;
+/// Rows whose text is held at once.
+const HELD_ROWS: usize = 1 << 18;
+
+/// Writes the samples. Times are whole nanoseconds written as seconds; values have the digits that read back
+/// as the same number in f32 and in f64, so that an integral in f64 gives the same joules as here. About 50
+/// bytes a sample.
+///
+/// # Errors
+/// [`WriteError::Encode`] if the writer fails, [`WriteError::Read`] if the samples cannot be read.
+pub fn write<W: Write + Send>(trace: &dyn TraceReader, out: W) -> Result<(), WriteError> {
+    write_with(trace, out, b',')
+}
+
+/// As [`write()`], with something else than a comma between the fields: a tab for TSV.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_with<W: Write + Send>(trace: &dyn TraceReader, out: W, delimiter: u8) -> Result<(), WriteError> {
+    let out = BufWriter::with_capacity(1 << 16, out);
+    let mut writer = Writer { out, header: trace.header(), delimiter: char::from(delimiter) };
+    writer.head().map_err(encode)?;
+    trace.read_into(&mut writer)?;
+    writer.out.flush().map_err(encode)
+}
+
+fn encode(error: impl std::fmt::Display) -> WriteError {
+    WriteError::Encode(error.to_string())
+}
+
+/// A text being written.
+struct Writer<W: Write + Send> {
+    out: BufWriter<W>,
+    header: TraceHeader,
+    delimiter: char,
+}
+
+impl<W: Write + Send> TraceWriter for Writer<W> {
+    fn write(&mut self, chunk: &TraceChunk<'_>) -> Result<(), WriteError> {
+        if chunk.lost {
+            return Ok(());
+        }
+        for from in (0..chunk.len()).step_by(HELD_ROWS) {
+            let held = chunk.part(from, chunk.len().min(from + HELD_ROWS));
+            for text in self.texts(&held) {
+                self.out.write_all(&text).map_err(encode)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<W: Write + Send> Writer<W> {
+    fn head(&mut self) -> io::Result<()> {
+        let c = self.delimiter;
+        writeln!(self.out, "{TIME_S}{c}{VOLTAGE_V}{c}{CURRENT_A}")
+    }
+
+    /// The text of rows, formatted in parallel.
+    fn texts(&self, held: &TraceChunk<'_>) -> Vec<Vec<u8>> {
+        let (header, delimiter) = (&self.header, self.delimiter);
+        let tasks = (0..held.len().div_ceil(TASK_ROWS)).into_par_iter();
+        let part = |task: usize| held.part(task * TASK_ROWS, held.len().min((task + 1) * TASK_ROWS));
+        tasks.map(|task| text(header, &part(task), delimiter)).collect()
+    }
+}
+
+/// The text of some rows.
+fn text(header: &TraceHeader, rows: &TraceChunk<'_>, c: char) -> Vec<u8> {
+    let mut out = Vec::with_capacity(rows.len() * 56);
+    for (index, (voltage, current)) in rows.voltage_v.iter().zip(rows.current_a).enumerate() {
+        let time_ns = header.time_ns(rows.first + index as u64);
+        let (sign, time_ns) = (if time_ns < 0 { "-" } else { "" }, time_ns.unsigned_abs());
+        let (seconds, mut fraction, mut digits) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000, 9);
+        while digits > 1 && fraction % 10 == 0 {
+            fraction /= 10;
+            digits -= 1;
+        }
+        // Writing to memory does not fail.
+        let _ = write!(out, "{sign}{seconds}.{fraction:0digits$}");
+        for value in [voltage, current] {
+            let _ = write!(out, "{c}");
+            decimal::push(&mut out, f64::from(*value));
+        }
+        out.push(b'\n');
+    }
+    out
+}
+
+/// Writes the JSON description: exact rate and start, number of samples, units, and the trace's metadata.
+///
+/// # Errors
+/// [`WriteError`] if a mark is not finite or the writer fails.
+pub fn write_sidecar<W: Write>(trace: &dyn TraceReader, mut out: W) -> Result<(), WriteError> {
+    let json = to_json(&trace.header(), true)?;
+    writeln!(out, "{json}").and_then(|()| out.flush()).map_err(encode)
+}
+
+/// Writes the CSV file and, beside it, its description; each whole or not at all.
+///
+/// # Errors
+/// [`WriteError`] names the file.
+pub fn save(trace: &dyn TraceReader, path: &Path) -> Result<(), WriteError> {
+    save_as(trace, path, b',', false)
+}
+
+/// As [`save`], with another delimiter and optionally compressed with gzip.
+///
+/// # Errors
+/// [`WriteError`] names the file.
+pub fn save_as(trace: &dyn TraceReader, path: &Path, delimiter: u8, gzip: bool) -> Result<(), WriteError> {
+    atomic::write_trace(path, |out| {
+        if !gzip {
+            return write_with(trace, out, delimiter);
+        }
+        let mut packed = GzEncoder::new(out, Compression::default());
+        write_with(trace, &mut packed, delimiter)?;
+        packed.finish().map(|_| ()).map_err(encode)
+    })?;
+    atomic::write_trace(&description_path(path), |out| write_sidecar(trace, out))
+}
+
+/// Rows that are checked for decimal commas, which cut numbers in two.
+const CHECKED_ROWS: u64 = 1000;
+
+type Text = Box<dyn Read + Send>;
+
+/// A text being read.
+pub(super) struct CsvRows {
+    path: PathBuf,
+    reader: Reader<Text>,
+    record: ByteRecord,
+    names: Vec<String>,
+    row: u64,
+    /// Whether the first record, which has no names, is in `record` already.
+    held: bool,
+    /// Rows with more or fewer fields than there are names: the first, its time if it has one, and how many.
+    uneven: Option<(u64, Option<f64>, u64)>,
+    /// How many of the first rows have something in a field for which there is no name.
+    surplus: u64,
+}
+
+fn damaged(path: &Path, error: &::csv::Error) -> ReadError {
+    ReadError::Damaged { path: path.to_owned(), format: "CSV", reason: error.to_string() }
+}
+
+/// The description beside a text, where there is one.
+fn description(path: &Path) -> Result<Description, ReadError> {
+    for sidecar in description_paths(path) {
+        match fs::read_to_string(&sidecar) {
+            Ok(json) => return Description::from_json(&sidecar, &json),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(ReadError::io(&sidecar, error)),
+        }
+    }
+    Ok(Description::default())
+}
+
+impl CsvRows {
+    pub fn open(
+        path: &Path,
+        options: &ReadOptions,
+        gzip: bool,
+    ) -> Result<(Self, Layout, Description), ReadError> {
+        let header = description(path)?;
+        let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+        let text: Text =
+            if gzip { Box::new(MultiGzDecoder::new(BufReader::new(file))) } else { Box::new(file) };
+        let mut text = BufReader::with_capacity(1 << 16, Box::new(LineLimit::new(text)) as Text);
+        let guessed = delimiter(text.fill_buf().map_err(|error| ReadError::io(path, error))?);
+        let mut reader = ReaderBuilder::new()
+            .flexible(true)
+            .has_headers(false)
+            .delimiter(options.delimiter.unwrap_or(guessed))
+            .trim(::csv::Trim::All)
+            .buffer_capacity(1 << 16)
+            .from_reader(Box::new(text) as Text);
+        let mut record = ByteRecord::new();
+        let any = reader.read_byte_record(&mut record).map_err(|error| damaged(path, &error))?;
+        if !any {
+            return Err(ReadError::Empty { path: path.to_owned() });
+        }
+        let numbers = record.iter().all(|field| number::<f64>(field).is_some());
+        let held = !options.header.unwrap_or(!numbers);
+        let names: Vec<String> = if held {
+            unnamed(record.len())
+        } else {
+            record
+                .iter()
+                .map(|name| String::from_utf8_lossy(name).trim_start_matches('\u{feff}').to_owned())
+                .collect()
+        };
+        let layout = layout(path, &names, options)?;
+        let path = path.to_owned();
+        Ok((Self { path, reader, record, names, row: 0, held, uneven: None, surplus: 0 }, layout, header))
+    }
+
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The repair of the rows so far; without times, by the rate and start of the description.
+    pub fn repair(&self, header: &Description) -> Option<Repair> {
+        let (row, time_s, count) = self.uneven?;
+        let time_s = time_s.unwrap_or_else(|| header.time_s(row as usize - 1));
+        let message = format!(
+            "{count} rows have more or fewer fields than there are columns, the first of them row {row} ({time_s} s); \
+             surplus fields were dropped"
+        );
+        Some(Repair { code: "uneven-rows", row, time_s, count, message })
+    }
+
+    /// Moves to the next row; whether there was one.
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        if !std::mem::take(&mut self.held)
+            && !self.reader.read_byte_record(&mut self.record).map_err(|error| damaged(&self.path, &error))?
+        {
+            self.check_surplus(self.row < CHECKED_ROWS)?;
+            return Ok(false);
+        }
+        self.row += 1;
+        let beyond =
+            |record: &ByteRecord| record.iter().skip(self.names.len()).any(|field| !field.is_empty());
+        self.surplus += u64::from(self.row <= CHECKED_ROWS && beyond(&self.record));
+        self.check_surplus(self.row == CHECKED_ROWS)?;
+        Ok(true)
+    }
+
+    /// Refuses numbers that most likely have decimal commas: without the surplus fields they would be wrong.
+    fn check_surplus(&self, now: bool) -> Result<(), ReadError> {
+        if now && 2 * self.surplus > self.row {
+            return Err(ReadError::Surplus { path: self.path.clone(), rows: self.row });
+        }
+        Ok(())
+    }
+
+    pub fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        for _ in 0..rows {
+            if !self.advance()? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    pub fn next(
+        &mut self,
+        layout: &Layout,
+        limit: usize,
+        repair: bool,
+        batch: &mut RowBatch,
+    ) -> Result<usize, ReadError> {
+        let mut times = match std::mem::replace(&mut batch.stamps, Stamps::Absent) {
+            Stamps::Seconds(times) => times,
+            _ => Vec::new(),
+        };
+        times.clear();
+        let mut rows = 0;
+        while rows < limit && self.advance()? {
+            if self.record.len() != self.names.len() && !repair {
+                let reason = format!("{} fields instead of {}", self.record.len(), self.names.len());
+                return Err(ReadError::Row { path: self.path.clone(), row: self.row, reason });
+            }
+            if self.row == 1 && self.record.iter().all(is_word) {
+                return Err(ReadError::Words { path: self.path.clone() });
+            }
+            if let Some(time) = &layout.time {
+                times.push(self.field::<f64>(time, repair, f64::NAN)? * time.scale);
+            }
+            if self.record.len() != self.names.len() {
+                let time_s = times.last().copied().filter(|time_s| time_s.is_finite());
+                self.uneven.get_or_insert((self.row, time_s, 0)).2 += 1;
+            }
+            for (column, values) in layout.values.iter().zip(&mut batch.values) {
+                // Parsed as f32 at once: two roundings, decimal to f64 to f32, can differ from one.
+                values.push(self.field::<f32>(column, repair, f32::NAN)?);
+            }
+            rows += 1;
+        }
+        if layout.time.is_some() {
+            batch.stamps = Stamps::Seconds(times);
+        }
+        Ok(rows)
+    }
+
+    /// A finite number; otherwise the placeholder `none` if it is repaired later, or the error that names its
+    /// place.
+    fn field<T: std::str::FromStr + Finite>(
+        &self,
+        column: &Picked,
+        repair: bool,
+        none: T,
+    ) -> Result<T, ReadError> {
+        let field = self.record.get(column.index).unwrap_or_default();
+        match number(field) {
+            Some(value) => Ok(value),
+            None if has_decimal_comma(field) => Err(ReadError::DecimalComma {
+                path: self.path.clone(),
+                row: self.row,
+                column: column.name.clone(),
+                value: String::from_utf8_lossy(field).chars().take(40).collect(),
+            }),
+            None if repair => Ok(none),
+            None => {
+                let shown: String = String::from_utf8_lossy(field).chars().take(40).collect();
+                let value = match number::<f64>(field) {
+                    Some(_) => format!("{shown:?}, which is beyond 3.4e38"),
+                    None if shown.is_empty() => "empty".to_owned(),
+                    None => format!("{shown:?}"),
+                };
+                Err(ReadError::Value {
+                    path: self.path.clone(),
+                    row: self.row,
+                    column: column.name.clone(),
+                    value,
+                })
+            }
+        }
+    }
+}
+
+/// Names for columns that have none: time, voltage, current; two columns are voltage and current.
+fn unnamed(columns: usize) -> Vec<String> {
+    let usual: &[&str] = if columns == 2 { &[VOLTAGE_V, CURRENT_A] } else { &[TIME_S, VOLTAGE_V, CURRENT_A] };
+    (0..columns)
+        .map(|i| usual.get(i).map_or_else(|| format!("column {}", i + 1), |name| (*name).to_owned()))
+        .collect()
+}
+
+/// Whether there is something in a field that is no number, not even one that is not finite.
+fn is_word(field: &[u8]) -> bool {
+    !field.is_empty()
+        && !has_decimal_comma(field)
+        && std::str::from_utf8(field).is_ok_and(|text| text.parse::<f64>().is_err())
+}
+
+/// Whether a field would be a number if its only comma were a point.
+fn has_decimal_comma(field: &[u8]) -> bool {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    text.matches(',').count() == 1 && number::<f64>(text.replace(',', ".").as_bytes()).is_some()
+}
+
+fn number<T: std::str::FromStr + Finite>(field: &[u8]) -> Option<T> {
+    std::str::from_utf8(field).ok().and_then(|text| text.parse().ok()).filter(T::finite)
+}
+
+trait Finite {
+    fn finite(&self) -> bool;
+}
+
+impl Finite for f32 {
+    fn finite(&self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Finite for f64 {
+    fn finite(&self) -> bool {
+        self.is_finite()
+    }
+}
+
+/// Longest line that is read, in bytes.
+const MAX_LINE_BYTES: usize = 1 << 20;
+
+/// Fails at a line longer than [`MAX_LINE_BYTES`], so that a file without line ends is not read into memory
+/// whole.
+struct LineLimit<R> {
+    inner: R,
+    since_end: usize,
+}
+
+impl<R> LineLimit<R> {
+    pub fn new(inner: R) -> Self {
+        Self { inner, since_end: 0 }
+    }
+}
+
+impl<R: Read> Read for LineLimit<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let read = self.inner.read(into)?;
+        self.since_end = match into[..read].iter().rposition(|&byte| byte == b'\n') {
+            Some(last) => read - last - 1,
+            None => self.since_end + read,
+        };
+        if self.since_end > MAX_LINE_BYTES {
+            return Err(io::Error::other("a line is longer than 1 MiB"));
+        }
+        Ok(read)
+    }
+}

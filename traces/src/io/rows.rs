@@ -1,0 +1,365 @@
+//! Rows of a file of any format, in pieces, so that no file has to fit into memory.
+
+use super::columns::{Layout, Rail, RowBatch};
+use super::csv::CsvRows;
+use super::description::Description;
+use super::jls::JlsRows;
+use super::parquet::ParquetRows;
+use super::time_base::mean_rate_hz;
+use super::{CURRENT_A, ReadError, ReadOptions, Repair, TIME_NS, TIME_S, VOLTAGE_V};
+use crate::metadata::Metadata;
+use std::fs::File;
+use std::io::Read;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// The first bytes of formats that are not read, and what to do about them.
+const FOREIGN: [(&[u8], &str, &str); 6] = [
+    (b"\xd3tagfmt", "a JLS recording of version 1", "export it to CSV from the program that made it"),
+    (b"\x89HDF\r\n", "an HDF5 file", "export its channels to CSV or Parquet"),
+    (
+        b"PK\x03\x04",
+        "an archive (sigrok .sr, .ppk2 or a spreadsheet)",
+        "export it to CSV from its own program",
+    ),
+    (b"\x89PNG", "a PNG image", TRACE_FORMATS),
+    (b"\xff\xd8\xff", "a JPEG image", TRACE_FORMATS),
+    (b"%PDF", "a PDF document", TRACE_FORMATS),
+];
+const TRACE_FORMATS: &str = "give a trace in Parquet, JLS, CSV or TSV";
+
+/// Whether these bytes are not text: control characters other than white space, as in UTF-16.
+fn is_binary(start: &[u8]) -> bool {
+    start.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace())
+}
+
+enum Format {
+    Csv(Box<CsvRows>),
+    Jls(Box<JlsRows>),
+    Parquet(Box<ParquetRows>),
+}
+
+/// A file being read.
+pub struct Rows {
+    path: PathBuf,
+    format: Format,
+    layout: Layout,
+    pub(crate) description: Description,
+    repair: bool,
+}
+
+impl Rows {
+    /// Opens Parquet, JLS, CSV or TSV, the latter two also with gzip; the format follows from the first
+    /// bytes.
+    ///
+    /// # Errors
+    /// [`ReadError`] if there is no such file, it is of no known format, or columns are missing.
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let rows = Self::of_kind(path, options)?;
+        check_rate(&rows, options)?;
+        Ok(rows)
+    }
+
+    fn of_kind(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        match first_bytes(path)? {
+            start if start.starts_with(b"PAR1") => Self::parquet(path, options),
+            start if start.starts_with(b"jlsfmt\r\n") => Self::jls(path, options),
+            start => match FOREIGN.iter().find(|(magic, _, _)| start.starts_with(magic)) {
+                Some((_, found, remedy)) => Err(ReadError::Format { path: path.to_owned(), found, remedy }),
+                None if is_binary(&start) && !start.starts_with(&[0x1f, 0x8b]) => {
+                    let found = "a binary file of an unknown kind";
+                    Err(ReadError::Format { path: path.to_owned(), found, remedy: TRACE_FORMATS })
+                }
+                None => Self::csv(path, options, start.starts_with(&[0x1f, 0x8b])),
+            },
+        }
+    }
+
+    pub(crate) fn parquet(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let opened = catch_unwind(AssertUnwindSafe(|| ParquetRows::open(path, options)));
+        let (format, layout, description) = opened.unwrap_or_else(|_| Err(decoder_panicked(path)))?;
+        Self::new(path, Format::Parquet(Box::new(format)), layout, description, options, TIME_NS)
+    }
+
+    pub(crate) fn csv(path: &Path, options: &ReadOptions, gzip: bool) -> Result<Self, ReadError> {
+        let (format, layout, description) = CsvRows::open(path, options, gzip)?;
+        Self::new(path, Format::Csv(Box::new(format)), layout, description, options, TIME_S)
+    }
+
+    fn jls(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let (format, layout, description) = JlsRows::open(path, options)?;
+        Self::new(path, Format::Jls(Box::new(format)), layout, description, options, TIME_S)
+    }
+
+    fn new(
+        path: &Path,
+        format: Format,
+        layout: Layout,
+        mut description: Description,
+        options: &ReadOptions,
+        time: &str,
+    ) -> Result<Self, ReadError> {
+        check_overrides(path, &layout, &description, options)?;
+        description.rate_hz = options.rate_hz.or(description.rate_hz);
+        description.start_s = options.start_s.or(description.start_s);
+        if layout.time.is_none() && description.rate_hz.is_none() {
+            let found = format.names().join(", ");
+            return Err(ReadError::MissingColumn { path: path.to_owned(), column: time.to_owned(), found });
+        }
+        if layout.names.len() > 1 {
+            description.metadata.other.insert("rails".to_owned(), layout.names.clone().into());
+        }
+        Ok(Self { path: path.to_owned(), format, layout, description, repair: options.repair })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The metadata of the file.
+    pub fn metadata(&self) -> &Metadata {
+        &self.description.metadata
+    }
+
+    /// Number of rows, in formats that state it.
+    pub fn count(&self) -> Option<u64> {
+        match &self.format {
+            Format::Csv(_) => None,
+            Format::Jls(rows) => Some(rows.count()),
+            Format::Parquet(rows) => Some(rows.count()),
+        }
+    }
+
+    /// Refuses non-finite values and names the first one; `first` is the number of rows before these.
+    pub(crate) fn check_finite(
+        &self,
+        voltage_v: &[f32],
+        current_a: &[f32],
+        first: u64,
+    ) -> Result<(), ReadError> {
+        for (values, column) in [(voltage_v, VOLTAGE_V), (current_a, CURRENT_A)] {
+            // Without an early exit, so that the loop vectorizes; the place is searched only afterwards.
+            if values.iter().fold(true, |all, value| all & value.is_finite()) {
+                continue;
+            }
+            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                return Err(ReadError::Value {
+                    path: self.path.clone(),
+                    row: first + at as u64 + 1,
+                    column: column.to_owned(),
+                    value: values[at].to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The repair made when the file was opened and in the rows read since.
+    pub(crate) fn repair(&self) -> Option<Repair> {
+        match &self.format {
+            Format::Csv(rows) => rows.repair(&self.description),
+            Format::Jls(rows) => rows.repair(&self.description),
+            Format::Parquet(_) => None,
+        }
+    }
+
+    /// Names of the rails that are read, in order.
+    pub fn rails(&self) -> &[String] {
+        &self.layout.names
+    }
+
+    /// Whether wrong input is to be repaired.
+    pub(crate) fn repairs_input(&self) -> bool {
+        self.repair
+    }
+
+    /// Skips rows.
+    pub(crate) fn skip(&mut self, rows: u64) -> Result<(), ReadError> {
+        let path = self.path.clone();
+        match &mut self.format {
+            Format::Csv(format) => format.skip(rows),
+            Format::Jls(format) => format.skip(rows),
+            Format::Parquet(format) => catch_unwind(AssertUnwindSafe(|| format.skip(rows)))
+                .unwrap_or_else(|_| Err(decoder_panicked(&path))),
+        }
+    }
+
+    /// Reads up to `limit` rows into `batch`, over its content; returns how many, 0 at the end.
+    pub(crate) fn next(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
+        batch.values.resize_with(self.layout.values.len(), Vec::new);
+        batch.values.iter_mut().for_each(Vec::clear);
+        self.read(limit, batch)
+    }
+
+    /// Reads up to `limit` rows and appends them, all rails together, to voltages (V) and currents (A);
+    /// returns how many.
+    pub(crate) fn append(
+        &mut self,
+        limit: usize,
+        batch: &mut RowBatch,
+        voltage_v: &mut Vec<f32>,
+        current_a: &mut Vec<f32>,
+    ) -> Result<usize, ReadError> {
+        let (Format::Parquet(_), Some([voltage, current])) = (&self.format, self.layout.unscaled_channels())
+        else {
+            let read = self.next(limit, batch)?;
+            self.channels(batch, voltage_v, current_a);
+            return Ok(read);
+        };
+        // Decoded in place: copying long traces costs a twentieth of the time.
+        batch.values.resize_with(self.layout.values.len(), Vec::new);
+        let mut exchange = |batch: &mut RowBatch| {
+            std::mem::swap(&mut batch.values[voltage], voltage_v);
+            std::mem::swap(&mut batch.values[current], current_a);
+        };
+        exchange(batch);
+        let read = self.read(limit, batch);
+        exchange(batch);
+        read
+    }
+
+    /// Appends up to `limit` rows to the values of `batch`; the stamps are those of these rows alone.
+    fn read(&mut self, limit: usize, batch: &mut RowBatch) -> Result<usize, ReadError> {
+        let path = &self.path;
+        match &mut self.format {
+            Format::Csv(format) => format.next(&self.layout, limit, self.repair, batch),
+            Format::Jls(format) => format.next(limit, batch),
+            Format::Parquet(format) => {
+                let read = catch_unwind(AssertUnwindSafe(|| format.next(limit, batch)));
+                read.unwrap_or_else(|_| Err(decoder_panicked(path)))
+            }
+        }
+    }
+
+    /// Appends a batch's rows, all rails together, to voltages (V) and currents (A). Where rails are added or
+    /// only the power is known, the voltage is 1 V and the current is the power.
+    fn channels(&self, batch: &mut RowBatch, voltage_v: &mut Vec<f32>, current_a: &mut Vec<f32>) {
+        self.layout.scale(&mut batch.values);
+        match self.layout.rails[..] {
+            [Rail::Measured { voltage, current }] => {
+                voltage_v.extend_from_slice(&batch.values[voltage]);
+                current_a.extend_from_slice(&batch.values[current]);
+            }
+            [Rail::Specified { volts, current }] => {
+                voltage_v.resize(voltage_v.len() + batch.values[current].len(), volts as f32);
+                current_a.extend_from_slice(&batch.values[current]);
+            }
+            ref rails => {
+                let rows = batch.values.first().map_or(0, Vec::len);
+                voltage_v.resize(voltage_v.len() + rows, 1.0);
+                let power_w =
+                    |row: usize| rails.iter().map(|rail| rail.power_w(&batch.values, row)).sum::<f64>();
+                current_a.extend((0..rows).map(|row| power_w(row) as f32));
+            }
+        }
+    }
+
+    /// The power of each rail in each row of a batch, W.
+    pub(super) fn powers_w(&self, batch: &mut RowBatch) -> Vec<Vec<f64>> {
+        self.layout.scale(&mut batch.values);
+        let rows = batch.values.first().map_or(0, Vec::len);
+        let of = |rail: &Rail| (0..rows).map(|row| rail.power_w(&batch.values, row)).collect();
+        self.layout.rails.iter().map(of).collect()
+    }
+}
+
+impl Format {
+    fn names(&self) -> &[String] {
+        match self {
+            Self::Csv(rows) => rows.names(),
+            Self::Jls(rows) => rows.names(),
+            Self::Parquet(rows) => rows.names(),
+        }
+    }
+}
+
+fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let mut start = Vec::new();
+    let file = File::open(path).map_err(|error| ReadError::io(path, error))?;
+    if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
+        return Err(ReadError::Folder { path: path.to_owned() });
+    }
+    file.take(8).read_to_end(&mut start).map_err(|error| ReadError::io(path, error))?;
+    if start.is_empty() { Err(ReadError::Empty { path: path.to_owned() }) } else { Ok(start) }
+}
+
+/// The error for a panic of the Parquet decoder, which happens on some damaged files.
+fn decoder_panicked(path: &Path) -> ReadError {
+    ReadError::Damaged { path: path.to_owned(), format: "Parquet", reason: "its decoder gave up".to_owned() }
+}
+
+/// Largest difference between a requested rate and that of the file, as a share: clocks differ, and JLS
+/// rounds by as much.
+const MAX_RATE_DEVIATION: f64 = 1e-3;
+/// Largest difference of times, in sample periods; rounding alone stays below.
+const MAX_OFFSET_PERIODS: f64 = 0.25;
+/// Rows whose times are compared with a requested rate.
+const CHECKED_ROWS: usize = 1 << 12;
+
+fn conflict(path: &Path, reason: String) -> ReadError {
+    ReadError::Conflict { path: path.to_owned(), reason }
+}
+
+/// Refuses a rate and a start that contradict columns or description.
+fn check_overrides(
+    path: &Path,
+    layout: &Layout,
+    description: &Description,
+    options: &ReadOptions,
+) -> Result<(), ReadError> {
+    if let Some((start_s, column)) = options.start_s.zip(layout.time.as_ref()) {
+        let reason = format!(
+            "a start at {start_s} s was asked for, but column {} has the times: leave --start out",
+            column.name
+        );
+        return Err(conflict(path, reason));
+    }
+    if let Some((requested_hz, stated_hz)) = options.rate_hz.zip(description.rate_hz)
+        && (requested_hz / stated_hz - 1.0).abs() > MAX_RATE_DEVIATION
+    {
+        let reason = format!(
+            "a rate of {requested_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or mend \
+             rate_hz there"
+        );
+        return Err(conflict(path, reason));
+    }
+    let rate_hz = description.rate_hz.or(options.rate_hz).unwrap_or(f64::INFINITY);
+    if let Some((requested_s, stated_s)) = options.start_s.zip(description.start_s)
+        && (requested_s - stated_s).abs() * rate_hz > MAX_OFFSET_PERIODS
+    {
+        let reason = format!(
+            "a start at {requested_s} s was asked for, but it or its description says {stated_s} s: leave --start out, or mend \
+             start_s there"
+        );
+        return Err(conflict(path, reason));
+    }
+    Ok(())
+}
+
+/// Refuses a rate that contradicts the times of the first rows: repairing to that rate would add or drop
+/// samples.
+fn check_rate(rows: &Rows, options: &ReadOptions) -> Result<(), ReadError> {
+    let (Some(requested_hz), Some(column)) = (options.rate_hz, &rows.layout.time) else { return Ok(()) };
+    let mut again = Rows::of_kind(&rows.path, &ReadOptions { rate_hz: None, ..options.clone() })?;
+    let mut batch = RowBatch::default();
+    again.next(CHECKED_ROWS, &mut batch)?;
+    let stamps = &batch.stamps;
+    let times = (0..stamps.len()).map(|row| stamps.time_s(row)).filter(|time_s| time_s.is_finite());
+    let mut times: Vec<f64> = times.collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    if times.len() < 2 {
+        return Ok(());
+    }
+    let rate_hz = mean_rate_hz(&times);
+    let off = (requested_hz / rate_hz - 1.0).abs();
+    if off > MAX_RATE_DEVIATION && off * times.len() as f64 > MAX_OFFSET_PERIODS {
+        let reason = format!(
+            "a rate of {requested_hz} Hz was asked for, but by column {} it is {rate_hz} Hz: leave --rate out",
+            column.name
+        );
+        return Err(conflict(&rows.path, reason));
+    }
+    Ok(())
+}
