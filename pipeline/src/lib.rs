@@ -1,28 +1,30 @@
-//! A tile-based rasterizer in five dimensions (screen, lens, time) as a functional model.
+//! Functional model of a tile-based rasterizer in five dimensions (screen, lens and time).
 //!
-//! It says *what* happens when triangles are drawn, never when or at what cost in joules: it renders an image and emits
-//! the work packets of the modelled hardware, each with the events it causes (see the crate `activity`).
+//! It models *what* happens when triangles are drawn; timing and energy are in other crates. It renders an
+//! image and emits the work packets of the modelled hardware with the events they cause (see the crate
+//! `activity`).
 //!
-//! The folders are the block diagram, in the order of the work:
+//! The modules follow the block diagram, in the order of the work:
 //!
 //! - [`geometry`]: cameras (perspective or orthographic), draws and vertices on the homogeneous image plane,
 //! - [`setup`]: triangles ready for traversal,
-//! - [`traversal`]: tile tests, which bound where in lens and time a triangle may touch a tile,
+//! - [`traversal`]: tile tests, which bound the lens positions and times at which a triangle may touch a
+//!   tile,
 //! - [`sample_test`]: the exact test of a sample against a triangle,
 //! - [`random`]: counter-based random numbers,
-//! - [`sampling`]: where and when each pixel looks,
+//! - [`sampling`]: sample positions of every pixel,
 //! - [`depth`]: depth intervals and culling,
 //! - [`shading`] and [`texture`]: the shading grid, shaders and textures,
 //! - [`memory`]: caches and addresses,
-//! - [`conservative`]: the tiles a triangle may touch, without samples,
-//! - [`frame`]: all of it in order.
+//! - [`conservative`]: the tiles that a triangle may touch, without samples,
+//! - [`frame`]: all stages in order.
 //!
-//! What it guarantees:
+//! Guarantees:
 //!
-//! - *Culling changes nothing*: the image is the same bit for bit whichever tests are switched on, because a tile test
+//! - *Culling changes nothing*: the image is the same bit for bit with any tests enabled, because a tile test
 //!   bounds the sample test's own arithmetic.
-//! - *Dropping a dimension changes nothing*: a still triangle takes the path without time and a pinhole the one without
-//!   lens, with equal bytes.
+//! - *Dropping a dimension changes nothing*: a still triangle is tested without time and a pinhole view
+//!   without lens, with equal bytes.
 //! - *Watertight*: the sample test is exact for the rounded points it sees, so a shared edge has one owner.
 //! - *Deterministic*: the same bytes for any number of threads and any vector width.
 

@@ -1,6 +1,6 @@
-//! Counter-based random numbers: a value depends on its counter alone, never on who asked before.
+//! Counter-based random numbers: a value depends on its counter alone.
 
-/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014): a bijection of 64-bit words that spreads every bit.
+/// Finalizer of SplitMix64 (Steele, Lea, Flood 2014): a bijection of 64-bit words that mixes all bits.
 pub const fn mix(word: u64) -> u64 {
     let z = word ^ (word >> 30);
     let z = z.wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -15,7 +15,7 @@ pub const fn unit(word: u64) -> f64 {
     (word >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// One 64-bit word from a seed and two counters.
+/// A 64-bit word from a seed and two counters.
 pub(crate) const fn word(seed: u64, first: u64, second: u64) -> u64 {
     const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let inner = mix(seed.wrapping_add(GOLDEN.wrapping_mul(first.wrapping_add(1))));
@@ -28,7 +28,7 @@ mod tests {
 
     #[test]
     fn splitmix_reference_values() {
-        // The first outputs of SplitMix64 from seed 0, as published with the generator.
+        // First outputs of SplitMix64 from seed 0, as published with the generator.
         let golden = 0x9E37_79B9_7F4A_7C15_u64;
         assert_eq!(mix(golden), 0xE220_A839_7B1D_CDAF);
         assert_eq!(mix(golden.wrapping_mul(2)), 0x6E78_9E6A_A1B9_65F4);

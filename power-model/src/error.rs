@@ -1,208 +1,208 @@
-//! Everything that can be wrong, and how to mend it.
+//! Errors of energy tables, platforms, models, timelines and pacing.
 
 use activity::spec::SpecError;
 
 use crate::quantity::OutOfRange;
 
-/// Why an energy table could not be used.
+/// Why an energy table cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// The file cannot be read, is not RON, or one of its rows is wrong in itself.
+    /// The file cannot be read, is not RON, or has an invalid row.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// No table of that name comes with the crate.
-    #[error("no built-in energy table is called `{name}`: {mend}")]
+    /// No built-in table has this name.
+    #[error("no built-in energy table is called `{name}`: {suggestion}")]
     Unknown {
-        /// The name asked for.
+        /// Name given.
         name: String,
-        /// The nearest known name.
-        mend: String,
+        /// Nearest known name.
+        suggestion: String,
     },
     /// An event has two rows.
     #[error("{path}: event `{event}` is listed more than once: keep one row")]
     Duplicate {
-        /// The file.
+        /// File.
         path: String,
-        /// The event.
+        /// Event.
         event: &'static str,
     },
     /// An event has no row.
     #[error("{path}: event `{event}` has no row: add one under `rows`, or under `free` with the reason")]
     Missing {
-        /// The file.
+        /// File.
         path: String,
-        /// The event.
+        /// Event.
         event: &'static str,
     },
-    /// The reference voltage is outside the table's own range.
+    /// The reference voltage is outside the table's own voltage range.
     #[error("{path}: v0_v is not between v_min_v and v_max_v: put v_min_v <= v0_v <= v_max_v")]
     Voltages {
-        /// The file.
+        /// File.
         path: String,
     },
 }
 
-/// Why a platform could not be used.
+/// Why a platform cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum PlatformError {
-    /// The file cannot be read, is not RON, or one of its numbers is wrong in itself.
+    /// The file cannot be read, is not RON, or has an invalid number.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// No platform of that name comes with the crate.
-    #[error("no built-in platform is called `{name}`: {mend}")]
+    /// No built-in platform has this name.
+    #[error("no built-in platform is called `{name}`: {suggestion}")]
     Unknown {
-        /// The name asked for.
+        /// Name given.
         name: String,
-        /// The nearest known name.
-        mend: String,
+        /// Nearest known name.
+        suggestion: String,
     },
     /// A unit has two rows under `units`.
     #[error("{path}: unit `{unit}` is listed more than once under `units`: keep one row")]
     DuplicateUnit {
-        /// The file.
+        /// File.
         path: String,
-        /// The unit.
+        /// Unit.
         unit: &'static str,
     },
     /// A unit has no row under `units`.
     #[error("{path}: unit `{unit}` has no row under `units`: add one")]
     MissingUnit {
-        /// The file.
+        /// File.
         path: String,
-        /// The unit.
+        /// Unit.
         unit: &'static str,
     },
-    /// Two disturbances have one name.
+    /// Two disturbances have the same name.
     #[error(
         "{path}: disturbance `{name}` is listed more than once under `system`: keep one, or name them apart"
     )]
     DuplicateDisturbance {
-        /// The file.
+        /// File.
         path: String,
-        /// The name.
+        /// Name.
         name: String,
     },
     /// An event is overridden twice.
     #[error("{path}: event `{event}` is listed more than once under `energy_rows`: keep one row")]
     DuplicateRow {
-        /// The file.
+        /// File.
         path: String,
-        /// The event.
+        /// Event.
         event: &'static str,
     },
 }
 
-/// Why a table and a platform do not go together.
+/// Why a table and a platform do not fit together.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// The platform is made on another process node than the table describes.
+    /// The platform's process node differs from the table's.
     #[error(
         "platform `{platform}` is a {platform_nm} nm part but energy table `{table}` is for {table_nm} nm: \
          use a table for its node, or scale one with `energy_from`"
     )]
     Node {
-        /// The platform.
+        /// Platform.
         platform: String,
-        /// The node of the tables it takes, in nanometres.
+        /// Node of the tables it uses, in nanometres.
         platform_nm: u32,
-        /// The table.
+        /// Table.
         table: String,
-        /// The table's node in nanometres.
+        /// Node of the table, in nanometres.
         table_nm: u32,
     },
-    /// The core voltage is outside the range over which the table's scaling holds.
+    /// The core voltage is outside the range of the table's voltage scaling.
     #[error(
         "platform `{platform}` runs at {v_v} V but energy table `{table}` scales only from {low_v} to \
          {high_v} V: change v_v, or use a table for that voltage"
     )]
     Voltage {
-        /// The platform.
+        /// Platform.
         platform: String,
-        /// Its core voltage.
+        /// Its core voltage, V.
         v_v: f64,
-        /// The table.
+        /// Table.
         table: String,
-        /// The lowest voltage the table scales to.
+        /// Lowest voltage of the scaling, V.
         low_v: f64,
-        /// The highest voltage the table scales to.
+        /// Highest voltage of the scaling, V.
         high_v: f64,
     },
-    /// Leakage at the voltage and temperature of the platform is more than any supply delivers.
+    /// The leakage at the platform's voltage and temperature exceeds any power supply.
     #[error(
         "platform `{platform}` leaks {leakage_w:.3e} W at its voltage and temperature, more than {most_w} W: check          leakage.doubling_c, leakage.voltage_exponent and v0_v"
     )]
     Leakage {
-        /// The platform.
+        /// Platform.
         platform: String,
-        /// The leakage, W.
+        /// Leakage, W.
         leakage_w: f64,
-        /// The most there can be, W.
+        /// Largest allowed leakage, W.
         most_w: f64,
     },
 }
 
-/// Why a timeline cannot be turned into watts.
+/// Why a timeline cannot be converted to power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TimelineError {
-    /// Bins have no length.
+    /// The bin length is 0.
     #[error("the timeline's bins are 0 ps long: make them at least 1 ps")]
     EmptyBin,
-    /// The bins end before the frame does.
+    /// The bins end before the frame.
     #[error(
         "the timeline has {bins} bins of {bin_ps} ps for a frame of {duration_ps} ps: add bins up to its end"
     )]
     TooShort {
-        /// How many bins there are.
+        /// Number of bins.
         bins: usize,
-        /// Length of each in picoseconds.
+        /// Length of a bin in picoseconds.
         bin_ps: u64,
         /// Length of the frame in picoseconds.
         duration_ps: u64,
     },
-    /// Something happens in a bin that begins at or after the end of the frame.
+    /// A bin that begins at or after the end of the frame has activity.
     #[error("bin {bin} of the timeline is active although the frame has ended: make duration_ps cover it")]
     AfterEnd {
-        /// The bin, counted from 0.
+        /// Bin number, from 0.
         bin: usize,
     },
-    /// A unit is busy for longer than the bin, cut at the end of the frame, lasts.
+    /// A unit is busy for longer than its bin lasts within the frame.
     #[error(
         "bin {bin} of the timeline has unit `{unit}` busy for {busy_ps} of {length_ps} ps: count a unit once \
          however many copies of it work, and end the frame after its last work"
     )]
     TooBusy {
-        /// The bin, counted from 0.
+        /// Bin number, from 0.
         bin: usize,
-        /// The unit.
+        /// Unit.
         unit: &'static str,
-        /// How long it is said to be busy, in picoseconds.
+        /// Busy time in picoseconds.
         busy_ps: u64,
-        /// How long the bin lasts, in picoseconds.
+        /// Length of the bin within the frame, in picoseconds.
         length_ps: u64,
     },
 }
 
-/// Why frames could not be paced.
+/// Why frames cannot be paced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PacingError {
-    /// There is nothing to pace.
+    /// The list of frames is empty.
     #[error("there are no frames to pace: render at least one")]
     NoFrames,
-    /// The V-sync rate is not usable.
+    /// The V-sync rate is out of range.
     #[error("the V-sync rate: {0}")]
     Rate(#[from] OutOfRange),
-    /// The run lasts longer than a clock of 64 bits of picoseconds.
+    /// The run is too long for 64 bits of picoseconds.
     #[error("the run lasts more than 213 days: pace fewer frames")]
     TooLong,
-    /// More disturbances than anyone can look at.
+    /// Too many disturbances in the run.
     #[error("the run of {run_s} s would have more than {most} disturbances: shorten it, or make them rarer")]
     TooDisturbed {
         /// Length of the run, s.
         run_s: f64,
-        /// The most there can be.
+        /// Largest number of disturbances.
         most: usize,
     },
-    /// The power curve refused a step.
+    /// The power curve rejects a step.
     #[error("the power curve of the run: {0}")]
     Curve(#[from] traces::CurveError),
 }

@@ -1,17 +1,17 @@
-//! The power of one frame over time.
+//! Power of one frame over time.
 
 use crate::parts::{Energy, PARTS};
 
-/// Watts over time of one frame, by part, and the joules they add up to.
+/// Power of one frame over time, by part, and its energy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePower {
     /// Length of a bin in picoseconds.
     pub(crate) bin_ps: u64,
     /// Length of the frame in picoseconds.
     pub(crate) duration_ps: u64,
-    /// Watts by part for each bin; the last one holds up to the end of the frame.
+    /// Power by part and bin in watts; the last bin ends with the frame.
     pub(crate) watts: Vec<[f64; PARTS]>,
-    /// Joules by part over the frame.
+    /// Energy of the frame by part, in joules.
     pub(crate) energy: Energy,
 }
 
@@ -34,38 +34,40 @@ impl FramePower {
         self.duration_ps
     }
 
-    /// Mean watts of each bin, by part in the order of [`crate::Part::ALL`].
+    /// Mean power of each bin in watts, by part in the order of [`crate::Part::ALL`].
     pub fn watts(&self) -> &[[f64; PARTS]] {
         &self.watts
     }
 
-    /// Joules by part over the frame. Its total is the frame's energy, without any idle time after it.
+    /// Energy of the frame by part, in joules. Its total is the frame's energy, without idle time after the
+    /// frame.
     pub const fn energy(&self) -> &Energy {
         &self.energy
     }
 
-    /// Each bin's true length in seconds and its watts by part; the last bin ends with the frame.
+    /// True length in seconds and power by part of each bin; the last bin ends with the frame.
     pub fn bins(&self) -> impl Iterator<Item = (f64, &[f64; PARTS])> {
         self.bins_ps().map(|(length_ps, watts)| (length_ps as f64 * S_PER_PS, watts))
     }
 
-    /// As [`Self::bins`], in picoseconds.
+    /// The bins as [`Self::bins`], with lengths in picoseconds.
     pub(crate) fn bins_ps(&self) -> impl Iterator<Item = (u64, &[f64; PARTS])> {
         bin_lengths_ps(self.bin_ps, self.duration_ps).zip(&self.watts)
     }
 
-    /// Mean watts over the frame, by part; zero for a frame of no length.
+    /// Mean power over the frame by part, in watts; zero for a frame of length 0.
     pub fn mean_w(&self) -> [f64; PARTS] {
         let duration_s = self.duration_s();
         self.energy.by_part_j.map(|joules| if duration_s > 0.0 { joules / duration_s } else { 0.0 })
     }
 
-    /// The same course of power over a frame of another length and another energy, of which each part keeps its share of every
-    /// bin. The bins are as many, and the last one may lose or gain a little of its share to whole picoseconds.
+    /// The frame with another length and energy but the same shape: each part keeps its share of every bin.
+    /// The number of bins is the same. The last bin may gain or lose a little by rounding to whole
+    /// picoseconds.
     #[must_use]
     pub fn reshaped(&self, duration_ps: u64, energy_j: f64) -> Self {
-        let stretch = duration_ps as f64 / self.duration_ps.max(1) as f64;
-        let bin_ps = ((self.bin_ps as f64 * stretch).ceil() as u64).max(1);
+        let length_ratio = duration_ps as f64 / self.duration_ps.max(1) as f64;
+        let bin_ps = ((self.bin_ps as f64 * length_ratio).ceil() as u64).max(1);
         let lengths: Vec<f64> =
             bin_lengths_ps(bin_ps, duration_ps).map(|length_ps| length_ps as f64 * S_PER_PS).collect();
         let joules = |watts: &[f64; PARTS], length_s: f64| watts.iter().sum::<f64>() * length_s;
@@ -80,13 +82,13 @@ impl FramePower {
         Self { bin_ps, duration_ps, watts, energy }
     }
 
-    /// The highest watts of any bin, all parts together; zero for a frame of no length.
+    /// Highest power of any bin, all parts together, in watts; zero for a frame of length 0.
     pub fn peak_w(&self) -> f64 {
         self.watts.iter().map(|watts| watts.iter().sum()).fold(0.0, f64::max)
     }
 }
 
-/// The true length of each bin that begins before the frame ends, in picoseconds.
+/// True lengths in picoseconds of the bins that begin before the end of the frame.
 pub(crate) fn bin_lengths_ps(bin_ps: u64, duration_ps: u64) -> impl Iterator<Item = u64> {
     let mut left_ps = duration_ps;
     std::iter::from_fn(move || {

@@ -1,18 +1,19 @@
-//! Joules laid end to end become a curve.
+//! Conversion of consecutive energies into a power curve.
 
 use traces::Curve;
 
 use crate::error::PacingError;
 use crate::frame::S_PER_PS;
 
-/// Builds a curve from joules spent over whole picoseconds.
+/// Builder of a power curve from energies spent over whole picoseconds.
 ///
-/// A curve's edges are rounded to f64; the watts between two edges are the joules over the *rounded* span, so that the
-/// curve integrates to what was spent. (Exact watts over rounded edges lose 1e-12 of a short frame.)
+/// The times of a curve are rounded to f64. The power of a step is its energy over the *rounded* length, so
+/// the integral of the curve equals the energy spent. (Exact power over rounded lengths loses 1e-12 of a
+/// short frame.)
 #[derive(Debug, Default)]
 pub(crate) struct Ledger {
     now_ps: u64,
-    /// Spent in spans too short to move a rounded edge; goes into the next span that does.
+    /// Energy of spans too short to move the rounded time; it goes into the next longer span.
     pending_j: f64,
     edges_s: Vec<f64>,
     watts: Vec<f64>,
@@ -24,12 +25,12 @@ impl Ledger {
         Self { edges_s: vec![0.0], ..Self::default() }
     }
 
-    /// The time so far, as the curve's edges have it.
+    /// Current time, as the curve has it.
     pub(crate) fn now_s(&self) -> f64 {
         self.now_ps as f64 * S_PER_PS
     }
 
-    /// Spends `joules` over the next `length_ps` picoseconds.
+    /// Spend `joules` evenly over the next `length_ps` picoseconds.
     pub(crate) fn spend(&mut self, length_ps: u64, joules: f64) -> Result<(), PacingError> {
         self.now_ps = self.now_ps.checked_add(length_ps).ok_or(PacingError::TooLong)?;
         self.pending_j += joules;
@@ -58,7 +59,7 @@ mod tests {
     #[test]
     fn joules_are_kept_however_short_their_spans() {
         let mut ledger = Ledger::new();
-        // Two hours on, a picosecond no longer moves an f64.
+        // After two hours, a picosecond no longer changes an f64.
         let two_hours_ps = 7_200_000_000_000_000;
         ledger.spend(two_hours_ps, 0.0).unwrap();
         for _ in 0..1000 {

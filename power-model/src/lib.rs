@@ -1,22 +1,23 @@
-//! Joules per event and platforms: activity over time becomes watts over time.
+//! Power model: activity over time becomes power over time, from an energy table and a platform.
 //!
-//! - [`EnergyTable`]: joules per [`activity::Event`], low, nominal and high, each row with its source.
-//! - [`Platform`]: what surrounds the events: voltages, constant power, leakage, clock trees, idle.
-//! - [`Part`] and [`Energy`]: where joules go. The sum over parts *is* a frame's energy, exactly.
-//! - [`PowerModel`]: a [`activity::Timeline`] in, a [`FramePower`] out.
-//! - [`pace`]: frames, one after another under V-sync or free-running, become one power curve.
-//! - [`System::surround`]: what launch, a blocking finish and the operating system add to that curve.
+//! - [`EnergyTable`]: energy per [`activity::Event`], with low, nominal and high value and a source in each
+//!   row.
+//! - [`Platform`]: voltages, constant power, leakage, clock trees and idle power.
+//! - [`Part`] and [`Energy`]: energy by part. The sum over parts is the exact energy of a frame.
+//! - [`PowerModel`]: converts an [`activity::Timeline`] to a [`FramePower`].
+//! - [`pace`]: puts frames one after another, under V-sync or free-running, into one power curve.
+//! - [`System::surround`]: adds launch, blocking calls and the operating system to that curve.
 //!
-//! The equation (design, section 7), for every bin of the timeline:
+//! The power in every bin of the timeline is
 //!
 //! ```text
 //! P(t) = P_constant + P_leak(V, T) + sum over events of E_event rate_event(t) (V/V0)^2
 //!      + sum over used units of [ busy_unit(t) P_clock,unit + (1 - busy_unit(t)) P_idle,unit ] (V/V0)^2
 //! ```
 //!
-//! Energies are computed first (counts times joules, watts times the bin's true length) and watts from
-//! them, so that nothing is lost to a partial last bin. This crate knows no triangle and no clock rate; it can
-//! be fed counts from a file ([`PowerModel::counts_energy`]).
+//! Energies are computed first: counts times joules, and watts times the true length of the bin. Power is
+//! derived from them, so a partial last bin loses nothing. The crate contains no geometry and no clock rate,
+//! and also accepts counts from a file ([`PowerModel::counts_energy`]).
 
 mod error;
 mod frame;

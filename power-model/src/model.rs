@@ -1,4 +1,4 @@
-//! Activity over time becomes watts over time.
+//! Conversion of activity over time to power over time.
 
 use activity::{Bin, Counts, Event, Timeline, Unit};
 
@@ -10,10 +10,10 @@ use crate::quantity::Watts;
 use crate::row::{EnergyRow, Supply};
 use crate::table::{Bound, EnergyTable};
 
-/// An energy table and a platform put together, voltages applied.
+/// An energy table and a platform, with voltages applied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PowerModel {
-    /// Joules per event at the platform's voltage, indexed by event.
+    /// Energy per event at the platform's voltage, in joules, indexed by event.
     event_j: [f64; Event::COUNT],
     clock_tree_w: [f64; Unit::COUNT],
     idle_unit_w: [f64; Unit::COUNT],
@@ -22,18 +22,18 @@ pub struct PowerModel {
 }
 
 impl PowerModel {
-    /// The model with every energy at its nominal value.
+    /// The model with nominal energies.
     ///
     /// # Errors
-    /// [`ModelError`] when the table is for another node or does not reach the platform's voltage.
+    /// [`ModelError`] if the table is for another node or does not cover the platform's voltage.
     pub fn new(table: &EnergyTable, platform: &Platform) -> Result<Self, ModelError> {
         Self::at(table, platform, Bound::Nominal)
     }
 
-    /// The model with every energy at one end of its interval.
+    /// The model with all energies at one end of their intervals.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// As for [`Self::new`].
     pub fn at(table: &EnergyTable, platform: &Platform, bound: Bound) -> Result<Self, ModelError> {
         check_match(table, platform)?;
         let squared = platform.voltage_ratio() * platform.voltage_ratio();
@@ -53,17 +53,17 @@ impl PowerModel {
         })
     }
 
-    /// Joules of one `event` at the platform's voltage.
+    /// Energy of one `event` at the platform's voltage, in joules.
     pub fn event_j(&self, event: Event) -> f64 {
         self.event_j[event as usize]
     }
 
-    /// The power of one frame, from its activity over time.
+    /// Power of one frame from its activity.
     ///
-    /// A unit that does nothing in the whole frame is not modelled: it neither clocks nor idles.
+    /// A unit without activity in the whole frame is not modelled: it has no clock or idle power.
     ///
     /// # Errors
-    /// [`TimelineError`] when the timeline contradicts itself.
+    /// [`TimelineError`] if the timeline contradicts itself.
     pub fn frame(&self, timeline: &Timeline) -> Result<FramePower, TimelineError> {
         check_timeline(timeline)?;
         let used = used_units(timeline);
@@ -79,7 +79,7 @@ impl PowerModel {
         Ok(FramePower { bin_ps: timeline.bin_ps, duration_ps: timeline.duration_ps, watts, energy })
     }
 
-    /// The energy of events alone, from counts wherever they come from: no time, so nothing that goes with time.
+    /// Energy of the events alone, from counts of any origin. Parts that depend on time are 0.
     pub fn counts_energy(&self, counts: &Counts) -> Energy {
         let mut energy = Energy::ZERO;
         for (event, count) in counts.iter() {
@@ -117,15 +117,16 @@ fn check_match(table: &EnergyTable, platform: &Platform) -> Result<(), ModelErro
         let (platform, table) = (platform.name.clone(), table.name().to_owned());
         return Err(ModelError::Voltage { platform, v_v, table, low_v, high_v });
     }
-    let (leakage_w, most_w) = (platform.leakage_w(), Watts::MOST);
+    let (leakage_w, most_w) = (platform.leakage_w(), Watts::MAX);
     if !(0.0..=most_w).contains(&leakage_w) {
         return Err(ModelError::Leakage { platform: platform.name.clone(), leakage_w, most_w });
     }
     Ok(())
 }
 
-/// Joules per event: the table's, the platform's own rows in their place, core rows scaled to the core voltage.
-/// Switching energy goes with C V^2 (Horowitz 2014); a platform's rows are stated at the table's V0, too, but on its own node.
+/// Energy per event in joules. Rows of the platform replace those of the table, and core rows are scaled to
+/// the core voltage. Switching energy is proportional to C V^2 (Horowitz 2014). Rows of the platform are also
+/// stated at the table's V0, but on the platform's node.
 fn event_energies(table: &EnergyTable, platform: &Platform, bound: Bound) -> [f64; Event::COUNT] {
     let ratio = platform.v_v.value() / table.v0_v();
     let at_voltage = |row: &EnergyRow| match row.supply() {

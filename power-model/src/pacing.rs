@@ -1,4 +1,4 @@
-//! Frames one after another: V-sync or free-running, with idle between them.
+//! Pacing of consecutive frames: V-sync or free-running, with idle time between them.
 
 use traces::Curve;
 use warnings::{Code, Warning};
@@ -13,10 +13,10 @@ use crate::quantity::Hertz;
 /// Picoseconds in a second.
 const PS_PER_S: f64 = 1e12;
 
-/// When the next frame starts.
+/// Rule for the start of the next frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pacing {
-    /// On the display's next tick.
+    /// At the next tick of the display.
     Vsync {
         /// Ticks per second.
         rate: Hertz,
@@ -35,36 +35,36 @@ impl Pacing {
     }
 }
 
-/// One frame in its place in a run: the truth a frame finder is scored against.
+/// A frame in a run. Its times are the ground truth for frame finding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PacedFrame {
-    /// When its first command is taken, in seconds from the start of the curve.
+    /// Start of its first command, in seconds from the start of the curve.
     pub start_s: f64,
-    /// When its last pixel is written.
+    /// End of its last pixel, in seconds.
     pub busy_end_s: f64,
-    /// When the next frame starts; for the last frame, when the next one would have.
+    /// Start of the next frame in seconds; for the last frame, when the next one would start.
     pub end_s: f64,
-    /// Joules from `start_s` to `end_s`, the idle time after its work included as [`Part::Idle`].
+    /// Energy from `start_s` to `end_s` in joules; idle time after the work counts as [`Part::Idle`].
     pub energy: Energy,
 }
 
-/// A whole run: its power curve, with idle before and after, and its frames.
+/// A whole run: its power curve, with idle time before and after, and its frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// Watts from 0 s, where the recording starts with idle, to where it ends with idle.
+    /// Power from 0 s, including the recorded idle time before and after the frames.
     pub curve: Curve,
-    /// The frames in order; each ends where the next starts.
+    /// The frames in order; each ends at the start of the next.
     pub frames: Vec<PacedFrame>,
     /// Start of the first frame in seconds.
     pub start_s: f64,
     /// End of the last frame in seconds.
     pub end_s: f64,
-    /// What went wrong on the way: `missed-vsync`.
+    /// Warnings: `missed-vsync`.
     pub warnings: Vec<Warning>,
 }
 
 impl Run {
-    /// Joules from the first frame's start to the last one's end, summed frame by frame.
+    /// Energy from the start of the first frame to the end of the last one, summed frame by frame, in joules.
     pub fn energy(&self) -> Energy {
         self.frames.iter().fold(Energy::ZERO, |mut sum, frame| {
             sum += &frame.energy;
@@ -73,30 +73,30 @@ impl Run {
     }
 }
 
-/// Lines `frames` up on `platform`. The same frame may be given many times, as in a still animation.
+/// Pace `frames` on `platform`. A frame may be given repeatedly, as for a still animation.
 ///
 /// # Errors
-/// [`PacingError::NoFrames`] for an empty list; [`PacingError::Curve`] when nothing lasts any time and
-/// [`PacingError::TooLong`] when it lasts for months.
+/// [`PacingError::NoFrames`] for an empty list, [`PacingError::Curve`] if the run has length 0, and
+/// [`PacingError::TooLong`] if it lasts for months.
 pub fn pace(frames: &[&FramePower], platform: &Platform, pacing: Pacing) -> Result<Run, PacingError> {
     if frames.is_empty() {
         return Err(PacingError::NoFrames);
     }
     let schedule = Schedule::new(frames, platform, pacing);
     let mut ledger = Ledger::new();
-    rest(&mut ledger, to_ps(platform.lead_in_s.value()), platform)?;
+    spend_idle(&mut ledger, to_ps(platform.lead_in_s.value()), platform)?;
     let start_s = ledger.now_s();
     let mut paced = Vec::with_capacity(frames.len());
     for (frame, &idle_ps) in frames.iter().zip(&schedule.idle_ps) {
         paced.push(spend_frame(&mut ledger, frame, idle_ps, platform)?);
     }
     let end_s = ledger.now_s();
-    rest(&mut ledger, to_ps(platform.tail_s.value()), platform)?;
+    spend_idle(&mut ledger, to_ps(platform.tail_s.value()), platform)?;
     let warnings = schedule.warning(pacing).into_iter().collect();
     Ok(Run { curve: ledger.close()?, frames: paced, start_s, end_s, warnings })
 }
 
-/// Appends a frame and the idle time after it.
+/// Append a frame and the idle time after it.
 fn spend_frame(
     ledger: &mut Ledger,
     frame: &FramePower,
@@ -110,29 +110,29 @@ fn spend_frame(
     }
     let busy_end_s = ledger.now_s();
     let mut energy = *frame.energy();
-    energy[Part::Idle] += rest(ledger, idle_ps, platform)?;
+    energy[Part::Idle] += spend_idle(ledger, idle_ps, platform)?;
     Ok(PacedFrame { start_s, busy_end_s, end_s: ledger.now_s(), energy })
 }
 
-/// Idles for `length_ps` picoseconds; the joules that takes.
-fn rest(ledger: &mut Ledger, length_ps: u64, platform: &Platform) -> Result<f64, PacingError> {
+/// Append `length_ps` picoseconds of idle time. Returns its energy in joules.
+fn spend_idle(ledger: &mut Ledger, length_ps: u64, platform: &Platform) -> Result<f64, PacingError> {
     let joules = platform.idle_w.value() * (length_ps as f64 * S_PER_PS);
     ledger.spend(length_ps, joules)?;
     Ok(joules)
 }
 
-/// Whole picoseconds in `seconds`, which a platform keeps between 0 and an hour.
+/// `seconds` in whole picoseconds; a platform limits them to an hour.
 fn to_ps(seconds: f64) -> u64 {
     (seconds * PS_PER_S).round() as u64
 }
 
-/// How long it is idle after each frame, in whole picoseconds so that no clock drifts.
+/// Idle time after each frame, in whole picoseconds, so clocks do not drift.
 #[derive(Debug, PartialEq)]
 struct Schedule {
     idle_ps: Vec<u64>,
-    /// Frames that outlasted their period.
+    /// Frames longer than their period.
     late: usize,
-    /// Ticks that passed while a frame was still being drawn.
+    /// Ticks missed because a frame was still being drawn.
     missed: u64,
 }
 
@@ -148,8 +148,8 @@ impl Schedule {
         }
     }
 
-    /// Frame 0 starts on tick 0; each other one on the first tick at or after the end of the one before, and
-    /// never on that one's own tick.
+    /// Frame 0 starts on tick 0. Each other frame starts on the first tick at or after the end of the
+    /// previous frame, and at least one tick after its start.
     fn vsync(durations_ps: impl Iterator<Item = u64>, rate: Hertz) -> Self {
         let mut schedule = Self { idle_ps: Vec::new(), late: 0, missed: 0 };
         let mut tick = 0;
@@ -180,12 +180,12 @@ impl Schedule {
     }
 }
 
-/// When a tick falls, in picoseconds after tick 0.
+/// Time of a tick in picoseconds after tick 0.
 fn tick_ps(tick: u64, rate: Hertz) -> u64 {
     (tick as f64 * PS_PER_S / rate.value()).round() as u64
 }
 
-/// The first tick at or after `time_ps`, but none before `earliest`.
+/// First tick at or after `time_ps`, at least `earliest`.
 fn first_tick_from(time_ps: u64, earliest: u64, rate: Hertz) -> u64 {
     let near = (time_ps as f64 * rate.value() / PS_PER_S).floor() as u64;
     let mut tick = near.saturating_sub(1).max(earliest);

@@ -1,4 +1,4 @@
-//! Where joules go.
+//! Parts that draw power, and energy by part.
 
 use std::ops::{AddAssign, Index, IndexMut};
 
@@ -6,26 +6,26 @@ use activity::Unit;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
-/// A part of the power drawn: a unit's events, or something no event causes.
+/// A part that draws power: the events of a unit, or power that no event causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// The events of one unit.
     Unit(Unit),
-    /// What is drawn as long as a frame runs, whatever it does.
+    /// Constant power during a frame.
     Constant,
     /// Leakage of the powered core.
     Leakage,
-    /// Clock trees of busy units and what powered but idle units draw.
+    /// Clock trees of busy units, and idle power of powered units.
     ClockTree,
-    /// The floor between frames, with the core power-gated.
+    /// Idle power between frames, with the core power-gated.
     Idle,
 }
 
-/// How many parts there are.
+/// Number of parts.
 pub const PARTS: usize = Unit::COUNT + 4;
 
 impl Part {
-    /// Every part in the fixed order in which they are stored and summed: units as declared, then the rest.
+    /// All parts in the order of storage and summation: units as declared, then the others.
     pub const ALL: [Self; PARTS] = {
         let mut all = [Self::Idle; PARTS];
         let mut at = 0;
@@ -39,7 +39,7 @@ impl Part {
         all
     };
 
-    /// Its place in [`Part::ALL`].
+    /// Index in [`Part::ALL`].
     pub const fn index(self) -> usize {
         match self {
             Self::Unit(unit) => unit as usize,
@@ -50,7 +50,7 @@ impl Part {
         }
     }
 
-    /// The name used in files, for example `sample_test` or `leakage`.
+    /// Name in files, for example `sample_test` or `leakage`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unit(unit) => unit.name(),
@@ -61,7 +61,7 @@ impl Part {
         }
     }
 
-    /// One sentence on what draws it.
+    /// One sentence: what draws the power.
     pub const fn doc(self) -> &'static str {
         match self {
             Self::Unit(unit) => unit.doc(),
@@ -73,23 +73,24 @@ impl Part {
     }
 }
 
-/// Joules by part.
+/// Energy by part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy {
-    /// Joules, in the order of [`Part::ALL`].
+    /// Energy in joules, in the order of [`Part::ALL`].
     pub by_part_j: [f64; PARTS],
 }
 
 impl Energy {
-    /// No energy at all.
+    /// Zero energy.
     pub const ZERO: Self = Self { by_part_j: [0.0; PARTS] };
 
-    /// All parts summed in the order of [`Part::ALL`]. This is the energy, exactly: no total is kept beside it.
+    /// Sum of all parts in joules, in the order of [`Part::ALL`]. No other total is stored, so it is exact by
+    /// definition.
     pub fn total_j(&self) -> f64 {
         self.by_part_j.iter().fold(0.0, |sum, joules| sum + joules)
     }
 
-    /// Each part with its joules, in the order of [`Part::ALL`].
+    /// Every part with its energy in joules, in the order of [`Part::ALL`].
     pub fn iter(&self) -> impl Iterator<Item = (Part, f64)> + '_ {
         Part::ALL.into_iter().zip(self.by_part_j)
     }
@@ -123,7 +124,7 @@ impl AddAssign<&Self> for Energy {
 }
 
 impl Serialize for Energy {
-    /// A map from part name to joules, in the order of [`Part::ALL`].
+    /// Write a map from part name to joules, in the order of [`Part::ALL`].
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(PARTS))?;
         for (part, joules) in self.iter() {
@@ -138,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_lie_where_their_index_says() {
+    fn an_index_matches_the_position() {
         for (at, part) in Part::ALL.into_iter().enumerate() {
             assert_eq!(part.index(), at, "{part:?}");
         }

@@ -1,18 +1,18 @@
-//! Numbers that cannot be built out of range, and numbers that cannot be written without a source.
+//! Quantities with a unit and a range in their type, and values with a mandatory source.
 
 use serde::Deserialize;
 
-/// A number outside the range its quantity can have.
+/// A value outside the range of its quantity.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{value} {unit} is not a number from {low} to {high} {unit}: give one in that range")]
 pub struct OutOfRange {
-    /// The number that was given.
+    /// Value given.
     pub value: f64,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
-    /// The smallest allowed.
+    /// Smallest allowed value.
     pub low: f64,
-    /// The largest allowed.
+    /// Largest allowed value.
     pub high: f64,
 }
 
@@ -24,10 +24,10 @@ macro_rules! quantities {
         pub struct $name(f64);
 
         impl $name {
-            /// The largest there is.
-            pub const MOST: f64 = $high;
+            /// Largest value.
+            pub const MAX: f64 = $high;
 
-            /// Checks `value` against the range of this quantity.
+            /// Check `value` against the range of the quantity.
             ///
             /// # Errors
             /// [`OutOfRange`], also for NaN and infinities.
@@ -39,7 +39,7 @@ macro_rules! quantities {
                 }
             }
 
-            /// The number, in the unit of this quantity.
+            /// Value in the unit of the quantity.
             pub const fn value(self) -> f64 {
                 self.0
             }
@@ -61,55 +61,55 @@ macro_rules! quantities {
     )*};
 }
 
-/// A process node, nm: from beyond the smallest to the first integrated circuits.
+/// Process node in nm, from beyond the smallest today to the first integrated circuits.
 pub type Nanometres = activity::Bounded<1, 20_000>;
 
-/// A number with a unit, for lists of where numbers come from.
+/// A number with a unit.
 pub trait Quantity {
-    /// The unit's symbol.
+    /// Symbol of the unit.
     const UNIT: &'static str;
-    /// The number in that unit.
+    /// Value in that unit.
     fn number(&self) -> f64;
 }
 
 quantities! {
-    /// Power, 0 to 10 kW: a supply that delivers more is not a graphics card's.
+    /// Power, 0 to 10 kW, more than any graphics card draws.
     Watts "W" 0.0 to 1e4
-    /// A supply voltage, 0.1 to 48 V.
+    /// Supply voltage, 0.1 to 48 V.
     Volts "V" 0.1 to 48.0
-    /// A length of time, at most an hour.
+    /// Duration, at most an hour.
     Seconds "s" 0.0 to 3600.0
-    /// Idle time recorded before or after a run, at most a minute: more shows nothing new and fills the disk.
+    /// Idle time recorded before or after a run, at most a minute, to limit the size of recordings.
     RecordedIdle "s" 0.0 to 60.0
-    /// A rate of frames, 0.1 Hz to 100 kHz.
+    /// Frame rate, 0.1 Hz to 100 kHz.
     Hertz "Hz" 0.1 to 1e5
-    /// A junction temperature.
+    /// Junction temperature.
     Celsius "degC" -50.0 to 150.0
-    /// A time from one thing to the next of its kind, 0.1 ms to an hour: nothing repeats without pause.
+    /// Time between occurrences, 0.1 ms to an hour.
     Interval "s" 1e-4 to 3600.0
-    /// A part of a whole.
+    /// Fraction of a whole.
     Share "(share)" 0.0 to 1.0
-    /// One number over another of the same kind.
+    /// Ratio of two numbers of one kind.
     Ratio "(ratio)" 0.01 to 100.0
-    /// An exponent of a stated law.
+    /// Exponent of a law.
     Exponent "(exponent)" 0.0 to 10.0
-    /// Energy of one event, at most 1 mJ: more is a mistake of units.
+    /// Energy of one event, at most 1 mJ, which catches wrong units.
     Picojoules "pJ" 0.0 to 1e9
 }
 
-/// Where a number comes from.
+/// Kind of source of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 pub enum Basis {
-    /// Printed in a publication, or measured, as it stands.
+    /// Printed in a publication, or measured.
     Published,
-    /// Worked out from published numbers; the source says how.
+    /// Derived from published numbers; the source says how.
     Derived,
-    /// A guess; the source gives the reasoning.
+    /// An assumption; the source gives the reasoning.
     Assumed,
 }
 
 impl Basis {
-    /// The word used in tables.
+    /// Word used in tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Published => "published",
@@ -119,13 +119,13 @@ impl Basis {
     }
 }
 
-/// The source of a number: a citation or the reasoning. Never empty.
+/// Source of a number: a citation or a reasoning. Never empty.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub struct Source(String);
 
 impl Source {
-    /// The text.
+    /// Text.
     pub fn text(&self) -> &str {
         &self.0
     }
@@ -147,28 +147,28 @@ impl TryFrom<String> for Source {
 pub enum Sourced<T> {
     /// Printed in a publication, or measured.
     Published(T, Source),
-    /// Worked out from published numbers.
+    /// Derived from published numbers.
     Derived(T, Source),
-    /// A guess with its reasoning.
+    /// An assumption with its reasoning.
     Assumed(T, Source),
 }
 
 impl<T> Sourced<T> {
-    /// The quantity.
+    /// Quantity.
     pub const fn get(&self) -> &T {
         match self {
             Self::Published(value, _) | Self::Derived(value, _) | Self::Assumed(value, _) => value,
         }
     }
 
-    /// Where it comes from, in words.
+    /// Source in words.
     pub fn source(&self) -> &str {
         match self {
             Self::Published(_, source) | Self::Derived(_, source) | Self::Assumed(_, source) => source.text(),
         }
     }
 
-    /// Where it comes from, in one word.
+    /// Kind of source.
     pub const fn basis(&self) -> Basis {
         match self {
             Self::Published(..) => Basis::Published,
@@ -179,12 +179,12 @@ impl<T> Sourced<T> {
 }
 
 impl<T: Quantity> Sourced<T> {
-    /// The number in the unit its field's name states.
+    /// Value in the unit given by the name of its field.
     pub fn value(&self) -> f64 {
         self.get().number()
     }
 
-    /// The unit's symbol.
+    /// Symbol of the unit.
     pub const fn unit(&self) -> &'static str {
         T::UNIT
     }
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn out_of_range_says_what_would_be_in_range() {
+    fn an_out_of_range_error_names_the_range() {
         let text = Watts::new(-1.0).unwrap_err().to_string();
         assert_eq!(text, "-1 W is not a number from 0 to 10000 W: give one in that range");
     }

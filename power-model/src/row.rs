@@ -1,21 +1,21 @@
-//! One row of an energy table.
+//! Row of an energy table.
 
 use activity::{Event, spec};
 use serde::Deserialize;
 
 use crate::quantity::{Basis, Picojoules, Source};
 
-/// The supply an event draws from, which decides whether the core voltage scales its energy.
+/// Supply of an event, which decides whether the core voltage scales its energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub enum Supply {
-    /// The core: energy goes with (V/V0)^2.
+    /// Core: energy scales with (V/V0)^2.
     #[default]
     Core,
-    /// Memory and its interface, at a voltage of their own that the core's does not move.
+    /// Memory and its interface, with a supply voltage independent of the core's.
     Memory,
 }
 
-/// Energy of one event at the table's reference voltage, with its source. `low <= nominal <= high` holds.
+/// Energy of one event at the table's reference voltage, with its source; `low <= nominal <= high`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Written")]
 pub struct EnergyRow {
@@ -27,52 +27,52 @@ pub struct EnergyRow {
     source: Source,
 }
 
-/// Picojoules in a joule, inverted.
+/// Joules per picojoule.
 const J_PER_PJ: f64 = 1e-12;
 
 impl EnergyRow {
-    /// The event it is about.
+    /// Event.
     pub const fn event(&self) -> Event {
         self.event
     }
 
-    /// The smallest energy the sources allow, in joules.
+    /// Smallest energy that the sources allow, in joules.
     pub fn low_j(&self) -> f64 {
         self.pj[0] * J_PER_PJ
     }
 
-    /// The energy to use, in joules.
+    /// Nominal energy in joules.
     pub fn nominal_j(&self) -> f64 {
         self.pj[1] * J_PER_PJ
     }
 
-    /// The largest energy the sources allow, in joules.
+    /// Largest energy that the sources allow, in joules.
     pub fn high_j(&self) -> f64 {
         self.pj[2] * J_PER_PJ
     }
 
-    /// The operation or the width of access it stands for.
+    /// Operation or access width that the energy refers to.
     pub fn per(&self) -> &str {
         &self.per
     }
 
-    /// The supply it draws from.
+    /// Supply.
     pub const fn supply(&self) -> Supply {
         self.supply
     }
 
-    /// Where it comes from, in one word.
+    /// Kind of source.
     pub const fn basis(&self) -> Basis {
         self.basis
     }
 
-    /// Where it comes from, in words.
+    /// Source in words.
     pub fn source(&self) -> &str {
         self.source.text()
     }
 }
 
-/// An event by its name in a file.
+/// An event, deserialized from its name.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "String")]
 pub(crate) struct EventName(pub(crate) Event);
@@ -88,7 +88,7 @@ impl TryFrom<String> for EventName {
     }
 }
 
-/// A row as it is written in a file.
+/// A row as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {

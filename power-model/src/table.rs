@@ -1,4 +1,4 @@
-//! Energy tables: joules per event on one process node at one voltage.
+//! Energy tables: energy per event on one process node at one voltage.
 
 use std::path::Path;
 
@@ -9,32 +9,32 @@ use crate::TableError;
 use crate::quantity::{Nanometres, Source, Volts};
 use crate::row::{EnergyRow, EventName};
 
-/// The tables that come with the crate, by name.
+/// Built-in tables by name.
 const BUILTIN: [(&str, &str); 1] = [("28nm", include_str!("../tables/28nm.ron"))];
 
-/// Which end of each row's interval to use.
+/// End of the interval of each row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
-    /// The smallest energies the sources allow.
+    /// Smallest energies that the sources allow.
     Low,
-    /// The energies to use.
+    /// Nominal energies.
     #[default]
     Nominal,
-    /// The largest energies the sources allow.
+    /// Largest energies that the sources allow.
     High,
 }
 
-/// What a table says of one event.
+/// Entry of one event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Entry {
-    /// It costs energy.
+    /// The event has an energy.
     Costs(EnergyRow),
-    /// It costs nothing by itself, for the reason given.
+    /// The event has no energy of its own, for the given reason.
     Free(Source),
 }
 
-/// Joules per event on one process node, every event accounted for.
+/// Energy per event on one process node, with an entry for every event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnergyTable {
     name: String,
@@ -46,7 +46,7 @@ pub struct EnergyTable {
     entries: Vec<Entry>,
 }
 
-/// A table as it is written in a file.
+/// A table as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -68,35 +68,35 @@ struct FreeRow {
 }
 
 impl EnergyTable {
-    /// The names of the tables that come with the crate.
+    /// Names of the built-in tables.
     pub fn names() -> impl Iterator<Item = &'static str> {
         BUILTIN.into_iter().map(|(name, _)| name)
     }
 
-    /// The table called `name` that comes with the crate.
+    /// The built-in table `name`.
     ///
     /// # Errors
     /// [`TableError::Unknown`] with the nearest known name.
     pub fn builtin(name: &str) -> Result<Self, TableError> {
         let Some((_, text)) = BUILTIN.into_iter().find(|(known, _)| *known == name) else {
-            let mend = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
-            return Err(TableError::Unknown { name: name.to_owned(), mend });
+            let suggestion = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
+            return Err(TableError::Unknown { name: name.to_owned(), suggestion });
         };
         Self::parse(text, &format!("power-model/tables/{name}.ron"))
     }
 
-    /// Reads the table in the RON file at `path`.
+    /// Read the table in the RON file at `path`.
     ///
     /// # Errors
-    /// [`TableError`] when the file cannot be read, a row is wrong, or an event is missing.
+    /// [`TableError`] if the file cannot be read, a row is invalid, or an event is missing.
     pub fn load(path: &Path) -> Result<Self, TableError> {
         Self::check(spec::load(path)?, &path.display().to_string())
     }
 
-    /// Parses RON `text`; `file` stands for the file in messages.
+    /// Parse RON `text`; `file` is the file name in messages.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// As for [`Self::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, TableError> {
         Self::check(spec::parse(text, file)?, file)
     }
@@ -113,37 +113,37 @@ impl EnergyTable {
         Ok(Self { name, doc, node_nm, v0_v, valid_v: [v_min_v, v_max_v], entries })
     }
 
-    /// The table's name.
+    /// Name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What the table describes, in words.
+    /// Description.
     pub fn doc(&self) -> &str {
         &self.doc
     }
 
-    /// The process node in nanometres.
+    /// Process node in nanometres.
     pub const fn node_nm(&self) -> u32 {
         self.node_nm
     }
 
-    /// The core voltage the energies hold at, in volts.
+    /// Core voltage of the energies, in volts.
     pub const fn v0_v(&self) -> f64 {
         self.v0_v.value()
     }
 
-    /// The core voltages, from and to, over which scaling with (V/V0)^2 is supported by the source.
+    /// Range of core voltages in which the source supports scaling with (V/V0)^2.
     pub fn valid_v(&self) -> [f64; 2] {
         self.valid_v.map(Volts::value)
     }
 
-    /// What the table says of each event, in the order of [`Event::ALL`].
+    /// Entry of every event, in the order of [`Event::ALL`].
     pub fn entries(&self) -> impl Iterator<Item = (Event, &Entry)> {
         Event::ALL.into_iter().zip(&self.entries)
     }
 
-    /// The rows that cost energy, in the order of [`Event::ALL`].
+    /// Rows with energies, in the order of [`Event::ALL`].
     pub fn rows(&self) -> impl Iterator<Item = &EnergyRow> {
         self.entries.iter().filter_map(|entry| match entry {
             Entry::Costs(row) => Some(row),
@@ -151,22 +151,22 @@ impl EnergyTable {
         })
     }
 
-    /// Joules per event at V0, nominal, indexed by event.
+    /// Nominal energy per event at V0 in joules, indexed by event.
     pub fn nominal(&self) -> [f64; Event::COUNT] {
         self.joules(Bound::Nominal)
     }
 
-    /// Joules per event at V0, at the low end of every interval.
+    /// Lowest energy per event at V0 in joules, indexed by event.
     pub fn low(&self) -> [f64; Event::COUNT] {
         self.joules(Bound::Low)
     }
 
-    /// Joules per event at V0, at the high end of every interval.
+    /// Highest energy per event at V0 in joules, indexed by event.
     pub fn high(&self) -> [f64; Event::COUNT] {
         self.joules(Bound::High)
     }
 
-    /// Joules per event at V0, at one end of every interval.
+    /// Energy per event at V0 in joules, at one end of every interval.
     pub fn joules(&self, bound: Bound) -> [f64; Event::COUNT] {
         let mut joules = [0.0; Event::COUNT];
         for row in self.rows() {
@@ -177,7 +177,7 @@ impl EnergyTable {
 }
 
 impl EnergyRow {
-    /// The energy at one end of the interval, in joules.
+    /// Energy at one end of the interval, in joules.
     pub fn joules(&self, bound: Bound) -> f64 {
         match bound {
             Bound::Low => self.low_j(),
@@ -187,7 +187,7 @@ impl EnergyRow {
     }
 }
 
-/// One entry per event in the order of [`Event::ALL`], or the event that is there twice or not at all.
+/// One entry per event in the order of [`Event::ALL`]. The error names a duplicate or missing event.
 fn complete(given: impl Iterator<Item = (Event, Entry)>, file: &str) -> Result<Vec<Entry>, TableError> {
     let mut entries: Vec<Option<Entry>> = vec![None; Event::COUNT];
     for (event, entry) in given {

@@ -3,8 +3,8 @@
 
     beside_ipctk.py FOLDER BENCH [--rounds 3]
 
-FOLDER is shared/ccd, BENCH the program that `cargo bench -p workloads --bench collision --no-run` names. One thread each, CPU
-time, reading files not counted; edges of the peer's mesh are made before its clock starts.
+FOLDER contains the public scenes as `.mts.gz` files, BENCH the program that `cargo bench -p workloads --bench collision --no-run` names. One thread each, CPU
+time, reading files not counted; the edges of the mesh of ipctk are made before the timed part.
 """
 import argparse
 import gzip

@@ -1,6 +1,6 @@
-//! How fast collision detection is on the public scenes, in CPU time, the reading of files not counted.
+//! CPU time of collision detection on the public scenes, without reading the files.
 //!
-//! `cargo bench -p workloads --bench collision -- FOLDER [RESOLUTION BINS]`, FOLDER being shared/ccd.
+//! `cargo bench -p workloads --bench collision -- FOLDER [RESOLUTION BINS]`, with the scenes in FOLDER.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run may as well panic")]
 
@@ -10,7 +10,7 @@ use cpu_time::ProcessTime;
 use workloads::collision::load_cases;
 use workloads::collision::{Object, Search, detect};
 
-/// Times that each scene is looked at; the median counts.
+/// Measurements per scene; the median counts.
 const ROUNDS: usize = 5;
 
 fn main() {

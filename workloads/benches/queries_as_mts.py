@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The public collision queries as `.mts` files, a case each: queries_as_mts.py CCD OUT
 
-CCD is shared/ccd: its README tells both layouts. A query is eight rows of three fractions and the answer; a point is the triangle
+CCD is the folder of the public queries; its README describes both layouts. A query is eight rows of three fractions and the answer; a point is the triangle
 (v, v, v), an edge (a, b, b). The name of a file ends with the answer. Fractions are rounded to f64.
 """
 import gzip

@@ -1,6 +1,7 @@
-//! How fast the visibility engine is, in samples of the image per second of a thread's CPU time.
+//! Throughput of visibility, in image samples per second of a thread's CPU time.
 //!
-//! `cargo bench -p workloads --bench visibility [NAME]`; `README.md` beside this file says what is measured and what was found.
+//! Run `cargo bench -p workloads --bench visibility [NAME]`; `README.md` beside this file describes the
+//! measurement and has results.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run may as well panic")]
 
@@ -13,7 +14,7 @@ use pipeline::sampling::HashedSamples;
 use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
 use pipeline::{Camera, Cull, Geometry, Lens, LensShape, Viewport};
 
-/// Moving triangles and the camera that sees them.
+/// Moving triangles and their camera.
 struct Scene {
     name: String,
     camera: Camera,
@@ -22,7 +23,7 @@ struct Scene {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Uniform numbers, a pure function of the count.
+/// Uniform random numbers from a counter.
 struct Uniform(u64);
 
 impl Uniform {
@@ -36,7 +37,8 @@ impl Uniform {
     }
 }
 
-/// What a soup is like: sizes and speeds are shares of the depth, `speed` the largest of a log-uniform range of 200 to 1.
+/// Parameters of random triangles. Sizes and speeds are shares of the depth; `speed` is the largest of a
+/// log-uniform range of 200 to 1.
 struct Soup {
     name: &'static str,
     count: u32,
@@ -77,7 +79,7 @@ impl Soup {
     }
 }
 
-/// Meshes under the folders of `QUINTILE_MESHES`, with a camera fitted to each.
+/// Meshes in the folders of `QUINTILE_MESHES`, each with a fitted camera.
 fn real_scenes() -> Vec<Scene> {
     let folders = std::env::var("QUINTILE_MESHES").unwrap_or_default();
     let mut files: Vec<PathBuf> = std::env::split_paths(&folders)
@@ -100,7 +102,7 @@ fn real_scene(path: &Path) -> Scene {
     Scene { name, camera: scene.camera, open: scene.open, close: scene.close, triangles: scene.triangles }
 }
 
-/// Median and best of runs on so many threads.
+/// Median and best of several runs on so many threads.
 fn measure(scene: &Scene, threads: usize) -> (f64, f64, Tally) {
     const RUNS: usize = 7;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

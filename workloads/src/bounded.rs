@@ -1,20 +1,20 @@
-//! Numbers with bounds, checked while the file is read so that a message has the line and column.
+//! Bounded numbers, checked while a file is parsed so that messages have line and column.
 
 use serde::{Deserialize, Deserializer, de::Error};
 
-/// The largest coordinate or length in scene units: beyond it products leave the range of 32-bit numbers.
+/// Largest coordinate or length in scene units. Products of larger ones overflow 32-bit floats.
 const MAX_LENGTH: f64 = 1e15;
-/// The latest time, s.
+/// Latest time, s.
 const MAX_TIME_S: f64 = 1e9;
-/// The largest angle, degrees.
+/// Largest angle, degrees.
 const MAX_ANGLE_DEG: f64 = 1e9;
-/// The brightest radiance.
+/// Largest radiance.
 const MAX_RADIANCE: f32 = 1e9;
 
-/// One after the last frame, at most: 46 hours at 60 Hz.
+/// Largest end of the frame range: 46 hours at 60 Hz.
 const MAX_FRAME: u32 = 10_000_000;
 
-/// A value that may be left out.
+/// Parses an optional value.
 fn checked<'de, D, T>(from: D, holds: impl Fn(&T) -> bool, due: &str) -> Result<Option<T>, D::Error>
 where
     D: Deserializer<'de>,
@@ -26,7 +26,7 @@ where
     }
 }
 
-/// A value that may not.
+/// Parses a required value.
 fn required<'de, D, T>(from: D, holds: impl Fn(&T) -> bool, due: &str) -> Result<T, D::Error>
 where
     D: Deserializer<'de>,

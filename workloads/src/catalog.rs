@@ -1,59 +1,59 @@
-//! Every job by name.
+//! Catalogue of all jobs by name.
 
 use crate::error::LoadError;
 use crate::job::{Flags, Job, OptionSource, Request};
 
 type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
 
-/// A job that can be asked for.
-struct Known {
+/// Entry of a job.
+struct Entry {
     name: &'static str,
-    /// What it is.
+    /// Description in a line.
     what: &'static str,
-    /// What it makes of flags.
+    /// Flags that it uses.
     flags: Flags,
     make: Maker,
 }
 
-/// Every job.
-const JOBS: &[Known] = &[
-    Known {
+/// All jobs.
+const JOBS: &[Entry] = &[
+    Entry {
         name: "caustics",
         what: "light refracted by waves: beams drawn as moving triangles, or in the bodies that others put around them",
         flags: crate::caustics::FLAGS,
         make: crate::caustics::job,
     },
-    Known {
+    Entry {
         name: "ccd",
         what: "continuous collision detection: moving objects drawn along three axes into boxes of time and depth",
         flags: crate::collision::FLAGS,
         make: crate::collision::job,
     },
-    Known {
+    Entry {
         name: "glossy",
         what: "glossy reflection or refraction on a planar receiver, pre-filtered by the lens of one pass",
         flags: crate::glossy::FLAGS,
         make: crate::glossy::job,
     },
-    Known {
+    Entry {
         name: "multiview",
         what: "stereo and multi-view images with motion and defocus in one pass, interlaced for a panel if asked to",
         flags: crate::multiview::FLAGS,
         make: crate::multiview::job,
     },
-    Known {
+    Entry {
         name: "occlusion",
         what: "occlusion queries: moving boxes behind moving walls, asked for by intervals of lens, time and depth",
         flags: crate::occlusion::FLAGS,
         make: crate::occlusion::job,
     },
-    Known {
+    Entry {
         name: "sampling",
         what: "dart throwing over voids that are drawn, until no point fits",
         flags: crate::points::job::FLAGS,
         make: crate::points::job::job,
     },
-    Known {
+    Entry {
         name: "soft-shadows",
         what: "motion-blurred soft shadows of an area light, by a shadow map over a fixed set of (u, v, t)",
         flags: crate::soft_shadows::FLAGS,
@@ -61,12 +61,12 @@ const JOBS: &[Known] = &[
     },
 ];
 
-/// Names of the jobs, each with a line that says what it is.
+/// Names of the jobs, each with a description in a line.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     JOBS.iter().map(|job| (job.name, job.what))
 }
 
-/// What to say of a name that is neither a scene nor a job, where either could have been meant; other errors stay as they are.
+/// Extends the error for an unknown scene with the names of jobs; other errors are unchanged.
 #[must_use]
 pub fn or_job(error: LoadError) -> LoadError {
     match error {
@@ -77,10 +77,10 @@ pub fn or_job(error: LoadError) -> LoadError {
     }
 }
 
-/// The job called `name`, if there is one.
+/// Makes the job with a name, if it exists.
 ///
 /// # Errors
-/// [`LoadError`] when its options or settings make no sense, or it has no use for one of them.
+/// [`LoadError`] for invalid options or settings, or flags that it does not use.
 pub fn find(
     name: &str,
     options: &OptionSource,

@@ -1,83 +1,83 @@
-//! Why a scene could not be loaded.
+//! Errors of loading scenes.
 
 use std::io;
 use std::path::Path;
 
 use activity::spec::SpecError;
 
-/// Why a scene could not be loaded or changed.
+/// Reason why a scene could not be loaded or changed.
 ///
-/// [`LoadError::is_usage`] tells what the caller asked wrongly (exit code 2) from files that are broken or
-/// cannot be read (exit code 1).
+/// [`LoadError::is_usage`] distinguishes mistakes of the caller (exit code 2) from broken or unreadable files
+/// (exit code 1).
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// Neither a built-in scene nor a file of a known kind.
+    /// Neither a built-in scene nor a file of a known format.
     #[error("no scene called `{name}`; {known}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// What there is, with a suggestion where one is near.
+        /// Known names, with a suggestion if one is similar.
         known: String,
     },
-    /// A file that is there, but of a kind that cannot be used for what was asked.
+    /// A file of a format that is not accepted here.
     #[error("{file}: it cannot be told what kind of file this is; known here: {known}")]
     Kind {
         /// The file.
         file: String,
-        /// What there could be instead.
+        /// Accepted formats.
         known: &'static str,
     },
-    /// A path that cannot be a scene: a folder, a file of another format, or one whose ending says nothing.
+    /// A path that is not a scene: a folder, another format, or an unknown extension.
     #[error("{file}: {message}")]
     Format {
         /// The path.
         file: String,
-        /// What it is, and what to do.
+        /// What is wrong, and what to do.
         message: String,
     },
-    /// A setting, from a command line or a scene file, that makes no sense.
+    /// An invalid setting, from a command line or a scene file.
     #[error("{setting}: {message}")]
     Setting {
-        /// Which setting.
+        /// The setting.
         setting: &'static str,
-        /// What is wrong and how to mend it.
+        /// What is wrong, and what to do.
         message: String,
     },
     /// A RON scene that cannot be read or parsed.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// A RON scene that parses but makes no sense.
+    /// A RON scene with invalid content.
     #[error("{file}: {place}: {message}")]
     Description {
         /// The scene file.
         file: String,
-        /// Which part of it.
+        /// The invalid part.
         place: String,
-        /// What is wrong and how to mend it.
+        /// What is wrong, and what to do.
         message: String,
     },
-    /// A file that cannot be read at all.
-    #[error("{file}: cannot read it: {source}; {}", mend(.source))]
+    /// A file that cannot be read.
+    #[error("{file}: cannot read it: {source}; {}", remedy(.source))]
     Read {
         /// The file.
         file: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// A file whose contents are broken or not supported.
+    /// A file with broken or unsupported content.
     #[error("{file}: {place}: {message}")]
     Broken {
         /// The file.
         file: String,
-        /// Where in it: a chunk, a primitive, an accessor, a line.
+        /// Place in the file: a chunk, a primitive, an accessor, a line.
         place: String,
-        /// What is wrong and how to mend it.
+        /// What is wrong, and what to do.
         message: String,
     },
 }
 
-/// What to do about a file that cannot be read.
-fn mend(error: &io::Error) -> &'static str {
+/// Remedy for a file that cannot be read.
+fn remedy(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "check the path",
         io::ErrorKind::IsADirectory => {
@@ -89,7 +89,9 @@ fn mend(error: &io::Error) -> &'static str {
 }
 
 impl LoadError {
-    /// Whether the mistake is the caller's (an unknown scene name or kind of file, a bad setting, a bad RON scene): exit code
+    /// Whether the caller made a mistake (unknown scene or format, invalid setting or RON scene): exit code
+    /// 2. Missing, unreadable, truncated, corrupt or unsupported files have exit code 1, as has an unreadable
+    /// RON file.
     /// 2. The others (files that are missing, unreadable, truncated, corrupt or not supported) are exit
     /// code 1. A RON file that cannot be read counts as unreadable.
     pub fn is_usage(&self) -> bool {
@@ -106,7 +108,7 @@ impl LoadError {
 }
 
 impl LoadError {
-    /// The same error of a scene that may have a name of its own, told of the file it came from.
+    /// The error with the path of the file instead of the scene's name.
     pub(crate) fn in_file(self, path: &str) -> Self {
         match self {
             Self::Broken { place, message, .. } => Self::Broken { file: path.to_owned(), place, message },

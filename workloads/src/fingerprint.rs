@@ -1,4 +1,4 @@
-//! Fingerprints: whether two frames are drawn from the same content.
+//! Fingerprints, which tell whether two frames have the same content.
 
 use std::io::{self, BufWriter, Write};
 
@@ -7,16 +7,17 @@ use twox_hash::xxhash3_128;
 
 /// A 128-bit hash (XXH3) of everything that a value serializes, floats by their bits.
 ///
-/// Values of one type with the same content have the same fingerprint. Values that differ in a single bit have different ones,
-/// but for a chance of 2^-128 a pair. Compare fingerprints of one type only: names of types and fields are not hashed.
+/// Values of one type with the same content have the same fingerprint. Values that differ in one bit have
+/// different ones, except with probability 2^-128 per pair. Compare fingerprints of one type only: names of
+/// types and fields are not hashed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Fingerprint(u128);
 
 impl Fingerprint {
-    /// The fingerprint of `value`. Derive `Serialize` on its type, so that no field can be forgotten.
+    /// Fingerprint of `value`. Derive `Serialize` on its type, so that no field is missing.
     ///
     /// # Errors
-    /// When the type cannot be serialized, as a sequence of unknown length.
+    /// [`FingerprintError`] for types that cannot be serialized, such as a sequence of unknown length.
     pub fn of<T: Serialize>(value: &T) -> Result<Self, FingerprintError> {
         let mut writer = BufWriter::with_capacity(BUFFER_BYTES, HashWriter(xxhash3_128::Hasher::new()));
         postcard::to_io(value, &mut writer).map_err(|error| FingerprintError(error.to_string()))?;
@@ -25,15 +26,15 @@ impl Fingerprint {
     }
 }
 
-/// Why a value has no fingerprint.
+/// Reason why a value has no fingerprint.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("internal error, please report it: frames cannot be compared: {0}")]
 pub struct FingerprintError(String);
 
-/// Bytes that are collected before they are hashed: the serializer writes a number at a time.
+/// Bytes that are buffered before hashing: the serializer writes single numbers.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// A hash as a place to write to.
+/// A hash as a writer.
 struct HashWriter(xxhash3_128::Hasher);
 
 impl Write for HashWriter {
@@ -64,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_content_has_one_fingerprint_wherever_it_is_stored() {
+    fn equal_content_has_equal_fingerprints() {
         assert_eq!(Fingerprint::of(&value()), Fingerprint::of(&value()));
     }
 

@@ -1,17 +1,19 @@
-//! Scenes: what the pipeline is given to draw.
+//! Scenes and workloads of the pipeline.
 //!
-//! - [`load`] finds a scene by name or path: built in, RON, glTF 2.0, OBJ, PLY, OFF or STL.
-//! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]), and
-//!   [`Frame::draws`] hands them to the pipeline.
-//! - [`scene`] holds the parts of a scene, for programs that build their own; [`shapes`] makes solids.
-//! - [`job`] is for work that is more than one rendering of a scene; [`catalog`] finds one by name.
-//! - [`caustics`] draws refracted and reflected light, beams as moving triangles.
-//! - [`glossy`] makes glossy reflections and refractions on planar receivers.
+//! - [`load`] loads a scene by name or path: built in, RON, glTF 2.0, OBJ, PLY, OFF or STL.
+//! - [`Scene`] gives, for every frame, the camera and all meshes at both ends of the shutter ([`Frame`]);
+//!   [`Frame::draws`] passes them to the pipeline.
+//! - [`scene`] has the parts of a scene, for programs that build their own; [`shapes`] makes solids.
+//! - [`points`] makes random points: Poisson disk points, points in volumes, white noise.
+//! - [`job`] is work beyond one rendering of a scene; [`catalog`] finds a job by name.
+//! - [`caustics`] draws refracted and reflected light, with light volumes as moving triangles.
+//! - [`glossy`] draws glossy reflections and refractions on planar receivers.
 //! - [`multiview`] draws stereo and multi-view images in one pass.
-//! - [`soft_shadows`] makes motion-blurred shadows of area lights; [`accumulation`] is what it is held against.
+//! - [`soft_shadows`] draws motion-blurred shadows of area lights; [`accumulation`] is the method for
+//!   comparison.
 //! - [`collision`] finds the pairs of moving objects that may collide.
-//! - [`occlusion`] finds objects that are hidden at all times and from everywhere on the lens.
-//! - [`Material`] is how a surface looks and [`material::SurfaceShader`] what that costs.
+//! - [`occlusion`] finds objects that are hidden at all times and from all of the lens.
+//! - [`Material`] is the look of a surface, and [`material::SurfaceShader`] its cost.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

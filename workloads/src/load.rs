@@ -1,4 +1,4 @@
-//! Finding a scene by its name or path.
+//! Loading of scenes by name or path.
 
 use std::path::Path;
 
@@ -9,11 +9,11 @@ use crate::error::LoadError;
 use crate::import;
 use crate::scene::Scene;
 
-/// The scene called `name_or_path`: a built-in one, or a `.ron`, `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file (the
-/// last four also gzipped, `.ply.gz`). A bare geometry file gets a fitted camera and default settings.
+/// Loads a scene: a built-in one by name, or a `.ron`, `.gltf`, `.glb`, `.obj`, `.ply`, `.off` or `.stl` file
+/// (the last four also gzipped, as `.ply.gz`). A geometry file gets a fitted camera and default settings.
 ///
 /// # Errors
-/// [`LoadError`]; [`LoadError::is_usage`] tells the caller's mistakes from broken files.
+/// [`LoadError`]; [`LoadError::is_usage`] distinguishes mistakes of the caller from broken files.
 pub fn load(name_or_path: impl AsRef<Path>) -> Result<Scene, LoadError> {
     let path = name_or_path.as_ref();
     if let Some(scene) = path.to_str().and_then(builtin) {
@@ -26,7 +26,7 @@ pub fn load(name_or_path: impl AsRef<Path>) -> Result<Scene, LoadError> {
     }
 }
 
-/// The error for a path that is meant as one, but cannot be read as a scene.
+/// Error for a path that is not a scene.
 fn unreadable(path: &Path) -> Option<LoadError> {
     let message = import::foreign(path).or_else(|| {
         let message = if path.is_dir() { "it is a folder" } else { "its ending is not one of a scene file" };
@@ -35,7 +35,7 @@ fn unreadable(path: &Path) -> Option<LoadError> {
     Some(LoadError::Format { file: path.display().to_string(), message })
 }
 
-/// The error for a name that is no scene, and none of `workloads` where these could have been meant.
+/// Error for an unknown name; `workloads` are listed if they are accepted.
 pub(crate) fn unknown(name: &str, workloads: &[&str]) -> LoadError {
     let mut names: Vec<&str> = builtin_names().map(|(name, _)| name).collect();
     let mut known = format!("built in: {}; ", names.join(", "));
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unknown_name_lists_what_there_is_and_suggests() {
+    fn an_unknown_name_lists_known_names_and_suggests() {
         let error = load("defualt").unwrap_err();
         assert!(error.is_usage());
         let text = error.to_string();

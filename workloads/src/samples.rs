@@ -9,21 +9,21 @@ use pipeline::{SampleSpec, SampleTable};
 use crate::error::LoadError;
 use crate::visibility::FixedSamples;
 
-/// A sample table that was asked for.
+/// A requested sample table.
 #[derive(Clone, Debug)]
 pub enum SampleChoice {
-    /// One to be made from a description.
+    /// A table made from a description.
     Described(SampleSpec),
-    /// One as it is in a file.
+    /// A table from a file.
     Fixed(FixedSamples),
 }
 
 impl SampleChoice {
-    /// The table called `name_or_path`: one with a name (see [`SampleSpec::names`]), a description in a `.ron` file, or
-    /// the samples themselves in any other file.
+    /// Loads a table: a named one (see [`SampleSpec::names`]), a description in a `.ron` file, or samples in
+    /// any other file.
     ///
     /// # Errors
-    /// [`LoadError`] when there is no such table, or its file cannot be read or makes no sense.
+    /// [`LoadError`] for an unknown name, or an unreadable or invalid file.
     pub fn load(name_or_path: &str) -> Result<Self, LoadError> {
         if let Some(spec) = SampleSpec::named(name_or_path) {
             return Ok(Self::Described(spec));
@@ -36,7 +36,7 @@ impl SampleChoice {
         }
     }
 
-    /// Samples in each pixel, where the table itself decides that.
+    /// Samples per pixel, if the table fixes them.
     pub fn per_pixel(&self) -> Option<u32> {
         match self {
             Self::Described(_) => None,
@@ -44,10 +44,10 @@ impl SampleChoice {
         }
     }
 
-    /// The table, with `per_pixel` samples in each pixel.
+    /// The table with `per_pixel` samples per pixel.
     ///
     /// # Errors
-    /// [`LoadError::Setting`] when the table has another number or cannot be made with this one.
+    /// [`LoadError::Setting`] if the table has another number, or cannot be made with this one.
     pub fn source(&self, per_pixel: u32, seed: u64) -> Result<Box<dyn SampleSource>, LoadError> {
         let wrong = |message| Err(LoadError::Setting { setting: "sample table", message });
         match self {
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lead_to_tables_and_others_to_a_list() {
+    fn known_names_load_and_others_are_listed() {
         assert!(SampleSpec::names().all(|(name, _)| SampleChoice::load(name).is_ok()));
         let text = SampleChoice::load("jitered").unwrap_err().to_string();
         assert!(text.contains("did you mean `jittered`?") && text.contains("owen, sobol"), "{text}");
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_description_says_as_much_as_it_wants() {
+    fn descriptions_may_be_partial() {
         assert_eq!(described("()").unwrap(), SampleSpec::default());
         let text = "(pattern: Interleaved(points: 16), lens: Polygon(blades: 7, rotation_deg: 12), regions: Grid(2, 1))";
         let spec = described(text).unwrap();

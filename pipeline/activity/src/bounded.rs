@@ -1,67 +1,67 @@
-//! Whole numbers that cannot be built out of range.
+//! Integers with a range in their type.
 
 use std::fmt;
 
 use serde::Deserialize;
 
-/// A whole number from `LEAST` to `MOST`, both included. A file with another number is refused while it is read, so the
-/// message has its line and column.
+/// An integer from `MIN` to `MAX`, both included. Deserializing a number outside the range is an error, so
+/// the message has the line and column of the file.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(try_from = "i64")]
-pub struct Bounded<const LEAST: u32, const MOST: u32>(u32);
+pub struct Bounded<const MIN: u32, const MAX: u32>(u32);
 
-/// A whole number outside its range.
+/// An integer outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{value} is out of range; it has to be {least} to {most}")]
 pub struct OutOfBounds {
-    /// The number that was given.
+    /// The value given.
     pub value: i64,
-    /// The least allowed.
+    /// Smallest allowed value.
     pub least: u32,
-    /// The most allowed.
+    /// Largest allowed value.
     pub most: u32,
 }
 
-impl<const LEAST: u32, const MOST: u32> Bounded<LEAST, MOST> {
-    /// The least there is.
-    pub const MIN: Self = Self(LEAST);
-    /// The most there is.
-    pub const MAX: Self = Self(MOST);
+impl<const MIN: u32, const MAX: u32> Bounded<MIN, MAX> {
+    /// Smallest value.
+    pub const MIN: Self = Self(MIN);
+    /// Largest value.
+    pub const MAX: Self = Self(MAX);
 
-    /// Checks `value` against the range.
+    /// Check `value` against the range.
     ///
     /// # Errors
     /// [`OutOfBounds`] with the range.
     pub const fn new(value: u32) -> Result<Self, OutOfBounds> {
-        if LEAST <= value && value <= MOST {
+        if MIN <= value && value <= MAX {
             Ok(Self(value))
         } else {
-            Err(OutOfBounds { value: value as i64, least: LEAST, most: MOST })
+            Err(OutOfBounds { value: value as i64, least: MIN, most: MAX })
         }
     }
 
-    /// The number.
+    /// The value.
     pub const fn get(self) -> u32 {
         self.0
     }
 }
 
-impl<const LEAST: u32, const MOST: u32> TryFrom<u32> for Bounded<LEAST, MOST> {
+impl<const MIN: u32, const MAX: u32> TryFrom<u32> for Bounded<MIN, MAX> {
     type Error = OutOfBounds;
     fn try_from(value: u32) -> Result<Self, OutOfBounds> {
         Self::new(value)
     }
 }
 
-impl<const LEAST: u32, const MOST: u32> TryFrom<i64> for Bounded<LEAST, MOST> {
+impl<const MIN: u32, const MAX: u32> TryFrom<i64> for Bounded<MIN, MAX> {
     type Error = OutOfBounds;
     fn try_from(value: i64) -> Result<Self, OutOfBounds> {
-        let out = OutOfBounds { value, least: LEAST, most: MOST };
+        let out = OutOfBounds { value, least: MIN, most: MAX };
         u32::try_from(value).map_err(|_| out).and_then(Self::new)
     }
 }
 
-impl<const LEAST: u32, const MOST: u32> fmt::Debug for Bounded<LEAST, MOST> {
+impl<const MIN: u32, const MAX: u32> fmt::Debug for Bounded<MIN, MAX> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
     }
@@ -69,8 +69,8 @@ impl<const LEAST: u32, const MOST: u32> fmt::Debug for Bounded<LEAST, MOST> {
 
 macro_rules! widens_to {
     ($($wide:ty)*) => {$(
-        impl<const LEAST: u32, const MOST: u32> From<Bounded<LEAST, MOST>> for $wide {
-            fn from(number: Bounded<LEAST, MOST>) -> $wide {
+        impl<const MIN: u32, const MAX: u32> From<Bounded<MIN, MAX>> for $wide {
+            fn from(number: Bounded<MIN, MAX>) -> $wide {
                 number.0.into()
             }
         }
@@ -86,7 +86,7 @@ mod tests {
     type Queue = Bounded<1, 65_536>;
 
     #[test]
-    fn what_is_out_of_range_cannot_be_built() {
+    fn values_out_of_range_are_refused() {
         assert_eq!([Queue::new(1), Queue::new(65_536)], [Ok(Queue::MIN), Ok(Queue::MAX)]);
         for value in [0, 65_537, u32::MAX] {
             assert_eq!(
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_refused_with_the_place_and_the_field() {
+    fn an_error_in_a_file_names_line_and_field() {
         #[derive(Debug, Deserialize)]
         struct Unit {
             #[allow(dead_code)]
@@ -117,7 +117,7 @@ mod tests {
             let text = message(&format!("(\n  // how long: it may be\n  queue: {value},\n  next: 1,\n)"));
             assert!(text.starts_with("gpu.ron:3:") && text.contains(says), "{text}");
         }
-        // Letters of several bytes before, in and behind the value.
+        // Multi-byte characters before, inside and after the value.
         let text = message("(\u{a0}queue:\u{a0}\u{fc}\u{a0}, next: 1)");
         assert!(text.starts_with("gpu.ron:1:"), "{text}");
         let text = message("(queue: 1, next: nan)");

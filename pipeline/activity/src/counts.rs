@@ -8,8 +8,8 @@ use serde::{Serialize, Serializer};
 use crate::events::EVENTS;
 use crate::{Event, Unit};
 
-/// How often each event happened. Workers own their counts and add them up with `+=`, which is exact and
-/// does not depend on the order.
+/// Count of every event. Each worker has its own counts, which are summed with `+=`. The sum is exact and
+/// independent of the order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counts([u64; Event::COUNT]);
 
@@ -20,34 +20,34 @@ impl Default for Counts {
 }
 
 impl Counts {
-    /// Each event with its count, in declaration order.
+    /// Every event with its count, in declaration order.
     pub fn iter(&self) -> impl Iterator<Item = (Event, u64)> + '_ {
         Event::ALL.into_iter().zip(self.0.iter().copied())
     }
 
-    /// Whether nothing was counted.
+    /// Whether all counts are 0.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(|&count| count == 0)
     }
 
-    /// Whether `unit` did anything at all; a unit that did not is not modelled.
+    /// Whether any event of `unit` happened. A unit without events is not modelled.
     pub fn uses(&self, unit: Unit) -> bool {
         self.iter().any(|(event, count)| count > 0 && event.unit() == unit)
     }
 
-    /// The counts of the events of `unit`, in declaration order, to be added to.
+    /// Mutable counts of the events of `unit`, in declaration order.
     pub fn of_mut(&mut self, unit: Unit) -> &mut [u64] {
         let (first, end) = EVENTS[unit as usize];
         &mut self.0[first..end]
     }
 
-    /// `numerator / denominator` as a ratio, or `None` when nothing was counted below the line.
+    /// `numerator / denominator`, or `None` if the denominator's count is 0.
     pub fn ratio(&self, numerator: Event, denominator: Event) -> Option<f64> {
-        let below = self[denominator];
-        (below > 0).then(|| self[numerator] as f64 / below as f64)
+        let total = self[denominator];
+        (total > 0).then(|| self[numerator] as f64 / total as f64)
     }
 
-    /// Samples hit over samples tested, in [0, 1]: the sample test efficiency of the paper.
+    /// Sample test efficiency: samples hit over samples tested, in [0, 1].
     pub fn sample_test_efficiency(&self) -> Option<f64> {
         self.ratio(Event::SamplesHit, Event::SamplesTested)
     }
@@ -68,14 +68,14 @@ impl IndexMut<Event> for Counts {
 
 impl AddAssign<&Self> for Counts {
     fn add_assign(&mut self, other: &Self) {
-        for (mine, theirs) in self.0.iter_mut().zip(&other.0) {
-            *mine += theirs;
+        for (sum, count) in self.0.iter_mut().zip(&other.0) {
+            *sum += count;
         }
     }
 }
 
 impl Serialize for Counts {
-    /// A map from event name to count, in declaration order.
+    /// Write a map from event name to count, in declaration order.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(Event::COUNT))?;
         for (event, count) in self.iter() {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ratio_over_nothing_is_none() {
+    fn a_ratio_with_denominator_0_is_none() {
         assert_eq!(Counts::default().sample_test_efficiency(), None);
     }
 

@@ -1,15 +1,15 @@
-//! Units and events, declared once.
+//! Units and events, each declared once.
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-/// Declares the units and, under each, its events: `Name "column" "what one of it is"`.
+/// Declare the units and their events: `Name "name in files" "documentation"`.
 macro_rules! activity {
     ($($unit:ident $unit_name:literal $unit_doc:literal {
         $($event:ident $event_name:literal $event_doc:literal)*
     })*) => {
-        /// A unit of the block diagram, in the order in which work passes through the front of the pipeline.
+        /// A unit of the block diagram, in the order of the pipeline.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[repr(u8)]
         pub enum Unit { $(#[doc = $unit_doc] $unit),* }
@@ -18,19 +18,18 @@ macro_rules! activity {
             /// Every unit, in declaration order.
             pub const ALL: [Self; [$(Self::$unit),*].len()] = [$(Self::$unit),*];
 
-            /// The name used in files, for example `sample_test`.
+            /// Name in files, for example `sample_test`.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$unit => $unit_name),* }
             }
 
-            /// One sentence on what the unit does.
+            /// One sentence: what the unit does.
             pub const fn doc(self) -> &'static str {
                 match self { $(Self::$unit => $unit_doc),* }
             }
         }
 
-        /// Something a unit does that can be counted. The energy of one and the rate at which the unit
-        /// can do it are other people's business.
+        /// A countable action of a unit. Its energy is in the energy tables, its rate in the GPU files.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         #[serde(into = "&'static str", try_from = "String")]
         #[repr(u8)]
@@ -40,17 +39,17 @@ macro_rules! activity {
             /// Every event, grouped by unit, in declaration order.
             pub const ALL: [Self; [$($(Self::$event),*),*].len()] = [$($(Self::$event),*),*];
 
-            /// The name used in files and energy tables, for example `samples_tested`.
+            /// Name in files and energy tables, for example `samples_tested`.
             pub const fn name(self) -> &'static str {
                 match self { $($(Self::$event => $event_name),*),* }
             }
 
-            /// What one of it is.
+            /// One sentence: what one event is.
             pub const fn doc(self) -> &'static str {
                 match self { $($(Self::$event => $event_doc),*),* }
             }
 
-            /// The unit that does it.
+            /// The unit that performs it.
             pub const fn unit(self) -> Unit {
                 match self { $($(Self::$event => Unit::$unit),*),* }
             }
@@ -147,15 +146,15 @@ activity! {
 }
 
 impl Unit {
-    /// How many units there are.
+    /// Number of units.
     pub const COUNT: usize = Self::ALL.len();
 
-    /// The unit called `name` in files.
+    /// The unit with this name in files.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|unit| unit.name() == name)
     }
 
-    /// The places of its events in [`Event::ALL`].
+    /// Index range of its events in [`Event::ALL`].
     pub const fn events(self) -> Range<usize> {
         let (mut first, mut end) = (0, Event::COUNT);
         while Event::ALL[first].unit() as u8 != self as u8 {
@@ -169,10 +168,10 @@ impl Unit {
 }
 
 impl Event {
-    /// How many events there are.
+    /// Number of events.
     pub const COUNT: usize = Self::ALL.len();
 
-    /// The event called `name` in files.
+    /// The event with this name in files.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|event| event.name() == name)
     }
@@ -192,7 +191,7 @@ impl TryFrom<String> for Event {
     }
 }
 
-/// First event and one past the last, by unit.
+/// Index of the first event and one past the last, by unit.
 pub(crate) const EVENTS: [(usize, usize); Unit::COUNT] = {
     let mut ranges = [(0, 0); Unit::COUNT];
     let mut at = 0;

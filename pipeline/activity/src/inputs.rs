@@ -1,7 +1,7 @@
-//! The files that something is made from.
+//! Recording of the input files of a run.
 //!
-//! Scenes, machines and tables are read through [`open`], [`read`] and [`read_to_string`], so that [`record`] knows every file,
-//! also those that a file names.
+//! Scenes, machines and tables are read through [`open`], [`read`] and [`read_to_string`], so [`record`]
+//! lists every file that was read, including files named by other files.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -10,11 +10,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 thread_local! {
-    /// Files opened on this thread, where somebody wants to know.
+    /// Files opened on this thread while [`record`] is active.
     static OPENED: RefCell<Option<BTreeSet<PathBuf>>> = const { RefCell::new(None) };
 }
 
-/// Does `work` and lists the files that it tried to open on this thread, in the order of their names.
+/// Run `work` and list the files it tried to open on this thread, sorted by path.
 pub fn record<T>(work: impl FnOnce() -> T) -> (T, Vec<PathBuf>) {
     let outer = OPENED.replace(Some(BTreeSet::new()));
     let done = work();
@@ -23,7 +23,7 @@ pub fn record<T>(work: impl FnOnce() -> T) -> (T, Vec<PathBuf>) {
     (done, opened.into_iter().collect())
 }
 
-/// Counts `path` among the files that something tried to open.
+/// Add `path` to the recorded files.
 pub fn note(path: &Path) {
     OPENED.with_borrow_mut(|opened| {
         if let Some(opened) = opened {
@@ -32,28 +32,28 @@ pub fn note(path: &Path) {
     });
 }
 
-/// As [`File::open`].
+/// Record `path` and open it, as [`File::open`] does.
 ///
 /// # Errors
-/// Those of the system.
+/// Those of [`File::open`].
 pub fn open(path: &Path) -> io::Result<File> {
     note(path);
     File::open(path)
 }
 
-/// As [`std::fs::read`].
+/// Record `path` and read it, as [`std::fs::read`] does.
 ///
 /// # Errors
-/// Those of the system.
+/// Those of [`std::fs::read`].
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     note(path);
     std::fs::read(path)
 }
 
-/// As [`std::fs::read_to_string`].
+/// Record `path` and read it, as [`std::fs::read_to_string`] does.
 ///
 /// # Errors
-/// Those of the system, or that the file is not UTF-8.
+/// Those of [`std::fs::read_to_string`], such as text that is not UTF-8.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
     note(path);
     std::fs::read_to_string(path)
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_opened_is_listed_once_also_if_it_is_missing() {
+    fn every_file_is_listed_once_even_if_missing() {
         let [a, b, c] = ["/nowhere/a", "/nowhere/b", "/nowhere/c"].map(Path::new);
         let (inner, outer) = record(|| {
             let _ = (read(b), open(a), read(b));

@@ -1,22 +1,22 @@
-//! The seam of the house: what the pipeline *did*, in integers, before anyone asks when or at what cost.
+//! Activity: what the modelled hardware did, in integers. It is the interface between the pipeline, the
+//! timing models and the power model.
 //!
-//! - [`Unit`] and [`Event`]: the units of the block diagram and what each of them counts. One
-//!   declaration gives the enum, the docs, the column in a file and the key of an energy table.
-//! - [`Counts`]: one integer per event; workers own theirs and add them up.
-//! - [`Packet`]: a piece of work that moves through the units as one, with the events it causes.
-//! - [`LineAccess`]: a line of memory a packet asks the L2 for, in order.
-//! - [`Timeline`]: counts over time, made by a timing model, read by a power model.
-//! - [`inputs`]: opening files so that it is known which were.
-//! - [`Bounded`]: a whole number that cannot be built out of range.
-//! - [`spec`]: reading RON files with the place of every mistake and a suggestion.
+//! - [`Unit`] and [`Event`]: the units of the block diagram and the events each unit counts. One declaration
+//!   gives the enum, the docs, the column in a file and the key of an energy table.
+//! - [`Counts`]: one integer per event, one set per worker, summed at the end.
+//! - [`Packet`]: work that moves through the units as one, with the events it causes.
+//! - [`LineAccess`]: a request of a packet for a memory line, in order.
+//! - [`Timeline`]: counts over time, written by a timing model and read by a power model.
+//! - [`inputs`]: recording of the files that a run reads.
+//! - [`Bounded`]: an integer with a range in its type.
+//! - [`spec`]: reading of RON files, with line, column and a suggestion in each error.
 //!
-//! This crate knows no triangle, no clock rate and no joule, and depends on nothing else of the house.
+//! The crate contains no geometry, clock rate or energy, and depends on no other crate of the workspace.
 
 mod bounded;
 mod counts;
 mod events;
 pub mod inputs;
-mod lines;
 mod packet;
 pub mod spec;
 mod timeline;
@@ -24,6 +24,5 @@ mod timeline;
 pub use bounded::{Bounded, OutOfBounds};
 pub use counts::Counts;
 pub use events::{Event, Unit};
-pub use lines::{LineAccess, LineKind};
-pub use packet::{Packet, PacketCounts, PacketKind};
+pub use packet::{LineAccess, LineKind, Packet, PacketCounts, PacketKind};
 pub use timeline::{Bin, Timeline};

@@ -1,24 +1,24 @@
-//! Work packets: what moves through the units as one.
+//! Work packets, the unit of work in the timing models, and the memory lines they request.
 
 use std::ops::{AddAssign, Index, IndexMut};
 
 use crate::events::EVENTS;
 use crate::{Counts, Event, Unit};
 
-/// What kind of work a packet is, which decides the units it passes through.
+/// Kind of work, which decides the units a packet passes through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PacketKind {
-    /// A draw starts: state is read.
+    /// Start of a draw: state is read.
     Draw,
-    /// A batch of vertices is fetched and shaded and its triangles are set up.
+    /// A batch of vertices is fetched and shaded, and its triangles are set up.
     Vertices,
     /// One triangle in one tile, from traversal to colour.
     Tile,
-    /// A tile's samples are resolved into pixels.
+    /// The samples of a tile are resolved into pixels.
     Resolve,
 }
 
-/// The events one packet causes; 32 bits are plenty for one packet.
+/// Events caused by one packet. 32 bits per event are enough for a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PacketCounts([u32; Event::COUNT]);
 
@@ -29,17 +29,17 @@ impl Default for PacketCounts {
 }
 
 impl PacketCounts {
-    /// Each event with its count, in declaration order.
+    /// Every event with its count, in declaration order.
     pub fn iter(&self) -> impl Iterator<Item = (Event, u32)> + '_ {
         Event::ALL.into_iter().zip(self.0.iter().copied())
     }
 
-    /// Whether the packet causes anything in `unit`.
+    /// Whether the packet causes any event in `unit`.
     pub fn uses(&self, unit: Unit) -> bool {
         self.of(unit).iter().any(|&count| count > 0)
     }
 
-    /// The counts of the events of `unit`, in declaration order.
+    /// Counts of the events of `unit`, in declaration order.
     pub fn of(&self, unit: Unit) -> &[u32] {
         &self.0[EVENTS[unit as usize].0..EVENTS[unit as usize].1]
     }
@@ -60,31 +60,71 @@ impl IndexMut<Event> for PacketCounts {
 
 impl AddAssign<&Self> for PacketCounts {
     fn add_assign(&mut self, other: &Self) {
-        for (mine, theirs) in self.0.iter_mut().zip(&other.0) {
-            *mine += theirs;
+        for (sum, count) in self.0.iter_mut().zip(&other.0) {
+            *sum += count;
         }
     }
 }
 
-/// A piece of work in the order in which the modelled hardware meets it.
+/// A piece of work, in the order in which the modelled hardware processes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packet {
-    /// The kind of work.
+    /// Kind of work.
     pub kind: PacketKind,
-    /// The pass it belongs to, counted from 0 in the frame.
+    /// Pass number in the frame, from 0.
     pub pass: u16,
-    /// The tile, row by row from the top left; meaningless for draws and vertices.
+    /// Tile number, row by row from the top left; unused for draws and vertices.
     pub tile: u32,
-    /// The triangle, counted through the pass; the first of the batch for vertices.
+    /// Triangle number in the pass; for vertices the first of the batch.
     pub triangle: u32,
-    /// The events it causes in every unit.
+    /// Events caused in every unit.
     pub counts: PacketCounts,
 }
 
 impl Packet {
-    /// A packet that causes nothing yet.
+    /// A packet without events.
     pub fn new(kind: PacketKind, pass: u16, tile: u32, triangle: u32) -> Self {
         Self { kind, pass, tile, triangle, counts: PacketCounts::default() }
+    }
+}
+
+/// Outcome of a line request in the L2. Hits and misses are decided in stream order, before the timing is
+/// known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LineKind {
+    /// Read; the line is in the L2.
+    Hit,
+    /// Read; the line is fetched from memory.
+    Fetch,
+    /// Written whole; replaces the line in the L2.
+    Write,
+    /// Written whole; the line was not in the L2.
+    Allocate,
+    /// Written back to memory at the end of a frame.
+    Drain,
+}
+
+/// A request for one line. The line number is the address divided by the line size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LineAccess {
+    /// Line number.
+    pub line: u32,
+    /// Dirty line evicted to make room, written to memory; [`LineAccess::NONE`] if there is none.
+    pub victim: u32,
+    /// Requesting unit.
+    pub client: Unit,
+    /// Outcome of the request.
+    pub kind: LineKind,
+}
+
+impl LineAccess {
+    /// Stands for no line.
+    pub const NONE: u32 = u32::MAX;
+
+    /// Number of lines transferred to or from memory.
+    pub fn transfers(&self) -> u32 {
+        u32::from(matches!(self.kind, LineKind::Fetch | LineKind::Drain))
+            + u32::from(self.victim != Self::NONE)
     }
 }
 

@@ -1,7 +1,7 @@
-//! Reading spec files (scenes, GPUs, platforms, energy tables) written in RON.
+//! Reading of spec files (scenes, GPUs, platforms, energy tables) in RON.
 //!
-//! Every mistake is reported as `file:line:column: what is wrong, how to mend it`; an unknown field or
-//! variant comes with the nearest known name.
+//! Every error has the form `file:line:column: what is wrong, how to fix it`. An unknown field or variant is
+//! reported with the nearest known name.
 
 use std::path::Path;
 
@@ -11,52 +11,52 @@ use serde::de::DeserializeOwned;
 
 use crate::inputs;
 
-/// Why a spec file could not be used.
+/// Why a spec file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SpecError {
     /// The file could not be read.
     #[error("{path}: cannot read it: {source}; check the path, and that it is a text file in UTF-8")]
     Read {
-        /// The file as it was named.
+        /// Path as given.
         path: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The text is not a valid spec.
     #[error("{path}:{line}:{column}: {message}")]
     Parse {
-        /// The file as it was named.
+        /// Path as given.
         path: String,
         /// Line, from 1.
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// What is wrong and how to mend it.
+        /// What is wrong and how to fix it.
         message: String,
     },
 }
 
-/// Reads and parses the RON file at `path`.
+/// Read and parse the RON file at `path`.
 ///
 /// # Errors
-/// [`SpecError`] when the file cannot be read or its text does not describe a `T`.
+/// [`SpecError`] if the file cannot be read or does not describe a `T`.
 pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, SpecError> {
     parse(&read(path)?, &path.display().to_string())
 }
 
-/// The text of the spec file at `path`.
+/// Text of the spec file at `path`.
 ///
 /// # Errors
-/// [`SpecError::Read`] when it cannot be read.
+/// [`SpecError::Read`] if it cannot be read.
 pub fn read(path: &Path) -> Result<String, SpecError> {
     inputs::read_to_string(path)
         .map_err(|source| SpecError::Read { path: path.display().to_string(), source })
 }
 
-/// Where the value of a field stands in RON `text`, as line and column from 1; `field` names it from the outside in, such as
-/// `pipeline.memory.l2`. Nothing where the text has no such field. For values that are wrong only beside others, which is
-/// known only after the text is parsed.
-pub fn place_of(text: &str, field: &str) -> Option<(usize, usize)> {
+/// Line and column (from 1) of a field's value in RON `text`; `None` if the field is missing. `field` is a
+/// path from the outside in, such as `pipeline.memory.l2`. It serves checks of several fields together, which
+/// run after parsing.
+pub fn position_of(text: &str, field: &str) -> Option<(usize, usize)> {
     let plain = without_comments(text);
     let mut at = 0;
     for name in field.split('.') {
@@ -67,7 +67,7 @@ pub fn place_of(text: &str, field: &str) -> Option<(usize, usize)> {
     Some((1 + before.matches('\n').count(), 1 + text[line_start..at].chars().count()))
 }
 
-/// Where the value of the first field called `name` begins.
+/// Byte offset of the value of the first field called `name`.
 fn value_of(text: &str, name: &str) -> Option<usize> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     text.match_indices(name).find_map(|(at, _)| {
@@ -78,7 +78,7 @@ fn value_of(text: &str, name: &str) -> Option<usize> {
     })
 }
 
-/// The same text with spaces in place of `//` comments, byte for byte.
+/// The text with every `//` comment overwritten by spaces; byte offsets stay the same.
 fn without_comments(text: &str) -> String {
     let line = |line: &str| match line.find("//") {
         Some(at) => format!("{}{}", &line[..at], " ".repeat(line.len() - at)),
@@ -87,10 +87,10 @@ fn without_comments(text: &str) -> String {
     text.split('\n').map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Parses RON `text`; `name` stands for the file in messages.
+/// Parse RON `text`; `name` is the file name in messages.
 ///
 /// # Errors
-/// [`SpecError::Parse`] with the place of the mistake.
+/// [`SpecError::Parse`] with line and column.
 pub fn parse<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, SpecError> {
     let options = ron::Options::default()
         .with_default_extension(Extensions::IMPLICIT_SOME)
@@ -101,22 +101,22 @@ pub fn parse<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, SpecError
 }
 
 fn describe(error: &SpannedError, text: &str, name: &str) -> SpecError {
-    let place = error.span.start;
-    let field = field_of_value(text, place.line, place.col);
+    let at = error.span.start;
+    let field = field_of_value(text, at.line, at.col);
     SpecError::Parse {
         path: name.to_owned(),
-        line: place.line,
-        column: place.col,
-        message: message(&error.code, field.as_deref(), word_at(text, place.line, place.col)),
+        line: at.line,
+        column: at.col,
+        message: message(&error.code, field.as_deref(), word_at(text, at.line, at.col)),
     }
 }
 
-/// The name of the field whose value is at or just before a place: what stands before the last colon of its line up to there.
-/// Nothing where the line has none.
+/// Name of the field whose value is at or just before a position: the word before the last colon of the line
+/// up to there. `None` if the line has no colon.
 fn field_of_value(text: &str, line: usize, column: usize) -> Option<String> {
     let line = text.lines().nth(line.checked_sub(1)?)?;
     let before: String = line.chars().take(column.saturating_sub(1)).collect();
-    // A place behind the comma that ends the value.
+    // The position may be after the comma that ends the value.
     let before = before.trim_end().trim_end_matches(',');
     let (name, value) = before.rsplit_once(':')?;
     let name = name.trim_end().trim_end_matches('"');
@@ -125,15 +125,16 @@ fn field_of_value(text: &str, line: usize, column: usize) -> Option<String> {
     (is_value && !name.is_empty()).then(|| name.to_owned())
 }
 
-/// The word or number that a place is in, just behind, or before but for spaces, for messages.
+/// The word or number at a position, or next to it, for messages.
 fn word_at(text: &str, line: usize, column: usize) -> &str {
     let line = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
     let at = line.char_indices().nth(column.saturating_sub(1)).map_or(line.len(), |(at, _)| at);
-    let ends = |c: char| c.is_whitespace() || ",:()[]{}".contains(c);
-    let apart = line[..at].ends_with(ends) || at == 0;
-    let at = if apart { at + line[at..].len() - line[at..].trim_start().len() } else { at };
-    let [before, after] = [line[..at].rsplit(ends).next(), line[at..].split(ends).next()];
-    let [before, after] = [before, after].map(|part| part.map_or(0, str::len));
+    let is_separator = |c: char| c.is_whitespace() || ",:()[]{}".contains(c);
+    let after_separator = line[..at].ends_with(is_separator) || at == 0;
+    let spaces = line[at..].len() - line[at..].trim_start().len();
+    let at = if after_separator { at + spaces } else { at };
+    let before = line[..at].rsplit(is_separator).next().map_or(0, str::len);
+    let after = line[at..].split(is_separator).next().map_or(0, str::len);
     &line[at - before..at + after]
 }
 
@@ -153,7 +154,7 @@ fn message(code: &Error, field: Option<&str>, word: &str) -> String {
         Error::MissingStructField { field, .. } => format!("missing field `{field}`: add it"),
         Error::ExpectedFloat => of_field(format!("`{word}` is not a number; write one such as 0.5 or 400e6")),
         Error::ExpectedInteger | Error::InvalidIntegerDigit { .. } => not_whole(),
-        // A whole number was read and something follows it, as in 1.5.
+        // An integer followed by more, as in 1.5.
         Error::ExpectedComma
         | Error::ExpectedStructLikeEnd
         | Error::ExpectedArrayEnd
@@ -176,12 +177,12 @@ fn message(code: &Error, field: Option<&str>, word: &str) -> String {
 /// "did you mean `x`?" for the nearest of `known`, or the whole list where none is near.
 pub fn suggestion(found: &str, known: &[&str]) -> String {
     let nearest = known.iter().map(|name| (strsim::damerau_levenshtein(found, name), *name)).min();
-    // Half of a short word is no slip of the hand: `foo` is not `look`.
-    let slip = |distance: usize, name: &str| {
+    // An edit of half of a short word is no typing error: `foo` does not suggest `look`.
+    let is_typing_error = |distance: usize, name: &str| {
         distance <= 1 + found.len() / 3 && 2 * distance < found.len().max(name.len())
     };
     match nearest {
-        Some((distance, name)) if slip(distance, name) => format!("did you mean `{name}`?"),
+        Some((distance, name)) if is_typing_error(distance, name) => format!("did you mean `{name}`?"),
         Some(_) => format!("known here: {}", known.join(", ")),
         None => "none is known here".to_owned(),
     }
@@ -202,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_field_names_its_place_and_its_neighbour() {
+    fn an_unknown_field_is_reported_with_line_and_suggestion() {
         let error = parse::<Gpu>("(\n  clock_hz: 1e9,\n  tile_sise: 8,\n)", "gpu.ron").unwrap_err();
         let text = error.to_string();
         assert!(text.starts_with("gpu.ron:3:"), "{text}");
@@ -210,25 +211,25 @@ mod tests {
     }
 
     #[test]
-    fn a_far_name_lists_the_known_ones() {
+    fn an_unrelated_name_lists_the_known_ones() {
         let error = parse::<Gpu>("(wibble: 1)", "gpu.ron").unwrap_err();
         assert!(error.to_string().contains("known here: tile_size, clock_hz"), "{error}");
         assert_eq!(suggestion("foo", &["look", "seconds"]), "known here: look, seconds");
     }
 
     #[test]
-    fn a_missing_field_is_named() {
+    fn a_missing_field_is_reported_by_name() {
         let error = parse::<Gpu>("(tile_size: 8)", "gpu.ron").unwrap_err();
         assert!(error.to_string().contains("missing field `clock_hz`"), "{error}");
     }
 
     #[test]
-    fn the_place_of_a_field_is_that_of_its_value() {
+    fn the_position_of_a_field_is_that_of_its_value() {
         let text = "(\n  // memory: none\n  core: (cache: (ways: 1)),\n  memory: (\n    l2: (ways: 8), cache: 4),\n)";
-        assert_eq!(place_of(text, "memory.l2.ways"), Some((5, 16)));
-        assert_eq!(place_of(text, "memory.cache"), Some((5, 27)));
-        assert_eq!(place_of(text, "core.cache"), Some((3, 17)));
-        assert_eq!([place_of(text, "way"), place_of(text, "memory.l3")], [None, None]);
+        assert_eq!(position_of(text, "memory.l2.ways"), Some((5, 16)));
+        assert_eq!(position_of(text, "memory.cache"), Some((5, 27)));
+        assert_eq!(position_of(text, "core.cache"), Some((3, 17)));
+        assert_eq!([position_of(text, "way"), position_of(text, "memory.l3")], [None, None]);
     }
 
     #[test]

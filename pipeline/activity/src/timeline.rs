@@ -2,17 +2,17 @@
 
 use crate::{Counts, Unit};
 
-/// What happened during one bin of time.
+/// Activity during one bin of time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Bin {
-    /// How often each event happened in the bin.
+    /// Count of every event in the bin.
     pub counts: Counts,
-    /// For how long each unit was serving work in the bin, in picoseconds, indexed by unit.
+    /// Busy time of every unit in the bin, in picoseconds.
     pub busy_ps: [u64; Unit::COUNT],
 }
 
-/// The activity of one frame over time, in equal bins from its start. The last bin may reach past the end
-/// of the frame; nothing happens there.
+/// Activity of one frame over time, in equal bins from its start. The last bin may extend past the end of the
+/// frame; that part is empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Timeline {
     /// Length of a bin in picoseconds, at least 1.
@@ -34,7 +34,7 @@ impl Timeline {
         self.duration_ps as f64 * 1e-12
     }
 
-    /// The counts of the whole frame.
+    /// Counts of the whole frame.
     pub fn total(&self) -> Counts {
         self.bins.iter().fold(Counts::default(), |mut total, bin| {
             total += &bin.counts;
@@ -42,7 +42,7 @@ impl Timeline {
         })
     }
 
-    /// For how long each unit was busy in the whole frame, in picoseconds.
+    /// Busy time of every unit in the whole frame, in picoseconds.
     pub fn busy_ps(&self) -> [u64; Unit::COUNT] {
         let mut total = [0; Unit::COUNT];
         for bin in &self.bins {

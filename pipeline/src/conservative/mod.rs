@@ -1,18 +1,20 @@
-//! Conservative mode: which tiles a moving, defocused triangle may touch, when, from where on the lens and how deep, without
-//! testing a sample (thesis, Paper VI, section 2).
+//! Conservative mode: the tiles that a moving, defocused triangle may touch, with intervals of time, lens
+//! position and depth, without sample tests (thesis, Paper VI, section 2).
 //!
-//! For every tile, of any size, the caller's closure is handed a [`Touch`]: the intervals `u^ v^ t^ z^`. What is promised:
+//! For every tile, of any size, the caller's closure gets a [`Touch`]: the intervals `u^ v^ t^ z^`.
+//! Guarantees:
 //!
-//! - a tile that the exact triangle touches at any `(u, v, t)` is reported, borders of tiles, lens and shutter included;
-//! - `u^`, `v^`, `t^` and `z^` hold every place, time and depth at which it does;
-//! - triangles without area (points, segments) count, as do those that reach behind the camera.
+//! - a tile that the exact triangle touches at any `(u, v, t)` is reported, borders of tiles, lens and
+//!   shutter included;
+//! - `u^`, `v^`, `t^` and `z^` contain every lens position, time and depth at which it does;
+//! - triangles without area (points, segments) and triangles that reach behind the camera are included.
 //!
-//! *Precision at the door.* Input is `f64` and so is all arithmetic here, on coordinates recentred at the tile; each test allows for
-//! the rounding of its own, a few parts in 2^48 of the magnitudes that entered it. Rounding outward to `f32` instead would widen
-//! a triangle by a part in 2^24 of its distance from the origin, a whole pixel at 1e7, and would need a bound to be carried
-//! beside every number; the mode runs per tile, not per sample, so the wider type is affordable. A bound on input that is not exact
-//! ([`MovingTriangle::uncertain`]) is carried as inflation; none is taken to be less than [`LEAST_UNCERTAINTY`], which pays for products
-//! that are too small to be numbers.
+//! *Precision.* Input and arithmetic are `f64`, with coordinates relative to the tile. Each test includes a
+//! bound of its own rounding, a few parts in 2^48 of the magnitudes involved. Rounding to `f32` instead would
+//! widen a triangle by 2^-24 of its distance from the origin, a whole pixel at 1e7, and would need an error
+//! bound beside every number. The mode runs per tile, not per sample, so `f64` is affordable. The error of
+//! inexact input ([`MovingTriangle::uncertain`]) is carried as inflation. It is at least [`MIN_UNCERTAINTY`],
+//! which covers products that underflow.
 //!
 //! ```
 //! use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
@@ -28,13 +30,10 @@
 
 mod edges;
 mod rasterizer;
-mod region;
-mod seen;
 mod sides;
 mod triangle;
 mod view;
 
 pub use rasterizer::{Grid, Rasterizer};
-pub use region::{Rect, Region, Touch};
-pub use triangle::{LEAST_UNCERTAINTY, MovingTriangle, Prepared};
-pub use view::View;
+pub use triangle::{MIN_UNCERTAINTY, MovingTriangle, Prepared};
+pub use view::{Rect, Region, Touch, View};

@@ -1,28 +1,28 @@
-//! From a triangle to the tiles it may touch.
+//! Conservative rasterizer: from a triangle to the tiles it may touch.
 
 use std::ops::Range;
 
 use super::edges::miss;
-use super::seen::{ROUNDING, Seen};
 use super::sides::narrow;
-use super::{LEAST_UNCERTAINTY, MovingTriangle, Prepared, Rect, Region, Touch, View};
+use super::triangle::{ROUNDING, Seen};
+use super::{MIN_UNCERTAINTY, MovingTriangle, Prepared, Rect, Region, Touch, View};
 use crate::depth::plane::{Beam, MovingPlane, normal, tightest};
 
-/// Tiles of one size.
+/// A grid of equal tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// Where the first tile begins.
+    /// Corner of the first tile.
     pub origin: [f64; 2],
-    /// Width and height of a tile, above zero.
+    /// Width and height of a tile, positive.
     pub tile: [f64; 2],
-    /// Tiles in a row.
+    /// Tiles per row.
     pub columns: u32,
-    /// Tiles in a column.
+    /// Tiles per column.
     pub rows: u32,
 }
 
 impl Grid {
-    /// What the tiles in these columns and rows cover; neighbours share the number of their border.
+    /// Area of the tiles in these columns and rows; neighbouring tiles share the coordinate of their border.
     pub fn rect(&self, columns: &Range<u32>, rows: &Range<u32>) -> Rect {
         let border = |axis: usize, index: u32| self.origin[axis] + f64::from(index) * self.tile[axis];
         Rect {
@@ -32,7 +32,7 @@ impl Grid {
     }
 }
 
-/// Finds the tiles that triangles may touch.
+/// Conservative rasterizer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rasterizer {
     view: View,
@@ -41,31 +41,32 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// All of lens and shutter in `view`, the time of a tile halved twice.
+    /// A rasterizer for the whole lens and shutter in `view`; the time of a touched tile is halved twice.
     pub fn new(view: View) -> Self {
         Self { view, clip: Region::WHOLE, halvings: 2 }
     }
 
-    /// The same for a part of lens and shutter, its ends included (user clip planes).
+    /// The rasterizer limited to a part of lens and shutter, ends included (user clip planes).
     #[must_use]
     pub fn clipped(self, clip: Region) -> Self {
         Self { clip, ..self }
     }
 
-    /// The same with the time of a tile that may be touched halved up to `halvings` times, each part tested anew: costs up to
-    /// `2^halvings` tests, and bounds better.
+    /// The rasterizer with the time of a touched tile halved up to `halvings` times. Each part is tested
+    /// again: up to `2^halvings` tests, and tighter bounds.
     #[must_use]
     pub fn halving(self, halvings: u32) -> Self {
         Self { halvings, ..self }
     }
 
-    /// Hands `each` tile that `triangle` may touch (column and row) its intervals, rows of blocks at a time. Allocates nothing.
+    /// Call `each` with every tile that `triangle` may touch (column and row) and its intervals, in rows of
+    /// blocks. Does not allocate.
     pub fn rasterize(&self, triangle: &MovingTriangle, grid: &Grid, mut each: impl FnMut([u32; 2], &Touch)) {
         let prepared = self.prepare(triangle);
         self.descend(&prepared, grid, 0..grid.columns, 0..grid.rows, &self.clip, &mut each);
     }
 
-    /// The same for a prepared triangle and the tiles in some columns and rows alone.
+    /// Rasterize a prepared triangle in the tiles of some columns and rows only.
     pub fn rasterize_part(
         &self,
         prepared: &Prepared,
@@ -76,13 +77,13 @@ impl Rasterizer {
         self.descend(prepared, grid, columns, rows, &self.clip, &mut each);
     }
 
-    /// What every tile asks of a triangle.
+    /// Prepare a triangle for the tests of all tiles.
     pub fn prepare(&self, triangle: &MovingTriangle) -> Prepared {
         Prepared::new(triangle, &self.view)
     }
 
-    /// The intervals in which a prepared triangle may touch `rect` within `region`, or `None` where it does not. For those who walk
-    /// tiles of their own: what holds for a tile holds for the tiles in it.
+    /// Intervals in which a prepared triangle may touch `rect` within `region`, or `None` if it cannot. For
+    /// callers with their own tile hierarchy: intervals of a tile are valid for the tiles inside.
     pub fn touch(&self, prepared: &Prepared, rect: &Rect, region: &Region) -> Option<Touch> {
         let seen = Seen::new(&self.view, prepared, rect, region);
         self.halved(prepared, seen, region, self.halvings)
@@ -129,7 +130,8 @@ impl Rasterizer {
         halves.into_iter().flatten().reduce(|a, b| a.hull(&b))
     }
 
-    /// The depths at which the triangle may touch the tile (thesis, Paper VI, Appendix A, both tests), or `None` where it cannot.
+    /// Depth range in which the triangle may touch the tile (thesis, Paper VI, Appendix A, both tests), or
+    /// `None` if it cannot.
     fn depths(&self, seen: &Seen, region: &Region) -> Option<[f64; 2]> {
         let vertices = seen.points.iter().flatten().map(|p| p[2]);
         let vertices =
@@ -142,8 +144,8 @@ impl Rasterizer {
         };
         let planes = seen.points.iter().map(|points| {
             let normal = normal(points);
-            // A shorter one is made of what is left of products that vanish.
-            if normal.iter().all(|n| n.abs() < LEAST_UNCERTAINTY * LEAST_UNCERTAINTY) {
+            // A shorter normal may consist of underflowed products.
+            if normal.iter().all(|n| n.abs() < MIN_UNCERTAINTY * MIN_UNCERTAINTY) {
                 return None;
             }
             let plane = MovingPlane::new(normal, [&seen.points[0], &seen.points[1]], seen.size);
@@ -156,7 +158,8 @@ impl Rasterizer {
     }
 }
 
-/// The part of `region` in which the triangle may touch the tile. It is `seen` within `region`, and then within that part.
+/// The part of `region` in which the triangle may touch the tile. `seen` is first given for `region`, then
+/// for that part.
 fn part(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
     let region = narrow(seen, prepared, region)?;
     (!miss(seen, &region)).then_some(region)

@@ -1,31 +1,32 @@
-//! The sides of a tile over lens and time (Munkberg et al. 2011 in t, extended to u and v), in `f64`.
+//! Side tests of a tile over lens and time (Munkberg et al. 2011 in t, extended to u and v), in `f64`.
 //!
-//! A point of the triangle in the tile at depth `w > 0` is not beyond the left side; being a mean of the vertices it needs one of
-//! them not to be: `d = x(t) + u (a w(t) - s) - X0 w(t) >= 0`, bilinear in `u` and `t`. The times that matter are
-//! the hull over the vertices of where `d` is not negative at one end of `u`, and for `u` alike.
+//! A point of the triangle in the tile at depth `w > 0` is not beyond the left side. The point is a mean of
+//! the vertices, so some vertex is not beyond it either: `d = x(t) + u (a w(t) - s) - X0 w(t) >= 0`, bilinear
+//! in `u` and `t`. The possible times are the hull over the vertices of the times at which `d` is not
+//! negative at one end of `u`; likewise for `u`.
 
-use super::seen::Seen;
+use super::triangle::Seen;
 use super::{Prepared, Region, View};
 use crate::depth::Real;
 
-/// The part of `region` in which the triangle may lie within the sides of the tile and beyond the near depth, or `None`. It is
-/// `seen` within `region`, and then within that part.
+/// The part of `region` in which the triangle may be inside the sides of the tile and beyond the near depth,
+/// or `None`. `seen` is first given for `region`, then for that part.
 pub(super) fn narrow(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
-    let left = if seen.view.has_lens() {
+    let part = if seen.view.has_lens() {
         through_lens(seen, prepared, region)?
     } else {
         Region { t: through_pinhole(seen, region.t)?, ..*region }
     };
-    let left = beyond_near(&seen.view, prepared, &left)?;
-    if left != *region {
-        *seen = seen.within(prepared, &left);
+    let part = beyond_near(&seen.view, prepared, &part)?;
+    if part != *region {
+        *seen = seen.within(prepared, &part);
     }
-    Some(left)
+    Some(part)
 }
 
-/// By all sides at once: what each says is linear in t alone.
+/// Test all sides together: each bound is linear in t alone.
 fn through_pinhole(seen: &Seen, t: [f64; 2]) -> Option<[f64; 2]> {
-    let mut left = t;
+    let mut part = t;
     for axis in [0, 1] {
         for (sign, border) in [(1.0, seen.tile[axis][0]), (-1.0, seen.tile[axis][1])] {
             let d = [0, 1, 2].map(|k| [0, 1].map(|end| sign * seen.through_pinhole(axis, k, end, border)));
@@ -33,13 +34,13 @@ fn through_pinhole(seen: &Seen, t: [f64; 2]) -> Option<[f64; 2]> {
                 continue;
             }
             let times = d.map(|[opening, closing]| above(t, opening, closing, seen.noise[axis]));
-            left = meet(left, times.into_iter().fold(None, union)?)?;
+            part = meet(part, times.into_iter().fold(None, union)?)?;
         }
     }
-    Some(left)
+    Some(part)
 }
 
-/// Side by side: each says more of the part of lens and time that the others have left.
+/// Test one side after another: each test uses the part of lens and time left by the previous ones.
 fn through_lens(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option<Region> {
     let mut region = *region;
     for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -52,37 +53,37 @@ fn through_lens(seen: &mut Seen, prepared: &Prepared, region: &Region) -> Option
 fn narrow_side(seen: &Seen, axis: usize, side: usize, region: &Region) -> Option<Region> {
     let lens = if axis == 0 { region.u } else { region.v };
     let (sign, border) = (if side == 0 { 1.0 } else { -1.0 }, seen.tile[axis][side]);
-    let (mut times, mut places) = (None, None);
+    let (mut times, mut positions) = (None, None);
     for k in 0..3 {
-        let d = lens.map(|place| [0, 1].map(|end| sign * seen.from(axis, k, end, place, border)));
+        let d = lens.map(|position| [0, 1].map(|end| sign * seen.from(axis, k, end, position, border)));
         for [opening, closing] in d {
             times = union(times, above(region.t, opening, closing, seen.noise[axis]));
         }
         for [at_low, at_high] in [0, 1].map(|end| [d[0][end], d[1][end]]) {
-            places = union(places, above(lens, at_low, at_high, seen.noise[axis]));
+            positions = union(positions, above(lens, at_low, at_high, seen.noise[axis]));
         }
     }
     let mut next = Region { t: times?, ..*region };
-    *if axis == 0 { &mut next.u } else { &mut next.v } = places?;
+    *if axis == 0 { &mut next.u } else { &mut next.v } = positions?;
     Some(next)
 }
 
-/// The part of `region` at which a vertex is beyond the near depth.
+/// The part of `region` in which some vertex is beyond the near depth.
 fn beyond_near(view: &View, prepared: &Prepared, region: &Region) -> Option<Region> {
     let near = view.near();
     if near == f64::NEG_INFINITY {
         return Some(*region);
     }
-    let noise = super::seen::ROUNDING * (prepared.size[2] + near.abs()) + prepared.uncertainty()[2];
+    let noise = super::triangle::ROUNDING * (prepared.size[2] + near.abs()) + prepared.uncertainty()[2];
     let [open, close] = region.t.map(|t| prepared.at(t));
     let times = (0..3).map(|k| above(region.t, open[k][2] - near, close[k][2] - near, noise));
     Some(Region { t: times.fold(None, union)?, ..*region })
 }
 
-/// The part of `range` where the linear function with the values `lo` and `hi` at its ends, known up to `noise`, may not be
-/// negative.
+/// The part of `range` in which a linear function may be non-negative. It has the values `lo` and `hi` at the
+/// ends, each with an error of at most `noise`.
 fn above(range: [f64; 2], lo: f64, hi: f64, noise: f64) -> Option<[f64; 2]> {
-    // Twice the noise pays for the rounding of the quotient as well, the nudge for mapping it to the range.
+    // Twice the noise also covers the rounding of the quotient; the nudge covers the mapping to the range.
     let (lo, hi) = (lo + 2.0 * noise, hi + 2.0 * noise);
     let nudge = 4.0 * f64::EPSILON * range[0].abs().max(range[1].abs());
     let root = || range[0] + (range[1] - range[0]) * (lo / (lo - hi));
@@ -94,10 +95,10 @@ fn above(range: [f64; 2], lo: f64, hi: f64, noise: f64) -> Option<[f64; 2]> {
     }
 }
 
-/// What two ranges share; touching counts.
+/// Intersection of two closed ranges.
 fn meet(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
-    let both = [a[0].most(b[0]), a[1].least(b[1])];
-    (both[0] <= both[1]).then_some(both)
+    let shared = [a[0].larger(b[0]), a[1].smaller(b[1])];
+    (shared[0] <= shared[1]).then_some(shared)
 }
 
 fn union(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
@@ -111,14 +112,14 @@ fn union(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// Exact: `value` in units of 2^-80.
+    /// The exact value in units of 2^-80.
     fn exact(value: f64) -> i128 {
         let bits = value.to_bits();
         let (mantissa, exponent) = (bits & ((1 << 52) - 1) | 1 << 52, (bits >> 52) as i32);
         if value == 0.0 { 0 } else { i128::from(mantissa) << (exponent - 1023 - 52 + 80) }
     }
 
-    /// The root lies within what is kept, in exact arithmetic, however narrow the range is.
+    /// The root is in the result in exact arithmetic, for ranges of any width.
     #[test]
     fn the_root_is_kept_whatever_is_rounded() {
         for seed in 1..200_000_u64 {

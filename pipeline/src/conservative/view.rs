@@ -1,50 +1,54 @@
-//! How points of view space appear on the image.
+//! Views, tiles, and boxes of lens and time of conservative mode.
 
+use crate::depth::{round_down, round_up};
 use crate::geometry::Shear;
+use crate::traversal::Box5;
 
-/// A projection. Points are `[x, y, depth]` in units of tiles' borders (pixels, for instance).
+/// A projection of points `[x, y, depth]`, in units of the tile borders (such as pixels).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum View {
-    /// A point is seen at `(x + u (a_x w - s_x)) / w`, `y` alike, where `w` is its depth: a thin lens with the shear `s`, `a`, or a
-    /// pinhole where these are zero. What is nearer than `near` (not below zero) is not seen.
+    /// A point appears at `(x + u (a_x w - s_x)) / w`, and likewise in y, with its depth `w`: a thin lens
+    /// with the shear `s`, `a`, or a pinhole if these are zero. Points nearer than `near` (at least 0) are
+    /// invisible.
     Perspective {
         /// Projection scale times lens radius.
         s: [f64; 2],
-        /// The same over the focus depth.
+        /// `s` over the focus depth.
         a: [f64; 2],
-        /// The nearest depth at which anything is seen.
+        /// Smallest visible depth.
         near: f64,
     },
-    /// A point is seen at `x + u (a_x z - s_x)`, `y` alike, where `z` is its depth. What is nearer than `near` is not seen.
+    /// A point appears at `x + u (a_x z - s_x)`, and likewise in y, with its depth `z`. Points nearer than
+    /// `near` are invisible.
     Orthographic {
         /// Projection scale times lens radius.
         s: [f64; 2],
-        /// The same over the focus depth.
+        /// `s` over the focus depth.
         a: [f64; 2],
-        /// The nearest depth at which anything is seen, perhaps negative infinity.
+        /// Smallest visible depth, possibly negative infinity.
         near: f64,
     },
 }
 
 impl View {
-    /// Through a pinhole.
+    /// Perspective through a pinhole.
     pub fn pinhole(near: f64) -> Self {
         Self::Perspective { s: [0.0; 2], a: [0.0; 2], near }
     }
 
-    /// At any depth and without a lens.
+    /// Orthographic, for all depths and without a lens.
     pub fn orthographic() -> Self {
         Self::Orthographic { s: [0.0; 2], a: [0.0; 2], near: f64::NEG_INFINITY }
     }
 
-    /// As a camera of the standard mode sees it.
+    /// View of a camera of the standard mode.
     pub fn of(shear: &Shear, near: f32) -> Self {
         let [s, a] = [shear.s, shear.a].map(|part| part.map(f64::from));
         let near = f64::from(near);
         if shear.parallel { Self::Orthographic { s, a, near } } else { Self::Perspective { s, a, near } }
     }
 
-    /// Whether places on the lens see different things.
+    /// Whether the view depends on the lens position.
     pub fn has_lens(&self) -> bool {
         self.shear() != ([0.0; 2], [0.0; 2])
     }
@@ -54,7 +58,7 @@ impl View {
         (*s, *a)
     }
 
-    /// The weight of a point on the homogeneous image plane.
+    /// Weight of a point on the homogeneous image plane.
     pub(super) fn weight(&self, depth: f64) -> f64 {
         match self {
             Self::Perspective { .. } => depth,
@@ -66,4 +70,83 @@ impl View {
         let (Self::Perspective { near, .. } | Self::Orthographic { near, .. }) = self;
         *near
     }
+}
+
+/// A closed rectangle of the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rect {
+    /// Range of x.
+    pub x: [f64; 2],
+    /// Range of y.
+    pub y: [f64; 2],
+}
+
+/// A closed box of lens and time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// Lens position in [-1, 1].
+    pub u: [f64; 2],
+    /// Lens position in [-1, 1].
+    pub v: [f64; 2],
+    /// Time in [0, 1].
+    pub t: [f64; 2],
+}
+
+/// Intervals in which a triangle may touch a tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Lens position `u^`; the whole requested region without a lens.
+    pub u: [f64; 2],
+    /// Lens position `v^`.
+    pub v: [f64; 2],
+    /// Time `t^`.
+    pub t: [f64; 2],
+    /// Depth `z^`.
+    pub z: [f64; 2],
+}
+
+impl Region {
+    /// The whole lens and shutter.
+    pub const WHOLE: Self = Self { u: [-1.0, 1.0], v: [-1.0, 1.0], t: [0.0, 1.0] };
+
+    /// Both halves in time.
+    pub(super) fn halves(&self) -> [Self; 2] {
+        let [lo, hi] = self.t;
+        let middle = 0.5 * (lo + hi);
+        [Self { t: [lo, middle], ..*self }, Self { t: [middle, hi], ..*self }]
+    }
+}
+
+impl Touch {
+    pub(super) fn new(region: &Region, z: [f64; 2]) -> Self {
+        Self { u: region.u, v: region.v, t: region.t, z }
+    }
+
+    /// Hull of the intervals of both.
+    #[must_use]
+    pub fn hull(&self, other: &Self) -> Self {
+        let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Self {
+            u: hull(self.u, other.u),
+            v: hull(self.v, other.v),
+            t: hull(self.t, other.t),
+            z: hull(self.z, other.z),
+        }
+    }
+
+    /// Its box of lens and time.
+    pub fn region(&self) -> Region {
+        Region { u: self.u, v: self.v, t: self.t }
+    }
+
+    /// The box and the depth range rounded outward to `f32`, for [`DepthBoxes`](crate::depth::DepthBoxes).
+    /// `lens` says whether the camera has a lens.
+    pub fn outward(&self, lens: bool) -> (Box5, [f32; 2]) {
+        (Box5 { u: outward(self.u), v: outward(self.v), t: outward(self.t), lens }, outward(self.z))
+    }
+}
+
+/// Narrowest `f32` range that contains the `f64` range.
+fn outward([lo, hi]: [f64; 2]) -> [f32; 2] {
+    [round_down(lo), round_up(hi)]
 }

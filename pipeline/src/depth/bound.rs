@@ -1,30 +1,32 @@
-//! The interval that holds every depth the sample test computes for a triangle in a tile and a box of lens and time.
+//! Depth interval: bounds of every depth that the sample test computes for a triangle, over a tile and a box
+//! of lens and time.
 
 use serde::Deserialize;
 
-use super::number::{Real, both, down, up};
+use super::number::{Real, both, round_down, round_up};
 use super::plane::{Beam, MovingPlane, Points, normal, tightest};
 use super::rounding::margin;
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 use crate::traversal::{Box5, TileRect};
 
-/// How the depth of a triangle over a tile is bounded; each takes in what the ones before it know.
+/// Method of bounding the depth of a triangle over a tile. Each method includes the bounds of the methods
+/// before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 pub enum DepthBound {
-    /// By its vertices at the ends of the shutter: what other methods fall back to.
+    /// Depths of the vertices at the ends of the shutter, the bound of other methods.
     Vertices,
-    /// By its vertices at the ends of the time interval (thesis, Paper VI, Appendix A, first test).
+    /// Depths of the vertices at the ends of the time interval (thesis, Paper VI, Appendix A, first test).
     #[default]
     VerticesInTime,
-    /// By moving planes through the triangle at either end of the shutter (second test).
+    /// Moving planes through the triangle at each end of the shutter (second test).
     Planes,
-    /// By moving planes through the triangle at either end of the time interval, which costs more and bounds better.
+    /// Moving planes through the triangle at each end of the time interval, more expensive and tighter.
     LocalPlanes,
 }
 
 impl DepthBound {
-    /// Every method, the coarsest first.
+    /// All methods, the coarsest first.
     pub const ALL: [Self; 4] = [Self::Vertices, Self::VerticesInTime, Self::Planes, Self::LocalPlanes];
 
     fn has_planes(self) -> bool {
@@ -32,8 +34,8 @@ impl DepthBound {
     }
 }
 
-/// Multiply-adds of [`Bounder::new`], counted from the code (a test runs it on numbers that count): one plane where the
-/// triangle is still, two where it moves, and none where they are found in every tile.
+/// Multiply-adds of [`Bounder::new`], counted from the code by a test with counting numbers. A still triangle
+/// has one plane, a moving one two. Methods that find their planes in every tile have none here.
 pub const fn set_up_madds(bound: DepthBound, moving: bool) -> u32 {
     match (bound, moving) {
         (DepthBound::Vertices | DepthBound::VerticesInTime, _) | (DepthBound::LocalPlanes, true) => 0,
@@ -42,7 +44,8 @@ pub const fn set_up_madds(bound: DepthBound, moving: bool) -> u32 {
     }
 }
 
-/// Multiply-adds of one [`Bounder::over`], counted likewise, where every plane gives a bound. Those of rounding are among them.
+/// Multiply-adds of one [`Bounder::over`], counted likewise, if every plane gives a bound. Rounding
+/// allowances are included.
 pub const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 {
     match (bound, moving, lens) {
         (DepthBound::VerticesInTime, true, _) => 6,
@@ -56,26 +59,27 @@ pub const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 
     }
 }
 
-/// The smallest and largest depth of the vertices of `triangle` for times within `t`. Depth at a sample is a convex combination
-/// kept within the range of the vertices, which move monotonically, so the ends of the interval are the extremes, rounding and all.
+/// Smallest and largest depth of the vertices of `triangle` for times in `t`. The depth at a sample is a
+/// convex combination, clamped to the range of the vertices. Vertices move monotonically, also with rounding,
+/// so the extremes are at the ends of the interval.
 pub fn vertex_range(triangle: &Triangle, t: [f32; 2]) -> [f32; 2] {
     let depths = triangle.corners.iter().flat_map(|corner| t.map(|t| corner.at(t)[2]));
     depths.fold([f32::INFINITY, f32::NEG_INFINITY], |[lo, hi], w| [lo.min(w), hi.max(w)])
 }
 
-/// What is known of the depth of a triangle before any tile is visited.
+/// Depth bounds of a triangle, prepared before any tile is visited.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounder {
     triangle: Triangle,
     bound: DepthBound,
-    /// What planes need, where there are any.
+    /// Input of the plane bounds, for methods with planes.
     facts: Option<Facts<f64>>,
-    /// Through the triangle at the ends of the shutter, where set-up finds them.
+    /// Planes through the triangle at the ends of the shutter, for methods that find them in set-up.
     shutter: Option<[MovingPlane<f64>; 2]>,
 }
 
 impl Bounder {
-    /// Prepares to bound `triangle` under a lens with `shear`.
+    /// Prepare depth bounds of `triangle` under a lens with `shear`.
     pub fn new(triangle: &Triangle, shear: &Shear, bound: DepthBound) -> Self {
         let facts = bound.has_planes().then(|| Facts::new(triangle, shear));
         let early = bound == DepthBound::Planes || (bound == DepthBound::LocalPlanes && !triangle.moving);
@@ -83,14 +87,14 @@ impl Bounder {
         Self { triangle: *triangle, bound, facts, shutter }
     }
 
-    /// The interval that holds the depth of every sample in `tile` and `within` that [`test_run`](crate::sample_test::test_run)
-    /// finds to see the triangle.
+    /// Interval of the depths of all samples in `tile` and `within` for which
+    /// [`test_run`](crate::sample_test::test_run) finds the triangle visible.
     pub fn over(&self, tile: &TileRect, within: &Box5) -> [f32; 2] {
         let t = if self.bound == DepthBound::Vertices { [0.0, 1.0] } else { within.t };
         let vertices = vertex_range(&self.triangle, t);
         let Some(facts) = &self.facts else { return vertices };
         match facts.over(self.shutter.as_ref(), &Region::new(tile, within)) {
-            Some([lo, hi]) => both(vertices, [down(lo), up(hi)]),
+            Some([lo, hi]) => both(vertices, [round_down(lo), round_up(hi)]),
             None => vertices,
         }
     }
@@ -114,13 +118,13 @@ impl Region<f64> {
     }
 }
 
-/// A triangle under a lens, as set-up leaves it.
+/// A triangle under a lens, after set-up.
 #[derive(Clone, Copy, Debug)]
 struct Facts<R> {
     open: Points<R>,
     delta: Points<R>,
     moving: bool,
-    /// The largest magnitude on each axis at any time, seen from the lens.
+    /// Largest magnitude on each axis at any time, seen from the lens.
     size: [R; 3],
     slack: [R; 2],
     s: [R; 2],
@@ -146,7 +150,7 @@ impl<R: Real> Facts<R> {
         [0, 1, 2].map(|k| [0, 1, 2].map(|axis| t.madd(self.delta[k][axis], self.open[k][axis])))
     }
 
-    /// The planes through the triangle at either end of the shutter; where it is still they are one.
+    /// Planes through the triangle at each end of the shutter; equal for a still triangle.
     fn shutter(&self) -> [MovingPlane<R>; 2] {
         if !self.moving {
             return [MovingPlane::still(normal(&self.open), &self.open, self.size); 2];
@@ -159,8 +163,8 @@ impl<R: Real> Facts<R> {
         [0, 1].map(|end| MovingPlane::new(normal(&ends[end]), [&ends[0], &ends[1]], self.size))
     }
 
-    /// The depths that the planes allow, those of set-up or else those through the triangle at the ends of the region's
-    /// time, with what rounding in the sample test adds.
+    /// Depths allowed by the planes of set-up or, without these, by planes through the triangle at the ends
+    /// of the region's time. The interval includes the rounding of the sample test.
     fn over(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>) -> Option<[R; 2]> {
         let beam = match (region.lens, self.parallel) {
             (Some(lens), false) => Beam::lens(region.tile, lens, self.s, self.a),
@@ -238,7 +242,7 @@ mod tests {
             let mut found = None;
             let over = madds(|| found = facts.over(shutter.as_ref(), &region));
             assert!(found.is_some());
-            // The vertices at the ends of the interval are worked out anyway.
+            // The vertices at the ends of the interval are computed in any case.
             assert_eq!(over, interval_madds(bound, moving, lens), "tile, {bound:?} {moving} {lens}");
         }
     }

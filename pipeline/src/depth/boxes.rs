@@ -1,34 +1,35 @@
-//! The farthest and nearest stored depth of a tile, for disjoint boxes that cover lens and time (thesis, Paper VI, section 3).
+//! Hi-Z of a tile: farthest and nearest stored depth in disjoint boxes that cover lens and time (thesis,
+//! Paper VI, section 3).
 
 use super::BoxGrid;
 use crate::sampling::TileSamples;
 use crate::traversal::Box5;
 
-/// What is known of the stored depths in one box.
+/// Bounds of the stored depths in one box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Known {
+struct BoxDepths {
     farthest: f32,
     nearest: f32,
     /// Whether the farthest depth is out of date.
     stale: bool,
-    /// Whether what is being written lowered the nearest depth.
+    /// Whether the current write lowered the nearest depth.
     lowered: bool,
-    /// Where its slots begin and end among those sorted by box.
+    /// Range of its slots in the list sorted by box.
     slots: [u32; 2],
-    /// The first of these that was the farthest when last looked for.
+    /// First of these slots with the farthest depth at the last update.
     witness: u32,
 }
 
-impl Known {
-    /// Nothing stored, and no slots yet of those that will be sorted from `first` on.
+impl BoxDepths {
+    /// An empty box whose slots will start at `first` of the sorted list.
     fn cleared(first: u32, farthest: f32) -> Self {
         let (nearest, slots, witness) = (f32::INFINITY, [first; 2], first);
         Self { farthest, nearest, stale: false, lowered: false, slots, witness }
     }
 
-    /// Finds the farthest depth anew. As depths only come nearer, it is what it was where any slot still has it, and slots
-    /// before the witness do not: most often one look is enough.
-    fn renew(&mut self, depth: &[f32], slots: &[u16]) {
+    /// Recompute the farthest depth. Depths only decrease, so it is unchanged while any slot still has it,
+    /// and slots before the witness do not. One comparison is usually enough.
+    fn update_farthest(&mut self, depth: &[f32], slots: &[u16]) {
         self.stale = false;
         let [first, end] = self.slots.map(|at| at as usize);
         let is = |farthest: f32| move |&slot: &u16| depth[slot as usize] == farthest;
@@ -42,100 +43,102 @@ impl Known {
     }
 }
 
-/// Where a triangle may be seen, as far as depths tell.
+/// Part of a box in which a triangle may be visible by stored depths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Visible {
-    /// What holds every box it is not behind in; `None` where it is hidden.
+    /// Hull of all boxes in which the triangle is not hidden; `None` if it is hidden everywhere.
     pub within: Option<Box5>,
-    /// Whether it is nearer than all that is stored there, so that no comparison is needed.
+    /// Whether the triangle is nearer than all stored depths there, so no depth comparison is needed.
     pub in_front: bool,
-    /// Boxes looked at.
+    /// Number of boxes compared.
     pub compared: u32,
-    /// Boxes it is behind in.
+    /// Number of boxes in which the triangle is hidden.
     pub behind: u32,
 }
 
 impl Visible {
-    /// In a tile where nothing is stored.
+    /// Result for an empty tile.
     pub fn unknown(within: &Box5) -> Self {
         Self { within: Some(*within), in_front: true, compared: 1, behind: 0 }
     }
 }
 
-/// The farthest and nearest stored depth of a tile by boxes of lens and time.
+/// Farthest and nearest stored depth of a tile in boxes of lens and time.
 ///
-/// Stored depths only ever come nearer. So a farthest depth that is not up to date is too far, which is safe for culling;
-/// [`Self::renew`] finds it anew. The nearest is always up to date.
+/// Stored depths only decrease. So an outdated farthest depth is too far, which is safe for culling;
+/// [`Self::update_farthest`] recomputes it. The nearest depth is always up to date.
 #[derive(Clone, Debug)]
 pub struct DepthBoxes {
     grid: BoxGrid,
-    boxes: Vec<Known>,
-    /// The box of each slot; empty where there is one only.
-    places: Vec<u16>,
-    /// The slots sorted by box.
+    boxes: Vec<BoxDepths>,
+    /// Box of each slot; empty for a single box.
+    box_of_slot: Vec<u16>,
+    /// Slots sorted by box.
     slots: Vec<u16>,
 }
 
 impl DepthBoxes {
-    /// Of a tile with `samples`, all of them infinitely far.
+    /// Boxes of a tile with `samples`, all infinitely far.
     pub fn cleared(grid: BoxGrid, samples: &TileSamples) -> Self {
-        let place = |slot| grid.of_sample(samples.u[slot], samples.v[slot], samples.t[slot]) as u16;
-        let places = if grid.len() == 1 { Vec::new() } else { (0..samples.len).map(place).collect() };
+        let box_index = |slot| grid.of_sample(samples.u[slot], samples.v[slot], samples.t[slot]) as u16;
+        let box_of_slot =
+            if grid.len() == 1 { Vec::new() } else { (0..samples.len).map(box_index).collect() };
         let mut counts = vec![0; grid.len()];
-        (0..samples.len).for_each(|slot| counts[places.get(slot).map_or(0, |&place| place as usize)] += 1);
+        (0..samples.len)
+            .for_each(|slot| counts[box_of_slot.get(slot).map_or(0, |&box_index| box_index as usize)] += 1);
         let mut first = 0;
         let boxes = counts.into_iter().map(|count| {
             first += count;
             // A box without samples hides everything and is hidden by nothing.
             let hides = count == 0 && samples.len > 0;
-            Known::cleared(first - count, if hides { f32::NEG_INFINITY } else { f32::INFINITY })
+            BoxDepths::cleared(first - count, if hides { f32::NEG_INFINITY } else { f32::INFINITY })
         });
-        let mut boxes = Self { grid, boxes: boxes.collect(), places, slots: vec![0; samples.len] };
+        let mut boxes = Self { grid, boxes: boxes.collect(), box_of_slot, slots: vec![0; samples.len] };
         boxes.sort_slots();
         boxes
     }
 
     fn sort_slots(&mut self) {
         for slot in 0..self.slots.len() {
-            let place = self.place(slot);
-            let end = &mut self.boxes[place].slots[1];
+            let box_index = self.box_of(slot);
+            let end = &mut self.boxes[box_index].slots[1];
             self.slots[*end as usize] = slot as u16;
             *end += 1;
         }
     }
 
-    /// Of a tile whose samples have these depths.
+    /// Boxes of a tile whose samples have the given depths.
     pub fn of(grid: BoxGrid, samples: &TileSamples, depth: &[f32]) -> Self {
         let mut boxes = Self::cleared(grid, samples);
         for (slot, &depth) in depth.iter().enumerate() {
-            let place = boxes.place(slot);
-            let known = &mut boxes.boxes[place];
+            let box_index = boxes.box_of(slot);
+            let known = &mut boxes.boxes[box_index];
             (known.nearest, known.stale) = (known.nearest.min(depth), true);
         }
-        boxes.renew(depth);
+        boxes.update_farthest(depth);
         boxes
     }
 
-    /// How lens and time are divided.
+    /// Division of lens and time.
     pub fn grid(&self) -> &BoxGrid {
         &self.grid
     }
 
-    /// No sample of `within` is farther than this.
+    /// Upper bound of the stored depths in `within`.
     pub fn farthest(&self, within: &Box5) -> f32 {
         let boxes = self.grid.overlapping(within).map(|(index, _)| self.boxes[index].farthest);
         boxes.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// No sample of `within` is nearer than this.
+    /// Lower bound of the stored depths in `within`.
     pub fn nearest(&self, within: &Box5) -> f32 {
         let boxes = self.grid.overlapping(within).map(|(index, _)| self.boxes[index].nearest);
         boxes.fold(f32::INFINITY, f32::min)
     }
 
-    /// Where in `within` a triangle may be seen, its depth in a part of it being `depth(part)`, given as the nearest and the
-    /// farthest. For each box it overlaps that depth is compared with the stored ones.
-    pub fn look(&self, within: &Box5, mut depth: impl FnMut(&Box5) -> [f32; 2]) -> Visible {
+    /// Part of `within` in which a triangle may be visible. `depth(part)` gives its nearest and farthest
+    /// depth in a part. It is compared with the stored depths of every overlapping box.
+    pub fn compare(&self, within: &Box5, mut depth: impl FnMut(&Box5) -> [f32; 2]) -> Visible {
         let mut visible = Visible { within: None, in_front: true, compared: 0, behind: 0 };
         for (index, part) in self.grid.overlapping(within) {
             let ([lo, hi], known) = (depth(&part), &self.boxes[index]);
@@ -147,22 +150,22 @@ impl DepthBoxes {
             visible.in_front &= hi < known.nearest;
             visible.within = Some(visible.within.map_or(part, |before: Box5| before.hull(&part)));
         }
-        // A box it is behind in may lie between those where it is not.
+        // A box in which it is hidden may lie between visible ones.
         let seen = (visible.compared - visible.behind) as usize;
-        visible.in_front &= visible.within.is_some_and(|rest| self.grid.overlapping(&rest).count() == seen);
+        visible.in_front &= visible.within.is_some_and(|part| self.grid.overlapping(&part).count() == seen);
         visible
     }
 
-    fn place(&self, slot: usize) -> usize {
-        self.places.get(slot).map_or(0, |&place| place as usize)
+    fn box_of(&self, slot: usize) -> usize {
+        self.box_of_slot.get(slot).map_or(0, |&box_index| box_index as usize)
     }
 
-    /// Notes that the depths in `slots` came nearer. Returns how many boxes have a new nearest depth.
+    /// Record that the depths in `slots` decreased. Returns the number of boxes with a new nearest depth.
     pub fn write(&mut self, depth: &[f32], slots: &[u16]) -> u32 {
         let mut lowered = 0;
         for &slot in slots {
-            let place = self.place(slot as usize);
-            let (known, depth) = (&mut self.boxes[place], depth[slot as usize]);
+            let box_index = self.box_of(slot as usize);
+            let (known, depth) = (&mut self.boxes[box_index], depth[slot as usize]);
             known.stale = true;
             if depth < known.nearest {
                 lowered += u32::from(!std::mem::replace(&mut known.lowered, true));
@@ -175,16 +178,51 @@ impl DepthBoxes {
         lowered
     }
 
-    /// Finds the farthest depths that are out of date. Returns how many.
-    pub fn renew(&mut self, depth: &[f32]) -> u32 {
+    /// Recompute all outdated farthest depths. Returns their number.
+    pub fn update_farthest(&mut self, depth: &[f32]) -> u32 {
         let stale = self.boxes.iter().filter(|known| known.stale).count();
         if stale == 0 {
             return 0;
         }
         for known in self.boxes.iter_mut().filter(|known| known.stale) {
-            known.renew(depth, &self.slots);
+            known.update_farthest(depth, &self.slots);
         }
         stale as u32
+    }
+}
+
+/// Stored samples of one tile.
+#[derive(Clone, Debug)]
+pub struct DepthTile {
+    /// Depth of the nearest hit of each sample, infinite without a hit.
+    pub depth: Vec<f32>,
+    /// Triangle of the nearest hit, [`Self::NO_TRIANGLE`] without a hit.
+    pub triangle: Vec<u32>,
+    /// Farthest and nearest depths.
+    pub boxes: DepthBoxes,
+}
+
+impl DepthTile {
+    /// Triangle of a sample without a hit.
+    pub const NO_TRIANGLE: u32 = u32::MAX;
+
+    /// A cleared tile of `samples`.
+    pub fn cleared(grid: BoxGrid, samples: &TileSamples) -> Self {
+        Self {
+            depth: vec![f32::INFINITY; samples.len],
+            triangle: vec![Self::NO_TRIANGLE; samples.len],
+            boxes: DepthBoxes::cleared(grid, samples),
+        }
+    }
+
+    /// Record that the depths in `slots` were written. Returns the number of boxes with a new nearest depth.
+    pub fn record_writes(&mut self, slots: &[u16]) -> u32 {
+        self.boxes.write(&self.depth, slots)
+    }
+
+    /// Recompute outdated farthest depths. Returns their number.
+    pub fn update_farthest(&mut self) -> u32 {
+        self.boxes.update_farthest(&self.depth)
     }
 }
 
@@ -192,6 +230,7 @@ impl DepthBoxes {
 mod tests {
     use super::*;
     use crate::depth::grid::tests::{holds, samples};
+    use crate::traversal::Box5;
 
     fn boxes() -> Vec<Box5> {
         let ranges = [[-1.0, 1.0], [-0.3, 0.2], [0.5, 1.0], [0.25, 0.25], [-1.0, -0.5]];
@@ -212,7 +251,7 @@ mod tests {
             slots.iter().for_each(|&slot| {
                 depth[slot as usize] = (mix(u32::from(slot), round + 99) % 1000) as f32 / (round + 1) as f32
             });
-            // Depths only come nearer.
+            // Depths only decrease.
             let before = depths.clone();
             let nearer: Vec<u16> =
                 slots.into_iter().filter(|&slot| depth[slot as usize] < f32::INFINITY).collect();
@@ -226,7 +265,7 @@ mod tests {
                         >= depths.nearest(&within).min(before.nearest(&within))
                 );
             }
-            depths.renew(&depth);
+            depths.update_farthest(&depth);
             for within in boxes() {
                 let inside = || {
                     (0..samples.len).filter(|&slot| holds(&within, &samples, slot)).map(|slot| depth[slot])
@@ -235,7 +274,7 @@ mod tests {
             }
             let whole = Box5::whole(true);
             assert_eq!(depths.farthest(&whole), depth.iter().copied().fold(f32::NEG_INFINITY, f32::max));
-            assert_eq!(depths.renew(&depth), 0);
+            assert_eq!(depths.update_farthest(&depth), 0);
             let anew = DepthBoxes::of(*depths.grid(), &samples, &depth);
             assert!(boxes().iter().all(|within| anew.farthest(within) == depths.farthest(within)));
         }
@@ -250,17 +289,17 @@ mod tests {
             for round in 0..400 {
                 let chosen = |slot: u16| mix(u32::from(slot), round).is_multiple_of(7);
                 let slots: Vec<u16> = (0..samples.len as u16).filter(|&slot| chosen(slot)).collect();
-                // Few values, so that several samples of a box are the farthest.
+                // Few distinct values, so several samples of a box are the farthest.
                 slots.iter().for_each(|&slot| {
                     depth[slot as usize] =
                         depth[slot as usize].min(1e3) - (mix(u32::from(slot), round) % 3) as f32
                 });
                 depths.write(&depth, &slots);
                 let written: std::collections::HashSet<usize> =
-                    slots.iter().map(|&slot| depths.place(slot as usize)).collect();
-                assert_eq!(depths.renew(&depth) as usize, written.len());
+                    slots.iter().map(|&slot| depths.box_of(slot as usize)).collect();
+                assert_eq!(depths.update_farthest(&depth) as usize, written.len());
                 for (index, known) in depths.boxes.iter().enumerate() {
-                    let own = (0..samples.len).filter(|&slot| depths.place(slot) == index);
+                    let own = (0..samples.len).filter(|&slot| depths.box_of(slot) == index);
                     let farthest = own.map(|slot| depth[slot]).fold(f32::NEG_INFINITY, f32::max);
                     assert_eq!(known.farthest, farthest, "box {index} of {counts:?}, round {round}");
                 }
@@ -273,21 +312,45 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_is_seen_where_it_is_not_behind() {
+    fn a_triangle_is_visible_where_it_is_not_hidden() {
         let samples = samples();
         let mut depths = DepthBoxes::cleared(BoxGrid::new([1, 1, 4], false).unwrap(), &samples);
         let depth: Vec<f32> = samples.t[..samples.len].iter().map(|t| 1.0 + (4.0 * t).floor()).collect();
         depths.write(&depth, &(0..samples.len as u16).collect::<Vec<_>>());
-        depths.renew(&depth);
+        depths.update_farthest(&depth);
         let whole = Box5::whole(false);
-        let look = |lo: f32, hi: f32| depths.look(&whole, |_| [lo, hi]);
-        assert_eq!(look(4.5, 5.0), Visible { within: None, in_front: false, compared: 4, behind: 4 });
-        assert_eq!(look(0.2, 0.5), Visible { within: Some(whole), in_front: true, compared: 4, behind: 0 });
+        let compare = |lo: f32, hi: f32| depths.compare(&whole, |_| [lo, hi]);
+        assert_eq!(compare(4.5, 5.0), Visible { within: None, in_front: false, compared: 4, behind: 4 });
+        assert_eq!(
+            compare(0.2, 0.5),
+            Visible { within: Some(whole), in_front: true, compared: 4, behind: 0 }
+        );
         let late = Box5 { t: [0.5, 1.0], ..whole };
-        assert_eq!(look(2.5, 3.0), Visible { within: Some(late), in_front: false, compared: 4, behind: 2 });
-        assert_eq!(look(2.5, 2.9), Visible { within: Some(late), in_front: true, compared: 4, behind: 2 });
-        // Behind in the second of three.
-        let wavy = depths.look(&whole, |part| if part.t[0] == 0.25 { [9.0; 2] } else { [0.1; 2] });
+        assert_eq!(
+            compare(2.5, 3.0),
+            Visible { within: Some(late), in_front: false, compared: 4, behind: 2 }
+        );
+        assert_eq!(compare(2.5, 2.9), Visible { within: Some(late), in_front: true, compared: 4, behind: 2 });
+        // Hidden in the second of three boxes.
+        let wavy = depths.compare(&whole, |part| if part.t[0] == 0.25 { [9.0; 2] } else { [0.1; 2] });
         assert_eq!(wavy, Visible { within: Some(whole), in_front: false, compared: 4, behind: 1 });
+    }
+
+    #[test]
+    #[allow(clippy::field_reassign_with_default, reason = "the other fields are private")]
+    fn a_tile_is_as_far_as_its_farthest_sample() {
+        let mut samples = TileSamples::default();
+        samples.len = 2;
+        let mut tile = DepthTile::cleared(BoxGrid::new([1; 3], false).unwrap(), &samples);
+        let whole = Box5::whole(false);
+        let farthest = |tile: &mut DepthTile| (tile.update_farthest(), tile.boxes.farthest(&whole));
+        assert_eq!(farthest(&mut tile), (0, f32::INFINITY));
+        tile.depth[0] = 3.0;
+        assert_eq!(tile.record_writes(&[0]), 1);
+        assert_eq!((farthest(&mut tile), tile.boxes.nearest(&whole)), ((1, f32::INFINITY), 3.0));
+        tile.depth[1] = 5.0;
+        assert_eq!(tile.record_writes(&[1]), 0, "farther than the nearest");
+        assert_eq!(farthest(&mut tile), (1, 5.0));
+        assert_eq!((farthest(&mut tile), tile.boxes.nearest(&whole)), ((0, 5.0), 3.0));
     }
 }

@@ -1,4 +1,4 @@
-//! Lens and time divided into boxes (thesis, Paper VI, section 3).
+//! Division of lens and time into boxes (thesis, Paper VI, section 3).
 
 use std::ops::Range;
 
@@ -7,15 +7,16 @@ use serde::Deserialize;
 use super::DepthBound;
 use crate::traversal::Box5;
 
-/// How depth is bounded and what a tile remembers of it.
+/// Settings of depth culling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DepthSpec {
-    /// How the depth of a triangle over a tile is bounded.
+    /// Method of bounding the depth of a triangle over a tile.
     pub bound: DepthBound,
-    /// Boxes of lens and time along u, v and t, each 1 to [`BoxGrid::MOST`]; a farthest and a nearest depth are kept for each.
+    /// Number of boxes of lens and time along u, v and t, each 1 to [`BoxGrid::MAX`]. Each box keeps its
+    /// farthest and nearest depth.
     pub boxes: [u32; 3],
-    /// Read no stored depth where a triangle lies in front of all of them (`z_min`).
+    /// Skip the reading of stored depths if a triangle is in front of all of them (`z_min`).
     pub z_min: bool,
 }
 
@@ -25,7 +26,7 @@ impl Default for DepthSpec {
     }
 }
 
-/// Lens and time divided into boxes of one size.
+/// Lens and time divided into equal boxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoxGrid {
     counts: [u32; 3],
@@ -40,39 +41,40 @@ impl Default for BoxGrid {
 }
 
 impl BoxGrid {
-    /// Boxes along one axis at most.
-    pub const MOST: u32 = 16;
-    /// The ends of u, v and t.
+    /// Largest number of boxes along one axis.
+    pub const MAX: u32 = 16;
+    /// Ranges of u, v and t.
     const ENDS: [[f32; 2]; 3] = [[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]];
 
-    /// `counts` boxes along u, v and t, or `None` when one is not 1 to [`Self::MOST`]. Without a lens, time alone is divided.
+    /// `counts` boxes along u, v and t, or `None` if one is not 1 to [`Self::MAX`]. Without a lens only time
+    /// is divided.
     pub fn new([u, v, t]: [u32; 3], lens: bool) -> Option<Self> {
         let counts = if lens { [u, v, t] } else { [1, 1, t] };
-        [u, v, t].iter().all(|count| (1..=Self::MOST).contains(count)).then_some(Self { counts, lens })
+        [u, v, t].iter().all(|count| (1..=Self::MAX).contains(count)).then_some(Self { counts, lens })
     }
 
-    /// How many boxes there are.
+    /// Number of boxes.
     pub fn len(&self) -> usize {
         self.counts.iter().map(|&count| count as usize).product()
     }
 
-    /// Never: there is at least one box.
+    /// Always false; there is at least one box.
     pub fn is_empty(&self) -> bool {
         false
     }
 
-    /// Where box `index` of `axis` begins; the one after the last begins where the axis ends.
+    /// Lower border of box `index` of `axis`, or the end of the axis for the index after the last.
     fn border(&self, axis: usize, index: u32) -> f32 {
         let [lo, hi] = Self::ENDS[axis];
         lo + (hi - lo) * index as f32 / self.counts[axis] as f32
     }
 
-    /// The box along `axis` in which a place lies.
-    fn index(&self, axis: usize, place: f32) -> u32 {
-        (1..self.counts[axis]).filter(|&index| self.border(axis, index) <= place).count() as u32
+    /// Box of a coordinate along `axis`.
+    fn index(&self, axis: usize, coordinate: f32) -> u32 {
+        (1..self.counts[axis]).filter(|&index| self.border(axis, index) <= coordinate).count() as u32
     }
 
-    /// The box of the sample at `u`, `v`, `t`.
+    /// Box of the sample at `u`, `v`, `t`.
     pub fn of_sample(&self, u: f32, v: f32, t: f32) -> usize {
         self.number([self.index(0, u), self.index(1, v), self.index(2, t)])
     }
@@ -81,7 +83,7 @@ impl BoxGrid {
         ((t * self.counts[1] + v) * self.counts[0] + u) as usize
     }
 
-    /// The boxes that may hold a sample of `within`, with what they have in common with it.
+    /// Boxes that may contain a sample of `within`, each with its intersection.
     pub fn overlapping(&self, within: &Box5) -> impl Iterator<Item = (usize, Box5)> + use<> {
         let (grid, within) = (*self, *within);
         let run = |axis: usize, [lo, hi]: [f32; 2]| -> Range<u32> {
@@ -109,7 +111,7 @@ impl BoxGrid {
         }
     }
 
-    /// The last place of box `index`: just before the next one begins.
+    /// Largest float in box `index`, just below the next border.
     fn last(&self, axis: usize, index: u32) -> f32 {
         let end = self.border(axis, index + 1);
         if index + 1 == self.counts[axis] { end } else { end.next_down() }
@@ -130,9 +132,9 @@ pub(super) mod tests {
         samples
     }
 
-    /// Whether the sample in `slot` lies in the box.
+    /// Whether the sample in `slot` is in the box.
     pub fn holds(within: &Box5, samples: &TileSamples, slot: usize) -> bool {
-        let inside = |[lo, hi]: [f32; 2], place: f32| (lo..=hi).contains(&place);
+        let inside = |[lo, hi]: [f32; 2], coordinate: f32| (lo..=hi).contains(&coordinate);
         let lens = inside(within.u, samples.u[slot]) && inside(within.v, samples.v[slot]);
         inside(within.t, samples.t[slot]) && (lens || !within.lens)
     }

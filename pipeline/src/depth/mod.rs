@@ -1,8 +1,8 @@
-//! Depth: the interval of a triangle over a box, and what a tile remembers for culling.
+//! Depth: the depth interval of a triangle over a box, and the stored depths of a tile for culling.
 //!
-//! - [`plane`]: planes that move with a triangle and keep it on one side, the mathematics of the bound,
-//! - [`DepthBound`] and [`Bounder`]: the interval that holds every depth the sample test computes in a tile,
-//! - [`DepthBoxes`]: the farthest and nearest stored depth of a tile, by boxes of lens and time,
+//! - [`plane`]: moving planes that bound a triangle from one side, the mathematics of the depth interval,
+//! - [`DepthBound`] and [`Bounder`]: the interval of all depths that the sample test computes in a tile,
+//! - [`DepthBoxes`]: farthest and nearest stored depth of a tile, by boxes of lens and time,
 //! - [`DepthTile`]: the stored samples.
 
 mod bound;
@@ -12,11 +12,9 @@ mod grid;
 mod number;
 pub mod plane;
 mod rounding;
-mod tile;
 
 pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
-pub use boxes::{DepthBoxes, Visible};
+pub use boxes::{DepthBoxes, DepthTile, Visible};
 pub use grid::{BoxGrid, DepthSpec};
 pub use number::Real;
-pub(crate) use number::{down, up};
-pub use tile::DepthTile;
+pub(crate) use number::{round_down, round_up};

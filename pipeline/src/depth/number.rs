@@ -1,4 +1,4 @@
-//! The numbers depth bounds are worked out in: `f64`, or in a test one that counts its operations.
+//! Numbers of the depth bounds: `f64`, or in tests a number that counts its operations.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -15,21 +15,21 @@ pub trait Real:
     /// The number `value`.
     fn new(value: f64) -> Self;
 
-    /// `self b + c`, each operation rounded; one multiply-add.
+    /// `self b + c`, rounded after each operation; one multiply-add.
     fn madd(self, b: Self, c: Self) -> Self;
 
-    /// The smaller of two; comparing is free.
-    fn least(self, other: Self) -> Self {
+    /// Minimum; comparisons are free.
+    fn smaller(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
 
-    /// The larger of two.
-    fn most(self, other: Self) -> Self {
+    /// Maximum.
+    fn larger(self, other: Self) -> Self {
         if other > self { other } else { self }
     }
 
-    /// Without its sign.
-    fn size(self) -> Self {
+    /// Magnitude.
+    fn magnitude(self) -> Self {
         if self < Self::new(0.0) { -self } else { self }
     }
 }
@@ -55,30 +55,30 @@ pub(super) fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
     [part(1, 2), part(2, 0), part(0, 1)]
 }
 
-/// The smallest and largest of some numbers.
+/// Smallest and largest value.
 pub(super) fn range<R: Real, const N: usize>(values: [R; N]) -> [R; 2] {
-    values.iter().fold([values[0]; 2], |[lo, hi], &value| [lo.least(value), hi.most(value)])
+    values.iter().fold([values[0]; 2], |[lo, hi], &value| [lo.smaller(value), hi.larger(value)])
 }
 
-/// What lies in both.
+/// Intersection of two ranges.
 pub(super) fn both<R: PartialOrd + Copy>(a: [R; 2], b: [R; 2]) -> [R; 2] {
     [if b[0] > a[0] { b[0] } else { a[0] }, if b[1] < a[1] { b[1] } else { a[1] }]
 }
 
-/// From the least of either to the most.
+/// Hull of two ranges.
 pub(super) fn hull<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
-    [a[0].least(b[0]), a[1].most(b[1])]
+    [a[0].smaller(b[0]), a[1].larger(b[1])]
 }
 
-/// The nearest `f32` that is not above.
-pub(crate) fn down(value: f64) -> f32 {
+/// Largest `f32` at or below `value`.
+pub(crate) fn round_down(value: f64) -> f32 {
     let near = value as f32;
     if f64::from(near) > value { near.next_down() } else { near }
 }
 
-/// The nearest `f32` that is not below.
-pub(crate) fn up(value: f64) -> f32 {
-    -down(-value)
+/// Smallest `f32` at or above `value`.
+pub(crate) fn round_up(value: f64) -> f32 {
+    -round_down(-value)
 }
 
 #[cfg(test)]
@@ -89,7 +89,7 @@ pub(super) mod counting {
 
     thread_local!(static MADDS: Cell<u32> = const { Cell::new(0) });
 
-    /// A number that counts multiply-adds; a lone addition, multiplication or division counts as one.
+    /// A number that counts multiply-adds; a separate addition, multiplication or division counts as one.
     #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
     pub struct Counted(pub f64);
 
@@ -98,7 +98,7 @@ pub(super) mod counting {
         Counted(value)
     }
 
-    /// The multiply-adds of `work`.
+    /// Multiply-adds of `work`.
     pub fn madds(work: impl FnOnce()) -> u32 {
         MADDS.set(0);
         work();
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn rounding_is_outward_and_no_further() {
         for value in [1.0 / 3.0, -1.0 / 3.0, 0.1, 7.0, -7.0, 0.0, 1e-50, -1e-50, 1e30] {
-            let (below, above) = (down(value), up(value));
+            let (below, above) = (round_down(value), round_up(value));
             assert!(f64::from(below) <= value && value <= f64::from(above), "{value}");
             assert!(above == below || above == below.next_up(), "{value}: {below} to {above}");
         }

@@ -1,36 +1,36 @@
-//! Planes that move with a triangle and keep it on one side (thesis, Paper VI, Appendix A, second test).
+//! Moving planes that bound a triangle from one side (thesis, Paper VI, Appendix A, second test).
 //!
-//! For any vector `n`, `n . p` over a moving triangle lies between the least and the most of its vertices. These move
-//! linearly, so at time `t` between two ends it is at most
+//! For any vector `n`, `n . p` over a moving triangle is between the minimum and maximum over its vertices.
+//! The vertices move linearly, so at time `t` between two ends it is at most
 //!
 //! ```text
 //! h(t) = (1 - t) max_i n . q_i + t max_i n . r_i
 //! ```
 //!
-//! and at least the same with the minimum. A ray holds the points `z G + B` at depth `z`, so the depth of the triangle on it
-//! is at most `(h(t) - n . B) / (n . G)` where `n . G > 0`. The paper takes the normal of the triangle at one end for `n`,
-//! which makes `h` vanish there up to rounding; nothing here relies on it, so a normal that is rounding noise gives a loose bound
-//! and never a false one.
+//! and at least the same with the minimum. A ray has the points `z G + B` at depth `z`. So the depth of the
+//! triangle on it is at most `(h(t) - n . B) / (n . G)` where `n . G > 0`. The paper takes the normal of the
+//! triangle at one end for `n`, which makes `h` vanish there up to rounding. No step relies on that, so a
+//! normal that consists of rounding errors gives a loose bound but never a wrong one.
 //!
-//! In perspective with a thin lens `G = (X - u a_x, Y - v a_y, 1)` and `B = (u s_x, v s_y, 0)`; in an orthographic view
-//! `G = (-u a_x, -v a_y, 1)` and `B = (X + u s_x, Y + v s_y, 0)`. The bound is a ratio of functions linear in each variable, so its extremes
-//! are at corners.
+//! In perspective with a thin lens `G = (X - u a_x, Y - v a_y, 1)` and `B = (u s_x, v s_y, 0)`. In an
+//! orthographic view `G = (-u a_x, -v a_y, 1)` and `B = (X + u s_x, Y + v s_y, 0)`. The bound is a ratio of
+//! functions linear in each variable, so its extremes are at corners.
 
 use super::number::{Real, both, cross, dot, hull, range};
 
 /// Three points.
 pub type Points<R> = [[R; 3]; 3];
 
-/// Rays with the points `z (g_x, g_y, 1) + (b_x, b_y, 0)`, `g` and `b` anywhere in their ranges.
+/// Rays with the points `z (g_x, g_y, 1) + (b_x, b_y, 0)`, for all `g` and `b` in their ranges.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<R> {
-    /// Smallest and largest `g_x` and `g_y`.
+    /// Ranges of `g_x` and `g_y`.
     pub slope: [[R; 2]; 2],
-    /// Smallest and largest `b_x` and `b_y`.
+    /// Ranges of `b_x` and `b_y`.
     pub base: [[R; 2]; 2],
 }
 
-/// The rays of a tile from a part of the lens, one set for each corner of that part.
+/// Rays of a tile from a part of the lens, one set per corner of that part.
 #[derive(Clone, Copy, Debug)]
 pub struct Beam<R> {
     rays: [Rays<R>; 4],
@@ -38,12 +38,12 @@ pub struct Beam<R> {
 }
 
 impl<R: Real> Beam<R> {
-    /// Through a pinhole: `tile` holds the ends of X and of Y.
+    /// Rays through a pinhole; `tile` has the ranges of X and Y.
     pub fn pinhole(tile: [[R; 2]; 2]) -> Self {
         Self::single(Rays { slope: tile, base: [[R::new(0.0); 2]; 2] })
     }
 
-    /// Parallel ones.
+    /// Parallel rays.
     pub fn orthographic(tile: [[R; 2]; 2]) -> Self {
         Self::single(Rays { slope: [[R::new(0.0); 2]; 2], base: tile })
     }
@@ -52,25 +52,26 @@ impl<R: Real> Beam<R> {
         Self { rays: [rays; 4], corners: 1 }
     }
 
-    /// Through the part `lens` (the ends of u and of v) of a thin lens with the shear `s`, `a`.
+    /// Rays through the part `lens` (ranges of u and v) of a thin lens with the shear `s`, `a`.
     pub fn lens(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
-        Self::corners(lens, |axis, place| {
-            let ([lo, hi], shift) = (tile[axis], place * a[axis]);
-            ([lo - shift, hi - shift], [place * s[axis]; 2])
+        Self::corners(lens, |axis, position| {
+            let ([lo, hi], shift) = (tile[axis], position * a[axis]);
+            ([lo - shift, hi - shift], [position * s[axis]; 2])
         })
     }
 
-    /// The same in an orthographic view.
+    /// Rays of an orthographic view with the same arguments.
     pub fn oblique(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
-        Self::corners(lens, |axis, place| {
-            let ([lo, hi], shift) = (tile[axis], place * s[axis]);
-            ([-(place * a[axis]); 2], [lo + shift, hi + shift])
+        Self::corners(lens, |axis, position| {
+            let ([lo, hi], shift) = (tile[axis], position * s[axis]);
+            ([-(position * a[axis]); 2], [lo + shift, hi + shift])
         })
     }
 
-    /// From each corner of a part of the lens, given slope and base along an axis from a place on it.
+    /// Rays from each corner of a part of the lens; `ray` gives slope and base along an axis for a lens
+    /// position.
     fn corners(lens: [[R; 2]; 2], ray: impl Fn(usize, R) -> ([R; 2], [R; 2])) -> Self {
-        let axis = |axis: usize| lens[axis].map(|place| ray(axis, place));
+        let axis = |axis: usize| lens[axis].map(|position| ray(axis, position));
         let (across, down) = (axis(0), axis(1));
         let rays = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| {
             let ((slope_x, base_x), (slope_y, base_y)) = (across[i], down[j]);
@@ -79,12 +80,12 @@ impl<R: Real> Beam<R> {
         Self { rays, corners: 4 }
     }
 
-    /// The rays from each corner of the part of the lens.
+    /// Rays from each corner of the part of the lens.
     pub fn rays(&self) -> &[Rays<R>] {
         &self.rays[..self.corners]
     }
 
-    /// Smallest and largest slope of all rays.
+    /// Range of the slopes of all rays.
     pub fn slopes(&self) -> [[R; 2]; 2] {
         let all = self.rays().iter();
         all.fold(self.rays[0].slope, |slopes, rays| {
@@ -97,45 +98,45 @@ impl<R: Real> Beam<R> {
 #[derive(Clone, Copy, Debug)]
 pub struct MovingPlane<R> {
     normal: [R; 3],
-    /// Least and most `n . p` at either end.
+    /// Minimum and maximum of `n . p` at each end.
     ends: [[R; 2]; 2],
-    /// What rounding may do to `n . p`.
+    /// Bound of the rounding error of `n . p`.
     noise: R,
 }
 
-/// Rounding of a handful of operations in `f64`, in parts of the sum of magnitudes.
+/// Rounding of a few operations in `f64`, relative to the sum of magnitudes.
 const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
 
 impl<R: Real> MovingPlane<R> {
-    /// The plane with `normal` that bounds a triangle with these vertices at the two ends, none of which is larger on an axis
-    /// than `size`.
+    /// The plane with `normal` for a triangle with the given vertices at the two ends; `size` bounds their
+    /// magnitudes by axis.
     pub fn new(normal: [R; 3], ends: [&Points<R>; 2], size: [R; 3]) -> Self {
-        let noise = R::new(ROUNDING) * dot(normal.map(R::size), size);
+        let noise = R::new(ROUNDING) * dot(normal.map(R::magnitude), size);
         Self { normal, ends: ends.map(|points| range(points.map(|p| dot(normal, p)))), noise }
     }
 
-    /// The same for a triangle that does not move.
+    /// The plane for a triangle that does not move.
     pub fn still(normal: [R; 3], points: &Points<R>, size: [R; 3]) -> Self {
-        let noise = R::new(ROUNDING) * dot(normal.map(R::size), size);
+        let noise = R::new(ROUNDING) * dot(normal.map(R::magnitude), size);
         Self { normal, ends: [range(points.map(|p| dot(normal, p))); 2], noise }
     }
 
-    /// Least and most `n . p` over the whole way.
+    /// Range of `n . p` over the whole motion.
     pub fn whole(&self) -> [R; 2] {
         hull(self.ends[0], self.ends[1])
     }
 
-    /// The same for the times `t` within [0, 1].
+    /// Range of `n . p` for times `t` in [0, 1].
     pub fn within(&self, t: [R; 2]) -> [R; 2] {
         let at = |side: usize, t: R| t.madd(self.ends[1][side] - self.ends[0][side], self.ends[0][side]);
-        [at(0, t[0]).least(at(0, t[1])), at(1, t[0]).most(at(1, t[1]))]
+        [at(0, t[0]).smaller(at(0, t[1])), at(1, t[0]).larger(at(1, t[1]))]
     }
 
-    /// Between which depths a ray of the beam meets points whose `n . p` lies within `reach` and which lie at most `off` from the
-    /// ray in x and in y. `None` where the plane may be seen edge-on, which bounds nothing.
+    /// Depth range in which a ray of the beam meets points with `n . p` in `reach` that are at most `off`
+    /// from the ray in x and y. `None` if the plane may be seen edge-on, which gives no bound.
     pub fn depths(&self, reach: [R; 2], beam: &Beam<R>, off: [R; 2]) -> Option<[R; 2]> {
         let [nx, ny, _] = self.normal;
-        let slack = nx.size().madd(off[0], ny.size().madd(off[1], self.noise));
+        let slack = nx.magnitude().madd(off[0], ny.magnitude().madd(off[1], self.noise));
         let reach = [reach[0] - slack, reach[1] + slack];
         let mut depths: Option<([R; 2], bool)> = None;
         for rays in beam.rays() {
@@ -151,43 +152,43 @@ impl<R: Real> MovingPlane<R> {
         depths.map(|(depths, _)| depths)
     }
 
-    /// Between what `n . G` lies, its rounding allowed for.
+    /// Range of `n . G`, rounding included.
     fn facing(&self, slope: &[[R; 2]; 2]) -> [R; 2] {
         let [nx, ny, nw] = self.normal;
         let (x, y) = (by_sign(nx, slope[0]), by_sign(ny, slope[1]));
-        let size = |slope: [R; 2]| slope[0].size().most(slope[1].size());
-        let sum = nx.size().madd(size(slope[0]), ny.size().madd(size(slope[1]), nw.size()));
+        let size = |slope: [R; 2]| slope[0].magnitude().larger(slope[1].magnitude());
+        let sum = nx.magnitude().madd(size(slope[0]), ny.magnitude().madd(size(slope[1]), nw.magnitude()));
         let noise = R::new(ROUNDING) * sum;
         [nx.madd(x[0], ny.madd(y[0], nw)) - noise, nx.madd(x[1], ny.madd(y[1], nw)) + noise]
     }
 
-    /// Between what `n . B` lies, its rounding allowed for.
+    /// Range of `n . B`, rounding included.
     fn based(&self, base: &[[R; 2]; 2]) -> [R; 2] {
         let [nx, ny, _] = self.normal;
         let (x, y) = (by_sign(nx, base[0]), by_sign(ny, base[1]));
-        let size = |base: [R; 2]| base[0].size().most(base[1].size());
-        let noise = R::new(ROUNDING) * nx.size().madd(size(base[0]), ny.size() * size(base[1]));
+        let size = |base: [R; 2]| base[0].magnitude().larger(base[1].magnitude());
+        let noise = R::new(ROUNDING) * nx.magnitude().madd(size(base[0]), ny.magnitude() * size(base[1]));
         [nx.madd(x[0], ny * y[0]) - noise, nx.madd(x[1], ny * y[1]) + noise]
     }
 }
 
-/// The ends of `range` in the order in which `factor` times them rises.
+/// The ends of `range`, ordered so that `factor` times them rises.
 fn by_sign<R: Real>(factor: R, [lo, hi]: [R; 2]) -> [R; 2] {
     if factor < R::new(0.0) { [hi, lo] } else { [lo, hi] }
 }
 
-/// Between what the quotient of two ranges lies; `None` where the denominator may be zero.
-fn quotient<R: Real>([lo, hi]: [R; 2], [least, most]: [R; 2]) -> Option<[R; 2]> {
+/// Range of the quotient of two ranges; `None` if the denominator may be zero.
+fn quotient<R: Real>([lo, hi]: [R; 2], [min, max]: [R; 2]) -> Option<[R; 2]> {
     let zero = R::new(0.0);
-    if most < zero {
-        return quotient([-hi, -lo], [-most, -least]);
+    if max < zero {
+        return quotient([-hi, -lo], [-max, -min]);
     }
-    let below = lo / if lo > zero { most } else { least };
-    let above = hi / if hi > zero { least } else { most };
-    (least > zero).then_some([below, above])
+    let below = lo / if lo > zero { max } else { min };
+    let above = hi / if hi > zero { min } else { max };
+    (min > zero).then_some([below, above])
 }
 
-/// The normal of a triangle, twice its area long.
+/// Normal of a triangle, with a length of twice its area.
 pub fn normal<R: Real>(p: &Points<R>) -> [R; 3] {
     let [first, second] = sides(p);
     cross(first, second)
@@ -198,7 +199,7 @@ pub(super) fn sides<R: Real>([a, b, c]: &Points<R>) -> [[R; 3]; 2] {
     [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]])
 }
 
-/// The depths that all of these allow.
+/// Intersection of all given depth ranges.
 pub fn tightest<R: Real>(bounds: impl IntoIterator<Item = Option<[R; 2]>>) -> Option<[R; 2]> {
     bounds.into_iter().flatten().reduce(both)
 }
@@ -207,7 +208,7 @@ pub fn tightest<R: Real>(bounds: impl IntoIterator<Item = Option<[R; 2]>>) -> Op
 mod tests {
     use super::*;
 
-    /// A square facing the camera that recedes from depth 2 to 4 while it slides.
+    /// A square facing the camera that recedes from depth 2 to 4 and moves sideways.
     const OPEN: Points<f64> = [[-2.0, -2.0, 2.0], [2.0, -2.0, 2.0], [-2.0, 2.0, 2.0]];
     const CLOSE: Points<f64> = [[0.0, -4.0, 4.0], [4.0, -4.0, 4.0], [0.0, 4.0, 4.0]];
     const SIZE: [f64; 3] = [4.0; 3];
@@ -230,7 +231,7 @@ mod tests {
         close_to(plane.depths(plane.within([0.25, 0.5]), &parallel, [0.0; 2]).unwrap(), [2.5, 3.0]);
     }
 
-    /// The plane w = 4 + x: seen at X it is at depth 4 / (1 - X), and at 4 + X in parallel light.
+    /// The plane w = 4 + x has depth 4 / (1 - X) at X, and 4 + X in parallel light.
     #[test]
     fn a_slanted_plane_is_bounded_at_the_corners_of_the_tile() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
@@ -250,7 +251,8 @@ mod tests {
         close_to(depths(&lens).unwrap(), inner);
     }
 
-    /// The plane w = 4 + x at X + u (a w - s) = x with s = 2, a = 1/2: w = 4 + X - u (w / 2 - 2), so w (1 + u / 2) = 4 + X + 2 u.
+    /// The plane w = 4 + x at X + u (a w - s) = x with s = 2, a = 1/2: w = 4 + X - u (w / 2 - 2), so w (1 + u
+    /// / 2) = 4 + X + 2 u.
     #[test]
     fn an_oblique_view_is_bounded_at_the_corners_of_tile_and_lens() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
@@ -261,7 +263,7 @@ mod tests {
         close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), corners);
     }
 
-    /// Front from one end of the lens and back from the other: from between it is seen edge-on.
+    /// Front-facing from one end of the lens and back-facing from the other: edge-on from a point in between.
     #[test]
     fn a_plane_seen_from_both_faces_bounds_nothing() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];

@@ -1,48 +1,48 @@
-//! Where in the image events happen.
+//! Heat maps: where in the image events happen.
 
 use activity::{Event, Packet, PacketKind, Unit};
 
 use super::bin::Bin;
-use super::counters::{BinLog, SamplesHere};
+use super::bin::{BinLog, SamplesHere};
 use super::pass::Pass;
 
-/// How often an event happened in each tile of the image.
+/// Count of one event in each tile of the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// The event.
+    /// Event.
     pub event: Event,
-    /// Fine tiles, row by row, each with what happened there alone.
+    /// Fine tiles, row by row, with the events of each tile alone.
     pub tiles: Vec<TileHeat>,
-    /// Coarse tiles, row by row, each with what happened once for the whole of it.
+    /// Coarse tiles, row by row, with the events of the coarse tile as a whole.
     pub coarse: Vec<TileHeat>,
-    /// What happened nowhere in the image: to vertices, or when the caches were emptied at the end.
+    /// Events without a position: those of vertices, and those of emptying the caches at the end.
     pub elsewhere: u64,
-    /// Every pixel, row by row, where the event is one of samples, which have a pixel each; else nothing.
+    /// Count in every pixel, row by row, for events of samples; otherwise empty.
     pub samples: Vec<u32>,
     width: u32,
     height: u32,
 }
 
-/// A tile, cut to the image, and how often the event happened in it.
+/// A tile clipped to the image, and its count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileHeat {
-    /// Its first pixel.
+    /// First pixel.
     pub origin: [u32; 2],
-    /// Pixels of it in the image, across and down.
+    /// Width and height in the image, in pixels.
     pub size: [u32; 2],
-    /// How often.
+    /// Count.
     pub count: u64,
 }
 
 impl TileHeat {
-    /// Events in a pixel, on average.
+    /// Mean number of events per pixel.
     pub fn per_pixel(&self) -> f64 {
         self.count as f64 / f64::from(self.size[0] * self.size[1])
     }
 }
 
 impl HeatMap {
-    /// Whether the event has a place in the image at all, be it that some of them have none.
+    /// Whether occurrences of the event have a position in the image, at least some of them.
     pub fn is_of(event: Event) -> bool {
         !matches!(event.unit(), Unit::Command | Unit::Setup) && event != Event::VertexInvocations
     }
@@ -73,7 +73,7 @@ impl HeatMap {
         }
     }
 
-    /// Counts a packet. Tile tests travel in packets of other tiles; they are counted in [`Self::tests`].
+    /// Add a packet. Tile tests may be in packets of other tiles; [`Self::tests`] adds them.
     pub(super) fn packet(&mut self, packet: &Packet) {
         let count = u64::from(packet.counts[self.event]);
         let placed = match packet.kind {
@@ -88,7 +88,7 @@ impl HeatMap {
         }
     }
 
-    /// Counts the tile tests of a bin, `number` row by row.
+    /// Add the tile tests of bin `number`.
     pub(super) fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
         if !self.samples.is_empty() {
             self.by_pixel(pass, bin, log);
@@ -97,9 +97,9 @@ impl HeatMap {
             return;
         }
         let mut in_tiles = 0;
-        for (tile, place, ..) in bin.inside(pass) {
-            // A bin of which no fine tile was visited has noted none.
-            let count = log.tests.get(place).map_or(0, |tests| tests.of(self.event));
+        for (tile, index, ..) in bin.inside(pass) {
+            // A bin without visited fine tiles has no record.
+            let count = log.tests.get(index).map_or(0, |tests| tests.of(self.event));
             self.tiles[tile as usize].count += count;
             in_tiles += count;
         }
@@ -107,12 +107,12 @@ impl HeatMap {
         self.coarse[number].count += all - in_tiles;
     }
 
-    /// Counts what happened to the samples of a bin, pixel by pixel.
+    /// Add the sample events of a bin, by pixel.
     fn by_pixel(&mut self, pass: &Pass<'_>, bin: &Bin, log: &BinLog) {
         let side = pass.settings.spec.tile_px;
-        for (place, samples) in log.samples.iter().enumerate() {
+        for (index, samples) in log.samples.iter().enumerate() {
             let Some(samples) = samples else { continue };
-            let [x, y] = bin.tile_origin(pass, place);
+            let [x, y] = bin.tile_origin(pass, index);
             for (pixel, count) in (0..side * side).zip(samples.of(self.event)) {
                 let (column, row) = (x + pixel % side, y + pixel / side);
                 if column < self.width && row < self.height {
@@ -122,7 +122,7 @@ impl HeatMap {
         }
     }
 
-    /// The value of every pixel, row by row: events there. What has a tile but no pixel is spread evenly over the tile.
+    /// Value of every pixel, row by row. Events known only by tile are spread evenly over the tile.
     pub fn pixels(&self) -> Vec<f32> {
         if !self.samples.is_empty() {
             return self.samples.iter().map(|&count| count as f32).collect();
@@ -138,13 +138,13 @@ impl HeatMap {
         pixels
     }
 
-    /// All of the event in the frame.
+    /// Total count in the frame.
     pub fn total(&self) -> u64 {
         self.tiles.iter().chain(&self.coarse).map(|tile| tile.count).sum::<u64>() + self.elsewhere
     }
 }
 
-/// Whether the event is counted by the tests of a tile.
+/// Whether the event belongs to the tests of a tile.
 fn is_tile_test(event: Event) -> bool {
     matches!(event.unit(), Unit::Traversal | Unit::ZCull)
 }

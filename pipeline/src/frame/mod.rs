@@ -1,16 +1,14 @@
-//! One frame through the pipeline: vertices, set-up, bins, tiles, the replay of what they touched, and the image.
+//! Frame: draws through the whole pipeline, from vertices, set-up, bins and tiles to the replay and the
+//! image.
 
 mod bin;
-mod counters;
-mod draw;
 mod heat;
-mod judge;
-mod look;
 mod pass;
 mod replay;
 mod resolve;
 mod settings;
 mod surface;
+mod test_selection;
 mod tile_tests;
 mod vertices;
 mod worker;
@@ -19,17 +17,16 @@ use std::ops::Range;
 
 use activity::{Counts, Event, LineAccess, Packet, PacketKind};
 use glam::Vec3;
-use judge::Judge;
 use rayon::prelude::*;
+use test_selection::TestSelector;
 use vertices::Ready;
 
 use crate::geometry::Camera;
 use crate::memory::CacheError;
 use crate::setup::distribute;
-use bin::Bin;
-use counters::BinLog;
-pub use draw::Draw;
+use bin::{Bin, BinLog};
 pub use heat::{HeatMap, TileHeat};
+pub use pass::Draw;
 use pass::Pass;
 use replay::Replay;
 pub use settings::{Features, PipelineSpec, Settings, Shading, SpecError};
@@ -38,18 +35,18 @@ use worker::Worker;
 /// A rendered frame.
 #[derive(Clone, Debug)]
 pub struct Rendered {
-    /// Linear RGB radiance of each pixel, row by row from the top left.
+    /// Linear RGB radiance of every pixel, row by row from the top left.
     pub image: Vec<Vec3>,
-    /// How often each event happened.
+    /// Count of every event.
     pub counts: Counts,
 }
 
-/// Renders `draws` as seen by `camera`, handing each work packet to `emit` in the order of the modelled hardware.
+/// Render `draws` as seen by `camera`. `emit` gets every work packet in the order of the modelled hardware.
 ///
-/// The image and every packet are the same for any number of threads.
+/// The image and all packets are the same for any number of threads.
 ///
 /// # Errors
-/// When a cache of the settings cannot be built.
+/// [`CacheError`] if a cache of the settings is invalid.
 pub fn render(
     camera: &Camera,
     draws: &[Draw<'_>],
@@ -59,10 +56,11 @@ pub fn render(
     render_with_heat(camera, draws, settings, &[], |packet, _| emit(packet)).map(|(rendered, _)| rendered)
 }
 
-/// The same, each packet with the lines it asks the L2 for, and where in the image each of `events` happened.
+/// Render as [`render`] does. `emit` also gets the lines each packet requests from the L2, and the result has
+/// a heat map for each of `events`.
 ///
 /// # Errors
-/// When a cache of the settings cannot be built.
+/// [`CacheError`] if a cache of the settings is invalid.
 pub fn render_with_heat(
     camera: &Camera,
     draws: &[Draw<'_>],
@@ -76,11 +74,12 @@ pub fn render_with_heat(
     Ok((Rendered { image: images.into_iter().flatten().collect(), counts }, heat))
 }
 
-/// Renders several images in one pass: image `k` is the mean of those samples of each pixel whose indices are in `views[k]`.
-/// Runs may overlap; indices beyond the samples of a pixel add nothing, and an image of no samples is black.
+/// Render several images in one pass. Image `k` is the mean of the samples of each pixel whose indices are in
+/// `views[k]`. Ranges may overlap. Indices beyond the samples of a pixel are ignored, and an image without
+/// samples is black.
 ///
 /// # Errors
-/// When a cache of the settings cannot be built.
+/// [`CacheError`] if a cache of the settings is invalid.
 pub fn render_views(
     camera: &Camera,
     draws: &[Draw<'_>],
@@ -96,11 +95,11 @@ pub fn render_views(
     draw(&pass, &[], &mut emit).map(|(images, counts, _)| (images, counts))
 }
 
-/// A pass that leaves depths and no image, such as a shadow map: nothing is shaded, and the depths are written to memory. What
-/// each sample sees is told as by [`visibility`].
+/// Render depths only, such as a shadow map. Nothing is shaded, and the depths are written to memory. The
+/// result is that of [`visibility`], with the counts.
 ///
 /// # Errors
-/// When a cache of the settings cannot be built.
+/// [`CacheError`] if a cache of the settings is invalid.
 pub fn render_depth(
     camera: &Camera,
     draws: &[Draw<'_>],
@@ -113,8 +112,8 @@ pub fn render_depth(
         counts += &packet.counts;
         emit(packet, lines);
     };
-    let bins = rasterize(&pass, &mut replay, &mut |done: Done<'_>| {
-        if let Done::Packet(packet, lines) = done {
+    let bins = rasterize(&pass, &mut replay, &mut |done: Finished<'_>| {
+        if let Finished::Packet(packet, lines) = done {
             emit(packet, lines);
         }
     });
@@ -122,64 +121,66 @@ pub fn render_depth(
     Ok((resolve::visible(&pass, &bins), counts))
 }
 
-/// Images, counts and heat.
-type Drawn = (Vec<Vec<Vec3>>, Counts, Vec<HeatMap>);
+/// Images, counts and heat maps.
+type PassOutput = (Vec<Vec<Vec3>>, Counts, Vec<HeatMap>);
 
-/// A pass from its draws to its images.
+/// Render a pass.
 fn draw(
     pass: &Pass<'_>,
     events: &[Event],
     emit: &mut impl FnMut(&Packet, &[LineAccess]),
-) -> Result<Drawn, CacheError> {
+) -> Result<PassOutput, CacheError> {
     let mut heat: Vec<_> = events.iter().map(|&event| HeatMap::new(event, pass)).collect();
     let mut counts = Counts::default();
     let mut replay = Replay::new(pass)?;
-    let mut emit = |work: Done<'_>| match work {
-        Done::Packet(packet, lines) => {
+    let mut emit = |work: Finished<'_>| match work {
+        Finished::Packet(packet, lines) => {
             counts += &packet.counts;
             heat.iter_mut().for_each(|map| map.packet(packet));
             emit(packet, lines);
         }
-        Done::Tests(number, bin, log) => heat.iter_mut().for_each(|map| map.tests(pass, number, bin, log)),
+        Finished::Tests(number, bin, log) => {
+            heat.iter_mut().for_each(|map| map.tests(pass, number, bin, log))
+        }
     };
     let bins = rasterize(pass, &mut replay, &mut emit);
-    replay.finish(&mut |packet: &Packet, lines: &[LineAccess]| emit(Done::Packet(packet, lines)));
+    replay.finish(&mut |packet: &Packet, lines: &[LineAccess]| emit(Finished::Packet(packet, lines)));
     Ok((resolve::resolve(pass, &bins), counts, heat))
 }
 
-/// Something that was done, told in order.
-enum Done<'a> {
+/// A unit of finished work, in the order of the modelled hardware.
+enum Finished<'a> {
     /// A packet and its lines.
     Packet(&'a Packet, &'a [LineAccess]),
-    /// The work of a batch in a bin, with the bin's number.
+    /// Work of a batch in a bin, with the bin's number.
     Tests(usize, &'a Bin, &'a BinLog),
 }
 
-/// The triangle each sample sees (`u32::MAX` for none) and the bits of its depth (infinite for none), in the order
-/// `(y width + x) per_pixel + index`.
+/// Visible triangle (`u32::MAX` for none) and bits of its depth (infinite for none) of every sample, in the
+/// order `(y width + x) per_pixel + index`.
 ///
 /// # Errors
-/// When a cache of the settings cannot be built.
+/// [`CacheError`] if a cache of the settings is invalid.
 pub fn visibility(
     camera: &Camera,
     draws: &[Draw<'_>],
     settings: &Settings<'_>,
 ) -> Result<Vec<(u32, u32)>, CacheError> {
     let pass = Pass::with_views(camera, draws, settings, Vec::new());
-    let bins = rasterize(&pass, &mut Replay::new(&pass)?, &mut |_: Done<'_>| ());
+    let bins = rasterize(&pass, &mut Replay::new(&pass)?, &mut |_: Finished<'_>| ());
     Ok(resolve::visible(&pass, &bins))
 }
 
-/// Every batch through the front end and the bins; what the tiles touched is replayed batch by batch. Bins are double
-/// buffered: the front end works on the next batch while tiles are traversed, so its packets come one batch ahead. After
+/// Process every batch: front end, bins, and replay of the work of the tiles. Bins are double buffered: the
+/// front end works on the next batch while tiles are traversed, so its packets come one batch ahead. After
 /// the last batch each bin is resolved at once, while its samples are still in the caches.
-fn rasterize<F: FnMut(Done<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut F) -> Vec<Bin> {
+fn rasterize<F: FnMut(Finished<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done: &mut F) -> Vec<Bin> {
     let mut bins = Bin::all(pass);
     let mut batches = pass.batches();
-    // Without a single triangle there is still an image to resolve.
+    // Without triangles there is still an image to resolve.
     let first = batches.next().unwrap_or(0..0);
     let front_end = |batch, replay: &mut Replay<'_>, done: &mut F| {
-        let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Done::Packet(packet, lines));
+        let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
         vertices::front_end(pass, batch, replay, emit)
     };
     let mut next = Some(front_end(first, replay, done));
@@ -192,8 +193,8 @@ fn rasterize<F: FnMut(Done<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done:
         );
         let logs = rasterize_bins(pass, &mut bins, &ready, &lists);
         for ((bin, log), number) in bins.iter().zip(&logs).zip(0..) {
-            done(Done::Tests(number, bin, log));
-            let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Done::Packet(packet, lines));
+            done(Finished::Tests(number, bin, log));
+            let emit = &mut |packet: &Packet, lines: &[LineAccess]| done(Finished::Packet(packet, lines));
             replay.bin(log, emit);
             if next.is_none() {
                 replay.resolve(bin, emit);
@@ -203,9 +204,10 @@ fn rasterize<F: FnMut(Done<'_>)>(pass: &Pass<'_>, replay: &mut Replay<'_>, done:
     bins
 }
 
-/// The logs of a batch, by bin. Where `auto` has learnt nothing yet some bins go first, and the others know what they have learnt.
+/// Logs of a batch, by bin. While the feature `auto` has no statistics, some bins run first, and the others
+/// start with their statistics.
 fn rasterize_bins(pass: &Pass<'_>, bins: &mut [Bin], ready: &[Ready], lists: &[Vec<u32>]) -> Vec<BinLog> {
-    const FIRST_OF: usize = 4;
+    const BINS_PER_FIRST: usize = 4;
     let mut logs = vec![BinLog::default(); bins.len()];
     let mut run = |bins: &mut [Bin], chosen: &(dyn Fn(usize) -> bool + Sync)| {
         let all = bins.par_iter_mut().zip(lists).zip(&mut logs).enumerate();
@@ -216,23 +218,23 @@ fn rasterize_bins(pass: &Pass<'_>, bins: &mut [Bin], ready: &[Ready], lists: &[V
             },
         );
     };
-    if !pass.settings.spec.features.auto || bins.iter().any(|bin| bin.judge.has_learnt()) {
+    if !pass.settings.spec.features.auto || bins.iter().any(|bin| bin.selector.has_records()) {
         run(bins, &|_| true);
         return logs;
     }
     let mut busiest: Vec<_> = (0..bins.len()).collect();
     busiest.sort_by_key(|&bin| std::cmp::Reverse(lists[bin].len()));
     let mut first = vec![false; bins.len()];
-    busiest.iter().take(bins.len().div_ceil(FIRST_OF)).for_each(|&bin| first[bin] = true);
+    busiest.iter().take(bins.len().div_ceil(BINS_PER_FIRST)).for_each(|&bin| first[bin] = true);
     run(bins, &|bin| first[bin]);
-    let mut known = Judge::new();
-    bins.iter().for_each(|bin| known.join(&bin.judge));
-    bins.iter_mut().zip(&first).filter(|(_, first)| !**first).for_each(|(bin, _)| bin.judge = known);
+    let mut known = TestSelector::new();
+    bins.iter().for_each(|bin| known.merge(&bin.selector));
+    bins.iter_mut().zip(&first).filter(|(_, first)| !**first).for_each(|(bin, _)| bin.selector = known);
     run(bins, &|bin| !first[bin]);
     logs
 }
 
-/// A packet of the only pass there is so far.
+/// A packet of pass 0, the only pass so far.
 fn packet(kind: PacketKind, tile: u32, triangle: u32) -> Packet {
     Packet::new(kind, 0, tile, triangle)
 }

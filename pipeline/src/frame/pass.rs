@@ -1,58 +1,58 @@
-//! A pass: draws and a camera, brought to the image plane, with every triangle numbered.
+//! Pass: draws and a camera, projected to the image plane, with numbered triangles.
 
 use std::ops::Range;
 
 use glam::Vec4;
 
-use super::draw::Draw;
 use super::{Features, Settings};
 use crate::depth::BoxGrid;
-use crate::geometry::{Camera, Clip, MovingVertex, Projection, Viewport};
+use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Viewport};
 use crate::memory::{AddressMap, Allocator};
 use crate::setup::Corner;
+use crate::shading::Shader;
 use crate::texture::Texture;
-use crate::traversal::small::{at_rest, blur_px, motion_px};
+use crate::traversal::thresholds::{at_rest, blur_px, motion_px};
 
 /// A triangle as it is drawn.
 pub(super) struct Staged {
     pub vertices: [MovingVertex; 3],
-    /// Whether it is sheared by the lens.
+    /// Whether the lens shears it.
     pub lens: bool,
 }
 
-/// Everything the stages read and none of them changes.
+/// Data of a pass that all stages read and none changes.
 pub(super) struct Pass<'a> {
     pub draws: &'a [Draw<'a>],
     pub settings: &'a Settings<'a>,
     pub projection: Projection,
     /// Vertices on the image plane, by draw.
     pub vertices: Vec<Vec<MovingVertex>>,
-    /// The first triangle of each draw, and one past the last of all.
+    /// First triangle of each draw, and the total number.
     first_triangle: Vec<u32>,
     pub addresses: AddressMap,
     /// Image coordinate of the first column and row.
     pub origin: [f32; 2],
     /// Whether the camera has a lens.
     pub lens: bool,
-    /// The part of lens and shutter in which anything is drawn.
+    /// Part of lens and shutter in which anything is drawn.
     pub clip: Clip,
-    /// Whether the camera does not move while the shutter is open.
+    /// Whether the camera is still while the shutter is open.
     pub still_camera: bool,
-    /// The camera in world space at mid-shutter, as a homogeneous point.
+    /// Camera position in world space at mid-shutter, homogeneous.
     pub eye: Vec4,
-    /// Whether workers note where tile tests are done.
+    /// Whether workers record tile tests by tile.
     pub heat: bool,
-    /// The samples of a pixel that each image is the mean of; without any the pass leaves depths only and shades nothing.
+    /// Range of samples of each image. Without ranges the pass computes depths only.
     pub views: Vec<Range<u32>>,
 }
 
 impl<'a> Pass<'a> {
-    /// A pass with an image of all samples.
+    /// A pass with one image of all samples.
     pub fn new(camera: &Camera, draws: &'a [Draw<'a>], settings: &'a Settings<'a>) -> Self {
         Self::with_views(camera, draws, settings, std::iter::once(0..settings.samples.per_pixel()).collect())
     }
 
-    /// A pass with an image for each run of samples, or with depths only.
+    /// A pass with an image for each range of samples, or with depths only.
     pub fn with_views(
         camera: &Camera,
         draws: &'a [Draw<'a>],
@@ -85,32 +85,32 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Runs of triangles that are binned together.
+    /// Ranges of triangles that are binned together.
     pub fn batches(&self) -> impl Iterator<Item = Range<u32>> + use<'_> {
         let total = self.first_triangle[self.draws.len()];
         let size = self.settings.spec.batch_triangles;
         (0..total.div_ceil(size)).map(move |batch| batch * size..total.min(batch * size + size))
     }
 
-    /// The draw a triangle belongs to, and its place in the draw.
+    /// Draw of a triangle, and its index in the draw.
     pub fn locate(&self, triangle: u32) -> (usize, usize) {
         let draw = self.first_triangle.partition_point(|&first| first <= triangle) - 1;
         (draw, (triangle - self.first_triangle[draw]) as usize)
     }
 
-    /// The vertex indices of a triangle and its draw.
+    /// Draw of a triangle, and its vertex indices.
     pub fn corners(&self, triangle: u32) -> (usize, [usize; 3]) {
         let (draw, index) = self.locate(triangle);
         (draw, self.draws[draw].geometry.triangles()[index].map(|vertex| vertex as usize))
     }
 
-    /// The vertices of a triangle on the image plane.
+    /// Vertices of a triangle on the image plane.
     pub fn images(&self, triangle: u32) -> [&MovingVertex; 3] {
         let (draw, corners) = self.corners(triangle);
         corners.map(|vertex| &self.vertices[draw][vertex])
     }
 
-    /// A triangle as it is drawn: with motion or blur left out where they are below the thresholds of the settings.
+    /// A triangle as it is drawn, without motion or blur below the thresholds of the settings.
     pub fn staged(&self, triangle: u32) -> Staged {
         let (images, shear) = (self.images(triangle), &self.projection.shear);
         let Features { still_px, in_focus_px, .. } = self.settings.spec.features;
@@ -122,18 +122,18 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// The corners of a triangle and whether any of them moves.
+    /// Corners of a triangle, and whether any of them moves.
     pub fn moving_corners(&self, triangle: u32) -> ([Corner; 3], bool) {
         let vertices = self.staged(triangle).vertices;
         (vertices.each_ref().map(Corner::new), vertices.iter().any(|vertex| !vertex.is_still()))
     }
 
-    /// How lens and time are divided for depth culling.
+    /// Division of lens and time for depth culling.
     pub fn depth_grid(&self) -> BoxGrid {
         BoxGrid::new(self.settings.spec.depth.boxes, self.lens).unwrap_or_default()
     }
 
-    /// Whether depths are all that is asked for.
+    /// Whether the pass computes depths only.
     pub fn is_depth_only(&self) -> bool {
         self.views.is_empty()
     }
@@ -177,4 +177,15 @@ fn addresses(draws: &[Draw<'_>], settings: &Settings<'_>, images: usize) -> Addr
         })
         .collect();
     AddressMap { depth, colour, image, vertices, textures }
+}
+
+/// Triangles with a shader.
+#[derive(Clone, Copy)]
+pub struct Draw<'a> {
+    /// Triangles.
+    pub geometry: Geometry<'a>,
+    /// Shader: its cost and its colours.
+    pub shader: &'a dyn Shader,
+    /// Culled faces.
+    pub cull: Cull,
 }

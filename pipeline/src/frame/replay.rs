@@ -1,10 +1,10 @@
-//! The replay: what workers logged is walked in the order of the modelled hardware, through its caches.
+//! Replay: the logs of the workers in the order of the modelled hardware, through its caches.
 
 use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 
 use super::Shading;
 use super::bin::Bin;
-use super::counters::{BinLog, Work};
+use super::bin::{BinLog, Work};
 use super::pass::Pass;
 use super::surface::Surface;
 use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
@@ -15,27 +15,27 @@ use crate::shading::QuadAccess;
 /// Bytes of a stored depth or colour of one sample, and of a pixel of the image.
 const SAMPLE_BYTES: u64 = 4;
 
-/// The state of every cache during a frame.
+/// State of all caches during a frame.
 pub(super) struct Replay<'a> {
     pass: &'a Pass<'a>,
     memory: MemorySystem,
     shading: Cache,
     reuse: Reuse,
-    /// Lines of depth and of colour that hold something else than the clear value.
+    /// Depth and colour lines that no longer hold the clear value.
     depth_used: Vec<bool>,
     colour_used: Vec<bool>,
-    /// Of each tile the pixels whose depths and whose colours fit in half their room; empty where nothing is compressed.
+    /// Pixels of each tile whose depths and whose colours compress to half; empty without compression.
     small: Vec<[u64; 2]>,
 }
 
-/// Vertices shaded of late, first in first out.
+/// Recently shaded vertices, first in first out.
 struct Reuse {
     recent: Vec<(usize, u32)>,
     next: usize,
 }
 
 impl Reuse {
-    fn knows(&mut self, vertex: (usize, u32)) -> bool {
+    fn contains_or_insert(&mut self, vertex: (usize, u32)) -> bool {
         if self.recent.contains(&vertex) {
             return true;
         }
@@ -68,13 +68,13 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Fetches and shades the vertices of a triangle that were not shaded of late.
+    /// Fetch and shade the vertices of a triangle that were not shaded recently.
     pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
         let geometry = &self.pass.draws[draw].geometry;
         let bytes = geometry.vertex_bytes();
         let ends = if geometry.is_still() && self.pass.still_camera { 1 } else { 2 };
         for vertex in self.pass.corners(triangle).1 {
-            if self.reuse.knows((draw, vertex as u32)) {
+            if self.reuse.contains_or_insert((draw, vertex as u32)) {
                 continue;
             }
             counts[Event::VerticesFetched] += 1;
@@ -86,20 +86,20 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Hands a packet on, with the lines that the L2 was asked for since the one before.
-    pub fn tell(&mut self, packet: &Packet, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
+    /// Emit a packet with the lines requested from the L2 since the previous packet.
+    pub fn emit(&mut self, packet: &Packet, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         emit(packet, self.memory.log());
-        self.memory.forget();
+        self.memory.clear_log();
     }
 
-    /// The packets of one bin in one batch.
+    /// Emit the packets of one bin in one batch.
     pub fn bin(&mut self, log: &BinLog, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut first_quad = 0;
         for work in &log.work {
             let quads = &log.quads[first_quad..work.quads_end as usize];
             first_quad = work.quads_end as usize;
             let packet = self.tile(work, quads);
-            self.tell(&packet, emit);
+            self.emit(&packet, emit);
         }
     }
 
@@ -141,7 +141,7 @@ impl<'a> Replay<'a> {
         packet
     }
 
-    /// Notes which lines of the tile fit in half their room after a packet. Where tiles are smaller than a line, the one that was
+    /// Record which lines of the tile compress to half after a packet. If a line spans several tiles, the one
     /// written last decides.
     fn compress(&mut self, work: &Work) {
         let Some(small) = self.small.get_mut(work.tile as usize) else { return };
@@ -152,12 +152,12 @@ impl<'a> Replay<'a> {
         self.lines(work.tile, work.written_pixels, |this, line, _| {
             let pixels = this.pixels_of(work.tile, line);
             for (base, small) in bases.into_iter().zip(now) {
-                this.memory.fits(base + line * LINE_BYTES, small & pixels == pixels);
+                this.memory.set_compressed(base + line * LINE_BYTES, small & pixels == pixels);
             }
         });
     }
 
-    /// The pixels of a tile that have samples in `line`.
+    /// Pixels of a tile that have samples in `line`.
     fn pixels_of(&self, tile: u32, line: u64) -> u64 {
         let spec = self.pass.settings.spec;
         let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
@@ -168,7 +168,7 @@ impl<'a> Replay<'a> {
         (first..=last).fold(0, |pixels, pixel| pixels | 1 << pixel)
     }
 
-    /// The quads of a packet through the shading cache, those that are not there through the shader cores.
+    /// Look up the quads of a packet in the shading cache, and shade those that miss.
     fn shade(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
         let surface = Surface::new(self.pass, triangle);
         for access in quads {
@@ -185,7 +185,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// The same where every sample is shaded: all quads through the shader cores.
+    /// Shade the quads of a packet at every sample, without a shading cache.
     fn shade_samples(&mut self, triangle: u32, quads: &[QuadAccess], counts: &mut PacketCounts) {
         let surface = Surface::new(self.pass, triangle);
         let source = self.pass.settings.samples;
@@ -208,15 +208,16 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Each line of a tile's samples that holds one of `pixels`, with those of them it holds.
+    /// Call `each` for every line of a tile's samples that holds one of `pixels`, with the mask of these
+    /// pixels.
     fn lines(&mut self, tile: u32, pixels: u64, mut each: impl FnMut(&mut Self, u64, u64)) {
         let spec = self.pass.settings.spec;
         let pixel_bytes = u64::from(self.pass.settings.samples.per_pixel()) * SAMPLE_BYTES;
         let first_byte = u64::from(tile) * u64::from(spec.tile_px * spec.tile_px) * pixel_bytes;
-        let (mut left, mut open) = (pixels, None);
-        while left != 0 {
-            let pixel = u64::from(left.trailing_zeros());
-            left &= left - 1;
+        let (mut remaining, mut open) = (pixels, None);
+        while remaining != 0 {
+            let pixel = u64::from(remaining.trailing_zeros());
+            remaining &= remaining - 1;
             let first = first_byte + pixel * pixel_bytes;
             for line in first / LINE_BYTES..=(first + pixel_bytes - 1) / LINE_BYTES {
                 open = match open {
@@ -231,25 +232,25 @@ impl<'a> Replay<'a> {
         open.into_iter().for_each(|(line, held)| each(self, line, held));
     }
 
-    /// The packets that resolve the tiles of a bin; depths stay what they are.
+    /// Emit the packets that resolve the tiles of a bin; a depth pass has none.
     pub fn resolve(&mut self, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         if self.pass.is_depth_only() {
             return;
         }
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
             let packet = self.resolve_tile(tile, pixels, touched);
-            self.tell(&packet, emit);
+            self.emit(&packet, emit);
         }
     }
 
-    /// The end of the frame: the images, or the depths where there are none, leave the caches.
+    /// End the frame: the images, or the depths of a depth pass, are written back.
     pub fn finish(&mut self, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         let mut last = super::packet(PacketKind::Resolve, 0, u32::MAX);
         let at = &self.pass.addresses;
         let end = at.vertices.first().copied().unwrap_or(u64::MAX);
         let kept = if self.pass.is_depth_only() { at.depth..at.colour } else { at.image..end };
         self.memory.finish(kept, &mut last.counts);
-        self.tell(&last, emit);
+        self.emit(&last, emit);
     }
 
     fn resolve_tile(&mut self, tile: u32, pixels: u64, touched: bool) -> Packet {
@@ -279,7 +280,7 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Four lanes of the shader, those that nobody asked for being helpers.
+/// Shade four lanes; lanes that were not requested are helpers.
 fn run_quad(surface: &Surface<'_>, access: &QuadAccess, counts: &mut PacketCounts) {
     counts[Event::QuadsShaded] += 1;
     counts[Event::PixelInvocations] += 4;
@@ -287,7 +288,7 @@ fn run_quad(surface: &Surface<'_>, access: &QuadAccess, counts: &mut PacketCount
     counts[Event::ShaderOps] += 4 * surface.shader().cost().pixel_ops;
 }
 
-/// The key of a quad in the shading cache, spread so that the set a quad falls into does not favour any direction.
+/// Key of a quad in the shading cache, hashed so that sets are used evenly in all directions.
 fn quad_key(triangle: u32, quad: [i32; 2]) -> u64 {
     let [x, y] = quad.map(|part| u64::from(part as u32));
     mix(mix(u64::from(triangle)) ^ (x << 32 | y))

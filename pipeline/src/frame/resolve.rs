@@ -1,4 +1,4 @@
-//! From what each sample sees to the image.
+//! Resolve: from visible triangles of samples to the image.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use super::Shading;
 use super::bin::Bin;
-use super::look::Look;
 use super::pass::Pass;
+use super::surface::SampleView;
 use super::surface::{Grid, Surface};
 use crate::depth::DepthTile;
 use crate::random::mix;
 use crate::sampling::TileSamples;
 
-/// The images: each pixel the mean of its samples.
+/// The images; each pixel is the mean of its samples.
 pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
     let viewport = pass.settings.viewport;
     let tiles: Vec<_> = bins.par_iter().map(|bin| resolve_bin(pass, bin)).collect();
@@ -34,16 +34,16 @@ pub(super) fn resolve(pass: &Pass<'_>, bins: &[Bin]) -> Vec<Vec<Vec3>> {
     images
 }
 
-/// The triangle each sample sees and the bits of its depth, pixel by pixel in rows.
+/// Visible triangle and depth bits of every sample, pixel by pixel in rows.
 pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
     let (viewport, per_pixel) = (pass.settings.viewport, pass.settings.samples.per_pixel());
     let mut seen =
-        vec![(DepthTile::NOTHING, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel as usize];
+        vec![(DepthTile::NO_TRIANGLE, f32::INFINITY.to_bits()); viewport.pixels() * per_pixel as usize];
     let mut samples = TileSamples::default();
     for bin in bins {
-        for (place, tile) in bin.tiles.iter().enumerate() {
+        for (index, tile) in bin.tiles.iter().enumerate() {
             let Some(tile) = tile else { continue };
-            let (origin, side) = (bin.tile_origin(pass, place), pass.settings.spec.tile_px);
+            let (origin, side) = (bin.tile_origin(pass, index), pass.settings.spec.tile_px);
             samples.fill(pass.settings.samples, viewport, &pass.projection.shear, origin, side);
             for slot in 0..samples.len {
                 let index = samples.in_image(slot, origin, side, viewport, per_pixel);
@@ -54,14 +54,14 @@ pub(super) fn visible(pass: &Pass<'_>, bins: &[Bin]) -> Vec<(u32, u32)> {
     seen
 }
 
-/// The touched tiles of a bin: the first pixel of each and its pixels, view by view and row by row.
+/// Touched tiles of a bin: first pixel and pixels of each, view by view and row by row.
 fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
     let mut samples = TileSamples::default();
     let mut scratch = Scratch::default();
     let mut resolved = Vec::new();
-    for (place, tile) in bin.tiles.iter().enumerate() {
+    for (index, tile) in bin.tiles.iter().enumerate() {
         let Some(tile) = tile else { continue };
-        let origin = bin.tile_origin(pass, place);
+        let origin = bin.tile_origin(pass, index);
         let settings = pass.settings;
         samples.fill(
             settings.samples,
@@ -75,16 +75,16 @@ fn resolve_bin(pass: &Pass<'_>, bin: &Bin) -> Vec<([u32; 2], Vec<Vec3>)> {
     resolved
 }
 
-/// Memory a worker uses over and over.
+/// Memory reused by a worker.
 #[derive(Default)]
 struct Scratch {
-    /// Slots of a tile, those of one triangle together.
+    /// Slots of a tile, grouped by triangle.
     slots: Vec<u16>,
     /// Cells of one triangle shaded so far.
     shaded: HashMap<[i32; 2], Vec3, BuildHasherDefault<CellHasher>>,
 }
 
-/// Every sample takes the colour of its cell, each cell of a triangle being shaded once for a tile, or is shaded itself.
+/// Shade a tile: each cell of a triangle once, or every sample.
 fn resolve_tile(
     pass: &Pass<'_>,
     tile: &DepthTile,
@@ -102,11 +102,11 @@ fn resolve_tile(
     };
     scratch.slots.clear();
     scratch.slots.extend(0..samples.len as u16);
-    // Stable, so that sums are made in one order.
+    // The stable sort fixes the order of sums.
     scratch.slots.sort_by_key(|&slot| tile.triangle[slot as usize]);
     for group in scratch.slots.chunk_by(|&a, &b| tile.triangle[a as usize] == tile.triangle[b as usize]) {
         let triangle = tile.triangle[group[0] as usize];
-        if triangle == DepthTile::NOTHING {
+        if triangle == DepthTile::NO_TRIANGLE {
             group.iter().for_each(|&slot| add(slot as usize, pass.settings.background));
             continue;
         }
@@ -116,7 +116,7 @@ fn resolve_tile(
         scratch.shaded.clear();
         for slot in group.iter().map(|&slot| slot as usize) {
             let colour = match pass.settings.spec.shading {
-                Shading::PerSample => surface.shade_at(&Look::of_slot(&corners, samples, slot)),
+                Shading::PerSample => surface.shade_at(&SampleView::of_slot(&corners, samples, slot)),
                 Shading::Cached => {
                     let cell = grid.cell(samples, slot, origin, side);
                     *scratch.shaded.entry(cell).or_insert_with(|| surface.shade(cell))
@@ -129,7 +129,7 @@ fn resolve_tile(
     sums.chunks_exact(pixels).zip(counts).flat_map(|(sums, n)| sums.iter().map(move |sum| *sum / n)).collect()
 }
 
-/// Spreads the two coordinates of a cell; the map is never iterated, so nothing depends on its order.
+/// Hasher of the two coordinates of a cell. The map is never iterated, so the order has no effect.
 #[derive(Default)]
 struct CellHasher(u64);
 

@@ -1,4 +1,4 @@
-//! What the modelled hardware is made of, and what one frame asks of it.
+//! Settings of the modelled hardware and of a frame.
 
 use glam::Vec3;
 use serde::Deserialize;
@@ -9,7 +9,8 @@ use crate::memory::{Cache, CacheError, CacheSpec, MemorySpec};
 use crate::sampling::SampleSource;
 use crate::traversal::Timeline;
 
-/// The functional side of the hardware: sizes that decide *what* happens. How fast is the business of a timing model.
+/// Functional parameters of the hardware: sizes that decide *what* happens. Throughput belongs to the timing
+/// models.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PipelineSpec {
@@ -17,60 +18,62 @@ pub struct PipelineSpec {
     pub tile_px: u32,
     /// Side of a coarse tile in pixels, a multiple of `tile_px` up to 256.
     pub coarse_tile_px: u32,
-    /// Triangles binned together; memory for bins does not grow beyond it.
+    /// Triangles per batch, which limits the memory of bins.
     pub batch_triangles: u32,
-    /// Vertices remembered after shading, first in first out.
+    /// Capacity of the FIFO of shaded vertices.
     pub vertex_reuse: u32,
     /// Where visible samples are shaded.
     #[serde(default)]
     pub shading: Shading,
-    /// The shading cache, entries being quads; idle where every sample is shaded.
+    /// Shading cache, with quads as entries; unused if every sample is shaded.
     pub shading_cache: CacheSpec,
-    /// The caches of memory.
+    /// Caches of memory.
     pub memory: MemorySpec,
-    /// Which tests are switched on.
+    /// Enabled tests.
     pub features: Features,
-    /// How depth is bounded and what a tile remembers of it.
+    /// Depth bounds and Hi-Z.
     #[serde(default)]
     pub depth: DepthSpec,
 }
 
-/// Where visible samples are shaded. This changes the image.
+/// Where visible samples are shaded. The choice changes the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub enum Shading {
-    /// At cells of the shading grid, remembered in the shading cache.
+    /// At cells of the shading grid, through the shading cache.
     #[default]
     Cached,
-    /// Each at its own place, lens position and time, and nothing is remembered.
+    /// At every sample's own position, lens position and time, without a cache.
     PerSample,
 }
 
-/// Tests that can be switched off. They change what it costs, never the image; the two thresholds change the image where they are
-/// above zero.
+/// Tests that can be disabled. They change the cost, never the image. The two thresholds change the image if
+/// they are above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Features {
-    /// Narrow the lens by dual-space lines found in set-up.
+    /// Narrow the lens interval by dual-space lines found in set-up.
     pub lens_lines: bool,
     /// Narrow the box of lens and time by the side planes of a tile.
     pub side_planes: bool,
-    /// Find which face a triangle shows over a tile and its box of lens and time.
+    /// Find which face of a triangle is visible over a tile and its box of lens and time.
     pub facing: bool,
-    /// How often the time is bisected at most where it is not decided which face; 0 to 3.
+    /// Largest number of time bisections while the visible face is undecided; 0 to 3.
     pub facing_splits: u32,
     /// Bound the edges over a tile and its box of lens and time.
     pub edges: bool,
-    /// Find facing and bound edges on coarse tiles, too.
+    /// Test facing and edges on coarse tiles, too.
     pub coarse: bool,
-    /// Screen single samples by the linearized edges before they are tested.
+    /// Screen single samples by the linearized edges before the sample test.
     pub screen: bool,
     /// Cull tiles behind the farthest stored depth.
     pub z_max: bool,
-    /// Run of those switched on only what pays.
+    /// Run only those of the enabled tests that pay off.
     pub auto: bool,
-    /// A triangle none of whose points is farther than this many pixels from its place in mid-shutter is drawn there, still. 0: none is.
+    /// A triangle whose points are all within this distance in pixels of their mid-shutter position is drawn
+    /// still at that position. 0 disables it.
     pub still_px: f32,
-    /// A triangle whose circle of confusion has at most this radius in pixels is drawn in focus. 0: none is.
+    /// A triangle whose circle of confusion has at most this radius in pixels is drawn in focus. 0 disables
+    /// it.
     pub in_focus_px: f32,
 }
 
@@ -81,7 +84,7 @@ impl Default for Features {
 }
 
 impl Features {
-    /// Every test there is.
+    /// All tests.
     pub const ALL: Self = Self {
         lens_lines: true,
         side_planes: true,
@@ -109,42 +112,42 @@ impl Features {
     };
 }
 
-/// Why a pipeline cannot be built.
+/// Why a pipeline specification is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SpecError {
-    /// A size is not among those allowed.
+    /// A size has an invalid value.
     #[error("`{field}` is {value}; {allowed}")]
     Size {
-        /// The field.
+        /// Field.
         field: &'static str,
-        /// Its value.
+        /// Value.
         value: u32,
-        /// What would do.
+        /// Allowed values.
         allowed: &'static str,
     },
-    /// A threshold is not a number of pixels.
+    /// A threshold has an invalid value.
     #[error("`{field}` is {value}; it has to be 0 to 16384")]
     Threshold {
-        /// The field.
+        /// Field.
         field: &'static str,
-        /// Its value.
+        /// Value.
         value: String,
     },
-    /// A cache cannot be built.
+    /// A cache is invalid.
     #[error("`{field}`: {source}")]
     Cache {
-        /// The field.
+        /// Field.
         field: &'static str,
-        /// Why.
+        /// Reason.
         source: CacheError,
     },
 }
 
-/// The largest threshold: the side of the largest image.
+/// Largest threshold in pixels: the side of the largest image.
 const MAX_THRESHOLD_PX: f32 = 16_384.0;
 
 impl SpecError {
-    /// The field that is wrong, such as `memory.l2`.
+    /// The invalid field, such as `memory.l2`.
     pub fn field(&self) -> &'static str {
         match self {
             Self::Size { field, .. } | Self::Threshold { field, .. } | Self::Cache { field, .. } => field,
@@ -153,10 +156,10 @@ impl SpecError {
 }
 
 impl PipelineSpec {
-    /// Checks every size.
+    /// Check every size.
     ///
     /// # Errors
-    /// Names the first field that cannot be, and what would do.
+    /// The first invalid field, with the allowed values.
     pub fn validate(&self) -> Result<(), SpecError> {
         let size = |field, value, fits: bool, allowed| {
             if fits { Ok(()) } else { Err(SpecError::Size { field, value, allowed }) }
@@ -170,16 +173,16 @@ impl PipelineSpec {
         let reuse = self.vertex_reuse;
         size("vertex_reuse", reuse, (1..=4096).contains(&reuse), "it has to be 1 to 4096")?;
         let Features { facing_splits, still_px, in_focus_px, .. } = self.features;
-        let most = Timeline::MOST_SPLITS;
-        size("features.facing_splits", facing_splits, facing_splits <= most, "it has to be 0 to 3")?;
+        let max = Timeline::MAX_SPLITS;
+        size("features.facing_splits", facing_splits, facing_splits <= max, "it has to be 0 to 3")?;
         for (field, value) in [("features.still_px", still_px), ("features.in_focus_px", in_focus_px)] {
             if !(0.0..=MAX_THRESHOLD_PX).contains(&value) {
                 return Err(SpecError::Threshold { field, value: value.to_string() });
             }
         }
         let boxes = self.depth.boxes;
-        let most = boxes.iter().copied().find(|count| !(1..=BoxGrid::MOST).contains(count));
-        size("depth.boxes", most.unwrap_or(1), most.is_none(), "it has to be 1 to 16 along each axis")?;
+        let invalid = boxes.iter().copied().find(|count| !(1..=BoxGrid::MAX).contains(count));
+        size("depth.boxes", invalid.unwrap_or(1), invalid.is_none(), "it has to be 1 to 16 along each axis")?;
         let caches = [
             ("shading_cache", self.shading_cache),
             ("memory.depth", self.memory.depth),
@@ -194,15 +197,15 @@ impl PipelineSpec {
     }
 }
 
-/// What one frame asks of the pipeline.
+/// Settings of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings<'a> {
-    /// The hardware; validated.
+    /// Hardware; validated.
     pub spec: &'a PipelineSpec,
-    /// Size of the image.
+    /// Image size.
     pub viewport: Viewport,
-    /// Where and when each pixel looks.
+    /// Sample positions of every pixel.
     pub samples: &'a dyn SampleSource,
-    /// Linear RGB radiance where nothing is hit.
+    /// Linear RGB radiance of samples without a hit.
     pub background: Vec3,
 }

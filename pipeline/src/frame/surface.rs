@@ -1,15 +1,17 @@
-//! From a sample to the cell that shades it, and from a cell to the point of the surface.
+//! Surfaces: the shading cell of a sample, and shading at cells and at samples.
 
 use glam::{Vec2, Vec3, Vec4};
 
 use super::pass::Pass;
+use crate::geometry::Viewport;
 use crate::sample_test::exact;
-use crate::sampling::TileSamples;
+use crate::sampling::{Sample, TileSamples};
 use crate::setup::Corner;
-use crate::shading::{self, REFERENCE_TIME, Shader, ShadingPoint};
+use crate::shading;
+use crate::shading::{QuadAccess, REFERENCE_TIME, Shader, ShadingPoint, weights_at};
 use crate::texture::{Footprint, Sampler};
 
-/// The shading grid over one triangle.
+/// Shading grid over one triangle.
 pub(super) struct Grid<'a> {
     corners: &'a [Corner; 3],
     reference: [[f32; 3]; 3],
@@ -23,8 +25,8 @@ impl<'a> Grid<'a> {
         Self { corners, reference, origin: pass.origin, plain: !moving && !pass.lens }
     }
 
-    /// The cell in which the sample in `slot` of a tile, which sees the triangle, is shaded. Where nothing moves and
-    /// all is in focus that is its own pixel, and so it is where its point of the surface falls behind the camera.
+    /// Cell that shades the sample in `slot` of a tile. A sample of a still triangle in focus uses its own
+    /// pixel. So does a sample whose surface point is behind the camera at the reference.
     pub fn cell(&self, samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
         let own = own_pixel(samples, slot, tile, side);
         if self.plain {
@@ -38,18 +40,18 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The vertices at the reference as homogeneous points of the image plane.
+/// Vertices at the reference, as homogeneous points of the image plane.
 fn reference(pass: &Pass<'_>, corners: &[Corner; 3]) -> [[f32; 3]; 3] {
     corners.map(|corner| pass.projection.shear.homogeneous(corner.at(REFERENCE_TIME)))
 }
 
-/// The pixel of the sample in `slot` of a tile.
+/// Pixel of the sample in `slot` of a tile.
 pub(super) fn own_pixel(samples: &TileSamples, slot: usize, tile: [u32; 2], side: u32) -> [i32; 2] {
     let pixel = u32::from(samples.pixel[slot]);
     [(tile[0] + pixel % side) as i32, (tile[1] + pixel / side) as i32]
 }
 
-/// One triangle as a surface to be shaded.
+/// One triangle as a surface for shading.
 pub(super) struct Surface<'a> {
     pass: &'a Pass<'a>,
     draw: usize,
@@ -70,7 +72,7 @@ impl<'a> Surface<'a> {
         Self { pass, draw, vertices, corners, reference, sampler }
     }
 
-    /// Linear RGB radiance of a cell; a function of the triangle and the cell alone.
+    /// Linear RGB radiance of a cell, a function of the triangle and the cell alone.
     pub fn shade(&self, cell: [i32; 2]) -> Vec3 {
         let weights = shading::cell_weights(&self.reference, cell, self.pass.origin);
         let texel = self.sampler.map_or(Vec4::ONE, |sampler| {
@@ -82,7 +84,7 @@ impl<'a> Surface<'a> {
         self.shader().shade(&self.point(weights, middle), texel)
     }
 
-    /// What a shader is told about the point with the given weights at time `t`.
+    /// Shader input at the point with the given weights at time `t`.
     pub fn point_at(&self, weights: [f32; 3], t: f32) -> ShadingPoint {
         let geometry = &self.pass.draws[self.draw].geometry;
         let ends = self.vertices.map(|v| (geometry.open()[v], geometry.close()[v]));
@@ -97,12 +99,12 @@ impl<'a> Surface<'a> {
         self.sampler
     }
 
-    /// The vertices on the image plane.
+    /// Vertices on the image plane.
     pub fn corners(&self) -> &[Corner; 3] {
         &self.corners
     }
 
-    /// Bilinear fetches that shading the four cells of a quad takes, and each line of memory they read.
+    /// Bilinear fetches of shading the four cells of a quad; `line` gets every memory line they read.
     pub fn fetch(&self, quad: [i32; 2], mut line: impl FnMut(u64)) -> u32 {
         let Some(sampler) = self.sampler else { return 0 };
         let footprint = self.footprint(&sampler, quad);
@@ -114,7 +116,7 @@ impl<'a> Surface<'a> {
         4 * Sampler::fetches(&footprint)
     }
 
-    /// The footprint shared by a quad, from the differences between its cells.
+    /// Footprint of a quad, from the differences between its cells.
     fn footprint(&self, sampler: &Sampler<'_>, quad: [i32; 2]) -> Footprint {
         let at = |dx, dy| {
             let cell = [2 * quad[0] + dx, 2 * quad[1] + dy];
@@ -129,7 +131,7 @@ impl<'a> Surface<'a> {
         if uvs.is_empty() { Vec2::ZERO } else { (0..3).map(|k| uvs[self.vertices[k]] * weights[k]).sum() }
     }
 
-    /// Cells that a border crosses extrapolate, so the colour is cut to what a colour can be.
+    /// Cells on a border extrapolate, so the colour is clamped to its range.
     fn color(&self, weights: [f32; 3]) -> Vec3 {
         let colors = self.pass.draws[self.draw].geometry.colors();
         if colors.is_empty() {
@@ -152,5 +154,87 @@ impl<'a> Surface<'a> {
         let to_camera = (eye.truncate() - position * eye.w).normalize_or_zero();
         let normal = if smooth.dot(to_camera) < 0.0 { -smooth } else { smooth };
         ShadingPoint { position, normal, to_camera, uv: self.uv(weights), color: self.color(weights) }
+    }
+}
+
+/// A triangle as seen by one sample.
+pub(super) struct SampleView {
+    /// The vertices at the sample's time, moved by the part of the lens shear that is independent of depth.
+    /// In an orthographic view they are homogeneous points as seen from the sample.
+    vertices: [[f32; 3]; 3],
+    /// Image position of the sample, including the other part of the lens shear.
+    at: [f32; 2],
+    t: f32,
+}
+
+impl SampleView {
+    /// View of the sample in `slot` of a tile.
+    pub fn of_slot(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> Self {
+        let rays = [0, 1].map(|axis| [samples.slope[axis][slot], samples.lens[axis][slot]]);
+        Self::new(corners, rays, samples.t[slot], samples.parallel)
+    }
+
+    /// View of a sample of pixel (`px`, `py`).
+    fn of_sample(corners: &[Corner; 3], pass: &Pass<'_>, [px, py]: [u32; 2], s: &Sample) -> Self {
+        let (shear, viewport) = (&pass.projection.shear, pass.settings.viewport);
+        let x = Viewport::edge(px, viewport.width()) + s.x;
+        let y = Viewport::edge(py, viewport.height()) + s.y;
+        Self::new(corners, [shear.ray(0, x, s.u), shear.ray(1, y, s.v)], s.t, shear.parallel)
+    }
+
+    /// Each axis has a slope and a base ([`crate::geometry::Shear::ray`]).
+    fn new(corners: &[Corner; 3], [across, down]: [[f32; 2]; 2], t: f32, parallel: bool) -> Self {
+        let vertices = corners.map(|corner| {
+            let [x, y, w] = corner.at(t);
+            let [x, y] = [x - across[1], y - down[1]];
+            if parallel { [x - across[0] * w, y - down[0] * w, 1.0] } else { [x, y, w] }
+        });
+        Self { vertices, at: if parallel { [0.0; 2] } else { [across[0], down[0]] }, t }
+    }
+
+    /// Barycentric weights of the point seen the given number of pixels to the right and below, at the same
+    /// lens position and time.
+    fn weights(&self, right: f32, below: f32) -> [f32; 3] {
+        weights_at(&self.vertices, [self.at[0] + right, self.at[1] + below])
+    }
+}
+
+impl Surface<'_> {
+    /// Linear RGB radiance at the sample's own point.
+    pub fn shade_at(&self, view: &SampleView) -> Vec3 {
+        let weights = view.weights(0.0, 0.0);
+        let texel = self.sampler().map_or(Vec4::ONE, |sampler| {
+            sampler.sample(self.uv(weights), &self.footprint_at(&sampler, view))
+        });
+        self.shader().shade(&self.point_at(weights, view.t), texel)
+    }
+
+    /// Bilinear fetches of the four lanes of a quad of pixels at one sample index; `line` gets every memory
+    /// line they read. `samples` has the samples of each pixel of the quad. A helper lane uses the sample of
+    /// its own pixel.
+    pub fn fetch_at(
+        &self,
+        pass: &Pass<'_>,
+        access: &QuadAccess,
+        samples: &[Vec<Sample>; 4],
+        mut line: impl FnMut(u64),
+    ) -> u32 {
+        let Some(sampler) = self.sampler() else { return 0 };
+        let corners = self.corners();
+        let lanes = [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().zip(samples);
+        lanes.fold(0, |fetches, (offset, of_pixel)| {
+            let pixel = [0, 1].map(|axis| (2 * access.quad[axis] + offset[axis]) as u32);
+            let view = SampleView::of_sample(corners, pass, pixel, &of_pixel[access.sample as usize]);
+            let footprint = self.footprint_at(&sampler, &view);
+            sampler.lines(self.uv(view.weights(0.0, 0.0)), &footprint, &mut line);
+            fetches + Sampler::fetches(&footprint)
+        })
+    }
+
+    /// Footprint of a pixel around the sample's point.
+    fn footprint_at(&self, sampler: &Sampler<'_>, view: &SampleView) -> Footprint {
+        let uv = |right, below| -> Vec2 { self.uv(view.weights(right, below)) };
+        let here = uv(0.0, 0.0);
+        sampler.footprint(uv(1.0, 0.0) - here, uv(0.0, 1.0) - here)
     }
 }

@@ -1,8 +1,8 @@
-//! The tile tests that are switched on, in order of price: what of lens and time one triangle leaves over one tile.
+//! Enabled tile tests of one triangle over one tile, in order of cost: which part of lens and time remains.
 
-use super::counters::TileWork;
-use super::judge::{Did, Judge, Plan, Stake};
+use super::bin::TileWork;
 use super::settings::Features;
+use super::test_selection::{Outcome, TestPlan, TestSelector, Workload};
 use crate::geometry::Shear;
 use crate::sample_test;
 use crate::setup::Triangle;
@@ -11,7 +11,7 @@ use crate::traversal::{
     Timeline, View, narrow_counted,
 };
 
-/// A triangle with what set-up found for its tile tests.
+/// A triangle with the results of its set-up.
 #[derive(Clone, Copy)]
 pub(super) struct Subject<'a> {
     pub triangle: &'a Triangle,
@@ -19,37 +19,37 @@ pub(super) struct Subject<'a> {
     pub shear: &'a Shear,
 }
 
-/// A tile, with how much there is to do on it.
+/// A tile with its amount of work.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct TestTile {
     pub rect: TileRect,
-    /// Whether it holds finer tiles, and how many of them are visited.
+    /// Number of fine tiles to visit in a coarse tile; `None` for a fine tile.
     pub tiles: Option<u32>,
-    /// Samples in those.
+    /// Samples in these tiles.
     pub samples: u32,
 }
 
-/// Which tests to run, what they have done so far and what was learnt from it.
-pub(super) struct Run<'a> {
+/// Enabled tests, their work so far and the statistics of the bin.
+pub(super) struct TestContext<'a> {
     pub features: &'a Features,
     pub work: &'a mut TileWork,
-    pub judge: &'a mut Judge,
+    pub selector: &'a mut TestSelector,
 }
 
-/// Where in lens and time the triangle may still be seen, and which faces when.
+/// Remaining part of lens and time in which the triangle may be visible, and the visible faces over time.
 #[derive(Clone, Copy)]
-pub(super) struct Left {
+pub(super) struct Remaining {
     pub within: Box5,
     pub times: Timeline,
     edges: Option<Edges>,
-    /// Whether facing was found.
+    /// Whether the facing test was run.
     pub facing: bool,
     /// Whether screens were set up.
     pub screened: bool,
 }
 
-impl Left {
-    /// Nothing is ruled out in `within`.
+impl Remaining {
+    /// Everything in `within` remains.
     pub fn all(within: Box5) -> Self {
         Self {
             within,
@@ -60,7 +60,7 @@ impl Left {
         }
     }
 
-    /// The same in the box `within`, or `None` where nothing is left.
+    /// The part inside the box `within`, or `None` if it is empty.
     pub fn narrowed(&self, within: Box5) -> Option<Self> {
         let times = self.times.meet(&Timeline::one(Piece { t: within.t, faces: [true; 2] }));
         Some(Self {
@@ -72,7 +72,7 @@ impl Left {
         })
     }
 
-    /// The share of all of lens and time that is left; samples are spread evenly over them.
+    /// Fraction of the whole lens and shutter that remains. Samples are distributed evenly over it.
     pub fn volume(&self, moving: bool) -> f64 {
         let length = |[lo, hi]: [f32; 2]| f64::from((hi - lo).max(0.0));
         let time: f64 = self.times.pieces().iter().map(|piece| length(piece.t)).sum();
@@ -82,115 +82,146 @@ impl Left {
 }
 
 impl Subject<'_> {
-    /// What is left at `place` of what was `left` before, or `None` where the triangle is not seen there.
-    pub fn test(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> Option<Left> {
-        // Edges found over a coarser tile are those of that tile.
-        let mut left = Left { edges: None, facing: false, ..*left };
-        let lines = self.lines.filter(|_| run.features.lens_lines && left.within.lens);
+    /// Run the tests at `tile` on the part `remaining` so far. `None` if the triangle is not visible there.
+    pub fn test(
+        &self,
+        tile: &TestTile,
+        remaining: &Remaining,
+        context: &mut TestContext<'_>,
+    ) -> Option<Remaining> {
+        // Edges of a coarser tile are not valid here.
+        let mut remaining = Remaining { edges: None, facing: false, ..*remaining };
+        let lines = self.lines.filter(|_| context.features.lens_lines && remaining.within.lens);
         if let Some(lines) = lines {
-            left = left.narrowed(lens_lines_over(lines, &place.rect, left.within, run.work)?)?;
+            remaining =
+                remaining.narrowed(lens_lines_over(lines, &tile.rect, remaining.within, context.work)?)?;
         }
-        let allowed = self.allowed(place, &left, run.features);
-        if !run.features.auto || allowed == Plan(0) {
-            return self.plan(allowed, place, left, run);
+        let allowed = self.allowed(tile, &remaining, context.features);
+        if !context.features.auto || allowed == TestPlan(0) {
+            return self.run_plan(allowed, tile, remaining, context);
         }
-        let stake = self.stake(allowed, place, &left);
-        match run.judge.plan(&stake) {
-            Some(plan) => self.watched(&stake, plan, place, left, run),
-            None => self.trial(&stake, place, left, run),
+        let workload = self.workload(allowed, tile, &remaining);
+        match context.selector.choose(&workload) {
+            Some(plan) => self.run_recorded(&workload, plan, tile, remaining, context),
+            None => self.explore(&workload, tile, remaining, context),
         }
     }
 
-    /// The tests that are switched on and can help here.
-    fn allowed(&self, place: &Place, left: &Left, features: &Features) -> Plan {
-        let here = features.coarse || place.tiles.is_none();
+    /// Tests that are enabled and can help here.
+    fn allowed(&self, tile: &TestTile, remaining: &Remaining, features: &Features) -> TestPlan {
+        let here = features.coarse || tile.tiles.is_none();
         let sides =
-            features.side_planes && (self.triangle.moving || left.within.lens || self.triangle.behind);
+            features.side_planes && (self.triangle.moving || remaining.within.lens || self.triangle.behind);
         let bits = [
-            (sides, Plan::SIDES),
-            (features.facing && here, Plan::FACING),
-            (features.edges && here, Plan::EDGES),
+            (sides, TestPlan::SIDES),
+            (features.facing && here, TestPlan::FACING),
+            (features.edges && here, TestPlan::EDGES),
         ];
-        Plan(bits.iter().map(|&(on, bit)| if on { bit } else { 0 }).sum())
+        TestPlan(bits.iter().map(|&(on, bit)| if on { bit } else { 0 }).sum())
     }
 
-    fn plan(&self, plan: Plan, place: &Place, left: Left, run: &mut Run<'_>) -> Option<Left> {
-        let tests = [Plan::SIDES, Plan::FACING, Plan::EDGES];
+    fn run_plan(
+        &self,
+        plan: TestPlan,
+        tile: &TestTile,
+        remaining: Remaining,
+        context: &mut TestContext<'_>,
+    ) -> Option<Remaining> {
+        let tests = [TestPlan::SIDES, TestPlan::FACING, TestPlan::EDGES];
         tests
             .into_iter()
             .filter(|&test| plan.has(test))
-            .try_fold(left, |left, test| self.step(test, place, left, run))
+            .try_fold(remaining, |remaining, test| self.step(test, tile, remaining, context))
     }
 
-    /// The same, learning from it.
-    fn watched(
+    /// Run a plan and record its outcome.
+    fn run_recorded(
         &self,
-        stake: &Stake,
-        plan: Plan,
-        place: &Place,
-        left: Left,
-        run: &mut Run<'_>,
-    ) -> Option<Left> {
-        let Some((_, parent)) = plan.last() else { return Some(left) };
-        let left = self.watched(stake, parent, place, left, run)?;
-        self.watched_step(stake, plan, place, left, run)
+        workload: &Workload,
+        plan: TestPlan,
+        tile: &TestTile,
+        remaining: Remaining,
+        context: &mut TestContext<'_>,
+    ) -> Option<Remaining> {
+        let Some((_, parent)) = plan.last() else { return Some(remaining) };
+        let remaining = self.run_recorded(workload, parent, tile, remaining, context)?;
+        self.step_recorded(workload, plan, tile, remaining, context)
     }
 
-    /// The last test of a plan on what those before it have left.
-    fn watched_step(
+    /// Run the last test of a plan on the part kept by the tests before it, and record the outcome.
+    fn step_recorded(
         &self,
-        stake: &Stake,
-        plan: Plan,
-        place: &Place,
-        left: Left,
-        run: &mut Run<'_>,
-    ) -> Option<Left> {
-        let Some((test, _)) = plan.last() else { return Some(left) };
-        let (volume, madds) = (left.volume(self.triangle.moving), run.work.tile_madds());
-        let rest = self.step(test, place, left, run);
-        let after = rest.map_or(0.0, |rest| rest.volume(self.triangle.moving));
-        let left = if volume > 0.0 { after / volume } else { f64::from(u8::from(rest.is_some())) };
-        let samples = f64::from(place.samples) * volume;
-        run.judge.learn(stake, plan, &Did { madds: run.work.tile_madds() - madds, samples, left });
-        rest
+        workload: &Workload,
+        plan: TestPlan,
+        tile: &TestTile,
+        remaining: Remaining,
+        context: &mut TestContext<'_>,
+    ) -> Option<Remaining> {
+        let Some((test, _)) = plan.last() else { return Some(remaining) };
+        let (volume, madds) = (remaining.volume(self.triangle.moving), context.work.tile_madds());
+        let narrowed = self.step(test, tile, remaining, context);
+        let after = narrowed.map_or(0.0, |narrowed| narrowed.volume(self.triangle.moving));
+        let kept = if volume > 0.0 { after / volume } else { f64::from(u8::from(narrowed.is_some())) };
+        let samples = f64::from(tile.samples) * volume;
+        context.selector.record(
+            workload,
+            plan,
+            &Outcome { madds: context.work.tile_madds() - madds, samples, kept },
+        );
+        narrowed
     }
 
-    /// Every plan on what is `left`; the rest of the fullest one is kept.
-    fn trial(&self, stake: &Stake, place: &Place, left: Left, run: &mut Run<'_>) -> Option<Left> {
-        let before = run.work.tile_madds();
-        let mut lefts = [Some(left); Plan::COUNT];
-        for plan in stake.allowed.within() {
+    /// Run all plans on `remaining` and record them; returns the result of the fullest plan.
+    fn explore(
+        &self,
+        workload: &Workload,
+        tile: &TestTile,
+        remaining: Remaining,
+        context: &mut TestContext<'_>,
+    ) -> Option<Remaining> {
+        let before = context.work.tile_madds();
+        let mut by_plan = [Some(remaining); TestPlan::COUNT];
+        for plan in workload.allowed.within() {
             let Some((_, parent)) = plan.last() else { continue };
-            let parent = lefts[parent.0 as usize];
-            lefts[plan.0 as usize] = parent.and_then(|left| self.watched_step(stake, plan, place, left, run));
+            let parent = by_plan[parent.0 as usize];
+            by_plan[plan.0 as usize] =
+                parent.and_then(|remaining| self.step_recorded(workload, plan, tile, remaining, context));
         }
-        run.judge.learn_trial(stake, run.work.tile_madds() - before);
-        lefts[stake.allowed.0 as usize]
+        context.selector.record_exploration(workload, context.work.tile_madds() - before);
+        by_plan[workload.allowed.0 as usize]
     }
 
-    fn step(&self, test: u8, place: &Place, mut left: Left, run: &mut Run<'_>) -> Option<Left> {
+    fn step(
+        &self,
+        test: u8,
+        tile: &TestTile,
+        mut remaining: Remaining,
+        context: &mut TestContext<'_>,
+    ) -> Option<Remaining> {
         match test {
-            Plan::SIDES => return left.narrowed(self.side_planes(&place.rect, left.within, run.work)?),
-            Plan::FACING => {
-                self.facing(&place.rect, &mut left, run.features.facing_splits, run.work)?;
-                left.facing = true;
+            TestPlan::SIDES => {
+                return remaining.narrowed(self.side_planes(&tile.rect, remaining.within, context.work)?);
             }
-            _ => self.edge_bounds(&place.rect, &mut left, run.work)?,
+            TestPlan::FACING => {
+                self.facing(&tile.rect, &mut remaining, context.features.facing_splits, context.work)?;
+                remaining.facing = true;
+            }
+            _ => self.edge_bounds(&tile.rect, &mut remaining, context.work)?,
         }
-        Some(left)
+        Some(remaining)
     }
 
-    /// What `auto` has to know of `place` and what is `left` there.
-    fn stake(&self, allowed: Plan, place: &Place, left: &Left) -> Stake {
-        let (moving, lens) = (self.triangle.moving, left.within.lens);
-        Stake {
+    /// Workload of `remaining` at `tile` for the test selector.
+    fn workload(&self, allowed: TestPlan, tile: &TestTile, remaining: &Remaining) -> Workload {
+        let (moving, lens) = (self.triangle.moving, remaining.within.lens);
+        Workload {
             allowed,
             moving,
-            samples: f64::from(place.samples) * left.volume(moving),
-            tiles: place.tiles,
-            found: f64::from(traversal::edge_madds(moving, lens)),
-            screen: f64::from(traversal::screen_setup_madds(moving, lens, true) + GAIN),
-            full: f64::from(sample_test::madds(moving, lens)),
+            samples: f64::from(tile.samples) * remaining.volume(moving),
+            tiles: tile.tiles,
+            edge_madds: f64::from(traversal::edge_madds(moving, lens)),
+            screen_setup_madds: f64::from(traversal::screen_setup_madds(moving, lens, true) + GAIN),
+            test_madds: f64::from(sample_test::madds(moving, lens)),
         }
     }
 
@@ -201,72 +232,90 @@ impl Subject<'_> {
         next
     }
 
-    fn facing(&self, rect: &TileRect, left: &mut Left, splits: u32, work: &mut TileWork) -> Option<()> {
-        if left.times.pieces().iter().all(Piece::is_decided) {
+    fn facing(
+        &self,
+        rect: &TileRect,
+        remaining: &mut Remaining,
+        splits: u32,
+        work: &mut TileWork,
+    ) -> Option<()> {
+        if remaining.times.pieces().iter().all(Piece::is_decided) {
             return Some(());
         }
-        let facing = Facing::new(self.edges(rect, left, work));
-        let (times, bisections) = facing.timeline(left.within.t, self.triangle.faces, splits);
-        work.facing_madds += traversal::facing_madds(self.triangle.moving, left.within.lens, bisections);
-        left.times = left.times.meet(&times);
-        let hull = left.times.hull();
+        let facing = Facing::new(self.edges(rect, remaining, work));
+        let (times, bisections) = facing.timeline(remaining.within.t, self.triangle.faces, splits);
+        work.facing_madds += traversal::facing_madds(self.triangle.moving, remaining.within.lens, bisections);
+        remaining.times = remaining.times.meet(&times);
+        let hull = remaining.times.hull();
         work.culled_facing += u32::from(hull.is_none());
-        left.within.t = hull?;
+        remaining.within.t = hull?;
         Some(())
     }
 
-    fn edge_bounds(&self, rect: &TileRect, left: &mut Left, work: &mut TileWork) -> Option<()> {
-        let edges = *self.edges(rect, left, work);
-        let (times, more) = EdgeBounds::new(&edges).timeline(&edges, &left.times, self.triangle.faces);
-        work.edge_bound_madds += traversal::edge_bound_madds(self.triangle.moving, left.within.lens) + more;
-        left.times = times;
-        let hull = left.times.hull();
+    fn edge_bounds(&self, rect: &TileRect, remaining: &mut Remaining, work: &mut TileWork) -> Option<()> {
+        let edges = *self.edges(rect, remaining, work);
+        let (times, more) = EdgeBounds::new(&edges).timeline(&edges, &remaining.times, self.triangle.faces);
+        work.edge_bound_madds +=
+            traversal::edge_bound_madds(self.triangle.moving, remaining.within.lens) + more;
+        remaining.times = times;
+        let hull = remaining.times.hull();
         work.culled_edges += u32::from(hull.is_none());
-        left.within.t = hull?;
+        remaining.within.t = hull?;
         Some(())
     }
 
-    /// Whether to set up screens for the samples of what is left on a fine tile.
-    pub fn wants_screen(&self, place: &Place, left: &Left, run: &mut Run<'_>) -> bool {
-        if !run.features.auto || !run.features.screen {
-            return run.features.screen;
+    /// Whether to set up screens for the remaining samples of a fine tile.
+    pub fn wants_screen(
+        &self,
+        tile: &TestTile,
+        remaining: &Remaining,
+        context: &mut TestContext<'_>,
+    ) -> bool {
+        if !context.features.auto || !context.features.screen {
+            return context.features.screen;
         }
-        let (moving, lens) = (self.triangle.moving, left.within.lens);
-        let found = if left.edges.is_some() { 0 } else { traversal::edge_madds(moving, lens) };
-        let full =
-            f64::from(place.samples) * left.volume(moving) * f64::from(sample_test::madds(moving, lens));
-        let pieces = left.times.pieces().len() as u32;
-        let set_up = found + pieces * (traversal::screen_setup_madds(moving, lens, pieces == 1) + GAIN);
-        let wants = run.judge.wants_screen(f64::from(set_up), full);
-        run.judge.learn_screened(wants);
+        let (moving, lens) = (self.triangle.moving, remaining.within.lens);
+        let edge_madds = if remaining.edges.is_some() { 0 } else { traversal::edge_madds(moving, lens) };
+        let test_madds =
+            f64::from(tile.samples) * remaining.volume(moving) * f64::from(sample_test::madds(moving, lens));
+        let pieces = remaining.times.pieces().len() as u32;
+        let set_up = edge_madds + pieces * (traversal::screen_setup_madds(moving, lens, pieces == 1) + GAIN);
+        let wants = context.selector.wants_screen(f64::from(set_up), test_madds);
+        context.selector.record_screened(wants);
         wants
     }
 
-    /// Whether a screen saves more than it costs, by what it is expected to take away.
-    pub fn pays(&self, screen: &Screen, lens: bool, run: &mut Run<'_>) -> bool {
-        if !run.features.auto {
+    /// Whether the expected savings of a screen exceed its cost.
+    pub fn pays(&self, screen: &Screen, lens: bool, context: &mut TestContext<'_>) -> bool {
+        if !context.features.auto {
             return true;
         }
-        run.work.screen_setup_madds += GAIN;
+        context.work.screen_setup_madds += GAIN;
         let moving = self.triangle.moving;
-        let (full, price) = (sample_test::madds(moving, lens), traversal::screen_madds(moving, lens));
-        run.judge.wants_samples_screened(screen.gain(), f64::from(price), f64::from(full))
+        let (test_madds, cost) = (sample_test::madds(moving, lens), traversal::screen_madds(moving, lens));
+        context.selector.wants_samples_screened(screen.gain(), f64::from(cost), f64::from(test_madds))
     }
 
-    /// The screen for the samples of a piece of the time that is left.
-    pub fn screen(&self, rect: &TileRect, left: &mut Left, piece: &Piece, work: &mut TileWork) -> Screen {
-        let edges = self.edges(rect, left, work);
+    /// Screen for the samples of one piece of the remaining time.
+    pub fn screen(
+        &self,
+        rect: &TileRect,
+        remaining: &mut Remaining,
+        piece: &Piece,
+        work: &mut TileWork,
+    ) -> Screen {
+        let edges = self.edges(rect, remaining, work);
         let (screen, whole) =
             (Screen::new(edges, piece.t, piece.seen(self.triangle.faces)), edges.spans(piece.t));
         work.screen_setup_madds +=
-            traversal::screen_setup_madds(self.triangle.moving, left.within.lens, whole);
+            traversal::screen_setup_madds(self.triangle.moving, remaining.within.lens, whole);
         screen
     }
 
-    /// The edges over the tile, found at the first use.
-    fn edges<'l>(&self, rect: &TileRect, left: &'l mut Left, work: &mut TileWork) -> &'l Edges {
-        let within = left.within;
-        left.edges.get_or_insert_with(|| {
+    /// Edges over the tile, computed on first use.
+    fn edges<'l>(&self, rect: &TileRect, remaining: &'l mut Remaining, work: &mut TileWork) -> &'l Edges {
+        let within = remaining.within;
+        remaining.edges.get_or_insert_with(|| {
             work.edge_madds += traversal::edge_madds(self.triangle.moving, within.lens);
             Edges::new(View::new(self.triangle, self.shear, rect, &within))
         })

@@ -1,4 +1,4 @@
-//! The front end: draws, vertex fetch, vertex shading and set-up of one batch.
+//! Front end: draws, vertex fetch, vertex shading and set-up of one batch.
 
 use std::ops::Range;
 
@@ -6,19 +6,19 @@ use activity::{Event, LineAccess, Packet, PacketKind};
 use rayon::prelude::*;
 
 use super::Features;
-use super::draw::Draw;
+use super::pass::Draw;
 use super::pass::{Pass, Staged};
 use super::replay::Replay;
 use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
-use crate::traversal::{self, Box5, LensLines, small};
+use crate::traversal::{self, Box5, LensLines, thresholds};
 
-/// A triangle that traversal has to visit, with the pixels it may touch.
+/// A triangle for traversal, with the pixels it may touch.
 pub(super) struct Ready {
     pub triangle: Triangle,
     pub pixels: PixelRect,
-    /// The part of lens and shutter between the clip planes, and whether the triangle is sheared by the lens.
+    /// Part of lens and shutter between the clip planes; says whether the lens shears the triangle.
     pub within: Box5,
-    /// Bounds on lens and image, where they are asked for.
+    /// Bounds over lens and image, if enabled.
     pub lines: Option<LensLines>,
 }
 
@@ -28,10 +28,10 @@ impl Ready {
     }
 }
 
-/// Triangles whose vertices travel in one packet.
+/// Triangles per packet of vertices.
 const PACKET_TRIANGLES: u32 = 32;
 
-/// Sets up the triangles of a batch and emits the packets of their vertices.
+/// Set up the triangles of a batch and emit the packets of their vertices.
 pub(super) fn front_end(
     pass: &Pass<'_>,
     batch: Range<u32>,
@@ -47,7 +47,7 @@ pub(super) fn front_end(
     outcomes.into_iter().filter_map(|(_, ready)| ready).collect()
 }
 
-/// What became of a triangle as an event, and what goes on.
+/// Outcome of a triangle as an event, and the triangle if it is kept.
 fn outcome(pass: &Pass<'_>, id: u32) -> (Event, Option<Ready>) {
     let viewport = pass.settings.viewport;
     let Draw { geometry, cull, .. } = &pass.draws[pass.locate(id).0];
@@ -85,8 +85,8 @@ fn emit_packet(
     let mut packet = super::packet(PacketKind::Vertices, 0, first);
     let Features { still_px, in_focus_px, .. } = pass.settings.spec.features;
     for ((event, ready), id) in outcomes.iter().zip(first..) {
-        let (draw, place) = pass.locate(id);
-        if place == 0 {
+        let (draw, index) = pass.locate(id);
+        if index == 0 {
             let mut start = super::packet(PacketKind::Draw, 0, id);
             start.counts[Event::Draws] = 1;
             emit(&start, &[]);
@@ -99,10 +99,10 @@ fn emit_packet(
         packet.counts[Event::Indices] += 3;
         packet.counts[Event::SetupMadds] +=
             madds(corners.iter().any(|v| !v.is_still()), pass.draws[draw].cull);
-        packet.counts[Event::SetupMadds] += if still_px > 0.0 { small::MOTION_MADDS } else { 0 }
-            + if in_focus_px > 0.0 { small::BLUR_MADDS } else { 0 }
+        packet.counts[Event::SetupMadds] += if still_px > 0.0 { thresholds::MOTION_MADDS } else { 0 }
+            + if in_focus_px > 0.0 { thresholds::BLUR_MADDS } else { 0 }
             + ready.as_ref().map_or(0, Ready::line_madds);
         replay.vertices(draw, id, &mut packet.counts);
     }
-    replay.tell(&packet, emit);
+    replay.emit(&packet, emit);
 }

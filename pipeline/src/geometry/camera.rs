@@ -1,14 +1,13 @@
-//! A thin-lens or orthographic camera that may move while the shutter is open.
+//! Cameras: thin-lens or orthographic, moving while the shutter is open, with clip planes across lens and
+//! shutter.
 
 use glam::{Affine3A, Vec2};
 use serde::Serialize;
 
-use super::Clip;
-
-/// A camera looking down `+z` of its own space, `x` to the right and `y` up.
+/// A camera looking along `+z` of its own space, with `x` to the right and `y` up.
 ///
-/// The pose is given at both ends of the shutter; in between every vertex moves on a straight line, so a
-/// camera that turns is a chord of its true path.
+/// The pose is given at both ends of the shutter. In between, every vertex moves linearly, so a rotating
+/// camera follows a chord of its true path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Camera {
     open: Affine3A,
@@ -21,29 +20,29 @@ pub struct Camera {
     clip: Clip,
 }
 
-/// A thin lens. In an orthographic view, where there is none, what it does to the image far away: a point at depth `w` is moved by
-/// `radius (w / focus - 1)` scene units.
+/// A thin lens. In an orthographic view it is a shear that moves a point at depth `w` by `radius (w / focus -
+/// 1)` scene units, like a distant lens.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Lens {
     radius: f32,
     focus: f32,
 }
 
-/// Why a camera or a lens cannot be built.
+/// Why a camera or a lens is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// A value that has to be finite and above zero is not.
+    /// A value is not finite and positive.
     #[error("{what} is {value}; it has to be a finite number above zero")]
     NotPositive {
-        /// Which value.
+        /// Name of the value.
         what: &'static str,
-        /// What was given.
+        /// Value given.
         value: f32,
     },
-    /// A pose or a shift holds a value that is not finite.
+    /// A pose or a shift is not finite.
     #[error("{what} holds a value that is not finite")]
     NotFinite {
-        /// Which value.
+        /// Name of the value.
         what: &'static str,
     },
 }
@@ -53,10 +52,11 @@ fn positive(what: &'static str, value: f32) -> Result<f32, CameraError> {
 }
 
 impl Lens {
-    /// A lens of `radius` focused at depth `focus`, both in scene units.
+    /// A lens of `radius` focused at depth `focus`, both in scene units. A pinhole is a camera without a
+    /// lens.
     ///
     /// # Errors
-    /// When either is not a finite number above zero. A pinhole is a camera without a lens.
+    /// [`CameraError`] if either is not finite and positive.
     pub fn new(radius: f32, focus: f32) -> Result<Self, CameraError> {
         Ok(Self { radius: positive("lens radius", radius)?, focus: positive("focus depth", focus)? })
     }
@@ -66,7 +66,7 @@ impl Lens {
         self.radius
     }
 
-    /// Depth in scene units at which everything is sharp.
+    /// Depth in focus, in scene units.
     pub fn focus(&self) -> f32 {
         self.focus
     }
@@ -74,20 +74,19 @@ impl Lens {
 
 impl Camera {
     /// A still pinhole camera with the world-to-camera transform `pose`. `tan_half_height` is the tangent of
-    /// half the vertical field of view; samples nearer than `near` (scene units) are not seen.
+    /// half the vertical field of view. Samples nearer than `near` (scene units) are invisible.
     ///
     /// # Errors
-    /// When the pose is not finite, or the others are not finite and above zero.
+    /// [`CameraError`] if the pose is not finite, or another value is not finite and positive.
     pub fn new(pose: Affine3A, tan_half_height: f32, near: f32) -> Result<Self, CameraError> {
         let half_height = positive("tangent of half the field of view", tan_half_height)?;
         Self::still(pose, half_height, false, near)
     }
 
-    /// A still camera that sees everything from the same side, at the same size at any depth: `half_height` is half the height of its
-    /// view in scene units.
+    /// A still orthographic camera; `half_height` is half the height of its view in scene units.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// As for [`Self::new`].
     pub fn orthographic(pose: Affine3A, half_height: f32, near: f32) -> Result<Self, CameraError> {
         Self::still(pose, positive("half the height of the view", half_height)?, true, near)
     }
@@ -98,10 +97,10 @@ impl Camera {
             .moving(pose, pose)
     }
 
-    /// The same camera moving from the world-to-camera transform `open` to `close` over the shutter.
+    /// The camera moving from the world-to-camera transform `open` to `close` during the shutter.
     ///
     /// # Errors
-    /// When a pose is not finite.
+    /// [`CameraError`] if a pose is not finite.
     pub fn moving(self, open: Affine3A, close: Affine3A) -> Result<Self, CameraError> {
         if open.is_finite() && close.is_finite() {
             Ok(Self { open, close, ..self })
@@ -110,22 +109,22 @@ impl Camera {
         }
     }
 
-    /// The same camera with a lens, or as a pinhole.
+    /// The camera with a lens, or as a pinhole.
     #[must_use]
     pub fn with_lens(self, lens: Option<Lens>) -> Self {
         Self { lens, ..self }
     }
 
-    /// The same camera with clip planes across lens and shutter: what is drawn is seen there only.
+    /// The camera with clip planes across lens and shutter, which limit where draws are visible.
     #[must_use]
     pub fn with_clip(self, clip: Clip) -> Self {
         Self { clip, ..self }
     }
 
-    /// The same camera with an off-centre frustum: `shift` moves the image by that many image heights.
+    /// The camera with an off-centre frustum; `shift` moves the image by that many image heights.
     ///
     /// # Errors
-    /// When the shift is not finite.
+    /// [`CameraError`] if the shift is not finite.
     pub fn with_shift(self, shift: Vec2) -> Result<Self, CameraError> {
         if shift.is_finite() {
             Ok(Self { shift, ..self })
@@ -134,18 +133,18 @@ impl Camera {
         }
     }
 
-    /// World to camera when the shutter opens.
+    /// World-to-camera transform when the shutter opens.
     pub fn open(&self) -> Affine3A {
         self.open
     }
 
-    /// World to camera when the shutter closes.
+    /// World-to-camera transform when the shutter closes.
     pub fn close(&self) -> Affine3A {
         self.close
     }
 
-    /// Half the height of the view: at depth 1 in perspective, which is the tangent of half the vertical field of view, and in scene
-    /// units at any depth in an orthographic view.
+    /// Half the height of the view. In perspective it is taken at depth 1, the tangent of half the vertical
+    /// field of view. In an orthographic view it is in scene units.
     pub fn half_height(&self) -> f32 {
         self.half_height
     }
@@ -165,14 +164,56 @@ impl Camera {
         self.lens
     }
 
-    /// The part of lens and shutter in which anything is drawn.
+    /// Part of lens and shutter in which anything is drawn.
     pub fn clip(&self) -> Clip {
         self.clip
     }
 
-    /// Depth in scene units below which samples are not seen.
+    /// Smallest visible depth in scene units.
     pub fn near(&self) -> f32 {
         self.near
+    }
+}
+
+/// Part of lens and shutter in which something is drawn, as a half-open range on each axis. Samples on the
+/// lower bound are included, samples on the upper bound are not, so adjacent parts share no sample.
+/// (Conservative mode includes both.) An infinite value is no bound; 1 would exclude samples on the rim of
+/// the lens.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Clip {
+    u: [f32; 2],
+    v: [f32; 2],
+    t: [f32; 2],
+}
+
+impl Default for Clip {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Clip {
+    /// No clip planes.
+    pub const NONE: Self = {
+        let all = [f32::NEG_INFINITY, f32::INFINITY];
+        Self { u: all, v: all, t: all }
+    };
+
+    /// Clip planes across `u`, `v` (lens, -1 to 1) and `t` (shutter, 0 to 1), or `None` if a bound is NaN.
+    pub fn new(u: [f32; 2], v: [f32; 2], t: [f32; 2]) -> Option<Self> {
+        let numbers = [u, v, t].iter().flatten().all(|bound| !bound.is_nan());
+        numbers.then_some(Self { u, v, t })
+    }
+
+    /// First and last included value on each axis, for standard mode.
+    pub fn half_open(&self) -> [[f32; 2]; 3] {
+        [self.u, self.v, self.t]
+            .map(|[lo, hi]| if hi == f32::INFINITY { [lo, hi] } else { [lo, hi.next_down()] })
+    }
+
+    /// Both bounds, for conservative mode.
+    pub fn closed(&self) -> [[f32; 2]; 3] {
+        [self.u, self.v, self.t]
     }
 }
 
@@ -193,5 +234,21 @@ mod tests {
         }
         assert!(Lens::new(0.0, 1.0).is_err());
         assert!(Lens::new(0.1, -1.0).is_err());
+    }
+
+    #[test]
+    fn parts_side_by_side_share_nothing_and_miss_nothing() {
+        let parts = [[f32::NEG_INFINITY, 0.0], [0.0, 0.5], [0.5, f32::INFINITY]];
+        let all = [-1.0, 1.0];
+        for value in [-1.0, -0.0, 0.0, -f32::MIN_POSITIVE / 4.0, f32::EPSILON, 0.5, 0.5_f32.next_down(), 1.0]
+        {
+            let owners = parts.iter().filter(|part| {
+                let [[lo, hi], ..] = Clip::new(**part, all, all).unwrap().half_open();
+                (lo..=hi).contains(&value)
+            });
+            assert_eq!(owners.count(), 1, "{value}");
+        }
+        assert_eq!(Clip::new([0.0, f32::NAN], all, all), None);
+        assert_eq!(Clip::new(all, all, [0.25, 0.5]).unwrap().closed()[2], [0.25, 0.5]);
     }
 }

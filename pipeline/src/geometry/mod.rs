@@ -1,11 +1,9 @@
-//! What is drawn and from where: cameras, triangles and the moving vertices they become.
+//! Geometry: cameras, triangles, and their moving vertices on the image plane.
 
 mod camera;
-mod clip;
 mod triangles;
 mod vertex;
 
-pub use camera::{Camera, CameraError, Lens};
-pub use clip::Clip;
+pub use camera::{Camera, CameraError, Clip, Lens};
 pub use triangles::{Cull, DrawError, Geometry};
 pub use vertex::{MovingVertex, Projection, Shear, Viewport};

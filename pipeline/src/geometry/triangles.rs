@@ -1,22 +1,22 @@
-//! Triangles to be drawn, checked once so that no later stage has to.
+//! Triangles to be drawn, validated once for all later stages.
 
 use glam::{Vec2, Vec3};
 
 use super::Clip;
 
-/// Which faces are dropped. A face is front when its vertices appear counter-clockwise on the screen.
+/// Culled faces. A face is front if its vertices appear counter-clockwise on the screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cull {
-    /// Both faces are drawn.
+    /// No face is culled.
     #[default]
     None,
-    /// Back faces are dropped, sample by sample: a triangle may turn while the shutter is open.
+    /// Back faces are culled, for each sample separately: a triangle may turn over while the shutter is open.
     Back,
-    /// Front faces are dropped.
+    /// Front faces are culled.
     Front,
 }
 
-/// Triangles in world space at both ends of the shutter. Vertices move on straight lines in between.
+/// Triangles in world space at both ends of the shutter. Vertices move linearly in between.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry<'a> {
     open: &'a [Vec3],
@@ -28,45 +28,45 @@ pub struct Geometry<'a> {
     clip: Clip,
 }
 
-/// Why triangles cannot be drawn.
+/// Why triangles are invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DrawError {
-    /// Arrays that run over the same vertices differ in length.
+    /// Arrays over the same vertices differ in length.
     #[error("{what} has {found} entries for {expected} vertices")]
     Length {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
         /// Its length.
         found: usize,
-        /// How many vertices there are.
+        /// Number of vertices.
         expected: usize,
     },
-    /// A triangle names a vertex that does not exist.
+    /// A triangle has an invalid vertex index.
     #[error("triangle {triangle} uses vertex {vertex}, but there are only {vertices}")]
     Index {
-        /// The triangle, from 0.
+        /// Triangle, from 0.
         triangle: usize,
-        /// The vertex it names.
+        /// Vertex index.
         vertex: u32,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// A coordinate is NaN or infinite.
     #[error("{what} of vertex {vertex} is not finite")]
     NotFinite {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// The vertex, from 0.
+        /// Vertex, from 0.
         vertex: usize,
     },
 }
 
 impl<'a> Geometry<'a> {
-    /// Triangles whose vertices are at `open` when the shutter opens and at `close` when it closes; pass the
-    /// same slice twice for still ones.
+    /// Triangles with vertices at `open` when the shutter opens and at `close` when it closes. Still
+    /// triangles use the same slice twice.
     ///
     /// # Errors
-    /// When the lengths differ, an index is out of range, or a coordinate is not finite.
+    /// [`DrawError`] if the lengths differ, an index is out of range, or a coordinate is not finite.
     pub fn new(open: &'a [Vec3], close: &'a [Vec3], triangles: &'a [[u32; 3]]) -> Result<Self, DrawError> {
         same_length("the closing positions", close.len(), open.len())?;
         finite("position at the opening", open.iter().map(|p| p.is_finite()))?;
@@ -81,43 +81,43 @@ impl<'a> Geometry<'a> {
         Ok(Self { open, close, normals: &[], uvs: &[], colors: &[], triangles, clip: Clip::NONE })
     }
 
-    /// The same with one normal for each vertex (at mid-shutter, world space; need not be unit length).
+    /// The geometry with one normal per vertex (at mid-shutter, in world space, of any length).
     ///
     /// # Errors
-    /// When the length differs or a normal is not finite.
+    /// [`DrawError`] if the length differs or a normal is not finite.
     pub fn with_normals(self, normals: &'a [Vec3]) -> Result<Self, DrawError> {
         same_length("the normals", normals.len(), self.open.len())?;
         finite("normal", normals.iter().map(|n| n.is_finite()))?;
         Ok(Self { normals, ..self })
     }
 
-    /// The same with one texture coordinate for each vertex; (0, 0) is the first texel of the first row.
+    /// The geometry with one texture coordinate per vertex; (0, 0) is the first texel of the first row.
     ///
     /// # Errors
-    /// When the length differs or a coordinate is not finite.
+    /// [`DrawError`] if the length differs or a coordinate is not finite.
     pub fn with_uvs(self, uvs: &'a [Vec2]) -> Result<Self, DrawError> {
         same_length("the texture coordinates", uvs.len(), self.open.len())?;
         finite("texture coordinate", uvs.iter().map(|uv| uv.is_finite()))?;
         Ok(Self { uvs, ..self })
     }
 
-    /// The same with one colour for each vertex: linear RGB, by which its shader may multiply.
+    /// The geometry with one colour per vertex, in linear RGB, for use by its shader.
     ///
     /// # Errors
-    /// When the length differs or a colour is not finite.
+    /// [`DrawError`] if the length differs or a colour is not finite.
     pub fn with_colors(self, colors: &'a [Vec3]) -> Result<Self, DrawError> {
         same_length("the colours", colors.len(), self.open.len())?;
         finite("colour", colors.iter().map(|color| color.is_finite()))?;
         Ok(Self { colors, ..self })
     }
 
-    /// The same with clip planes across lens and shutter: it is drawn there only.
+    /// The geometry with clip planes across lens and shutter, which limit where it is drawn.
     #[must_use]
     pub fn with_clip(self, clip: Clip) -> Self {
         Self { clip, ..self }
     }
 
-    /// The part of lens and shutter in which it is drawn.
+    /// Part of lens and shutter in which it is drawn.
     pub fn clip(&self) -> Clip {
         self.clip
     }
@@ -132,32 +132,32 @@ impl<'a> Geometry<'a> {
         self.close
     }
 
-    /// Whether the positions at both ends are one array, so that nothing moves.
+    /// Whether both ends are the same array, so nothing moves.
     pub fn is_still(&self) -> bool {
         std::ptr::eq(self.open, self.close)
     }
 
-    /// Normals, or nothing where faces are flat.
+    /// Normals; empty for flat faces.
     pub fn normals(&self) -> &'a [Vec3] {
         self.normals
     }
 
-    /// Texture coordinates, or nothing.
+    /// Texture coordinates, if any.
     pub fn uvs(&self) -> &'a [Vec2] {
         self.uvs
     }
 
-    /// Colours in linear RGB, or nothing.
+    /// Colours in linear RGB, if any.
     pub fn colors(&self) -> &'a [Vec3] {
         self.colors
     }
 
-    /// Vertex indices of each triangle, all in range.
+    /// Vertex indices of every triangle, all in range.
     pub fn triangles(&self) -> &'a [[u32; 3]] {
         self.triangles
     }
 
-    /// Bytes of one vertex as fetched: positions at both ends where they differ, and the attributes.
+    /// Bytes per fetched vertex: positions (of both ends if they differ) and attributes.
     pub fn vertex_bytes(&self) -> u32 {
         let bytes = |size: u32, present: bool| if present { size } else { 0 };
         12 + bytes(12, !self.is_still())

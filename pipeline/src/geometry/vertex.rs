@@ -1,4 +1,4 @@
-//! From world space to the homogeneous image plane.
+//! Projection from world space to the homogeneous image plane.
 
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{Camera, Geometry};
 
-/// The size of an image in pixels; both sides are 1 to 16384.
+/// Image size in pixels; both sides are 1 to 16384.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Viewport {
     width: u32,
@@ -14,10 +14,10 @@ pub struct Viewport {
 }
 
 impl Viewport {
-    /// The longest side an image may have, in pixels.
+    /// Longest side of an image in pixels.
     pub const MAX_PX: u32 = 16_384;
 
-    /// A viewport of `width` x `height` pixels, or `None` when a side is zero or above [`Self::MAX_PX`].
+    /// A viewport of `width` x `height` pixels, or `None` if a side is zero or above [`Self::MAX_PX`].
     pub fn new(width: u32, height: u32) -> Option<Self> {
         let fits = |side| (1..=Self::MAX_PX).contains(&side);
         (fits(width) && fits(height)).then_some(Self { width, height })
@@ -38,47 +38,50 @@ impl Viewport {
         [0.5 * self.width as f32, 0.5 * self.height as f32]
     }
 
-    /// Pixels of the image.
+    /// Number of pixels.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The image coordinate of the left edge of pixel column `px` (or the top edge of row `px` when given the
-    /// height): the origin is the centre of the image, whatever the tile size, and the value is exact.
+    /// Image coordinate of the left edge of pixel column `px`, or of the top edge of a row with the height as
+    /// `side`. The origin is the centre of the image, for any tile size, and the value is exact.
     pub(crate) fn edge(px: u32, side: u32) -> f32 {
         px as f32 - 0.5 * side as f32
     }
 }
 
-/// A vertex on the image plane at both ends of the shutter, as `[x, y, w]`: `w` is its depth in scene units. In perspective `x, y` are
-/// homogeneous, its image is at `(x / w, y / w)` pixels from the centre of the image, `y` downwards; in an orthographic view it is
-/// at `(x, y)`.
+/// A vertex on the image plane at both ends of the shutter, as `[x, y, w]`; `w` is its depth in scene units.
+/// In perspective `x, y` are homogeneous: its image is `(x / w, y / w)` pixels from the centre of the image,
+/// `y` downwards. In an orthographic view its image is `(x, y)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingVertex {
-    /// When the shutter opens.
+    /// Position when the shutter opens.
     pub open: [f32; 3],
-    /// When the shutter closes.
+    /// Position when the shutter closes.
     pub close: [f32; 3],
 }
 
 impl MovingVertex {
-    /// Whether both ends agree to the last bit.
+    /// Whether both ends are equal to the last bit.
     pub fn is_still(&self) -> bool {
         self.open == self.close
     }
 }
 
-/// How a sample sees a point: from `(X, Y)` of the image and `(u, v)` of a thin lens it is at
+/// Shear of points by the lens. From `(X, Y)` of the image and `(u, v)` of a thin lens, a sample sees a point
+/// at
 ///
 /// ```text
 /// x' = x + u (a.x w - s.x) - X w        in perspective
 /// x' = x + u (a.x w - s.x) - X          in an orthographic view
 /// ```
 ///
-/// from the sample, and `y'` alike. `s` is projection scale times lens radius and `a = s / F`. The lens of an orthographic view is
-/// an oblique shear, nothing at the focus depth and linear in depth: what a lens does to the image far away.
+/// relative to the sample, and likewise in y. `s` is projection scale times lens radius, and `a = s / F`. The
+/// lens of an orthographic view is an oblique shear: zero at the focus depth and linear in depth, like a
+/// distant lens.
 ///
-/// Both are `(x - base) - slope w` with a `base` and a `slope` of the sample's own, so one sample test serves both; see [`Self::ray`].
+/// Both forms are `(x - base) - slope w` with a `base` and a `slope` of the sample, so one sample test serves
+/// both; see [`Self::ray`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shear {
     /// Projection scale times lens radius: pixels times scene units, or pixels in an orthographic view.
@@ -90,12 +93,12 @@ pub struct Shear {
 }
 
 impl Shear {
-    /// In perspective through a lens.
+    /// Shear of a perspective view through a lens.
     pub const fn new(s: [f32; 2], a: [f32; 2]) -> Self {
         Self { s, a, parallel: false }
     }
 
-    /// Whether the camera is a pinhole, so that the lens dimensions can be dropped.
+    /// Whether the camera is a pinhole, so the lens dimensions can be dropped.
     pub fn is_none(&self) -> bool {
         *self == self.sharp()
     }
@@ -106,7 +109,7 @@ impl Shear {
         Self { parallel: self.parallel, ..Self::default() }
     }
 
-    /// What a place on the image is multiplied with for a point at this depth.
+    /// Factor of an image coordinate for a point at this depth: its depth, or 1 in an orthographic view.
     pub fn weight(&self, depth: f32) -> f32 {
         if self.parallel { 1.0 } else { depth }
     }
@@ -116,42 +119,43 @@ impl Shear {
         [x, y, self.weight(depth)]
     }
 
-    /// The slope and the base along `axis` of the sample at `at` on the image and `place` on the lens: it sees the points with
-    /// `x = base + slope w`.
-    pub fn ray(&self, axis: usize, at: f32, place: f32) -> [f32; 2] {
+    /// Slope and base along `axis` of the sample at image coordinate `at` and lens position `lens`. It sees
+    /// the points with `x = base + slope w`.
+    pub fn ray(&self, axis: usize, at: f32, lens: f32) -> [f32; 2] {
         let (s, a) = (self.s[axis], self.a[axis]);
-        if self.parallel { [-(place * a), at + place * s] } else { [at - place * a, place * s] }
+        if self.parallel { [-(lens * a), at + lens * s] } else { [at - lens * a, lens * s] }
     }
 
-    /// How far along `axis` the image of a point at this depth moves from the middle of the lens to its rim, in pixels; signed.
+    /// Signed distance in pixels along `axis` that the image of a point at this depth moves between the
+    /// middle and the rim of the lens.
     pub fn circle(&self, axis: usize, depth: f64) -> f64 {
         let (s, a) = (f64::from(self.s[axis]), f64::from(self.a[axis]));
         if self.parallel { a * depth - s } else { a - s / depth }
     }
 }
 
-/// A camera fitted to a viewport. Works in `f64` and rounds once, so that equal input gives equal vertices.
+/// A camera fitted to a viewport. It computes in `f64` and rounds once, so equal input gives equal vertices.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection {
     open: DAffine3,
     close: DAffine3,
     scale_px: f64,
     shift_px: [f64; 2],
-    /// How samples see points: perspective or not, and through which lens.
+    /// Projection and lens of the samples.
     pub shear: Shear,
-    /// Depth in scene units below which samples are not seen.
+    /// Smallest visible depth in scene units.
     pub near: f32,
 }
 
 impl Projection {
-    /// The projection of `camera` onto an image of the size of `viewport`.
+    /// Projection of `camera` onto an image of the size of `viewport`.
     pub fn new(camera: &Camera, viewport: Viewport) -> Self {
         let height = f64::from(viewport.height);
         let scale_px = 0.5 * height / f64::from(camera.half_height());
         let shear = camera.lens().map_or(Shear::default(), |lens| {
             let s = scale_px * f64::from(lens.radius());
             let a = s / f64::from(lens.focus());
-            // v points up on the lens and y down in the image.
+            // v points up on the lens, y down in the image.
             Shear::new([s as f32, -s as f32], [a as f32, -a as f32])
         });
         let shear = Shear { parallel: camera.is_orthographic(), ..shear };
@@ -165,12 +169,12 @@ impl Projection {
         }
     }
 
-    /// The image of a vertex that is at `open` and `close`, in world space, at the ends of the shutter.
+    /// Image of a vertex at `open` and `close` in world space, at the ends of the shutter.
     pub fn vertex(&self, open: Vec3, close: Vec3) -> MovingVertex {
         MovingVertex { open: self.image(&self.open, open), close: self.image(&self.close, close) }
     }
 
-    /// The images of all vertices of `geometry`.
+    /// Images of all vertices of `geometry`.
     pub(crate) fn images(&self, geometry: &Geometry<'_>) -> Vec<MovingVertex> {
         if self.open == self.close && geometry.is_still() {
             let still = |&world: &Vec3| {
@@ -196,8 +200,8 @@ impl Projection {
         [x as f32, y as f32, p.z as f32]
     }
 
-    /// The camera in world space at mid-shutter as a homogeneous point: where it stands, or in an orthographic view the direction
-    /// towards it.
+    /// Camera in world space at mid-shutter as a homogeneous point: its position, or in an orthographic view
+    /// the direction towards it.
     pub fn eye(&self) -> Vec4 {
         let at = |pose: &DAffine3| {
             let world = pose.inverse();
@@ -227,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_does_not_move_what_is_in_focus() {
+    fn a_lens_does_not_move_points_in_focus() {
         let lens = Lens::new(0.25, 8.0).unwrap();
         let camera = Camera::new(Affine3A::IDENTITY, 1.0, 0.1).unwrap().with_lens(Some(lens));
         let shear = Projection::new(&camera, Viewport::new(512, 512).unwrap()).shear;
@@ -248,15 +252,15 @@ mod tests {
         assert_eq!(projection.shear.homogeneous([3.0, 4.0, 5.0]), [3.0, 4.0, 1.0]);
     }
 
-    /// On its ray a sample sees what the formula says, whichever view and lens.
+    /// Slope and base of a ray agree with the formula of the shear, for all views and lenses.
     #[test]
     fn rays_are_the_formula() {
-        let (s, a, [x, w], [at, place]) = ([6.0, -6.0], [2.0, -2.0], [7.0_f32, 5.0], [-3.0_f32, 0.5]);
+        let (s, a, [x, w], [at, lens]) = ([6.0, -6.0], [2.0, -2.0], [7.0_f32, 5.0], [-3.0_f32, 0.5]);
         for parallel in [false, true] {
             let shear = Shear { parallel, ..Shear::new(s, a) };
             for axis in [0, 1] {
-                let [slope, base] = shear.ray(axis, at, place);
-                let seen = x + place * (a[axis] * w - s[axis]) - at * shear.weight(w);
+                let [slope, base] = shear.ray(axis, at, lens);
+                let seen = x + lens * (a[axis] * w - s[axis]) - at * shear.weight(w);
                 assert_eq!((x - base) - slope * w, seen, "{parallel} {axis}");
             }
         }

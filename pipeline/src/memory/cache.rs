@@ -1,4 +1,4 @@
-//! A set-associative cache as a functional model: it says what hits.
+//! Functional model of a set-associative cache: hits and misses.
 
 use serde::Deserialize;
 
@@ -8,34 +8,34 @@ use crate::random::mix;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CacheSpec {
-    /// Entries in all.
+    /// Total number of entries.
     pub entries: u32,
-    /// Entries a key may be kept in.
+    /// Entries per set.
     pub ways: u32,
-    /// Which entry of a full set makes room.
+    /// Replacement policy.
     #[serde(default)]
     pub replacement: Replacement,
 }
 
 impl CacheSpec {
-    /// A cache in which the least recently used entry makes room.
+    /// A cache with LRU replacement.
     pub const fn lru(entries: u32, ways: u32) -> Self {
         Self { entries, ways, replacement: Replacement::Lru }
     }
 }
 
-/// Which entry of a full set makes room.
+/// Replacement policy: which entry of a full set is evicted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Replacement {
-    /// The least recently used.
+    /// Least recently used.
     #[default]
     Lru,
-    /// The one that came first, used since or not.
+    /// First in first out, independent of use.
     Fifo,
-    /// Any, by the hash of a seed and of how many made room before.
+    /// Random, by the hash of the seed and the number of evictions so far.
     Random {
-        /// The seed.
+        /// Seed.
         seed: u64,
     },
 }
@@ -46,24 +46,24 @@ pub enum Replacement {
     "a cache of {entries} entries in {ways} ways; ways have to divide entries, and both be 1 to 16777216"
 )]
 pub struct CacheError {
-    /// Entries asked for.
+    /// Number of entries.
     pub entries: u32,
-    /// Ways asked for.
+    /// Number of ways.
     pub ways: u32,
 }
 
-/// What an access found.
+/// Outcome of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// The key was there.
+    /// The key is in the cache.
     Hit,
-    /// It was not, and nothing that was written had to make room.
+    /// The key is not in the cache, and no dirty key is evicted.
     Miss,
-    /// It was not, and this key, which had been written, made room.
+    /// The key is not in the cache, and this dirty key is evicted.
     MissEvicting(u64),
 }
 
-/// The contents of a cache: keys only, no data.
+/// Contents of a cache: keys only, no data.
 #[derive(Clone, Debug)]
 pub struct Cache {
     ways: usize,
@@ -71,7 +71,8 @@ pub struct Cache {
     replacement: Replacement,
     /// Misses so far.
     misses: u64,
-    /// Per set, the latest first: used or, where use does not count, come. Empty ways hold [`Line::EMPTY`] and lie behind.
+    /// Entries of every set, the most recently used (LRU) or inserted (FIFO) first. Empty ways hold
+    /// [`Line::EMPTY`] and come last.
     lines: Vec<Line>,
 }
 
@@ -89,7 +90,7 @@ impl Cache {
     /// An empty cache.
     ///
     /// # Errors
-    /// When the ways do not divide the entries, or either is zero or absurdly large.
+    /// [`CacheError`] if the ways do not divide the entries, or either is zero or too large.
     pub fn new(spec: CacheSpec) -> Result<Self, CacheError> {
         let CacheSpec { entries, ways, replacement } = spec;
         let sane = 1..=16_777_216;
@@ -100,8 +101,8 @@ impl Cache {
         Ok(Self { ways: ways as usize, sets: u64::from(entries / ways), replacement, misses: 0, lines })
     }
 
-    /// Looks `key` up and keeps it; `write` marks it as changed. The set is chosen by the key modulo the number of sets.
-    /// `u64::MAX` is not a key.
+    /// Access `key`; `write` marks it as dirty. The set is the key modulo the number of sets. `u64::MAX` is
+    /// not a valid key.
     pub fn access(&mut self, key: u64, write: bool) -> Access {
         let first = (key % self.sets) as usize * self.ways;
         let set = &mut self.lines[first..first + self.ways];
@@ -124,7 +125,7 @@ impl Cache {
         if victim.dirty { Access::MissEvicting(victim.key) } else { Access::Miss }
     }
 
-    /// Forgets `key`, written or not: its contents are not needed again.
+    /// Remove `key` without writing it back.
     pub fn discard(&mut self, key: u64) {
         let first = (key % self.sets) as usize * self.ways;
         let set = &mut self.lines[first..first + self.ways];
@@ -134,7 +135,7 @@ impl Cache {
         }
     }
 
-    /// Forgets everything and returns the keys that had been written, in order of place.
+    /// Empty the cache. Returns the dirty keys in order of their entries.
     pub fn flush(&mut self) -> Vec<u64> {
         let dirty = self.lines.iter().filter(|line| line.dirty).map(|line| line.key).collect();
         self.lines.fill(Line::EMPTY);
@@ -157,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_first_in_is_the_first_out_however_used() {
-        // 1 is used again before 3 comes: the policies differ on whom that spares.
+        // 1 is used again before 3 arrives, so the policies evict different keys.
         let keys = [1, 2, 1, 3, 1];
         assert_eq!(hits(Replacement::Lru, &keys), [false, false, true, false, true]);
         assert_eq!(hits(Replacement::Fifo, &keys), [false, false, true, false, false]);
@@ -169,19 +170,19 @@ mod tests {
         let of = |seed| hits(Replacement::Random { seed }, &keys);
         assert_eq!(of(1), of(1));
         assert_ne!(of(1), of(2));
-        // A set of two holds both of two keys for good, whatever the seed.
+        // A set of two holds both keys permanently, for any seed.
         let two: Vec<u64> = (0..50).map(|i| i % 2).collect();
         assert!(
             (0..20).all(|seed| hits(Replacement::Random { seed }, &two).iter().filter(|h| !**h).count() == 2)
         );
-        // Four keys at random in two ways: half of the look-ups hit.
+        // Four random keys in two ways: half of the accesses hit.
         let share = of(3).iter().filter(|hit| **hit).count() as f64 / 400.0;
         assert!((0.42..0.58).contains(&share), "{share}");
     }
 
     #[test]
     fn a_cyclic_walk_defeats_recency_but_not_chance() {
-        // One key more than there are ways, round and round: the textbook case against LRU and FIFO.
+        // One key more than ways, in turn: the textbook worst case of LRU and FIFO.
         let keys: Vec<u64> = (0..300).map(|i| i % 3).collect();
         let count = |replacement| hits(replacement, &keys).iter().filter(|hit| **hit).count();
         assert_eq!((count(Replacement::Lru), count(Replacement::Fifo)), (0, 0));
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_was_written_is_written_back() {
+    fn only_dirty_keys_are_written_back() {
         let mut c = cache(1, 1);
         c.access(1, false);
         assert_eq!(c.access(2, true), Access::Miss);
@@ -211,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_discarded_is_not_written_back() {
+    fn discarded_keys_are_not_written_back() {
         let mut c = cache(2, 2);
         c.access(1, true);
         c.access(2, true);

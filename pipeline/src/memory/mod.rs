@@ -1,13 +1,10 @@
-//! Memory as the pipeline sees it: addresses, caches and what reaches the chips.
+//! Memory of the pipeline: addresses, caches and traffic to the chips.
 
 mod cache;
-mod compress;
-mod map;
+mod layout;
 mod system;
 
 pub use cache::{Access, Cache, CacheError, CacheSpec, Replacement};
-pub use compress::Compression;
-pub(crate) use compress::depths_fit;
-pub(crate) use map::Allocator;
-pub use map::{AddressMap, LINE_BYTES};
+pub use layout::{AddressMap, Compression, LINE_BYTES};
+pub(crate) use layout::{Allocator, depths_fit};
 pub use system::{MemorySpec, MemorySystem};

@@ -1,29 +1,29 @@
-//! The caches between the units and the memory chips, walked in the order of the modelled hardware.
+//! Cache hierarchy between the units and the memory chips, accessed in the order of the modelled hardware.
 
 use activity::{Event, LineAccess, LineKind, PacketCounts, Unit};
 use serde::Deserialize;
 
-use super::compress::{Compression, Halves};
-use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES};
+use super::layout::{CompressedLines, Compression, LINE_BYTES};
+use super::{Access, Cache, CacheError, CacheSpec};
 
-/// The caches of memory. Entries are lines of 64 bytes.
+/// Caches of memory, with lines of 64 bytes as entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MemorySpec {
-    /// The depth unit's cache.
+    /// Depth cache.
     pub depth: CacheSpec,
-    /// The colour unit's cache.
+    /// Colour cache.
     pub colour: CacheSpec,
-    /// The texture units' cache.
+    /// Texture cache.
     pub texture: CacheSpec,
-    /// The cache shared by all.
+    /// L2, shared by all.
     pub l2: CacheSpec,
-    /// What is compressed on its way to it; nothing unless said.
+    /// Compression between the unit caches and the L2; off by default.
     #[serde(default)]
     pub compression: Compression,
 }
 
-/// A unit's own cache above the L2, and the events it counts.
+/// A unit's own cache above the L2, and its events.
 #[derive(Clone, Debug)]
 struct Client {
     unit: Unit,
@@ -32,17 +32,17 @@ struct Client {
     misses: Event,
 }
 
-/// The state of all caches.
+/// State of all caches.
 #[derive(Clone, Debug)]
 pub struct MemorySystem {
     depth: Client,
     colour: Client,
     texture: Client,
     l2: Shared,
-    halves: Halves,
+    compressed: CompressedLines,
 }
 
-/// The L2 and what it was asked for since that was last taken note of.
+/// The L2, and its requests since the log was last cleared.
 #[derive(Clone, Debug)]
 struct Shared {
     cache: Cache,
@@ -53,7 +53,7 @@ impl MemorySystem {
     /// Empty caches.
     ///
     /// # Errors
-    /// When one of them cannot be built.
+    /// [`CacheError`] if one of them is invalid.
     pub fn new(spec: &MemorySpec) -> Result<Self, CacheError> {
         let client = |spec, lines: Event, misses| {
             Ok(Client { unit: lines.unit(), cache: Cache::new(spec)?, lines, misses })
@@ -63,72 +63,73 @@ impl MemorySystem {
             colour: client(spec.colour, Event::ColourLines, Event::ColourMisses)?,
             texture: client(spec.texture, Event::TextureLines, Event::TextureMisses)?,
             l2: Shared { cache: Cache::new(spec.l2)?, log: Vec::new() },
-            halves: Halves::default(),
+            compressed: CompressedLines::default(),
         })
     }
 
-    /// The same with depths and colours, which lie between these addresses, compressed where [`Self::fits`] says so.
+    /// The same caches with compression of the depth and colour buffers at these addresses.
+    /// [`Self::set_compressed`] marks lines.
     pub fn with_compression(self, buffers: [u64; 3]) -> Self {
-        Self { halves: Halves::new(buffers), ..self }
+        Self { compressed: CompressedLines::new(buffers), ..self }
     }
 
-    /// Says whether what is now in the line at `address` fits in half of it.
-    pub fn fits(&mut self, address: u64, fits: bool) {
-        self.halves.note(address, fits);
+    /// Set whether the line at `address` compresses to half.
+    pub fn set_compressed(&mut self, address: u64, fits: bool) {
+        self.compressed.set(address, fits);
     }
 
-    /// The lines the L2 was asked for since they were last forgotten, in order.
+    /// Lines requested from the L2 since the log was last cleared, in order.
     pub fn log(&self) -> &[LineAccess] {
         &self.l2.log
     }
 
-    /// Forgets them.
-    pub fn forget(&mut self) {
+    /// Clear the log.
+    pub fn clear_log(&mut self) {
         self.l2.log.clear();
     }
 
-    /// The depth unit reads, and where `write` changes, the line at `address`. A `fresh` line was cleared and never
-    /// written: its contents are known and not fetched.
+    /// Read the line at `address` by the depth unit, and write it if `write` is set. A `fresh` line holds the
+    /// clear value, so it is not fetched.
     pub fn depth(&mut self, address: u64, write: bool, fresh: bool, counts: &mut PacketCounts) {
-        access(&mut self.depth, (&mut self.l2, &self.halves), address, write, fresh, counts);
+        access(&mut self.depth, (&mut self.l2, &self.compressed), address, write, fresh, counts);
     }
 
-    /// The colour unit writes or reads the line at `address`; `fresh` as for depth.
+    /// Read or write the line at `address` by the colour unit; `fresh` as for depth.
     pub fn colour(&mut self, address: u64, write: bool, fresh: bool, counts: &mut PacketCounts) {
-        access(&mut self.colour, (&mut self.l2, &self.halves), address, write, fresh, counts);
+        access(&mut self.colour, (&mut self.l2, &self.compressed), address, write, fresh, counts);
     }
 
-    /// The line at `address` holds depths or colours of samples that are not needed again: it is dropped wherever it is,
-    /// rather than written back.
+    /// Discard the line at `address`, whose samples are no longer needed. It is removed from all caches and
+    /// not written back.
     pub fn discard(&mut self, address: u64) {
         let line = address / LINE_BYTES;
         self.depth.cache.discard(line);
         self.colour.cache.discard(line);
-        if self.halves.is_last(line) {
-            self.l2.cache.discard(self.halves.place(line));
+        if self.compressed.is_last(line) {
+            self.l2.cache.discard(self.compressed.moved_line(line));
         }
     }
 
-    /// A texture unit reads the line at `address`.
+    /// Read the line at `address` by a texture unit.
     pub fn texture(&mut self, address: u64, counts: &mut PacketCounts) {
-        access(&mut self.texture, (&mut self.l2, &self.halves), address, false, false, counts);
+        access(&mut self.texture, (&mut self.l2, &self.compressed), address, false, false, counts);
     }
 
-    /// The vertex fetch reads the lines that hold `bytes` from `address`, straight from the L2.
+    /// Read the lines of `bytes` from `address` by the vertex fetch, directly from the L2.
     pub fn vertices(&mut self, address: u64, bytes: u64, counts: &mut PacketCounts) {
         let first = address / LINE_BYTES;
         let last = (address + bytes.max(1) - 1) / LINE_BYTES;
         (first..=last).for_each(|line| shared(&mut self.l2, Unit::Command, line, false, counts));
     }
 
-    /// The end of the frame: what is `kept`, images or depths, leaves the L2; all else is not needed again.
+    /// End the frame: lines in `kept` (images or depths) are written back, all others are dropped.
     pub fn finish(&mut self, kept: std::ops::Range<u64>, counts: &mut PacketCounts) {
         let mut unit = Unit::Colour;
         for client in [&mut self.colour, &mut self.depth] {
             for line in client.cache.flush() {
                 if kept.contains(&(line * LINE_BYTES)) {
                     unit = client.unit;
-                    shared(&mut self.l2, unit, self.halves.place(line), true, counts);
+                    shared(&mut self.l2, unit, self.compressed.moved_line(line), true, counts);
                 }
             }
         }
@@ -142,7 +143,7 @@ impl MemorySystem {
 
 fn access(
     client: &mut Client,
-    (l2, halves): (&mut Shared, &Halves),
+    (l2, compressed): (&mut Shared, &CompressedLines),
     address: u64,
     write: bool,
     fresh: bool,
@@ -156,14 +157,14 @@ fn access(
     }
     counts[client.misses] += 1;
     if let Access::MissEvicting(victim) = found {
-        shared(l2, client.unit, halves.place(victim), true, counts);
+        shared(l2, client.unit, compressed.moved_line(victim), true, counts);
     }
     if !fresh {
-        shared(l2, client.unit, halves.place(line), false, counts);
+        shared(l2, client.unit, compressed.moved_line(line), false, counts);
     }
 }
 
-/// One line through the L2. A line written whole is not fetched first.
+/// Access one line of the L2. A line written whole is not fetched first.
 fn shared(l2: &mut Shared, client: Unit, line: u64, write: bool, counts: &mut PacketCounts) {
     counts[if write { Event::L2Writes } else { Event::L2Reads }] += 1;
     let found = l2.cache.access(line, write);
@@ -187,7 +188,7 @@ fn shared(l2: &mut Shared, client: Unit, line: u64, write: bool, counts: &mut Pa
     }
 }
 
-/// Line numbers are small: what an image, its vertices and its textures take is far below 2^38 bytes.
+/// Line numbers fit in 32 bits: an image, its vertices and its textures are far below 2^38 bytes.
 fn access_to(client: Unit, line: u64, kind: LineKind, victim: Option<u64>) -> LineAccess {
     LineAccess {
         line: line as u32,
@@ -257,7 +258,7 @@ mod tests {
         let moved = |fits: bool| {
             let (mut memory, mut counts) =
                 (system().with_compression([0, 4096, 8192]), PacketCounts::default());
-            (0..2).for_each(|line| memory.fits(64 * line, fits));
+            (0..2).for_each(|line| memory.set_compressed(64 * line, fits));
             (0..2).for_each(|line| memory.depth(64 * line, false, false, &mut counts));
             (counts[Event::DepthMisses], counts[Event::L2Reads], counts[Event::DramReadBytes])
         };

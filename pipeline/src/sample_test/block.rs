@@ -1,20 +1,20 @@
-//! Sixteen samples against one triangle.
+//! Edge functions of a triangle at sixteen samples.
 
 use crate::setup::Corner;
 use crate::simd::{LANES, Lanes, Mask};
 
-/// Sixteen samples in memory, as far as the sample test asks for them.
+/// Data of sixteen samples for the sample test, in memory.
 #[derive(Clone, Copy)]
 pub(crate) struct SampleRows<'a> {
-    /// What multiplies the depth of a vertex ([`crate::geometry::Shear::ray`]).
+    /// Factor of a vertex's depth ([`crate::geometry::Shear::ray`]).
     pub slope: [&'a [f32; LANES]; 2],
-    /// What is taken off a vertex whatever its depth; read where there is a lens or the view is orthographic.
+    /// Offset of a vertex independent of its depth; read with a lens or in an orthographic view.
     pub lens: [&'a [f32; LANES]; 2],
-    /// Time; read where something moves.
+    /// Time; read for moving triangles.
     pub t: &'a [f32; LANES],
 }
 
-/// The same in registers, in perspective or in an orthographic view.
+/// Data of sixteen samples in registers, in perspective or in an orthographic view.
 #[derive(Clone, Copy)]
 pub(crate) struct View<V, const MOTION: bool, const LENS: bool, const PARALLEL: bool = false> {
     pub slope: [V; 2],
@@ -22,7 +22,7 @@ pub(crate) struct View<V, const MOTION: bool, const LENS: bool, const PARALLEL: 
     pub t: V,
 }
 
-/// A vertex as samples see it.
+/// A vertex relative to the samples.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<V> {
     pub x: V,
@@ -65,11 +65,11 @@ impl<V: Lanes, const MOTION: bool, const LENS: bool, const PARALLEL: bool> View<
     }
 }
 
-/// The edge functions of a triangle at sixteen samples, and what their signs say.
+/// Edge functions of a triangle at sixteen samples, and their signs.
 pub(crate) struct Crossing<V> {
     edges: [V; 3],
     depths: [V; 3],
-    /// The smallest and largest edge function.
+    /// Smallest and largest edge function.
     ends: [V; 2],
 }
 
@@ -83,8 +83,8 @@ impl<V: Lanes> Crossing<V> {
         let e0 = b.x * c.y - c.x * b.y;
         let e1 = c.x * a.y - a.x * c.y;
         let e2 = a.x * b.y - b.x * a.y;
-        let (least, most) = (e0.min(e1).min(e2), e0.max(e1).max(e2));
-        Self { edges: [e0, e1, e2], depths: [a.w, b.w, c.w], ends: [least, most] }
+        let (min, max) = (e0.min(e1).min(e2), e0.max(e1).max(e2));
+        Self { edges: [e0, e1, e2], depths: [a.w, b.w, c.w], ends: [min, max] }
     }
 
     /// Whether any lane is inside or on an edge.
@@ -94,18 +94,18 @@ impl<V: Lanes> Crossing<V> {
         (self.ends[0].ge(zero) | zero.ge(self.ends[1])) != 0
     }
 
-    /// Lanes on an edge or a vertex, and outside of no other edge, for [`super::exact`] to decide.
+    /// Lanes on an edge or a vertex and outside of no other edge; [`super::exact`] decides them.
     #[inline(always)]
     pub fn tie(&self) -> Mask {
         let zero = V::splat(0.0);
         self.ends[0].equal(zero) | self.ends[1].equal(zero)
     }
 
-    /// Lanes inside that show a face to be drawn.
+    /// Lanes inside that show a drawn face.
     #[inline(always)]
     pub fn shown(&self, faces: [bool; 2]) -> Mask {
         let zero = V::splat(0.0);
-        // By branches, which are always taken alike, rather than by masks, which the compiler would put into vectors.
+        // Uniform branches rather than masks, which the compiler would vectorize.
         let mut shown = 0;
         if faces[0] {
             shown |= self.ends[0].gt(zero);
@@ -116,12 +116,12 @@ impl<V: Lanes> Crossing<V> {
         shown
     }
 
-    /// The depth of the lanes inside.
+    /// Depth of the lanes inside.
     #[inline(always)]
     pub fn depth(&self) -> V {
         let ([e0, e1, e2], [a, b, c]) = (self.edges, self.depths);
         let quotient = ((e0 * a + e1 * b) + e2 * c) / ((e0 + e1) + e2);
-        // The quotient may leave the range of the vertices by a rounding; depth culling relies on it.
+        // The quotient may leave the range of the vertices by rounding; depth culling relies on the range.
         quotient.max(a.min(b).min(c)).min(a.max(b).max(c))
     }
 }

@@ -1,20 +1,20 @@
-//! The sample test where rounded products tie, and the weights of a hit.
+//! Exact sample test for ties of rounded products, and the weights of a hit.
 
 use super::block::SampleRows;
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::simd::LANES;
 
-/// A vertex seen from a sample: `[x', y', w]`.
+/// A vertex relative to a sample: `[x', y', w]`.
 pub type Seen = [f32; 3];
 
-/// The vertices of a triangle as the sample in `slot` of a tile sees them.
+/// Vertices of a triangle as seen by the sample in `slot` of a tile.
 pub fn seen_in_tile(corners: &[Corner; 3], samples: &TileSamples, slot: usize) -> [Seen; 3] {
     let [slope, lens] = [&samples.slope, &samples.lens].map(|axes| [axes[0][slot], axes[1][slot]]);
     corners.map(|corner| see(&corner, slope, lens, samples.t[slot]))
 }
 
-/// The vertices of a triangle as one of sixteen samples sees them.
+/// Vertices of a triangle as seen by one of sixteen samples.
 pub(crate) fn seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) -> [Seen; 3] {
     let [slope, lens] =
         [&rows.slope, &rows.lens].map(|axes: &[&[f32; LANES]; 2]| [axes[0][lane], axes[1][lane]]);
@@ -27,29 +27,29 @@ fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
     [(-slope[0]).mul_add(w, x - lens[0]), (-slope[1]).mul_add(w, y - lens[1]), w]
 }
 
-/// The depth at which a sample hits a triangle of which the given faces are drawn.
+/// Depth at which a sample hits a triangle with the given drawn faces.
 pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<f32> {
     let (weights, counter_clockwise) = weights(seen)?;
     faces[usize::from(counter_clockwise)].then(|| depth(seen, &weights))
 }
 
-/// Barycentric weights of the origin in the triangle, or `None` when it is outside. They add up to one and are not
-/// negative. Also says whether the triangle turns counter-clockwise on the screen (`y` downwards).
+/// Barycentric weights of the origin in the triangle, or `None` if it is outside. They add up to 1 and are
+/// not negative. The flag says whether the triangle is counter-clockwise on the screen (`y` downwards).
 ///
-/// Ties are broken by moving the sample by `(eps, eps^2)` for an infinitely small `eps`: the edge becomes
-/// `e + eps B + eps^2 C` with `B = y_i w_j - y_j w_i`, `C = w_i x_j - w_j x_i`, and its first term that is not zero
+/// Ties are broken by moving the sample by `(eps, eps^2)` for an infinitely small `eps`. The edge becomes `e
+/// + eps B + eps^2 C` with `B = y_i w_j - y_j w_i`, `C = w_i x_j - w_j x_i`, and its first nonzero term
 /// decides (Edelsbrunner and Mücke 1990, simulation of simplicity). Products of two `f32` are exact in `f64`.
 ///
-/// In an orthographic view the same terms tilt the ray about its place at depth zero, by `(eps, eps^2)` for each unit of depth. Any
-/// tilted ray does for neighbours to agree, and at a depth above zero, where alone a sample counts, edges and vertices go to
-/// the owner they would have if the sample were moved.
+/// In an orthographic view the same terms tilt the ray about its point at depth 0, by `(eps, eps^2)` per unit
+/// of depth. Any tilted ray makes neighbours agree. At positive depth, where alone samples count, edges and
+/// vertices have the same owner as if the sample were moved.
 pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
     let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| terms(&seen[i], &seen[j]));
     let signs = edges.map(|levels| levels.into_iter().map(sign).find(|&s| s != 0).unwrap_or(0));
     if signs[0] == 0 || signs[1] != signs[0] || signs[2] != signs[0] {
         return None;
     }
-    // The lowest order at which any edge differs from zero carries the weights.
+    // The lowest order at which any edge is nonzero has the weights.
     let level = (0..3).find(|&level| edges.iter().any(|levels| sign(levels[level]) != 0))?;
     let parts = edges.map(|levels| levels[level].0 - levels[level].1);
     let parts = [0, 1, 2].map(|k| if sign(edges[k][level]) == signs[0] { parts[k].abs() } else { 0.0 });
@@ -57,7 +57,7 @@ pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
     (sum > 0.0).then(|| (parts.map(|part| part / sum), signs[0] < 0))
 }
 
-/// The pairs of exact products whose differences are `e`, `B` and `C` of the edge from `i` to `j`.
+/// Pairs of exact products whose differences are `e`, `B` and `C` of the edge from `i` to `j`.
 fn terms(i: &Seen, j: &Seen) -> [(f64, f64); 3] {
     let [xi, yi, wi] = i.map(f64::from);
     let [xj, yj, wj] = j.map(f64::from);
@@ -68,7 +68,7 @@ fn sign((plus, minus): (f64, f64)) -> i8 {
     i8::from(plus > minus) - i8::from(plus < minus)
 }
 
-/// The depth of a hit with the given weights, kept within the range of the vertices.
+/// Depth of a hit with the given weights, clamped to the range of the vertices.
 pub fn depth(seen: &[Seen; 3], weights: &[f64; 3]) -> f32 {
     let w = seen.map(|vertex| vertex[2]);
     let mean: f64 = weights.iter().zip(w).map(|(weight, w)| weight * f64::from(w)).sum();
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shared_edge_has_one_owner_wherever_the_sample_lies_on_it() {
+    fn a_shared_edge_has_one_owner_for_all_samples_on_it() {
         let (a, b) = ([-3.0_f32, -1.5, 1.0], [6.0_f32, 3.0, 2.0]);
         let (left, right) = ([-1.0_f32, 4.0, 1.5], [2.0_f32, -5.0, 0.5]);
         let owners = [[a, b, left], [b, a, right]].iter().filter(|t| weights(t).is_some()).count();
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_shared_vertex_has_one_owner() {
-        // A fan of eight about a vertex that is exactly the sample.
+        // A fan of eight triangles around a vertex at the sample itself.
         let rim: Vec<Seen> = [(3, 0), (2, 2), (0, 3), (-2, 2), (-3, 0), (-2, -2), (0, -3), (2, -2)]
             .map(|(x, y)| [x as f32, y as f32, 1.0 + 0.1 * x as f32])
             .to_vec();

@@ -1,7 +1,7 @@
-//! The sample test over a run of samples of a tile, sixteen at a time.
+//! Sample test over a range of samples of a tile, sixteen at a time, and its cost.
 //!
-//! One source serves every combination of dimensions and every vector width, by generics. Where a multiply-add is fused is
-//! written out, so all of them give the same bytes.
+//! One generic source serves all combinations of dimensions and all vector widths. Fused multiply-adds are
+//! explicit, so all variants give the same bytes.
 
 use std::ops::Range;
 
@@ -12,15 +12,15 @@ use crate::setup::Triangle;
 use crate::simd::{Kernel, LANES, Lanes, Mask, Width, dispatch};
 use crate::traversal::{Box5, Screen};
 
-/// The stored samples of a tile, in the order of its [`TileSamples`].
+/// Stored samples of a tile, in the order of its [`TileSamples`].
 pub struct Target<'a> {
-    /// Depth of the nearest hit so far, infinite where there is none.
+    /// Depth of the nearest hit so far, infinite without a hit.
     pub depth: &'a mut [f32],
-    /// Triangle of the nearest hit so far; meaningless where there is none.
+    /// Triangle of the nearest hit so far; undefined without a hit.
     pub triangle: &'a mut [u32],
 }
 
-/// What a run of sample tests found.
+/// Result of a range of sample tests.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Hits {
     /// Samples screened by the linearized edges.
@@ -29,17 +29,17 @@ pub struct Hits {
     pub tested: u32,
     /// Samples inside the triangle and beyond the near depth.
     pub hit: u32,
-    /// The slots of samples that now see the triangle, in order.
+    /// Slots of samples that now see the triangle, in order.
     pub written: Vec<u16>,
     /// Pixels of the tile whose stored depth was read.
     pub read_pixels: u64,
     /// Pixels of the tile whose stored depth was written.
     pub written_pixels: u64,
-    /// The same by pixel of the tile, where somebody asks for it.
+    /// The same by pixel of the tile, if requested.
     pub by_pixel: Option<Box<PixelHits>>,
 }
 
-/// What happened to the samples of each pixel of a tile, row by row.
+/// Sample events of each pixel of a tile, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PixelHits {
     /// Samples screened.
@@ -59,7 +59,7 @@ impl Default for PixelHits {
 }
 
 impl Hits {
-    /// Forgets what was found, keeping the memory.
+    /// Clear the result but keep its memory.
     pub fn clear(&mut self) {
         self.written.clear();
         let by_pixel = self.by_pixel.take().map(|mut pixels| {
@@ -70,7 +70,7 @@ impl Hits {
     }
 }
 
-/// Tests the samples of a tile that lie in the box against `triangle` and stores those that see it.
+/// Test the samples of a tile in the box against `triangle`, and store those that see it.
 pub fn test_run(
     triangle: &Triangle,
     samples: &TileSamples,
@@ -82,7 +82,7 @@ pub fn test_run(
     test_screened(triangle, samples, within, None, near, target, hits);
 }
 
-/// The same for those samples only that pass the screen, where there is one.
+/// Test only the samples that pass the screen, if given.
 pub fn test_screened(
     triangle: &Triangle,
     samples: &TileSamples,
@@ -95,7 +95,7 @@ pub fn test_screened(
     start(Width::widest(), Job { triangle, samples, within, screen, near, target, hits });
 }
 
-/// The same as [`test_run`] with vectors of a given width, to show that all give the same bytes.
+/// [`test_run`] with vectors of a given width, to check that all widths give the same bytes.
 pub fn test_run_at(
     width: Width,
     triangle: &Triangle,
@@ -118,7 +118,7 @@ struct Job<'a, 'b> {
     hits: &'a mut Hits,
 }
 
-/// A job in the dimensions it needs.
+/// A run of the kernel in the dimensions it needs.
 struct Run<'a, 'b, const MOTION: bool, const LENS: bool, const PARALLEL: bool>(Job<'a, 'b>);
 
 fn start(width: Width, job: Job<'_, '_>) {
@@ -174,15 +174,15 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Lanes whose place on the lens lies in the box.
+    /// Lanes with a lens position in the box.
     #[inline(always)]
     fn in_lens_box<V: Lanes>(&self, base: usize) -> Mask {
-        let within = |place: V, [lo, hi]: [f32; 2]| place.ge(V::splat(lo)) & V::splat(hi).ge(place);
+        let within = |position: V, [lo, hi]: [f32; 2]| position.ge(V::splat(lo)) & V::splat(hi).ge(position);
         let (u, v) = (V::load(block_of(&self.samples.u, base)), V::load(block_of(&self.samples.v, base)));
         within(u, self.within.u) & within(v, self.within.v)
     }
 
-    /// Lanes that no pair of linearized edges tells to lie outside.
+    /// Lanes that no pair of linearized edges places outside.
     #[inline(always)]
     fn pass<V: Lanes, const MOTION: bool, const LENS: bool>(&self, screen: &Screen, base: usize) -> Mask {
         let samples = self.samples;
@@ -210,7 +210,7 @@ impl Job<'_, '_> {
         !(below & above)
     }
 
-    /// Resolves ties, applies facing and the near depth, and keeps what is nearest.
+    /// Resolve ties, apply facing and the near depth, and store the nearest hits.
     #[inline(always)]
     fn store<V: Lanes>(&mut self, base: usize, crossing: &Crossing<V>, active: Mask) {
         let mut inside = crossing.shown(self.triangle.faces) & active;
@@ -231,7 +231,7 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Notes in which pixels samples are, where somebody asks.
+    /// Record the pixels of samples, if requested.
     #[inline(always)]
     fn note(&mut self, base: usize, active: Mask, of: fn(&mut PixelHits) -> &mut [u32; 64]) {
         if self.hits.by_pixel.is_some() {
@@ -282,15 +282,25 @@ impl Job<'_, '_> {
 
 #[inline(always)]
 fn block_of(array: &[f32], base: usize) -> &[f32; LANES] {
-    // Arrays are padded to whole blocks, so the fallback is never taken.
+    // Arrays are padded to whole blocks, so the fallback is never used.
     array[base..base + LANES].first_chunk().unwrap_or(&[0.0; LANES])
 }
 
-/// The lanes of the block at `base` that belong to `run`.
+/// Lanes of the block at `base` that belong to `run`.
 fn lanes(run: &Range<usize>, base: usize) -> Mask {
     let first = run.start.saturating_sub(base);
     let last = (run.end - base).min(LANES);
     (((1_u32 << last) - 1) & !((1_u32 << first) - 1)) as Mask
+}
+
+/// Multiply-adds of one sample test; a separate addition or multiplication counts as one.
+///
+/// Each vertex: one per coordinate that moves with time, one per axis sheared by the lens, and one per axis
+/// translated to the sample, in all views. Each edge: two. The depth: two additions, three multiply-adds and
+/// a division.
+pub const fn madds(moving: bool, lens: bool) -> u32 {
+    let vertex = 2 + if moving { 3 } else { 0 } + if lens { 2 } else { 0 };
+    3 * vertex + 3 * 2 + 6
 }
 
 #[cfg(test)]
@@ -303,5 +313,13 @@ mod tests {
         assert_eq!(lanes(&(3..40), 0), 0xFFF8);
         assert_eq!(lanes(&(3..40), 16), 0xFFFF);
         assert_eq!(lanes(&(3..40), 32), 0x00FF);
+    }
+
+    #[test]
+    fn the_cost_of_each_dimension_is_that_of_the_kernel() {
+        assert_eq!(
+            [madds(false, false), madds(true, false), madds(false, true), madds(true, true)],
+            [18, 27, 24, 33]
+        );
     }
 }

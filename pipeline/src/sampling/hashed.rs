@@ -1,14 +1,14 @@
-//! Samples made by hashing, as the ray-casting peer makes them: plain random, reproducible to the bit anywhere.
+//! Hashed samples: plain random samples, reproducible to the bit in other programs.
 
 use super::{LensShape, Sample, SampleSource};
 use crate::random::mix;
 
 /// Independent uniform samples, each a hash of (seed, pixel, index).
 ///
-/// With all arithmetic modulo 2^64, `G = 0x9E3779B97F4A7C15` and `index = (py * width + px) * per_pixel + s`:
-/// `state = mix(seed + G (index + 1))` and the numbers are `r(d) = mix(state + G (d + 1)) >> 40`, 24 bits each. `x, y, t`
-/// are `r(0), r(1), r(2)` over 2^24; the lens takes the first pair `2 r(3 + 2k) - 2^24, 2 r(4 + 2k) - 2^24` that lies in
-/// the disk, or the first pair for a square.
+/// All arithmetic is modulo 2^64, with `G = 0x9E3779B97F4A7C15` and `index = (py * width + px) * per_pixel +
+/// s`. Then `state = mix(seed + G (index + 1))`, and the numbers are `r(d) = mix(state + G (d + 1)) >> 40`,
+/// 24 bits each. `x, y, t` are `r(0), r(1), r(2)` over 2^24. The lens uses the first pair `2 r(3 + 2k) -
+/// 2^24, 2 r(4 + 2k) - 2^24` inside the disk, or the first pair for a square.
 #[derive(Clone, Copy, Debug)]
 pub struct HashedSamples {
     seed: u64,
@@ -22,7 +22,7 @@ const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 const RANGE: i64 = 1 << 24;
 
 impl HashedSamples {
-    /// Samples for an image of `width` pixels, or `None` when `per_pixel` is not 1 to 256.
+    /// Samples for an image of `width` pixels, or `None` if `per_pixel` is not 1 to 256.
     pub fn new(seed: u64, width: u32, per_pixel: u32, shape: LensShape) -> Option<Self> {
         (1..=256).contains(&per_pixel).then_some(Self { seed, width, per_pixel, shape })
     }
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_polygon_rejects_what_lies_outside() {
+    fn a_polygon_rejects_points_outside() {
         let shape = LensShape::Polygon { blades: 5, rotation_deg: 10 };
         let source = HashedSamples::new(3, 64, 16, shape).unwrap();
         let mut found = [Sample::default(); 16];
@@ -77,7 +77,8 @@ mod tests {
 
     #[test]
     fn the_first_samples_are_those_of_the_peer() {
-        // `shared/peers/embree5d/README.md`: seed 71, 128x128, one sample per pixel, little-endian bytes of x y u v t.
+        // Digest from an independent implementation (a ray caster on Embree): seed 71, 128x128, one sample
+        // per pixel, little-endian bytes of x y u v t.
         let source = HashedSamples::new(71, 128, 1, LensShape::Disk).unwrap();
         let bytes = [
             [0x3d20_6530, 0x3f5c_690b, 0x3ddc_5ab0_u32, 0xbd88_efc0, 0x3f01_3905],

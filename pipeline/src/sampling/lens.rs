@@ -1,24 +1,24 @@
-//! Shapes of the aperture.
+//! Aperture shapes.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
-/// The shape of the aperture, inscribed in the square [-1, 1]^2 of lens coordinates.
+/// Shape of the aperture, inscribed in the square [-1, 1]^2 of lens coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum LensShape {
-    /// A round aperture.
+    /// Round aperture.
     #[default]
     Disk,
     /// The whole square.
     Square,
-    /// A regular polygon with its corners on the unit circle, as the blades of an iris leave it open.
+    /// Regular polygon with its corners on the unit circle, like an iris of blades.
     Polygon {
-        /// Blades, 3 to 64: the polygon has as many sides.
+        /// Number of blades and sides, 3 to 64.
         #[serde(deserialize_with = "blades")]
         blades: u32,
-        /// How far the first corner is turned from `+u` towards `+v`, in degrees.
+        /// Rotation of the first corner from `+u` towards `+v`, in degrees.
         #[serde(default)]
         rotation_deg: u16,
     },
@@ -31,11 +31,11 @@ fn blades<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
 }
 
 impl LensShape {
-    /// How many blades an iris may have.
+    /// Allowed number of blades.
     pub const BLADES: std::ops::RangeInclusive<u32> = 3..=64;
 
-    /// Maps a point of the unit square to the aperture, areas kept in proportion. The disk uses the concentric
-    /// map of Shirley and Chiu 1997, the polygon that map with `polygon` behind it.
+    /// Map a point of the unit square to the aperture, preserving area ratios. The disk uses the concentric
+    /// map of Shirley and Chiu 1997. The polygon uses that map followed by `polygon`.
     pub fn map(self, unit: [f32; 2]) -> [f32; 2] {
         let [a, b] = unit.map(|c| f64::from(c) * 2.0 - 1.0);
         let on_lens = match self {
@@ -46,11 +46,11 @@ impl LensShape {
             }
             Self::Polygon { blades, rotation_deg } => polygon(concentric(a, b), blades, rotation_deg),
         };
-        // Half a unit in the last place may lie beyond the square.
+        // Half an ulp may be outside the square.
         on_lens.map(|c| (c as f32).clamp(-1.0, 1.0))
     }
 
-    /// Whether a point of the lens lies in the aperture, border included: for samples found by rejection.
+    /// Whether a lens position is in the aperture, border included; for rejection sampling.
     pub fn contains(self, [u, v]: [f32; 2]) -> bool {
         let [u, v] = [u, v].map(f64::from);
         match self {
@@ -63,7 +63,7 @@ impl LensShape {
         }
     }
 
-    /// The area of the aperture; that of the square is 4.
+    /// Area of the aperture; the square's is 4.
     pub fn area(self) -> f64 {
         match self {
             Self::Square => 4.0,
@@ -76,8 +76,8 @@ impl LensShape {
     }
 }
 
-/// Signed radius and angle in the unit disk of a point of [-1, 1]^2 (Shirley and Chiu 1997). In these, equal areas of the
-/// square are equal steps of angle times equal steps of squared radius.
+/// Signed radius and angle in the unit disk of a point of [-1, 1]^2 (Shirley and Chiu 1997). Equal areas of
+/// the square are equal steps of angle times equal steps of squared radius.
 fn concentric(a: f64, b: f64) -> (f64, f64) {
     if a == 0.0 && b == 0.0 {
         (0.0, 0.0)
@@ -88,9 +88,9 @@ fn concentric(a: f64, b: f64) -> (f64, f64) {
     }
 }
 
-/// From a place in the disk to one in the polygon: the angle picks a triangle between the centre and a side and the place
-/// along that side, the radius the place on the way out. In a triangle area goes with the squared way out (Turk 1990), as
-/// in the disk with the squared radius, so equal areas stay equal.
+/// Map from the disk to the polygon. The angle selects a triangle between the centre and a side, and the
+/// position along that side; the radius is the distance from the centre. In a triangle, area is proportional
+/// to the squared distance (Turk 1990), as in the disk to the squared radius, so equal areas stay equal.
 fn polygon((radius, angle): (f64, f64), blades: u32, rotation_deg: u16) -> [f64; 2] {
     let turned = if radius < 0.0 { angle + TAU / 2.0 } else { angle };
     let sides = turned.rem_euclid(TAU) / TAU * f64::from(blades);
@@ -118,7 +118,7 @@ mod tests {
         LensShape::Polygon { blades: 12, rotation_deg: 359 },
     ];
 
-    /// The images of the middles of `n` x `n` cells of the unit square.
+    /// Images of the centres of `n` x `n` cells of the unit square.
     fn grid(shape: LensShape, n: u32) -> impl Iterator<Item = [f32; 2]> {
         let at = move |i: u32| (i as f32 + 0.5) / n as f32;
         (0..n * n).map(move |i| shape.map([at(i % n), at(i / n)]))
@@ -135,8 +135,8 @@ mod tests {
 
     #[test]
     fn equal_areas_hold_equal_shares() {
-        // Every part of the aperture that a cell of a coarse grid cuts out gets its share of the points; the areas of the
-        // parts are measured by rejection on a finer grid.
+        // Each cell of a coarse grid gets its share of the points; areas of the aperture in cells are
+        // measured by rejection on a finer grid.
         let (n, cells) = (250, 8);
         let cell = |[u, v]: [f32; 2]| {
             let at = |c: f32| (((c + 1.0) * 0.5 * cells as f32) as usize).min(cells - 1);

@@ -1,36 +1,36 @@
-//! Patterns: how the samples of a pixel are spread over pixel, lens and shutter.
+//! Sample patterns: how the samples of a pixel are distributed over pixel, lens and shutter.
 
-use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::Sample;
-use super::sobol::{owen, sobol};
 use crate::random::word;
 
-/// How the samples of a pixel are spread.
+/// Distribution of the samples of a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Pattern {
-    /// The first points of the five-dimensional Sobol sequence, Owen scrambled by pixel and dimension (Laine and Karras
-    /// 2011, constants of Burley 2020).
+    /// First points of the five-dimensional Sobol sequence, Owen scrambled by pixel and dimension (Laine and
+    /// Karras 2011, constants of Burley 2020).
     #[default]
     Owen,
-    /// The first points of the Sobol sequence as they are (Joe and Kuo 2008), the same ones in every pixel.
+    /// First points of the unscrambled Sobol sequence (Joe and Kuo 2008), the same in every pixel.
     Sobol,
     /// Independent uniform numbers, hashed from the seed.
     Random,
-    /// Jittered (Cook 1986): the pixel and the lens each divided into as many cells as there are samples, the shutter into
-    /// as many intervals, a random point in each, paired at random.
+    /// Jittered (Cook 1986). Pixel and lens are each divided into as many cells as there are samples, the
+    /// shutter into as many intervals. Each has one random point, and they are paired at random.
     Jittered,
-    /// A fixed set of places on the lens and in time, used by all pixels: each takes a run of it, and its neighbours the
-    /// runs that follow, in the order of a Z-curve (interleaved sampling, Keller and Heidrich 2001). With as many points
-    /// as samples all pixels see the same places. The set is the first points of the scrambled Sobol sequence; positions
-    /// in the pixel are those of [`Pattern::Owen`].
+    /// A fixed set of lens positions and times, shared by all pixels. Each pixel uses a range of the set, and
+    /// its neighbours the following ranges, in the order of a Z-curve (interleaved sampling, Keller and
+    /// Heidrich 2001). With as many points as samples all pixels have the same ones. The set is the first
+    /// points of the scrambled Sobol sequence; positions in the pixel are those of [`Pattern::Owen`].
     Interleaved {
         /// Points of the set, best a power of two and a multiple of the samples of a pixel.
         #[serde(deserialize_with = "points")]
         points: u32,
     },
-    /// The same with a set of one's own: `(u, v, t)` on the lens and in time, taken as they are.
+    /// The same with a given set: `(u, v, t)` on the lens and in time, used unchanged.
     Given {
         /// Lens coordinates from -1 to 1, time from 0 to below 1.
         #[serde(deserialize_with = "given")]
@@ -61,7 +61,7 @@ fn in_range((u, v, t): (f32, f32, f32)) -> bool {
     Sample { u, v, t, ..Sample::default() }.is_in_range()
 }
 
-/// The dimension of a number in the Sobol sequence and in hashes.
+/// Dimension of a number in the Sobol sequence and in hashes.
 const X: usize = 0;
 const Y: usize = 1;
 const U: usize = 2;
@@ -69,15 +69,15 @@ const V: usize = 3;
 const T: usize = 4;
 
 impl Pattern {
-    /// How many points a fixed set may have.
+    /// Allowed number of points of a fixed set.
     pub const POINTS: std::ops::RangeInclusive<u32> = 1..=65_536;
 
-    /// Whether `u, v` are places on the lens already rather than in the unit square.
+    /// Whether `u, v` are lens positions rather than points of the unit square.
     pub(super) fn is_on_lens(&self) -> bool {
         matches!(self, Self::Given { .. })
     }
 
-    /// Whether the pattern can be: its points in number and range.
+    /// Whether the points are valid in number and range.
     pub(super) fn is_sane(&self) -> bool {
         match self {
             Self::Interleaved { points } => Self::POINTS.contains(points),
@@ -88,8 +88,8 @@ impl Pattern {
         }
     }
 
-    /// Fills the samples of pixel (`px`, `py`) of a block `side` pixels wide, `u, v` in the unit square unless
-    /// [`Self::is_on_lens`].
+    /// Fill the samples of pixel (`px`, `py`) of a block `side` pixels wide. `u, v` are in the unit square
+    /// unless [`Self::is_on_lens`].
     pub(super) fn fill(&self, seed: u64, [px, py]: [u32; 2], side: u32, into: &mut [Sample]) {
         let pixel = py * side + px;
         let run = z_curve(px, py) * into.len() as u64;
@@ -124,7 +124,7 @@ fn from_array([x, y, u, v, t]: [f32; 5]) -> Sample {
     Sample { x, y, u, v, t }
 }
 
-/// 24 bits, so that the fraction is exact in f32 and below one.
+/// 24 bits, so that the fraction is exact in f32 and below 1.
 fn fraction(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
@@ -133,7 +133,7 @@ fn random(seed: u64, pixel: u32, index: u32, dim: usize) -> f32 {
     fraction((word(word(seed, pixel.into(), index.into()), dim as u64, 0) >> 32) as u32)
 }
 
-/// The place of a pixel on a Z-curve: the bits of its column and row in turn (Morton 1966).
+/// Position of a pixel on a Z-curve: the interleaved bits of its column and row (Morton 1966).
 fn z_curve(px: u32, py: u32) -> u64 {
     (0..32).fold(0, |code, bit| {
         let [x, y] = [px, py].map(|c| u64::from(c >> bit & 1));
@@ -164,12 +164,12 @@ fn below_one(value: f64) -> f32 {
     (value as f32).min(1.0 - f32::EPSILON / 2.0)
 }
 
-/// The largest divisor of `count` up to its root: the cells are as square as can be.
+/// Largest divisor of `count` up to its square root, for cells as square as possible.
 fn columns(count: u32) -> u32 {
     (1..=count.isqrt()).rev().find(|&columns| count.is_multiple_of(columns)).unwrap_or(1)
 }
 
-/// The numbers below `count` in a random order (Fisher and Yates 1938, downwards).
+/// Numbers below `count` in random order (Fisher and Yates 1938, downwards).
 fn shuffled(seed: u64, pixel: u32, count: u32, dim: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
     for last in (1..count).rev() {
@@ -177,6 +177,68 @@ fn shuffled(seed: u64, pixel: u32, count: u32, dim: usize) -> Vec<u32> {
         order.swap(last as usize, pick as usize);
     }
     order
+}
+
+/// Primitive polynomial degree, coefficients and initial odd numbers of dimensions 2 to 5. Direction numbers:
+/// Joe and Kuo 2008, `new-joe-kuo-6`, dimensions 1 to 5.
+const JOE_KUO: [(usize, u32, &[u32]); 4] =
+    [(1, 0, &[1]), (2, 1, &[1, 3]), (3, 1, &[1, 3, 1]), (3, 2, &[1, 1, 1])];
+
+const fn directions() -> [[u32; 32]; 5] {
+    let mut v = [[0_u32; 32]; 5];
+    let mut bit = 0;
+    while bit < 32 {
+        v[0][bit] = 1 << (31 - bit);
+        bit += 1;
+    }
+    let mut dim = 0;
+    while dim < 4 {
+        let (degree, coefficients, initial) = JOE_KUO[dim];
+        let mut i = 0;
+        while i < 32 {
+            v[dim + 1][i] = if i < degree {
+                initial[i] << (31 - i)
+            } else {
+                let mut value = v[dim + 1][i - degree] ^ (v[dim + 1][i - degree] >> degree);
+                let mut k = 1;
+                while k < degree {
+                    if (coefficients >> (degree - 1 - k)) & 1 == 1 {
+                        value ^= v[dim + 1][i - k];
+                    }
+                    k += 1;
+                }
+                value
+            };
+            i += 1;
+        }
+        dim += 1;
+    }
+    v
+}
+
+const DIRECTIONS: [[u32; 32]; 5] = directions();
+
+/// Point `index` of dimension `dim` (0 to 4) as a 32-bit fraction.
+pub(super) fn sobol(index: u32, dim: usize) -> u32 {
+    let mut bits = index;
+    let mut value = 0;
+    while bits != 0 {
+        value ^= DIRECTIONS[dim][bits.trailing_zeros() as usize];
+        bits &= bits - 1;
+    }
+    value
+}
+
+/// Nested uniform scrambling of a 32-bit fraction, which preserves the net structure and randomizes the rest
+/// (Laine and Karras 2011 as improved by Burley 2020, "Practical Hash-based Owen Scrambling", listing 3).
+pub(super) fn owen(value: u32, seed: u32) -> u32 {
+    let mut x = value.reverse_bits();
+    x ^= x.wrapping_mul(0x3D20_ADEA);
+    x = x.wrapping_add(seed);
+    x = x.wrapping_mul((seed >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6C56);
+    x ^= x.wrapping_mul(0x53A2_2864);
+    x.reverse_bits()
 }
 
 #[cfg(test)]
@@ -247,7 +309,7 @@ mod tests {
         assert_eq!(set([0, 0]), set([34, 6]), "every block of 2x2 holds the same set");
         distinct.dedup();
         assert_eq!(distinct.len(), 64);
-        // With as many samples as points each pixel has them all.
+        // With as many samples as points each pixel has all of them.
         let whole = |at| {
             let mut set: Vec<_> = pixel(&pattern, at, 64).iter().map(uvt).collect();
             set.sort_unstable();
@@ -271,5 +333,26 @@ mod tests {
         let mut first: Vec<u64> = (0..4).flat_map(|y| (0..4).map(move |x| z_curve(x, y))).collect();
         first.sort_unstable();
         assert_eq!(first, (0..16).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn first_points_are_the_published_ones() {
+        let point = |i| [0, 1, 2, 3, 4].map(|d| f64::from(sobol(i, d)) / 4_294_967_296.0);
+        assert_eq!(point(1), [0.5; 5]);
+        // Values of scipy 1.17's qmc.Sobol(5, scramble=False), whose Gray code order swaps these two.
+        assert_eq!(point(2), [0.25, 0.75, 0.75, 0.75, 0.25]);
+        assert_eq!(point(3), [0.75, 0.25, 0.25, 0.25, 0.75]);
+    }
+
+    #[test]
+    fn every_dimension_is_stratified_scrambled_or_not() {
+        for dim in 0..5 {
+            for seed in [None, Some(1), Some(0xDEAD_BEEF)] {
+                let mut strata: Vec<u32> =
+                    (0..16).map(|i| seed.map_or(sobol(i, dim), |s| owen(sobol(i, dim), s)) >> 28).collect();
+                strata.sort_unstable();
+                assert_eq!(strata, (0..16).collect::<Vec<_>>(), "dimension {dim}, seed {seed:?}");
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Disjoint regions of the lens: several views out of one table.
+//! Disjoint regions of the lens, for several views from one sample table.
 
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
@@ -6,9 +6,9 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LensRegion {
-    /// Lowest and highest `u`.
+    /// Range of `u`.
     pub u: (f32, f32),
-    /// Lowest and highest `v`.
+    /// Range of `v`.
     pub v: (f32, f32),
 }
 
@@ -16,8 +16,8 @@ impl LensRegion {
     /// The whole square of the lens.
     pub const WHOLE: Self = Self { u: (-1.0, 1.0), v: (-1.0, 1.0) };
 
-    /// The place in the region of a point of the whole square.
-    pub fn place(&self, lens: [f32; 2]) -> [f32; 2] {
+    /// Map a point of the whole square to the region.
+    pub fn map(&self, lens: [f32; 2]) -> [f32; 2] {
         let within = |(lo, hi): (f32, f32), c: f32| {
             let part = 0.5 * (f64::from(c) + 1.0);
             ((f64::from(lo) + part * (f64::from(hi) - f64::from(lo))) as f32).clamp(lo, hi)
@@ -25,7 +25,7 @@ impl LensRegion {
         if *self == Self::WHOLE { lens } else { [within(self.u, lens[0]), within(self.v, lens[1])] }
     }
 
-    /// Whether the point lies in the region, border included.
+    /// Whether the point is in the region, border included.
     pub fn contains(&self, [u, v]: [f32; 2]) -> bool {
         (self.u.0..=self.u.1).contains(&u) && (self.v.0..=self.v.1).contains(&v)
     }
@@ -34,35 +34,36 @@ impl LensRegion {
         [self.u, self.v].iter().all(|&(lo, hi)| -1.0 <= lo && lo < hi && hi <= 1.0)
     }
 
-    /// Whether the insides of the two have a point in common.
+    /// Whether the interiors of the two intersect.
     fn overlaps(&self, other: &Self) -> bool {
         let meet = |(a, b): (f32, f32), (c, d): (f32, f32)| a < d && c < b;
         meet(self.u, other.u) && meet(self.v, other.v)
     }
 }
 
-/// How the lens is divided. Each region is an aperture of its own: the shape of the lens, inscribed in the rectangle. The
-/// samples of a pixel are shared out evenly, the first run of them to the first region.
+/// Division of the lens. Each region is a separate aperture: the shape of the lens, inscribed in the
+/// rectangle. The samples of a pixel are divided evenly; the first ones belong to the first region.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum LensRegions {
-    /// Not at all.
+    /// Not divided.
     #[default]
     Whole,
-    /// Into so many equal strips side by side in `u`, the views of a camera line from left to right.
+    /// This many equal strips side by side in `u`, for the views of a camera line from left to right.
     Across(#[serde(deserialize_with = "few")] u32),
-    /// Into columns times rows, row by row from the lowest `v`.
+    /// Columns times rows, row by row from the lowest `v`.
     Grid(#[serde(deserialize_with = "few")] u32, #[serde(deserialize_with = "few")] u32),
-    /// Into these rectangles; what lies in none of them gets no samples.
+    /// The given rectangles; the rest of the lens has no samples.
     Rectangles(#[serde(deserialize_with = "disjoint")] Vec<LensRegion>),
 }
 
-/// The most regions along an axis, and in a list.
-const MOST: u32 = 256;
+/// Largest number of regions along an axis, and in a list.
+const MAX_REGIONS: u32 = 256;
 
 fn few<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
     let count = u32::deserialize(from)?;
-    let fits = (1..=MOST).contains(&count);
-    fits.then_some(count).ok_or_else(|| D::Error::custom(format!("{count} regions; it takes 1 to {MOST}")))
+    let fits = (1..=MAX_REGIONS).contains(&count);
+    fits.then_some(count)
+        .ok_or_else(|| D::Error::custom(format!("{count} regions; it takes 1 to {MAX_REGIONS}")))
 }
 
 fn disjoint<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<LensRegion>, D::Error> {
@@ -73,10 +74,10 @@ fn disjoint<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<LensRegion>, D::Er
     }
 }
 
-/// What is wrong with a list of regions.
+/// Error in a list of regions, if any.
 fn fault(regions: &[LensRegion]) -> Option<String> {
-    if regions.is_empty() || regions.len() > MOST as usize {
-        return Some(format!("{} regions; it takes 1 to {MOST}", regions.len()));
+    if regions.is_empty() || regions.len() > MAX_REGIONS as usize {
+        return Some(format!("{} regions; it takes 1 to {MAX_REGIONS}", regions.len()));
     }
     if let Some(index) = regions.iter().position(|region| !region.is_proper()) {
         return Some(format!("region {index} has to lie within -1 and 1, each low end below its high end"));
@@ -87,9 +88,9 @@ fn fault(regions: &[LensRegion]) -> Option<String> {
 }
 
 impl LensRegions {
-    /// The rectangles in order, or `None` when they are none, too many, improper or overlap.
+    /// The rectangles in order, or `None` if there are none, too many, or invalid or overlapping ones.
     pub fn rectangles(&self) -> Option<Vec<LensRegion>> {
-        let sane = 1..=MOST;
+        let sane = 1..=MAX_REGIONS;
         match self {
             Self::Whole => Some(vec![LensRegion::WHOLE]),
             Self::Across(count) => Self::Grid(*count, 1).rectangles(),
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused() {
+    fn invalid_regions_are_refused() {
         let region = |a, b| LensRegion { u: (a, b), v: (-1.0, 1.0) };
         assert!(LensRegions::Across(0).rectangles().is_none());
         assert!(LensRegions::Rectangles(vec![]).rectangles().is_none());
@@ -140,8 +141,8 @@ mod tests {
     #[test]
     fn the_corners_of_the_square_go_to_the_corners_of_the_region() {
         let region = LensRegion { u: (-0.75, -0.25), v: (0.1, 0.3) };
-        assert_eq!(region.place([-1.0, 1.0]), [-0.75, 0.3]);
-        assert_eq!(region.place([1.0, -1.0]), [-0.25, 0.1]);
-        assert_eq!(LensRegion::WHOLE.place([0.123, -0.5]), [0.123, -0.5]);
+        assert_eq!(region.map([-1.0, 1.0]), [-0.75, 0.3]);
+        assert_eq!(region.map([1.0, -1.0]), [-0.25, 0.1]);
+        assert_eq!(LensRegion::WHOLE.map([0.123, -0.5]), [0.123, -0.5]);
     }
 }

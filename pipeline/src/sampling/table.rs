@@ -1,28 +1,30 @@
-//! A programmable table of samples, tiled over the image.
+//! Programmable sample table, tiled over the image, and its description.
 
-use super::{LensRegion, LensShape, Sample, SampleSource, SampleSpec};
+use serde::{Deserialize, Serialize};
+
+use super::{LensRegion, LensRegions, LensShape, Pattern, Sample, SampleSource};
 use crate::random::word;
 
-/// Samples for a square block of pixels. The block repeats over the image, each copy turned round in itself by an
-/// offset hashed from the seed, so that a sample is a pure function of (seed, pixel, index).
+/// Samples of a square block of pixels. The block repeats over the image. Each copy is shifted cyclically by
+/// an offset hashed from the seed, so a sample is a pure function of (seed, pixel, index).
 #[derive(Clone, Debug)]
 pub struct SampleTable {
     per_pixel: u32,
     seed: u64,
     samples: Vec<Sample>,
     regions: Vec<LensRegion>,
-    /// For each block of [`Self::TURN_PX`] pixels squared, its samples by time: the pixel in the block times
-    /// `per_pixel` plus the index in the pixel.
+    /// For each block of [`Self::SHIFT_PX`] pixels squared, its samples sorted by time: the pixel in the block
+    /// times `per_pixel` plus the index in the pixel.
     by_time: Vec<u16>,
 }
 
-/// Why a sample table cannot be built.
+/// Why a sample table is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TableError {
-    /// Too few or too many samples in a pixel.
+    /// The number of samples per pixel is out of range.
     #[error("{0} samples per pixel; it has to be 1 to {max}", max = SampleTable::MAX_PER_PIXEL)]
     PerPixel(u32),
-    /// The block is not filled.
+    /// The number of samples does not fill the block.
     #[error("{found} samples for a block of {expected}")]
     Length {
         /// Samples given.
@@ -30,27 +32,27 @@ pub enum TableError {
         /// Samples of a block.
         expected: usize,
     },
-    /// A sample lies outside pixel, lens or shutter.
+    /// A sample is outside pixel, lens or shutter.
     #[error("sample {0} of the block lies outside [0, 1) in x, y or t, or outside [-1, 1] in u or v")]
     Range(usize),
-    /// The samples of a pixel cannot be shared out evenly.
+    /// The samples of a pixel cannot be divided evenly among the regions.
     #[error("{per_pixel} samples per pixel for {regions} regions of the lens; take a multiple of {regions}")]
     Shares {
-        /// Samples in a pixel.
+        /// Samples per pixel.
         per_pixel: u32,
         /// Regions of the lens.
         regions: u32,
     },
-    /// The regions of the lens are none, too many, improper, or overlap.
+    /// The list of lens regions is empty, too long, or has invalid or overlapping regions.
     #[error("the regions of the lens have to be 1 to 256 rectangles within -1 and 1 that do not overlap")]
     Regions,
-    /// A fixed set of points that cannot be.
+    /// A fixed set of points is invalid.
     #[error("a fixed set has 1 to 65536 points, u and v within -1 and 1, t from 0 to below 1")]
     Points,
-    /// An iris of too few or too many blades.
+    /// The number of iris blades is out of range.
     #[error("{0} blades; an iris has 3 to 64")]
     Blades(u32),
-    /// Given points are places on the lens, which cannot be divided any more.
+    /// Given points are lens positions, which cannot be divided among regions.
     #[error("given points are places on the lens as they are: leave `regions` out")]
     GivenRegions,
 }
@@ -58,26 +60,27 @@ pub enum TableError {
 impl SampleTable {
     /// Side of the block in pixels.
     pub const SIDE_PX: u32 = 64;
-    /// Copies are turned by multiples of this many pixels, the largest tile, so that the samples of a tile keep
+    /// Copies are shifted by multiples of this many pixels, the largest tile, so the samples of a tile stay
     /// together.
-    pub const TURN_PX: u32 = 8;
-    /// The most samples a pixel may have.
+    pub const SHIFT_PX: u32 = 8;
+    /// Largest number of samples per pixel.
     pub const MAX_PER_PIXEL: u32 = 256;
 
-    /// The default table: in each pixel the first `per_pixel` points of a five-dimensional Sobol sequence, Owen
-    /// scrambled by pixel, with `u, v` mapped to the aperture.
+    /// The default table: each pixel has the first `per_pixel` points of a five-dimensional Sobol sequence,
+    /// Owen scrambled by pixel, with `u, v` mapped to the aperture.
     ///
     /// # Errors
-    /// When `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
+    /// [`TableError`] if `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`].
     pub fn low_discrepancy(per_pixel: u32, seed: u64, shape: LensShape) -> Result<Self, TableError> {
         Self::new(&SampleSpec { lens: shape, ..SampleSpec::default() }, per_pixel, seed)
     }
 
-    /// The table that `spec` describes, with `per_pixel` samples in each pixel. Every region of the lens has a run of the
-    /// pattern's samples of its own.
+    /// The table described by `spec`, with `per_pixel` samples per pixel. Every region of the lens has its
+    /// own range of the pattern's samples.
     ///
     /// # Errors
-    /// When `per_pixel` is out of range or cannot be shared out among the regions, or the description cannot be.
+    /// [`TableError`] if `per_pixel` is out of range or not divisible among the regions, or if the
+    /// description is invalid.
     pub fn new(spec: &SampleSpec, per_pixel: u32, seed: u64) -> Result<Self, TableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
             return Err(TableError::PerPixel(per_pixel));
@@ -103,21 +106,23 @@ impl SampleTable {
             let at = [pixel % Self::SIDE_PX, pixel / Self::SIDE_PX];
             let runs = of_pixel.chunks_exact_mut((per_pixel / count) as usize);
             for ((region, run), number) in regions.iter().zip(runs).zip(0_u64..) {
-                // The first region keeps the seed, so that the whole lens is what it is without regions.
+                // The first region keeps the seed, so a lens of one region equals an undivided lens.
                 let seed = if number == 0 { seed } else { word(seed, u64::MAX, number) };
                 spec.pattern.fill(seed, at, Self::SIDE_PX, run);
                 if !spec.pattern.is_on_lens() {
-                    run.iter_mut().for_each(|s| [s.u, s.v] = region.place(spec.lens.map([s.u, s.v])));
+                    run.iter_mut().for_each(|s| [s.u, s.v] = region.map(spec.lens.map([s.u, s.v])));
                 }
             }
         }
         Ok(Self { regions, ..Self::programmed(per_pixel, seed, samples)? })
     }
 
-    /// A table of one's own: `per_pixel` samples for each pixel of a block of [`Self::SIDE_PX`] pixels squared, row by row.
+    /// A table of given samples: `per_pixel` for each pixel of a block of [`Self::SIDE_PX`] pixels squared,
+    /// row by row.
     ///
     /// # Errors
-    /// When `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`], the block is not filled, or a sample is out of range.
+    /// [`TableError`] if `per_pixel` is zero or above [`Self::MAX_PER_PIXEL`], the block is not filled, or a
+    /// sample is out of range.
     pub fn programmed(per_pixel: u32, seed: u64, samples: Vec<Sample>) -> Result<Self, TableError> {
         if !(1..=Self::MAX_PER_PIXEL).contains(&per_pixel) {
             return Err(TableError::PerPixel(per_pixel));
@@ -136,16 +141,16 @@ impl SampleTable {
     }
 
     fn sorted_blocks(&self) -> Vec<u16> {
-        let blocks = Self::SIDE_PX / Self::TURN_PX;
-        let per_block = Self::TURN_PX * Self::TURN_PX * self.per_pixel;
+        let blocks = Self::SIDE_PX / Self::SHIFT_PX;
+        let per_block = Self::SHIFT_PX * Self::SHIFT_PX * self.per_pixel;
         let mut sorted = Vec::with_capacity(self.samples.len());
         for block in 0..blocks * blocks {
-            let (x0, y0) = (block % blocks * Self::TURN_PX, block / blocks * Self::TURN_PX);
+            let (x0, y0) = (block % blocks * Self::SHIFT_PX, block / blocks * Self::SHIFT_PX);
             let mut order: Vec<u16> = (0..per_block).map(|index| index as u16).collect();
             // Times are not negative, so their bits sort as they do; the index breaks ties.
             order.sort_by_key(|&index| {
                 let (pixel, sample) = (u32::from(index) / self.per_pixel, u32::from(index) % self.per_pixel);
-                let (x, y) = (x0 + pixel % Self::TURN_PX, y0 + pixel / Self::TURN_PX);
+                let (x, y) = (x0 + pixel % Self::SHIFT_PX, y0 + pixel / Self::SHIFT_PX);
                 self.samples[((y * Self::SIDE_PX + x) * self.per_pixel + sample) as usize].t.to_bits()
             });
             sorted.extend(order);
@@ -153,33 +158,33 @@ impl SampleTable {
         sorted
     }
 
-    /// Samples in each pixel.
+    /// Samples per pixel.
     pub fn per_pixel(&self) -> u32 {
         self.per_pixel
     }
 
-    /// The samples of pixel (`px`, `py`), in table order.
+    /// Samples of pixel (`px`, `py`), in table order.
     pub fn pixel(&self, px: u32, py: u32) -> &[Sample] {
-        let (x, y) = self.place(px, py);
+        let (x, y) = self.block_pixel(px, py);
         let first = ((y * Self::SIDE_PX + x) * self.per_pixel) as usize;
         &self.samples[first..first + self.per_pixel as usize]
     }
 
-    /// The regions of the lens, in order; one, the whole of it, where it is not divided.
+    /// Regions of the lens, in order; an undivided lens is one region.
     pub fn regions(&self) -> &[LensRegion] {
         &self.regions
     }
 
-    /// The region that sample `index` of any pixel lies in, as a place in [`Self::regions`].
+    /// Region of sample `index` of any pixel, as an index of [`Self::regions`].
     pub fn region_of(&self, index: u32) -> usize {
         (index * self.regions.len() as u32 / self.per_pixel) as usize
     }
 
-    /// Where in the block pixel (`px`, `py`) looks.
-    fn place(&self, px: u32, py: u32) -> (u32, u32) {
+    /// Pixel of the block for pixel (`px`, `py`) of the image.
+    fn block_pixel(&self, px: u32, py: u32) -> (u32, u32) {
         let copy = word(self.seed, u64::from(px / Self::SIDE_PX), u64::from(py / Self::SIDE_PX));
         let turn = |bits: u64, at: u32| {
-            (at + bits as u32 % Self::SIDE_PX / Self::TURN_PX * Self::TURN_PX) % Self::SIDE_PX
+            (at + bits as u32 % Self::SIDE_PX / Self::SHIFT_PX * Self::SHIFT_PX) % Self::SIDE_PX
         };
         (turn(copy & 0xFFFF, px), turn((copy >> 16) & 0xFFFF, py))
     }
@@ -195,15 +200,57 @@ impl SampleSource for SampleTable {
     }
 
     fn block_by_time(&self, px: u32, py: u32) -> Option<&[u16]> {
-        let (x, y) = self.place(px, py);
-        let block = y / Self::TURN_PX * (Self::SIDE_PX / Self::TURN_PX) + x / Self::TURN_PX;
-        let per_block = (Self::TURN_PX * Self::TURN_PX * self.per_pixel) as usize;
+        let (x, y) = self.block_pixel(px, py);
+        let block = y / Self::SHIFT_PX * (Self::SIDE_PX / Self::SHIFT_PX) + x / Self::SHIFT_PX;
+        let per_block = (Self::SHIFT_PX * Self::SHIFT_PX * self.per_pixel) as usize;
         self.by_time.chunks_exact(per_block).nth(block as usize)
+    }
+}
+
+/// Description of a sample table, as in a RON file. Missing fields have the values of the default table.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SampleSpec {
+    /// Distribution of the samples of a pixel.
+    pub pattern: Pattern,
+    /// Shape of the aperture, or of each region's.
+    pub lens: LensShape,
+    /// Division of the lens.
+    pub regions: LensRegions,
+}
+
+/// Named tables with a description each.
+const NAMED: [(&str, &str); 5] = [
+    ("owen", "Sobol points, Owen scrambled by pixel; the default"),
+    ("sobol", "Sobol points as they are, the same in every pixel"),
+    ("random", "independent uniform numbers"),
+    ("jittered", "a random point in each cell of pixel, lens and shutter"),
+    ("interleaved", "64 places on lens and in time, shared by all pixels"),
+];
+
+impl SampleSpec {
+    /// Named tables with a description each, one line long.
+    pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+        NAMED.into_iter()
+    }
+
+    /// The table called `name`.
+    pub fn named(name: &str) -> Option<Self> {
+        let pattern = match name {
+            "owen" => Pattern::Owen,
+            "sobol" => Pattern::Sobol,
+            "random" => Pattern::Random,
+            "jittered" => Pattern::Jittered,
+            "interleaved" => Pattern::Interleaved { points: 64 },
+            _ => return None,
+        };
+        Some(Self { pattern, ..Self::default() })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::SampleTable;
     use super::*;
 
     #[test]
@@ -283,5 +330,15 @@ mod tests {
         );
         let none = SampleSpec { pattern: Pattern::Interleaved { points: 0 }, ..SampleSpec::default() };
         assert_eq!(SampleTable::new(&none, 9, 1).unwrap_err(), TableError::Points);
+    }
+
+    #[test]
+    fn every_name_makes_a_table() {
+        for (name, _) in SampleSpec::names() {
+            let table = SampleTable::new(&SampleSpec::named(name).unwrap(), 6, 1).unwrap();
+            assert_eq!(table.per_pixel(), 6, "{name}");
+        }
+        assert_eq!(SampleSpec::named("owen"), Some(SampleSpec::default()));
+        assert_eq!(SampleSpec::named("sobel"), None);
     }
 }

@@ -1,13 +1,13 @@
-//! The samples of one tile, laid out for the sample test.
+//! Samples of one tile, in the layout of the sample test.
 
 use super::{Sample, SampleSource, SampleTable};
 use crate::geometry::{Shear, Viewport};
 
-/// Samples of one tile as arrays, sorted by time so that a time interval is a run of them. Arrays are padded to
-/// whole blocks of [`TileSamples::LANES`]; padding lies at a time no interval holds.
+/// Samples of one tile as arrays, sorted by time so that a time interval is a contiguous range. Arrays are
+/// padded to whole blocks of [`TileSamples::LANES`]; the time of padding is outside all intervals.
 #[derive(Clone, Debug, Default)]
 pub struct TileSamples {
-    /// Samples, padding not counted.
+    /// Samples without padding.
     pub len: usize,
     /// Image position in pixels from the centre of the image.
     pub x: Vec<f32>,
@@ -19,13 +19,15 @@ pub struct TileSamples {
     pub v: Vec<f32>,
     /// Time over the shutter.
     pub t: Vec<f32>,
-    /// `u s.x` and `v s.y`, in an orthographic view `x + u s.x` and `y + v s.y`: what is taken off a vertex whatever its depth.
+    /// Depth-independent offset of a vertex: `u s.x` and `v s.y`, in an orthographic view `x + u s.x` and `y
+    /// + v s.y`.
     pub lens: [Vec<f32>; 2],
-    /// `x - u a.x` and `y - v a.y`, in an orthographic view `-u a.x` and `-v a.y`: what multiplies the depth of a vertex.
+    /// Factor of a vertex's depth: `x - u a.x` and `y - v a.y`, in an orthographic view `-u a.x` and `-v
+    /// a.y`.
     pub slope: [Vec<f32>; 2],
     /// Whether the view is orthographic.
     pub parallel: bool,
-    /// The pixel within the tile, row by row.
+    /// Pixel in the tile, row by row.
     pub pixel: Vec<u8>,
     order: Vec<u16>,
     gathered: Vec<Sample>,
@@ -34,11 +36,11 @@ pub struct TileSamples {
 impl TileSamples {
     /// Samples tested together.
     pub const LANES: usize = 16;
-    /// The time given to padding.
-    const NEVER: f32 = f32::INFINITY;
+    /// Time of padding.
+    const PADDING_TIME: f32 = f32::INFINITY;
 
-    /// Fills the arrays for the tile of `side_px` pixels (at most 8) whose first pixel is `(px, py)`. Pixels outside
-    /// the viewport get no samples.
+    /// Fill the arrays for the tile of `side_px` pixels (at most 8) whose first pixel is `(px, py)`. Pixels
+    /// outside the viewport have no samples.
     pub fn fill(
         &mut self,
         source: &dyn SampleSource,
@@ -67,7 +69,7 @@ impl TileSamples {
         }
     }
 
-    /// The samples of the tile's pixels that lie in the image, each at its pixel times `per_pixel` plus its index.
+    /// Samples of the tile's pixels inside the image, each at its pixel times `per_pixel` plus its index.
     fn gather(
         &mut self,
         source: &dyn SampleSource,
@@ -94,7 +96,7 @@ impl TileSamples {
     ) {
         self.order.clear();
         if [side_px; 2] == inside
-            && side_px == SampleTable::TURN_PX
+            && side_px == SampleTable::SHIFT_PX
             && let Some(order) = source.block_by_time(px, py)
         {
             self.order.extend(order);
@@ -107,11 +109,12 @@ impl TileSamples {
                 self.order.extend((first..first + per_pixel).map(|index| index as u16));
             }
         }
-        // Times are not negative, so their bits sort as they do; the sort is stable, so the index breaks ties.
+        // Times are not negative, so their bits sort as they do; the sort is stable, so the index breaks
+        // ties.
         self.order.sort_by_key(|&index| self.gathered[index as usize].t.to_bits());
     }
 
-    /// The place in the whole image of the sample in `slot` of the tile of `side_px` pixels whose first pixel is
+    /// Index in the whole image of the sample in `slot` of the tile of `side_px` pixels whose first pixel is
     /// `(px, py)`: `(y width + x) per_pixel + index`.
     pub fn in_image(
         &self,
@@ -127,7 +130,7 @@ impl TileSamples {
         (y * viewport.width() as usize + x) * per_pixel as usize + sample as usize
     }
 
-    /// The index in its pixel of the sample in `slot`, of `per_pixel`.
+    /// Index in its pixel of the sample in `slot`, of `per_pixel`.
     pub fn in_pixel(&self, slot: usize, per_pixel: u32) -> u32 {
         u32::from(self.order[slot]) % per_pixel
     }
@@ -140,12 +143,12 @@ impl TileSamples {
             array.resize(padded, 0.0);
         }
         self.t.clear();
-        self.t.resize(padded, Self::NEVER);
+        self.t.resize(padded, Self::PADDING_TIME);
         self.pixel.clear();
         self.pixel.resize(padded, 0);
     }
 
-    /// The run of samples with `lo <= t <= hi`.
+    /// Range of samples with `lo <= t <= hi`.
     pub fn between(&self, lo: f32, hi: f32) -> std::ops::Range<usize> {
         let times = &self.t[..self.len];
         times.partition_point(|&t| t < lo)..times.partition_point(|&t| t <= hi)

@@ -1,4 +1,4 @@
-//! The pixels a triangle may touch at any time and from anywhere on the lens.
+//! Screen bounds: the pixels a triangle may touch at any time and from any lens position.
 
 use super::Triangle;
 use crate::geometry::{Shear, Viewport};
@@ -22,12 +22,12 @@ impl PixelRect {
         Self { x0: 0, y0: 0, x1: viewport.width(), y1: viewport.height() }
     }
 
-    /// Whether it holds no pixel.
+    /// Whether it contains no pixel.
     pub fn is_empty(&self) -> bool {
         self.x0 >= self.x1 || self.y0 >= self.y1
     }
 
-    /// The tiles of `side_px` pixels it touches, as a rectangle counted in tiles.
+    /// Tiles of `side_px` pixels that it touches, as a rectangle in tiles.
     pub fn tiles(&self, side_px: u32) -> Self {
         Self {
             x0: self.x0 / side_px,
@@ -37,7 +37,7 @@ impl PixelRect {
         }
     }
 
-    /// The pixels in both.
+    /// Intersection of both.
     pub fn intersection(&self, other: &Self) -> Self {
         Self {
             x0: self.x0.max(other.x0),
@@ -48,10 +48,11 @@ impl PixelRect {
     }
 }
 
-/// The pixels `triangle` may touch: the box of its vertices at the corners of the shutter and the lens, widened by
-/// the rounding of the sample test. While `w` stays positive the image of a vertex is monotone in time and in the
-/// lens position, so the corners are the extremes; where it does not, nothing is divided and the whole viewport
-/// stands. In an orthographic view the image moves as the vertex does and is linear in the lens position: corners again.
+/// Pixels that `triangle` may touch: the bounding box of its vertices at the corners of shutter and lens,
+/// widened by the rounding of the sample test. While `w` stays positive the image of a vertex is monotone in
+/// time and lens position, so the corners are the extremes. Otherwise nothing is divided and the bounds are
+/// the whole viewport. In an orthographic view the image moves as the vertex does and is linear in the lens
+/// position, so corners suffice again.
 pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRect {
     let mut nearest = f32::INFINITY;
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
@@ -75,14 +76,15 @@ pub fn bounds(triangle: &Triangle, shear: &Shear, viewport: Viewport) -> PixelRe
     let [x, y] = [0, 1].map(|axis| {
         let slack = 2.0 * f64::from(triangle.slack[axis]) / f64::from(nearest);
         let half = 0.5 * f64::from(side[axis]);
-        // Cutting off rounds down what is not negative.
+        // The cast truncates, which rounds non-negative values down.
         let pixel = |at: f64| at.clamp(0.0, f64::from(side[axis])) as u32;
         [pixel(range[axis][0] - slack + half), pixel(range[axis][1] + slack + half + 1.0)]
     });
     PixelRect { x0: x[0], y0: y[0], x1: x[1], y1: y[1] }
 }
 
-/// For each square of `side_px` pixels of the image, row by row, the numbers of the rectangles that meet it, in their order.
+/// For each square of `side_px` pixels of the image, row by row, the indices of the rectangles that intersect
+/// it, in order.
 pub(crate) fn distribute(
     rects: impl IntoIterator<Item = (u32, PixelRect)>,
     viewport: Viewport,

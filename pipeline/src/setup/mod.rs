@@ -1,4 +1,4 @@
-//! Triangle set-up: what is known of a triangle before any tile is visited.
+//! Triangle set-up: everything known of a triangle before any tile is visited.
 
 mod bounds;
 mod triangle;

@@ -2,11 +2,11 @@
 
 use crate::geometry::{Cull, MovingVertex, Shear};
 
-/// A vertex `open + t delta` on the image plane, as `[x, y, w]` (see [`MovingVertex`]). Written so that a still vertex is
-/// `open` to the last bit at every time.
+/// A vertex `open + t delta` on the image plane, as `[x, y, w]` (see [`MovingVertex`]). In this form a still
+/// vertex equals `open` to the last bit at all times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Corner {
-    /// When the shutter opens.
+    /// Position when the shutter opens.
     pub open: [f32; 3],
     /// Closing minus opening position, rounded once.
     pub delta: [f32; 3],
@@ -19,13 +19,13 @@ impl Corner {
         Self { open: vertex.open, delta }
     }
 
-    /// The vertex when the shutter opens and when it closes, with the rounding of the sample test.
+    /// Vertex when the shutter opens and closes, rounded as in the sample test.
     #[inline]
     pub fn ends(&self) -> [[f32; 3]; 2] {
         [self.open, std::array::from_fn(|axis| self.open[axis] + self.delta[axis])]
     }
 
-    /// The vertex at time `t`, with the rounding of the sample test: monotone in `t` on every axis.
+    /// Vertex at time `t`, rounded as in the sample test: monotone in `t` on every axis.
     #[inline]
     pub fn at(&self, t: f32) -> [f32; 3] {
         let ([x, y, w], [dx, dy, dw]) = (self.open, self.delta);
@@ -33,29 +33,31 @@ impl Corner {
     }
 }
 
-/// A triangle that traversal has to visit.
+/// A triangle for traversal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
-    /// The triangle, counted through the pass. Of two at equal depth the lower one wins.
+    /// Triangle number in the pass. At equal depth the lower number wins.
     pub id: u32,
-    /// Its vertices.
+    /// Vertices.
     pub corners: [Corner; 3],
-    /// Whether any vertex moves; where none does the time dimension is dropped.
+    /// Whether any vertex moves; still triangles drop the time dimension.
     pub moving: bool,
-    /// Whether any vertex is behind the camera at an end of the shutter, where perspective mirrors it; never in an orthographic view.
+    /// Whether any vertex is behind the camera at an end of the shutter, where perspective mirrors it; always
+    /// false in an orthographic view.
     pub behind: bool,
-    /// Whether samples may see the face that appears clockwise (`[0]`) and counter-clockwise (`[1]`) on the screen.
+    /// Whether samples may see the face that appears clockwise (`[0]`) and counter-clockwise (`[1]`) on the
+    /// screen.
     pub faces: [bool; 2],
-    /// What a tile test has to allow for rounding in `x` and in `y`, in the units of these.
+    /// Rounding allowance of a tile test in `x` and `y`, in their units.
     pub slack: [f32; 2],
 }
 
-/// What became of a triangle in set-up.
+/// Result of set-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// It goes on.
+    /// The triangle goes on to traversal.
     Ready(Triangle),
-    /// Two of its corners are one at all times.
+    /// Two of its corners coincide at all times.
     Degenerate,
     /// It is nearer than the near depth at all times.
     Outside,
@@ -63,13 +65,13 @@ pub enum Outcome {
     FaceCulled,
 }
 
-/// Multiply-adds of setting up a triangle: the differences of moving vertices and, where both faces are not drawn,
-/// the facing determinant.
+/// Multiply-adds of set-up: the differences of moving vertices and, unless both faces are drawn, the facing
+/// determinant.
 pub fn madds(moving: bool, cull: Cull) -> u32 {
     u32::from(moving) * 9 + if cull == Cull::None { 0 } else { 9 }
 }
 
-/// Sets up the triangle `id` with the given vertices; `half_px` is half the size of the image in pixels.
+/// Set up the triangle `id` with the given vertices; `half_px` is half the size of the image in pixels.
 pub fn set_up(
     id: u32,
     vertices: [&MovingVertex; 3],
@@ -82,7 +84,7 @@ pub fn set_up(
         return Outcome::Degenerate;
     }
     let corners = vertices.map(Corner::new);
-    // The depth of a sample lies between those of the vertices, which are farthest at an end of the shutter.
+    // The depth of a sample is between those of the vertices, which are farthest at an end of the shutter.
     if corners.iter().all(|c| c.ends().iter().all(|p| p[2] <= near)) {
         return Outcome::Outside;
     }
@@ -97,14 +99,14 @@ pub fn set_up(
     Outcome::Ready(Triangle { id, corners, moving, behind, faces, slack })
 }
 
-/// Two vertices that agree at both ends leave an edge of nothing, which no sample is on any side of. Three on one line may
-/// still surround a sample once they are rounded, and neighbours count on that, so they are kept.
+/// Whether two vertices coincide at both ends. No sample is on any side of such an edge. Three collinear
+/// vertices may still surround a sample after rounding, and neighbours rely on that, so they are kept.
 fn has_no_area([a, b, c]: [&MovingVertex; 3]) -> bool {
     a == b || b == c || c == a
 }
 
-/// Whether three vertices lie on one line at all times, to the last bit: their area is a vector quadratic in time, whose
-/// three Bernstein coefficients vanish together.
+/// Whether three vertices are collinear at all times, to the last bit. Their area is a vector quadratic in
+/// time, whose three Bernstein coefficients vanish together.
 pub fn is_flat([a, b, c]: [&MovingVertex; 3]) -> bool {
     let side = |from: &[f32; 3], to: &[f32; 3]| [0, 1, 2].map(|i| f64::from(to[i]) - f64::from(from[i]));
     let (ab0, ab1) = (side(&a.open, &b.open), side(&a.close, &b.close));
@@ -117,8 +119,9 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Whether a still triangle seen through a pinhole, given by its homogeneous points, shows a face that is not drawn: the sign of det[p0, p1, p2], trusted only
-/// beyond what the rounding of the sample test can do to it. Where it reaches behind the camera that is left to the samples.
+/// Whether a still triangle, seen through a pinhole and given by homogeneous points, shows a culled face. The
+/// sign of det[p0, p1, p2] is used only beyond its rounding error in the sample test. Triangles that reach
+/// behind the camera are left to the sample test.
 fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) -> bool {
     let p = images.map(|image| image.map(f64::from));
     if p.iter().any(|vertex| vertex[2] <= 0.0) {
@@ -126,8 +129,8 @@ fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) 
     }
     let normal = cross(p[1], p[2]);
     let det: f64 = (0..3).map(|i| p[0][i] * normal[i]).sum();
-    // A sample inside sees every vertex within the extent of the triangle; an edge is a cross product of two of them, each
-    // rounded by the slack at most, and the determinant weighs three edges by depth.
+    // A sample inside sees every vertex within the extent of the triangle. An edge is a cross product of two
+    // vertices, each rounded by the slack at most, and the determinant weights three edges by depth.
     let reach = [0, 1].map(|axis| {
         let seen = |i: usize, j: usize| (p[i][axis] - p[j][axis] / p[j][2] * p[i][2]).abs();
         (0..9).map(|pair| seen(pair / 3, pair % 3)).fold(0.0, f64::max)
@@ -138,8 +141,8 @@ fn shows_culled_face(images: &[[f32; 3]; 3], faces: [bool; 2], slack: [f32; 2]) 
     det.abs() > rounding && !faces[usize::from(det < 0.0)]
 }
 
-/// A bound on the rounding error of `(x - u s) - (X - u a) w`, or `(x - (X + u s)) + u a w`, for any sample, in x and in y,
-/// eight units in the last place of the largest intermediate value and more: 2^-20 of the sum of magnitudes.
+/// Bound of the rounding error of `(x - u s) - (X - u a) w`, or `(x - (X + u s)) + u a w`, for any sample, in
+/// x and y. It is more than eight ulp of the largest intermediate value: 2^-20 of the sum of magnitudes.
 fn slack(corners: &[Corner; 3], shear: &Shear, half_px: [f32; 2]) -> [f32; 2] {
     const ROUNDING: f32 = 1.0 / 1_048_576.0;
     let mut largest = [0.0_f32; 3];
@@ -206,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_near_is_outside() {
+    fn triangles_nearer_than_the_near_depth_are_outside() {
         let behind = [[0.0, 0.0, -1.0], [10.0, 0.0, -1.0], [0.0, 10.0, 0.05]];
         assert_eq!(outcome(behind, Cull::None), Outcome::Outside);
     }

@@ -1,8 +1,8 @@
-//! Sixteen numbers side by side, in the vectors this machine has.
+//! Vectors of sixteen numbers, in the widest registers of the machine.
 //!
-//! Kernels are written once over `Lanes` and entered through `dispatch`, which picks the widest vectors when
-//! the program runs. Every operation rounds as IEEE 754 asks, and multiply-adds round once where they are written and nowhere
-//! else, so all widths give the same bytes.
+//! Kernels are written once over `Lanes` and entered through `dispatch`, which selects the widest vectors at
+//! run time. Every operation rounds as IEEE 754 requires. Multiply-adds are fused only where they are
+//! written, so all widths give the same bytes.
 
 mod plain;
 #[cfg(target_arch = "x86_64")]
@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 
 pub(crate) use plain::Plain;
 
-/// Numbers worked on together.
+/// Numbers per vector.
 pub const LANES: usize = 16;
 
 /// Sixteen numbers in memory, aligned to the widest vector.
@@ -22,13 +22,13 @@ pub const LANES: usize = 16;
 pub struct Row(pub [f32; LANES]);
 
 impl Row {
-    /// The same number sixteen times.
+    /// Sixteen copies of a number.
     pub const fn splat(value: f32) -> Self {
         Self([value; LANES])
     }
 }
 
-/// One bit for each lane.
+/// One bit per lane.
 pub(crate) type Mask = u16;
 
 /// Sixteen `f32` in registers. Comparisons with NaN are false.
@@ -38,9 +38,9 @@ pub(crate) trait Lanes:
     fn splat(value: f32) -> Self;
     fn load(from: &[f32; LANES]) -> Self;
     fn store(self, to: &mut [f32; LANES]);
-    /// The smaller of each pair; `other` where either is NaN.
+    /// Minimum by lane; `other` if either is NaN.
     fn min(self, other: Self) -> Self;
-    /// The larger of each pair; `other` where either is NaN.
+    /// Maximum by lane; `other` if either is NaN.
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
     /// `self * by + plus`, rounded once.
@@ -50,17 +50,18 @@ pub(crate) trait Lanes:
     fn gt(self, other: Self) -> Mask;
     fn ge(self, other: Self) -> Mask;
     fn equal(self, other: Self) -> Mask;
-    /// Writes `value` to the lanes of the mask only.
+    /// Write `value` to the lanes of the mask only.
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]);
-    /// `first` plus the number of each lane of the mask, one after the other; what comes after them is of no use.
+    /// Write `first` plus the number of each lane of the mask, consecutively; the entries after them are
+    /// undefined.
     fn number(mask: Mask, first: u32, to: &mut [u32; LANES]);
-    /// The lanes of the mask from `self`, the others from `other`.
+    /// Lanes of the mask from `self`, the others from `other`.
     fn or_else(self, mask: Mask, other: Self) -> Self;
-    /// The largest of the sixteen, none of them NaN.
+    /// Largest of the sixteen, none of them NaN.
     fn largest(self) -> f32;
 }
 
-/// A width of vectors that this machine has.
+/// A vector width that this machine supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Width(Vectors);
 
@@ -76,7 +77,7 @@ enum Vectors {
 static WIDEST: LazyLock<Width> = LazyLock::new(|| Width::available().last().unwrap_or(Width(Vectors::Plain)));
 
 impl Width {
-    /// Every width of this machine, the widest last.
+    /// All widths of this machine, the widest last.
     pub fn available() -> impl Iterator<Item = Self> {
         let mut widths = vec![Self(Vectors::Plain)];
         #[cfg(target_arch = "x86_64")]
@@ -102,13 +103,13 @@ impl Width {
     }
 }
 
-/// A job that runs with whatever vectors there are. Its `run` has to be `#[inline(always)]`, and so has everything it
-/// calls that works on lanes, to be compiled for the vectors it is entered with.
+/// A computation that runs with any vector width. Its `run` and all functions it calls on lanes need
+/// `#[inline(always)]`, to be compiled for the vectors it is entered with.
 pub(crate) trait Kernel {
     fn run<V: Lanes>(self);
 }
 
-/// Asks for the memory of `at` to be fetched, as it is read soon.
+/// Prefetch the memory of `at`.
 #[inline(always)]
 pub(crate) fn prefetch<T>(at: &T) {
     #[cfg(target_arch = "x86_64")]
@@ -117,11 +118,11 @@ pub(crate) fn prefetch<T>(at: &T) {
     let _ = at;
 }
 
-/// Runs a kernel with vectors of the given width.
+/// Run a kernel with vectors of the given width.
 pub(crate) fn dispatch(width: Width, kernel: impl Kernel) {
     match width.0 {
         Vectors::Plain => kernel.run::<Plain>(),
-        // SAFETY: a `Width` other than the plain one exists only where the machine has it.
+        // SAFETY: a `Width` other than the plain one exists only on machines that support it.
         #[cfg(target_arch = "x86_64")]
         Vectors::Avx2 => unsafe { x86::avx2(kernel) },
         #[cfg(target_arch = "x86_64")]
@@ -133,7 +134,7 @@ pub(crate) fn dispatch(width: Width, kernel: impl Kernel) {
 mod tests {
     use super::*;
 
-    /// Every operation on a few hundred awkward numbers, as bits.
+    /// Every operation on a few hundred special numbers, as bits.
     struct Everything<'a>(&'a mut Vec<u32>);
 
     fn awkward(seed: u32) -> [f32; LANES] {
@@ -171,7 +172,7 @@ mod tests {
                 for result in results {
                     let mut out = [0.0; LANES];
                     result.store(&mut out);
-                    // The sign and payload of a NaN that arithmetic makes are nobody's business.
+                    // The sign and payload of a NaN are unspecified.
                     self.0.extend(out.map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }));
                 }
                 self.0.extend(masks.map(u32::from));

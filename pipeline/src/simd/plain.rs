@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use super::{LANES, Lanes, Mask};
 
-/// An array; the compiler vectorizes its loops with what every machine of the target has.
+/// An array; the compiler vectorizes its loops for the baseline of the target.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain([f32; LANES]);
 
@@ -109,28 +109,28 @@ impl Lanes for Plain {
 
     #[inline(always)]
     fn put(mask: Mask, value: u32, to: &mut [u32; LANES]) {
-        for (lane, place) in to.iter_mut().enumerate() {
+        for (lane, slot) in to.iter_mut().enumerate() {
             if mask >> lane & 1 != 0 {
-                *place = value;
+                *slot = value;
             }
         }
     }
 
     #[inline(always)]
     fn number(mask: Mask, first: u32, to: &mut [u32; LANES]) {
-        let mut rest = mask;
-        for place in to.iter_mut().take(mask.count_ones() as usize) {
-            *place = first + rest.trailing_zeros();
-            rest &= rest - 1;
+        let mut remaining = mask;
+        for slot in to.iter_mut().take(mask.count_ones() as usize) {
+            *slot = first + remaining.trailing_zeros();
+            remaining &= remaining - 1;
         }
     }
 
     #[inline(always)]
     fn or_else(self, mask: Mask, other: Self) -> Self {
         let mut out = other.0;
-        for (lane, (place, value)) in out.iter_mut().zip(self.0).enumerate() {
+        for (lane, (slot, value)) in out.iter_mut().zip(self.0).enumerate() {
             if mask >> lane & 1 != 0 {
-                *place = value;
+                *slot = value;
             }
         }
         Self(out)

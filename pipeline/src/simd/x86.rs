@@ -1,26 +1,26 @@
 //! Lanes in the vector registers of x86-64: one of 512 bits, or two of 256.
 //!
-//! SAFETY, for all of this file: the types are used inside [`avx2`] and [`avx512`] only, whose callers made sure of the
-//! instructions; memory is reached through references to whole arrays.
+//! SAFETY, for all of this file: the types are used inside [`avx2`] and [`avx512`] only, whose callers have
+//! checked for the instructions. Memory is accessed through references to whole arrays.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
 use super::{Kernel, LANES, Lanes, Mask};
 
-/// Runs a kernel with 256-bit vectors.
+/// Run a kernel with 256-bit vectors.
 #[target_feature(enable = "avx2,fma,popcnt,bmi1,bmi2,lzcnt")]
 pub(super) fn avx2(kernel: impl Kernel) {
     kernel.run::<Avx2>();
 }
 
-/// Runs a kernel with 512-bit vectors.
+/// Run a kernel with 512-bit vectors.
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma,popcnt,bmi1,bmi2,lzcnt")]
 pub(super) fn avx512(kernel: impl Kernel) {
     kernel.run::<Avx512>();
 }
 
-/// Asks for every cache line of `at`.
+/// Prefetch every cache line of `at`.
 #[inline(always)]
 pub(super) fn prefetch<T>(at: &T) {
     let first = std::ptr::from_ref(at).cast::<i8>();

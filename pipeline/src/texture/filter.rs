@@ -1,4 +1,4 @@
-//! Trilinear filtering, and the lines of memory it touches.
+//! Trilinear filtering, and the memory lines it reads.
 
 use glam::{Vec2, Vec4};
 
@@ -6,10 +6,10 @@ use super::image::Level;
 use super::{Texture, Wrap, srgb8_to_linear};
 use crate::memory::LINE_BYTES;
 
-/// Texels of a line are a block of 4x4, so that neighbours in both directions share lines.
+/// Side of the block of texels in a line; blocks of 4x4 let neighbours in both directions share lines.
 const BLOCK: u32 = 4;
 
-/// A level of detail as one or two mip levels and the weight of the coarser one.
+/// Level of detail as one or two mip levels and the weight of the coarser one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     fine: usize,
@@ -17,7 +17,7 @@ pub struct Footprint {
     weight: f32,
 }
 
-/// A texture at its place in memory.
+/// A texture at an address in memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler<'a> {
     texture: &'a Texture,
@@ -25,13 +25,13 @@ pub struct Sampler<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    /// `texture` stored from byte `address`.
+    /// A sampler of `texture`, stored from byte `address`.
     pub fn new(texture: &'a Texture, address: u64) -> Self {
         Self { texture, address }
     }
 
-    /// The footprint of a pixel whose neighbours lie `dx` and `dy` away in texture coordinates: the longer of the two in
-    /// texels decides (Williams 1983, with the conservative choice of OpenGL).
+    /// Footprint of a pixel whose neighbours are `dx` and `dy` away in texture coordinates. The longer of the
+    /// two in texels decides (Williams 1983, with the conservative choice of OpenGL).
     pub fn footprint(&self, dx: Vec2, dy: Vec2) -> Footprint {
         let [width, height] = self.texture.size().map(|side| side as f32);
         let texels = |d: Vec2| (d * Vec2::new(width, height)).length();
@@ -43,19 +43,20 @@ impl<'a> Sampler<'a> {
         Footprint { fine, coarse: (fine + 1).min(last), weight: lod - fine as f32 }
     }
 
-    /// The filtered texel at `uv` in linear RGBA.
+    /// Filtered texel at `uv` in linear RGBA.
     pub fn sample(&self, uv: Vec2, footprint: &Footprint) -> Vec4 {
         let level = |index: usize| self.bilinear(&self.texture.levels()[index], uv);
         let fine = level(footprint.fine);
         if footprint.weight == 0.0 { fine } else { fine.lerp(level(footprint.coarse), footprint.weight) }
     }
 
-    /// Bilinear fetches that [`Self::sample`] makes.
+    /// Bilinear fetches of [`Self::sample`].
     pub fn fetches(footprint: &Footprint) -> u32 {
         1 + u32::from(footprint.weight != 0.0)
     }
 
-    /// The address of each line that [`Self::sample`] reads, neighbours that are equal told once.
+    /// Call `each` with the address of every line that [`Self::sample`] reads; consecutive equal lines are
+    /// merged.
     pub fn lines(&self, uv: Vec2, footprint: &Footprint, mut each: impl FnMut(u64)) {
         let mut previous = u64::MAX;
         let both = [footprint.fine, footprint.coarse];
@@ -80,7 +81,7 @@ impl<'a> Sampler<'a> {
         a.lerp(b, fraction.x).lerp(c.lerp(d, fraction.x), fraction.y)
     }
 
-    /// The four texels about `uv` and where it lies between them.
+    /// The four texels around `uv` and the position between them.
     fn taps(&self, level: &Level, uv: Vec2) -> ([[u32; 2]; 4], Vec2) {
         let [wrap_x, wrap_y] = self.texture.wrap();
         let at = uv * Vec2::new(level.width as f32, level.height as f32) - Vec2::splat(0.5);
@@ -95,7 +96,7 @@ fn block(level: &Level, x: u32, y: u32) -> u32 {
     y / BLOCK * level.width.div_ceil(BLOCK) + x / BLOCK
 }
 
-/// Texel `first + step` brought into `0..side`.
+/// Texel `first + step` wrapped into `0..side`.
 fn wrapped(first: f32, step: i64, side: u32, wrap: Wrap) -> u32 {
     let (texel, side) = ((first as i64).saturating_add(step), i64::from(side));
     let inside = match wrap {

@@ -1,6 +1,8 @@
-//! A texture as stored: 8-bit RGBA in sRGB, with its mip chain.
+//! Stored textures: 8-bit RGBA in sRGB with a mip chain, and the sRGB transfer function.
 
-/// What happens outside [0, 1].
+use std::sync::LazyLock;
+
+/// Wrap mode: texture coordinates outside [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// The texture repeats.
@@ -8,7 +10,7 @@ pub enum Wrap {
     Repeat,
     /// The texture repeats, every other copy mirrored.
     Mirror,
-    /// The border texel goes on.
+    /// The border texel continues.
     Clamp,
 }
 
@@ -29,7 +31,7 @@ pub(super) struct Level {
     pub texels: Vec<[u8; 4]>,
 }
 
-/// Why a texture cannot be built.
+/// Why a texture is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TextureError {
     /// A side is zero or above 16384 texels.
@@ -40,7 +42,7 @@ pub enum TextureError {
         /// Height in texels.
         height: u32,
     },
-    /// The data does not fill the image.
+    /// The data does not match the size.
     #[error("{found} texels for an image of {expected}")]
     Length {
         /// Texels given.
@@ -52,10 +54,10 @@ pub enum TextureError {
 
 impl Texture {
     /// A texture of `width` x `height` texels, rows from the top, each `[r, g, b, a]` with colour in sRGB and
-    /// alpha linear. The mip chain is made by averaging 2x2 texels in linear light.
+    /// alpha linear. The mip chain averages 2x2 texels in linear light.
     ///
     /// # Errors
-    /// When a side is zero or above 16384, or the data does not fill the image.
+    /// [`TextureError`] if a side is zero or above 16384, or the data does not match the size.
     pub fn from_srgb8(
         width: u32,
         height: u32,
@@ -86,8 +88,8 @@ impl Texture {
         self.levels.iter().map(|level| u64::from(level.blocks()) * 64).sum()
     }
 
-    /// The lowest alpha of any texel.
-    pub fn least_alpha(&self) -> u8 {
+    /// Lowest alpha of all texels.
+    pub fn min_alpha(&self) -> u8 {
         self.levels[0].texels.iter().map(|texel| texel[3]).min().unwrap_or(u8::MAX)
     }
 
@@ -127,11 +129,33 @@ impl Level {
                 let sum: u32 = corners.iter().map(|texel| u32::from(texel[3])).sum();
                 ((sum + 2) / 4) as u8
             } else {
-                let sum: f32 = corners.iter().map(|texel| super::srgb8_to_linear(texel[channel])).sum();
-                super::linear_to_srgb8(sum / 4.0)
+                let sum: f32 = corners.iter().map(|texel| srgb8_to_linear(texel[channel])).sum();
+                linear_to_srgb8(sum / 4.0)
             }
         })
     }
+}
+
+static TO_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64)));
+
+fn decode(code: f64) -> f32 {
+    let c = code / 255.0;
+    (if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }) as f32
+}
+
+/// Linear value in [0, 1] of an 8-bit sRGB code (IEC 61966-2-1:1999). It uses `libm`, so bytes do not depend
+/// on the machine.
+pub fn srgb8_to_linear(code: u8) -> f32 {
+    TO_LINEAR[code as usize]
+}
+
+/// Linear values half way between neighbouring codes.
+static BORDERS: LazyLock<[f32; 255]> =
+    LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 + 0.5)));
+
+/// Nearest 8-bit sRGB code of a linear value. Values outside [0, 1] are clamped, NaN becomes 0.
+pub fn linear_to_srgb8(linear: f32) -> u8 {
+    BORDERS.partition_point(|&border| border <= linear) as u8
 }
 
 #[cfg(test)]
@@ -150,5 +174,19 @@ mod tests {
     fn a_zero_area_image_is_refused() {
         assert!(Texture::from_srgb8(0, 4, vec![], [Wrap::Clamp; 2]).is_err());
         assert!(Texture::from_srgb8(2, 2, vec![[0; 4]; 3], [Wrap::Clamp; 2]).is_err());
+    }
+
+    #[test]
+    fn every_code_survives_the_round_trip() {
+        for code in 0..=255 {
+            assert_eq!(linear_to_srgb8(srgb8_to_linear(code)), code);
+        }
+    }
+
+    #[test]
+    fn values_out_of_range_are_clamped() {
+        assert_eq!(linear_to_srgb8(-1.0), 0);
+        assert_eq!(linear_to_srgb8(7.0), 255);
+        assert_eq!(linear_to_srgb8(f32::NAN), 0);
     }
 }

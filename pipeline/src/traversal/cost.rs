@@ -1,21 +1,22 @@
-//! What each test costs in multiply-adds, the same whether the view is orthographic or not. The kernels are written over [`Number`](super::Number); the tests below run them on
-//! numbers that count and hold the figures here against that.
+//! Cost of each test in multiply-adds, the same for perspective and orthographic views. The kernels are
+//! generic over [`Number`](super::Number). The tests below run them with counting numbers and compare the
+//! counts with these constants.
 
 /// Solving one quadratic for its roots.
 pub const ROOT: u32 = 8;
 
-/// Finding the place of a time in the interval of a box.
+/// Converting a time to its position in the interval of a box.
 pub const PHASE: u32 = 3;
 
-/// Finding where a distance to a side is nothing, and mapping that to a range.
+/// Finding the zero of a distance to a side, and mapping it to a range.
 pub const SIDE_ROOT: u32 = 4;
 
-/// Holding a triangle against one side of a tile, roots apart.
+/// Testing a triangle against one side of a tile, without roots.
 pub const fn side_madds(moving: bool, lens: bool, behind: bool) -> u32 {
     by(moving, lens, [6, 24, 18, 48]) * if behind { 2 } else { 1 }
 }
 
-/// Picks by dimensions in use: 2D, with time, with lens, both.
+/// Select by dimensions in use: 2D, with time, with lens, both.
 const fn by(moving: bool, lens: bool, madds: [u32; 4]) -> u32 {
     madds[moving as usize + 2 * lens as usize]
 }
@@ -25,27 +26,27 @@ pub const fn lens_line_setup_madds(moving: bool) -> u32 {
     by(moving, true, [0, 0, 74, 152])
 }
 
-/// Holding the lines against a tile, with `crossings` found.
+/// Testing the lines against a tile, with `crossings` computed.
 pub const fn lens_line_madds(crossings: u32) -> u32 {
     8 + 3 * crossings
 }
 
-/// Bringing a triangle's vertices and edges to a box.
+/// Transforming a triangle's vertices and edges to a box.
 pub const fn edge_madds(moving: bool, lens: bool) -> u32 {
     by(moving, lens, [39, 141, 79, 217])
 }
 
-/// Bounding the determinant over a box, with the time bisected so often.
+/// Bounding the determinant over a box, with `bisections` of the time.
 pub const fn facing_madds(moving: bool, lens: bool, bisections: u32) -> u32 {
     by(moving, lens, [10, 33, 26, 69]) + bisections * 27
 }
 
-/// Bounding the edges over a box; roots and phases come on top.
+/// Bounding the edges over a box, without roots and phases.
 pub const fn edge_bound_madds(moving: bool, lens: bool) -> u32 {
     by(moving, lens, [12, 30, 28, 64])
 }
 
-/// Linearizing the edges over a box; over a part of its time that costs more.
+/// Linearizing the edges over a box; a part of its time costs more than the whole.
 pub const fn screen_setup_madds(moving: bool, lens: bool, whole: bool) -> u32 {
     by(moving, lens, [8, 83, 24, 153]) + if whole { 0 } else { by(moving, lens, [0, 132, 0, 228]) }
 }
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn every_figure_is_what_its_kernel_counts() {
+    fn every_cost_is_that_of_its_kernel() {
         for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
             let shear = if lens { SHEAR } else { Shear::default() };
             let triangle = triangle(moving, &shear);
@@ -106,7 +107,8 @@ mod tests {
         }
     }
 
-    /// One unit serves both views, so its price is one. What an orthographic view asks of it is less, or a tenth more.
+    /// One unit serves both views, so both have the same cost. An orthographic view needs less, or at most a
+    /// tenth more.
     #[test]
     fn orthographic_views_cost_about_as_much() {
         for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
@@ -119,11 +121,12 @@ mod tests {
             let (facing, _) = count(|| Facing::new(&edges));
             let (bounds, _) = count(|| EdgeBounds::new(&edges));
             let (screen, _) = count(|| Screen::new(&edges, within.t, [true; 2]));
-            let (sides, (_, told)) = count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
+            let (sides, (_, madds_found)) =
+                count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
             println!("{moving} {lens}: {found} {facing} {bounds} {screen} {sides}");
             assert!(10 * found <= 11 * edge_madds(moving, lens) + 1, "{found}");
             assert!(10 * facing <= 11 * facing_madds(moving, lens, 0), "{facing}");
-            assert!(bounds <= edge_bound_madds(moving, lens) && sides <= told);
+            assert!(bounds <= edge_bound_madds(moving, lens) && sides <= madds_found);
             assert!(screen <= screen_setup_madds(moving, lens, true));
         }
         for moving in [false, true] {
@@ -135,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn side_planes_cost_what_their_kernel_counts() {
+    fn the_cost_of_side_planes_is_that_of_their_kernel() {
         for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
             let shear = if lens { SHEAR } else { Shear::default() };
             for behind in [false, true] {
@@ -143,16 +146,16 @@ mod tests {
                 for x in [-60.0, -20.0, 0.0, 40.0, 70.0, 300.0] {
                     let tile = TileRect { x: [x, x + 8.0], y: [16.0, 24.0] };
                     let within = Box5 { t: [0.25, 0.75], ..Box5::whole(lens) };
-                    let (madds, (_, told)) =
+                    let (madds, (_, madds_found)) =
                         count(|| narrow_counted::<Counted>(&triangle, &shear, &tile, &within));
-                    assert_eq!(madds, told, "{moving} {lens} {behind} {x}");
+                    assert_eq!(madds, madds_found, "{moving} {lens} {behind} {x}");
                 }
             }
         }
     }
 
     #[test]
-    fn lens_lines_cost_what_their_kernel_counts() {
+    fn the_cost_of_lens_lines_is_that_of_their_kernel() {
         for moving in [false, true] {
             let triangle = triangle(moving, &SHEAR);
             let (madds, lines) = count(|| LensLines::<Counted>::new(&triangle, &SHEAR, 0.1));

@@ -1,4 +1,5 @@
-//! The edges of a triangle over a box, as quadratics of time.
+//! Edges of a triangle over a box as quadratics of time, and the times at which a sample may be inside all of
+//! them.
 //!
 //! Seen from the middle of a box (see [`View`]) the edge `e = P_i x P_j` is, exactly,
 //!
@@ -8,53 +9,54 @@
 //! A = w_i y_j - w_j y_i        B = w_j x_i - w_i x_j
 //! ```
 //!
-//! In an orthographic view `dX` and `dY` move a vertex as it stands, not times its depth, and so
+//! In an orthographic view `dX` and `dY` move a vertex without the factor of its depth, and so
 //!
 //! ```text
 //! e(d) = e + dX (y_i - y_j) + dY (x_j - x_i) + du (a A + s (y_i - y_j)) + dv (b B + s' (x_j - x_i))
 //!          + (w_j - w_i) (dY a du - dX b dv + (a s' - b s) du dv)
 //! ```
 //!
-//! where `e`, `A` and `B` are quadratic in time and the last factor is linear. Each is kept in Bernstein form, so
-//! bounding its coefficients bounds it at all times (Munkberg and Akenine-Moeller 2012 bound edges so; the form recentred at
-//! the box is our own).
+//! where `e`, `A` and `B` are quadratic in time and the last factor is linear. Each is stored in Bernstein
+//! form, so bounds of its coefficients hold at all times. (Munkberg and Akenine-Moeller 2012 bound edges this
+//! way; the form relative to the middle of the box is new here.)
 
-use super::View;
 use super::number::Number;
 use super::quadratic::Quadratic;
+use super::region::{Faces, Piece, Timeline};
+use super::{View, cost};
 
-/// The edges of a triangle over a box; edge `k` is the one opposite vertex `k`.
+/// Edges of a triangle over a box; edge `k` is opposite vertex `k`.
 #[derive(Clone, Copy, Debug)]
 pub struct Edges<N = f64> {
     pub(super) view: View<N>,
     pub(super) edges: [Edge<N>; 3],
 }
 
-/// One edge, from vertex `i` to vertex `j`.
+/// The edge from vertex `i` to vertex `j`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge<N> {
-    /// In the middle of the tile and the lens.
+    /// Value in the middle of the tile and the lens.
     pub value: Quadratic<N>,
-    /// Its slopes along X, Y, u, v.
+    /// Slopes along X, Y, u, v.
     pub slopes: [Quadratic<N>; 4],
-    /// The difference of the depths of its ends, as time begins and ends.
+    /// Difference of the depths of its vertices at both ends of the time.
     pub depths: [N; 2],
 }
 
 impl<N: Number> Edges<N> {
-    /// The edges of the triangle in `view`.
+    /// Edges of the triangle in `view`.
     pub fn new(view: View<N>) -> Self {
         let edge = |i: usize, j: usize| Edge::new(&view, i, j);
         let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
         Self { view, edges }
     }
 
-    /// Whether `t` is all of the time of the box, as far as that matters.
+    /// Whether `t` covers the whole time of the box, as far as it matters.
     pub fn spans(&self, t: [f32; 2]) -> bool {
         !self.view.moving || t == self.view.t
     }
 
-    /// How strongly the difference of depths bends an edge over lens and tile.
+    /// Factor of the difference of depths in the nonlinear term over lens and tile.
     pub(super) fn skew(&self) -> N {
         let View { half, s, a, lens, parallel, .. } = &self.view;
         if !lens {
@@ -82,7 +84,7 @@ impl<N: Number> Edge<N> {
             if view.moving { Quadratic::linear(start, end) } else { Quadratic::constant(start) }
         };
         let none = Quadratic::constant(N::zero());
-        // What the view does not ask for is not found.
+        // Slopes that the view does not need are not computed.
         let [along, across] = if view.lens || !view.parallel {
             [product(|p, q| p[2] * q[1] - q[2] * p[1]), product(|p, q| q[2] * p[0] - p[2] * q[0])]
         } else {
@@ -115,7 +117,7 @@ impl<N: Number> Edge<N> {
         }
     }
 
-    /// The lowest and the highest it can be in the arithmetic of the sample test, as quadratics of time.
+    /// Lower and upper bound in the arithmetic of the sample test, as quadratics of time.
     pub(super) fn range(&self, view: &View<N>, skew: N) -> [Quadratic<N>; 2] {
         let [from, to] = self.depths.map(N::abs);
         let bend = [from, from.max(to), to];
@@ -139,10 +141,93 @@ impl<N: Number> Edge<N> {
     }
 }
 
+/// Lower and upper bounds of three edges over a box, as quadratics of time (after Munkberg and
+/// Akenine-Moeller 2012).
+#[derive(Clone, Copy, Debug)]
+pub struct EdgeBounds<N = f64> {
+    pub(super) ranges: [[Quadratic<N>; 2]; 3],
+    pub(super) moving: bool,
+}
+
+impl<N: Number> EdgeBounds<N> {
+    /// Bounds of each of `edges` over the whole box.
+    pub fn new(edges: &Edges<N>) -> Self {
+        let skew = edges.skew();
+        let ranges = edges.edges.map(|edge| edge.range(&edges.view, skew));
+        Self { ranges, moving: edges.view.moving }
+    }
+
+    /// The part of the time, from 0 to 1, in which a sample may see one of `faces`, and the number of
+    /// quadratics solved. The clockwise face needs all three edges to reach above zero, the other face all
+    /// below. So if the facing is known, one edge suffices to cull; otherwise one negative and one positive
+    /// edge are needed.
+    pub fn narrow(&self, part: [N; 2], faces: Faces) -> (Option<[N; 2]>, u32) {
+        let mut solved = 0;
+        let [clockwise, counter_clockwise] =
+            [0, 1].map(|face| if faces[face] { self.reaching(face, part, &mut solved) } else { None });
+        let hull = match (clockwise, counter_clockwise) {
+            (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
+            (a, b) => a.or(b),
+        };
+        (hull, solved)
+    }
+
+    /// The same for each piece of `times`, for the `drawn` faces; `edges` are those bounded. The second
+    /// result is the cost in multiply-adds beyond [`Edges::bounds`].
+    pub fn timeline(&self, edges: &Edges<N>, times: &Timeline, drawn: Faces) -> (Timeline, u32) {
+        let (mut left, mut madds) = (Timeline::empty(), 0);
+        for piece in times.pieces() {
+            let part = if edges.spans(piece.t) {
+                [N::zero(), N::from(1.0)]
+            } else {
+                madds += 2 * cost::PHASE;
+                piece.t.map(|t| edges.view.phase(t))
+            };
+            let (part, roots) = self.narrow(part, piece.seen(drawn));
+            madds += roots * cost::ROOT;
+            if let Some(part) = part {
+                let [lo, hi] = if self.moving { edges.view.times(part) } else { piece.t };
+                let t = [lo.max(piece.t[0]), hi.min(piece.t[1])];
+                if t[0] <= t[1] {
+                    left.push(Piece { t, ..*piece });
+                }
+            }
+        }
+        (left, madds)
+    }
+
+    /// For each edge its upper bound on the side of the face; on that of the clockwise face if both are
+    /// requested.
+    pub(super) fn tallest(&self, faces: Faces) -> [Quadratic<N>; 3] {
+        self.ranges.map(|[lowest, highest]| if faces[0] { highest } else { Quadratic(lowest.0.map(|b| -b)) })
+    }
+
+    /// The part of `part` in which every edge can have the sign of `face`.
+    fn reaching(&self, face: usize, part: [N; 2], solved: &mut u32) -> Option<[N; 2]> {
+        let mut left = part;
+        for tallest in self.tallest([face == 0, face == 1]) {
+            if !self.moving {
+                if tallest.0[0] < N::zero() {
+                    return None;
+                }
+                continue;
+            }
+            let (above, rooted) = tallest.hull_above();
+            *solved += u32::from(rooted);
+            let [lo, hi] = above?;
+            left = [left[0].max(lo), left[1].min(hi)];
+            if left[0] > left[1] {
+                return None;
+            }
+        }
+        Some(left)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::EdgeBounds;
     use super::super::testing::{Case, Uniform, cases};
+    use super::super::{EdgeBounds, View};
     use super::*;
 
     fn edges(case: &Case) -> Edges {
@@ -161,10 +246,10 @@ mod tests {
             let edges = edges(&case);
             let bounds = EdgeBounds::new(&edges);
             for _ in 0..40 {
-                let place = case.place(&mut r);
+                let place = case.position(&mut r);
                 let phase = edges.view.phase(place[4] as f32);
                 for (value, [low, high]) in case.edges(place).into_iter().zip(&bounds.ranges) {
-                    // The part of the range that is there for the rounding of the sample test is not to be used up.
+                    // The allowance for the rounding of the sample test must not be used up.
                     let room = 0.99 * edges.view.rounding;
                     let range = [at(low, phase) + room, at(high, phase) - room];
                     assert!(range[0] <= value && value <= range[1], "{seed}: {value} {range:?}");
@@ -218,5 +303,28 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn no_time_in_which_a_place_is_inside_is_lost() {
+        let (mut r, mut culled, mut shrunk) = (Uniform::new(4), 0, 0);
+        for (seed, case) in cases(400) {
+            let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
+            let whole = Timeline::one(Piece { t: case.within.t, faces: [true; 2] });
+            for drawn in [[true, true], [true, false], [false, true]] {
+                let (left, _) = EdgeBounds::new(&edges).timeline(&edges, &whole, drawn);
+                culled += u32::from(left.hull().is_none());
+                shrunk += u32::from(left.hull().is_some_and(|t| t != case.within.t));
+                for _ in 0..60 {
+                    let place = case.position(&mut r);
+                    let e = case.edges(place);
+                    let seen = (drawn[0] && e.iter().all(|&e| e >= 0.0))
+                        || (drawn[1] && e.iter().all(|&e| e <= 0.0));
+                    let kept = left.pieces().iter().any(|p| (p.t[0]..=p.t[1]).contains(&(place[4] as f32)));
+                    assert!(kept || !seen, "{seed}: {drawn:?} {place:?} {left:?}");
+                }
+            }
+        }
+        assert!(culled > 500 && shrunk > 100, "{culled} {shrunk}");
     }
 }

@@ -1,4 +1,4 @@
-//! Which face a triangle shows to the samples of a box.
+//! Facing test: which face of a triangle the samples of a box see.
 //!
 //! Seen from `(u, v)` at time `t`, the determinant of its vertices is
 //!
@@ -6,21 +6,23 @@
 //! det(u, v, t) = det[x, y, w] + u s sum(A) + v s' sum(B)        A, B as in `edges`
 //! ```
 //!
-//! cubic in time and affine in `u, v`. In an orthographic view the determinant of `(x, y, 1)` stands for it, twice the area as seen:
+//! cubic in time and affine in `u, v`. An orthographic view uses the determinant of `(x, y, 1)`, twice the
+//! area as seen:
 //!
 //! ```text
 //! det(u, v, t) = sum(e_k) + u a sum(A) + v b sum(B)
 //! ```
 //!
-//! So its four Bernstein coefficients, each plus or minus its lens terms, bound it.
-//! A sample inside has `det = sum(e_k w_k)`, its depth times `sum(e_k)`, and the depth is beyond the near one, or `det = sum(e_k)`:
-//! the sign of `det` is that of all three edges. Where it is not decided over the whole time, the time is bisected (de Casteljau).
+//! So its four Bernstein coefficients, each plus or minus its lens terms, bound it. A sample inside has `det
+//! = sum(e_k w_k)`, its depth times `sum(e_k)` with a depth beyond the near depth, or `det = sum(e_k)`. In
+//! both cases the sign of `det` is that of all three edges. If the sign is undecided over the whole time, the
+//! time is bisected (de Casteljau).
 
 use super::edges::Edges;
 use super::number::Number;
-use super::timeline::{Faces, Piece, Timeline};
+use super::region::{Faces, Piece, Timeline};
 
-/// Bounds on the determinant over a box: its lowest and highest Bernstein coefficients.
+/// Bounds of the determinant over a box: its lowest and highest Bernstein coefficients.
 #[derive(Clone, Copy, Debug)]
 pub struct Facing<N = f64> {
     range: [[N; 4]; 2],
@@ -29,13 +31,13 @@ pub struct Facing<N = f64> {
 }
 
 impl<N: Number> Facing<N> {
-    /// The determinant of the triangle of `edges`.
+    /// Determinant of the triangle of `edges`.
     pub fn new(edges: &Edges<N>) -> Self {
         let view = &edges.view;
         let third = N::constant(1.0 / 3.0);
         let count = if view.moving { 4 } else { 1 };
         let [mut lowest, mut highest] = [[N::zero(); 4]; 2];
-        // Where vertices weigh alike their lens terms add up to the slopes of the edges themselves.
+        // If vertices have equal weights, their lens terms are the sums of the edges' slopes.
         let (first, factors) = if view.parallel { (2, [N::from(1.0); 2]) } else { (0, view.s.map(N::abs)) };
         let sums: [[N; 3]; 2] = [0, 1].map(|axis| {
             let [a, b, c] = edges.edges.map(|edge| edge.slopes[first + axis]);
@@ -59,24 +61,25 @@ impl<N: Number> Facing<N> {
         Self { range, margin: margin(edges), moving: view.moving }
     }
 
-    /// The faces that can be seen over the whole time.
+    /// Faces that may be visible over the whole time.
     pub fn faces(&self) -> Faces {
-        // Written so that what is not a number leaves both.
+        // Written so that NaN keeps both faces.
         let above = self.range[0].iter().all(|&low| low > self.margin);
         let below = self.range[1].iter().all(|&high| high < -self.margin);
         [!below, !above]
     }
 
-    /// The parts of the times `t` in which one of the faces `drawn` can be seen, time being bisected `splits` times at most where it
-    /// is not decided which. Also says how often it was.
+    /// The parts of the times `t` in which one of the faces `drawn` may be visible. Undecided time is
+    /// bisected up to `splits` times. The second result is the number of bisections.
     pub fn timeline(&self, t: [f32; 2], drawn: Faces, splits: u32) -> (Timeline, u32) {
         let (mut timeline, mut done) = (Timeline::empty(), 0);
-        let splits = if self.moving { splits.min(Timeline::MOST_SPLITS) } else { 0 };
+        let splits = if self.moving { splits.min(Timeline::MAX_SPLITS) } else { 0 };
         self.bisect([t[0], t[1], t[1]], drawn, splits, &mut timeline, &mut done);
         (timeline, done)
     }
 
-    /// `last` is the last time of a part that ends at `end`, which belongs to the next part unless it is the end of all.
+    /// `last` is the last time of a part that ends at `end`. The end belongs to the next part, except for the
+    /// last part.
     fn bisect(
         &self,
         [start, end, last]: [f32; 3],
@@ -101,8 +104,8 @@ impl<N: Number> Facing<N> {
         later.bisect([middle, end, last], drawn, splits - 1, out, done);
     }
 
-    /// Before and after `phase` of the time. Each coefficient is a mean of others with weights that are not negative, so bounds
-    /// stay bounds.
+    /// The determinant before and after `phase` of the time. Each coefficient is a convex combination of
+    /// others, so bounds stay bounds.
     fn split(&self, phase: N) -> [Self; 2] {
         let mut parts = [*self; 2];
         for side in [0, 1] {
@@ -147,15 +150,15 @@ fn elevated<N: Number>(q: &[N; 3], k: usize, third: N) -> N {
     }
 }
 
-/// How far the determinant of what the sample test sees, weighed with depths as it rounds them, may be from the true one:
-/// three edges of at most `2 reach_x reach_y`, each rounded, by depths that are rounded.
+/// Error bound of the determinant as the sample test sees it, weighted by rounded depths: three edges of at
+/// most `2 reach_x reach_y`, each rounded, times rounded depths.
 fn margin<N: Number>(edges: &Edges<N>) -> N {
     const ROUNDING: f64 = 1.0 / 524_288.0;
     let view = &edges.view;
     let [reach_x, reach_y] = view.reach;
     let weight = reach_x * reach_y * view.depth[1];
-    // Outside the range of f32 the depth of a sample says nothing, and where some vertices are behind the camera its sign
-    // would count.
+    // Outside the range of f32 the depth of a sample is meaningless. With vertices behind the camera, its
+    // sign would matter.
     if !(weight > N::constant(1e-30) && weight < N::constant(1e36)) {
         return N::from(f32::INFINITY);
     }
@@ -181,9 +184,9 @@ mod tests {
                 decided += times.pieces().iter().filter(|p| p.is_decided()).count();
                 pieces += usize::from(times.pieces().len() > 1);
                 for _ in 0..40 {
-                    let place = case.place(&mut r);
+                    let place = case.position(&mut r);
                     let det = case.det(place);
-                    // A hair beyond what rounding may hide, which is what the margin is for.
+                    // Slightly beyond the rounding error that the margin covers.
                     let sure = 0.99 * facing.margin;
                     let t = place[4] as f32;
                     let here: Vec<_> = times.pieces().iter().filter(|p| p.t[0] <= t && t <= p.t[1]).collect();
@@ -217,7 +220,7 @@ mod tests {
         let edges = Edges::<f64>::new(View::new(&triangle, &shear, &tile, &Box5::whole(false)));
         let facing = Facing::new(&edges);
         assert_eq!(facing.timeline([0.0, 1.0], [true; 2], 0).0.pieces().len(), 1);
-        // About the instant at which it has no area neither half is decided; the outer quarters are.
+        // Around the time without area neither half is decided; the outer quarters are.
         let (times, bisections) = facing.timeline([0.0, 1.0], [true; 2], 3);
         let found: Vec<_> = times.pieces().iter().map(|p| (p.t[0], p.faces)).collect();
         assert_eq!(
@@ -234,7 +237,7 @@ mod tests {
         use crate::geometry::{Cull, MovingVertex, Shear};
         use crate::setup::{Outcome, set_up};
         use crate::traversal::{Box5, TileRect};
-        // Its area goes with (1 - 3 t) (2 - 3 t), which is below zero in the middle third only.
+        // Its area is proportional to (1 - 3 t) (2 - 3 t), negative in the middle third only.
         let v = [
             ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
             ([8.0, 0.0, 1.0], [-16.0, 0.0, 1.0]),

@@ -1,37 +1,40 @@
-//! Lines in the dual space of image and lens (after Laine, Aila, Karras and Lehtinen 2011, "Clipless dual-space bounds for
-//! faster stochastic rasterization").
+//! Lens lines in the dual space of image and lens (after Laine, Aila, Karras and Lehtinen 2011, "Clipless
+//! dual-space bounds for faster stochastic rasterization").
 //!
-//! Seen from `u` of the lens a vertex appears at `X = (x + u (a w - s)) / w`, a line in the plane of X and u; all of the triangle
-//! lies between a lower and an upper line
+//! Seen from `u` of the lens a vertex appears at `X = (x + u (a w - s)) / w`, a line in the plane of X and u.
+//! The whole triangle is between a lower and an upper line
 //!
 //! ```text
 //! l(u) <= X <= h(u)
 //! ```
 //!
-//! found once for each triangle, over all times; in (Y, v) alike. A tile then asks where on the lens the lower line is left of its
-//! right side and the upper line right of its left side: four differences an axis, and a quotient where it is not all or nothing.
+//! found once per triangle, over all times; likewise in (Y, v). A tile then needs the lens positions at which
+//! the lower line is left of its right side and the upper line right of its left side. That costs four
+//! differences per axis, and a quotient if the answer is neither all nor nothing.
 //!
-//! Nothing is clipped: a lower line needs `f = x + u (a w - s) - l(u) w >= 0` for each vertex, whatever the sign of `w`.
-//! Then a sample `X w = sum(l_i (x_i + u (a w_i - s)))` of positive depth has `(X - l(u)) w >= 0`. `f` is bilinear in `u` and
-//! time, so the corners decide, and the line is that through the tightest values at both ends of the lens. (The paper
-//! fixes a slope and finds the offset; the two ends of the lens are tighter and as cheap.) In an orthographic view `X = x + u (a w - s)`, a
-//! line again, and `f` has 1 for the last `w`. Vertices behind the camera bound
-//! those values from the other side, and where no value is left there is no line.
+//! Nothing is clipped: a lower line needs `f = x + u (a w - s) - l(u) w >= 0` for each vertex, for any sign
+//! of `w`. Then a sample `X w = sum(l_i (x_i + u (a w_i - s)))` of positive depth has `(X - l(u)) w >= 0`.
+//! `f` is bilinear in `u` and time, so the corners decide, and the line passes through the tightest values at
+//! both ends of the lens. (The paper fixes a slope and finds the offset; the two ends of the lens are tighter
+//! and as cheap.) In an orthographic view `X = x + u (a w - s)`, again a line, and `f` has 1 in place of the
+//! last `w`. Vertices behind the camera bound those values from the other side. If no value remains there is
+//! no line.
 
 use super::number::Number;
 use super::{Box5, TileRect};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 
-/// The lines of one triangle.
+/// Lines of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LensLines<N = f64> {
-    /// For (X, u) and (Y, v): the lower line, and the upper line with its sign turned, each at `u = -1` and `u = 1`.
+    /// For (X, u) and (Y, v): the lower line, and the upper line with its sign inverted, each at `u = -1` and
+    /// `u = 1`.
     axes: [[[N; 2]; 2]; 2],
 }
 
 impl<N: Number> LensLines<N> {
-    /// The lines of `triangle`, seen by samples beyond the depth `near`.
+    /// Lines of `triangle` for samples beyond the depth `near`.
     pub fn new(triangle: &Triangle, shear: &Shear, near: f32) -> Self {
         let none = N::from(f32::NEG_INFINITY);
         if !depth_is_sound(triangle, near) {
@@ -40,8 +43,8 @@ impl<N: Number> LensLines<N> {
         Self { axes: [0, 1].map(|axis| lines(triangle, shear, axis)) }
     }
 
-    /// The part of `within` from which the triangle can be seen in `tile`, or `None` where there is none; and how many crossings were
-    /// found.
+    /// The part of `within` from which the triangle may be visible in `tile`, or `None`, and the number of
+    /// crossings computed.
     pub fn narrow(&self, tile: &TileRect, within: &Box5) -> (Option<Box5>, u32) {
         let (mut next, mut crossings) = (*within, 0);
         if !within.lens {
@@ -50,7 +53,7 @@ impl<N: Number> LensLines<N> {
         for (axis, [low, high]) in [tile.x, tile.y].into_iter().enumerate() {
             let range = if axis == 0 { &mut next.u } else { &mut next.v };
             for (line, side) in self.axes[axis].iter().zip([high, -low]) {
-                // `side - l(u)`, not below zero where the triangle can be in the tile.
+                // `side - l(u)`, not negative where the triangle may be in the tile.
                 let room = line.map(|end| N::from(side) - end);
                 let Some(left) = narrowed(*range, room, &mut crossings) else { return (None, crossings) };
                 *range = left;
@@ -60,8 +63,9 @@ impl<N: Number> LensLines<N> {
     }
 }
 
-/// Whether the sign of a sample's depth can be trusted: no vertex is behind the camera, or the near depth is well beyond what
-/// rounding may make of a depth, and products of depths and places stay within the range of f32.
+/// Whether the sign of a sample's depth is reliable. No vertex may be behind the camera, or the near depth
+/// has to be well above the rounding error of a depth; and products of depths and positions have to stay
+/// within the range of f32.
 fn depth_is_sound(triangle: &Triangle, near: f32) -> bool {
     let depth = triangle.corners.iter().map(|c| c.open[2].abs() + c.delta[2].abs()).fold(0.0, f32::max);
     let [slack_x, slack_y] = triangle.slack;
@@ -69,7 +73,7 @@ fn depth_is_sound(triangle: &Triangle, near: f32) -> bool {
     !triangle.behind || (near > depth / 1_048_576.0 && weight > 1e-36 && weight < 1e24)
 }
 
-/// The lower line of an axis and the upper one with its sign turned.
+/// Lower line of an axis, and the upper line with its sign inverted.
 fn lines<N: Number>(triangle: &Triangle, shear: &Shear, axis: usize) -> [[N; 2]; 2] {
     let [s, a] = [shear.s[axis], shear.a[axis]].map(N::from);
     let slack = N::from(triangle.slack[axis]);
@@ -81,65 +85,66 @@ fn lines<N: Number>(triangle: &Triangle, shear: &Shear, axis: usize) -> [[N; 2];
                 if end == 0 { open } else { open + N::from(corner.delta[k]) }
             });
             let shift = a * w - s;
-            for (u, place) in [x - shift, x + shift].into_iter().enumerate() {
+            for (u, position) in [x - shift, x + shift].into_iter().enumerate() {
                 let weight = if shear.parallel { N::from(1.0) } else { w };
-                lines[0][u].hold(place - slack, weight);
-                lines[1][u].hold(-(place + slack), weight);
+                lines[0][u].keep_below(position - slack, weight);
+                lines[1][u].keep_below(-(position + slack), weight);
             }
         }
     }
     lines.map(|line| line.map(|offset| offset.highest().unwrap_or(N::from(f32::NEG_INFINITY))))
 }
 
-/// The values a lower line can have at one place of the lens.
+/// Range of values of a lower line at one end of the lens.
 #[derive(Clone, Copy)]
 struct Offset<N> {
-    most: N,
-    least: N,
+    max: N,
+    min: N,
     possible: bool,
 }
 
 impl<N: Number> Offset<N> {
     fn any() -> Self {
-        Self { most: N::from(f32::INFINITY), least: N::from(f32::NEG_INFINITY), possible: true }
+        Self { max: N::from(f32::INFINITY), min: N::from(f32::NEG_INFINITY), possible: true }
     }
 
-    /// Keeps those that leave a vertex at `place` on the homogeneous plane, with weight `w`, above the line.
-    fn hold(&mut self, place: N, w: N) {
+    /// Keep the values for which the line is below a vertex at `position` on the homogeneous plane with
+    /// weight `w`.
+    fn keep_below(&mut self, position: N, w: N) {
         if w > N::zero() {
-            self.most = self.most.min(place / w);
+            self.max = self.max.min(position / w);
         } else if w < N::zero() {
-            self.least = self.least.max(place / w);
+            self.min = self.min.max(position / w);
         } else {
-            self.possible &= w == N::zero() && place >= N::zero();
+            self.possible &= w == N::zero() && position >= N::zero();
         }
     }
 
-    /// The highest, but for a hair to spare for the rounding of the quotients.
+    /// Highest value, less an allowance for the rounding of the quotients.
     fn highest(&self) -> Option<N> {
         let hair = N::constant(HAIR);
-        let most = self.most - self.most.abs() * hair;
-        let bounded = self.most < N::from(f32::INFINITY)
-            && (self.least == N::from(f32::NEG_INFINITY) || most >= self.least + self.least.abs() * hair);
-        (self.possible && bounded).then_some(most)
+        let max = self.max - self.max.abs() * hair;
+        let bounded = self.max < N::from(f32::INFINITY)
+            && (self.min == N::from(f32::NEG_INFINITY) || max >= self.min + self.min.abs() * hair);
+        (self.possible && bounded).then_some(max)
     }
 }
 
 const HAIR: f64 = 1e-12;
 
-/// The part of `range` where what is `room` at -1 and at 1 is not below zero.
+/// The part of `range` in which a linear function with the given values at -1 and 1 is not negative.
 fn narrowed<N: Number>(range: [f32; 2], [start, end]: [N; 2], crossings: &mut u32) -> Option<[f32; 2]> {
     let starts_below = start < N::zero();
     if starts_below == (end < N::zero()) {
         return (!starts_below).then_some(range);
     }
     *crossings += 1;
-    // From -1 to 1, to a float outwards. What is not a number leaves the range as it is.
-    let place: f64 = (start / (start - end) * N::from(2.0) - N::from(1.0)).into();
+    // Mapped from -1 to 1 and rounded outward to a float. NaN leaves the range unchanged.
+    let position: f64 = (start / (start - end) * N::from(2.0) - N::from(1.0)).into();
     let left = if starts_below {
-        [range[0].max((place as f32).next_down()), range[1]]
+        [range[0].max((position as f32).next_down()), range[1]]
     } else {
-        [range[0], range[1].min((place as f32).next_up())]
+        [range[0], range[1].min((position as f32).next_up())]
     };
     (left[0] <= left[1]).then_some(left)
 }
@@ -158,14 +163,14 @@ mod tests {
             bounded += finite;
             behind += if case.triangle.behind { finite } else { 0 };
             for _ in 0..60 {
-                let [_, _, u, v, t] = case.place(&mut r);
+                let [_, _, u, v, t] = case.position(&mut r);
                 let (seen, weights) = (case.seen([0.0, 0.0, u, v, t]), r.weights());
                 let [x, y, w] = [0, 1, 2].map(|k| (0..3).map(|i| weights[i] * seen[i][k]).sum::<f64>());
                 if w <= f64::from(NEAR) && !case.shear.parallel {
                     continue;
                 }
                 let weight = case.weight(w);
-                for (axis, place, lens) in [(0, x / weight, u), (1, y / weight, v)] {
+                for (axis, position, lens) in [(0, x / weight, u), (1, y / weight, v)] {
                     let at = |line: [f64; 2]| {
                         let bounded = line.iter().all(|end| end.is_finite());
                         if bounded {
@@ -175,8 +180,8 @@ mod tests {
                         }
                     };
                     let [low, high] = lines.axes[axis];
-                    let inside = at(low) <= place && place <= -at(high);
-                    assert!(inside, "{seed}: {place} {low:?} {high:?} {lens}");
+                    let inside = at(low) <= position && position <= -at(high);
+                    assert!(inside, "{seed}: {position} {low:?} {high:?} {lens}");
                 }
             }
         }
@@ -192,14 +197,14 @@ mod tests {
             culled += u32::from(left.is_none());
             narrowed += u32::from(left.is_some_and(|left| left != case.within));
             for _ in 0..60 {
-                let place = case.place(&mut r);
-                let e = case.edges(place);
-                let depth = case.depth(place);
+                let position = case.position(&mut r);
+                let e = case.edges(position);
+                let depth = case.depth(position);
                 let inside = e.iter().all(|&e| e >= 0.0) || e.iter().all(|&e| e <= 0.0);
-                let [u, v] = [place[2] as f32, place[3] as f32];
+                let [u, v] = [position[2] as f32, position[3] as f32];
                 let kept =
                     left.is_some_and(|b| (b.u[0]..=b.u[1]).contains(&u) && (b.v[0]..=b.v[1]).contains(&v));
-                assert!(kept || !inside || depth <= f64::from(NEAR), "{seed}: {place:?}");
+                assert!(kept || !inside || depth <= f64::from(NEAR), "{seed}: {position:?}");
             }
         }
         assert!(culled > 200 && narrowed > 40, "{culled} {narrowed}");
@@ -209,7 +214,8 @@ mod tests {
     fn a_point_at_one_depth_has_one_line() {
         use crate::geometry::{Cull, MovingVertex};
         use crate::setup::{Outcome, set_up};
-        // At twice the focus depth of 6 the circle of confusion has the radius a - s / w = 15 - 90 / 12 = 7.5.
+        // At twice the focus depth of 6 the circle of confusion has the radius a - s / w = 15 - 90 / 12 =
+        // 7.5.
         let shear = Shear::new([90.0, -90.0], [15.0, -15.0]);
         let v = [[0.0, 0.0, 12.0], [12.0, 0.0, 12.0], [0.0, 12.0, 12.0]]
             .map(|p| MovingVertex { open: p, close: p });

@@ -1,38 +1,35 @@
-//! Tile tests: which tiles can hold a sample that sees the triangle, and in which part of u, v, t space.
+//! Traversal: tile tests, which bound the lens positions and times at which a tile may contain a sample that
+//! sees the triangle.
 //!
-//! A test may keep too much and never too little: it evaluates what the sample test evaluates, at the corners of the
-//! tile, and allows for the rounding of both.
+//! A test is conservative: it may keep too much but never too little. It evaluates the expressions of the
+//! sample test at the corners of the tile, with an allowance for the rounding of both.
 
-mod box5;
 mod cost;
-mod edge_bounds;
 mod edges;
 mod facing;
 mod lens_lines;
 mod number;
 mod quadratic;
+mod region;
 mod screen;
 mod side_planes;
-pub mod small;
 #[cfg(test)]
 mod testing;
+pub mod thresholds;
 mod time_interval;
-mod timeline;
 mod view;
 
-pub use box5::{Box5, TileRect};
 pub use cost::{
     edge_bound_madds, edge_madds, facing_madds, lens_line_madds, lens_line_setup_madds, screen_setup_madds,
     side_madds,
 };
-pub use edge_bounds::EdgeBounds;
-pub use edges::Edges;
+pub use edges::{EdgeBounds, Edges};
 pub use facing::Facing;
 pub use lens_lines::LensLines;
 pub use number::Number;
 pub use quadratic::{Pieces, Quadratic};
+pub use region::{Box5, Faces, Piece, TileRect, Timeline};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
-pub use timeline::{Faces, Piece, Timeline};
 pub use view::View;

@@ -1,8 +1,9 @@
-//! The numbers a kernel runs on: `f64` at run time, and in tests one that counts its operations.
+//! Numbers of the tile tests: `f64` at run time, and in tests a number that counts its operations.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What the kernels of the tile tests need of a number. A kernel written over it can be run to count what it costs.
+/// Number type of the kernels of the tile tests. A generic kernel can be run with counting numbers to measure
+/// its cost.
 pub trait Number:
     Copy
     + PartialOrd
@@ -14,25 +15,25 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The magnitude.
+    /// Magnitude.
     fn abs(self) -> Self;
-    /// The square root.
+    /// Square root.
     fn sqrt(self) -> Self;
 
-    /// The larger one; the other one where one is not a number.
+    /// Maximum; the other one if one is NaN.
     fn max(self, other: Self) -> Self {
         if other > self || self.partial_cmp(&self).is_none() { other } else { self }
     }
 
-    /// The smaller one; the other one where one is not a number.
+    /// Minimum; the other one if one is NaN.
     fn min(self, other: Self) -> Self {
         if other < self || self.partial_cmp(&self).is_none() { other } else { self }
     }
 
-    /// A number known beforehand.
+    /// A constant.
     fn constant(value: f64) -> Self;
 
-    /// Nothing.
+    /// Zero.
     fn zero() -> Self {
         Self::from(0.0)
     }
@@ -52,8 +53,9 @@ impl Number for f64 {
     }
 }
 
-/// A number that counts multiply-adds, by the convention of the sample test: a product and the sum it goes into are one, a
-/// lone addition, multiplication, division or root is one; signs, magnitudes and comparisons are free.
+/// A number that counts multiply-adds by the convention of the sample test. A product and the sum it goes
+/// into are one. A separate addition, multiplication, division or root is one. Signs, magnitudes and
+/// comparisons are free.
 #[cfg(test)]
 pub mod counted {
     use std::cell::Cell;
@@ -65,14 +67,14 @@ pub mod counted {
         static COUNT: Cell<u32> = const { Cell::new(0) };
     }
 
-    /// The multiply-adds of running `kernel`, and its result.
+    /// Multiply-adds and result of `kernel`.
     pub fn count<R>(kernel: impl FnOnce() -> R) -> (u32, R) {
         COUNT.set(0);
         let result = kernel();
         (COUNT.get(), result)
     }
 
-    /// A value, and whether it is a product that no sum has taken up yet.
+    /// A value, and whether it is a product not yet used in a sum.
     #[derive(Clone, Copy, Debug, Default)]
     pub struct Counted {
         pub value: f64,

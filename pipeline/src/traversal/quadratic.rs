@@ -1,36 +1,37 @@
-//! Quadratics of time in Bernstein form, and where they are not below zero.
+//! Quadratics of time in Bernstein form, and the intervals where they are not negative.
 
 use std::ops::Neg;
 
 use super::number::Number;
 
-/// `b0 (1-s)^2 + 2 b1 s (1-s) + b2 s^2` for `s` in [0, 1]. The values lie between the smallest and the largest coefficient.
+/// `b0 (1-s)^2 + 2 b1 s (1-s) + b2 s^2` for `s` in [0, 1]. Its values are between the smallest and the
+/// largest coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadratic<N = f64>(pub [N; 3]);
 
-/// Up to two pieces of [0, 1], in order.
+/// Up to two intervals of [0, 1], in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pieces<N> {
-    /// Nothing.
+    /// No interval.
     None,
-    /// One piece.
+    /// One interval.
     One([N; 2]),
-    /// Two, with a gap in between.
+    /// Two intervals with a gap in between.
     Two([N; 2], [N; 2]),
 }
 
 impl<N: Number> Quadratic<N> {
-    /// The same value always.
+    /// A constant.
     pub fn constant(value: N) -> Self {
         Self([value; 3])
     }
 
-    /// What is linear from `start` to `end`.
+    /// A linear function from `start` to `end`.
     pub fn linear(start: N, end: N) -> Self {
         Self([start, (start + end) * N::from(0.5), end])
     }
 
-    /// Coefficient by coefficient.
+    /// Combine two quadratics coefficient by coefficient.
     pub fn zip(&self, other: &Self, f: impl Fn(N, N) -> N) -> Self {
         Self([0, 1, 2].map(|k| f(self.0[k], other.0[k])))
     }
@@ -50,8 +51,8 @@ impl<N: Number> Quadratic<N> {
         [(ends + twice) * quarter, (b2 - b0) * N::from(0.5), (ends - twice) * quarter]
     }
 
-    /// The hull of where it is not below zero. Where that is the whole interval, or nothing by the coefficients alone, nothing is
-    /// solved; the flag says whether a root was.
+    /// Hull of the times at which it is not negative. If the coefficients alone decide for all or none of the
+    /// interval, no root is computed; the flag says whether one was.
     pub fn hull_above(&self) -> (Option<[N; 2]>, bool) {
         let [b0, b1, b2] = self.0;
         let (zero, one) = (N::zero(), N::from(1.0));
@@ -69,9 +70,10 @@ impl<N: Number> Quadratic<N> {
         }
     }
 
-    /// Where it is not below zero. With `r = s / (1 - s)` it is `b2 r^2 + 2 b1 r + b0`, whose roots are `q / b2` and `b0 / q` with
-    /// `q = -(b1 +- sqrt(b1^2 - b0 b2))`, the sign being that of `b1`, so that nothing cancels (Kahan). Back in [0, 1] they are
-    /// `q / (q + b2)` and `b0 / (b0 + q)`, both sums of equal signs where the root lies inside.
+    /// Intervals where it is not negative. With `r = s / (1 - s)` it is `b2 r^2 + 2 b1 r + b0`, whose roots
+    /// are `q / b2` and `b0 / q` with `q = -(b1 +- sqrt(b1^2 - b0 b2))`. The sign is that of `b1`, so there
+    /// is no cancellation (Kahan). Mapped back to [0, 1] they are `q / (q + b2)` and `b0 / (b0 + q)`, both
+    /// sums of equal signs for roots inside.
     pub fn above(&self) -> Pieces<N> {
         let [b0, b1, b2] = self.0;
         let (zero, one) = (N::zero(), N::from(1.0));

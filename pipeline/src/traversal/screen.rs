@@ -1,34 +1,35 @@
-//! The edges linearized in (X, Y, u, v, t), to screen single samples by (Munkberg and Akenine-Moeller 2012, whose
-//! hyperplanes these are; the remainder is our own).
+//! Screening of single samples by edges linearized in (X, Y, u, v, t) (Munkberg and Akenine-Moeller 2012,
+//! whose hyperplanes these are; the remainder bound is new here).
 
 use super::edges::{Edge, Edges};
 use super::number::Number;
 use super::quadratic::Quadratic;
-use super::timeline::Faces;
+use super::region::Faces;
 use super::view::View;
 
-/// Linear edges in the arithmetic of the sample test. A sample is outside where one edge is below `-margin` and another above
-/// `margin`.
+/// Linear edges in the arithmetic of the sample test. A sample is outside if one edge is below `-margin` and
+/// another above `margin`.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
-    /// The middle of the box: X, Y, u, v, t.
+    /// Middle of the box: X, Y, u, v, t.
     pub middle: [f32; 5],
-    /// For each edge its value in the middle.
+    /// Value of each edge in the middle.
     pub value: [f32; 3],
-    /// For each edge its slope along X, Y, u, v, t.
+    /// Slope of each edge along X, Y, u, v, t.
     pub gradient: [[f32; 5]; 3],
-    /// For each edge how far the linear value may be off.
+    /// Error bound of the linear value of each edge.
     pub margin: [f32; 3],
-    /// For each edge how far it may be from its value in the middle, but for the margin.
+    /// Largest difference of each edge from its value in the middle, without the margin.
     pub extent: [f32; 3],
 }
 
-/// Multiply-adds of [`Screen::gain`]: for each edge a reciprocal, two places on it and two products; the product of both.
+/// Multiply-adds of [`Screen::gain`]: for each edge a reciprocal, two positions and two products; the product
+/// of both.
 pub const SCREEN_GAIN_MADDS: u32 = 3 * 5 + 1;
 
 impl Screen {
-    /// The screen for single samples of the box of `edges` with times `t`, within those of the box, of which only `faces` can be
-    /// seen.
+    /// Screen for single samples of the box of `edges` at times `t`, within those of the box, if only `faces`
+    /// can be visible.
     pub fn new<N: Number>(edges: &Edges<N>, t: [f32; 2], faces: Faces) -> Self {
         let (view, skew) = (&edges.view, edges.skew());
         let [x, y, u, v] = view.middle;
@@ -39,7 +40,7 @@ impl Screen {
         let mut screen =
             Self { middle, value: [0.0; 3], gradient: [[0.0; 5]; 3], margin: [0.0; 3], extent: [0.0; 3] };
         for (k, linear) in linear.iter().enumerate() {
-            // The middle of the times is rounded; what it moves by goes into the margin.
+            // The middle of the times is rounded; the resulting shift goes into the margin.
             let off = Into::<f64>::into(linear.slopes[4]).abs() * f64::from(f32::EPSILON * middle[4].abs());
             let [value, margin] = one_sided(linear, off, faces);
             (screen.value[k], screen.margin[k]) = (value, margin);
@@ -49,7 +50,8 @@ impl Screen {
         screen
     }
 
-    /// The share of samples that it takes away, were the edges spread evenly over their extents and independent.
+    /// Expected fraction of samples rejected, for edges distributed evenly over their extents and independent
+    /// of each other.
     pub fn gain(&self) -> f32 {
         let mut kept = [1.0_f32; 2];
         for k in 0..3 {
@@ -62,23 +64,23 @@ impl Screen {
     }
 }
 
-/// `value + slopes . d` over a box, right to within `remainder` of what the sample test computes.
+/// `value + slopes . d` over a box, within `remainder` of the result of the sample test.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Linear<N> {
     pub value: N,
     pub slopes: [N; 5],
     pub remainder: N,
-    /// How far the linear part reaches from its middle value.
+    /// Largest difference of the linear part from its middle value.
     pub extent: N,
 }
 
-/// Multiply-adds of screening one sample: three edges, one for each dimension in use.
+/// Multiply-adds of screening one sample: three edges, one per dimension in use.
 pub const fn screen_madds(moving: bool, lens: bool) -> u32 {
     3 * (2 + moving as u32 + 2 * lens as u32)
 }
 
-/// The value of an edge and its margin. Where only one face can be seen, one edge on the wrong side is enough: the zero that values
-/// are compared with is moved so far that the other side is always met.
+/// Value of an edge and its margin. If only one face can be visible, one edge on the wrong side suffices. The
+/// threshold is then shifted so far that the other side always passes.
 fn one_sided<N: Number>(linear: &Linear<N>, off: f64, faces: Faces) -> [f32; 2] {
     // The linear value is rounded a dozen times, each by at most 2^-24 of the sum of magnitudes.
     const ROUNDING: f64 = 1.0 / 1_048_576.0;
@@ -98,7 +100,7 @@ fn one_sided<N: Number>(linear: &Linear<N>, off: f64, faces: Faces) -> [f32; 2] 
 }
 
 impl<N: Number> Edge<N> {
-    /// It linearized over `part` of the time, or all of it, half of which lasts `half_t`.
+    /// The edge linearized over `part` of the time, or over all of it; `half_t` is half the length.
     fn linear(&self, view: &View<N>, part: Option<[N; 2]>, half_t: N, skew: N) -> Linear<N> {
         let over = |q: &Quadratic<N>| match part {
             Some(part) => q.over(part),
@@ -156,10 +158,10 @@ mod tests {
             for (kind, faces) in [[true, true], [true, false], [false, true]].into_iter().enumerate() {
                 let screen = Screen::new(&edges, part, faces);
                 for _ in 0..30 {
-                    let mut place = case.place(&mut r);
+                    let mut place = case.position(&mut r);
                     place[4] = f64::from(r.often_an_end(part));
                     let e = case.edges(place);
-                    // As the sample test does it, but for its rounding.
+                    // As in the sample test, but without rounding.
                     let signs: Vec<_> = (0..3)
                         .map(|k| {
                             let linear: f64 = (0..5)

@@ -1,22 +1,23 @@
-//! The side planes of a tile over lens and time (Munkberg et al. 2011 in t, extended here to u and v).
+//! Side planes of a tile over lens and time (Munkberg et al. 2011 in t, extended here to u and v).
 //!
-//! A vertex is beyond the left side of a tile at `(u, t)` where `d = x(t) + u (a w(t) - s) - X0 w(t) < 0`, and the
-//! triangle is outside where all three are. `d` is bilinear in `(u, t)`, so the times that can matter are the hull over
-//! the vertices of where `max(d(u_lo, t), d(u_hi, t)) >= 0`: two linear functions each. For `u` likewise with the ends
-//! of `t`. A vertex behind the camera (`w < 0`) is beyond the side only when it is for every `X` of the tile, so both
-//! edges of the tile are tried there. In an orthographic view `d = x(t) + u (a w(t) - s) - X0`, whatever the sign of `w`.
+//! A vertex is beyond the left side of a tile at `(u, t)` if `d = x(t) + u (a w(t) - s) - X0 w(t) < 0`. The
+//! triangle is outside if all three vertices are. `d` is bilinear in `(u, t)`, so the possible times are the
+//! hull over the vertices of the times with `max(d(u_lo, t), d(u_hi, t)) >= 0`: two linear functions each.
+//! Likewise for `u` with the ends of `t`. A vertex behind the camera (`w < 0`) is beyond the side only if it
+//! is for every `X` of the tile, so both edges of the tile are tested there. In an orthographic view `d =
+//! x(t) + u (a w(t) - s) - X0`, for any sign of `w`.
 
 use super::number::Number;
 use super::{Box5, TileRect, cost};
 use crate::geometry::Shear;
 use crate::setup::{Corner, Triangle};
 
-/// The part of `within` in which `triangle` may touch `tile`, or `None` where it cannot.
+/// The part of `within` in which `triangle` may touch `tile`, or `None` if it cannot.
 pub fn narrow(triangle: &Triangle, shear: &Shear, tile: &TileRect, within: &Box5) -> Option<Box5> {
     narrow_counted::<f64>(triangle, shear, tile, within).0
 }
 
-/// The same, with what it took in multiply-adds.
+/// The same, with its cost in multiply-adds.
 pub fn narrow_counted<N: Number>(
     triangle: &Triangle,
     shear: &Shear,
@@ -47,7 +48,7 @@ pub fn narrow_counted<N: Number>(
     (Some(current), madds)
 }
 
-/// One side of a tile: the left or top one is `positive`.
+/// One side of a tile; the left and top sides are `positive`.
 struct Side<'a, N> {
     triangle: &'a Triangle,
     s: N,
@@ -90,7 +91,8 @@ impl<N: Number> Side<'_, N> {
         (Some(next), roots)
     }
 
-    /// How far a vertex lies to the inner side of `edge`, and a slack, by end of the lens and end of the time interval.
+    /// Distances of a vertex to the inner side of `edge`, plus a slack, by end of the lens and end of the
+    /// time interval.
     fn distances(&self, corner: &Corner, within: &Box5, lens: [f32; 2], edge: N, slack: N) -> [[N; 2]; 2] {
         let ends = |end: usize| {
             let [x, w] = [self.axis, 2].map(|k| {
@@ -115,15 +117,16 @@ impl<N: Number> Side<'_, N> {
     }
 }
 
-/// The part of `range` where the linear function with the values `lo` and `hi` at its ends is not below zero.
+/// The part of `range` in which the linear function with the values `lo` and `hi` at its ends is not
+/// negative.
 fn above<N: Number>(range: [f32; 2], lo: N, hi: N, roots: &mut u32) -> Option<[f32; 2]> {
     match (lo < N::zero(), hi < N::zero()) {
         (false, false) => Some(range),
         (true, true) => None,
         (starts_below, _) => {
             *roots += 1;
-            // The slack is twice the rounding of the sample test, which pays for that of the quotient as well; the nudge pays for
-            // that of mapping it to the range. What is not a number leaves the range as it is.
+            // The slack is twice the rounding of the sample test, which also covers the rounding of the
+            // quotient; the nudge covers the mapping to the range. NaN leaves the range unchanged.
             let share = lo / (lo - hi);
             let root: f64 = (N::from(range[0]) + (N::from(range[1]) - N::from(range[0])) * share).into();
             Some(if starts_below {
@@ -166,7 +169,7 @@ mod tests {
             culled += u32::from(left.is_none());
             narrowed += u32::from(left.is_some_and(|left| left != case.within));
             for _ in 0..60 {
-                let place = case.place(&mut r);
+                let place = case.position(&mut r);
                 let e = case.edges(place);
                 let inside = e.iter().all(|&e| e >= 0.0) || e.iter().all(|&e| e <= 0.0);
                 let within = |[lo, hi]: [f32; 2], value: f64| (lo..=hi).contains(&(value as f32));

@@ -1,4 +1,4 @@
-//! Random triangles over random boxes, and what they are evaluated directly in `f64`.
+//! Random triangles over random boxes, with direct evaluation in `f64`, for tests.
 
 use super::{Box5, TileRect};
 use crate::geometry::{Cull, MovingVertex, Shear};
@@ -20,7 +20,7 @@ impl Uniform {
         lo + (hi - lo) * ((mix(self.0) >> 40) as f32 / 16_777_216.0)
     }
 
-    /// A point of a range, often an end of it.
+    /// A number of a range, often an end of it.
     pub fn often_an_end(&mut self, [lo, hi]: [f32; 2]) -> f32 {
         match self.within(0.0, 4.0) as u32 {
             0 => lo,
@@ -29,7 +29,7 @@ impl Uniform {
         }
     }
 
-    /// Weights that are not negative and add up to one.
+    /// Non-negative weights that add up to 1.
     pub fn weights(&mut self) -> [f64; 3] {
         let parts = [0; 3].map(|_| f64::from(self.within(0.0, 1.0)).powi(3));
         let sum: f64 = parts.iter().sum();
@@ -45,12 +45,12 @@ pub struct Case {
     pub within: Box5,
 }
 
-/// A random one; a third of the vertices of every other triangle may be behind the camera.
+/// A random case; a third of the vertices of every other triangle may be behind the camera.
 pub fn case(seed: u64, moving: bool, lens: bool, parallel: bool) -> Case {
     let mut r = Uniform::new(seed);
     let size = [4.0, 40.0, 400.0][(seed % 3) as usize];
     let shear = if lens { Shear::new([90.0, -90.0], [15.0, -15.0]) } else { Shear::default() };
-    // Focused so near that what grows with depth outweighs the rest, and another way on each axis.
+    // A short focus depth, so that terms with depth dominate, with opposite signs on the two axes.
     let shear = match (parallel, lens) {
         (true, true) => Shear { parallel, ..Shear::new([12.0, -30.0], [18.0, -5.0]) },
         _ => Shear { parallel, ..shear },
@@ -80,7 +80,7 @@ pub fn case(seed: u64, moving: bool, lens: bool, parallel: bool) -> Case {
     }
 }
 
-/// Every mixture of dimensions, with `count` random cases each, in perspective and in orthographic views.
+/// All combinations of dimensions, with `count` random cases each, in perspective and in orthographic views.
 pub fn cases(count: u64) -> impl Iterator<Item = (u64, Case)> {
     [false, true].into_iter().flat_map(move |parallel| (0..count).flat_map(move |seed| mixed(seed, parallel)))
 }
@@ -92,19 +92,19 @@ fn mixed(seed: u64, parallel: bool) -> impl Iterator<Item = (u64, Case)> {
 }
 
 impl Case {
-    /// A place in the box, often on its border: X, Y, u, v, t.
-    pub fn place(&self, r: &mut Uniform) -> [f64; 5] {
+    /// A position in the box, often on its border: X, Y, u, v, t.
+    pub fn position(&self, r: &mut Uniform) -> [f64; 5] {
         let lens = if self.within.lens { [self.within.u, self.within.v] } else { [[0.0; 2]; 2] };
         [self.tile.x, self.tile.y, lens[0], lens[1], self.within.t]
             .map(|range| f64::from(r.often_an_end(range)))
     }
 
-    /// What a vertex at this depth is multiplied with to be moved by a pixel.
+    /// Factor of an image coordinate for a vertex at this depth.
     pub fn weight(&self, depth: f64) -> f64 {
         if self.shear.parallel { 1.0 } else { depth }
     }
 
-    /// The vertices seen from a place of the box: `[x', y', w]`.
+    /// Vertices as seen from a position of the box: `[x', y', w]`.
     pub fn seen(&self, [x, y, u, v, t]: [f64; 5]) -> [[f64; 3]; 3] {
         let [s, a] = [self.shear.s, self.shear.a].map(|c| c.map(f64::from));
         self.triangle.corners.map(|corner| {
@@ -126,7 +126,7 @@ impl Case {
         (0..3).map(|k| self.edges(at)[k] * self.weight(p[k][2])).sum()
     }
 
-    /// The depth of the triangle's plane there.
+    /// Depth of the triangle's plane there.
     pub fn depth(&self, at: [f64; 5]) -> f64 {
         let (p, e) = (self.seen(at), self.edges(at));
         (0..3).map(|k| e[k] * p[k][2]).sum::<f64>() / e.iter().sum::<f64>()

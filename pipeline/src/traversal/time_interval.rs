@@ -1,13 +1,14 @@
-//! When a point of the image lies inside a moving triangle seen through a pinhole or in an orthographic view (after Gribel, Doggett and
-//! Akenine-Moeller 2010, "Analytical motion blur rasterization with compression").
+//! Times at which a point of the image is inside a moving triangle, seen through a pinhole or in an
+//! orthographic view (after Gribel, Doggett and Akenine-Moeller 2010, "Analytical motion blur rasterization
+//! with compression").
 //!
-//! At a fixed point each edge, `e = (p_i x p_j) . (X, Y, 1)` in perspective, is a quadratic in time. The point is inside where all
-//! three are not below zero (it sees the face that appears clockwise) or none is above (the other one). Both sets are intersections of
-//! roots' intervals.
-//! Over a rectangle the same holds for the largest, or the smallest, values of the edges: then a point of it *may* be inside.
+//! At a fixed point each edge, `e = (p_i x p_j) . (X, Y, 1)` in perspective, is a quadratic in time. The
+//! point is inside if all three edges are non-negative (it sees the clockwise face) or all are non-positive
+//! (the other face). Both sets are intersections of intervals between roots. Over a rectangle the same holds
+//! for the largest or smallest values of the edges; then a point of it *may* be inside.
 //!
-//! A homogeneous triangle also covers what lies behind the camera, mirrored. Where vertices have depths of both signs the
-//! caller asks for the depth at the times found.
+//! A homogeneous triangle also covers its mirror image behind the camera. If vertices have depths of both
+//! signs, the caller has to check the depth at the times found.
 
 use super::quadratic::{Pieces, Quadratic};
 use super::{EdgeBounds, Edges, Faces, TileRect, View};
@@ -16,30 +17,30 @@ use crate::setup::Triangle;
 
 use super::Box5;
 
-/// Intervals of time in order, within [0, 1], ends included.
+/// Closed intervals of time in order, within [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeIntervals {
-    intervals: [[f64; 2]; Self::MOST],
+    intervals: [[f64; 2]; Self::MAX],
     len: usize,
 }
 
 impl TimeIntervals {
-    /// The most there can be for one face: each of three quadratics cuts out one gap.
-    pub const MOST: usize = 4;
+    /// Largest number of intervals for one face: each of three quadratics cuts out one gap.
+    pub const MAX: usize = 4;
 
-    const WHOLE: Self = Self { intervals: [[0.0, 1.0]; Self::MOST], len: 1 };
+    const WHOLE: Self = Self { intervals: [[0.0, 1.0]; Self::MAX], len: 1 };
 
     /// The intervals.
     pub fn as_slice(&self) -> &[[f64; 2]] {
         &self.intervals[..self.len]
     }
 
-    /// Whether `t` lies in one of them.
+    /// Whether `t` is in one of them.
     pub fn contains(&self, t: f64) -> bool {
         self.as_slice().iter().any(|[lo, hi]| (lo..=hi).contains(&&t))
     }
 
-    /// How long they last together.
+    /// Total length.
     pub fn length(&self) -> f64 {
         self.as_slice().iter().map(|[lo, hi]| hi - lo).sum()
     }
@@ -49,13 +50,15 @@ impl TimeIntervals {
         let (count, parts) = match pieces {
             Pieces::None => (0, [[0.0; 2]; 2]),
             Pieces::One(piece) => (1, [piece; 2]),
-            Pieces::Two(first, last) if last[0] - first[1] <= 2.0 * WIDENED => (1, [[first[0], last[1]]; 2]),
+            Pieces::Two(first, last) if last[0] - first[1] <= 2.0 * ROOT_ERROR => {
+                (1, [[first[0], last[1]]; 2])
+            }
             Pieces::Two(first, last) => (2, [first, last]),
         };
         for mine in self.as_slice() {
             for part in &parts[..count] {
-                let [lo, hi] = [mine[0].max(part[0] - WIDENED), mine[1].min(part[1] + WIDENED)];
-                if lo <= hi && both.len < Self::MOST {
+                let [lo, hi] = [mine[0].max(part[0] - ROOT_ERROR), mine[1].min(part[1] + ROOT_ERROR)];
+                if lo <= hi && both.len < Self::MAX {
                     both.intervals[both.len] = [lo, hi];
                     both.len += 1;
                 }
@@ -65,16 +68,16 @@ impl TimeIntervals {
     }
 }
 
-/// What rounding may move a root by once the quadratic is raised by [`RAISED`].
-const WIDENED: f64 = 4.0 * f64::EPSILON;
+/// Bound of the rounding error of a root, for a quadratic raised by [`RAISED`].
+const ROOT_ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// By how much a quadratic is raised, as a part of its largest coefficient: far more than the rounding of its coefficients, of
-/// its discriminant and of the roots amounts to.
+/// Amount by which a quadratic is raised, relative to its largest coefficient. It is far above the rounding
+/// errors of the coefficients, the discriminant and the roots.
 const RAISED: f64 = 64.0 * f64::EPSILON;
 
-/// The times at which the point `(x, y)`, in pixels from the centre of the image, lies inside `triangle` and sees its clockwise
-/// face, and those at which it sees the other one. Of `shear` it only matters whether the view is orthographic. Widened by the
-/// rounding of `f64`.
+/// Times at which the point `(x, y)`, in pixels from the centre of the image, is inside `triangle` and sees
+/// its clockwise face, and those at which it sees the other face. `shear` only says whether the view is
+/// orthographic. The intervals are widened by the rounding of `f64`.
 pub fn time_interval(triangle: &Triangle, shear: &Shear, x: f64, y: f64) -> [TimeIntervals; 2] {
     let weight = |depth: f64| if shear.parallel { 1.0 } else { depth };
     let ends = [0.0, 1.0].map(|t| {
@@ -88,13 +91,13 @@ pub fn time_interval(triangle: &Triangle, shear: &Shear, x: f64, y: f64) -> [Tim
         Quadratic([cross(0, 0), 0.5 * (cross(0, 1) + cross(1, 0)), cross(1, 1)])
     };
     let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
-    // The size of the terms that cancel in an edge.
+    // Magnitude of the terms that cancel in an edge.
     let size = [0, 1].map(|axis| ends.iter().flatten().map(|p| p[axis].abs()).fold(0.0, f64::max));
     let error = RAISED * (size[0] * size[1]) + rounding_of_places(triangle, shear, [x, y], size);
     [1.0, -1.0].map(|sign| inside(edges.map(|edge| Quadratic(edge.0.map(|b| sign * b + error)))))
 }
 
-/// What the rounding of the places in `f64` adds to an edge.
+/// Error of an edge by the rounding of positions in `f64`.
 fn rounding_of_places(triangle: &Triangle, shear: &Shear, at: [f64; 2], size: [f64; 2]) -> f64 {
     let largest = |axis: usize| {
         let reach = |k: usize| triangle.corners.map(|c| f64::from(c.open[k].abs() + c.delta[k].abs()));
@@ -105,8 +108,9 @@ fn rounding_of_places(triangle: &Triangle, shear: &Shear, at: [f64; 2], size: [f
     RAISED * (largest(0) * size[1] + largest(1) * size[0])
 }
 
-/// The times at which some point of `rect` may lie inside `triangle`, by the face it sees: never too few, and for a rectangle
-/// without extent those of its point but for the rounding of the sample test, which is allowed for.
+/// Times at which some point of `rect` may be inside `triangle`, by visible face; conservative. For a
+/// rectangle without extent these are the times of its point, plus an allowance for the rounding of the
+/// sample test.
 pub fn time_interval_over(triangle: &Triangle, shear: &Shear, rect: &TileRect) -> [TimeIntervals; 2] {
     let moving = Triangle { moving: true, ..*triangle };
     let edges = Edges::new(View::new(&moving, &shear.sharp(), rect, &Box5::whole(false)));
@@ -123,7 +127,8 @@ mod tests {
     use super::*;
     use crate::setup::Corner;
 
-    /// The three edges at a point and the time `k / 64`, exactly, for vertices with small whole coordinates.
+    /// The three edges at a point and the time `k / 64`, exactly, for vertices with small integer
+    /// coordinates.
     fn exact(corners: &[Corner; 3], at: [i128; 2], k: i128) -> [i128; 3] {
         let seen = corners.map(|corner| {
             let p = [0, 1, 2].map(|axis| corner.open[axis] as i128 * 64 + k * corner.delta[axis] as i128);
@@ -157,7 +162,7 @@ mod tests {
                 let inside = [e.iter().all(|&e| e >= 0), e.iter().all(|&e| e <= 0)];
                 for face in [0, 1] {
                     found[face] += u32::from(inside[face]);
-                    // Away from the roots both say the same; on a root and nowhere else they may differ by rounding.
+                    // Away from the roots both agree; on a root, and only there, they may differ by rounding.
                     let on_a_root = e.contains(&0);
                     let says = sets[face].contains(t);
                     assert!(says == inside[face] || (on_a_root && says), "{face} {t} {e:?} {sets:?}");
@@ -171,7 +176,7 @@ mod tests {
     fn dense_sampling_finds_no_other_time_and_the_intervals_are_no_wider() {
         let mut r = Uniform::new(10);
         for (seed, case) in cases(300).filter(|(_, case)| case.triangle.moving && !case.within.lens) {
-            let place = case.place(&mut r);
+            let place = case.position(&mut r);
             let sets = time_interval(&case.triangle, &case.shear, place[0], place[1]);
             let mut lasted = [0.0; 2];
             for step in 0..=4000 {
@@ -197,7 +202,7 @@ mod tests {
             let over = time_interval_over(&case.triangle, &case.shear, &case.tile);
             short += u32::from(over.iter().any(|set| set.length() < 0.9));
             for _ in 0..40 {
-                let place = case.place(&mut r);
+                let place = case.position(&mut r);
                 let point = time_interval(&case.triangle, &case.shear, place[0], place[1]);
                 for face in [0, 1] {
                     for [lo, hi] in point[face].as_slice() {
@@ -213,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_triangle_that_flies_past_is_there_while_it_covers_the_point() {
-        // 4 wide, moving 16 to the right: its edges x = t 16 - 8 and x = t 16 - 4 pass the origin at 1/4 and 1/2.
+        // 4 wide, moving 16 to the right: its edges x = t 16 - 8 and x = t 16 - 4 pass the origin at 1/4 and
+        // 1/2.
         let corner = |x: f32, y: f32| Corner { open: [x, y, 1.0], delta: [16.0, 0.0, 0.0] };
         let (_, case) = cases(1).nth(1).unwrap();
         let triangle = Triangle {

@@ -1,4 +1,4 @@
-//! A triangle as it is seen from the middle of a box, and how far the box reaches from there.
+//! A triangle seen from the middle of a box, and the extent of the box.
 
 use super::number::Number;
 use super::{Box5, TileRect};
@@ -8,27 +8,28 @@ use crate::setup::Triangle;
 /// A vertex relative to a sample: `[x', y', w]` on the image plane.
 pub(super) type Point<N> = [N; 3];
 
-/// A triangle moved and sheared so that the middle of a tile, seen from the middle of a part of the lens, is the origin.
-/// With offsets `dX, dY, du, dv` from there, and `alpha = a du - dX`, `beta = b dv - dY`, a vertex is
+/// A triangle moved and sheared so that the middle of a tile, seen from the middle of a part of the lens, is
+/// the origin. With offsets `dX, dY, du, dv` from there, and `alpha = a du - dX`, `beta = b dv - dY`, a
+/// vertex is
 ///
 /// ```text
 /// (x', y') + (alpha w - s du, beta w - s' dv)
 /// ```
 ///
-/// In an orthographic view `alpha = a du`, `beta = b dv`, and `dX`, `dY` are taken off as they are:
+/// In an orthographic view `alpha = a du`, `beta = b dv`, and `dX`, `dY` are subtracted without a factor:
 ///
 /// ```text
 /// (x', y') + (alpha w - s du - dX, beta w - s' dv - dY)
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct View<N = f64> {
-    /// The vertices at both ends of the time interval; the same where the triangle is still.
+    /// Vertices at both ends of the time interval; equal for a still triangle.
     pub(super) ends: [[Point<N>; 3]; 2],
-    /// The middle in X, Y, u, v.
+    /// Middle in X, Y, u, v.
     pub(super) middle: [f32; 4],
-    /// Half of the extent in X, Y, u, v.
+    /// Half the extent in X, Y, u, v.
     pub(super) half: [N; 4],
-    /// The time interval.
+    /// Time interval.
     pub(super) t: [f32; 2],
     pub(super) s: [N; 2],
     pub(super) a: [N; 2],
@@ -36,11 +37,12 @@ pub struct View<N = f64> {
     pub(super) lens: bool,
     /// Whether the view is orthographic.
     pub(super) parallel: bool,
-    /// The largest |x'| and |y'| of any vertex anywhere in the box.
+    /// Largest |x'| and |y'| of any vertex anywhere in the box.
     pub(super) reach: [N; 2],
-    /// How far an edge the sample test computes may be from the true one.
+    /// Error bound of an edge of the sample test.
     pub(super) rounding: N,
-    /// The largest weight of a vertex in the box ([`View::weight`]), and the largest that rounding of any goes by.
+    /// Largest weight of a vertex in the box ([`View::weight`]), and the largest depth that scales rounding
+    /// errors.
     pub(super) depth: [N; 2],
 }
 
@@ -71,12 +73,12 @@ impl<N: Number> View<N> {
             rounding: N::zero(),
             depth: [N::zero(); 2],
         };
-        view.place(triangle);
+        view.transform(triangle);
         view.measure(triangle);
         view
     }
 
-    fn place(&mut self, triangle: &Triangle) {
+    fn transform(&mut self, triangle: &Triangle) {
         let rays = [0, 1].map(|axis| self.middle_ray(axis));
         for end in 0..if self.moving { 2 } else { 1 } {
             for (point, corner) in self.ends[end].iter_mut().zip(&triangle.corners) {
@@ -98,18 +100,19 @@ impl<N: Number> View<N> {
         }
     }
 
-    /// The slope and the base of the middle as if it were a sample ([`Shear::ray`]).
+    /// Slope and base of the middle, as if it were a sample ([`Shear::ray`]).
     fn middle_ray(&self, axis: usize) -> [N; 2] {
-        let [at, place] = [axis, 2 + axis].map(|k| N::from(self.middle[k]));
+        let [at, lens] = [axis, 2 + axis].map(|k| N::from(self.middle[k]));
         match (self.parallel, self.lens) {
-            (false, false) => [at, place * self.s[axis]],
-            (false, true) => [at - place * self.a[axis], place * self.s[axis]],
+            (false, false) => [at, lens * self.s[axis]],
+            (false, true) => [at - lens * self.a[axis], lens * self.s[axis]],
             (true, false) => [N::zero(), at],
-            (true, true) => [-(place * self.a[axis]), at + place * self.s[axis]],
+            (true, true) => [-(lens * self.a[axis]), at + lens * self.s[axis]],
         }
     }
 
-    /// What a vertex at this depth is multiplied with to be moved by a pixel; the determinant weighs its edge with it, too.
+    /// Factor of an image coordinate for a vertex at this depth; the determinant weights its edge with it,
+    /// too.
     pub(super) fn weight(&self, depth: N) -> N {
         if self.parallel { N::from(1.0) } else { depth }
     }
@@ -134,12 +137,13 @@ impl<N: Number> View<N> {
         }
         let deepest = |corner: &crate::setup::Corner| corner.open[2].abs() + corner.delta[2].abs();
         self.depth[1] = self.weight(N::from(triangle.corners.iter().map(deepest).fold(0.0, f32::max)));
-        // The sample test is exact for points seen from the sample, and these are rounded by up to half the slack on each axis.
+        // The sample test is exact for points seen from the sample, which are rounded by up to half the slack
+        // on each axis.
         let [slack_x, slack_y] = triangle.slack.map(|slack| N::from(2.0 * slack));
         self.rounding = slack_x * (self.reach[1] + slack_y) + slack_y * self.reach[0];
     }
 
-    /// The largest |alpha| (or |beta|): how far the vertices move for each unit of depth.
+    /// Largest |alpha| (or |beta|): motion of the vertices per unit of depth.
     fn sway(&self, axis: usize) -> N {
         match (self.parallel, self.lens) {
             (false, false) => self.half[axis],
@@ -149,13 +153,13 @@ impl<N: Number> View<N> {
         }
     }
 
-    /// The place of the time `t` in the interval, from 0 to 1.
+    /// Position of the time `t` in the interval, from 0 to 1.
     pub(super) fn phase(&self, t: f32) -> N {
         let [start, end] = self.t.map(N::from);
         if end > start { (N::from(t) - start) / (end - start) } else { N::zero() }
     }
 
-    /// The times of a part of the interval given from 0 to 1, rounded outwards. What is not a number stands for an end.
+    /// Times of a part of the interval given from 0 to 1, rounded outward. NaN stands for an end.
     pub(super) fn times(&self, part: [N; 2]) -> [f32; 2] {
         let ([start, end], [lo, hi]) = (self.t, part.map(Into::<f64>::into));
         let at = |phase: f64| (f64::from(start) + phase * (f64::from(end) - f64::from(start))) as f32;

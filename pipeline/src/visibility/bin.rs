@@ -1,32 +1,34 @@
-//! The samples of a bin, in packets with the boxes about them.
+//! Samples of a bin in packets, with their bounding boxes, and tests of blocks and packets against these
+//! boxes.
 
 use crate::sample_test::block::SampleRows;
 use crate::simd::{LANES, Row};
 
-/// The samples of one bin. Packets are counted by block, cell and place in the cell.
+/// Samples of one bin. Packets are numbered by block, cell and position in the cell.
 #[derive(Clone, Debug)]
 pub(super) struct BinSamples {
-    /// Its first pixel.
+    /// First pixel.
     pub origin: [u32; 2],
-    /// The y of that on the image.
+    /// Image coordinate y of the first pixel.
     pub top: f32,
-    /// The range of its sample positions in x and in y.
+    /// Ranges of its sample positions in x and y.
     pub rect: [[f32; 2]; 2],
-    /// The box of lens and time of each cell.
+    /// Box of lens and time of each cell.
     pub cells: CellBoxes,
-    /// By sixteen blocks, the box of each on the screen.
+    /// Screen box of each block, in groups of sixteen blocks.
     pub blocks: Vec<Boxes>,
-    /// By block and cell, the box of each packet on the screen.
+    /// Screen box of each packet, by block and cell.
     pub boxes: Vec<Boxes>,
-    /// By packet and lane, the place of the sample in the bin: pixel by pixel in rows, times samples in a pixel, plus index.
-    pub places: Vec<[u32; LANES]>,
-    /// The packets with fewer samples than lanes.
+    /// Index in the bin of the sample of each packet and lane: pixel by pixel in rows, times samples per
+    /// pixel, plus index.
+    pub sample_indices: Vec<[u32; LANES]>,
+    /// Packets with fewer samples than lanes.
     pub partial: Vec<u32>,
-    /// The samples of each packet.
+    /// Samples of each packet.
     pub packets: Vec<Packet>,
 }
 
-/// Sixteen samples as the sample test asks for them; zero in dimensions that are not in use, whose rows are not read.
+/// Sixteen samples in the layout of the sample test. Unused dimensions are zero, and their rows are not read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Packet {
     pub slope: [Row; 2],
@@ -34,7 +36,8 @@ pub(super) struct Packet {
     pub t: Row,
 }
 
-/// By cell: the lowest, middle and highest of an axis, and how far from the middle either end may be.
+/// By cell: lowest, middle and highest value of an axis, and the largest distance from the middle to either
+/// end.
 #[derive(Clone, Debug)]
 pub(super) struct CellRange {
     pub lo: Row,
@@ -43,7 +46,7 @@ pub(super) struct CellRange {
     pub half: Row,
 }
 
-/// The boxes of lens and time of the cells.
+/// Boxes of lens and time of the cells.
 #[derive(Clone, Debug)]
 pub(super) struct CellBoxes {
     pub u: CellRange,
@@ -51,18 +54,19 @@ pub(super) struct CellBoxes {
     pub t: CellRange,
 }
 
-/// By packet of a cell, or by block: lowest and highest x and y of its samples. Lowest above highest where it has none.
+/// By packet of a cell, or by block: lowest and highest x and y of its samples. Lowest is above highest
+/// without samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Boxes {
     pub x: [Row; 2],
     pub y: [Row; 2],
 }
 
-/// No range at all.
-pub(super) const NOTHING: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
+/// Empty range.
+pub(super) const EMPTY_RANGE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 impl BinSamples {
-    /// The place of a lane that has no sample.
+    /// Index of a lane without a sample.
     pub const NO_SAMPLE: u32 = u32::MAX;
 }
 
@@ -86,7 +90,7 @@ impl Packet {
 
 impl Boxes {
     pub fn nothing() -> Self {
-        let range = NOTHING.map(Row::splat);
+        let range = EMPTY_RANGE.map(Row::splat);
         Self { x: range, y: range }
     }
 
@@ -101,7 +105,7 @@ impl Boxes {
 impl CellRange {
     pub fn nothing() -> Self {
         let zero = Row::splat(0.0);
-        Self { lo: Row::splat(NOTHING[0]), hi: Row::splat(NOTHING[1]), middle: zero, half: zero }
+        Self { lo: Row::splat(EMPTY_RANGE[0]), hi: Row::splat(EMPTY_RANGE[1]), middle: zero, half: zero }
     }
 
     pub fn include(&mut self, cell: usize, at: f32) {
@@ -109,7 +113,7 @@ impl CellRange {
         self.hi.0[cell] = self.hi.0[cell].max(at);
     }
 
-    /// Finds the middles; a cell without samples becomes the point zero.
+    /// Compute the middles; a cell without samples becomes the point zero.
     fn finish(&mut self) {
         for cell in 0..LANES {
             let (lo, hi) = (&mut self.lo.0[cell], &mut self.hi.0[cell]);
@@ -125,7 +129,7 @@ impl CellRange {
 }
 
 impl CellBoxes {
-    /// Finds the middles.
+    /// Compute the middles.
     pub fn finish(&mut self) {
         for range in [&mut self.u, &mut self.v, &mut self.t] {
             range.finish();

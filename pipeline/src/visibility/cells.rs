@@ -1,43 +1,45 @@
 //! One triangle over the cells of a bin, sixteen cells at a time.
 //!
-//! For every cell, a box of lens and time: where on the screen the triangle may be, which faces it may show (`faces`), and a
-//! linear function in X and Y above each of its edge functions (`edges`).
+//! For every cell, a box of lens and time: where on the screen the triangle may be, which faces it may show
+//! (`facing`), and a linear function in X and Y above each of its edge functions (`edges`).
 
-use super::bin::CellRange;
-use super::scene::{EdgeRows, Extent, ROUNDING, Scene};
+use super::bin::{BinSamples, Boxes, CellRange};
+use super::facing::Facing;
+use crate::geometry::Shear;
 use crate::sample_test::block::View;
+use crate::setup::Triangle;
 use crate::simd::{LANES, Lanes, Mask, Row};
 
-/// Depths below this are not divided by.
-const TINY: f32 = 1e-30;
-/// Results above this are not trusted.
-const HUGE: f32 = 1e30;
+/// Smaller depths are not used as divisors.
+const MIN_DIVISOR: f32 = 1e-30;
+/// Larger results are not used.
+const MAX_RESULT: f32 = 1e30;
 
 /// A triangle over the cells of a bin.
 #[derive(Clone, Debug)]
 pub(super) struct CellSetup {
-    /// Where it may be seen: lowest and highest x and y.
+    /// Screen box in which it may be visible: lowest and highest x and y.
     pub x: [Row; 2],
     pub y: [Row; 2],
-    /// First and last row of the blocks that may hold it.
+    /// First and last row of blocks that may contain it.
     pub rows: [Row; 2],
-    /// The smallest depth of its vertices.
+    /// Smallest depth of its vertices.
     pub nearest: Row,
     pub edges: [EdgeRows; 3],
-    /// Cells in which it may show a face that is drawn: the one that appears clockwise, and counter-clockwise.
+    /// Cells in which it may show a drawn face: the one that appears clockwise, and counter-clockwise.
     pub faces: [Mask; 2],
 }
 
 impl CellSetup {
     pub const EMPTY: Self = {
         const ZERO: Row = Row::splat(0.0);
-        const EDGE: EdgeRows = EdgeRows { most: [ZERO; 2], slope_x: ZERO, slope_y: ZERO };
+        const EDGE: EdgeRows = EdgeRows { bound: [ZERO; 2], slope_x: ZERO, slope_y: ZERO };
         Self { x: [ZERO; 2], y: [ZERO; 2], rows: [ZERO; 2], nearest: ZERO, edges: [EDGE; 3], faces: [0; 2] }
     };
 }
 
 impl Scene<'_> {
-    /// Fills `setup` and says in which cells the triangle may be seen.
+    /// Fill `setup` and return the cells in which the triangle may be visible.
     #[inline(always)]
     pub fn cells<V: Lanes, const MOTION: bool, const LENS: bool>(&self, setup: &mut CellSetup) -> Mask {
         let (x, y, nearest, mut active) = self.boxes::<V, MOTION, LENS>();
@@ -67,7 +69,8 @@ impl Scene<'_> {
         active
     }
 
-    /// The box on the screen in each cell, the smallest depth, and the cells where both let the triangle be seen.
+    /// Screen box in each cell, the smallest depth, and the cells in which both allow the triangle to be
+    /// visible.
     #[inline(always)]
     fn boxes<V: Lanes, const MOTION: bool, const LENS: bool>(&self) -> ([V; 2], [V; 2], V, Mask) {
         let cells = &self.bin.cells;
@@ -92,15 +95,15 @@ impl Scene<'_> {
                 self.include::<V, LENS>(&mut y, 1, py * inverse, inverse, &cells.v);
             }
         }
-        // A vertex at or behind the camera may be seen anywhere.
-        let ahead = nearest.gt(V::splat(TINY));
+        // A vertex at or behind the camera may appear anywhere.
+        let ahead = nearest.gt(V::splat(MIN_DIVISOR));
         let inverse = V::splat(1.0) / nearest;
         let (x, seen_x) = self.within::<V>(x, 0, inverse, ahead);
         let (y, seen_y) = self.within::<V>(y, 1, inverse, ahead);
         (x, y, nearest, seen_x & seen_y & farthest.gt(V::splat(self.near)))
     }
 
-    /// Widens `range` to where a vertex is seen from both ends of a cell on the lens.
+    /// Widen `range` by the images of a vertex from both ends of a cell on the lens.
     #[inline(always)]
     fn include<V: Lanes, const LENS: bool>(
         &self,
@@ -121,22 +124,24 @@ impl Scene<'_> {
         }
     }
 
-    /// The range widened by what rounding may do, as far as it lies in the bin, and the cells where it does.
+    /// The range widened by the rounding error and clipped to the bin, and the cells in which it is not
+    /// empty.
     #[inline(always)]
     fn within<V: Lanes>(&self, range: [V; 2], axis: usize, inverse: V, ahead: Mask) -> ([V; 2], Mask) {
         let share = V::splat(4.0 * ROUNDING);
         let pad = V::splat(4.0 * self.triangle.slack[axis]) * inverse
             + share * (range[0].abs().max(range[1].abs()) + V::splat(self.shear.a[axis].abs()));
         let (low, high) = (range[0] - pad, range[1] + pad);
-        // Where the arithmetic may have overflowed nothing is known.
-        let known = ahead & V::splat(HUGE).gt(pad) & V::splat(HUGE).gt(high - low);
+        // After a possible overflow nothing is known.
+        let known = ahead & V::splat(MAX_RESULT).gt(pad) & V::splat(MAX_RESULT).gt(high - low);
         let [bin_low, bin_high] = [V::splat(self.bin.rect[axis][0]), V::splat(self.bin.rect[axis][1])];
         let low = low.max(bin_low).or_else(known, bin_low);
         let high = high.min(bin_high).or_else(known, bin_high);
         ([low, high], high.ge(low))
     }
 
-    /// First and last row of the blocks of a bin that may hold samples in `range`, as whole numbers once cut off.
+    /// First and last row of the blocks of a bin that may contain samples in `range`, as integers after
+    /// truncation.
     #[inline(always)]
     fn rows<V: Lanes>(&self, range: [V; 2], into: &mut [Row; 2]) {
         // Rounding may put a sample of the last pixel of a block at the first position of the next.
@@ -148,7 +153,7 @@ impl Scene<'_> {
         ((range[1] - V::splat(self.bin.top)) * per_px).max(V::splat(0.0)).min(last).store(&mut into[1].0);
     }
 
-    /// The middle of the box on the screen and half the extents of the cell.
+    /// Middle of the screen box, and half the extents of the cell.
     #[inline(always)]
     fn extent<V: Lanes, const MOTION: bool, const LENS: bool>(
         &self,
@@ -173,16 +178,16 @@ impl Scene<'_> {
         (middle, Extent { screen, lens, t, turn, shift })
     }
 
-    /// The middle of every cell as if it were a sample.
+    /// Middle of every cell, as if it were a sample.
     #[inline(always)]
     fn middle<V: Lanes, const MOTION: bool, const LENS: bool>(&self, at: [V; 2]) -> View<V, MOTION, LENS> {
         let (cells, zero) = (&self.bin.cells, V::splat(0.0));
         let mut view = View { slope: at, lens: [zero; 2], t: zero };
         if LENS {
-            let place = [V::load(&cells.u.middle.0), V::load(&cells.v.middle.0)];
+            let position = [V::load(&cells.u.middle.0), V::load(&cells.v.middle.0)];
             for axis in 0..2 {
-                view.slope[axis] = at[axis] - place[axis] * V::splat(self.shear.a[axis]);
-                view.lens[axis] = place[axis] * V::splat(self.shear.s[axis]);
+                view.slope[axis] = at[axis] - position[axis] * V::splat(self.shear.a[axis]);
+                view.lens[axis] = position[axis] * V::splat(self.shear.s[axis]);
             }
         }
         if MOTION {
@@ -192,7 +197,168 @@ impl Scene<'_> {
     }
 }
 
-/// The cells there are, of [`LANES`].
+/// Mask of the existing cells, out of [`LANES`].
 pub(super) fn all(cells: usize) -> Mask {
     if cells >= LANES { Mask::MAX } else { (1 << cells) - 1 }
+}
+
+/// Rounding error of a sum of products of `f32`, relative to the sum of magnitudes.
+pub(super) const ROUNDING: f32 = 1.0 / 524_288.0;
+
+/// Triangle, camera and bin, as needed for bounds over cells.
+#[derive(Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub triangle: &'a Triangle,
+    pub facing: &'a Facing,
+    pub shear: &'a Shear,
+    pub near: f32,
+    pub bin: &'a BinSamples,
+    /// Largest |X| and |Y| of the image.
+    pub half_px: [f32; 2],
+    /// Height of a block, and rows of blocks in a bin.
+    pub block_px: u32,
+    pub block_rows: u32,
+}
+
+/// An edge, by cell.
+#[derive(Clone, Debug)]
+pub(super) struct EdgeRows {
+    /// By face: upper bound of the edge in the cell, in the sign of the face, less its slopes times X and Y.
+    pub bound: [Row; 2],
+    pub slope_x: Row,
+    pub slope_y: Row,
+}
+
+/// Half the extents of a cell, and derived values.
+pub(super) struct Extent<V> {
+    pub screen: [V; 2],
+    pub lens: [V; 2],
+    pub t: V,
+    /// Largest `a du - dX`, in x and y.
+    pub turn: [V; 2],
+    /// Largest `s du`.
+    pub shift: [V; 2],
+}
+
+impl Scene<'_> {
+    /// Cells in which a clockwise face, and those in which a counter-clockwise face, may be visible.
+    #[inline(always)]
+    pub fn faces<V: Lanes, const MOTION: bool, const LENS: bool>(
+        &self,
+        margin: V,
+        extent: &Extent<V>,
+    ) -> [Mask; 2] {
+        let (cells, constant) = (&self.bin.cells, &self.facing.constant);
+        let t = V::load(&cells.t.middle.0);
+        let mut det = Polynomial::new::<MOTION>(constant, t, extent.t);
+        if LENS {
+            for (axis, range) in [&cells.u, &cells.v].into_iter().enumerate() {
+                let slope = Polynomial::new::<MOTION>(&self.facing.lens[axis], t, extent.t);
+                let position = V::load(&range.middle.0);
+                det.value = det.value + position * slope.value;
+                det.extent = det.extent
+                    + position.abs() * slope.extent
+                    + extent.lens[axis] * (slope.value.abs() + slope.extent);
+                det.magnitude = det.magnitude + slope.magnitude;
+            }
+        }
+        let extent = det.extent + margin + V::splat(ROUNDING) * det.magnitude;
+        let zero = V::splat(0.0);
+        let mut faces = [!zero.gt(det.value + extent), !(det.value - extent).gt(zero)];
+        for (face, drawn) in faces.iter_mut().zip(self.triangle.faces) {
+            *face = if drawn { *face } else { 0 };
+        }
+        faces
+    }
+}
+
+/// A polynomial in time over a cell.
+struct Polynomial<V> {
+    /// Value in the middle.
+    value: V,
+    /// Largest difference from it anywhere.
+    extent: V,
+    /// Sum of the magnitudes of its terms.
+    magnitude: V,
+}
+
+impl<V: Lanes> Polynomial<V> {
+    /// A polynomial with the given coefficients, about `t` in either direction by `half`: its finite Taylor
+    /// series.
+    #[inline(always)]
+    fn new<const MOTION: bool>(coefficients: &[f32], t: V, half: V) -> Self {
+        let magnitude = V::splat(coefficients.iter().map(|c| c.abs()).sum());
+        if !MOTION {
+            return Self { value: V::splat(coefficients[0]), extent: V::splat(0.0), magnitude };
+        }
+        let cubic = coefficients.get(3).copied().unwrap_or(0.0);
+        let [c0, c1] = [V::splat(coefficients[0]), V::splat(coefficients[1])];
+        let [c2, c3] = [V::splat(coefficients[2]), V::splat(cubic)];
+        let value = ((c3 * t + c2) * t + c1) * t + c0;
+        let first = (V::splat(3.0) * c3 * t + V::splat(2.0) * c2) * t + c1;
+        let second = V::splat(3.0) * c3 * t + c2;
+        let extent = ((c3.abs() * half + second.abs()) * half + first.abs()) * half;
+        Self { value, extent, magnitude }
+    }
+}
+
+/// Bounds of a triangle in a cell, each number in all lanes.
+pub(super) struct CellBounds<V> {
+    nearest: V,
+    x: [V; 2],
+    y: [V; 2],
+}
+
+impl<V: Lanes> CellBounds<V> {
+    #[inline(always)]
+    pub fn new(setup: &CellSetup, cell: usize) -> Self {
+        Self {
+            nearest: V::splat(setup.nearest.0[cell]),
+            x: [V::splat(setup.x[0].0[cell]), V::splat(setup.x[1].0[cell])],
+            y: [V::splat(setup.y[0].0[cell]), V::splat(setup.y[1].0[cell])],
+        }
+    }
+
+    /// Lanes with farthest depths behind the triangle's nearest depth.
+    #[inline(always)]
+    pub fn before(&self, farthest: &Row) -> Mask {
+        V::load(&farthest.0).ge(self.nearest)
+    }
+
+    /// Boxes that the triangle may touch.
+    #[inline(always)]
+    pub fn meet(&self, boxes: &Boxes) -> Mask {
+        V::load(&boxes.x[1].0).ge(self.x[0])
+            & self.x[1].ge(V::load(&boxes.x[0].0))
+            & V::load(&boxes.y[1].0).ge(self.y[0])
+            & self.y[1].ge(V::load(&boxes.y[0].0))
+    }
+}
+
+/// Boxes in which, for some face that may be visible, no edge is known to be negative in the sign of the
+/// face.
+#[inline(always)]
+pub(super) fn in_front_of_edges<V: Lanes>(setup: &CellSetup, cell: usize, boxes: &Boxes) -> Mask {
+    let mut shown = 0;
+    for face in 0..2 {
+        if setup.faces[face] >> cell & 1 != 0 {
+            let [a, b, c] = &setup.edges;
+            shown |= in_front::<V>(a, cell, face, boxes)
+                & in_front::<V>(b, cell, face, boxes)
+                & in_front::<V>(c, cell, face, boxes);
+        }
+    }
+    shown
+}
+
+/// The same for one edge and face, with `bound` and the slopes evaluated at their maximum in a box.
+#[inline(always)]
+fn in_front<V: Lanes>(edge: &EdgeRows, cell: usize, face: usize, boxes: &Boxes) -> Mask {
+    let sign = if face == 0 { 1.0 } else { -1.0 };
+    let (x, y) = (sign * edge.slope_x.0[cell], sign * edge.slope_y.0[cell]);
+    let (end_x, end_y) = (usize::from(x > 0.0), usize::from(y > 0.0));
+    let bound = V::load(&boxes.x[end_x].0).times_plus(V::splat(x), V::splat(edge.bound[face].0[cell]));
+    let bound = V::load(&boxes.y[end_y].0).times_plus(V::splat(y), bound);
+    // Overflow to NaN proves nothing.
+    !V::splat(0.0).gt(bound)
 }

@@ -1,8 +1,9 @@
-//! The edges of a triangle over sixteen cells.
+//! Edges of a triangle over sixteen cells.
 //!
-//! The edges are linearized about the middle of the box (Munkberg and
-//! Akenine-Moeller 2012), and what is left out is bounded term by term. With `dX, dY, du, dv, dt` from the middle, a vertex
-//! there at `P` with velocity `V`, depth `w` and change of depth `w'`, and `(s, a)` the shear of the lens in x, `(r, b)` in y,
+//! The edges are linearized about the middle of the box (Munkberg and Akenine-Moeller 2012), and the
+//! remainder is bounded term by term. Let `dX, dY, du, dv, dt` be offsets from the middle, `P` the position
+//! of a vertex there, `V` its velocity, `w` its depth and `w'` the change of depth. `(s, a)` is the shear of
+//! the lens in x, `(r, b)` in y. Then
 //!
 //! ```text
 //! P(d) = P + (du (a w - s) - dX w, dv (b w - r) - dY w) + dt (V + w' (a du - dX, b dv - dY))
@@ -12,15 +13,16 @@
 //! c_a = w_i V_jy - w_j V_iy + w'_i P_jy - w'_j P_iy        c_b = w_j V_ix - w_i V_jx + w'_j P_ix - w'_i P_jx
 //! ```
 //!
-//! which is exact, as `a r = b s` for a lens. All is in `f32` with an allowance for the rounding of both sides: the sample test
-//! sees each vertex within `slack` of its place (see [`crate::setup::Triangle::slack`]), and so does this.
+//! which is exact, as `a r = b s` for a lens. All arithmetic is `f32` with an allowance for the rounding of
+//! both sides. The sample test sees each vertex within `slack` of its exact position (see
+//! [`crate::setup::Triangle::slack`]), and so does this.
 
-use super::scene::{EdgeRows, Extent, ROUNDING, Scene};
+use super::cells::{EdgeRows, Extent, ROUNDING, Scene};
 use crate::sample_test::block::{Seen, View};
 use crate::setup::Corner;
 use crate::simd::Lanes;
 
-/// A vertex over the cells: in the middle, and how far it may be from the samples anywhere.
+/// A vertex over the cells: its position in the middle, and its largest distance from the samples anywhere.
 #[derive(Clone, Copy)]
 pub(super) struct Vertex<V> {
     seen: Seen<V>,
@@ -60,7 +62,7 @@ impl Scene<'_> {
         Vertex { seen, velocity, dw, reach, w_abs }
     }
 
-    /// Writes one edge and returns how far rounding may move its value.
+    /// Write one edge and return the bound of its rounding error.
     #[inline(always)]
     pub fn edge<V: Lanes, const MOTION: bool, const LENS: bool>(
         &self,
@@ -96,14 +98,14 @@ impl Scene<'_> {
             margin = slope_t.abs().times_plus(extent.t, margin);
         }
         let value = value - slope_x * middle[0] - slope_y * middle[1];
-        (value + margin).store(&mut row.most[0].0);
-        (margin - value).store(&mut row.most[1].0);
+        (value + margin).store(&mut row.bound[0].0);
+        (margin - value).store(&mut row.bound[1].0);
         slope_x.store(&mut row.slope_x.0);
         slope_y.store(&mut row.slope_y.0);
         rounding
     }
 
-    /// The most that the linear part leaves out, by the formula above.
+    /// Bound of the terms left out of the linear part, by the formula above.
     #[inline(always)]
     fn remainder<V: Lanes, const MOTION: bool, const LENS: bool>(
         &self,
@@ -113,13 +115,13 @@ impl Scene<'_> {
     ) -> V {
         let ([turn_x, turn_y], [shift_x, shift_y]) = (extent.turn, extent.shift);
         let (p, q, [vi_x, vi_y], [vj_x, vj_y]) = (&i.seen, &j.seen, i.velocity, j.velocity);
-        let mut rest = V::splat(0.0);
+        let mut sum = V::splat(0.0);
         if LENS {
             let mut apart = (q.w - p.w).abs();
             if MOTION {
                 apart = apart + extent.t * (j.dw - i.dw).abs();
             }
-            rest = apart * (extent.screen[1] * shift_x + extent.screen[0] * shift_y);
+            sum = apart * (extent.screen[1] * shift_x + extent.screen[0] * shift_y);
         }
         if MOTION {
             let turn_a = (p.w * vj_y - q.w * vi_y) + (i.dw * q.y - j.dw * p.y);
@@ -133,8 +135,8 @@ impl Scene<'_> {
             let twice = (vi_x * vj_y - vj_x * vi_y).abs()
                 + turn_x * (i.dw * vj_y - j.dw * vi_y).abs()
                 + turn_y * (j.dw * vi_x - i.dw * vj_x).abs();
-            rest = rest + extent.t * (once + extent.t * twice);
+            sum = sum + extent.t * (once + extent.t * twice);
         }
-        rest
+        sum
     }
 }

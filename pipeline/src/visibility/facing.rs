@@ -1,32 +1,33 @@
-//! Which way a triangle faces, as a polynomial of lens and time.
+//! Facing of a triangle as a polynomial of lens and time.
 //!
-//! With `p_k = (x, y, w)` the vertices, sheared to the place `(u, v)` on the lens,
+//! With the vertices `p_k = (x, y, w)`, sheared to the lens position `(u, v)`,
 //!
 //! ```text
 //! det(u, v, t) = det[x, y, w] - u s.x sum(y_i w_j - y_j w_i) - v s.y sum(w_i x_j - w_j x_i)
 //! ```
 //!
-//! since the part of the shear that grows with depth adds a multiple of a row to another. The first term is cubic in `t`, the
-//! sums are quadratic. As the edge functions weighted by depth add up to `det`, a sample beyond the near depth that lies inside
-//! sees all edges with its sign: it tells the face before any sample is tested.
+//! since the part of the shear that grows with depth adds a multiple of one row to another. The first term is
+//! cubic in `t`, the sums are quadratic. The edge functions weighted by depth add up to `det`. So a sample
+//! inside, beyond the near depth, sees all edges with the sign of `det`, and the face is known before any
+//! sample is tested.
 
 use crate::geometry::Shear;
 use crate::setup::{Corner, cross};
 
-/// The facing determinant of a triangle by powers of `t`.
+/// Facing determinant of a triangle, by powers of `t`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facing {
-    /// What does not depend on the lens.
+    /// Part independent of the lens.
     pub constant: [f32; 4],
-    /// What `u` and `v` are multiplied with.
+    /// Factors of `u` and `v`.
     pub lens: [[f32; 3]; 2],
 }
 
 type Point = [f64; 3];
 
 impl Facing {
-    /// Rounded to `f32` from `f64`, so that each coefficient is right to within 2^-24 of itself and 2^-48 of the products it
-    /// is made of.
+    /// Computed in `f64` and rounded to `f32`. Each coefficient is within 2^-24 of itself plus 2^-48 of the
+    /// products in it.
     pub fn new(corners: &[Corner; 3], shear: &Shear) -> Self {
         let open = corners.map(|corner| corner.open.map(f64::from));
         let delta = corners.map(|corner| corner.delta.map(f64::from));
@@ -36,7 +37,7 @@ impl Facing {
         let normals = [normal(1, 2), normal(2, 0), normal(0, 1)];
         let mut constant = [0.0; 4];
         for (power, part) in constant.iter_mut().enumerate() {
-            // The determinant is the first vertex on the normal of the edge opposite.
+            // The determinant is the first vertex times the normal of the opposite edge.
             let still = if power < 3 { dot(open[0], normals[0][power]) } else { 0.0 };
             let moved = if power > 0 { dot(delta[0], normals[0][power - 1]) } else { 0.0 };
             *part = (still + moved) as f32;

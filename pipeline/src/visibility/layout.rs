@@ -1,14 +1,13 @@
-//! Samples sorted into packets: what can be done before any triangle is known.
+//! Layout of samples in packets, computed before any triangle is known.
 
 use rayon::prelude::*;
 
 use super::bin::BinSamples;
-use super::plan::Plan;
-use super::sorter::Sorter;
+use super::sorter::{Plan, Sorter};
 use crate::geometry::{Camera, Projection, Viewport};
 use crate::sampling::SampleSource;
 
-/// The samples of an image, divided in the dimensions in use and ready to be tested against triangles.
+/// Samples of an image, divided in the dimensions in use and ready to be tested against triangles.
 #[derive(Clone, Debug)]
 pub struct SampleLayout {
     pub(super) viewport: Viewport,
@@ -19,9 +18,9 @@ pub struct SampleLayout {
 }
 
 impl SampleLayout {
-    /// Sorts the samples of `source` for what `camera` sees in `viewport`. `moving` says whether triangles may move; where
-    /// none does, time is not divided. Samples outside the clip planes of the camera see nothing. `None` for an orthographic
-    /// camera, which the engine does not take.
+    /// Sort the samples of `source` for the view of `camera` in `viewport`. `moving` says whether triangles
+    /// may move; otherwise time is not divided. Samples outside the clip planes of the camera see nothing.
+    /// `None` for an orthographic camera, which the engine does not support.
     pub fn new(camera: &Camera, viewport: Viewport, source: &dyn SampleSource, moving: bool) -> Option<Self> {
         if camera.is_orthographic() {
             return None;
@@ -42,17 +41,17 @@ impl SampleLayout {
         Some(Self { viewport, per_pixel, projection, plan, bins })
     }
 
-    /// Samples of the image.
+    /// Number of samples of the image.
     pub fn samples(&self) -> usize {
         self.viewport.pixels() * self.per_pixel as usize
     }
 
-    /// Where the sample at `place` of a bin stands in the order of the image, if it is one.
-    pub(super) fn in_image(&self, bin: &BinSamples, place: u32) -> Option<usize> {
-        if place == BinSamples::NO_SAMPLE {
+    /// Index in the image of the sample with index `sample_index` of a bin, if it exists.
+    pub(super) fn in_image(&self, bin: &BinSamples, sample_index: u32) -> Option<usize> {
+        if sample_index == BinSamples::NO_SAMPLE {
             return None;
         }
-        let (pixel, index) = (place / self.per_pixel, place % self.per_pixel);
+        let (pixel, index) = (sample_index / self.per_pixel, sample_index % self.per_pixel);
         let [x, y] = [bin.origin[0] + pixel % self.plan.bin_px, bin.origin[1] + pixel / self.plan.bin_px];
         let pixel = y as usize * self.viewport.width() as usize + x as usize;
         Some(pixel * self.per_pixel as usize + index as usize)

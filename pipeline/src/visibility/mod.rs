@@ -1,29 +1,24 @@
-//! Which triangle each sample sees, as fast as it can be found: the rasterizer without the hardware around it.
+//! Fast visibility: the visible triangle of every sample, without a model of the hardware.
 //!
-//! [`crate::frame`] models tile tests one by one, counts them and logs what they touch; here nothing is logged, and samples
-//! are sorted beforehand into packets of sixteen that are close on the screen, on the lens and in time. The hierarchy
-//! is bin, cell, block, packet (see `plan`):
+//! [`crate::frame`] models tile tests one by one, counts them and logs their accesses. Here nothing is
+//! logged. Samples are sorted beforehand into packets of sixteen that are close on the screen, on the lens
+//! and in time. The hierarchy is bin, cell, block, packet (see `layout`):
 //!
-//! 1. triangles are set up, sorted front to back and handed to the bins they may touch;
-//! 2. in a bin each is bounded over sixteen boxes of lens and time at once (`cells`);
-//! 3. in each cell where it may be seen, blocks and then their packets are tested sixteen at once: against its box, the depths
-//!    they hold and, where that leaves something, its edges;
-//! 4. what is left waits in a queue while its samples are fetched, and is tested sample by sample, by the very kernel of
-//!    [`crate::sample_test`].
+//! 1. triangles are set up, sorted front to back and passed to the bins they may touch;
+//! 2. in a bin each triangle is bounded over sixteen boxes of lens and time at once (`cells`);
+//! 3. in each cell where it may be visible, blocks and then their packets are tested sixteen at once: against
+//!    its box, their stored depths and finally its edges;
+//! 4. the remaining packets wait in a queue while their samples are prefetched. They are tested sample by
+//!    sample, with the kernel of [`crate::sample_test`].
 //!
 //! The result is that of the sample test on all samples, bit for bit.
 
 mod bin;
-mod block;
 mod cells;
 mod edges;
-mod faces;
 mod facing;
 mod layout;
-mod plan;
-mod queue;
 mod raster;
-mod scene;
 mod sorter;
 
 use rayon::prelude::*;
@@ -34,36 +29,35 @@ use crate::setup::{Outcome, PixelRect, Triangle, bounds, distribute, set_up};
 use crate::simd::{Width, dispatch};
 use facing::Facing;
 pub use layout::SampleLayout;
-use queue::Queue;
 pub use raster::Tally;
-use raster::{BinSurface, Worker};
+use raster::{BinSurface, Queue, Worker};
 
-/// What every sample of a layout sees.
+/// Visible triangle of every sample of a layout.
 #[derive(Clone, Debug)]
 pub struct Visibility {
     bins: Vec<BinSurface>,
 }
 
-/// The triangle a sample sees, [`Visibility::NOTHING`] for none, and its depth, infinite for none.
-pub type Sighting = (u32, f32);
+/// Visible triangle of a sample, [`Visibility::NO_TRIANGLE`] for none, and its depth, infinite for none.
+pub type VisibleTriangle = (u32, f32);
 
 impl Visibility {
-    /// The triangle of a sample that sees none.
-    pub const NOTHING: u32 = u32::MAX;
+    /// Triangle of a sample without a hit.
+    pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// Room for what the samples of `layout` see; may be used again and again.
+    /// Memory for the result of `layout`; reusable.
     pub fn new(layout: &SampleLayout) -> Self {
         Self { bins: layout.bins.par_iter().map(BinSurface::new).collect() }
     }
 
-    /// In the order `(y width + x) per_pixel + index`.
-    pub fn in_image_order(&self, layout: &SampleLayout) -> Vec<Sighting> {
-        let mut image = vec![(Self::NOTHING, f32::INFINITY); layout.samples()];
+    /// Result in the order `(y width + x) per_pixel + index`.
+    pub fn in_image_order(&self, layout: &SampleLayout) -> Vec<VisibleTriangle> {
+        let mut image = vec![(Self::NO_TRIANGLE, f32::INFINITY); layout.samples()];
         for (samples, surface) in layout.bins.iter().zip(&self.bins) {
-            let lanes = samples.places.as_flattened().iter().zip(surface.triangle.as_flattened());
-            for ((&place, &triangle), depth) in lanes.zip(surface.depth.iter().flat_map(|row| row.0)) {
-                if let Some(index) = layout.in_image(samples, place) {
-                    image[index] = (if depth.is_finite() { triangle } else { Self::NOTHING }, depth);
+            let lanes = samples.sample_indices.as_flattened().iter().zip(surface.triangle.as_flattened());
+            for ((&sample_index, &triangle), depth) in lanes.zip(surface.depth.iter().flat_map(|row| row.0)) {
+                if let Some(index) = layout.in_image(samples, sample_index) {
+                    image[index] = (if depth.is_finite() { triangle } else { Self::NO_TRIANGLE }, depth);
                 }
             }
         }
@@ -71,15 +65,16 @@ impl Visibility {
     }
 }
 
-/// Finds what every sample of `layout` sees of `geometry`.
+/// Find the visible triangle of `geometry` at every sample of `layout`.
 ///
 /// # Panics
-/// When the geometry has clip planes of its own: the samples are sorted without those outside, so they belong to the camera.
+/// If the geometry has clip planes. The layout already excludes samples outside the camera's clip planes, so
+/// clip planes belong to the camera.
 pub fn resolve(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull, into: &mut Visibility) -> Tally {
     resolve_at(Width::widest(), layout, geometry, cull, into)
 }
 
-/// The same with vectors of a given width, to show that all give the same bytes.
+/// [`resolve`] with vectors of a given width, to check that all widths give the same bytes.
 pub fn resolve_at(
     width: Width,
     layout: &SampleLayout,
@@ -105,7 +100,7 @@ pub fn resolve_at(
                     placed: &placed,
                     list,
                     tally: &mut tally,
-                    queue: Queue::new(samples.places.len()),
+                    queue: Queue::new(samples.sample_indices.len()),
                 },
             );
             tally
@@ -113,12 +108,12 @@ pub fn resolve_at(
         .sum()
 }
 
-/// Triangles set up, and those that each bin has to visit, front to back.
+/// Set up triangles, and list those of each bin, front to back.
 fn front_end(
     layout: &SampleLayout,
     geometry: &Geometry<'_>,
     cull: Cull,
-) -> (Vec<Option<Placed>>, Vec<Vec<u32>>) {
+) -> (Vec<Option<BinTriangle>>, Vec<Vec<u32>>) {
     let vertices = layout.projection.images(geometry);
     let (mut spans, mut placed) = (Vec::new(), Vec::new());
     (0..geometry.triangles().len() as u32)
@@ -126,10 +121,10 @@ fn front_end(
         .with_min_len(256)
         .map(|id| {
             let corners = geometry.triangles()[id as usize].map(|vertex| &vertices[vertex as usize]);
-            place(layout, id, corners, cull).unzip()
+            set_up_triangle(layout, id, corners, cull).unzip()
         })
         .unzip_into_vecs(&mut spans, &mut placed);
-    // Keys are sorted, not triangles, which are large; of equal depths the lower number comes first.
+    // Keys are sorted, as triangles are large; at equal depths the lower number comes first.
     let keys = (0_u32..).zip(&spans).filter_map(|(id, span): (u32, &Option<Span>)| {
         span.as_ref().map(|span| u64::from(span.nearest.to_bits()) << 32 | u64::from(id))
     });
@@ -141,22 +136,27 @@ fn front_end(
     (placed, lists)
 }
 
-/// Where a triangle may be seen.
+/// Screen bounds of a triangle.
 struct Span {
-    /// The smallest depth, not negative.
+    /// Smallest depth, not negative.
     nearest: f32,
     pixels: PixelRect,
 }
 
 /// A triangle set up for all bins.
 #[derive(Clone, Debug)]
-struct Placed {
+struct BinTriangle {
     triangle: Triangle,
     facing: Facing,
 }
 
-/// Sets up a triangle, unless it cannot be seen.
-fn place(layout: &SampleLayout, id: u32, corners: [&MovingVertex; 3], cull: Cull) -> Option<(Span, Placed)> {
+/// Set up a triangle, unless it is invisible.
+fn set_up_triangle(
+    layout: &SampleLayout,
+    id: u32,
+    corners: [&MovingVertex; 3],
+    cull: Cull,
+) -> Option<(Span, BinTriangle)> {
     let Projection { shear, near, .. } = &layout.projection;
     let Outcome::Ready(triangle) = set_up(id, corners, cull, shear, *near, layout.viewport.half_px()) else {
         return None;
@@ -164,5 +164,5 @@ fn place(layout: &SampleLayout, id: u32, corners: [&MovingVertex; 3], cull: Cull
     let pixels = bounds(&triangle, shear, layout.viewport);
     let nearest = vertex_range(&triangle, [0.0, 1.0])[0].max(0.0);
     let facing = Facing::new(&triangle.corners, shear);
-    (!pixels.is_empty()).then_some((Span { nearest, pixels }, Placed { triangle, facing }))
+    (!pixels.is_empty()).then_some((Span { nearest, pixels }, BinTriangle { triangle, facing }))
 }

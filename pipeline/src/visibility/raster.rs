@@ -1,42 +1,39 @@
-//! One worker at one bin: each triangle through cells, blocks and packets.
+//! Worker: rasterizes the triangles of one bin, through cells, blocks and packets.
 
-use super::Placed;
+use super::BinTriangle;
 use super::bin::BinSamples;
-use super::block::{CellBounds, in_front_of_edges};
-use super::cells::{CellSetup, all};
+use super::cells::{CellBounds, CellSetup, Scene, all, in_front_of_edges};
 use super::layout::SampleLayout;
-use super::queue::Queue;
-use super::scene::Scene;
 use crate::sample_test::block::{Crossing, View};
 use crate::sample_test::exact;
 use crate::setup::Triangle;
 use crate::simd::{Kernel, LANES, Lanes, Mask, Row, prefetch};
 
-/// How many triangles, or packets, ahead of the one in work memory is asked for.
-const AHEAD: usize = 4;
+/// Prefetch distance, in triangles or packets.
+const PREFETCH_DISTANCE: usize = 4;
 
-/// So many blocks are not worth being tested against edges before their packets are.
-const FEW_BLOCKS: u32 = 4;
+/// With at most this many blocks, packets are tested against edges without a test of the blocks.
+const MAX_UNTESTED_BLOCKS: u32 = 4;
 
-/// What the samples of a bin see.
+/// Visible triangles of the samples of a bin.
 #[derive(Clone, Debug)]
 pub(super) struct BinSurface {
-    /// By packet, the depth of the nearest hit; infinite where there is none, below everything where there is no sample.
+    /// By packet, the depth of the nearest hit; infinite without a hit, negative infinity without a sample.
     pub depth: Vec<Row>,
-    /// By packet, the triangle of the nearest hit; meaningless where there is none.
+    /// By packet, the triangle of the nearest hit; undefined without a hit.
     pub triangle: Vec<[u32; LANES]>,
     /// By block and cell, the largest depth of each packet.
     pub farthest: Vec<Row>,
 }
 
-/// How often each step was taken.
+/// Number of executions of each step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Triangles set up in a bin.
     pub bins: u64,
-    /// Cells of a bin in which a triangle may be seen.
+    /// Cells of a bin in which a triangle may be visible.
     pub cells: u64,
-    /// Blocks of a cell of which the packets were bounded.
+    /// Blocks of a cell whose packets were tested.
     pub blocks: u64,
     /// Packets of sixteen samples tested.
     pub packets: u64,
@@ -58,7 +55,7 @@ impl std::iter::Sum for Tally {
 
 impl BinSurface {
     pub fn new(samples: &BinSamples) -> Self {
-        let packets = samples.places.len();
+        let packets = samples.sample_indices.len();
         Self {
             depth: vec![Row::splat(0.0); packets],
             triangle: vec![[0; LANES]; packets],
@@ -66,14 +63,16 @@ impl BinSurface {
         }
     }
 
-    /// Forgets what was seen.
+    /// Clear the result.
     fn clear(&mut self, samples: &BinSamples) {
         self.farthest.fill(Row::splat(f32::INFINITY));
         self.depth.fill(Row::splat(f32::INFINITY));
         for packet in samples.partial.iter().map(|&packet| packet as usize) {
             let mut farthest = f32::NEG_INFINITY;
-            for (depth, &place) in self.depth[packet].0.iter_mut().zip(&samples.places[packet]) {
-                *depth = if place == BinSamples::NO_SAMPLE { f32::NEG_INFINITY } else { f32::INFINITY };
+            for (depth, &sample_index) in self.depth[packet].0.iter_mut().zip(&samples.sample_indices[packet])
+            {
+                *depth =
+                    if sample_index == BinSamples::NO_SAMPLE { f32::NEG_INFINITY } else { f32::INFINITY };
                 farthest = farthest.max(*depth);
             }
             self.farthest[packet / LANES].0[packet % LANES] = farthest;
@@ -81,12 +80,12 @@ impl BinSurface {
     }
 }
 
-/// A worker at a bin; the triangles come front to back, and any order gives the same result.
+/// A worker at a bin. Triangles come front to back, but any order gives the same result.
 pub(super) struct Worker<'a> {
     pub layout: &'a SampleLayout,
     pub samples: &'a BinSamples,
     pub surface: &'a mut BinSurface,
-    pub placed: &'a [Option<Placed>],
+    pub placed: &'a [Option<BinTriangle>],
     pub list: &'a [u32],
     pub tally: &'a mut Tally,
     pub queue: Queue,
@@ -105,7 +104,7 @@ impl Worker<'_> {
     fn bin<V: Lanes, const LENS: bool>(&mut self) {
         let mut setup = CellSetup::EMPTY;
         for (turn, &index) in self.list.iter().enumerate() {
-            if let Some(&soon) = self.list.get(turn + AHEAD) {
+            if let Some(&soon) = self.list.get(turn + PREFETCH_DISTANCE) {
                 prefetch(&self.placed[soon as usize]);
             }
             let Some(ready) = &self.placed[index as usize] else { continue };
@@ -120,7 +119,7 @@ impl Worker<'_> {
     #[inline(always)]
     fn triangle<V: Lanes, const MOTION: bool, const LENS: bool>(
         &mut self,
-        ready: &Placed,
+        ready: &BinTriangle,
         setup: &mut CellSetup,
     ) {
         let mut active = self.scene(ready).cells::<V, MOTION, LENS>(setup) & all(self.layout.plan.cells());
@@ -134,12 +133,12 @@ impl Worker<'_> {
         }
         self.tally.packets += self.queue.len() as u64;
         for turn in 0..self.queue.len() {
-            prefetch(&self.samples.packets[self.queue.packet(turn + AHEAD)]);
+            prefetch(&self.samples.packets[self.queue.packet(turn + PREFETCH_DISTANCE)]);
             self.packet::<V, MOTION, LENS>(&ready.triangle, self.queue.packet(turn));
         }
     }
 
-    fn scene<'s>(&'s self, ready: &'s Placed) -> Scene<'s> {
+    fn scene<'s>(&'s self, ready: &'s BinTriangle) -> Scene<'s> {
         Scene {
             triangle: &ready.triangle,
             facing: &ready.facing,
@@ -152,7 +151,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Queues the packets of a cell that may see the triangle.
+    /// Queue the packets of a cell that may see the triangle.
     #[inline(always)]
     fn cell<V: Lanes>(&mut self, setup: &CellSetup, cell: usize) {
         let bounds = CellBounds::<V>::new(setup, cell);
@@ -161,7 +160,7 @@ impl Worker<'_> {
         for group in first * across / LANES as u32..(last * across).div_ceil(LANES as u32) {
             let boxes = &self.samples.blocks[group as usize];
             let mut pass = bounds.meet(boxes);
-            if pass.count_ones() > FEW_BLOCKS {
+            if pass.count_ones() > MAX_UNTESTED_BLOCKS {
                 pass &= in_front_of_edges::<V>(setup, cell, boxes);
             }
             self.tally.blocks += u64::from(pass.count_ones());
@@ -179,7 +178,7 @@ impl Worker<'_> {
         }
     }
 
-    /// Stores what the samples of a packet see of a triangle.
+    /// Test the samples of a packet against a triangle, and store the hits.
     #[inline(always)]
     fn packet<V: Lanes, const MOTION: bool, const LENS: bool>(&mut self, triangle: &Triangle, packet: usize) {
         let view = View::<V, MOTION, LENS>::load(&self.samples.packets[packet].rows());
@@ -207,7 +206,7 @@ impl Worker<'_> {
         self.surface.farthest[packet / LANES].0[packet % LANES] = nearest.largest();
     }
 
-    /// Of the lanes at equal depth, those where this triangle comes first.
+    /// Lanes at equal depth for which this triangle has the lower number.
     #[cold]
     fn lower_id(&self, id: u32, packet: usize, equal: Mask) -> Mask {
         let owners = &self.surface.triangle[packet];
@@ -216,7 +215,7 @@ impl Worker<'_> {
             .fold(0, |mask, lane| mask | 1 << lane)
     }
 
-    /// Decides and stores the lanes on an edge; says whether any was written.
+    /// Decide and store the lanes on an edge; returns whether any was written.
     #[cold]
     fn ties(&mut self, triangle: &Triangle, packet: usize, tie: Mask) -> bool {
         let mut written = false;
@@ -233,5 +232,44 @@ impl Worker<'_> {
             }
         }
         written
+    }
+}
+
+/// Packets of a bin that may see one triangle. It is filled without data-dependent branches, and is known
+/// ahead of the tests, so that samples can be prefetched.
+pub(super) struct Queue {
+    /// With room for a whole block after the last packet.
+    packets: Vec<u32>,
+    len: usize,
+}
+
+impl Queue {
+    /// A queue for bins of this many packets.
+    pub fn new(packets: usize) -> Self {
+        Self { packets: vec![0; packets + LANES], len: 0 }
+    }
+
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Packet number `turn` of the queue. Shortly past the end it is some packet of the bin, for a useless
+    /// prefetch.
+    #[inline(always)]
+    pub fn packet(&self, turn: usize) -> usize {
+        self.packets[turn] as usize
+    }
+
+    /// Queue the packets of a mask, numbered from `first`.
+    #[inline(always)]
+    pub fn push<V: Lanes>(&mut self, mask: Mask, first: u32) {
+        if let Some(room) = self.packets[self.len..].first_chunk_mut() {
+            V::number(mask, first, room);
+            self.len += mask.count_ones() as usize;
+        }
     }
 }

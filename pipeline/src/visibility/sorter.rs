@@ -1,23 +1,22 @@
-//! Dividing the samples of a bin into cells and packets.
+//! Division of the samples of a bin into cells and packets.
 
-use super::bin::{BinSamples, Boxes, CellBoxes, CellRange, NOTHING, Packet};
-use super::plan::{Axis, Plan};
+use super::bin::{BinSamples, Boxes, CellBoxes, CellRange, EMPTY_RANGE, Packet};
 use crate::geometry::{Clip, Shear, Viewport};
 use crate::sampling::{Sample, SampleSource};
 use crate::simd::LANES;
 
 /// A sample on its way into a packet.
 #[derive(Clone, Copy, Debug, Default)]
-struct Placed {
+struct SampleEntry {
     x: f32,
     y: f32,
     u: f32,
     v: f32,
     t: f32,
-    place: u32,
+    sample_index: u32,
 }
 
-impl Placed {
+impl SampleEntry {
     fn along(&self, axis: Axis) -> f32 {
         match axis {
             Axis::X => self.x,
@@ -29,7 +28,7 @@ impl Placed {
     }
 }
 
-/// Sorts the samples of a bin.
+/// Sorter of the samples of a bin.
 pub(super) struct Sorter<'a> {
     pub viewport: Viewport,
     pub source: &'a dyn SampleSource,
@@ -39,19 +38,19 @@ pub(super) struct Sorter<'a> {
 }
 
 impl Sorter<'_> {
-    /// The samples of the bin whose first pixel is `origin`.
+    /// Samples of the bin whose first pixel is `origin`.
     pub fn bin(&self, origin: [u32; 2]) -> BinSamples {
         let [across, down] = self.plan.blocks();
         let (blocks, cells) = ((across * down) as usize, self.plan.cells());
         let mut bin = BinSamples {
             origin,
             top: Viewport::edge(origin[1], self.viewport.height()),
-            rect: [NOTHING; 2],
+            rect: [EMPTY_RANGE; 2],
             cells: CellBoxes { u: CellRange::nothing(), v: CellRange::nothing(), t: CellRange::nothing() },
             blocks: vec![Boxes::nothing(); blocks.div_ceil(LANES)],
             boxes: vec![Boxes::nothing(); blocks * cells],
             partial: Vec::new(),
-            places: vec![[BinSamples::NO_SAMPLE; LANES]; blocks * cells * LANES],
+            sample_indices: vec![[BinSamples::NO_SAMPLE; LANES]; blocks * cells * LANES],
             packets: vec![Packet::NOWHERE; blocks * cells * LANES],
         };
         let (mut samples, mut pixel) =
@@ -63,14 +62,23 @@ impl Sorter<'_> {
             self.split_cells(&mut bin, block * cells, cells, &mut samples, self.plan.cell_axes);
         }
         bin.cells.finish();
-        let partial = |places: &[u32; LANES]| places.contains(&BinSamples::NO_SAMPLE);
-        bin.partial =
-            (0..).zip(&bin.places).filter(|(_, places)| partial(places)).map(|(at, _)| at).collect();
+        let partial = |sample_indices: &[u32; LANES]| sample_indices.contains(&BinSamples::NO_SAMPLE);
+        bin.partial = (0..)
+            .zip(&bin.sample_indices)
+            .filter(|(_, sample_indices)| partial(sample_indices))
+            .map(|(at, _)| at)
+            .collect();
         bin
     }
 
-    /// The samples of the pixels of a block that lie in the image.
-    fn gather(&self, origin: [u32; 2], first: [u32; 2], pixel: &mut [Sample], samples: &mut Vec<Placed>) {
+    /// Samples of the pixels of a block that are in the image.
+    fn gather(
+        &self,
+        origin: [u32; 2],
+        first: [u32; 2],
+        pixel: &mut [Sample],
+        samples: &mut Vec<SampleEntry>,
+    ) {
         let (viewport, [width, height]) = (self.viewport, self.plan.block_px);
         samples.clear();
         for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
@@ -80,32 +88,32 @@ impl Sorter<'_> {
                 continue;
             }
             self.source.pixel_into(px, py, pixel);
-            let place = (by * self.plan.bin_px + bx) * pixel.len() as u32;
-            let drawn = pixel.iter().zip(place..).filter(|(sample, _)| self.is_drawn(sample));
-            samples.extend(drawn.map(|(s, place)| Placed {
+            let sample_index = (by * self.plan.bin_px + bx) * pixel.len() as u32;
+            let drawn = pixel.iter().zip(sample_index..).filter(|(sample, _)| self.is_drawn(sample));
+            samples.extend(drawn.map(|(s, sample_index)| SampleEntry {
                 x: Viewport::edge(px, viewport.width()) + s.x,
                 y: Viewport::edge(py, viewport.height()) + s.y,
                 u: s.u,
                 v: s.v,
                 t: s.t,
-                place,
+                sample_index,
             }));
         }
     }
 
-    /// Whether a sample lies between the clip planes.
+    /// Whether a sample is between the clip planes.
     fn is_drawn(&self, sample: &Sample) -> bool {
-        let places = [sample.u, sample.v, sample.t];
-        places.iter().zip(self.clip.half_open()).all(|(at, [lo, hi])| (lo..=hi).contains(at))
+        let coordinates = [sample.u, sample.v, sample.t];
+        coordinates.iter().zip(self.clip.half_open()).all(|(at, [lo, hi])| (lo..=hi).contains(at))
     }
 
-    /// Halves `samples` along each axis, down to cells.
+    /// Halve `samples` along each axis, down to cells.
     fn split_cells(
         &self,
         bin: &mut BinSamples,
         first: usize,
         count: usize,
-        samples: &mut [Placed],
+        samples: &mut [SampleEntry],
         axes: &[Axis],
     ) {
         let Some((&axis, rest)) = axes.split_first() else {
@@ -117,7 +125,7 @@ impl Sorter<'_> {
         self.split_cells(bin, first + count / 2, count / 2, high, rest);
     }
 
-    fn cell(&self, bin: &mut BinSamples, block_cell: usize, samples: &mut [Placed]) {
+    fn cell(&self, bin: &mut BinSamples, block_cell: usize, samples: &mut [SampleEntry]) {
         let (block, cell) = (block_cell / self.plan.cells(), block_cell % self.plan.cells());
         for sample in &*samples {
             bin.blocks[block / LANES].include(block % LANES, sample.x, sample.y);
@@ -131,14 +139,15 @@ impl Sorter<'_> {
         self.split_packets(bin, block_cell, 0, LANES, samples, &Plan::PACKET_AXES);
     }
 
-    /// Halves the samples of a cell along each axis, down to packets; full ones first, so that few are tested in vain.
+    /// Halve the samples of a cell along each axis, down to packets. Full packets come first, so few lanes
+    /// are wasted.
     fn split_packets(
         &self,
         bin: &mut BinSamples,
         block_cell: usize,
         first: usize,
         count: usize,
-        samples: &mut [Placed],
+        samples: &mut [SampleEntry],
         axes: &[Axis],
     ) {
         if samples.is_empty() {
@@ -154,12 +163,12 @@ impl Sorter<'_> {
         self.split_packets(bin, block_cell, first + count / 2, count / 2, high, rest);
     }
 
-    fn packet(&self, bin: &mut BinSamples, block_cell: usize, lane_in_cell: usize, samples: &[Placed]) {
+    fn packet(&self, bin: &mut BinSamples, block_cell: usize, lane_in_cell: usize, samples: &[SampleEntry]) {
         let number = block_cell * LANES + lane_in_cell;
         let packet = &mut bin.packets[number];
         let boxes = &mut bin.boxes[block_cell];
         for (lane, s) in samples.iter().enumerate() {
-            bin.places[number][lane] = s.place;
+            bin.sample_indices[number][lane] = s.sample_index;
             for (axis, (at, lens)) in [(s.x, s.u), (s.y, s.v)].into_iter().enumerate() {
                 [packet.slope[axis].0[lane], packet.lens[axis].0[lane]] = self.shear.ray(axis, at, lens);
             }
@@ -169,13 +178,102 @@ impl Sorter<'_> {
     }
 }
 
-/// The samples lowest along the axis, `count` of them, and the rest. Ties go by place, so that the division is a function of the
-/// samples alone.
-fn halve(samples: &mut [Placed], axis: Axis, count: usize) -> (&mut [Placed], &mut [Placed]) {
+/// The `count` samples lowest along the axis, and the rest. Ties are decided by index, so the division is a
+/// function of the samples alone.
+fn halve(samples: &mut [SampleEntry], axis: Axis, count: usize) -> (&mut [SampleEntry], &mut [SampleEntry]) {
     if count > 0 && count < samples.len() {
         samples.select_nth_unstable_by(count, |a, b| {
-            a.along(axis).total_cmp(&b.along(axis)).then(a.place.cmp(&b.place))
+            a.along(axis).total_cmp(&b.along(axis)).then(a.sample_index.cmp(&b.sample_index))
         });
     }
     samples.split_at_mut(count)
+}
+
+/// A dimension along which samples are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    X,
+    Y,
+    U,
+    V,
+    T,
+}
+
+/// Hierarchy of bins, blocks, cells and packets. A *packet* is sixteen samples that are tested together. A
+/// *cell* is a box of lens and time, as equal for all blocks of a bin as the samples allow, with at most
+/// sixteen packets in a block. A *block* is a rectangle of pixels. A *bin* is a square of blocks that one
+/// worker rasterizes, small enough for its samples and depths to stay in the L2 cache of the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Plan {
+    /// Axes that divide a block into cells, each by halving.
+    pub cell_axes: &'static [Axis],
+    /// Size of a block in pixels.
+    pub block_px: [u32; 2],
+    /// Side of a bin in pixels.
+    pub bin_px: u32,
+}
+
+impl Plan {
+    /// Axes that divide a cell into packets.
+    pub const PACKET_AXES: [Axis; 4] = [Axis::Y, Axis::X, Axis::Y, Axis::X];
+    /// Target number of samples in a bin.
+    const BIN_SAMPLES: u32 = 1 << 16;
+
+    /// Hierarchy for `per_pixel` samples in the dimensions in use; only these are divided.
+    pub fn new(per_pixel: u32, moving: bool, lens: bool) -> Self {
+        let cell_axes: &[Axis] = match (moving, lens) {
+            (false, false) => &[],
+            (true, false) => &[Axis::T; 4],
+            (false, true) => &[Axis::U, Axis::V, Axis::U, Axis::V],
+            (true, true) => &[Axis::T, Axis::T, Axis::T, Axis::U],
+        };
+        let block_samples = ((LANES * LANES) as u32) << cell_axes.len();
+        let mut block_px = [1, 1];
+        let mut bin_px = 1;
+        while 2 * block_px[0] * block_px[1] * per_pixel <= block_samples {
+            // Wider first, so that a block is one or two squares.
+            let axis = usize::from(block_px[0] > block_px[1]);
+            block_px[axis] *= 2;
+        }
+        while 4 * bin_px * bin_px * per_pixel <= Self::BIN_SAMPLES {
+            bin_px *= 2;
+        }
+        Self { cell_axes, block_px, bin_px: bin_px.max(block_px[0]) }
+    }
+
+    /// Cells of a block, 1 to 16.
+    pub fn cells(&self) -> usize {
+        1 << self.cell_axes.len()
+    }
+
+    /// Blocks of a bin, across and down.
+    pub fn blocks(&self) -> [u32; 2] {
+        self.block_px.map(|side| self.bin_px / side)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_fill_their_packets_and_bins_their_blocks() {
+        for per_pixel in 1..=256 {
+            for (moving, lens) in [(false, false), (true, false), (false, true), (true, true)] {
+                let plan = Plan::new(per_pixel, moving, lens);
+                let samples = plan.block_px[0] * plan.block_px[1] * per_pixel;
+                let room = (plan.cells() * LANES * LANES) as u32;
+                assert!(samples <= room && (2 * samples > room || samples == per_pixel), "{plan:?}");
+                assert!(plan.blocks().iter().all(|&count| count >= 1), "{plan:?}");
+                assert_eq!(plan.blocks()[0] * plan.block_px[0], plan.bin_px);
+                assert_eq!(plan.blocks()[1] * plan.block_px[1], plan.bin_px);
+            }
+        }
+    }
+
+    #[test]
+    fn sixteen_samples_in_five_dimensions() {
+        let plan = Plan::new(16, true, true);
+        assert_eq!((plan.block_px, plan.bin_px, plan.cells()), ([16, 16], 64, 16));
+    }
 }

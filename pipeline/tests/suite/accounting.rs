@@ -1,4 +1,4 @@
-//! Accounting: the counters of a frame add up and agree with each other.
+//! Accounting: the counters of a frame add up and are consistent.
 
 use crate::common::*;
 use activity::{Counts, Event, Packet, PacketKind, Unit};
@@ -25,19 +25,19 @@ impl Shader for Checkered {
     }
 }
 
-/// Every way to switch the tests on and off.
+/// All combinations of enabled tests.
 fn switches() -> Vec<Features> {
     (0..SWITCHES).map(switched).collect()
 }
 
-/// A frame's packets and counts, and how many of its samples see anything.
+/// Packets and counts of a frame, and the number of its samples that see a triangle.
 struct Frame {
     packets: Vec<Packet>,
     counts: Counts,
     visible: u64,
     samples: u64,
     pixels: u64,
-    /// Boxes of lens and time that a tile may have.
+    /// Boxes of lens and time of a tile.
     boxes: u64,
 }
 
@@ -88,11 +88,12 @@ proptest! {
         prop_assert!((least * tested..=most * tested).contains(&madds), "{} {}", madds, tested);
     }
 
-    /// Tests save work and change nothing: one more of them leaves no more samples to be looked at, and what is written is the
-    /// same. (Edges and screens linearize over the box that they are given. Over a smaller one the linear edges are others, better as
-    /// a rule and not for every sample, so counts of one frame are compared where at most one of the two has them.)
+    /// Tests save work and change nothing: another test leaves at most as many samples to test, and the
+    /// writes are the same. (Edges and screens linearize over their box. Over a smaller box the linear edges
+    /// differ; usually they are tighter, but not for every sample. So counts of one frame are compared only
+    /// if at most one of the two has them.)
     #[test]
-    fn switching_a_test_on_costs_no_sample(
+    fn enabling_a_test_adds_no_sample_tests(
         kind in kinds(), lens: bool, count in 1..100_u32, seed: u64, pairs in prop::collection::vec((0..SWITCHES, 0..SWITCHES.ilog2()), 10),
     ) {
         let soup = Soup::new(kind, count, seed);
@@ -113,7 +114,7 @@ proptest! {
     }
 }
 
-/// Counts of a soup with the test of `bit` and without it.
+/// Counts of a soup with and without the test of `bit`.
 fn one_apart(soup: &Soup, lens: bool, switches: u32, bit: u32) -> ((Features, Counts), (Features, Counts)) {
     let counts = |switches: u32| {
         let features = switched(switches);
@@ -122,12 +123,13 @@ fn one_apart(soup: &Soup, lens: bool, switches: u32, bit: u32) -> ((Features, Co
     (counts(switches | 1 << bit), counts(switches & !(1 << bit)))
 }
 
-/// Samples that were left after the tile tests.
+/// Samples left after the tile tests.
 fn looked_at(features: &Features, counts: &Counts) -> u64 {
     counts[if features.screen { Event::SamplesScreened } else { Event::SamplesTested }]
 }
 
-/// Where edges linearize over the boxes that other tests leave, those save samples over many frames, if not in each one.
+/// Where edges linearize over the boxes left by other tests, these tests save samples over many frames, if
+/// not in each one.
 #[test]
 fn beside_edges_a_test_saves_samples_over_many_frames() {
     let edges = switched(SWITCHES - 1);
@@ -146,7 +148,7 @@ fn beside_edges_a_test_saves_samples_over_many_frames() {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
-    /// However depth is bounded and kept, the same is written; finer boxes and better bounds test no more samples.
+    /// All depth settings give the same writes; finer boxes and tighter bounds test at most as many samples.
     #[test]
     fn depth_settings_save_work_and_change_nothing(
         kind in kinds(), lens: bool, count in 1..120_u32, boxes in (1..=4_u32, 1..=4_u32, 1..=8_u32), z_min: bool, seed: u64,
@@ -179,13 +181,13 @@ proptest! {
     }
 }
 
-/// Multiply-adds of one sample test as the design counts them: two for each vertex to bring it to the sample, three more to
-/// move it, two more to shear it; two for each edge; six for the depth.
+/// Multiply-adds of one sample test, counted by hand: two per vertex to translate it to the sample, three
+/// more to move it, two more to shear it; two per edge; six for the depth.
 fn sample_madds(moving: bool, lens: bool) -> u64 {
     3 * (2 + 3 * u64::from(moving) + 2 * u64::from(lens)) + 3 * 2 + 6
 }
 
-/// What holds for every frame.
+/// Invariants of every frame.
 fn agree(frame: &Frame) {
     let mut sum = Counts::default();
     frame.packets.iter().for_each(|packet| sum += &packet.counts);
@@ -262,7 +264,7 @@ fn agree(frame: &Frame) {
     frame.packets.iter().for_each(stays_in_its_units);
 }
 
-/// A packet causes something, and in the units it passes through only.
+/// A packet causes events, and only in units of its kind.
 fn stays_in_its_units(packet: &Packet) {
     use Unit as U;
     let units: &[Unit] = match packet.kind {
@@ -300,7 +302,7 @@ fn an_empty_frame_is_resolved_and_nothing_else() {
     assert_eq!(frame.counts[Event::SamplesResolved], 0);
 }
 
-/// A vertex is fetched again once enough others came in between.
+/// A vertex is fetched again after enough others.
 #[test]
 fn vertices_are_reused_first_in_first_out() {
     let corners: Vec<_> =
@@ -315,7 +317,7 @@ fn vertices_are_reused_first_in_first_out() {
     }
 }
 
-/// Counts of a soup before small caches, with depths and colours compressed or not, and its image.
+/// Counts of a soup with small caches, with or without compression, and its image.
 fn compressed(soup: &Soup, lens: bool, compression: Compression) -> (Counts, Vec<Vec3>) {
     let small = CacheSpec::lru(8, 4);
     let memory =
@@ -332,7 +334,7 @@ const NOTHING: Compression = Compression { depth: false, colour: false };
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
-    /// Compression changes what memory moves and nothing else.
+    /// Compression changes memory traffic only.
     #[test]
     fn compression_changes_traffic_alone(kind in kinds(), lens: bool, seed: u64, depth: bool, colour: bool) {
         let soup = Soup::new(kind, 40, seed);
@@ -346,7 +348,7 @@ proptest! {
     }
 }
 
-/// Walls that fill the image, each nearer than the one before, a little tilted; moving to the side or not.
+/// Slightly tilted walls that fill the image, each nearer than the one before, optionally moving sideways.
 fn walls(moving: bool) -> Soup {
     let mut open = Vec::new();
     for wall in 0..8_u8 {
@@ -357,9 +359,10 @@ fn walls(moving: bool) -> Soup {
     Soup { open, close, triangles: (0..8).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect() }
 }
 
-/// Large still surfaces compress to half, but for the image itself. What moves has another shading in every sample of a pixel.
+/// Large still surfaces compress to half, except for the image. Moving ones have different shading in every
+/// sample of a pixel.
 #[test]
-fn compression_pays_where_pixels_are_alike() {
+fn similar_pixels_compress() {
     let moved = |moving, depth, colour| {
         let bytes = |compression| {
             let (counts, _) = compressed(&walls(moving), false, compression);

@@ -1,7 +1,8 @@
-//! Analytic: images whose answer is known in closed form.
+//! Images with a known closed form.
 //!
-//! Sampling errors are bounded by that of independent samples, `sqrt(p (1 - p) / n)` for a share `p` of `n` samples, times
-//! four; the low-discrepancy table is stratified within a pixel and scrambled anew in the next, so its error is smaller.
+//! Sampling errors are compared with four times the error of independent samples, `sqrt(p (1 - p) / n)` for a
+//! share `p` of `n` samples. The low-discrepancy table is stratified within a pixel and scrambled anew in the
+//! next, so its error is smaller.
 
 use crate::common::stage::*;
 use crate::common::*;
@@ -9,7 +10,7 @@ use glam::{Affine3A, Vec2, Vec3};
 use pipeline::sampling::Sample;
 use pipeline::*;
 
-/// Four times the error of `n` independent samples of which a share `p` hits.
+/// Four times the error of `n` independent samples with hit probability `p`.
 fn four_sigma(p: f64, n: f64) -> f64 {
     4.0 * (p * (1.0 - p) / n).sqrt()
 }
@@ -47,8 +48,8 @@ fn an_edge_through_the_middle_of_pixels_covers_half_of_them() {
     }
 }
 
-/// A square of 16 pixels moves by `way` pixels to the right: at its right side, pixel `k` is covered from the time at which
-/// the edge passes, a ramp of `1 - (k + 1/2) / way`.
+/// A square of 16 pixels moves by `way` pixels to the right. At its right side, pixel `k` is covered from the
+/// time the edge passes, a ramp of `1 - (k + 1/2) / way`.
 #[test]
 fn motion_is_a_linear_ramp_of_coverage() {
     for way in [1, 4, 8] {
@@ -76,7 +77,8 @@ fn motion_is_a_linear_ramp_of_coverage() {
     }
 }
 
-/// A quad of 4x4 pixels out of focus is a disk whose radius is the circle of confusion, evenly lit, and no light is lost.
+/// A quad of 4x4 pixels out of focus is a uniform disk with the radius of the circle of confusion, and no
+/// light is lost.
 #[test]
 fn a_point_out_of_focus_is_a_disk_of_the_circle_of_confusion() {
     for (depth, focus) in [(4.0_f32, 8.0_f32), (16.0, 8.0), (8.0, 8.0)] {
@@ -105,16 +107,17 @@ fn a_point_out_of_focus_is_a_disk_of_the_circle_of_confusion() {
         assert!((light - area).abs() < bound, "{light} of {area} at {depth}, bound {bound}");
         let reach = circle + f64::from(side) * std::f64::consts::FRAC_1_SQRT_2;
         assert!(widest < reach + 1.0 && widest > circle - 1.0, "{widest} for a circle of {circle}");
-        // An even disk has a quarter of its light within half its radius; a pixel's width blurs that circle.
+        // A uniform disk has a quarter of its light within half its radius; the pixel width blurs that
+        // circle.
         let hits = 64.0 * area;
         let slack = four_sigma(0.25, hits) + 2.0 / circle;
         assert!((inner / light - 0.25).abs() < slack, "{} within half the radius", inner / light);
     }
 }
 
-/// What is nearer than the focus and what is beyond it move to opposite sides as the lens position does.
+/// Points nearer and farther than the focus move to opposite sides with the lens position.
 #[test]
-fn a_sample_sees_what_its_place_on_the_lens_shows() {
+fn the_visible_point_depends_on_the_lens_position() {
     let lens = [0.5, -0.25];
     let block = vec![Sample { x: 0.5, y: 0.5, u: lens[0], v: lens[1], t: 0.0 }; 64];
     let mut stage = Stage::new(40, 40, repeated(1, &block));
@@ -134,7 +137,7 @@ fn a_sample_sees_what_its_place_on_the_lens_shows() {
     }
 }
 
-/// A dyadic scene of many quads and a table that is the same in every pixel: nothing rounds.
+/// A dyadic scene of many quads and a table that is the same in every pixel, so nothing rounds.
 fn dyadic(seed: u64) -> (Vec<Vec3>, Vec<[u32; 3]>, Stage) {
     let mut r = Uniform::new(seed);
     let (mut corners, mut triangles) = (Vec::new(), Vec::new());

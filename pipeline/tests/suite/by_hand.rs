@@ -5,13 +5,14 @@ use activity::{Counts, Event, Packet, PacketKind, Unit};
 use glam::Vec3;
 use pipeline::*;
 
-/// A frame's packets and counts.
+/// Packets and counts of a frame.
 struct Counted {
     packets: Vec<Packet>,
     counts: Counts,
 }
 
-/// A quad over an image of 32x32 pixels, 8 samples each: its diagonal runs through the corners of the diagonal tiles.
+/// A quad over an image of 32x32 pixels, 8 samples each; its diagonal passes through the corners of the
+/// diagonal tiles.
 fn two_triangles(features: Features) -> Counted {
     rectangle_of([-20.0, 20.0], [-20.0, 20.0], features)
 }
@@ -36,7 +37,7 @@ fn expect(counts: &Counts, expected: &[(Event, u64)]) {
     }
 }
 
-/// What does not depend on which tests are on.
+/// Counts that do not depend on the enabled tests.
 const BY_HAND: [(Event, u64); 25] = [
     (Event::Draws, 1),
     (Event::Indices, 6),
@@ -50,19 +51,20 @@ const BY_HAND: [(Event, u64); 25] = [
     (Event::TilesVisited, 2 * 16),
     (Event::SamplesHit, 8192),
     (Event::DepthWrites, 8192),
-    // Each triangle has its own quads, and those on the diagonal are asked for by both.
+    // Each triangle has its own quads; those on the diagonal are requested by both.
     (Event::QuadsShaded, 256 + 16),
     (Event::PixelInvocations, 4 * (256 + 16)),
-    // On the diagonal each triangle wants three lanes: every pixel of it has samples on either side.
+    // On the diagonal each triangle requests three lanes: every pixel of it has samples on both sides.
     (Event::HelperInvocations, 2 * 16),
     (Event::ShaderOps, 4 * 20 + 4 * (256 + 16) * 10),
-    // Two pixels a line: 32 lines of each of the 12 tiles off the diagonal, 20 for each triangle of each of the 4 on it.
+    // Two pixels per line: 32 lines of each of the 12 tiles off the diagonal, 20 for each triangle of each of
+    // the 4 on it.
     (Event::DepthLines, 12 * 32 + 4 * 2 * 20),
-    // The same written, then read with the 4 lines of each tile of the image to resolve.
+    // The same lines written, then read with the 4 lines of each tile of the image to resolve.
     (Event::ColourLines, 12 * 32 + 4 * 2 * 20 + 16 * (32 + 4)),
     (Event::SamplesResolved, 8192),
     (Event::PixelsResolved, 1024),
-    // The vertices fill one line; cleared lines are not read, and of the frame the image alone is kept.
+    // The vertices fill one line; cleared lines are not read, and only the image is written back.
     (Event::DramReadBytes, 64),
     (Event::DramWriteBytes, 4 * 1024),
     (Event::TextureFetches, 0),
@@ -102,7 +104,8 @@ fn two_triangles_counted_by_hand() {
     let depth = two_triangles(Features { z_max: true, ..Features::NONE });
     agree_by_hand(&depth);
     expect(&depth.counts, &BY_HAND);
-    // Each triangle asks in each tile; the farthest depth is found anew where the first one wrote: 10 tiles.
+    // One test per triangle and tile; the farthest depth is recomputed after the writes of the first
+    // triangle, in 10 tiles.
     expect(&depth.counts, &[(Event::ZCullTests, 32), (Event::ZMaxUpdates, 10)]);
 }
 
@@ -115,7 +118,7 @@ fn agree_by_hand(frame: &Counted) {
 }
 
 #[test]
-fn what_a_still_pinhole_scene_does_not_need_it_does_not_use() {
+fn a_still_pinhole_scene_uses_no_time_and_no_lens() {
     let frame = two_triangles(Features { edges: false, ..Features::ALL });
     assert!(!frame.counts.uses(Unit::Texture));
     // Still, in focus and in front of the camera: no side plane, no depth interval, no time and no lens.
@@ -124,7 +127,7 @@ fn what_a_still_pinhole_scene_does_not_need_it_does_not_use() {
     assert_eq!(frame.counts[Event::SampleMadds], 18 * frame.counts[Event::SamplesTested]);
 }
 
-/// One pixel, halved by the diagonal: each triangle sends its quad for one lane and three helpers.
+/// One pixel, halved by the diagonal: each triangle requests a quad for one lane and three helpers.
 #[test]
 fn a_single_pixel_has_three_helpers() {
     let frame = rectangle_of([3.0, 4.0], [7.0, 8.0], Features::ALL);

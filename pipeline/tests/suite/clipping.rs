@@ -1,4 +1,4 @@
-//! Clip planes across lens and shutter, and thresholds below which motion and blur are left out.
+//! Clip planes across lens and shutter, and motion and blur thresholds.
 
 use crate::common::*;
 use glam::Vec3;
@@ -18,7 +18,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// By the fast engine.
+    /// Result of the fast visibility engine.
     fn see_fast(&self, frame: Clip) -> Vec<(u32, u32)> {
         let camera = camera(self.lens).with_clip(frame);
         let layout =
@@ -48,7 +48,8 @@ fn within([lo, hi]: [f32; 2], value: f32) -> bool {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
-    /// A sample within the planes sees what it sees without; one outside sees nothing. Samples lie on the planes.
+    /// Samples between the planes see the same with and without them; samples outside see nothing. Some
+    /// samples are on the planes.
     #[test]
     fn a_clipped_draw_is_seen_between_its_planes_only(
         kind in kinds(), lens: bool, switches in 0..SWITCHES, count in 1..60_u32, seed: u64, planes in prop::sample::select(vec![
@@ -64,14 +65,14 @@ proptest! {
         let clipped = scene.see(features, frame, draw);
         let whole = scene.see(features, Clip::NONE, Clip::NONE);
         prop_assert!(scene.see_fast(clip) == clipped);
-        for ((_, sample), (ours, all)) in looks(&scene.table, viewport()).iter().zip(clipped.iter().zip(&whole)) {
+        for ((_, sample), (ours, all)) in sample_positions(&scene.table, viewport()).iter().zip(clipped.iter().zip(&whole)) {
             let inside = within(u, sample.u) && within(v, sample.v) && within(t, sample.t);
             let expected = if inside { *all } else { (NOTHING, f32::INFINITY.to_bits()) };
             prop_assert_eq!(*ours, expected, "{:?}", sample);
         }
     }
 
-    /// Parts side by side share no sample and miss none: their counts add up.
+    /// Adjacent parts share no sample and miss none: their counts add up.
     #[test]
     fn parts_side_by_side_make_the_whole(kind in kinds(), lens: bool, seed: u64, axis in 0..3_usize) {
         let scene = Scene { soup: Soup::new(kind, 40, seed), lens, table: border_table(seed) };
@@ -87,7 +88,7 @@ proptest! {
         prop_assert_eq!(parts.iter().sum::<usize>(), seen(ALL));
     }
 
-    /// Where a threshold is above zero, what moves or blurs less than that is as if it did not, and nothing else changes.
+    /// Above a threshold of zero, smaller motion or blur is dropped, and nothing else changes.
     #[test]
     fn below_its_threshold_a_scene_is_that_without(seed: u64, lens: bool, blurred: bool) {
         let mut soup = Soup::new(Kind::Moving, 40, seed);
@@ -118,10 +119,10 @@ proptest! {
     }
 }
 
-/// The place at which a sample sees a triangle drawn at rest is off by the threshold at most: a lone edge moves, and only
-/// samples that near to it change.
+/// A triangle drawn still is off by the threshold at most: a single edge moves, and only samples that near to
+/// it change.
 #[test]
-fn what_is_left_out_moves_an_outline_by_the_threshold_at_most() {
+fn dropped_motion_moves_an_outline_by_at_most_the_threshold() {
     let viewport = Viewport::new(32, 32).unwrap();
     let camera = pixel_camera(viewport, 0.25);
     let table = SampleTable::low_discrepancy(64, 3, LensShape::Disk).unwrap();
@@ -137,7 +138,8 @@ fn what_is_left_out_moves_an_outline_by_the_threshold_at_most() {
     let (exact, below, above) = (see(0.0), see(0.39), see(0.41));
     assert_eq!(exact, below, "it moves 0.4 pixels each way");
     let mut changed = 0;
-    for (([px, _], Sample { x, .. }), (a, b)) in looks(&table, viewport).iter().zip(exact.iter().zip(&above))
+    for (([px, _], Sample { x, .. }), (a, b)) in
+        sample_positions(&table, viewport).iter().zip(exact.iter().zip(&above))
     {
         if (a.0 == NOTHING) != (b.0 == NOTHING) {
             let place = *px as f32 + x - 16.0;

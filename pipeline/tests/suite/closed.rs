@@ -1,5 +1,5 @@
-//! Property: a closed surface wholly beyond the near depth is crossed as often to the front as to the back, by every sample,
-//! at any place on the lens and time.
+//! Closed surfaces: every sample, at any lens position and time, crosses a closed surface beyond the near
+//! depth as often front to back as back to front.
 
 use crate::common::meshes::*;
 use crate::common::*;
@@ -13,9 +13,9 @@ enum Body {
     Tetrahedron,
     /// A subdivided octahedron on an ellipsoid.
     Convex,
-    /// The same, each vertex at a radius of its own.
+    /// The same with a random radius per vertex.
     Star,
-    /// The same, vertices anywhere: it passes through itself.
+    /// The same with random vertices, so that it intersects itself.
     Wild,
 }
 
@@ -23,7 +23,7 @@ fn bodies() -> impl Strategy<Value = Body> {
     prop_oneof![Just(Body::Tetrahedron), Just(Body::Convex), Just(Body::Star), Just(Body::Wild)]
 }
 
-/// Directions and outward triangles of an octahedron, each face cut in four, twice.
+/// Directions and outward triangles of an octahedron, each face divided in four, twice.
 fn sphere() -> (Vec<[f32; 3]>, Vec<[usize; 3]>) {
     let mut at: Vec<[f32; 3]> = Vec::new();
     for axis in 0..3 {
@@ -56,7 +56,7 @@ fn middle(at: &mut Vec<[f32; 3]>, i: usize, j: usize) -> usize {
     })
 }
 
-/// A body in front of the camera, some pixels across; each vertex moves on a line of its own.
+/// A body in front of the camera, some pixels across, with an independent motion of each vertex.
 fn body(r: &mut Uniform, kind: Body, centre: [f32; 2], dims: Dims, snapped: bool) -> Mesh {
     let (directions, triangles) = match kind {
         Body::Tetrahedron => {
@@ -77,7 +77,7 @@ fn body(r: &mut Uniform, kind: Body, centre: [f32; 2], dims: Dims, snapped: bool
             _ => std::array::from_fn(|k| axes[k] * radius * direction[k]),
         };
         let (at, w) = ([centre[0] + p[0], centre[1] + p[1]], depth + p[2]);
-        // On corners of pixels at depths that are powers of two nothing rounds and samples lie on vertices.
+        // On pixel corners at depths that are powers of two nothing rounds, and samples are on vertices.
         let (at, w) = if snapped { (at.map(f32::round), if w < 4.0 { 2.0 } else { 4.0 }) } else { (at, w) };
         dims.vertex(at, w)
     };
@@ -107,7 +107,7 @@ fn closed_case(dims: Dims, kind: Body, far: bool, snapped: bool, seed: u64) {
     let mut crossings = vec![[0_u32; 2]; probe.samples.len];
     for triangle in 0..mesh.triangles.len() {
         for (side, cull) in [Cull::Back, Cull::Front].into_iter().enumerate() {
-            // Meshes on a grid have triangles of no area; that set-up drops them is a matter of its own, below.
+            // Meshes on a grid have triangles without area; a test below covers that set-up drops them.
             let seen = probe.see_without_area(mesh.corners(triangle), cull);
             crossings.iter_mut().zip(seen).for_each(|(count, seen)| count[side] += u32::from(seen.is_some()));
         }
@@ -145,7 +145,8 @@ fn the_bodies_are_crossed_at_all() {
     }
 }
 
-/// A triangle of no area closes a T-vertex: rounding gives it an area at this sample, and its neighbours count on it.
+/// A triangle without area closes a T-vertex. Rounding gives it an area at this sample, and its neighbours
+/// rely on it.
 #[test]
 fn dropping_triangles_of_no_area_leaves_a_closed_surface_closed() {
     let still = |[x, y, w]: [f32; 3]| MovingVertex { open: [w * x, w * y, w], close: [w * x, w * y, w] };

@@ -1,4 +1,5 @@
-//! Oracle: no tile that a triangle touches anywhere in lens and time is missed, and nothing lies outside the intervals.
+//! Conservative mode against dense sampling: no touched tile is missed, and no touch is outside the
+//! intervals.
 
 use std::collections::{HashMap, HashSet};
 
@@ -100,18 +101,18 @@ fn triangle(kind: Kind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
     [open, if still { open } else { end(drift) }]
 }
 
-/// The shear of the lens.
+/// Shear of the lens.
 fn lens(view: &View) -> [[f64; 2]; 2] {
     let (View::Perspective { s, a, .. } | View::Orthographic { s, a, .. }) = view;
     [*s, *a]
 }
 
-/// What a point at this depth is multiplied with to be moved by a tile.
+/// Factor of an image coordinate for a point at this depth.
 fn weight(view: &View, depth: f64) -> f64 {
     if let View::Orthographic { .. } = view { 1.0 } else { depth }
 }
 
-/// A point of the triangle at a time and place on the lens: where it is seen and how deep.
+/// A point of the triangle at a time and lens position: its image position and depth.
 struct Point {
     u: f64,
     v: f64,
@@ -139,8 +140,8 @@ fn point_at(ends: &[[[f64; 3]; 3]; 2], view: &View, [u, v, t]: [f64; 3], weights
     Point { u, v, t, x: shear(0, u), y: shear(1, v), w, z: p[2] }
 }
 
-/// The point of the triangle seen in the middle part of a random tile, at a random time and place on the lens, if it is there
-/// and well inside.
+/// The point of the triangle seen in the middle part of a random tile, at a random time and lens position, if
+/// it exists and is well inside.
 fn aimed(
     ends: &[[[f64; 3]; 3]; 2],
     view: &View,
@@ -173,7 +174,7 @@ fn aimed(
     inside.then_some(Point { u, v, t, x: at[0] * w, y: at[1] * w, w, z })
 }
 
-/// The tiles, at most four, that hold a seen point; borders count.
+/// The tiles, at most four, that contain an image position; borders count.
 fn tiles(grid: &Grid, point: &Point) -> impl Iterator<Item = [u32; 2]> + use<> {
     let along = |at: f64, w: f64, axis: usize, count: u32| {
         let (tile, origin) = (grid.tile[axis], grid.origin[axis]);
@@ -229,7 +230,7 @@ fn check(
     let mut touched = HashSet::new();
     let size = ends.iter().flatten().map(|p| p[2].abs()).fold(0.0, f64::max);
     for index in 0..points {
-        // A point that was aimed at knows its depth up to rounding only; one of given weights is what it is.
+        // The depth of an aimed point is known up to rounding only; a point of given weights is exact.
         let (p, off) = if index % 4 == 3 {
             (aimed(ends, view, clip, grid, r), 1e-11 * size)
         } else {
@@ -276,8 +277,9 @@ fn no_tile_is_missed_and_nothing_lies_outside() {
     }
 }
 
-/// Where rounding bites: far from the origin, a thin triangle that passes, at one time and from one place on the lens, through the
-/// corner of four tiles as near as `f64` can tell. The tiles that it is found in have to be among the reported ones.
+/// Worst case of rounding: far from the origin, a thin triangle passes, at one time and from one lens
+/// position, through the corner of four tiles within `f64` precision. The tiles in which it is found have to
+/// be reported.
 #[test]
 fn a_corner_cut_off_by_a_rounding_is_reported() {
     let grid = Grid { origin: [1e6, -1e6], ..GRID };
@@ -316,9 +318,9 @@ fn a_corner_cut_off_by_a_rounding_is_reported() {
     }
 }
 
-/// Reported tiles over those that dense sampling shows to be touched; the fewer points find a touched tile, the larger.
+/// Reported tiles over those that dense sampling finds touched; with fewer points the ratio grows.
 #[test]
-fn few_tiles_are_reported_in_vain() {
+fn the_false_positive_rate_of_tiles_is_low() {
     for (kind, most) in [(Kind::Ordinary, 1.05), (Kind::Sliver, 1.05), (Kind::Behind, 1.6)] {
         for view in VIEWS {
             let ratios = [0, 2, 4].map(|halvings| {
@@ -337,7 +339,7 @@ fn few_tiles_are_reported_in_vain() {
     }
 }
 
-/// Walking tiles of one's own, from coarse to fine, finds no more than the grid does.
+/// A custom hierarchy of tiles, from coarse to fine, finds no more than the grid does.
 #[test]
 fn tiles_can_be_walked_by_hand() {
     let mut r = Numbers(3);

@@ -1,4 +1,4 @@
-//! Analytic: conservative mode on triangles whose tiles, times and depths are known.
+//! Conservative mode on triangles whose tiles, times and depths are known.
 
 use std::collections::HashSet;
 
@@ -16,7 +16,7 @@ fn still(points: [[f64; 3]; 3]) -> MovingTriangle {
     MovingTriangle::new(points, points).unwrap()
 }
 
-/// A point on the corner of four tiles touches all of them; a segment along a border both rows.
+/// A point on the corner of four tiles touches all of them; a segment along a border touches both rows.
 #[test]
 fn touching_counts() {
     let rasterizer = Rasterizer::new(View::orthographic());
@@ -29,7 +29,7 @@ fn touching_counts() {
     assert_eq!(tiles([[0.5, 0.5, 1.0]; 3]), HashSet::from([[8, 8]]));
 }
 
-/// A square that passes from left to right at one tile a quarter of the shutter, at depth 1 + t.
+/// A square that moves from left to right at one tile per quarter of the shutter, at depth 1 + t.
 #[test]
 fn times_and_depths_are_those_of_the_passing() {
     let open = [[-8.0, -8.0, 1.0], [-7.5, -8.0, 1.0], [-8.0, -7.5, 1.0]];
@@ -50,7 +50,7 @@ fn times_and_depths_are_those_of_the_passing() {
 }
 
 #[test]
-fn what_is_too_near_is_not_seen() {
+fn points_nearer_than_the_near_depth_are_invisible() {
     let behind = still([[0.0, 0.0, -1.0], [1.0, 0.0, -2.0], [0.0, 1.0, 0.125]]);
     assert!(all(&Rasterizer::new(View::pinhole(0.25)), &behind, &GRID).is_empty());
     assert!(!all(&Rasterizer::new(View::pinhole(0.0)), &behind, &GRID).is_empty());
@@ -66,9 +66,9 @@ fn a_triangle_that_may_be_off_is_reported_as_far_as_it_may_be() {
     assert!(touched.iter().all(|(_, touch)| touch.z[0] <= 2.0 && touch.z[1] >= 4.0));
 }
 
-/// What may be off on one axis alone may be moved along it, its slanted edge too.
+/// With an uncertainty on one axis only, the triangle may be shifted along it, including its slanted edge.
 #[test]
-fn a_slanted_edge_is_reported_as_far_as_either_coordinate_may_be_off() {
+fn a_slanted_edge_is_widened_by_the_uncertainty_of_each_axis() {
     let points = [[0.25, 0.25, 3.0], [3.5, 0.25, 3.0], [0.25, 3.5, 3.0]];
     let tiles = |triangle: &MovingTriangle| -> HashSet<_> {
         all(&Rasterizer::new(View::orthographic()), triangle, &GRID)
@@ -86,8 +86,8 @@ fn a_slanted_edge_is_reported_as_far_as_either_coordinate_may_be_off() {
     }
 }
 
-/// Seen from the middle of the tile all corners are low, but from its top those far behind are a long way off: the near one may reach the
-/// tile, and then the edges to it lie elsewhere.
+/// Seen from the middle of the tile all corners are low, but from its top those far behind are far away. The
+/// near corner may reach the tile, and then the edges to it change.
 #[test]
 fn an_edge_may_be_off_by_more_at_the_border_of_a_tile_than_in_its_middle() {
     let points = [[2000.0, 1.0, 1000.0], [2000.0, -1.0, 1000.0], [1.875, 0.875, 1.0]];
@@ -118,7 +118,7 @@ fn numbers_that_would_overflow_are_refused() {
     assert!(!all(&Rasterizer::new(lens), &large, &GRID).is_empty());
 }
 
-/// A triangle in whole numbers that holds a point of them, its axes in units whose products are no numbers.
+/// A triangle of integers that contains an integer point, on axes whose units have products that underflow.
 #[test]
 fn products_that_vanish_miss_nothing() {
     let corners = [[-7_i32, 5, 3], [9, 2, -6], [1, -11, 9]];
@@ -141,7 +141,7 @@ fn products_that_vanish_miss_nothing() {
 }
 
 #[test]
-fn what_is_asked_of_depth_boxes_is_rounded_outward() {
+fn intervals_for_depth_boxes_are_rounded_outward() {
     let third = 1.0 / 3.0;
     let touch = Touch { u: [-third, third], v: [third; 2], t: [third; 2], z: [-third, 1e40] };
     let (within, [lo, hi]) = touch.outward(true);

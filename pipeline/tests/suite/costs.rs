@@ -1,4 +1,4 @@
-//! What tile and sample tests cost together, over scenes and switches.
+//! Cost of tile tests and sample tests together, over scenes and combinations of tests.
 
 use crate::common::*;
 use activity::{Counts, Event};
@@ -18,8 +18,8 @@ fn total(c: &Counts) -> u64 {
     c[Event::TileMadds] + c[Event::ScreenMadds] + c[Event::SampleMadds] + c[Event::DepthIntervalMadds]
 }
 
-/// `auto` is at most 5 % worse than the best fixed choice of tests, but for known gaps (docs/deviations.md): the last line fails on
-/// the day one of them closes.
+/// `auto` is at most 5 % worse than the best fixed choice of tests, except for known gaps
+/// (docs/deviations.md). The last line fails when one of them is closed.
 #[test]
 fn auto_is_as_good_as_the_best_fixed_choice() {
     let mut worse = Vec::new();
@@ -57,7 +57,7 @@ fn auto_is_as_good_as_the_best_fixed_choice() {
     assert_eq!(worse, [(Kind::Layers, true, 3000, 4)]);
 }
 
-/// Every triangle smaller about its own middle; its motion stays.
+/// Shrink every triangle about its own middle; its motion stays.
 fn shrink(soup: &mut Soup, scale: f32) {
     for end in [&mut soup.open, &mut soup.close] {
         for triangle in end.chunks_exact_mut(3) {

@@ -1,5 +1,5 @@
-//! Property: culling and dropped dimensions change nothing. Every visible sample of the pipeline, with any tests switched
-//! on, is that of testing every sample against every triangle on the full five-dimensional path.
+//! Culling and dropped dimensions change nothing: with any tests enabled, every visible sample is that of
+//! testing every sample against every triangle on the full five-dimensional path.
 
 use crate::common::*;
 use glam::Vec3;
@@ -18,7 +18,7 @@ fn depths() -> impl Strategy<Value = DepthSpec> {
     (bound, boxes, any::<bool>()).prop_map(|(bound, boxes, z_min)| DepthSpec { bound, boxes, z_min })
 }
 
-/// A scene with the visible triangle and depth of every sample, by testing every sample against every triangle.
+/// A scene, with the visible triangle and depth of every sample by brute force.
 struct Scene {
     soup: Soup,
     cull: Cull,

@@ -1,5 +1,5 @@
-//! Oracle: the depth interval of a triangle over a tile and a box of lens and time holds every depth the sample test computes
-//! there, and every depth of the exact triangle.
+//! Depth intervals contain every depth of the sample test in a tile and a box of lens and time, and every
+//! depth of the exact triangle.
 
 use crate::common::case::{Case, Setting, setting};
 use crate::common::*;
@@ -20,7 +20,7 @@ fn part(r: &mut Uniform, lens: bool) -> Box5 {
     Box5 { u: range(-1.0, 1.0), v: range(-1.0, 1.0), t: range(0.0, 1.0), lens }
 }
 
-/// What the tests found: samples looked at, depths outside, and where planes bounded better than vertices.
+/// Result of the tests: samples tested, depths outside, and cases in which planes are tighter than vertices.
 #[derive(Debug, Default)]
 struct Found {
     depths: u64,
@@ -51,7 +51,8 @@ fn tile(far: bool) -> TileRect {
     TileRect::new(viewport, origin, 8)
 }
 
-/// Samples on the edges of triangles of every kind, a third of the vertices behind the camera, slivers among them.
+/// Samples on the edges of triangles of every kind, including slivers, with a third of the vertices behind
+/// the camera.
 #[test]
 fn no_depth_of_the_sample_test_is_outside() {
     for flags in 0..64_u32 {
@@ -77,7 +78,8 @@ fn no_depth_of_the_sample_test_is_outside() {
     }
 }
 
-/// The same triangle seen through a pinhole, nearly parallel to the image: there the depth's own rounding outweighs that of its place.
+/// The same triangle seen through a pinhole, nearly parallel to the image. There the rounding of the depth
+/// exceeds that of the position.
 fn flattened(triangle: [MovingVertex; 3]) -> [MovingVertex; 3] {
     let depth = triangle[0].open[2];
     let flat = |[x, y, w]: [f32; 3]| {
@@ -87,8 +89,8 @@ fn flattened(triangle: [MovingVertex; 3]) -> [MovingVertex; 3] {
     triangle.map(|vertex| MovingVertex { open: flat(vertex.open), close: flat(vertex.close) })
 }
 
-/// The same triangle with its third vertex brought close to the line through the others, where the samples are: its area as
-/// seen comes near to rounding.
+/// The same triangle with its third vertex close to the line through the others, at the samples. Its area as
+/// seen is close to the rounding error.
 fn thinned(triangle: [MovingVertex; 3], r: &mut Uniform) -> [MovingVertex; 3] {
     let (along, off) = (r.within(-0.2, 1.2), (-14.0 * r.next()).exp2() * 1e-2);
     let [a, b, c] = triangle;
@@ -98,8 +100,8 @@ fn thinned(triangle: [MovingVertex; 3], r: &mut Uniform) -> [MovingVertex; 3] {
     [a, b, MovingVertex { open: thin(a.open, b.open, c.open), close: thin(a.close, b.close, c.close) }]
 }
 
-/// The tightest places: a tile that is one sample and a box that is its place on the lens and its time, or a while around that.
-/// What is left of the interval is rounding, so a margin too small shows.
+/// Tightest cases: a tile of one sample and a box of its lens position and time, or a short time around that.
+/// The rest of the interval is rounding, so too small a margin shows.
 #[test]
 fn no_depth_is_outside_the_interval_of_its_own_sample() {
     let (mut depths, mut plain, mut bounded, mut outside) = (0_u64, 0_u64, 0_u64, 0_u64);
@@ -149,8 +151,8 @@ fn no_depth_is_outside_the_interval_of_its_own_sample() {
     assert!(bounded > plain / 2, "{bounded} of {plain}");
 }
 
-/// A triangle that turns over in the very instant at which a sample on its first edge looks: broad at the ends of the shutter, so
-/// that planes through it there are sure of themselves, and nothing but rounding to the sample.
+/// A triangle that turns over exactly at the time of a sample on its first edge. It is wide at the ends of
+/// the shutter, so planes through it there are accurate, but only rounding remains at the sample.
 #[test]
 fn no_depth_is_outside_where_the_triangle_turns_over() {
     let (mut depths, mut outside) = (0_u64, 0_u64);
@@ -190,7 +192,7 @@ fn no_depth_is_outside_where_the_triangle_turns_over() {
     assert!(depths > 5000, "{depths}");
 }
 
-/// A triangle on the edge from `a` to `b` whose third vertex comes to a hair from that edge at `t`.
+/// A triangle on the edge from `a` to `b` whose third vertex nearly reaches that edge at `t`.
 fn turning_over_at(t: f32, [a, b]: [MovingVertex; 2], r: &mut Uniform) -> [MovingVertex; 3] {
     let (along, off) = (r.within(-0.2, 1.2), (-24.0 * r.next()).exp2());
     let velocity = [0, 1, 2].map(|axis| if axis < 2 { r.within(-40.0, 40.0) } else { 0.0 });

@@ -1,5 +1,6 @@
-//! How wide depth intervals are: those of each method against that of the vertices and against the true one, by dense sampling.
-//! `cargo test --release -p pipeline --test depth_width -- --nocapture` prints the numbers of the book.
+//! Widths of depth intervals: each method compared with that of the vertices and with the true one, by dense
+//! sampling. `cargo test --release -p pipeline --test suite -- depth_width --nocapture` prints the numbers of
+//! the book.
 
 use crate::common::Uniform;
 use pipeline::conservative::{MovingTriangle, Rasterizer, Rect, Region, View};
@@ -12,9 +13,9 @@ const NEAR: f32 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
-    /// Both ends of each vertex anywhere: triangles turn over in front of most tiles.
+    /// Independent positions of each vertex at both ends: triangles turn over in front of most tiles.
     Independent,
-    /// The triangle drifts and wobbles a little.
+    /// The triangle drifts and deforms slightly.
     Coherent,
     Still,
 }
@@ -36,7 +37,7 @@ fn random(motion: Motion, r: &mut Uniform) -> [MovingVertex; 3] {
     })
 }
 
-/// The range of true depths over a tile and a box, found by looking at many places, and how many of these saw the triangle.
+/// Range of true depths over a tile and a box by dense sampling, and the number of hits.
 fn truth(
     triangle: &Triangle,
     shear: &Shear,
@@ -80,7 +81,8 @@ fn exact(triangle: &[MovingVertex; 3], shear: &Shear, tile: &TileRect, within: &
     rasterizer.touch(&prepared, &rect, &region).map_or(0.0, |touch| touch.z[1] - touch.z[0])
 }
 
-/// Mean widths over that of the vertices in the whole shutter: the four methods, the last one without rounding, the true one.
+/// Mean widths over that of the vertices in the whole shutter: the four methods, the last one without
+/// rounding, the true one.
 fn mean_widths(motion: Motion, lens: bool, count: u32) -> [f64; 6] {
     let mut r = Uniform::new(5);
     let viewport = Viewport::new(80, 80).unwrap();

@@ -1,4 +1,4 @@
-//! Determinism: the same image, counts and packets to the byte, whatever the number of threads.
+//! Determinism: image, counts and packets are the same to the byte for any number of threads.
 
 use crate::common::*;
 use activity::{Packet, PacketKind};
@@ -52,7 +52,7 @@ fn texture() -> Texture {
     Texture::from_srgb8(64, 32, (0..64 * 32).map(texel).collect(), [Wrap::Repeat, Wrap::Mirror]).unwrap()
 }
 
-/// What a frame of all dimensions leaves behind, on so many threads.
+/// Results of a frame of all dimensions.
 type Frame = (Vec<[u32; 3]>, activity::Counts, Stream, Vec<(u32, u32)>);
 
 fn frame(threads: usize, lens: bool, features: Features, batch_triangles: u32) -> Frame {
@@ -98,7 +98,7 @@ fn the_same_threads_give_the_same_bytes_again() {
     assert!(first == again);
 }
 
-/// Batches and tiles are how the work is cut, not what is seen.
+/// Batches and tiles divide the work but do not change the image.
 #[test]
 fn the_size_of_batches_changes_no_sample() {
     let whole = frame(2, true, Features::ALL, 4096);

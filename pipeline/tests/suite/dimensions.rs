@@ -1,5 +1,4 @@
-//! Property: dropping a dimension changes nothing, and a box of lens and time takes away what lies outside it and nothing
-//! else.
+//! Dropping a dimension changes nothing, and a box of lens and time removes exactly the samples outside it.
 
 use crate::common::*;
 use glam::Vec3;
@@ -66,21 +65,21 @@ proptest! {
     }
 
     #[test]
-    fn a_box_takes_away_what_lies_outside_it_and_nothing_else(lens: bool, parallel: bool, seed: u64) {
+    fn a_box_removes_exactly_the_samples_outside(lens: bool, parallel: bool, seed: u64) {
         let mut r = Uniform::new(seed);
         let probe = probe(&mut r, Optics { lens, parallel }, seed);
         let mut range = |lo: f32, hi: f32| {
             let ends = [r.within(lo, hi), r.within(lo, hi)];
-            // Now and then the ends are those of samples, and the box is empty.
+            // Sometimes the ends are those of samples, and the box is empty.
             if r.next() < 0.3 { [0.0, 0.5] } else if r.next() < 0.1 { ends } else { [ends[0].min(ends[1]), ends[0].max(ends[1])] }
         };
         let within = Box5 { t: range(0.0, 1.0), u: range(-1.0, 1.0), v: range(-1.0, 1.0), lens };
         let vertices = random_triangle(&mut r, true);
         if let Some(triangle) = ready(&probe, vertices) {
             let inside: Vec<_> = (0..probe.samples.len).map(|slot| {
-                let look = probe.at(slot);
+                let position = probe.at(slot);
                 let holds = |c: f64, [lo, hi]: [f32; 2]| (f64::from(lo)..=f64::from(hi)).contains(&c);
-                holds(look.t, within.t) && (!lens || holds(look.u, within.u) && holds(look.v, within.v))
+                holds(position.t, within.t) && (!lens || holds(position.u, within.u) && holds(position.v, within.v))
             }).collect();
             let (all, _) = probe.test(&triangle, &Box5::whole(lens));
             let (some, hits) = probe.test(&triangle, &within);
@@ -92,8 +91,8 @@ proptest! {
         }
     }
 
-    /// Lengths have no unit: all of them times a power of two changes not a bit. Depth takes products of three lengths, which
-    /// sets the limits: vertices at 20 units from 2^-30 to 2^30 stay clear of the ends of the range of f32.
+    /// Scaling all lengths by a power of two changes no bit. Depth uses products of three lengths, which
+    /// limits the range: vertices at 20 units from 2^-30 to 2^30 stay within the range of f32.
     #[test]
     fn scaling_by_a_power_of_two_changes_nothing(moving: bool, lens: bool, down in 1..=30_i32, up in 1..=30_i32, seed: u64) {
         let mut r = Uniform::new(seed);
@@ -129,8 +128,8 @@ proptest! {
     }
 }
 
-/// A single vertex that moves by the smallest amount takes the triangle off the still path; what it shows before it has
-/// moved is that of the still one.
+/// A single vertex that moves by the smallest amount takes the triangle off the still path. Before it has
+/// moved, the result is that of the still triangle.
 #[test]
 fn a_triangle_that_moves_late_starts_like_a_still_one() {
     let mut r = Uniform::new(9);

@@ -1,11 +1,11 @@
-//! Oracle: set-up drops whole triangles early; none of them may have had a sample to show.
+//! Triangles dropped by set-up have no visible sample.
 
 use crate::common::case::*;
 use crate::common::*;
 use pipeline::setup::Outcome;
 use pipeline::*;
 
-/// Set-up drops whole triangles early; none of them may have had a sample to show.
+/// Triangles dropped by set-up have no visible sample.
 #[test]
 fn set_up_drops_nothing_that_a_sample_sees() {
     let mut dropped = [0; 2];
@@ -21,7 +21,8 @@ fn set_up_drops_nothing_that_a_sample_sees() {
             scale: (seed % 5) as i32 - 2,
         };
         let Setting { mut triangle, probe } = setting(case, seed);
-        // Small in the image and large in depth: where it passes through the camera plane samples see it from far off.
+        // Small in the image and large in depth: where it passes through the camera plane, samples see it at
+        // a large distance.
         let small = libm::exp2f(-((seed / 32 % 13) as f32));
         for vertex in &mut triangle {
             let [x, y, w] = vertex.open;
@@ -43,8 +44,8 @@ fn set_up_drops_nothing_that_a_sample_sees() {
     assert!(dropped.iter().all(|&count| count > 200), "{dropped:?}");
 }
 
-/// The same for triangles that pass through the camera plane right behind a sample: their determinant is small, the terms of
-/// the sample test are not.
+/// The same for triangles that pass through the camera plane just behind a sample. Their determinant is
+/// small, but the terms of the sample test are not.
 #[test]
 fn set_up_drops_nothing_seen_close_to_the_camera_plane() {
     let mut r = Uniform::new(3);
@@ -53,8 +54,8 @@ fn set_up_drops_nothing_seen_close_to_the_camera_plane() {
     for _ in 0..12_000 {
         let depth = libm::exp2f(r.within(-14.0, 0.0));
         let probe = Probe::new(&table, Viewport::new(8, 8).unwrap(), Shear::default(), [0, 0], 0.5 * depth);
-        let look = probe.at((r.next() * probe.samples.len as f32) as usize);
-        let seen = [look.x, look.y, 1.0].map(|c| c as f32 * depth);
+        let position = probe.at((r.next() * probe.samples.len as f32) as usize);
+        let seen = [position.x, position.y, 1.0].map(|c| c as f32 * depth);
         let flat = libm::exp2f(r.within(-10.0, 1.0));
         let mut side = || [r.within(-1.0, 1.0) * flat, r.within(-1.0, 1.0) * flat, r.within(-1.0, 1.0)];
         let (a, b) = (side(), side());
@@ -78,7 +79,7 @@ fn set_up_drops_nothing_seen_close_to_the_camera_plane() {
     assert!(dropped > 400, "{dropped}");
 }
 
-/// On a line when the shutter opens and on another when it closes, and wide in between.
+/// Collinear when the shutter opens and, on another line, when it closes, but wide in between.
 #[test]
 fn a_triangle_without_area_at_both_ends_is_seen_in_between() {
     let along = |x: f32, y: f32| [16.0 * x - 4.0, 16.0 * y - 4.0, 1.0];

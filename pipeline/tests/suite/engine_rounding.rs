@@ -1,6 +1,6 @@
-//! Oracle: the fast visibility engine sees what brute force sees where its bounds have nothing to spare but their allowance for
-//! rounding: samples on the edges of triangles as near as f32 can tell, all from one place on the lens at one time, so that
-//! the cells are points; triangles nearly edge-on from there, whose face rounding may turn over; one face culled.
+//! The fast visibility engine equals brute force where only the rounding allowance of its bounds is left.
+//! Samples are on the edges of triangles within f32 precision, all at one lens position and time, so that
+//! cells are points. Triangles are nearly edge-on, so rounding may invert their face; one face is culled.
 
 use crate::common::*;
 use glam::Vec3;
@@ -17,12 +17,12 @@ const NEAR: f32 = 0.25;
 const PER_PIXEL: u32 = 4;
 const TRIANGLES: u32 = 24;
 
-/// Where samples look from.
+/// Lens positions and times of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Places {
-    /// The same place on the lens, the same time.
+enum SampleOrigins {
+    /// One lens position, one time.
     One,
-    /// Anywhere, any time.
+    /// Any lens position and time.
     Anywhere,
 }
 
@@ -32,18 +32,18 @@ struct Case {
     lens: bool,
     /// At the end of a wide image.
     far: bool,
-    from: Places,
+    from: SampleOrigins,
     cull: Cull,
 }
 
 fn cases() -> impl Strategy<Value = Case> {
     let culls = prop_oneof![Just(Cull::None), Just(Cull::Back), Just(Cull::Front)];
-    let from = prop_oneof![Just(Places::One), Just(Places::Anywhere)];
+    let from = prop_oneof![Just(SampleOrigins::One), Just(SampleOrigins::Anywhere)];
     (any::<bool>(), any::<bool>(), any::<bool>(), from, culls)
         .prop_map(|(moving, lens, far, from, cull)| Case { moving, lens, far, from, cull })
 }
 
-/// A square of 64 pixels with their samples, again and again over the image.
+/// A square of 64 pixels with samples, repeated over the image.
 #[derive(Debug)]
 struct Block(Vec<Sample>);
 
@@ -73,7 +73,7 @@ struct Scene {
     samples: Block,
 }
 
-/// Pixels, from the centre of the image, of the square of 64 that holds the triangles.
+/// Position, in pixels from the centre of the image, of the square of 64 that contains the triangles.
 fn corner(viewport: Viewport) -> [f32; 2] {
     [viewport.width() as f32 * 0.5 - 64.0, viewport.height() as f32 * -0.5]
 }
@@ -101,13 +101,13 @@ impl Scene {
         })
     }
 
-    /// Half of the samples lie on an edge.
+    /// Half of the samples are on an edge.
     fn on_edges(&self, r: &mut Uniform, from: Sample) -> Block {
         let mut pixels = vec![Vec::new(); 64 * 64];
         let corner = corner(self.viewport).map(f64::from);
         let any = |r: &mut Uniform| match self.case.from {
-            Places::One => Sample { x: r.next(), y: r.next(), ..from },
-            Places::Anywhere => {
+            SampleOrigins::One => Sample { x: r.next(), y: r.next(), ..from },
+            SampleOrigins::Anywhere => {
                 let place =
                     if self.case.lens { [r.within(-1.0, 1.0), r.within(-1.0, 1.0)] } else { [0.0; 2] };
                 Sample { x: r.next(), y: r.next(), u: place[0], v: place[1], t: r.next() }
@@ -115,10 +115,11 @@ impl Scene {
         };
         for _ in 0..12_000 {
             let sample = any(r);
-            let look = Look { x: 0.0, y: 0.0, u: sample.u.into(), v: sample.v.into(), t: sample.t.into() };
+            let position =
+                SamplePosition { x: 0.0, y: 0.0, u: sample.u.into(), v: sample.v.into(), t: sample.t.into() };
             let vertices = self.vertices((r.next() * TRIANGLES as f32) as usize);
             let k = (r.next() * 3.0) as usize;
-            let [p, q] = [k, (k + 1) % 3].map(|k| look.sheared(&vertices[k], &self.projection.shear));
+            let [p, q] = [k, (k + 1) % 3].map(|k| position.sheared(&vertices[k], &self.projection.shear));
             let along = f64::from(r.next());
             let mix = |axis: usize| p[axis] + along * (q[axis] - p[axis]);
             let at = [0, 1].map(|axis| mix(axis) / mix(2) - corner[axis]);
@@ -136,7 +137,7 @@ impl Scene {
         Block(pixels.concat())
     }
 
-    /// What the engine sees.
+    /// Result of the engine.
     fn found(&self) -> Vec<(u32, u32)> {
         let layout = SampleLayout::new(&self.camera, self.viewport, &self.samples, self.case.moving).unwrap();
         let mut seen = Visibility::new(&layout);
@@ -145,7 +146,7 @@ impl Scene {
         seen.in_image_order(&layout).into_iter().map(|(id, depth)| (id, depth.to_bits())).collect()
     }
 
-    /// What all triangles against all samples come to, none culled before it is tested.
+    /// Result of testing all triangles against all samples, without culling.
     fn expected(&self) -> Vec<(u32, u32)> {
         let Self { case, viewport, projection: Projection { shear, .. }, .. } = self;
         let mut seen = vec![(u32::MAX, f32::INFINITY.to_bits()); viewport.pixels() * PER_PIXEL as usize];
@@ -174,11 +175,12 @@ impl Scene {
         if let Outcome::Ready(ready) = ready { Some(Triangle { faces, ..ready }) } else { None }
     }
 
-    /// How many of the samples see a face that is turned away from them, but for rounding.
+    /// Number of samples that see a face turned away from them, because of rounding.
     fn turned(&self, seen: &[(u32, u32)]) -> usize {
         let turned = |(id, sample): (u32, Sample)| {
-            let look = Look { x: 0.0, y: 0.0, u: sample.u.into(), v: sample.v.into(), t: sample.t.into() };
-            let p = self.vertices(id as usize).map(|v| look.sheared(&v, &self.projection.shear));
+            let position =
+                SamplePosition { x: 0.0, y: 0.0, u: sample.u.into(), v: sample.v.into(), t: sample.t.into() };
+            let p = self.vertices(id as usize).map(|v| position.sheared(&v, &self.projection.shear));
             let minor = |i: usize, j: usize| p[1][i] * p[2][j] - p[1][j] * p[2][i];
             let det = p[0][0] * minor(1, 2) + p[0][1] * minor(2, 0) + p[0][2] * minor(0, 1);
             if self.case.cull == Cull::Front { det < 0.0 } else { det > 0.0 }
@@ -187,7 +189,7 @@ impl Scene {
         hits.filter(|&(index, seen)| turned((seen.0, self.sample(index)))).count()
     }
 
-    /// The sample that is number `index` of the image.
+    /// Sample number `index` of the image.
     fn sample(&self, index: usize) -> Sample {
         let (per_pixel, width) = (PER_PIXEL as usize, self.viewport.width() as usize);
         let pixel = index / per_pixel;
@@ -200,7 +202,7 @@ fn tiles(viewport: Viewport) -> impl Iterator<Item = [u32; 2]> {
     rows.flat_map(move |y| (0..viewport.width()).step_by(8).map(move |x| [x, y]))
 }
 
-/// Triangles whose vertices, seen from `from`, lie on a line but for a hair.
+/// Triangles whose vertices, seen from `from`, are nearly collinear.
 fn nearly_edge_on(r: &mut Uniform, case: Case, from: &Sample, shear: &Shear, viewport: Viewport) -> Soup {
     let (mut open, mut close) = (Vec::new(), Vec::new());
     let corner = corner(viewport);
@@ -223,7 +225,7 @@ fn nearly_edge_on(r: &mut Uniform, case: Case, from: &Sample, shear: &Shear, vie
     Soup { open, close, triangles: (0..TRIANGLES).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect() }
 }
 
-/// Says how many samples see something, and how many of them a face turned away.
+/// Number of samples with a hit, and of those with a face turned away.
 fn agree(case: Case, seed: u64) -> [usize; 2] {
     let scene = Scene::new(case, seed);
     let (found, expected) = (scene.found(), scene.expected());
@@ -237,22 +239,22 @@ fn agree(case: Case, seed: u64) -> [usize; 2] {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn the_engine_sees_what_rounding_makes_of_edges_and_faces(case in cases(), seed: u64) {
+    fn the_engine_equals_brute_force_under_worst_rounding(case in cases(), seed: u64) {
         agree(case, seed);
     }
 }
 
-/// The cases that matter are there.
+/// The relevant cases occur.
 #[test]
 fn rounding_turns_faces_over() {
     for ways in 0..8 {
         let [moving, lens, far] = [1, 2, 4].map(|bit| ways & bit != 0);
         for cull in [Cull::Back, Cull::Front] {
-            let case = Case { moving, lens, far, from: Places::One, cull };
+            let case = Case { moving, lens, far, from: SampleOrigins::One, cull };
             let found = (0..8).map(|seed| agree(case, seed));
             let [hits, turned] = found.fold([0; 2], |sum, found| [sum[0] + found[0], sum[1] + found[1]]);
             println!("{case:?}: {turned} of {hits} hits");
-            // So far out what is left of a still vertex once the sample is taken off it, rounding once, is exact.
+            // So far out the position of a still vertex relative to a sample, rounded once, is exact.
             let exact = far && !moving && !lens;
             let enough = if exact { turned == 0 } else { turned > 10 };
             assert!(hits > 500 && enough, "{case:?}: {turned} of {hits} hits");

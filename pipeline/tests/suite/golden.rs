@@ -1,8 +1,8 @@
 //! Golden images: small frames compared with stored ones to the last bit.
 //!
-//! `golden/NAME.ppm` is the image in sRGB, for the eye, and its comment line a digest of the exact radiances, depths and
-//! triangles. After a wanted change, `QUINTILE_BLESS=1 cargo test -p pipeline --test golden` writes them anew; look at them
-//! before they are committed.
+//! `golden/NAME.ppm` is the image in sRGB, for viewing. Its comment line is a digest of the exact radiances,
+//! depths and triangles. After an intended change, `QUINTILE_BLESS=1 cargo test -p pipeline --test suite --
+//! golden` rewrites the files; review them before committing.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use pipeline::*;
 
 const SIDE_PX: u32 = 32;
 
-/// Light from above the camera on a textured surface.
+/// A textured surface lit from above the camera.
 struct Lit(Texture);
 
 impl Shader for Lit {
@@ -60,7 +60,7 @@ fn pyramid(turn: f32, lift: Vec3) -> Vec<Vec3> {
 
 const SIDES: [[u32; 3]; 4] = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
 
-/// The image as text, the comment line being a digest of what the eye cannot see.
+/// The image as text; the comment line is a digest of the exact values.
 fn image(moving: bool, lens: bool, textured: bool) -> String {
     let open = pyramid(0.4, Vec3::new(0.0, 0.0, 5.0));
     let close = if moving { pyramid(0.9, Vec3::new(0.5, 0.25, 4.5)) } else { open.clone() };
@@ -105,9 +105,9 @@ fn check(name: &str, found: &str) {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, found).unwrap();
     }
-    let mend = "QUINTILE_BLESS=1 cargo test -p pipeline --test golden writes it anew";
-    let stored =
-        std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}; {mend}", path.display()));
+    let rewrite = "QUINTILE_BLESS=1 cargo test -p pipeline --test suite golden rewrites it";
+    let stored = std::fs::read_to_string(&path)
+        .unwrap_or_else(|error| panic!("{}: {error}; {rewrite}", path.display()));
     let differ: Vec<_> = stored.lines().zip(found.lines()).enumerate().filter(|(_, (a, b))| a != b).collect();
     let Some((line, (old, new))) = differ.iter().find(|(line, _)| *line > 2).or(differ.first()) else {
         assert_eq!(stored.lines().count(), found.lines().count(), "{}", path.display());
@@ -119,7 +119,7 @@ fn check(name: &str, found: &str) {
         None => "in bits too small to see".to_owned(),
     };
     panic!(
-        "{}: {pixels} pixels differ, {place}: stored `{old}`, found `{new}`; if that is wanted, {mend}",
+        "{}: {pixels} pixels differ, {place}: stored `{old}`, found `{new}`; if that is intended, {rewrite}",
         path.display()
     );
 }

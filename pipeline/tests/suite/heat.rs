@@ -1,4 +1,4 @@
-//! Heat maps: every event is counted once, and where it happens.
+//! Heat maps: every event is counted once, at its position.
 
 use crate::common::stage::{RED, still};
 use crate::common::{Kind, Plain, Soup, camera, pixel_camera, rectangle, spec};
@@ -18,7 +18,7 @@ fn maps(size: [u32; 2], spec: &PipelineSpec, draws: &[Draw<'_>], camera: &Camera
 }
 
 #[test]
-fn every_event_is_somewhere_once() {
+fn every_event_is_counted_once() {
     for (kind, tile_px, coarse_tile_px) in [(Kind::Moving, 8, 32), (Kind::Layers, 4, 16), (Kind::Still, 1, 8)]
     {
         let soup = Soup::new(kind, 250, 4);
@@ -35,7 +35,7 @@ fn every_event_is_somewhere_once() {
 }
 
 #[test]
-fn a_triangle_is_hot_where_it_is() {
+fn events_of_a_triangle_are_in_its_tiles() {
     // A rectangle over the pixels 16..24 by 8..16 of 64x32: one fine tile of 8 pixels.
     let (viewport, corners) = (Viewport::new(64, 32).unwrap(), rectangle([-15.5, -8.5], [0.5, 7.5], 2.0));
     let spec = spec(Features::ALL);
@@ -51,9 +51,9 @@ fn a_triangle_is_hot_where_it_is() {
     assert_eq!(map(Event::Indices).elsewhere, 6);
 }
 
-/// What happens to samples is known by pixel: a triangle over part of a tile is hit there and nowhere else.
+/// Sample events are known by pixel: a triangle over part of a tile is hit there only.
 #[test]
-fn samples_are_hot_in_their_own_pixels() {
+fn sample_events_are_in_their_own_pixels() {
     let (viewport, corners) = (Viewport::new(64, 32).unwrap(), rectangle([-15.5, -10.5], [0.5, 4.5], 2.0));
     let (heat, counts) =
         maps([64, 32], &spec(Features::ALL), &[still(&corners, &RED)], &pixel_camera(viewport, 0.25));
@@ -73,8 +73,9 @@ fn samples_are_hot_in_their_own_pixels() {
 }
 
 #[test]
-fn tests_that_lead_to_no_packet_are_where_they_were_done() {
-    // A sliver along the diagonal: its box visits every tile, its edges cull those beside the diagonal.
+fn tests_without_a_packet_are_counted_in_their_tile() {
+    // A sliver along the diagonal: its bounding box visits every tile, its edges cull those beside the
+    // diagonal.
     let viewport = Viewport::new(32, 32).unwrap();
     let corners = [[-15.0, -15.0], [15.0, 15.0], [15.0, 14.0]].map(|[x, y]| Vec3::new(x, y, 1.0));
     let geometry = Geometry::new(&corners, &corners, &[[0, 1, 2]]).unwrap();
@@ -87,7 +88,7 @@ fn tests_that_lead_to_no_packet_are_where_they_were_done() {
     let culled = counts(Event::TilesCulledEdges);
     for (index, count) in culled.iter().enumerate() {
         let (column, row) = (index % 4, index / 4);
-        // The diagonal meets those of column + row = 3, and the neighbours of these at a corner.
+        // The diagonal crosses the tiles with column + row = 3, and touches their neighbours at a corner.
         match (column + row).abs_diff(3) {
             0 => assert_eq!(*count, 0, "tile {column}, {row}"),
             1 => (),

@@ -1,4 +1,4 @@
-//! Analytic: what hides what, by depth, facing, the near depth and time, in scenes whose answer is known.
+//! Hidden surfaces by depth, facing, the near depth and time, in scenes with a known result.
 
 use crate::common::stage::*;
 use crate::common::*;
@@ -8,7 +8,7 @@ use pipeline::depth::DepthSpec;
 use pipeline::sampling::Sample;
 use pipeline::*;
 
-/// Two planes that cross in the middle of the image: each is seen where it is nearer.
+/// Two planes that intersect in the middle of the image: each is visible where it is nearer.
 #[test]
 fn of_two_crossing_surfaces_the_nearer_is_seen() {
     let stage = Stage::sampled(64, 32, 8);
@@ -72,7 +72,7 @@ fn a_card_that_turns_over_is_culled_for_half_the_shutter() {
     }
 }
 
-/// A floor that runs through the near plane and on behind the camera: seen beyond the near depth and not before it.
+/// A floor that passes through the near plane and on behind the camera is visible beyond the near depth only.
 #[test]
 fn the_near_depth_cuts() {
     let stage = Stage::sampled(40, 40, 8);
@@ -94,7 +94,7 @@ fn the_near_depth_cuts() {
     assert!(seen > 1000, "{seen}");
 }
 
-/// Seen is what lies beyond the near depth: a surface at it is not, when it is about to recede.
+/// Surfaces beyond the near depth are visible; a surface exactly at it is not, even if it is about to recede.
 #[test]
 fn at_the_near_depth_itself_nothing_is_seen() {
     let (open, close) =
@@ -107,11 +107,12 @@ fn at_the_near_depth_itself_nothing_is_seen() {
 }
 
 #[test]
-fn what_comes_through_the_near_plane_vanishes_in_time() {
+fn a_surface_through_the_near_plane_vanishes_over_time() {
     let stage = Stage::sampled(16, 16, 16);
     let (open, close) =
         (rectangle([-99.0, 99.0], [-99.0, 99.0], 1.0), rectangle([-99.0, 99.0], [-99.0, 99.0], -0.5));
-    // The depth is 1 - 3/2 t, at the near depth of 1/4 when t is 1/2; the corners pass through the lens later.
+    // The depth is 1 - 3/2 t, at the near depth of 1/4 when t is 1/2; the corners pass through the lens
+    // later.
     for (_, s, id, _) in stage.see(&[quad(&open, &close, &RED)]) {
         if (s.t - 0.5).abs() > 1e-5 {
             assert_eq!(id < 2, s.t < 0.5, "{s:?}");
@@ -138,9 +139,9 @@ fn at_equal_depth_the_lowest_triangle_wins() {
     }
 }
 
-/// A curtain comes through a wall in mid-shutter.
+/// A curtain moves through a wall in mid-shutter.
 #[test]
-fn who_hides_whom_changes_with_time() {
+fn occlusion_changes_with_time() {
     let stage = Stage::sampled(24, 24, 16);
     let wall = rectangle([-99.0, 99.0], [-99.0, 99.0], 4.0);
     let [open, close] = [6.0, 2.0].map(|z| rectangle([-99.0, 99.0], [-99.0, 99.0], z));
@@ -161,10 +162,10 @@ fn who_hides_whom_changes_with_time() {
     }
 }
 
-/// A curtain that comes nearer than a wall in the last quarter of the shutter: with four boxes of time it is tested in that
-/// quarter only, and where the wall is not yet drawn no depth is read.
+/// A curtain moves in front of a wall in the last quarter of the shutter. With four boxes of time it is
+/// tested in that quarter only, and before the wall is drawn no depth is read.
 #[test]
-fn boxes_of_time_hide_what_is_behind_for_a_part_of_the_shutter() {
+fn boxes_of_time_cull_during_a_part_of_the_shutter() {
     let stage = Stage::sampled(32, 32, 16);
     let wall = rectangle([-99.0, 99.0], [-99.0, 99.0], 4.0);
     let [open, close] = [7.0, 3.1].map(|z| rectangle([-99.0, 99.0], [-99.0, 99.0], z));
@@ -178,11 +179,12 @@ fn boxes_of_time_hide_what_is_behind_for_a_part_of_the_shutter() {
     };
     let (one, four) = (counts([1; 3]), counts([1, 1, 4]));
     let samples = 32 * 32 * 16;
-    // 7 - 3.9 t is beyond 4 up to t = 0.769, in the first three quarters. Every tile sees both triangles of either rectangle.
+    // 7 - 3.9 t is beyond 4 up to t = 0.769, in the first three quarters. Every tile sees both triangles of
+    // either rectangle.
     assert_eq!(one[Event::SamplesTested], 4 * samples);
     assert_eq!(four[Event::SamplesTested], 2 * samples + 2 * samples / 4);
     assert_eq!([one[Event::BoxesCulledZMax], four[Event::BoxesCulledZMax]], [0, 3 * 2 * 16]);
-    // The first triangle of the wall meets nothing in any tile.
+    // The first triangle of the wall finds every tile empty.
     let [skipped, of_one] = [four[Event::DepthReadsSkipped], one[Event::DepthReadsSkipped]];
     assert!(skipped >= of_one && of_one > samples / 3, "{skipped} {of_one}");
     assert_eq!(four[Event::DepthWrites], one[Event::DepthWrites]);

@@ -1,9 +1,9 @@
-//! Oracle: the sample test against evaluation that does not round to f32.
+//! Sample test compared with an evaluation that does not round to f32.
 //!
-//! The ideal vertex is `p = q + t (r - q)` and the ideal point seen from a sample `x' = (p.x - u s) - (X - u a) p.w`, `y'`
-//! alike, of the f32 inputs. They are evaluated in f64, whose own error is some 2^-29 of the bands below. The sample test
-//! rounds each operation to f32, once, by at most `g = 2^-24` of its result. Counting them one by one, its points may be
-//! off, on each axis, by the **band**
+//! The ideal vertex is `p = q + t (r - q)` and the ideal point seen from a sample `x' = (p.x - u s) - (X - u
+//! a) p.w`, likewise in y, of the f32 inputs. They are evaluated in f64, whose own error is about 2^-29 of
+//! the bands below. The sample test rounds each operation to f32, once, by at most `g = 2^-24` of its result.
+//! Counted one by one, its points may be off on each axis by the **band**
 //!
 //! ```text
 //! off p  = g (2 |t (r - q)| + |p|)        where the vertex moves on that axis, else 0; p.x and p.w alike
@@ -26,8 +26,9 @@
 //! band_ij = |x_i| band_yj + |y_j| band_xi + |x_j| band_yi + |y_i| band_xj + band_xi band_yj + band_xj band_yi
 //! ```
 //!
-//! A simpler bound on `band_x` that holds for a whole triangle is 2^-21 (max |x| + |s| + (|X| + |a|) max |w|). The test is
-//! exact for the rounded points, so every disagreement must have an edge, or the near depth, within its band.
+//! A simpler bound of `band_x` for a whole triangle is 2^-21 (max |x| + |s| + (|X| + |a|) max |w|). The test
+//! is exact for the rounded points, so every disagreement must have an edge, or the near depth, within its
+//! band.
 
 use crate::common::case::*;
 use crate::common::*;
@@ -35,23 +36,23 @@ use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
 
-/// One rounding of f32; second orders are paid for by the last factor.
+/// One rounding of f32; the last factor covers second-order terms.
 const ROUNDING: f64 = (1.0 + 1e-6) / 16_777_216.0;
 
-/// A vertex as a sample sees it, and how far off f32 may be on each axis.
+/// A vertex as a sample sees it, and its f32 error bound on each axis.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     p: [f64; 3],
     band: [f64; 2],
-    /// The same for its depth.
+    /// Error bound of its depth.
     band_w: f64,
 }
 
-fn ideal(vertex: &MovingVertex, shear: &Shear, look: &Look) -> Point {
-    let [x, y, w] = look.sheared(vertex, shear);
+fn ideal(vertex: &MovingVertex, shear: &Shear, position: &SamplePosition) -> Point {
+    let [x, y, w] = position.sheared(vertex, shear);
     let off = |axis: usize| {
         let [q, r] = [vertex.open[axis], vertex.close[axis]].map(f64::from);
-        let way = look.t * (r - q);
+        let way = position.t * (r - q);
         if q == r { 0.0 } else { ROUNDING * (2.0 * way.abs() + (q + way).abs()) }
     };
     let band = |axis: usize, sheared: f64, at: f64, lens: f64| {
@@ -74,8 +75,8 @@ fn ideal(vertex: &MovingVertex, shear: &Shear, look: &Look) -> Point {
             + ROUNDING * ((slope * w).abs() + (sheared - at * w).abs())
     };
     Point {
-        p: [x - look.x * weight(shear, w), y - look.y * weight(shear, w), w],
-        band: [band(0, x, look.x, look.u), band(1, y, look.y, look.v)],
+        p: [x - position.x * weight(shear, w), y - position.y * weight(shear, w), w],
+        band: [band(0, x, position.x, position.u), band(1, y, position.y, position.v)],
         band_w: off(2),
     }
 }
@@ -85,7 +86,7 @@ fn ideal(vertex: &MovingVertex, shear: &Shear, look: &Look) -> Point {
 struct Edge {
     value: f64,
     band: f64,
-    /// The roundings of its own products, which matter to depth and not to the decision.
+    /// Rounding of its own products, which affects the depth but not the decision.
     own: f64,
 }
 
@@ -97,17 +98,17 @@ fn edge(i: &Point, j: &Point) -> Edge {
     Edge { value: xi * yj - xj * yi, band, own }
 }
 
-/// What the ideal says about one sample and triangle.
+/// Ideal result of one sample and triangle.
 struct Verdict {
     inside: bool,
-    /// The band of an edge has to be at least this many times its own for the decision to turn.
+    /// Smallest ratio of an edge to its band for which the decision flips.
     to_turn: f64,
     depth: f64,
-    /// How far off a depth in f32 may be; infinite where the edges are lost in their bands.
+    /// Error bound of a depth in f32; infinite if the edges are within their bands.
     depth_band: f64,
 }
 
-fn judge(points: &[Point; 3]) -> Verdict {
+fn evaluate(points: &[Point; 3]) -> Verdict {
     let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| edge(&points[i], &points[j]));
     let same = |sign: f64| edges.iter().all(|e| e.value * sign > 0.0);
     let inside = same(1.0) || same(-1.0);
@@ -132,16 +133,16 @@ fn judge(points: &[Point; 3]) -> Verdict {
     Verdict { inside, to_turn, depth, depth_band }
 }
 
-/// What was seen over many samples.
+/// Results over many samples.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     samples: u32,
     hits: u32,
     disagreements: u32,
     depths: u32,
-    /// The largest share of the band that a disagreement needed.
+    /// Largest fraction of the band used by a disagreement.
     worst: f64,
-    /// The largest share of its band that a depth was off by.
+    /// Largest fraction of its band used by a depth error.
     worst_depth: f64,
 }
 
@@ -162,8 +163,8 @@ fn compare(case: Case, seed: u64) -> Tally {
     let seen = probe.see(triangle, Cull::None);
     let mut tally = Tally::default();
     for (slot, seen) in seen.into_iter().enumerate() {
-        let look = probe.at(slot);
-        let verdict = judge(&triangle.map(|vertex| ideal(&vertex, &probe.shear, &look)));
+        let position = probe.at(slot);
+        let verdict = evaluate(&triangle.map(|vertex| ideal(&vertex, &probe.shear, &position)));
         tally.samples += 1;
         tally.hits += u32::from(seen.is_some());
         if seen.is_some() != (verdict.inside && verdict.depth > near) {
@@ -195,7 +196,7 @@ proptest! {
     }
 }
 
-/// The same over fixed cases, so that it is known to have looked where it matters; with `--nocapture` it tells what it found.
+/// The same over fixed cases, to check that the relevant cases occur; `--nocapture` prints the results.
 #[test]
 fn the_band_is_measured() {
     let mut all = Tally::default();
@@ -210,13 +211,13 @@ fn the_band_is_measured() {
     assert!(all.hits > 20_000 && all.depths > 20_000, "{all:?}");
     assert!(all.disagreements > 2_000, "too few samples on edges to say anything: {all:?}");
     assert!(all.worst <= 1.0 && all.worst_depth <= 1.0, "{all:?}");
-    // The band is not idle.
+    // The band is used.
     assert!(all.worst > 0.25, "{all:?}");
 }
 
-/// Where the arithmetic is exact anyway there is no band: small integers, dyadic times and lens places.
+/// Exact arithmetic gives no disagreement: small integers, dyadic times and lens positions.
 #[test]
-fn nothing_disagrees_where_nothing_rounds() {
+fn exact_arithmetic_gives_no_disagreement() {
     let mut r = Uniform::new(5);
     let (mut hits, mut ties) = (0, 0);
     for _ in 0..300 {
@@ -244,7 +245,7 @@ fn nothing_disagrees_where_nothing_rounds() {
                 ties += 1;
                 continue;
             }
-            let verdict = judge(&points);
+            let verdict = evaluate(&points);
             assert_eq!(
                 seen.is_some(),
                 verdict.inside && verdict.depth > 0.25,

@@ -1,4 +1,4 @@
-//! Analytic: orthographic views whose picture is known in closed form, and as the limit of perspective from far away.
+//! Orthographic views with a known closed form, and as the limit of distant perspective views.
 
 use crate::common::stage::*;
 use crate::common::*;
@@ -16,7 +16,7 @@ fn table(per_pixel: u32) -> SampleTable {
     SampleTable::low_discrepancy(per_pixel, 1, LensShape::Disk).unwrap()
 }
 
-/// A rectangle of the scene, `x0..x1` by `y0..y1`, with a depth for each place.
+/// A rectangle of the scene, `x0..x1` by `y0..y1`, with a depth for each position.
 fn sheet(x: [f32; 2], y: [f32; 2], depth: impl Fn(f32, f32) -> f32) -> [Vec3; 4] {
     rectangle(x, y, 1.0).map(|p| Vec3::new(p.x, p.y, depth(p.x, p.y)))
 }
@@ -34,7 +34,7 @@ fn a_square_is_as_large_at_any_depth() {
     }
 }
 
-/// The plane z = x / 2 is seen where it is beyond the near depth, and its vertices behind the camera's plane mirror nothing.
+/// The plane z = x / 2 is visible beyond the near depth; vertices behind the camera plane are not mirrored.
 #[test]
 fn a_slanted_plane_has_its_depth_and_ends_at_the_near_depth() {
     let stage = stage(40, 24, table(8));
@@ -67,7 +67,7 @@ fn a_square_moves_as_far_whatever_its_depth() {
     }
 }
 
-/// x' = x + u R (z / F - 1), to the right and upwards: nothing at the focus depth, linear in depth, without an end.
+/// x' = x + u R (z / F - 1), to the right and upwards: zero at the focus depth and linear in depth.
 #[test]
 fn a_lens_shears_by_depth() {
     let lens = [0.5, -0.25];
@@ -86,9 +86,9 @@ fn a_lens_shears_by_depth() {
     }
 }
 
-/// Seen from so far away that depth no longer counts, through a lens that grows with the distance, perspective is the same picture.
+/// A very distant perspective view, through a lens that grows with the distance, gives the same picture.
 #[test]
-fn it_is_what_perspective_comes_to_from_far_away() {
+fn an_orthographic_view_is_the_limit_of_distant_perspective() {
     const FAR: f32 = 8192.0;
     let (radius, focus, height) = (1.5, 6.0, 48);
     for moving in [false, true] {
@@ -116,7 +116,7 @@ fn it_is_what_perspective_comes_to_from_far_away() {
     }
 }
 
-/// Colours a point by where it is and by where the viewer is.
+/// A shader of the position and of the direction to the viewer.
 struct Placed;
 
 impl Shader for Placed {
@@ -130,9 +130,9 @@ impl Shader for Placed {
     }
 }
 
-/// A cell is shaded at the point of the surface that its middle sees, and so is each sample.
+/// A cell is shaded at the surface point that its centre sees, and so is each sample.
 #[test]
-fn surfaces_are_shaded_where_they_are_seen() {
+fn surfaces_are_shaded_at_their_visible_points() {
     let block = vec![Sample { x: 0.5, y: 0.5, u: 0.0, v: 0.0, t: 0.5 }; 64];
     let mut stage = stage(32, 32, repeated(1, &block));
     let depth = |x: f32, y: f32| 20.0 + 0.25 * x - 0.5 * y;

@@ -1,4 +1,4 @@
-//! Shading every sample where it is, as the alternative to the shading cache.
+//! Shading of every sample at its own position, the alternative to the shading cache.
 
 use crate::common::{Flat, Kind, Plain, QUAD, Soup, camera, pixel_camera, rectangle, spec};
 use activity::{Counts, Event};
@@ -7,7 +7,7 @@ use pipeline::*;
 
 const SIDE: u32 = 16;
 
-/// Colours a point by where it is, with a texture of its own behind it.
+/// A shader of the position, with an optional texture.
 struct ByPlace<F: Fn(&ShadingPoint, Vec4) -> f32 + Sync>(F, Option<Texture>);
 
 impl<F: Fn(&ShadingPoint, Vec4) -> f32 + Sync> Shader for ByPlace<F> {
@@ -36,7 +36,7 @@ fn quad<'a>(open: &'a [Vec3], close: &'a [Vec3], shader: &'a dyn Shader) -> Draw
     Draw { geometry: Geometry::new(open, close, &QUAD).unwrap(), shader, cull: Cull::None }
 }
 
-/// More than the image.
+/// Larger than the image.
 fn all(z: f32) -> [Vec3; 4] {
     rectangle([-40.0, 40.0], [-40.0, 40.0], z)
 }
@@ -46,7 +46,7 @@ fn lanes(counts: &Counts) -> u64 {
 }
 
 #[test]
-fn where_the_colour_does_not_vary_so_does_the_image_not() {
+fn a_constant_colour_gives_a_constant_image() {
     let viewport = Viewport::new(40, 40).unwrap();
     let table = SampleTable::low_discrepancy(8, 3, LensShape::Disk).unwrap();
     for kind in [Kind::Still, Kind::Moving, Kind::Crossing] {
@@ -70,14 +70,15 @@ fn smooth_shading_converges_to_the_same_image() {
         let [cached, own] = [image(Shading::Cached), image(Shading::PerSample)];
         cached.iter().zip(&own).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max)
     };
-    // A pixel spans 0.04 of the colour at depth 2; its mean is the colour of its middle.
+    // A pixel spans 0.04 of the colour at depth 2; its mean is the colour of its centre.
     let [few, some, many] = [4, 32, 256].map(worst);
     assert!(few < 0.02 && some < 0.5 * few && many < 0.2 * some, "{few} {some} {many}");
 }
 
 #[test]
 fn a_sample_is_shaded_at_its_own_time() {
-    // The plane slides by 8 pixels while what colours it stays in the world: a step that its motion must not blur.
+    // The plane moves by 8 pixels while its colour is fixed in the world: a step that its motion must not
+    // blur.
     let (open, close) = (all(1.0), all(1.0).map(|p| p + Vec3::new(8.0, 0.0, 0.0)));
     let shader = ByPlace(|at, _| f32::from(at.position.x > 0.0), None);
     let row =
@@ -85,7 +86,7 @@ fn a_sample_is_shaded_at_its_own_time() {
     for (x, colour) in row(Shading::PerSample).iter().enumerate() {
         assert_eq!(colour.x, if x < 8 { 0.0 } else { 1.0 }, "column {x}");
     }
-    // At mid-shutter the points seen in a pixel lie up to 4 pixels to either side.
+    // At mid-shutter the points seen in a pixel are up to 4 pixels to either side.
     assert!((0.2..0.8).contains(&row(Shading::Cached)[8].x));
 }
 
@@ -115,7 +116,7 @@ fn a_whole_quad_needs_no_helper_and_a_column_needs_half() {
     };
     let quads = u64::from(SIDE * SIDE / 4 * 4);
     assert_eq!(helpers([-8.0, 800.0]), (0, quads));
-    // From the last column to the right edge: the left half of each quad there is not asked for.
+    // From the last column to the right edge, the left half of each quad is not requested.
     assert_eq!(helpers([7.0, 800.0]), (2 * 4 * u64::from(SIDE / 2), 4 * u64::from(SIDE / 2)));
 }
 
@@ -125,7 +126,7 @@ fn textures_are_fetched_by_every_lane() {
     let texture = Texture::from_srgb8(64, 64, texels, [Wrap::Clamp; 2]).unwrap();
     let shader = ByPlace(|_, texel| texel.x, Some(texture));
     let corners = rectangle([-8.0, 8.0], [-8.0, 8.0], 1.0);
-    // A texel is two pixels wide: one bilinear fetch a lane.
+    // A texel is two pixels wide: one bilinear fetch per lane.
     let uvs = [[0.0, 0.0], [0.125, 0.0], [0.125, 0.125], [0.0, 0.125]].map(Vec2::from_array);
     let geometry = Geometry::new(&corners, &corners, &QUAD).unwrap().with_uvs(&uvs).unwrap();
     let draws = [Draw { geometry, shader: &shader, cull: Cull::None }];

@@ -1,6 +1,6 @@
-//! Property: no tile test rejects what the sample test accepts, where that is hardest: over a box that is one sample and nothing
-//! else, with samples on the edges of triangles as near as f32 can tell. There all that a test has to spare is its allowance for the
-//! rounding of the sample test.
+//! No tile test rejects a sample that the sample test accepts, in the hardest case: a box of exactly one
+//! sample, on an edge of a triangle within f32 precision. There only the rounding allowance of a test is
+//! left.
 
 use crate::common::case::{Case, NEAR, cases, setting};
 use crate::common::*;
@@ -10,7 +10,7 @@ use pipeline::traversal::*;
 use pipeline::*;
 use proptest::prelude::*;
 
-/// How many hits lie on the outer side of an edge, exactly seen.
+/// Number of hits on the outer side of an edge in exact arithmetic.
 struct Found {
     hits: u32,
     beyond: u32,
@@ -31,16 +31,17 @@ fn hold(case: Case, seed: u64) -> Found {
         let tile = TileRect { x: point(s.x[slot]), y: point(s.y[slot]) };
         let [u, v] = if lens { [point(s.u[slot]), point(s.v[slot])] } else { [[-1.0, 1.0]; 2] };
         let within = Box5 { u, v, t: point(s.t[slot]), lens };
-        let told = format!("{case:?} {seed} slot {slot}");
-        assert_eq!(narrow(&triangle, &probe.shear, &tile, &within), Some(within), "side planes: {told}");
-        assert_eq!(lines.narrow(&tile, &within).0, Some(within), "lens lines: {told}");
-        found.beyond += u32::from(edges_keep(&triangle, probe, &tile, &within, &told));
+        let context = format!("{case:?} {seed} slot {slot}");
+        assert_eq!(narrow(&triangle, &probe.shear, &tile, &within), Some(within), "side planes: {context}");
+        assert_eq!(lines.narrow(&tile, &within).0, Some(within), "lens lines: {context}");
+        found.beyond += u32::from(edges_keep(&triangle, probe, &tile, &within, &context));
     }
     found
 }
 
-/// Facing, edge bounds and screens over one sample, each with either face drawn. Says whether the exact edges would not have it.
-fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5, told: &str) -> bool {
+/// Facing, edge bounds and screens over one sample, with either face drawn. Returns whether the exact edges
+/// reject it.
+fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5, context: &str) -> bool {
     let edges = Edges::<f64>::new(View::new(triangle, &probe.shear, tile, within));
     let slot = (0..probe.samples.len)
         .find(|&slot| {
@@ -62,25 +63,29 @@ fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5
             continue;
         }
         let (times, _) = Facing::new(&edges).timeline(within.t, drawn, 3);
-        assert!(times.hull().is_some(), "facing {drawn:?}: {told}");
+        assert!(times.hull().is_some(), "facing {drawn:?}: {context}");
         let whole = Timeline::one(Piece { t: within.t, faces: [true; 2] });
         for faces in [drawn, [true; 2]] {
             let (left, _) = EdgeBounds::new(&edges).timeline(&edges, &whole, faces);
-            assert!(left.hull().is_some(), "edge bounds {faces:?}: {told}");
-            assert!(hit(Some(&Screen::new(&edges, within.t, faces))), "screen {faces:?}: {told}");
+            assert!(left.hull().is_some(), "edge bounds {faces:?}: {context}");
+            assert!(hit(Some(&Screen::new(&edges, within.t, faces))), "screen {faces:?}: {context}");
         }
     }
     signs.contains(&1) && signs.contains(&-1)
 }
 
-/// The signs of the edges of the triangle a sample would see if nothing were rounded.
+/// Exact signs of the edges of the triangle at a sample.
 fn exact_signs(triangle: &Triangle, probe: &Probe, slot: usize) -> [i8; 3] {
-    let look = probe.at(slot);
+    let position = probe.at(slot);
     let [s, a] = [probe.shear.s, probe.shear.a].map(|c| c.map(f64::from));
     let p = triangle.corners.map(|corner| {
-        let [x, y, w] = [0, 1, 2].map(|k| f64::from(corner.open[k]) + look.t * f64::from(corner.delta[k]));
+        let [x, y, w] =
+            [0, 1, 2].map(|k| f64::from(corner.open[k]) + position.t * f64::from(corner.delta[k]));
         let weight = weight(&probe.shear, w);
-        [x + look.u * (a[0] * w - s[0]) - look.x * weight, y + look.v * (a[1] * w - s[1]) - look.y * weight]
+        [
+            x + position.u * (a[0] * w - s[0]) - position.x * weight,
+            y + position.v * (a[1] * w - s[1]) - position.y * weight,
+        ]
     });
     [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| {
         let e = p[i][0] * p[j][1] - p[j][0] * p[i][1];
@@ -96,7 +101,7 @@ proptest! {
     }
 }
 
-/// The cases that matter are there: samples that are hit although the exact edges would not have them.
+/// The relevant cases occur: samples that are hit although the exact edges reject them.
 #[test]
 fn many_hits_lie_beyond_an_edge_by_rounding_alone() {
     for ways in 0..8 {
@@ -109,7 +114,7 @@ fn many_hits_lie_beyond_an_edge_by_rounding_alone() {
                 (hits, beyond) = (hits + found.hits, beyond + found.beyond);
             }
             println!("{case:?}: {beyond} of {hits} hits");
-            // So far out what is left of a still vertex once the sample is taken off it, rounding once, is exact.
+            // So far out the position of a still vertex relative to a sample, rounded once, is exact.
             let exact = far && !moving && !lens;
             assert!(
                 hits > 1000 && if exact { beyond == 0 } else { beyond >= 20 },

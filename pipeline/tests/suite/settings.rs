@@ -1,4 +1,4 @@
-//! Failure: what cannot be is refused where it is said, with a message that names it and what would do.
+//! Invalid settings are refused with a message that names the field and the allowed values.
 
 use crate::common::*;
 use glam::{Affine3A, Vec2, Vec3};
@@ -14,7 +14,7 @@ fn refused(change: impl FnOnce(&mut PipelineSpec)) -> SpecError {
 }
 
 #[test]
-fn sizes_that_cannot_be_are_named_with_what_would_do() {
+fn invalid_sizes_are_reported_with_the_allowed_values() {
     for (found, field) in [
         (refused(|s| s.tile_px = 0), "tile_px"),
         (refused(|s| s.tile_px = 3), "tile_px"),
@@ -196,7 +196,7 @@ fn a_camera_that_is_not_finite_is_refused() {
     }
 }
 
-/// Numbers that are finite and absurd make a poor image and no panic.
+/// Finite but extreme numbers make a poor image and no panic.
 #[test]
 fn absurd_numbers_do_not_panic() {
     let sizes = [f32::MAX, 1e30, 1e19, 1e-19, 1e-38, f32::MIN_POSITIVE / 1e3];

@@ -1,4 +1,5 @@
-//! Oracle: what set-up allows for the rounding of a vertex as a sample sees it, against the exact place, where one term alone is large.
+//! Rounding allowance of set-up for a vertex as a sample sees it, compared with the exact position, with one
+//! dominant term.
 
 use crate::common::*;
 use pipeline::sample_test::exact::seen_in_tile;
@@ -6,7 +7,7 @@ use pipeline::sampling::Sample;
 use pipeline::setup::Outcome;
 use pipeline::*;
 
-/// What is large: the place of the vertex, the place on the image, the lens at depth zero, the lens for each unit of depth.
+/// Dominant term: vertex position, image position, lens at depth zero, lens per unit of depth.
 #[derive(Clone, Copy, Debug)]
 enum Large {
     Vertex,
@@ -24,7 +25,7 @@ struct Setting {
 fn setting(r: &mut Uniform, large: Large, moving: bool, parallel: bool, seed: u64) -> Setting {
     let image = matches!(large, Large::Image | Large::All);
     let side = if image { Viewport::MAX_PX } else { 8 };
-    let size = |asked: bool| if asked { 4096.0 } else { 1e-3 };
+    let size = |dominant: bool| if dominant { 4096.0 } else { 1e-3 };
     let [vertex, base, slope] = [
         matches!(large, Large::Vertex | Large::All),
         matches!(large, Large::Base | Large::All),
@@ -52,19 +53,20 @@ fn setting(r: &mut Uniform, large: Large, moving: bool, parallel: bool, seed: u6
     Setting { probe, triangle }
 }
 
-/// The largest error of a vertex in shares of half the slack, which is what it is a bound on.
+/// Largest error of a vertex over half the slack, its bound.
 fn worst(large: Large, moving: bool, parallel: bool) -> f64 {
     let mut worst = 0.0_f64;
     for seed in 0..400 {
         let Setting { probe, triangle } = setting(&mut Uniform::new(seed), large, moving, parallel, seed);
         let Outcome::Ready(ready) = probe.set_up(triangle, Cull::None) else { continue };
         for slot in 0..probe.samples.len {
-            let look = probe.at(slot);
+            let position = probe.at(slot);
             let seen = seen_in_tile(&ready.corners, &probe.samples, slot);
             for (corner, seen) in ready.corners.iter().zip(seen) {
-                let at = |axis: usize| f64::from(corner.open[axis]) + look.t * f64::from(corner.delta[axis]);
+                let at =
+                    |axis: usize| f64::from(corner.open[axis]) + position.t * f64::from(corner.delta[axis]);
                 let weight = weight(&probe.shear, at(2));
-                for (axis, place, lens) in [(0, look.x, look.u), (1, look.y, look.v)] {
+                for (axis, place, lens) in [(0, position.x, position.u), (1, position.y, position.v)] {
                     let [s, a] = [probe.shear.s, probe.shear.a].map(|c| f64::from(c[axis]));
                     let exact = at(axis) + lens * (a * at(2) - s) - place * weight;
                     let error = (f64::from(seen[axis]) - exact).abs();
@@ -76,7 +78,8 @@ fn worst(large: Large, moving: bool, parallel: bool) -> f64 {
     worst
 }
 
-/// No vertex is farther off than half the slack, and wherever it is dominated by one term there are some that need a good part of it.
+/// No vertex is off by more than half the slack, and for each dominant term some vertices use a good part of
+/// it.
 #[test]
 fn half_the_slack_is_enough_and_each_of_its_terms_is_needed() {
     for large in [Large::Vertex, Large::Image, Large::Base, Large::Slope, Large::All] {

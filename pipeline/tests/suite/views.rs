@@ -1,4 +1,4 @@
-//! Several images out of one pass, and passes without any.
+//! Several images from one pass, and passes without images.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use pipeline::*;
 
 const PER_PIXEL: u32 = 8;
 
-/// A run of the samples of another source.
+/// A range of the samples of another source.
 #[derive(Debug)]
 struct Run<'a>(&'a SampleTable, Range<u32>);
 
@@ -60,7 +60,7 @@ fn each_view_is_the_image_of_its_samples_alone() {
 }
 
 #[test]
-fn a_single_view_is_what_render_gives_packet_by_packet() {
+fn a_single_view_equals_render_packet_by_packet() {
     with(Kind::Moving, |camera, draws, table, viewport| {
         let spec = spec(Features::ALL);
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
@@ -103,7 +103,7 @@ fn a_pass_without_an_image_sees_the_same_shades_nothing_and_keeps_its_depths() {
             for event in [Event::SamplesTested, Event::SamplesHit, Event::DepthWrites, Event::DepthLines] {
                 assert_eq!(counts[event], drawn[event], "{event:?}");
             }
-            // Every line that a sample was written into goes to memory once at least.
+            // Every line with a written sample goes to memory at least once.
             let bytes = seen.iter().filter(|(triangle, _)| *triangle != u32::MAX).count() as u64 * 4;
             assert!(counts[Event::DramWriteBytes] >= bytes, "{} {bytes}", counts[Event::DramWriteBytes]);
         });

@@ -1,4 +1,4 @@
-//! Oracle: the fast visibility engine sees what brute force over all samples sees, bit for bit.
+//! The fast visibility engine equals brute force over all samples, bit for bit.
 
 use crate::common::*;
 use pipeline::sample_test::Width;
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 type Seen = Vec<(u32, u32)>;
 
-/// What the engine sees, with nothing divided that is not in use.
+/// Result of the engine; unused dimensions are not divided.
 fn seen(
     soup: &Soup,
     cull: Cull,
@@ -25,14 +25,14 @@ fn seen(
 fn seen_in(layout: &SampleLayout, soup: &Soup, cull: Cull, width: Width) -> Seen {
     let mut visibility = Visibility::new(layout);
     let geometry = soup.draw(&Plain, cull).geometry;
-    // Twice, as the second time must not remember the first.
+    // Twice, as the second run must not depend on the first.
     resolve_at(width, layout, &geometry, cull, &mut visibility);
     let tally = resolve_at(width, layout, &geometry, cull, &mut visibility);
     assert!(tally.hits <= 16 * tally.packets);
     visibility.in_image_order(layout).into_iter().map(|(id, depth)| (id, depth.to_bits())).collect()
 }
 
-/// Names the first sample that differs, not all of them.
+/// Report the first sample that differs, not all of them.
 fn agree(found: &Seen, expected: &Seen) -> Result<(), TestCaseError> {
     prop_assert_eq!(found.len(), expected.len());
     let differs = (0..found.len()).find(|&i| found[i] != expected[i]);
@@ -49,7 +49,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
     #[test]
-    fn the_engine_sees_what_brute_force_sees(
+    fn the_engine_equals_brute_force(
         kind in kinds(), cull in culls(), lens: bool, seed: u64,
         per_pixel in prop_oneof![Just(1_u32), Just(2), Just(3), Just(5), Just(16), Just(40)],
         width in 1_u32..90, height in 1_u32..70,
@@ -102,7 +102,7 @@ fn every_width_and_number_of_threads_gives_the_same_bytes() {
     }
 }
 
-/// The engine would see another picture, so it takes no such camera.
+/// The engine does not support orthographic cameras.
 #[test]
 fn an_orthographic_camera_is_refused() {
     let table = SampleTable::low_discrepancy(1, 1, LensShape::Disk).unwrap();
@@ -111,7 +111,7 @@ fn an_orthographic_camera_is_refused() {
 }
 
 #[test]
-fn dividing_time_where_nothing_moves_changes_nothing() {
+fn dividing_time_for_still_scenes_changes_nothing() {
     let (soup, viewport) = (Soup::new(Kind::Still, 200, 4), Viewport::new(64, 64).unwrap());
     let table = SampleTable::low_discrepancy(16, 3, LensShape::Disk).unwrap();
     for lens in [false, true] {
@@ -143,10 +143,10 @@ fn coordinates_out_of_all_proportion_are_seen_as_brute_force_sees_them() {
     }
 }
 
-/// A triangle that comes nearer early in the shutter is tested first; where both stand at one depth later, as near as can be, the
-/// one with the lower number is seen all the same.
+/// A triangle that comes nearer early in the shutter is tested first. Where both are later at equal depth, up
+/// to rounding, the one with the lower number is visible nevertheless.
 #[test]
-fn of_two_at_one_depth_the_lower_number_is_seen_whichever_is_tested_first() {
+fn at_equal_depth_the_lower_number_is_visible_in_any_order() {
     let wall =
         |depth: f32| [(-40.0, -40.0), (40.0, -40.0), (0.0, 60.0)].map(|(x, y)| glam::Vec3::new(x, y, depth));
     let (still, first, last) = (wall(4.0), wall(2.0), wall(6.0));

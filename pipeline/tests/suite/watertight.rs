@@ -1,5 +1,5 @@
-//! Property: a patch that projects one to one covers each sample once, also those on its inner edges and vertices, at any
-//! place on the lens and time.
+//! Watertight: a patch that projects one to one covers each sample once, including those on its inner edges
+//! and vertices, at any lens position and time.
 
 use crate::common::meshes::*;
 use crate::common::*;
@@ -7,12 +7,14 @@ use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
 
-/// Cells along a side of a patch, and the size of one in pixels; it hangs over the tile of 8x8 pixels on no side.
+/// Cells along a side of a patch, and the size of one in pixels; the patch extends beyond the tile of 8x8
+/// pixels on no side.
 const CELLS: usize = 5;
 const CELL_PX: f32 = 1.3;
 
-/// A patch about `centre`: a jittered grid with a random diagonal in each cell. Depth is a plane in the scene, off which a
-/// height field lifts the vertices; motion is a similarity of the image, the same for all vertices.
+/// A patch around `centre`: a jittered grid with a random diagonal in each cell. Its depth is a plane in the
+/// scene, from which a height field lifts the vertices. Its motion is a similarity of the image, the same for
+/// all vertices.
 fn patch(r: &mut Uniform, centre: [f32; 2], dims: Dims, lift: f32) -> Mesh {
     let half = 0.5 * CELL_PX * CELLS as f32;
     let (nearness, tilt) = (r.within(0.15, 0.5), [r.within(-0.004, 0.004), r.within(-0.004, 0.004)]);
@@ -23,7 +25,7 @@ fn patch(r: &mut Uniform, centre: [f32; 2], dims: Dims, lift: f32) -> Mesh {
         let grid = [i % (CELLS + 1), i / (CELLS + 1)].map(|step| step as f32 * CELL_PX - half);
         let at = grid.map(|c| c + CELL_PX * r.within(-0.11, 0.11));
         let plane = nearness + tilt[0] * at[0] + tilt[1] * at[1] + lift * r.within(-1.0, 1.0);
-        // What a lens shifts the image by is linear in 1 / w in perspective, and in w in an orthographic view.
+        // The image shift by a lens is linear in 1 / w in perspective, and in w in an orthographic view.
         let w = if dims.parallel { 4.0 * plane } else { 1.0 / plane };
         let open = dims.vertex([centre[0] + at[0], centre[1] + at[1]], w);
         let (sin, cos) = (grow * libm::sinf(turn), grow * libm::cosf(turn));
@@ -36,7 +38,7 @@ fn patch(r: &mut Uniform, centre: [f32; 2], dims: Dims, lift: f32) -> Mesh {
     for cell in 0..CELLS * CELLS {
         let a = cell / CELLS * (CELLS + 1) + cell % CELLS;
         let [b, c, d] = [a + 1, a + CELLS + 2, a + CELLS + 1];
-        // Soup and order must not matter, so corners start anywhere and some triangles are wound the other way round.
+        // Soup and order must not matter, so corners start anywhere and some triangles have inverted winding.
         let pair = if r.next() < 0.5 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
         for mut triangle in pair {
             triangle.rotate_left((r.next() * 3.0) as usize);
@@ -49,7 +51,7 @@ fn patch(r: &mut Uniform, centre: [f32; 2], dims: Dims, lift: f32) -> Mesh {
     Mesh { vertices, triangles }
 }
 
-/// The vertices of the outline of a patch in order.
+/// Vertices of the outline of a patch, in order.
 fn outline() -> Vec<usize> {
     let side = CELLS + 1;
     let top = (0..CELLS).collect::<Vec<_>>();
@@ -59,7 +61,8 @@ fn outline() -> Vec<usize> {
     [top, right, bottom, left].concat()
 }
 
-/// Where a point lies with respect to an outline: strictly inside, strictly outside, or nearer to it than `margin`.
+/// Position of a point relative to an outline: strictly inside, strictly outside, or `None` within `margin`
+/// of it.
 fn inside(at: [f64; 2], outline: &[[f64; 2]], margin: f64) -> Option<bool> {
     let mut odd = false;
     for (p, q) in outline.iter().zip(outline.iter().cycle().skip(1)) {
@@ -74,7 +77,7 @@ fn inside(at: [f64; 2], outline: &[[f64; 2]], margin: f64) -> Option<bool> {
     Some(odd)
 }
 
-/// How often each sample is covered, and by the outline's account.
+/// Check how often each sample is covered against the outline.
 fn check_patch(mesh: &Mesh, probe: &Probe, far: bool) {
     let mut covered = vec![0; probe.samples.len];
     for triangle in 0..mesh.triangles.len() {
@@ -86,13 +89,13 @@ fn check_patch(mesh: &Mesh, probe: &Probe, far: bool) {
     let rim = outline();
     let (mut within, mut without) = (0, 0);
     for (slot, &count) in covered.iter().enumerate() {
-        let look = probe.at(slot);
-        assert_one_to_one(mesh, probe, &look);
-        let rim: Vec<_> = rim.iter().map(|&v| image(&mesh.vertices[v], &look, &probe.shear)).collect();
-        match inside([look.x, look.y], &rim, margin) {
-            Some(true) => assert_eq!(count, 1, "a sample inside is covered {count} times: {look:?}"),
-            Some(false) => assert_eq!(count, 0, "a sample outside is covered {count} times: {look:?}"),
-            None => assert!(count <= 1, "a sample on the outline is covered {count} times: {look:?}"),
+        let position = probe.at(slot);
+        assert_one_to_one(mesh, probe, &position);
+        let rim: Vec<_> = rim.iter().map(|&v| image(&mesh.vertices[v], &position, &probe.shear)).collect();
+        match inside([position.x, position.y], &rim, margin) {
+            Some(true) => assert_eq!(count, 1, "a sample inside is covered {count} times: {position:?}"),
+            Some(false) => assert_eq!(count, 0, "a sample outside is covered {count} times: {position:?}"),
+            None => assert!(count <= 1, "a sample on the outline is covered {count} times: {position:?}"),
         }
         within += u32::from(count == 1);
         without += u32::from(count == 0);
@@ -100,21 +103,21 @@ fn check_patch(mesh: &Mesh, probe: &Probe, far: bool) {
     assert!(within > 100 && without > 0, "{within} samples inside and {without} outside show little");
 }
 
-fn image(vertex: &MovingVertex, look: &Look, shear: &Shear) -> [f64; 2] {
-    let [x, y, w] = look.sheared(vertex, shear);
+fn image(vertex: &MovingVertex, position: &SamplePosition, shear: &Shear) -> [f64; 2] {
+    let [x, y, w] = position.sheared(vertex, shear);
     [x, y].map(|c| c / weight(shear, w))
 }
 
-/// What the property asks for: no triangle of the patch is turned over, as this sample sees it.
-fn assert_one_to_one(mesh: &Mesh, probe: &Probe, look: &Look) {
-    let seen: Vec<_> = mesh.vertices.iter().map(|v| image(v, look, &probe.shear)).collect();
+/// Precondition of the property: no triangle of the patch is turned over, as seen by this sample.
+fn assert_one_to_one(mesh: &Mesh, probe: &Probe, position: &SamplePosition) {
+    let seen: Vec<_> = mesh.vertices.iter().map(|v| image(v, position, &probe.shear)).collect();
     for cell in 0..CELLS * CELLS {
         let a = cell / CELLS * (CELLS + 1) + cell % CELLS;
         let around = [a, a + 1, a + CELLS + 2, a + CELLS + 1].map(|v| seen[v]);
         for k in 0..4 {
             let [p, q, r] = [0, 1, 2].map(|step| around[(k + step) % 4]);
             let area = (q[0] - p[0]) * (r[1] - p[1]) - (r[0] - p[0]) * (q[1] - p[1]);
-            assert!(area > 0.05, "the patch of this test folds over: {area} at {look:?}");
+            assert!(area > 0.05, "the patch of this test folds over: {area} at {position:?}");
         }
     }
 }
@@ -123,7 +126,7 @@ fn patch_case(dims: Dims, lifted: bool, far: bool, borders: bool, seed: u64) {
     let mut r = Uniform::new(seed);
     let (viewport, origin, origin_px) = place(far);
     let centre = [0, 1].map(|axis| origin_px[axis] + 4.0);
-    // A lens of 2.5 pixels moves a lifted vertex by 0.02 * 2.5 pixels, well within what the grid can take.
+    // A lens of 2.5 pixels moves a lifted vertex by 0.02 * 2.5 pixels, well within the limits of the grid.
     let mesh = patch(&mut r, centre, dims, if lifted { 0.02 } else { 0.0 });
     let shear = random_shear(&mut r, dims, 2.5);
     let table = if borders { border_table(seed) } else { on_edges(&mut r, &mesh, &shear, origin_px, dims) };
@@ -143,8 +146,8 @@ proptest! {
     }
 }
 
-/// Vertices on corners and middles of pixels and samples there too, all numbers short enough for every operation to be
-/// exact: ties everywhere, at every time and place on the lens.
+/// Vertices and samples on corners and centres of pixels, with numbers short enough for every operation to be
+/// exact: ties everywhere, at every time and lens position.
 #[test]
 fn every_sample_on_a_corner_of_a_grid_has_one_owner() {
     for ways in 0..8 {
@@ -187,12 +190,13 @@ fn every_sample_on_a_corner_of_a_grid_has_one_owner() {
                 covered.iter_mut().zip(seen).for_each(|(count, seen)| *count += u32::from(seen.is_some()));
             }
             for (slot, &count) in covered.iter().enumerate() {
-                let look = probe.at(slot);
-                // Half open: the sample is moved by an infinitely small step towards +x and, smaller still, +y.
-                let from = image(&mesh.vertices[0], &look, &shear);
-                let at = [look.x - from[0], look.y - from[1]];
+                let position = probe.at(slot);
+                // Half open: the sample is moved by an infinitely small step towards +x and, smaller still,
+                // +y.
+                let from = image(&mesh.vertices[0], &position, &shear);
+                let at = [position.x - from[0], position.y - from[1]];
                 let expected = at.iter().all(|c| (0.0..16.0).contains(c));
-                assert_eq!(count, u32::from(expected), "moving {moving} {shear:?}: {at:?} {look:?}");
+                assert_eq!(count, u32::from(expected), "moving {moving} {shear:?}: {at:?} {position:?}");
                 once += count;
                 columns += u32::from(at[0] % 4.0 == 0.0 && expected);
             }

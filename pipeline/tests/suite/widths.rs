@@ -1,4 +1,4 @@
-//! Oracle: vectors of every width of this machine find the same hits with the same depths.
+//! All vector widths of this machine find the same hits with the same depths.
 
 use crate::common::*;
 use pipeline::sample_test::{Hits, Target, Width, test_run_at};

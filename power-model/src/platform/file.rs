@@ -1,4 +1,4 @@
-//! A platform as it stands in a file.
+//! File format of a platform.
 
 use activity::{Event, Unit, spec};
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use crate::PlatformError;
 use crate::quantity::{Nanometres, RecordedIdle, Seconds, Source, Sourced, Volts, Watts};
 use crate::row::EnergyRow;
 
-/// A platform as it is written in a file.
+/// A platform as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Written {
@@ -55,7 +55,7 @@ impl TryFrom<String> for UnitName {
 }
 
 impl Written {
-    /// Puts what is written in order, or says what is there twice or not at all.
+    /// Check the file and build the platform. The error names a duplicate or missing entry.
     pub(super) fn check(self, file: &str) -> Result<Platform, PlatformError> {
         refuse_repeated_rows(&self.energy_rows, file)?;
         refuse_repeated_names(&self.system, file)?;
@@ -100,7 +100,7 @@ fn refuse_repeated_names(system: &System, file: &str) -> Result<(), PlatformErro
     Ok(())
 }
 
-/// One row per unit in the order of [`Unit::ALL`], or the unit that is there twice or not at all.
+/// One row per unit in the order of [`Unit::ALL`]. The error names a duplicate or missing unit.
 fn complete(rows: Vec<UnitRow>, file: &str) -> Result<Vec<UnitPower>, PlatformError> {
     let mut units: Vec<Option<UnitPower>> = vec![None; Unit::COUNT];
     for UnitRow { unit: UnitName(unit), clock_tree_w, idle_unit_w } in rows {

@@ -1,4 +1,5 @@
-//! What surrounds the events: voltages, constant power, leakage, clock trees, idle.
+//! Platforms: all power that is not caused by events, such as voltages, constant power, leakage, clock trees
+//! and idle power.
 
 mod file;
 mod system;
@@ -16,161 +17,162 @@ use crate::quantity::{
 };
 use crate::row::EnergyRow;
 
-/// The platforms that come with the crate, by name.
+/// Built-in platforms by name.
 const BUILTIN: [(&str, &str); 3] = [
     ("reference", include_str!("../../platforms/reference.ron")),
     ("iphone_4s", include_str!("../../platforms/iphone_4s.ron")),
     ("hd_4000", include_str!("../../platforms/hd_4000.ron")),
 ];
 
-/// The supply at which a power meter would be put.
+/// The supply where a power meter is attached.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rail {
-    /// Its name in a trace.
+    /// Name in a trace.
     pub name: String,
-    /// Its voltage, which turns watts into amperes; not the core voltage.
+    /// Voltage of the rail, which converts watts to amperes. It differs from the core voltage.
     pub voltage_v: Sourced<Volts>,
 }
 
-/// How energies of another node's table become this node's.
+/// Conversion of energies from the node of another table.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScaledFrom {
-    /// The node of the table.
+    /// Node of the table.
     pub node_nm: Nanometres,
-    /// Energy of an event in the core on this platform's node over that on the table's, at one voltage. Memory has nodes of
-    /// its own and is not scaled.
+    /// Energy of a core event on the platform's node over that on the table's node, at equal voltage. Memory
+    /// has separate nodes and is not scaled.
     pub core_scale: Sourced<Ratio>,
 }
 
-/// Leakage of the powered core: `P = reference_w (V/V0)^voltage_exponent 2^((T - T0) / doubling)`, with V0 the
-/// platform's [`Platform::v0_v`].
+/// Leakage of the powered core: `P = reference_w (V/V0)^voltage_exponent 2^((T - T0) / doubling)`, with V0
+/// the platform's [`Platform::v0_v`].
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Leakage {
-    /// At V0 and `reference_c`.
+    /// Leakage at V0 and `reference_c`.
     pub reference_w: Sourced<Watts>,
-    /// 1 for a current that does not depend on the voltage (Butts and Sohi, MICRO 2000), more with
+    /// Exponent of the voltage: 1 for a constant leakage current (Butts and Sohi, MICRO 2000), more with
     /// drain-induced barrier lowering.
     pub voltage_exponent: Sourced<Exponent>,
-    /// The junction temperature, held fixed for the whole run.
+    /// Junction temperature, constant for the whole run.
     pub temperature_c: Sourced<Celsius>,
-    /// The junction temperature `reference_w` holds at.
+    /// Junction temperature of `reference_w`.
     pub reference_c: Sourced<Celsius>,
-    /// How many degrees double the leakage; 0 or less switches the dependence off.
+    /// Temperature difference that doubles the leakage; 0 or less makes it independent of temperature.
     pub doubling_c: Sourced<Celsius>,
 }
 
-/// What one unit draws apart from its events, at [`Platform::v0_v`] and the clock of the GPU it is used with; both
-/// scale with (V/V0)^2. It counts only in frames that use the unit.
+/// Power of one unit apart from its events, at [`Platform::v0_v`] and the clock of the GPU in use. Both
+/// values scale with (V/V0)^2 and apply only in frames that use the unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitPower {
-    /// The unit.
+    /// Unit.
     pub unit: Unit,
-    /// While it is busy: its clock tree and the registers that toggle whatever it does.
+    /// Power while busy: its clock tree and registers that toggle with any work.
     pub clock_tree_w: Sourced<Watts>,
-    /// While it is powered but idle: what clock gating does not stop.
+    /// Power while powered but idle, which clock gating does not remove.
     pub idle_unit_w: Sourced<Watts>,
 }
 
-/// A machine: everything about its power that is not an event.
+/// A platform: everything about the power of a machine that is not an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Platform {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What it is, in words.
+    /// Description.
     pub doc: String,
-    /// Its process node in nanometres, which the energy table's must match, or that of `energy_from`.
+    /// Process node in nanometres. It has to match the energy table's, or `energy_from` gives the table's
+    /// node.
     pub node_nm: u32,
-    /// The table it uses instead of one for its own node.
+    /// Conversion from a table of another node.
     pub energy_from: Option<ScaledFrom>,
-    /// The supply a meter would see.
+    /// The supply that a meter measures.
     pub rail: Rail,
-    /// The core voltage at which the watts of this platform are stated.
+    /// Core voltage for which the watts of this platform are stated.
     pub v0_v: Sourced<Volts>,
-    /// The core voltage it runs at.
+    /// Core voltage in operation.
     pub v_v: Sourced<Volts>,
-    /// Drawn as long as a frame runs, whatever it does.
+    /// Constant power during a frame.
     pub constant_w: Sourced<Watts>,
     /// Leakage of the powered core.
     pub leakage: Leakage,
     /// One row per unit, in the order of [`Unit::ALL`].
     units: Vec<UnitPower>,
-    /// The floor between frames: everything, with the core power-gated.
+    /// Power between frames: everything, with the core power-gated.
     pub idle_w: Sourced<Watts>,
-    /// Free-running, the gap between the end of a frame and the start of the next, while the driver submits.
+    /// Free-running: gap between the end of a frame and the start of the next, in which the driver submits.
     pub submit_gap_s: Sourced<Seconds>,
     /// Idle time recorded before the first frame.
     pub lead_in_s: Sourced<RecordedIdle>,
     /// Idle time recorded after the last frame.
     pub tail_s: Sourced<RecordedIdle>,
-    /// What surrounds the GPU and shows in a recording: launch, blocking calls, the operating system.
+    /// Contributions around the GPU that a recording shows: launch, blocking calls, the operating system.
     pub system: System,
-    /// Rows that replace the energy table's, for devices the table cannot know.
+    /// Rows that replace rows of the energy table, for devices with other energies.
     energy_rows: Vec<EnergyRow>,
 }
 
-/// One number of a platform and where it comes from.
+/// One number of a platform and its source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance<'a> {
-    /// The field, for example `leakage.reference_w`.
+    /// Field, for example `leakage.reference_w`.
     pub field: String,
-    /// The number.
+    /// Value.
     pub value: f64,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
-    /// Where it comes from, in one word.
+    /// Kind of source.
     pub basis: Basis,
-    /// Where it comes from, in words.
+    /// Source in words.
     pub source: &'a str,
 }
 
 impl Platform {
-    /// The names of the platforms that come with the crate.
+    /// Names of the built-in platforms.
     pub fn names() -> impl Iterator<Item = &'static str> {
         BUILTIN.into_iter().map(|(name, _)| name)
     }
 
-    /// The platform called `name` that comes with the crate.
+    /// The built-in platform `name`.
     ///
     /// # Errors
     /// [`PlatformError::Unknown`] with the nearest known name.
     pub fn builtin(name: &str) -> Result<Self, PlatformError> {
         let Some((_, text)) = BUILTIN.into_iter().find(|(known, _)| *known == name) else {
-            let mend = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
-            return Err(PlatformError::Unknown { name: name.to_owned(), mend });
+            let suggestion = spec::suggestion(name, &BUILTIN.map(|(known, _)| known));
+            return Err(PlatformError::Unknown { name: name.to_owned(), suggestion });
         };
         Self::parse(text, &format!("power-model/platforms/{name}.ron"))
     }
 
-    /// Reads the platform in the RON file at `path`.
+    /// Read the platform in the RON file at `path`.
     ///
     /// # Errors
-    /// [`PlatformError`] when the file cannot be read, a number is out of range, or a unit is missing.
+    /// [`PlatformError`] if the file cannot be read, a number is out of range, or a unit is missing.
     pub fn load(path: &Path) -> Result<Self, PlatformError> {
         spec::load::<Written>(path)?.check(&path.display().to_string())
     }
 
-    /// Parses RON `text`; `file` stands for the file in messages.
+    /// Parse RON `text`; `file` is the file name in messages.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// As for [`Self::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, PlatformError> {
         spec::parse::<Written>(text, file)?.check(file)
     }
 
-    /// What each unit draws apart from its events, in the order of [`Unit::ALL`].
+    /// Power of every unit apart from its events, in the order of [`Unit::ALL`].
     pub fn units(&self) -> &[UnitPower] {
         &self.units
     }
 
-    /// Rows that replace the energy table's.
+    /// Rows that replace rows of the energy table.
     pub fn energy_rows(&self) -> &[EnergyRow] {
         &self.energy_rows
     }
 
-    /// Leakage at the core voltage and temperature it runs at, in watts.
+    /// Leakage at the operating voltage and temperature, in watts.
     pub fn leakage_w(&self) -> f64 {
         let Leakage { reference_w, voltage_exponent, temperature_c, reference_c, doubling_c } = &self.leakage;
         let voltage = libm::pow(self.voltage_ratio(), voltage_exponent.value());
@@ -182,18 +184,19 @@ impl Platform {
         reference_w.value() * voltage * libm::exp2(doublings)
     }
 
-    /// The node of the table it uses, and what the table's energies of core events are multiplied with.
+    /// Node of the table in use, and the factor for its energies of core events.
     pub fn table_node(&self) -> (u32, f64) {
         let from = self.energy_from.as_ref();
         from.map_or((self.node_nm, 1.0), |from| (from.node_nm.get(), from.core_scale.value()))
     }
 
-    /// V/V0: the core voltage it runs at over the one its watts are stated at.
+    /// V/V0: operating core voltage over the voltage for which the watts are stated.
     pub fn voltage_ratio(&self) -> f64 {
         self.v_v.value() / self.v0_v.value()
     }
 
-    /// Every number with its source, in the order of the file; energy rows excepted, which carry their own.
+    /// Every number with its source, in the order of the file. Energy rows have their own sources and are
+    /// left out.
     pub fn provenance(&self) -> Vec<Provenance<'_>> {
         let scale =
             self.energy_from.as_ref().map(|from| provenance("energy_from.core_scale", &from.core_scale));

@@ -1,51 +1,51 @@
-//! The system around a GPU as it stands in a platform's file.
+//! The system around a GPU, as a platform file describes it.
 
 use serde::Deserialize;
 
 use super::{Provenance, provenance};
 use crate::quantity::{Hertz, Interval, Seconds, Share, Sourced, Watts};
 
-/// What a platform does besides drawing. Every part may be left out.
+/// Power of the system apart from drawing. All parts are optional.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct System {
-    /// Frames a second at which applications are capped: a whole part of the display's ticks.
+    /// Frame rate at which applications are capped: the rate of the display's ticks over an integer.
     pub frame_cap_hz: Option<Sourced<Hertz>>,
-    /// What an application draws more just after its launch.
+    /// Extra power of an application after its launch.
     pub launch: Option<Launch>,
-    /// What a blocking finish at the end of each frame costs.
+    /// Cost of a blocking finish at the end of each frame.
     pub finish: Option<Finish>,
-    /// What the operating system does on the side.
+    /// Periodic activity of the operating system.
     pub disturbances: Vec<Disturbance>,
 }
 
-/// After its launch an application draws more for a while, whatever it does: a state of voltages and clocks that is left
-/// at once (Johnsson and Akenine-Moeller, Paper III, section 5.1).
+/// Extra power after the launch of an application, independent of its work. It stems from a state of voltages
+/// and clocks that ends abruptly (Johnsson and Akenine-Moeller, Paper III, section 5.1).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Launch {
-    /// The power on top, between frames as within them.
+    /// Extra power, during frames and between them.
     pub extra_w: Sourced<Watts>,
-    /// How long, from the first frame's start.
+    /// Duration from the start of the first frame.
     pub duration_s: Sourced<Seconds>,
 }
 
-/// A call that returns when everything drawn is finished, such as `glFinish` (Paper III, section 5.2).
+/// A call that returns when all drawing is finished, such as `glFinish` (Paper III, section 5.2).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finish {
-    /// What the processor draws on top while it waits, from the frame's start on: asleep it would draw less.
+    /// Extra power of the waiting processor, from the start of the frame on; a sleeping processor draws less.
     pub waiting_w: Sourced<Watts>,
-    /// From the last pixel to the return of the call.
+    /// Time from the last pixel to the return of the call.
     pub return_s: Sourced<Seconds>,
 }
 
-/// Something that happens again and again and draws power on top (Paper III, section 5.3).
+/// A recurring disturbance with extra power (Paper III, section 5.3).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Written")]
 pub struct Disturbance(Written);
 
-/// As it stands in the file, before anything is known of whether it can be.
+/// The disturbance as written in the file, before validation.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -73,39 +73,39 @@ impl TryFrom<Written> for Disturbance {
 }
 
 impl Disturbance {
-    /// Its name.
+    /// Name.
     pub fn name(&self) -> &str {
         &self.0.name
     }
 
-    /// The time from one to the next, on average, s.
+    /// Mean time between occurrences, s.
     pub fn period_s(&self) -> f64 {
         self.0.period_s.value()
     }
 
-    /// Which part of its period each one may come late: 0 for a clock, 1 for no pattern but its mean.
+    /// Largest delay of an occurrence as a fraction of the period: 0 is periodic, 1 is irregular.
     pub fn irregularity(&self) -> f64 {
         self.0.irregularity.value()
     }
 
-    /// How long each lasts, at most a period, s.
+    /// Duration of an occurrence, at most a period, s.
     pub fn duration_s(&self) -> f64 {
         self.0.duration_s.value()
     }
 
-    /// The power on top, on average, W.
+    /// Mean extra power, W.
     pub fn extra_w(&self) -> f64 {
         self.0.extra_w.value()
     }
 
-    /// The same with another power on top.
+    /// The disturbance with another extra power.
     #[must_use]
     pub fn drawing(mut self, extra_w: Sourced<Watts>) -> Self {
         self.0.extra_w = extra_w;
         self
     }
 
-    /// By which part of it each one may draw more or less: 0 where all are alike.
+    /// Largest relative deviation of an occurrence's extra power; 0 if all are equal.
     pub fn variation(&self) -> f64 {
         self.0.variation.value()
     }

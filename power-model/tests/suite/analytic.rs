@@ -1,4 +1,4 @@
-//! Analytic: cases whose watts and joules are known in closed form.
+//! Cases with power and energy known in closed form.
 
 use super::common::{at, bare, model, reference, steady, table, volts, watts};
 use activity::{Counts, Event, Unit};
@@ -8,7 +8,7 @@ const US_PS: u64 = 1_000_000;
 
 #[test]
 fn an_event_at_a_known_rate_draws_rate_times_energy() {
-    // 3000 a microsecond are 3e9 a second.
+    // 3000 per microsecond are 3e9 per second.
     let frame = model(&bare()).frame(&steady(US_PS, 4, Event::SampleMadds, 3000, 0)).unwrap();
     let expected_w = 3e9 * table().nominal()[Event::SampleMadds as usize];
     for watts in frame.watts() {
@@ -32,7 +32,7 @@ fn core_energy_goes_with_the_square_of_the_voltage_and_memory_does_not() {
 }
 
 #[test]
-fn a_frame_that_does_nothing_draws_the_constant_and_the_leakage() {
+fn an_idle_frame_draws_constant_power_and_leakage() {
     let platform = reference();
     let frame = model(&platform).frame(&steady(US_PS, 3, Event::Draws, 0, 0)).unwrap();
     let seconds = 3e-6;
@@ -78,7 +78,7 @@ fn bins_past_the_end_of_the_frame_cost_nothing() {
 }
 
 #[test]
-fn counts_from_a_file_cost_what_their_rows_say() {
+fn counts_from_a_file_have_the_energy_of_their_rows() {
     let mut counts = Counts::default();
     counts[Event::DramReadBytes] = 5_000_000;
     counts[Event::TilesCulledSides] = 99;

@@ -1,4 +1,4 @@
-//! What several tests need.
+//! Helpers shared by the tests.
 
 use activity::{Bin, Event, Timeline, Unit};
 use power_model::{EnergyTable, Platform, PowerModel, Source, Sourced, Volts, Watts};
@@ -13,22 +13,22 @@ pub fn reference() -> Platform {
     Platform::builtin("reference").unwrap()
 }
 
-/// A number of watts made up for a test.
+/// An arbitrary power for a test.
 pub fn watts(watts: f64) -> Sourced<Watts> {
     Sourced::Assumed(Watts::new(watts).unwrap(), source())
 }
 
-/// A number of volts made up for a test.
+/// An arbitrary voltage for a test.
 pub fn volts(volts: f64) -> Sourced<Volts> {
     Sourced::Assumed(Volts::new(volts).unwrap(), source())
 }
 
-/// The source of a number made up for a test.
+/// The source of an arbitrary number.
 pub fn source() -> Source {
     Source::try_from("for this test".to_owned()).unwrap()
 }
 
-/// A platform on which only events draw power.
+/// A platform whose power comes from events only.
 pub fn bare() -> Platform {
     let text = include_str!("bare.ron");
     Platform::parse(text, "bare.ron").unwrap()
@@ -47,7 +47,7 @@ pub fn steady(bin_ps: u64, bins: usize, event: Event, count: u64, busy_ps: u64) 
     Timeline { bin_ps, duration_ps: bin_ps * bins as u64, bins: vec![bin; bins] }
 }
 
-/// The place of `unit` in an array by unit.
+/// Index of `unit` in an array by unit.
 pub fn at(unit: Unit) -> usize {
     unit as usize
 }

@@ -1,6 +1,6 @@
-//! Oracle: every row of the 28 nm table is rebuilt from the published ingredients its `source` names.
+//! Oracle: every row of the 28 nm table is recomputed from the published numbers that its `source` names.
 //!
-//! The table holds three digits; a row that says something else than its ingredients fails here.
+//! The table holds three digits; a row that differs from its derivation fails here.
 
 use activity::{Bin, Event, Timeline};
 
@@ -36,12 +36,12 @@ const CACTI: [(u32, f64, [f64; 2], [f64; 2]); 6] = [
     (256, 64.0, [62.11, 93.76], [42.66, 46.92]),
 ];
 
-/// How much of an access is a write.
+/// Fraction of an access that is a write.
 const READ: f64 = 0.0;
 const HALF: f64 = 0.5;
 const WRITE: f64 = 1.0;
 
-/// Rule S of the table: `bytes` of an SRAM of `kb` kilobytes.
+/// Rule S of the table: an access of `bytes` to an SRAM of `kb` kilobytes.
 fn sram(kb: u32, bytes: f64, writes: f64) -> Interval {
     let (_, port_bytes, fast, low_power) = CACTI.into_iter().find(|row| row.0 == kb).unwrap();
     let blend = |[read, write]: [f64; 2]| read + writes * (write - read);
@@ -154,8 +154,9 @@ fn every_row_follows_from_its_ingredients() {
     }
 }
 
-/// A second opinion on the multiply-add: what it is made of bounds it from below, two independent figures from above:
-/// the FP64 one of 40 pJ at 28 nm over four (a multiplier grows with the square of its width), and the shader core's.
+/// An independent check of the multiply-add. Its components bound it from below. Two independent numbers
+/// bound it from above: the FP64 one of 40 pJ at 28 nm over four (a multiplier grows with the square of its
+/// width), and the shader core's.
 #[test]
 fn a_multiply_add_lies_between_published_figures() {
     let madd_pj = table().nominal()[Event::SampleMadds as usize] * 1e12;
@@ -164,9 +165,9 @@ fn a_multiply_add_lies_between_published_figures() {
     assert!(madd_pj < shader_pj && shader_pj < 31.0, "{shader_pj} pJ");
 }
 
-/// The further from the arithmetic, the dearer a byte: cache line, L2 line, DRAM.
+/// Energy per byte grows with the distance from the arithmetic: cache line, L2 line, DRAM.
 #[test]
-fn a_byte_costs_more_the_further_it_comes() {
+fn energy_per_byte_grows_with_distance() {
     for joules in [table().low(), table().nominal(), table().high()] {
         let per_byte = [
             joules[Event::TextureLines as usize] / 64.0,
@@ -177,16 +178,16 @@ fn a_byte_costs_more_the_further_it_comes() {
     }
 }
 
-/// An LPDDR3 channel pair at its peak of 12.8 GB/s draws about a watt, as it should (43 pJ/B in the device alone: 0.55 W).
+/// An LPDDR3 channel pair at its peak of 12.8 GB/s draws about 1 W (43 pJ/B in the device alone: 0.55 W).
 #[test]
 fn memory_at_its_peak_draws_between_the_device_and_three_times_it() {
     let peak_w = 12.8e9 * table().nominal()[Event::DramReadBytes as usize];
     assert!((0.55..3.0 * 0.55).contains(&peak_w), "{peak_w} W");
 }
 
-/// What the reference platform was made up to be. The rates are those its file reasons with, at 400 MHz.
+/// Design target of the reference platform, with the rates of its file at 400 MHz.
 #[test]
-fn the_reference_draws_about_a_watt_at_rest_and_a_few_at_full_load() {
+fn the_reference_draws_about_a_watt_when_idle_and_a_few_at_full_load() {
     let platform = reference();
     let millisecond_ps = 1_000_000_000;
     let mut bin = Bin { busy_ps: [millisecond_ps; activity::Unit::COUNT], ..Bin::default() };

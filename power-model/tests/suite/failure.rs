@@ -1,4 +1,4 @@
-//! Failure: each mistake gives one message that names the file, the place, what is wrong and how to mend it.
+//! Errors: each mistake gives one message with the file, the position, what is wrong and how to fix it.
 
 use std::path::Path;
 
@@ -11,25 +11,25 @@ const TABLE: &str = include_str!("../../tables/28nm.ron");
 const PLATFORM: &str = include_str!("../../platforms/reference.ron");
 const PHONE: &str = include_str!("../../platforms/iphone_4s.ron");
 
-/// The message for the table with `from` replaced by `to` once.
+/// The message for the table with the first `from` replaced by `to`.
 fn table_error(from: &str, to: &str) -> String {
     assert!(TABLE.contains(from), "the table has no `{from}`");
     EnergyTable::parse(&TABLE.replacen(from, to, 1), "mine.ron").unwrap_err().to_string()
 }
 
-/// The message for the platform with `from` replaced by `to` once.
+/// The message for the platform with the first `from` replaced by `to`.
 fn platform_error(from: &str, to: &str) -> String {
     assert!(PLATFORM.contains(from), "the platform has no `{from}`");
     Platform::parse(&PLATFORM.replacen(from, to, 1), "mine.ron").unwrap_err().to_string()
 }
 
-/// The message for the phone with `from` replaced by `to` once.
+/// The message for the phone with the first `from` replaced by `to`.
 fn phone_error(from: &str, to: &str) -> String {
     assert!(PHONE.contains(from), "the phone has no `{from}`");
     Platform::parse(&PHONE.replacen(from, to, 1), "mine.ron").unwrap_err().to_string()
 }
 
-/// The line of `text` on which `what` first stands, from 1.
+/// First line of `text` that contains `what`, from 1.
 fn line_of(text: &str, what: &str) -> usize {
     1 + text.lines().position(|line| line.contains(what)).unwrap()
 }
@@ -63,7 +63,7 @@ fn an_event_without_a_row_is_named() {
 }
 
 #[test]
-fn energies_that_are_not_energies_are_refused_where_they_stand() {
+fn invalid_energies_are_refused_with_their_position() {
     for bad in ["-1", "NaN", "inf", "1e300"] {
         let message = table_error("nominal_pj: 600", &format!("nominal_pj: {bad}"));
         let place = format!("mine.ron:{}:", line_of(TABLE, "nominal_pj: 600"));
@@ -118,7 +118,7 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
-fn a_platforms_numbers_are_checked_where_they_stand() {
+fn invalid_platform_numbers_are_refused_with_their_position() {
     for (from, to, range) in [
         ("constant_w: Assumed(0.80", "constant_w: Assumed(-0.80", "-0.8 W is not a number from 0"),
         ("idle_w: Assumed(0.95", "idle_w: Assumed(NaN", "NaN W is not a number"),
@@ -158,7 +158,7 @@ fn a_platforms_own_rows_are_there_once_each() {
 }
 
 #[test]
-fn what_surrounds_a_platform_is_checked_where_it_stands() {
+fn invalid_surroundings_are_refused_with_their_position() {
     for (from, to, parts) in [
         ("launch: (", "lunch: (", ["unknown field `lunch`", "did you mean `launch`?"]),
         ("waiting_w: ", "wating_w: ", ["unknown field `wating_w`", "did you mean `waiting_w`?"]),
@@ -188,7 +188,7 @@ fn what_surrounds_a_platform_is_checked_where_it_stands() {
 }
 
 #[test]
-fn a_disturbance_ends_before_it_comes_again_and_has_a_name_of_its_own() {
+fn a_disturbance_is_shorter_than_its_period_and_has_a_unique_name() {
     let message = phone_error("duration_s: Published(0.090", "duration_s: Published(6");
     assert_says(&message, &["mine.ron:", "`five_seconds` lasts 6 s but comes every 5 s", "shorten it"]);
     let message = phone_error("name: \"stray_spike\"", "name: \"regular_spike\"");

@@ -1,4 +1,4 @@
-//! Tests of the whole crate, by what they promise.
+//! Tests of the whole crate, by kind.
 
 #[cfg(test)]
 mod analytic;

@@ -1,4 +1,4 @@
-//! Property: what holds for any timeline and any run.
+//! Properties of all timelines and runs.
 
 use super::common::{model, reference};
 use activity::{Bin, Event, Timeline, Unit};
@@ -20,7 +20,7 @@ fn bin(length_ps: u64) -> impl Strategy<Value = Bin> {
     })
 }
 
-/// One to eight bins, the last one cut anywhere.
+/// One to eight bins; the last one may be partial.
 fn timeline() -> impl Strategy<Value = Timeline> {
     (1_000..20_000_000_u64, 1..8_usize, 1..1_000_u64).prop_flat_map(|(bin_ps, count, cut)| {
         let last_ps = 1 + (bin_ps - 1) * cut / 1_000;
@@ -140,7 +140,8 @@ proptest! {
     }
 }
 
-/// One microsecond bins for two minutes' worth of frames: sums must not drift with the number of bins.
+/// Bins of one microsecond over frames of two minutes in total: rounding errors must not grow with the number
+/// of bins.
 #[test]
 fn a_million_bins_keep_the_sum_and_the_integral_together() {
     let mut timeline = super::common::steady(1_000_000, 4_000, Event::ShaderOps, 1_000, 400_000);

@@ -1,4 +1,4 @@
-//! What surrounds the GPU, in closed form: launch, blocking finish, disturbances.
+//! Surroundings of the GPU in closed form: launch, blocking finish, disturbances.
 
 use activity::Event;
 use power_model::{
@@ -19,14 +19,14 @@ fn phone() -> Platform {
     Platform::builtin("iphone_4s").unwrap()
 }
 
-/// A phone on which nothing but what is named happens on the side.
+/// A phone with no disturbance except the given one.
 fn quiet(but: &str) -> Platform {
     let mut phone = phone();
     phone.system.disturbances.retain(|disturbance| disturbance.name() == but);
     phone
 }
 
-/// Equal frames of 20 ms at 30 a second.
+/// Equal frames of 20 ms at 30 frames per second.
 fn thirty(platform: &Platform, frames: usize) -> Run {
     let frame: FramePower =
         model(platform).frame(&steady(MS_PS, 20, Event::ShaderOps, 4_000_000, MS_PS / 2)).unwrap();
@@ -44,7 +44,7 @@ fn recorded(curve: &Curve) -> Trace {
     Device::new(spec).unwrap().noise_free().sample(curve, 0.0, curve.end_s()).unwrap().trace
 }
 
-/// Start to start, from the recording alone.
+/// Energies from start to start, from the recording alone.
 fn energies_j(surrounded: &Surrounded) -> Vec<f64> {
     let trace = recorded(&surrounded.curve);
     let integral = PowerIntegral::new(&trace);
@@ -83,7 +83,7 @@ fn a_blocking_finish_costs_its_power_until_it_returns_and_leaves_idle_alone() {
         let idle = |curve: &Curve| curve.mean_power_w(frame.finish_s + 1e-9, frame.end_s);
         assert_eq!(idle(&blocked.curve), idle(&run.curve));
     }
-    // The old method, begin to finish: more than the new one where a frame is nearly all work, less where it is not.
+    // Begin to finish gives more than start to start if work fills most of the frame, and less otherwise.
     let period_s: f64 = 1.0 / 30.0;
     let idle_w = phone.idle_w.value();
     let gain_j = |busy_s: f64| waiting_w * (busy_s + return_s) - idle_w * (period_s - busy_s - return_s);
@@ -112,14 +112,14 @@ fn a_periodic_disturbance_touches_the_frames_that_overlap_it_and_no_others() {
             let overlap_s: f64 =
                 disturbed.pulses.iter().map(|p| p.overlap_s(frame.start_s, frame.end_s)).sum();
             assert!((frame.extra_j - 0.4 * overlap_s).abs() < 1e-12);
-            // What is less than a thousandth of a frame's energy nobody can tell from rounding.
+            // Less than a thousandth of a frame's energy is within rounding.
             assert!(out == (overlap_s > 0.0) || overlap_s < 1e-3, "overlap {overlap_s} s, outlier {out}");
         }
     }
 }
 
 #[test]
-fn what_is_irregular_comes_once_in_a_period_of_its_own_and_another_time_with_another_seed() {
+fn an_irregular_disturbance_occurs_once_per_period_at_times_of_its_seed() {
     let phone = quiet("stray_spike");
     let run = thirty(&phone, 300);
     let starts = |seed| -> Vec<f64> {
@@ -133,10 +133,10 @@ fn what_is_irregular_comes_once_in_a_period_of_its_own_and_another_time_with_ano
     assert!((one.len() as f64 - expected).abs() <= 3.0, "{} for {expected}", one.len());
     let gaps: Vec<f64> = one.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(gaps.iter().all(|gap| (0.0..2.0 * 0.066).contains(gap)));
-    // Two numbers uniform in a period differ by a triangular distribution, of variance P^2/6.
+    // The difference of two uniform numbers of a period has a triangular distribution, with variance P^2/6.
     let variance = gaps.iter().map(|gap| (gap - 0.066) * (gap - 0.066)).sum::<f64>() / gaps.len() as f64;
     assert!((variance / (0.066 * 0.066 / 6.0) - 1.0).abs() < 0.4, "{variance}");
-    // 0.2 W, from half to one and a half of it: uniform, so of variance 0.2^2 / 12.
+    // 0.2 W, times 0.5 to 1.5, uniform: variance 0.2^2 / 12.
     let drawn = phone.system.surround(&run, &SETTLED).unwrap().pulses;
     let powers: Vec<f64> = drawn.iter().map(|pulse| pulse.extra_w).collect();
     assert!(powers.iter().all(|watts| (0.1..=0.3).contains(watts)));
@@ -149,7 +149,7 @@ fn what_is_irregular_comes_once_in_a_period_of_its_own_and_another_time_with_ano
 fn disturbances_reach_into_the_first_and_the_last_moment() {
     let phone = quiet("five_seconds");
     let run = thirty(&phone, 60);
-    // A disturbance of 90 ms in 5 s is under way at a given moment in 1.8 % of all runs.
+    // A disturbance of 90 ms in 5 s covers a given time in 1.8 % of all runs.
     let under_way = |time_s: f64, seed| {
         let disturbed = phone.system.surround(&run, &Circumstances { seed, ..SETTLED }).unwrap();
         disturbed.pulses.iter().any(|p| (p.start_s..p.end_s).contains(&time_s))
@@ -162,7 +162,7 @@ fn disturbances_reach_into_the_first_and_the_last_moment() {
 }
 
 #[test]
-fn frames_add_up_to_the_curve_whatever_surrounds_them() {
+fn frame_energies_add_up_to_the_curve_in_all_surroundings() {
     for name in ["iphone_4s", "hd_4000"] {
         let platform = Platform::builtin(name).unwrap();
         let run = thirty(&platform, 200);
@@ -178,13 +178,13 @@ fn frames_add_up_to_the_curve_whatever_surrounds_them() {
 }
 
 #[test]
-fn a_table_of_another_node_is_scaled_in_the_core_and_nowhere_else() {
+fn a_table_of_another_node_is_scaled_in_the_core_only() {
     let hd_4000 = Platform::builtin("hd_4000").unwrap();
     let (scaled, table) = (model(&hd_4000), table());
     let volts = hd_4000.v_v.value() / table.v0_v();
     let expected = 0.62 * volts * volts * table.nominal()[Event::SampleMadds as usize];
     assert!((scaled.event_j(Event::SampleMadds) / expected - 1.0).abs() < 1e-12);
-    // Its own rows stand as they are written.
+    // The platform's own rows are not scaled.
     assert!((scaled.event_j(Event::DramReadBytes) / 24e-12 - 1.0).abs() < 1e-12);
     let memory = model(&phone()).event_j(Event::DramReadBytes);
     assert_eq!(memory, table.nominal()[Event::DramReadBytes as usize]);
@@ -214,7 +214,7 @@ fn a_finish_that_returns_after_the_frame_ends_with_it() {
 }
 
 proptest! {
-    /// The energy on top is that of the pulses, each for as long as it lies in the curve.
+    /// The added energy is that of the pulses, each clipped to the curve.
     #[test]
     fn an_overlay_adds_the_energy_of_its_pulses(
         lengths in proptest::collection::vec(1e-4f64..0.5, 1..20),

@@ -133,7 +133,7 @@ impl GpuSpec {
         match spec.validate() {
             Ok(()) => Ok(spec),
             Err((field, message)) => {
-                let place = spec::place_of(text, &field)
+                let place = spec::position_of(text, &field)
                     .map_or_else(|| file.to_owned(), |(line, column)| format!("{file}:{line}:{column}"));
                 Err(GpuError::Value { place, message })
             }

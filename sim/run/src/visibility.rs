@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use pipeline::sampling::SampleSource;
-use pipeline::visibility::{SampleLayout, Sighting, Visibility, resolve};
+use pipeline::visibility::{SampleLayout, Visibility, VisibleTriangle, resolve};
 use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, Settings, frame};
 use serde::Serialize;
 use warnings::{Code, Warning};
@@ -31,7 +31,7 @@ pub struct Rates {
 /// Visible triangles and rates.
 pub struct Found {
     /// Triangle and depth of each sample, in the order `(y width + x) per_pixel + index`.
-    pub seen: Vec<Sighting>,
+    pub seen: Vec<VisibleTriangle>,
     /// Rates.
     pub rates: Rates,
 }

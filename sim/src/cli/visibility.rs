@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use pipeline::SampleTable;
 use pipeline::sampling::SampleSource;
-use pipeline::visibility::Sighting;
+use pipeline::visibility::VisibleTriangle;
 use serde::Serialize;
 use warnings::{Code, Warning};
 use workloads::visibility::{self, CameraSpec, FixedSamples, VisibilityScene, write_hits};
@@ -113,7 +113,12 @@ fn slow_view() -> Warning {
     Warning::new(Code::OrthographicView, message)
 }
 
-fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[Sighting]) -> Result<(), Failure> {
+fn write(
+    out: &Path,
+    scene: &VisibilityScene,
+    per_pixel: u32,
+    seen: &[VisibleTriangle],
+) -> Result<(), Failure> {
     let (triangles, depths): (Vec<u32>, Vec<f32>) = seen.iter().copied().unzip();
     let written = traces::io::atomic::write_file(out, |file: &mut BufWriter<File>| {
         write_hits(scene.viewport, per_pixel, &triangles, &depths, file)?;

@@ -1,32 +1,33 @@
-//! Which channel, bank and row a line lies in.
+//! Address map of memory: channel, bank and row of a line.
 
 use crate::LINE_BYTES;
 use crate::clock::gcd;
 use crate::spec::DramSpec;
 
-/// The place of a line.
+/// Address of a line in the memory chips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RowPlace {
-    /// The channel.
+pub struct RowAddress {
+    /// Channel.
     pub channel: usize,
-    /// The bank of the channel.
+    /// Bank in the channel.
     pub bank: usize,
-    /// The row of the bank.
+    /// Row in the bank.
     pub row: u32,
 }
 
-/// Addresses go round the channels in chunks, then along a row, then round the banks.
+/// AddressMap from line numbers to channels, banks and rows. Chunks of lines go round the channels, then along a
+/// row, then round the banks.
 #[derive(Clone, Copy, Debug)]
-pub struct Map {
+pub struct AddressMap {
     lines_per_chunk: Divisor,
     lines_per_row: Divisor,
-    /// Lines side by side that share a chunk and a row.
-    together: Divisor,
+    /// Consecutive lines that share both a chunk and a row.
+    lines_per_group: Divisor,
     channels: Divisor,
     banks: Divisor,
 }
 
-/// A number at least 1 to divide by, most often a power of two.
+/// Divisor of at least 1, usually a power of two.
 #[derive(Clone, Copy, Debug)]
 struct Divisor {
     by: u32,
@@ -47,8 +48,8 @@ impl Divisor {
     }
 }
 
-impl Map {
-    /// The map of these chips.
+impl AddressMap {
+    /// Address map of the chips in `spec`.
     pub fn new(spec: &DramSpec) -> Self {
         let [chunk, row] =
             [spec.interleave_bytes, spec.row_bytes].map(|bytes| (bytes.get() / LINE_BYTES).max(1));
@@ -56,24 +57,24 @@ impl Map {
     }
 
     fn with(lines_per_chunk: u32, lines_per_row: u32, channels: u32, banks: u32) -> Self {
-        let together = gcd(lines_per_chunk.into(), lines_per_row.into()) as u32;
-        let [lines_per_chunk, lines_per_row, together, channels, banks] =
-            [lines_per_chunk, lines_per_row, together, channels, banks].map(Divisor::new);
-        Self { lines_per_chunk, lines_per_row, together, channels, banks }
+        let lines_per_group = gcd(lines_per_chunk.into(), lines_per_row.into()) as u32;
+        let [lines_per_chunk, lines_per_row, lines_per_group, channels, banks] =
+            [lines_per_chunk, lines_per_row, lines_per_group, channels, banks].map(Divisor::new);
+        Self { lines_per_chunk, lines_per_row, lines_per_group, channels, banks }
     }
 
-    /// Lines with the same number here have one place.
-    pub fn chunk(&self, line: u32) -> u32 {
-        self.together.divide(line).0
+    /// Group of a line. All lines of a group have the same channel, bank and row.
+    pub fn group(&self, line: u32) -> u32 {
+        self.lines_per_group.divide(line).0
     }
 
-    /// The place of line number `line`.
-    pub fn place(&self, line: u32) -> RowPlace {
+    /// Channel, bank and row of a line.
+    pub fn locate(&self, line: u32) -> RowAddress {
         let (chunk, rest) = self.lines_per_chunk.divide(line);
         let (round, channel) = self.channels.divide(chunk);
         let row = self.lines_per_row.divide(round * self.lines_per_chunk.by + rest).0;
         let (row, bank) = self.banks.divide(row);
-        RowPlace { channel: channel as usize, bank: bank as usize, row }
+        RowAddress { channel: channel as usize, bank: bank as usize, row }
     }
 }
 
@@ -82,10 +83,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_go_round_channels_then_along_rows_then_round_banks() {
-        let map = Map::with(4, 8, 2, 2);
+    fn lines_go_round_channels_then_rows_then_banks() {
+        let map = AddressMap::with(4, 8, 2, 2);
         let at = |line| {
-            let RowPlace { channel, bank, row } = map.place(line);
+            let RowAddress { channel, bank, row } = map.locate(line);
             (channel, bank, row)
         };
         assert_eq!(
@@ -96,12 +97,12 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_a_chunk_have_one_place() {
+    fn lines_of_a_group_have_one_address() {
         for (chunk, row) in [(4, 8), (8, 4), (6, 4), (1, 5)] {
-            let map = Map::with(chunk, row, 3, 2);
+            let map = AddressMap::with(chunk, row, 3, 2);
             for line in 1..500 {
-                let same = map.chunk(line) == map.chunk(line - 1);
-                assert!(!same || map.place(line) == map.place(line - 1), "{chunk} {row} {line}");
+                let same = map.group(line) == map.group(line - 1);
+                assert!(!same || map.locate(line) == map.locate(line - 1), "{chunk} {row} {line}");
             }
         }
     }

@@ -1,15 +1,15 @@
-//! Time in grains: whole numbers in which the cycles of every clock are whole.
+//! Time in grains. A grain divides the period of every clock, so all times are integers.
 
 use crate::spec::Clock;
 
-/// A moment or a length of time in grains.
+/// A time or a duration, in grains.
 pub type Time = u64;
 
 const PS_PER_MS: u64 = 1_000_000_000;
-/// Grains in a millisecond beyond which a frame of some seconds would not be counted any more.
-const MOST_GRAINS_PER_MS: u64 = 1_000_000_000_000_000;
+/// Largest number of grains in a millisecond. A frame of some seconds then fits into 64 bits.
+const MAX_GRAINS_PER_MS: u64 = 1_000_000_000_000_000;
 
-/// Two clocks and the grain in which both have whole periods.
+/// Two clocks and their common grain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clocks {
     grains_per_ms: u64,
@@ -17,8 +17,8 @@ pub struct Clocks {
 }
 
 impl Clocks {
-    /// Clocks of the given frequencies, each rounded to a kilohertz; `None` where they have no common grain that is coarse
-    /// enough, or one of them is below a kilohertz.
+    /// Clocks of the given frequencies, each rounded to 1 kHz. `None` if a frequency is below 1 kHz, or if
+    /// the common grain is too fine.
     pub fn new(core_hz: f64, memory_hz: f64) -> Option<Self> {
         let khz = [core_hz, memory_hz].map(|hz| (hz / 1e3).round() as u64);
         let [core, memory] = khz;
@@ -26,22 +26,22 @@ impl Clocks {
             return None;
         }
         let grains_per_ms =
-            (core / gcd(core, memory)).checked_mul(memory).filter(|&g| g <= MOST_GRAINS_PER_MS)?;
+            (core / gcd(core, memory)).checked_mul(memory).filter(|&g| g <= MAX_GRAINS_PER_MS)?;
         Some(Self { grains_per_ms, periods: khz.map(|khz| grains_per_ms / khz) })
     }
 
-    /// Grains of a cycle of `clock`.
+    /// Grains in a cycle of `clock`.
     pub fn period(&self, clock: Clock) -> Time {
         self.periods[clock as usize]
     }
 
-    /// The first edge of any of the clocks after `now`.
+    /// First edge of either clock after `now`.
     pub fn next_edge(&self, now: Time) -> Time {
         let [core, memory] = self.periods.map(|period| now - now % period + period);
         core.min(memory)
     }
 
-    /// The first edge of any of the clocks at or after `at`.
+    /// First edge of either clock at or after `at`.
     pub fn edge_from(&self, at: Time) -> Time {
         let [core, memory] = self.periods.map(|period| at.next_multiple_of(period));
         core.min(memory)
@@ -58,7 +58,7 @@ impl Clocks {
         }
     }
 
-    /// Picoseconds of a length of time, rounded down.
+    /// Picoseconds in `length`, rounded down.
     pub(crate) fn ps_below(&self, length: Time) -> u64 {
         match length.checked_mul(PS_PER_MS) {
             Some(product) => product / self.grains_per_ms,
@@ -66,12 +66,12 @@ impl Clocks {
         }
     }
 
-    /// The first moment that is at `ps` or later.
+    /// First time at or after `ps` picoseconds.
     pub(crate) fn grain_from(&self, ps: u64) -> Time {
         ps.checked_sub(1).map_or(0, |before| self.grain_up_to(before) + 1)
     }
 
-    /// The last moment that is at `ps` or before.
+    /// Last time at or before `ps` picoseconds.
     pub(crate) fn grain_up_to(&self, ps: u64) -> Time {
         match ps.checked_mul(self.grains_per_ms) {
             Some(product) => product / PS_PER_MS,
@@ -79,7 +79,7 @@ impl Clocks {
         }
     }
 
-    /// Whole cycles of `clock` that begin before `at`.
+    /// Cycles of `clock` that begin before `at`.
     pub fn cycles(&self, clock: Clock, at: Time) -> u64 {
         at.div_ceil(self.period(clock))
     }
@@ -99,13 +99,13 @@ mod tests {
         assert_eq!([Clock::Core, Clock::Memory].map(|c| clocks.period(c)), [55, 37]);
         assert_eq!(clocks.next_edge(0), 37);
         assert_eq!(clocks.next_edge(37), 55);
-        // 925 cycles of the core are a microsecond.
+        // 925 cycles of the core clock are 1 us.
         assert_eq!(clocks.ps(925 * 55), 1_000_000);
         assert_eq!(clocks.cycles(Clock::Core, 56), 2);
     }
 
     #[test]
-    fn grains_and_picoseconds_meet() {
+    fn grains_and_picoseconds_convert_both_ways() {
         let clocks = Clocks::new(925e6, 1375e6).unwrap();
         for ps in [0, 1, 19, 20, 1_000_000, 1_000_001] {
             let (first, last) = (clocks.grain_from(ps), clocks.grain_up_to(ps));

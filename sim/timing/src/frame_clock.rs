@@ -1,11 +1,11 @@
-//! The levels, and a clock of any of them.
+//! Timing levels, and a clock for any of them.
 
-use crate::stepped::{self, Manner, Stalled, Stream};
-use crate::{BoundClock, Clocks, Jobs, MAX_CYCLES, MachineSpec, PacketClock, Recorder, Timed};
+use crate::stepped::{self, Stalled, StepOptions, Stream};
+use crate::{BoundClock, Clocks, DemandBuilder, MAX_CYCLES, MachineSpec, PacketClock, Recorder, Timed};
 use activity::{LineAccess, Packet};
 use serde::{Deserialize, Serialize};
 
-/// How time is modelled.
+/// Timing level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
@@ -19,10 +19,10 @@ pub enum Level {
 }
 
 impl Level {
-    /// Every level, the most exact first.
+    /// All levels, the most exact first.
     pub const ALL: [Self; 3] = [Self::Stepped, Self::Packet, Self::Bound];
 
-    /// Its name on the command line and in files.
+    /// Name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Stepped => "stepped",
@@ -32,53 +32,53 @@ impl Level {
     }
 }
 
-/// Why a frame has no time.
+/// Why a frame could not be timed.
 #[derive(Debug, thiserror::Error)]
 pub enum TimingError {
-    /// The reference came to a stop.
+    /// The level `stepped` reached a deadlock.
     #[error(transparent)]
     Stalled(#[from] Stalled),
-    /// A frame takes longer than what the level `packet` keeps in memory.
+    /// The frame is longer than the level `packet` can store.
     #[error(
         "a frame takes more than {MAX_CYCLES} cycles of the core clock, more than `--timing packet` holds: check the rates of the \
          GPU file, ask for fewer pixels or samples, or use `--timing bound`"
     )]
     TooLong,
-    /// The clocks have no common cycle; validated GPUs have one.
+    /// The clocks have no common grain; validated GPUs always have one.
     #[error("the clocks of GPU `{0}` have no common cycle")]
     Clocks(String),
 }
 
-/// All of a GPU that its time depends on.
+/// The properties of a GPU that its timing depends on.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine<'a> {
-    /// Rates, latencies, queues and clock domains of each unit.
+    /// Rates, latencies, queues and clock domains of all units.
     pub units: &'a MachineSpec,
-    /// Both clocks in one time.
+    /// Both clocks.
     pub clocks: Clocks,
-    /// Triangles of a batch, after which tiles are flushed.
+    /// Triangles per batch; tiles are flushed after each batch.
     pub batch_triangles: u32,
 }
 
-/// A clock that takes the packets of a frame.
+/// Clock of one frame, at any level.
 pub struct FrameClock<'a> {
     machine: Machine<'a>,
     state: State,
 }
 
 enum State {
-    Stepped(Box<(Jobs, Stream, Recorder)>),
+    Stepped(Box<(DemandBuilder, Stream, Recorder)>),
     Packet(Box<PacketClock>),
     Bound(Box<BoundClock>),
 }
 
 impl<'a> FrameClock<'a> {
-    /// A clock at zero.
+    /// A clock at time 0.
     pub fn new(level: Level, machine: Machine<'a>, recorder: Recorder) -> Self {
         let Machine { units, clocks, batch_triangles: batch } = machine;
         let state = match level {
             Level::Stepped => {
-                State::Stepped(Box::new((Jobs::new(units, batch), Stream::default(), recorder)))
+                State::Stepped(Box::new((DemandBuilder::new(units, batch), Stream::default(), recorder)))
             }
             Level::Packet => State::Packet(Box::new(PacketClock::new(units, clocks, batch, recorder))),
             Level::Bound => State::Bound(Box::new(BoundClock::new(units, clocks, batch, recorder))),
@@ -86,7 +86,7 @@ impl<'a> FrameClock<'a> {
         Self { machine, state }
     }
 
-    /// The next packet of the stream and the lines it asks the L2 for.
+    /// Add the next packet of the stream and the lines it requests from the L2.
     pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
         match &mut self.state {
             State::Stepped(state) => state.1.push(&mut state.0, packet, lines),
@@ -95,21 +95,21 @@ impl<'a> FrameClock<'a> {
         }
     }
 
-    /// The frame in time.
+    /// Timing of the frame.
     ///
     /// # Errors
-    /// When the reference came to a stop, which would be a fault of the model.
+    /// [`TimingError::Stalled`] is an error of the model; [`TimingError::TooLong`] limits the level `packet`.
     pub fn finish(self) -> Result<Timed, TimingError> {
         Ok(match self.state {
             State::Stepped(state) => {
-                let (makes, stream, recorder) = *state;
+                let (builder, stream, recorder) = *state;
                 stepped::run(
                     self.machine.units,
                     self.machine.clocks,
-                    &makes,
+                    &builder,
                     &stream,
                     recorder,
-                    &Manner::default(),
+                    &StepOptions::default(),
                 )?
             }
             State::Packet(clock) if clock.is_too_long() => return Err(TimingError::TooLong),

@@ -1,25 +1,27 @@
-//! When it happens. One description of a machine, one stream of packets, and a ladder of models of the time they take.
+//! Timing: when the activity happens. One machine description, one stream of packets, and several levels of
+//! models.
 //!
-//! - [`MachineSpec`]: the units of the block diagram, with throughput, latency, queues and clocks.
-//! - [`Jobs`] and [`Job`]: what a packet owes each unit, in cycles; every level reads the same.
-//! - [`Level`] and [`FrameClock`]: the ladder, and a clock at any rung of it; [`AccuracyWarning`]: where a rung is not to be trusted.
-//! - [`stepped`]: the reference, from cycle to cycle.
-//! - [`PacketClock`]: packets, not cycles: a recurrence, with calendars for what is shared.
-//! - [`BoundClock`]: no packets: the busiest unit of each stretch, from [`Totals`] gathered while packets come by.
-//! - [`sampled`]: which frames of many to simulate, and what they say of the others.
-//! - [`streams`]: packets that break levels, and packets that ask for one rate alone.
+//! - [`MachineSpec`]: throughput, latency, queues and clocks of the units of the block diagram.
+//! - [`DemandBuilder`] and [`ServiceDemand`]: cycles that a packet needs at each station, the same for all
+//!   levels.
+//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`AccuracyWarning`]: known
+//!   inaccuracies.
+//! - [`stepped`]: the reference, cycle by cycle.
+//! - [`PacketClock`]: a recurrence over packets, with calendars for shared resources.
+//! - [`BoundClock`]: a roofline over segments of the stream, from [`Totals`] gathered while packets arrive.
+//! - [`sampled`]: which frames of an animation to simulate, and estimates of the others.
+//! - [`streams`]: streams that challenge the levels, and microbenchmarks of single rates.
 //! - [`Recorder`]: events and busy time over time; [`Stalls`]: why units did not work.
 //!
-//! The crate knows no triangle and no joule, and what happens is decided before it is asked: caches are walked in the order
-//! of the stream, here they take their time.
+//! The crate contains no geometry and no energy. The activity is fixed before its timing: cache hits and
+//! misses are decided in stream order, and the levels here only add their time.
 
 mod address;
 mod bound;
 mod clock;
+mod demand;
 mod frame_clock;
-mod job;
 mod packet;
-mod rates;
 mod recorder;
 pub mod sampled;
 mod spec;
@@ -30,41 +32,40 @@ mod warning;
 
 pub use bound::{BoundClock, Totals, bound};
 pub use clock::{Clocks, Time};
+pub use demand::{CLIENTS, DemandBuilder, ServiceDemand, Station};
 pub use frame_clock::{FrameClock, Level, Machine, TimingError};
-pub use job::{CLIENTS, Job, Jobs, Place};
 pub use packet::{MAX_CYCLES, PacketClock};
-pub use rates::Rates;
 pub use recorder::Recorder;
 pub use spec::{
-    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, L2Spec, MachineSpec, RowBytes, ShaderSpec,
-    UnitSpec, WaitCycles, Width,
+    Chips, ClientSpec, Clock, Common, Cycles, DramSpec, Entries, L2Spec, MachineSpec, Rates, RowBytes,
+    ShaderSpec, UnitSpec, WaitCycles, Width,
 };
 pub use stalls::{Reason, Stalls, UnitTime};
 pub use warning::AccuracyWarning;
 
-/// Bytes of a line of memory.
+/// Bytes of a memory line.
 pub const LINE_BYTES: u32 = 64;
 
-/// A frame in time.
+/// Timing of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timed {
     /// Events and busy time over time.
     pub timeline: activity::Timeline,
-    /// Cycles of the core clock.
+    /// Length in cycles of the core clock.
     pub cycles: u64,
-    /// Why units did not work, where the level knows.
+    /// Why units did not work; only at the level `stepped`.
     pub stalls: Option<Stalls>,
-    /// Units visited, summed over cycles; 0 where the level has no cycles.
+    /// Simulated cycles summed over units; 0 at levels without cycles.
     pub unit_cycles: u64,
     /// Packets of the stream.
     pub packets: u64,
-    /// For how long the bank of memory that is busiest with it opens and closes rows, over the busy time of the unit that is
-    /// busiest; where the level knows. Levels differ most where it is large, as they reorder lines differently.
+    /// Row time of the busiest memory bank over the busy time of the busiest unit; `None` at the level
+    /// `stepped`. Levels differ most where it is large, as they order lines differently.
     pub rows: Option<f64>,
 }
 
-/// A length of time over the busy time of the busiest unit.
-fn over_busiest(length_ps: u64, timeline: &activity::Timeline) -> f64 {
+/// `length_ps` over the busy time of the busiest unit.
+fn ratio_to_busiest(length_ps: u64, timeline: &activity::Timeline) -> f64 {
     let busiest = timeline.busy_ps().into_iter().max().unwrap_or(0);
     length_ps as f64 / busiest.max(1) as f64
 }

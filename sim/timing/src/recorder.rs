@@ -1,9 +1,9 @@
-//! Writes down when events happen, in bins.
+//! Recording of events and busy time in bins.
 
 use activity::{Bin, Counts, Event, PacketCounts, Timeline, Unit};
 
-/// The first event of each unit: found once, as finding it is a walk through all events.
-const FIRST: [usize; Unit::COUNT] = {
+/// First event of each unit, as an index. A constant, as finding it takes a search through all events.
+const FIRST_EVENT: [usize; Unit::COUNT] = {
     let mut first = [0; Unit::COUNT];
     let mut at = 0;
     while at < Unit::COUNT {
@@ -13,59 +13,61 @@ const FIRST: [usize; Unit::COUNT] = {
     first
 };
 
-/// The most events of a unit.
-const MOST_EVENTS: usize = {
-    let (mut most, mut at) = (0, 0);
+/// Largest number of events of a unit.
+const MAX_UNIT_EVENTS: usize = {
+    let (mut max, mut at) = (0, 0);
     while at < Unit::COUNT {
         let events = Unit::ALL[at].events();
-        if events.end - events.start > most {
-            most = events.end - events.start;
+        if events.end - events.start > max {
+            max = events.end - events.start;
         }
         at += 1;
     }
-    most
+    max
 };
 
-/// Collects activity into equal bins. Where a frame outgrows the most bins allowed, pairs of bins are merged, so memory
-/// stays bounded.
+/// Recorder of activity in equal bins. When a frame exceeds the largest number of bins, pairs of bins are
+/// merged, so memory stays bounded.
 #[derive(Clone, Debug)]
 pub struct Recorder {
     bin_ps: u64,
     bins: Vec<Bin>,
-    most_bins: usize,
+    max_bins: usize,
     end_ps: u64,
 }
 
 impl Recorder {
-    /// A recorder with bins of `bin_ps` picoseconds to begin with and at most `most_bins` of them; both at least 2.
-    pub fn new(bin_ps: u64, most_bins: usize) -> Self {
-        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), most_bins: most_bins.max(2), end_ps: 0 }
+    /// A recorder that starts with bins of `bin_ps` picoseconds and keeps at most `max_bins`; both at least
+    /// 2.
+    pub fn new(bin_ps: u64, max_bins: usize) -> Self {
+        Self { bin_ps: bin_ps.max(2), bins: Vec::new(), max_bins: max_bins.max(2), end_ps: 0 }
     }
 
-    /// `unit` did its share of `counts` evenly from `start_ps` to `end_ps`, and was busy meanwhile.
+    /// Record that `unit` did its part of `counts` evenly from `start_ps` to `end_ps`, and was busy
+    /// meanwhile.
     pub fn record(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
         self.count(unit, counts, start_ps, end_ps);
         self.busy(unit, start_ps, end_ps, 1, 1);
     }
 
-    /// `unit` did its share of `counts` evenly from `start_ps` to `end_ps`; nothing is said of how busy it was.
+    /// Record the events of `unit` evenly from `start_ps` to `end_ps`, without busy time.
     pub fn count(&mut self, unit: Unit, counts: &PacketCounts, start_ps: u64, end_ps: u64) {
         let counts = counts.of(unit);
         self.spread(unit, start_ps, end_ps, |at| u64::from(counts[at]));
     }
 
-    /// The same for counts of many packets together.
+    /// Record the events of `unit` for the summed counts of many packets.
     pub fn count_all(&mut self, unit: Unit, counts: &Counts, start_ps: u64, end_ps: u64) {
-        let first = FIRST[unit as usize];
+        let first = FIRST_EVENT[unit as usize];
         self.spread(unit, start_ps, end_ps, |at| counts[Event::ALL[first + at]]);
     }
 
-    /// Events of `unit` that happened in the bin of `at_ps`, by their place among its events.
+    /// Record events of `unit` in the bin of `at_ps`; `counts` maps the index in the unit to a count.
     pub(crate) fn add(&mut self, unit: Unit, at_ps: u64, counts: impl Fn(usize) -> u64) {
         self.spread(unit, at_ps, at_ps, counts);
     }
 
-    /// The length of a bin, so far.
+    /// Current length of a bin in picoseconds.
     pub(crate) fn bin_ps(&self) -> u64 {
         self.bin_ps
     }
@@ -78,7 +80,7 @@ impl Recorder {
             return targets.zip(0..).for_each(|(target, at)| *target += counts(at));
         }
         let events = self.bins[first].counts.of_mut(unit).len();
-        let mut written = [0; MOST_EVENTS];
+        let mut written = [0; MAX_UNIT_EVENTS];
         for (bin, _, to) in span {
             let part = fraction(to, end_ps - start_ps);
             let targets = self.bins[bin].counts.of_mut(unit).iter_mut().zip(&mut written);
@@ -90,7 +92,7 @@ impl Recorder {
         }
     }
 
-    /// `event` happened `times` times at `at_ps`.
+    /// Record that `event` happened `times` times at `at_ps`.
     pub fn event(&mut self, event: Event, times: u64, at_ps: u64) {
         self.end_ps = self.end_ps.max(at_ps);
         self.reach(at_ps);
@@ -98,7 +100,7 @@ impl Recorder {
         self.bins[bin].counts[event] += times;
     }
 
-    /// `busy` of the `of` servers of `unit` worked from `start_ps` to `end_ps`.
+    /// Record that `busy` of the `of` servers of `unit` worked from `start_ps` to `end_ps`.
     pub fn busy(&mut self, unit: Unit, start_ps: u64, end_ps: u64, busy: u64, of: u64) {
         let span = self.span(start_ps, end_ps);
         let bin_ps = self.bin_ps;
@@ -110,12 +112,13 @@ impl Recorder {
         span.for_each(|(bin, from, to)| add(bin, shares.next(to - from)));
     }
 
-    /// The frame lasts until `end_ps` at least.
+    /// Extend the frame to `end_ps` at least.
     pub fn lasts(&mut self, end_ps: u64) {
         self.end_ps = self.end_ps.max(end_ps);
     }
 
-    /// The bins from `start_ps` to `end_ps`, each with the part of that time it holds, counted from `start_ps`; at least one.
+    /// The bins from `start_ps` to `end_ps`, at least one. Each comes with the part of that time in it,
+    /// relative to `start_ps`.
     fn span(
         &mut self,
         start_ps: u64,
@@ -132,9 +135,9 @@ impl Recorder {
         })
     }
 
-    /// Makes room for what happens at `at_ps`.
+    /// Add bins up to `at_ps`.
     fn reach(&mut self, at_ps: u64) {
-        while at_ps / self.bin_ps >= self.most_bins as u64 {
+        while at_ps / self.bin_ps >= self.max_bins as u64 {
             self.merge();
         }
         let needed = (at_ps / self.bin_ps) as usize + 1;
@@ -159,7 +162,7 @@ impl Recorder {
             .collect();
     }
 
-    /// The timeline of everything recorded.
+    /// Timeline of everything recorded.
     pub fn finish(mut self) -> Timeline {
         let duration_ps = self.end_ps.max(1);
         self.reach(duration_ps - 1);
@@ -167,46 +170,55 @@ impl Recorder {
     }
 }
 
-/// Binary places of a [`fraction`].
-const PLACES: u32 = 32;
+/// Fractional bits of a [`fraction`].
+const FRACTION_BITS: u32 = 32;
 
-/// `part` of `length` (at least `part`), rounded down but for all of it.
+/// `part / length` in fixed point, rounded down; exactly 1 if they are equal. `part` is at most `length`.
 fn fraction(part: u64, length: u64) -> u64 {
     match part {
-        _ if part == length => 1 << PLACES,
-        _ => ((u128::from(part) << PLACES) / u128::from(length)) as u64,
+        _ if part == length => 1 << FRACTION_BITS,
+        _ => ((u128::from(part) << FRACTION_BITS) / u128::from(length)) as u64,
     }
 }
 
-/// That fraction of `whole`, rounded down.
+/// `whole * fraction`, rounded down.
 fn share(whole: u64, fraction: u64) -> u64 {
     match whole.checked_mul(fraction) {
-        Some(product) => product >> PLACES,
-        None => ((u128::from(whole) * u128::from(fraction)) >> PLACES) as u64,
+        Some(product) => product >> FRACTION_BITS,
+        None => ((u128::from(whole) * u128::from(fraction)) >> FRACTION_BITS) as u64,
     }
 }
 
-/// The shares of a whole that fall to parts of a length, one after another. What falls to all parts up to one is rounded down, so
-/// the shares add up to the whole.
+/// Shares of a whole for consecutive parts of a length. Prefix sums are rounded down, so the shares add up to
+/// the whole.
 struct Shares {
     whole: u64,
     length: u64,
-    /// Of the parts so far, what was rounded away, in parts of `length`.
-    rest: u64,
-    /// The length most parts have, and quotient and remainder of their share.
-    usual: (u64, u64, u64),
+    /// Remainder carried from the parts so far, in units of 1 / `length`.
+    carry: u64,
+    /// The most frequent part length, with quotient and remainder of its share.
+    usual: UsualPart,
+}
+
+/// A part length with its share of the whole.
+#[derive(Clone, Copy)]
+struct UsualPart {
+    length: u64,
+    quotient: u64,
+    remainder: u64,
 }
 
 impl Shares {
     fn new(whole: u64, length: u64, usual: u64) -> Self {
-        let mut shares = Self { whole, length, rest: 0, usual: (usual, 0, 0) };
+        let mut shares =
+            Self { whole, length, carry: 0, usual: UsualPart { length: usual, quotient: 0, remainder: 0 } };
         let (quotient, remainder) = shares.divide(usual);
-        shares.usual = (usual, quotient, remainder);
+        shares.usual = UsualPart { length: usual, quotient, remainder };
         shares
     }
 
     fn divide(&self, part: u64) -> (u64, u64) {
-        // A moment has no parts: it takes all.
+        // The only part of length 0 takes everything.
         let Some(length) = std::num::NonZeroU64::new(self.length) else { return (self.whole, 0) };
         match self.whole.checked_mul(part) {
             Some(product) => (product / length, product % length),
@@ -218,13 +230,13 @@ impl Shares {
     }
 
     fn next(&mut self, part: u64) -> u64 {
-        let (usual, quotient, remainder) = self.usual;
-        let (quotient, remainder) = if part == usual { (quotient, remainder) } else { self.divide(part) };
-        if self.rest >= self.length - remainder {
-            self.rest -= self.length - remainder;
+        let UsualPart { length, quotient, remainder } = self.usual;
+        let (quotient, remainder) = if part == length { (quotient, remainder) } else { self.divide(part) };
+        if self.carry >= self.length - remainder {
+            self.carry -= self.length - remainder;
             return quotient + u64::from(self.length > 0);
         }
-        self.rest += remainder;
+        self.carry += remainder;
         quotient
     }
 }
@@ -247,14 +259,14 @@ mod tests {
         let timeline = recorder.finish();
         assert_eq!(timeline.bins.len(), 4);
         assert_eq!(timeline.total()[Event::SamplesTested], 1001);
-        assert_eq!(timeline.total()[Event::DepthReads], 0, "events of other units are theirs");
+        assert_eq!(timeline.total()[Event::DepthReads], 0, "events of other units are not recorded");
         assert_eq!(timeline.busy_ps()[Unit::SampleTest as usize], 327);
         assert_eq!(timeline.bins[0].busy_ps[Unit::SampleTest as usize], 50);
         assert_eq!(timeline.duration_ps, 377);
     }
 
     #[test]
-    fn work_that_takes_no_time_is_counted() {
+    fn events_without_duration_are_counted() {
         let mut recorder = Recorder::new(100, 1000);
         recorder.record(Unit::SampleTest, &counts(7), 200, 200);
         let timeline = recorder.finish();

@@ -1,63 +1,66 @@
-//! The machine as its file describes it. `docs/gpu.md` documents every field.
+//! The machine description, as its file gives it. `docs/gpu.md` documents every field.
 
-use activity::{Bounded, Unit};
-use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fmt;
 
-use crate::Rates;
+use activity::spec::suggestion;
+use activity::{Bounded, Event, Unit};
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 
-/// Cycles that something takes at least 1 of: 65,536 are 65 us at 1 GHz, a hundred times what memory takes.
+/// Cycles, at least 1. The maximum is 65 us at 1 GHz, a hundred times the latency of memory.
 pub type Cycles = Bounded<1, 65_536>;
-/// Cycles that something may take none of.
+/// Cycles, possibly none.
 pub type WaitCycles = Bounded<0, 65_536>;
-/// Packets, warps, requests or lines that may wait or be under way: more than the largest machines have, and so deep that a
+/// Entries of a queue: packets, warps, requests or lines. The maximum exceeds the largest machines, so such a
 /// queue never fills.
 pub type Entries = Bounded<1, 65_536>;
-/// Things of which a unit does some in each cycle, and hardware that is there that often.
+/// Actions per cycle, or copies of a piece of hardware.
 pub type Width = Bounded<1, 4096>;
-/// Channels of memory, or banks of a channel.
+/// Memory channels, or banks of a channel.
 pub type Chips = Bounded<1, 1024>;
-/// Bytes of a row or of an interleaving step, from a line to 1 MiB.
+/// Bytes of a row or of an interleaving step, from one line to 1 MiB.
 pub type RowBytes = Bounded<{ crate::LINE_BYTES }, 1_048_576>;
 
-/// A clock domain.
+/// Clock domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub enum Clock {
-    /// That of everything but memory.
+    /// Clock of all units but memory.
     #[default]
     Core,
-    /// That of memory.
+    /// Clock of memory.
     Memory,
 }
 
-/// A unit that works on one packet after another and asks no memory.
+/// A unit that serves packets one after another and requests no lines.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UnitSpec {
-    /// The clock its cycles are counted in.
+    /// Clock of its cycles.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the moment a packet leaves until the next unit sees it.
+    /// Cycles from the departure of a packet until the next unit sees it.
     pub latency_cycles: Cycles,
-    /// Packets that may be in front of it or on their way to it, at least 1.
+    /// Packets that may wait in front of it or be on their way to it, at least 1.
     pub queue: Entries,
-    /// Events per cycle. The parts of a unit work side by side: the slowest sets the pace.
+    /// Events per cycle. The parts of a unit work in parallel, so the slowest one sets the pace.
     pub rates: Rates,
 }
 
-/// A unit that works on one packet after another and asks the L2 for lines.
+/// A unit that serves packets one after another and requests lines from the L2.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClientSpec {
-    /// The clock its cycles are counted in.
+    /// Clock of its cycles.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the moment a packet leaves until the next unit sees it.
+    /// Cycles from the departure of a packet until the next unit sees it.
     pub latency_cycles: Cycles,
-    /// Packets that may be in front of it or on their way to it, at least 1; warps at the texture units.
+    /// Packets that may wait in front of it or be on their way to it, at least 1; warps at the texture units.
     pub queue: Entries,
-    /// Packets (warps) that may wait behind it for their lines, at least 1.
+    /// Packets (warps) that may wait for their lines after service, at least 1.
     pub in_flight: Entries,
-    /// Lines it can ask the L2 for in a cycle.
+    /// Lines it can request from the L2 per cycle.
     #[serde(default = "one")]
     pub lines_per_cycle: Width,
     /// Events per cycle.
@@ -68,43 +71,44 @@ fn one() -> Width {
     Width::MIN
 }
 
-/// The shader cores.
+/// Shader cores.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShaderSpec {
-    /// The clock its cycles are counted in.
+    /// Clock of their cycles.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the end of a packet's last warp until the next unit sees it, at least 1.
+    /// Cycles from the end of a packet's last warp until the next unit sees the packet, at least 1.
     pub latency_cycles: Cycles,
-    /// Packets of vertices, and as many of pixels, that may wait in front.
+    /// Packets of each kind (vertices and pixels) that may wait in front.
     pub queue: Entries,
-    /// Packets of vertices, and as many of pixels, whose warps may be on the cores.
+    /// Packets of each kind whose warps may be on the cores.
     pub in_flight: Entries,
-    /// Cores.
+    /// Number of cores.
     pub cores: Width,
-    /// Lanes of a core: operations per cycle.
+    /// Lanes per core, each one operation per cycle.
     pub lanes: Width,
-    /// Threads that go through a shader together, at most.
+    /// Largest number of threads in a warp.
     pub warp_lanes: Width,
-    /// Warps a core can hold.
+    /// Warps that fit on a core.
     pub warps: Width,
-    /// Cycles from an operation of a warp to its next.
+    /// Cycles between consecutive operations of a warp.
     pub alu_latency_cycles: Cycles,
 }
 
-/// The cache shared by all.
+/// L2, the cache shared by all clients.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct L2Spec {
-    /// The clock its cycles are counted in.
+    /// Clock of its cycles.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles from the moment a request is taken, or its line has come from memory, until the client has it; at least 1.
+    /// Cycles from the acceptance of a hit, or from the arrival of a line from memory, until the client has
+    /// the line; at least 1.
     pub latency_cycles: Cycles,
-    /// Requests that may wait in front of it, of each client.
+    /// Requests of each client that may wait in front of it.
     pub queue: Entries,
-    /// Lines it takes in a cycle.
+    /// Lines it accepts per cycle.
     pub lines_per_cycle: Width,
 }
 
@@ -112,26 +116,27 @@ pub struct L2Spec {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DramSpec {
-    /// The clock its cycles are counted in.
+    /// Clock of their cycles.
     #[serde(default)]
     pub clock: Clock,
-    /// Cycles a request spends in the controller and on the way, beside what the chips take; at least 1.
+    /// Cycles of a request in the controller and on the way, in addition to the time of the chips; at least
+    /// 1.
     pub latency_cycles: Cycles,
     /// Lines that may wait at a channel, at least 2.
     pub queue: Bounded<2, 65_536>,
-    /// Channels; any number, not only powers of two.
+    /// Channels; not necessarily a power of two.
     pub channels: Chips,
-    /// Banks of a channel.
+    /// Banks per channel.
     pub banks: Chips,
-    /// Bytes of a row in a channel.
+    /// Bytes per row of a channel.
     pub row_bytes: RowBytes,
-    /// Bytes after which addresses go on in the next channel.
+    /// Consecutive bytes in a channel before addresses move on to the next one.
     pub interleave_bytes: RowBytes,
-    /// Cycles for which a line occupies the data bus of its channel.
+    /// Cycles of a line on the data bus of its channel.
     pub burst_cycles: Cycles,
     /// Cycles from a column command to the first data (CL).
     pub cas_cycles: WaitCycles,
-    /// Cycles from opening a row to the first column command (tRCD).
+    /// Cycles from the activation of a row to the first column command (tRCD).
     pub activate_cycles: WaitCycles,
     /// Cycles to close a row (tRP).
     pub precharge_cycles: WaitCycles,
@@ -156,18 +161,18 @@ pub struct MachineSpec {
     pub dram: DramSpec,
 }
 
-/// What a unit has in common with every other that takes one packet after another.
+/// Properties that all units with packets share.
 #[derive(Clone, Copy, Debug)]
 pub struct Common<'a> {
-    /// Its clock.
+    /// Clock domain.
     pub clock: Clock,
     /// Cycles until the next unit sees a packet.
     pub latency_cycles: u32,
-    /// Packets in front.
+    /// Packets in the input queue.
     pub queue: u32,
-    /// Packets that may wait for lines; 0 where it asks for none.
+    /// Packets that may wait for lines; 0 for units without lines.
     pub in_flight: u32,
-    /// Lines it asks for in a cycle; 0 where it asks for none.
+    /// Lines requested per cycle; 0 for units without lines.
     pub lines_per_cycle: u32,
     /// Events per cycle.
     pub rates: Option<&'a Rates>,
@@ -195,7 +200,7 @@ impl ClientSpec {
 }
 
 impl MachineSpec {
-    /// What `unit` has in common with the others.
+    /// Shared properties of `unit`.
     pub fn common(&self, unit: Unit) -> Common<'_> {
         let bare = |clock, latency_cycles: Cycles, queue, in_flight| Common {
             clock,
@@ -224,10 +229,10 @@ impl MachineSpec {
         }
     }
 
-    /// Checks what the types of single fields do not: that every rate is that of the unit it is written for.
+    /// Check that every rate belongs to the unit it is written for. Types check all single fields.
     ///
     /// # Errors
-    /// The first that is not: its field, such as `depth.rates`, and what is wrong with it.
+    /// The first wrong rate: its field, such as `depth.rates`, and the message.
     pub fn validate(&self) -> Result<(), (String, String)> {
         for unit in Unit::ALL {
             let foreign = |rates: &Rates| rates.iter().find(|(event, _)| event.unit() != unit);
@@ -238,5 +243,58 @@ impl MachineSpec {
             }
         }
         Ok(())
+    }
+}
+
+/// Smallest rate in events per cycle: one in 10,000 cycles.
+const MIN_RATE: f64 = 1e-4;
+/// Largest rate in events per cycle, practically unlimited.
+const MAX_RATE: f64 = 1e9;
+
+/// Events per cycle of one unit, each 1e-4 to 1e9. Events without a rate take no time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rates(BTreeMap<Event, f64>);
+
+impl Rates {
+    /// Every event with its rate, in declaration order.
+    pub fn iter(&self) -> impl Iterator<Item = (Event, f64)> + '_ {
+        self.0.iter().map(|(&event, &rate)| (event, rate))
+    }
+}
+
+impl<'de> Deserialize<'de> for Rates {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(RatesVisitor)
+    }
+}
+
+struct RatesVisitor;
+
+impl<'de> Visitor<'de> for RatesVisitor {
+    type Value = Rates;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a map from event names to events per cycle")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Rates, A::Error> {
+        let mut rates = BTreeMap::new();
+        while let Some(name) = map.next_key::<String>()? {
+            let event = Event::from_name(&name).ok_or_else(|| {
+                let known = Event::ALL.map(Event::name);
+                de::Error::custom(format!("unknown event `{name}`, {}", suggestion(&name, &known)))
+            })?;
+            let rate = map.next_value::<f64>()?;
+            if !(MIN_RATE..=MAX_RATE).contains(&rate) {
+                let message = format!(
+                    "`{name}`: {rate:?} is out of range; a rate has to be {MIN_RATE:e} to {MAX_RATE:e} events per cycle"
+                );
+                return Err(de::Error::custom(message));
+            }
+            if rates.insert(event, rate).is_some() {
+                return Err(de::Error::custom(format!("`{name}` has two rates")));
+            }
+        }
+        Ok(Rates(rates))
     }
 }

@@ -1,40 +1,40 @@
-//! Where each unit's time went: busy, starved by whom, blocked by whom, idle.
+//! Stall accounting: where each unit's time went (busy, starved, blocked, idle).
 
 use activity::Unit;
 
 use crate::clock::{Clocks, Time};
 
-/// Why a unit (or a server of it) does not work.
+/// Why a unit (or one of its servers) does not work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// Nothing is left for it in this frame, or nobody asks.
+    /// It has no work left in this frame, or no requests.
     Idle,
-    /// It waits for this unit to hand it something.
+    /// It waits for input from this unit.
     Starved(Unit),
-    /// It waits for this unit to take something, or to answer.
+    /// It waits for this unit to accept its output or to answer.
     Blocked(Unit),
 }
 
-/// Most intervals that are kept; a frame that outgrows them gets longer ones.
-const MOST: usize = 512;
-/// Cycles of the core clock in an interval, to begin with.
-const CYCLES: Time = 256;
+/// Largest number of intervals; longer frames get longer intervals.
+const MAX_INTERVALS: usize = 512;
+/// Initial length of an interval in core cycles.
+const FIRST_INTERVAL_CYCLES: Time = 256;
 
-/// Server-time of a unit in an interval or a frame, in grains: each server of a unit counts.
+/// Server time of a unit in an interval or a frame, in grains, summed over its servers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UnitTime {
     /// Working.
     pub busy: Time,
-    /// With nothing left to do.
+    /// Without work.
     pub idle: Time,
-    /// Waiting for a unit to hand something over, by that unit.
+    /// Waiting for input, by the unit waited for.
     pub starved: [Time; Unit::COUNT],
-    /// Waiting for a unit to take something or to answer, by that unit.
+    /// Waiting for output or an answer, by the unit waited for.
     pub blocked: [Time; Unit::COUNT],
 }
 
 impl UnitTime {
-    /// All of it.
+    /// Sum of all parts.
     pub fn total(&self) -> Time {
         self.busy + self.idle + self.starved.iter().sum::<Time>() + self.blocked.iter().sum::<Time>()
     }
@@ -42,11 +42,11 @@ impl UnitTime {
     fn merge(&mut self, other: &Self) {
         self.busy += other.busy;
         self.idle += other.idle;
-        for (mine, theirs) in self.starved.iter_mut().zip(other.starved) {
-            *mine += theirs;
+        for (sum, part) in self.starved.iter_mut().zip(other.starved) {
+            *sum += part;
         }
-        for (mine, theirs) in self.blocked.iter_mut().zip(other.blocked) {
-            *mine += theirs;
+        for (sum, part) in self.blocked.iter_mut().zip(other.blocked) {
+            *sum += part;
         }
     }
 
@@ -59,7 +59,7 @@ impl UnitTime {
     }
 }
 
-/// The units' time, interval by interval.
+/// Server time of all units, by interval.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stalls {
     clocks: Clocks,
@@ -72,12 +72,12 @@ pub struct Stalls {
 
 impl Stalls {
     pub(crate) fn new(clocks: Clocks, servers: [u32; Unit::COUNT]) -> Self {
-        let length = CYCLES * clocks.period(crate::Clock::Core);
+        let length = FIRST_INTERVAL_CYCLES * clocks.period(crate::Clock::Core);
         Self { clocks, servers, length, intervals: Vec::new(), end: 0 }
     }
 
-    pub(crate) fn add(&mut self, unit: Unit, busy: u32, rest: Reason, from: Time, to: Time) {
-        while (to - 1) / self.length >= MOST as Time {
+    pub(crate) fn add(&mut self, unit: Unit, busy: u32, reason: Reason, from: Time, to: Time) {
+        while (to - 1) / self.length >= MAX_INTERVALS as Time {
             self.merge();
         }
         let needed = ((to - 1) / self.length) as usize + 1;
@@ -89,7 +89,7 @@ impl Stalls {
             let time = to.min((at + 1) * self.length) - from.max(at * self.length);
             let unit = &mut self.intervals[at as usize][unit as usize];
             unit.busy += time * Time::from(busy);
-            *unit.of(rest) += time * others;
+            *unit.of(reason) += time * others;
         }
     }
 
@@ -98,29 +98,29 @@ impl Stalls {
         let merged = self.intervals.chunks(2).map(|pair| {
             let mut sum = pair[0];
             if let Some(second) = pair.get(1) {
-                sum.iter_mut().zip(second).for_each(|(mine, theirs)| mine.merge(theirs));
+                sum.iter_mut().zip(second).for_each(|(sum, part)| sum.merge(part));
             }
             sum
         });
         self.intervals = merged.collect();
     }
 
-    /// Length of an interval in picoseconds; the last one ends with the frame.
+    /// Length of an interval in picoseconds; the last interval ends with the frame.
     pub fn interval_ps(&self) -> u64 {
         self.clocks.ps(self.length)
     }
 
-    /// Server-time of every unit in each interval.
+    /// Server time of every unit in each interval.
     pub fn intervals(&self) -> &[[UnitTime; Unit::COUNT]] {
         &self.intervals
     }
 
-    /// Servers of a unit: lanes of all cores, channels, lines in a cycle; else 1.
+    /// Servers of a unit: lanes of all cores, memory channels, L2 lines per cycle; otherwise 1.
     pub fn servers(&self, unit: Unit) -> u32 {
         self.servers[unit as usize]
     }
 
-    /// Server-time of `unit` in the whole frame.
+    /// Server time of `unit` in the whole frame.
     pub fn of(&self, unit: Unit) -> UnitTime {
         self.intervals.iter().fold(UnitTime::default(), |mut sum, interval| {
             sum.merge(&interval[unit as usize]);
@@ -128,13 +128,13 @@ impl Stalls {
         })
     }
 
-    /// The length of the frame in grains.
+    /// Length of the frame in grains.
     pub fn frame(&self) -> Time {
         self.end
     }
 
-    /// The unit that is busiest in each interval, with the share of its servers' time; memory and caches among them. It is
-    /// what holds the frame up where that share is near 1; where no share is, latency is.
+    /// Busiest unit of each interval, with its utilization; caches and memory are included. A utilization
+    /// near 1 is the bottleneck; otherwise latency limits the frame.
     pub fn bottlenecks(&self) -> Vec<(Unit, f64)> {
         let share = |interval: &[UnitTime; Unit::COUNT], unit: Unit| {
             let time = &interval[unit as usize];

@@ -1,5 +1,5 @@
-//! Streams made to break levels of timing, and microbenchmarks of one rate each. They are made of packets, not of triangles, so
-//! that each breaks one thing.
+//! Synthetic streams of packets: some challenge the levels of timing, others measure a single rate. They
+//! bypass the pipeline, so each has a single cause.
 
 use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 
@@ -8,7 +8,7 @@ use crate::spec::{Entries, MachineSpec};
 /// Packets with their lines.
 pub type Packets = Vec<(Packet, Vec<LineAccess>)>;
 
-/// A packet of triangle `triangle` with its events and lines, the lines counted as the pipeline would.
+/// A packet with events and lines; the events of the lines are counted as in the pipeline.
 fn packet(
     kind: PacketKind,
     triangle: u32,
@@ -27,7 +27,8 @@ fn packet(
     (packet, lines)
 }
 
-/// `count` lines from `first` on, `stride` apart, each with the line `victim` further on that makes room where there is one.
+/// `count` lines of `client` from `first` on, `stride` apart. Each evicts the line `victim` after it, if
+/// given.
 fn lines(
     client: Unit,
     first: u32,
@@ -57,7 +58,7 @@ fn vertices(triangle: u32, triangles: u32, ops: u32) -> (Packet, Vec<LineAccess>
     )
 }
 
-/// A tile in which so many pixels are shaded with so many operations.
+/// A tile with `pixels` shaded pixels of `ops` operations each.
 fn tile(triangle: u32, pixels: u32, ops: u32, lines: Vec<LineAccess>) -> (Packet, Vec<LineAccess>) {
     let counts = [
         (Event::TilesVisited, 1),
@@ -73,10 +74,10 @@ fn tile(triangle: u32, pixels: u32, ops: u32, lines: Vec<LineAccess>) -> (Packet
     packet(PacketKind::Tile, triangle, &counts, lines)
 }
 
-/// A stream that breaks some level, and the machine it does it on.
+/// A stream that challenges a level, and its machine.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// What is wrong with it, in a few words.
+    /// What is special about it, in a few words.
     pub name: &'static str,
     /// The stream.
     pub packets: Packets,
@@ -84,7 +85,7 @@ pub struct Failure {
     pub units: MachineSpec,
 }
 
-/// Every stream that breaks a level on `units`, in batches of `batch` triangles.
+/// All challenging streams for `units`, in batches of `batch` triangles.
 pub fn failures(units: &MachineSpec, batch: u32) -> Vec<Failure> {
     let on = |name, packets| Failure { name, packets, units: units.clone() };
     let mut narrow = on("queues of one", tiny(batch));
@@ -105,7 +106,7 @@ fn giant() -> Packets {
     std::iter::once(vertices(0, 1, 20)).chain((0..4000).map(|n| tile(0, 64, 20, fetched(n)))).collect()
 }
 
-/// As many batches of `triangles` as make some thousand of them.
+/// Number of batches of `triangles` for some thousand triangles.
 fn batches(triangles: u32) -> u32 {
     (6144 / triangles).max(2)
 }
@@ -129,7 +130,7 @@ fn alternating(triangles: u32) -> Packets {
     in_batches((0..batches(triangles)).map(batch).collect())
 }
 
-/// The front end one batch ahead of the tiles.
+/// Packets of all batches, with the front end one batch ahead of the tiles.
 fn in_batches(batches: Vec<(Packets, Packets)>) -> Packets {
     let (mut all, mut waiting) = (Packets::new(), Packets::new());
     for (fronts, tiles) in batches {
@@ -141,7 +142,7 @@ fn in_batches(batches: Vec<(Packets, Packets)>) -> Packets {
     all
 }
 
-/// Depth, texture and colour miss with every line, each `stride` lines from the one before.
+/// Tiles whose depth, texture and colour lines all miss, with `stride` lines between accesses.
 fn thrashing(stride: u32) -> Packets {
     let tiles = (0..1500).map(|n| {
         let of = |client, base: u32, victim| {
@@ -174,22 +175,22 @@ fn shallow(units: &mut MachineSpec) {
     units.dram.queue = Bounded::MIN;
 }
 
-/// One rate of a machine: a stream that asks for nothing else.
+/// Microbenchmark of one rate of a machine.
 #[derive(Clone, Debug)]
 pub struct Rate {
-    /// What it is the rate of.
+    /// Name of the rate.
     pub name: &'static str,
-    /// The stream.
+    /// A stream that uses only this rate.
     pub packets: Packets,
-    /// How many of it the stream has in all.
+    /// Amount in the whole stream.
     pub amount: f64,
-    /// One of it, over a second.
+    /// Unit of the rate.
     pub unit: &'static str,
 }
 
 const TILES: u32 = 3000;
 
-/// Fill, triangles, texels and bandwidth.
+/// Microbenchmarks of fill, triangles, texels and bandwidth.
 pub fn rates() -> Vec<Rate> {
     let of = |name, unit, each: f64, of: &dyn Fn(u32) -> (Packet, Vec<LineAccess>)| Rate {
         name,
@@ -198,7 +199,7 @@ pub fn rates() -> Vec<Rate> {
         unit,
     };
     let fill = |lines| packet(PacketKind::Tile, 0, &[(Event::ColourWrites, 256)], lines);
-    // Pixels of 8 bytes, read and written: 32 lines a packet, and as many go back.
+    // Pixels of 8 bytes, read and written: 32 lines per packet, and as many written back.
     let blended = |n: u32| lines(Unit::Colour, n * 32, 32, 1, LineKind::Fetch, Some(1 << 22));
     vec![
         of("colour fill, nothing to memory", "pixel/s", 256.0, &|_| fill(Vec::new())),

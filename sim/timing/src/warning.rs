@@ -1,33 +1,34 @@
-//! What a level is known to be bad at, seen in its own result.
+//! Known inaccuracies of a level, detected in its own results.
 
 use crate::{Level, Timed};
 use warnings::{Code, Warning};
 
-/// A reason why the time of a frame may be inaccurate at its level.
+/// Reason why the time of a frame may be inaccurate at its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AccuracyWarning {
-    /// A bank of memory opens and closes rows for this long, over the busy time of the busiest unit: `packet` and `bound` reorder
-    /// its lines otherwise than `stepped` does.
+    /// Row time of the busiest memory bank over the busy time of the busiest unit. `packet` and `bound` order
+    /// its lines differently from `stepped`.
     MemoryRows(f64),
-    /// A packet comes every so many cycles: at `bound`, short ones wait for a unit each, where no unit is busy for long.
+    /// Core cycles per packet. At `bound`, short packets wait for one unit each, so no unit is busy for long.
     ShortPackets(f64),
 }
 
-/// The time of rows, over that of the busiest unit, from which they decide.
-const ROWS: f64 = 0.2;
-/// Cycles of a packet below which packets are short.
-const SHORT: f64 = 2.0;
+/// Smallest row time over busy time that gives a warning.
+const MIN_ROW_RATIO: f64 = 0.2;
+/// Packets with fewer cycles than this give a warning.
+const MIN_PACKET_CYCLES: f64 = 2.0;
 
 impl AccuracyWarning {
-    /// Those about a frame at `level`.
+    /// All warnings about a frame at `level`.
     pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
-        let rows = timed.rows.filter(|&share| share >= ROWS).map(Self::MemoryRows);
+        let rows = timed.rows.filter(|&share| share >= MIN_ROW_RATIO).map(Self::MemoryRows);
         let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
-        let short = (level == Level::Bound && cycles < SHORT).then_some(Self::ShortPackets(cycles));
+        let short =
+            (level == Level::Bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
         rows.into_iter().chain(short).collect()
     }
 
-    /// Its code among the warnings.
+    /// Warning code.
     pub const fn code(self) -> Code {
         match self {
             Self::MemoryRows(_) => Code::MemoryRows,
@@ -35,7 +36,7 @@ impl AccuracyWarning {
         }
     }
 
-    /// How bad it is: more than another of its kind is worse.
+    /// Severity, comparable among warnings of one kind; larger is worse.
     pub fn extent(self) -> f64 {
         match self {
             Self::MemoryRows(share) => share,
@@ -43,7 +44,7 @@ impl AccuracyWarning {
         }
     }
 
-    /// What to tell of a frame.
+    /// Warning about a frame.
     pub fn warning(self, frame: u32, level: Level) -> Warning {
         let name = level.name();
         match self {

@@ -1,7 +1,7 @@
-//! One pass of the five-dimensional rasterizer beside the same done as many passes, by CPU time of one thread.
+//! CPU time of one 5D pass on one thread, compared with the same work in many passes.
 //!
-//! `cargo bench -p workloads --bench views`; with `sweep` after `--` what the shading of more than one view takes on top of one view
-//! (rows VI-13 and VI-14), over one setting at a time.
+//! Run `cargo bench -p workloads --bench views`. With `sweep` after `--`, it prints how much shading several
+//! views costs compared with one view (rows VI-13 and VI-14), over one setting at a time.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run may as well panic")]
 
@@ -13,12 +13,12 @@ use pipeline::sampling::SampleSpec;
 use pipeline::{Cull, Draw, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
 use workloads::multiview::{Layout, Rig, Target};
-use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
+use workloads::soft_shadows::{AreaLight, LightSpec, Method, Renderer, ShadowMap};
 use workloads::{Overrides, glossy, soft_shadows};
 
 const RUNS: usize = 3;
 
-/// The median CPU time of some runs, in seconds.
+/// Median CPU time of several runs, in seconds.
 fn time(mut run: impl FnMut()) -> f64 {
     let one = |_| {
         let started = ProcessTime::now();
@@ -30,8 +30,8 @@ fn time(mut run: impl FnMut()) -> f64 {
     seconds[RUNS / 2]
 }
 
-/// A row: one pass against others, each with its number of passes.
-fn tell(what: &str, one: f64, others: &[(&str, usize, f64)]) {
+/// A row: one pass and the others, each with its number of passes.
+fn print_row(what: &str, one: f64, others: &[(&str, usize, f64)]) {
     for (name, passes, seconds) in others {
         println!(
             "| {what} | {:.1} ms | {name}, {passes} passes | {:.1} ms | {:.2} |",
@@ -56,7 +56,7 @@ fn views(spec: &PipelineSpec) {
         let each = time(|| _ = rig.view_by_view(&draws, &to, &mut |_, _| ()).unwrap());
         let many = time(|| _ = rig.accumulated(&draws, &to, &mut |_, _| ()).unwrap());
         let what = format!("{} views, 160x90, 8 samples", layout.views);
-        tell(&what, one, &[("view by view", passes[0], each), ("accumulation", passes[1], many)]);
+        print_row(&what, one, &[("view by view", passes[0], each), ("accumulation", passes[1], many)]);
     }
 }
 
@@ -74,7 +74,7 @@ fn gloss(spec: &PipelineSpec) {
         let one = time(|| _ = map.one_pass(&draws, &table, to, &mut |_, _| ()).unwrap());
         let many = time(|| _ = map.accumulated(&draws, &set, to, &mut |_, _| ()).unwrap());
         let what = format!("glossy map, {}x128, {count} samples", map.viewport.width());
-        tell(&what, one, &[("accumulation", count as usize, many)]);
+        print_row(&what, one, &[("accumulation", count as usize, many)]);
     }
 }
 
@@ -89,11 +89,12 @@ fn shadows(spec: &PipelineSpec) {
         let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
         let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
             time(|| {
-                _ = ShadowMap::new((&light, &draws), 256, &set, (method, spec), &mut |_, _| ()).unwrap();
+                _ = ShadowMap::new(&light, &draws, 256, &set, Renderer { method, spec }, &mut |_, _| ())
+                    .unwrap();
             })
         });
         let what = format!("shadow map, 256x256, {count} places");
-        tell(&what, one, &[("accumulation", count as usize, many)]);
+        print_row(&what, one, &[("accumulation", count as usize, many)]);
     }
 }
 

@@ -1,4 +1,4 @@
-//! What shading two and seven views takes on top of one, over one setting at a time.
+//! Additional shading of two and seven views over one view, over one setting at a time.
 
 use activity::Event;
 use pipeline::depth::DepthSpec;
@@ -28,17 +28,18 @@ pub fn hardware() -> PipelineSpec {
     }
 }
 
-/// Distance of eyes, scene units, which are metres in the built-in scene: the mean of adults is 63 mm (Dodgson 2004).
+/// Distance of the eyes in scene units, which are metres in the built-in scene: the mean of adults is 63 mm
+/// (Dodgson 2004).
 const EYES: f64 = 0.065;
 
-/// One setting of everything.
+/// One combination of settings.
 #[derive(Clone)]
 struct Point {
     scene: String,
     size: (u32, u32),
-    /// From eye to eye, scene units.
+    /// Distance of the eyes, scene units.
     eyes: f64,
-    /// Radius of an eye's lens over the distance from eye to eye.
+    /// Radius of an eye's lens, relative to the distance of the eyes.
     aperture: f64,
     shutter: f64,
     samples: u32,
@@ -58,7 +59,8 @@ impl Point {
         }
     }
 
-    /// What one pass shades over what the middle view alone does, less one: two eyes, and seven views on a line as long.
+    /// Additional shading of one pass relative to the middle view alone: for two eyes, and for seven views on
+    /// a line of the same length.
     fn increases(&self, hardware: &PipelineSpec) -> [f64; 2] {
         let over = Overrides { size: Some(self.size), shutter: Some(self.shutter), ..Overrides::default() };
         let scene = workloads::load(&self.scene).unwrap().with_overrides(&over).unwrap();
@@ -87,7 +89,7 @@ fn line(what: &str, value: impl std::fmt::Display, point: &Point, hardware: &Pip
     println!("| {what} | {value} | {two:+.1} % | {seven:+.1} % |");
 }
 
-/// Prints all of it.
+/// Prints all rows.
 pub fn run(hardware: &PipelineSpec) {
     let base = Point::base();
     println!(

@@ -1,17 +1,13 @@
-//! Accumulation buffering (Haeberli and Akeley 1990): many renderings of still geometry through pinholes, added up. What one pass
-//! of a five-dimensional rasterizer is held against.
+//! Accumulation buffering (Haeberli and Akeley 1990): the mean of many pinhole renderings of still geometry.
+//! It is the method that one 5D pass is compared with.
 //!
-//! - [`SharedSamples`]: the same samples in all pixels, as accumulation has them by nature.
-//! - [`Snapshot`]: moving geometry as it stands at one time and from one place on the lens, for a rendering with neither.
-//! - [`pinhole`]: the camera at one place on a lens.
-//! - [`Rays`]: what a ray hits, as the truth about visibility.
+//! - [`SharedSamples`]: the same samples in all pixels, which accumulation requires.
+//! - [`Snapshot`]: moving geometry at one time and one lens position, for a rendering without either.
+//! - [`pinhole`]: the camera at one lens position.
+//! - [`Rays`]: ray casting, as the ground truth of visibility.
 
-mod pinhole;
 mod rays;
-mod shared;
-mod snapshot;
+mod still;
 
-pub use pinhole::pinhole;
 pub use rays::{Face, Rays};
-pub use shared::SharedSamples;
-pub use snapshot::{Snapshot, SnapshotError};
+pub use still::{SharedSamples, Snapshot, SnapshotError, pinhole};

@@ -1,4 +1,4 @@
-//! The default scene: what the tool is for, in one picture.
+//! The default scene, with all features of the pipeline.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::scene::{
 };
 use crate::shapes;
 
-/// Materials by name.
+/// Material indices by name.
 struct Palette {
     tiles: usize,
     steel: usize,
@@ -78,7 +78,7 @@ fn floor(graph: &mut Graph, palette: &Palette) {
     place(graph, "floor", mesh, [0.0, 0.0, -14.0], DQuat::IDENTITY, Motion::default());
 }
 
-/// Two gears in mesh: 24 teeth against 16, so their rates are as 2 to 3 and opposite.
+/// Two engaged gears with 24 and 16 teeth, so their rates have the ratio -2 to 3.
 fn gears(graph: &mut Graph, palette: &Palette) {
     let large = shapes::gear(24, 1.2, 0.35, palette.brass);
     place(graph, "large gear", large, [-1.15, 1.3, 0.0], DQuat::IDENTITY, spin(DVec3::Z, 2.0));
@@ -95,7 +95,7 @@ fn propeller(graph: &mut Graph, palette: &Palette) {
     place(graph, "mast", mast, [2.40, 0.725, -0.45], DQuat::IDENTITY, Motion::default());
 }
 
-/// A ball that crosses the picture in the run, and rings that tumble.
+/// A ball that crosses the image, and tumbling rings.
 fn in_flight(graph: &mut Graph, palette: &Palette) {
     let ball = shapes::sphere(0.42, 48, palette.stripes);
     let flight = Motion { velocity: DVec3::new(13.0, 0.0, 0.0), spin: Spin::new(DVec3::Z, -4.9) };
@@ -106,8 +106,8 @@ fn in_flight(graph: &mut Graph, palette: &Palette) {
     place(graph, "spinning ring", ring, [1.5, 2.75, -0.6], upright(), spin(DVec3::Z.cross(DVec3::X), 1.2));
 }
 
-/// Close to the camera and far out of focus. Few triangles do: each is tested over the whole of its blur, so
-/// what is smallest on the screen would cost the most.
+/// Objects near the camera and far out of focus. They have few triangles: each is tested over all of its
+/// blur, so small triangles cost the most.
 fn foreground(graph: &mut Graph, palette: &Palette) {
     let ring = shapes::torus(0.40, 0.12, 24, palette.blue);
     place(graph, "near ring", ring, [-1.15, 1.45, 5.3], rotation(DVec3::X, 0.20), Motion::default());
@@ -117,7 +117,7 @@ fn foreground(graph: &mut Graph, palette: &Palette) {
     place(graph, "near block", block, [1.9, 0.28, 3.6], rotation(DVec3::Y, 0.09), Motion::default());
 }
 
-/// Rows of balls and rings that go out of focus with their distance.
+/// Rows of balls and rings, out of focus with distance.
 fn background(graph: &mut Graph, palette: &Palette) {
     let colors = [palette.blue, palette.cream, palette.green, palette.brass, palette.red];
     for row in 0..3_u32 {

@@ -1,4 +1,4 @@
-//! The scene for tests: motion, lens and texture in a handful of triangles.
+//! The test scene: motion, lens and texture in a handful of triangles.
 
 use std::sync::Arc;
 

@@ -1,32 +1,32 @@
-//! The warped volume behind a generator triangle.
+//! Light volumes (beams): the warped volume behind a generator triangle, and the cubics that test points in
+//! it.
 
 use glam::DVec3;
 
-use super::cubic::{Cubic, quadratic_roots};
-
-/// A beam: the points `sum b_i ((1 - t) open_i + t close_i)` for barycentric weights `b` and `t` in [0, 1]. Its flux is spread evenly over the
-/// generator triangle `open`.
+/// A beam: the points `sum b_i ((1 - t) open_i + t close_i)` for barycentric weights `b` and `t` in [0, 1].
+/// Its flux is uniform over the generator triangle `open`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
     /// The generator triangle.
     pub open: [DVec3; 3],
-    /// Where the light of its corners ends.
+    /// End points of the light of the corners.
     pub close: [DVec3; 3],
-    /// The light it carries, in watts.
+    /// Radiant flux, in watts.
     pub flux_w: f64,
 }
 
-/// A place in a beam.
+/// A position in a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Barycentric weights of the corners.
     pub weights: [f64; 3],
-    /// How far along the beam, 0 to 1.
+    /// Parameter along the beam, 0 to 1.
     pub t: f64,
 }
 
-/// How far outside of a triangle, in barycentric weights, a point counts as in it: rounding of the root, and less than anybody sees.
-const EDGE: f64 = 1e-9;
+/// Largest negative barycentric weight that counts as inside. It allows for rounding of the roots, and is
+/// invisible.
+const MAX_NEGATIVE_WEIGHT: f64 = 1e-9;
 
 impl Beam {
     /// The corners at `t`.
@@ -34,35 +34,36 @@ impl Beam {
         [0, 1, 2].map(|k| self.open[k] + t * (self.close[k] - self.open[k]))
     }
 
-    /// What the light of a corner goes through.
+    /// Path of the light of a corner, from start to end.
     pub fn path(&self, corner: usize) -> DVec3 {
         self.close[corner] - self.open[corner]
     }
 
-    /// The point at a place.
+    /// Point at a position.
     pub fn point(&self, hit: &Hit) -> DVec3 {
         weigh(&self.corners(hit.t), hit.weights)
     }
 
-    /// The motion at a place: its light's direction times its length.
+    /// Motion at a position: the direction of its light, times its length.
     pub fn motion(&self, hit: &Hit) -> DVec3 {
         weigh(&[0, 1, 2].map(|k| self.path(k)), hit.weights)
     }
 
-    /// The Bernstein coefficients in `t` of the vector area `(x1 - x0) x (x2 - x0)`, twice that of the triangle.
+    /// Bernstein coefficients in `t` of the vector area `(x1 - x0) x (x2 - x0)`, twice that of the triangle.
     pub fn areas(&self) -> [DVec3; 3] {
         let [first, last] = [&self.open, &self.close].map(|x| [x[1] - x[0], x[2] - x[0]]);
         let middle = 0.5 * (first[0].cross(last[1]) + last[0].cross(first[1]));
         [first[0].cross(first[1]), middle, last[0].cross(last[1])]
     }
 
-    /// `det(dx/db1, dx/db2, dx/dt)` at a place: how much room the light has there. Where it changes sign the light crosses itself.
+    /// Jacobian `det(dx/db1, dx/db2, dx/dt)` at a position. Light crosses itself where it changes sign.
     pub fn jacobian(&self, hit: &Hit) -> f64 {
         let [a, b, c] = self.corners(hit.t);
         (b - a).cross(c - a).dot(self.motion(hit))
     }
 
-    /// The places at which `point` lies in the beam, up to three: `det[x1 - x0, x2 - x0, point - x0] = 0` is a cubic in `t`.
+    /// Positions at which `point` lies in the beam, up to three: roots in `t` of the cubic `det[x1 - x0, x2 -
+    /// x0, point - x0] = 0`.
     pub fn inside(&self, point: DVec3) -> impl Iterator<Item = Hit> {
         let sides = |x: &[DVec3; 3]| [x[1] - x[0], x[2] - x[0], point - x[0]];
         let (first, last) = (sides(&self.open), sides(&self.close));
@@ -70,7 +71,7 @@ impl Beam {
         roots.into_iter().flatten().filter_map(move |t| self.at(point, t))
     }
 
-    /// The weights of a point in the plane of the triangle at `t`, if it is in the triangle.
+    /// Weights of a point in the plane of the triangle at `t`, if it is in the triangle.
     fn at(&self, point: DVec3, t: f64) -> Option<Hit> {
         let [a, b, c] = self.corners(t);
         let (along, across, to) = (b - a, c - a, point - a);
@@ -82,15 +83,16 @@ impl Beam {
         let second = to.cross(across).dot(area) / squared;
         let third = along.cross(to).dot(area) / squared;
         let weights = [1.0 - second - third, second, third];
-        // Rounding of the corners, in parts of the triangle.
+        // Rounding error of the corners, relative to the triangle.
         let size = [a, b, c, point].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let side = libm::sqrt(along.length_squared().max(across.length_squared()));
-        let slack = EDGE + 64.0 * f64::EPSILON * size * side / libm::sqrt(squared);
+        let slack = MAX_NEGATIVE_WEIGHT + 64.0 * f64::EPSILON * size * side / libm::sqrt(squared);
         weights.iter().all(|weight| *weight >= -slack).then_some(Hit { weights, t })
     }
 
-    /// The times at which the light of corner `k` crosses that of its neighbours, and between which it may: roots of
-    /// the Jacobian at the corners, in order. Between two of them its sign is one over all of the triangle, or differs all the time.
+    /// Roots of the Jacobian at the corners, sorted: the light of a corner crosses that of its neighbours.
+    /// Between two roots, the Jacobian has either one sign over all of the triangle, or different signs all
+    /// the time.
     pub fn folds(&self) -> Vec<f64> {
         let areas = self.areas();
         let at_corner = |k: usize| quadratic_roots(areas.map(|area| area.dot(self.path(k))));
@@ -99,7 +101,7 @@ impl Beam {
         folds
     }
 
-    /// The sign of the Jacobian at `t`, or `None` where it differs over the triangle: sides cross there.
+    /// Sign of the Jacobian at `t`; `None` if it differs over the triangle, where sides cross.
     pub fn sign(&self, t: f64) -> Option<f64> {
         let [a, b, c] = self.corners(t);
         let area = (b - a).cross(c - a);
@@ -108,8 +110,8 @@ impl Beam {
         all(1.0).or_else(|| all(-1.0))
     }
 
-    /// For how much of its length sides cross, 0 to 1. Nothing for a beam that is pinched at a point or a line, much for one whose light the
-    /// corners do not stand for.
+    /// Share of its length over which sides cross, 0 to 1. A beam that is pinched at a point or a line has 0;
+    /// a beam that its corners do not represent has much.
     pub fn crossing(&self) -> f64 {
         let cuts = self.cuts();
         let crossed = |ends: &&[f64]| self.sign(0.5 * (ends[0] + ends[1])).is_none();
@@ -121,7 +123,7 @@ impl Beam {
         [0.0].into_iter().chain(self.folds()).chain([1.0]).collect()
     }
 
-    /// The part from `from` to `to`.
+    /// The part of the beam from `from` to `to`.
     #[must_use]
     pub fn part(&self, from: f64, to: f64) -> Self {
         Self { open: self.corners(from), close: self.corners(to), flux_w: self.flux_w }
@@ -132,13 +134,108 @@ fn weigh(of: &[DVec3; 3], weights: [f64; 3]) -> DVec3 {
     of[0] * weights[0] + of[1] * weights[1] + of[2] * weights[2]
 }
 
+/// A cubic, by its Bernstein coefficients.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cubic([f64; 4]);
+
+/// Rounding error of a zero, relative to the largest coefficient.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+impl Cubic {
+    /// `det[a(t), b(t), c(t)]` of three vectors that are linear in `t`, by the polar form of a product.
+    pub fn of_determinant(first: &[DVec3; 3], last: &[DVec3; 3]) -> Self {
+        let det = |at: [usize; 3]| {
+            let [a, b, c] = [0, 1, 2].map(|k| if at[k] == 0 { first[k] } else { last[k] });
+            a.cross(b).dot(c)
+        };
+        let mean = |of: [[usize; 3]; 3]| (det(of[0]) + det(of[1]) + det(of[2])) / 3.0;
+        Self([
+            det([0, 0, 0]),
+            mean([[1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+            mean([[0, 1, 1], [1, 0, 1], [1, 1, 0]]),
+            det([1, 1, 1]),
+        ])
+    }
+
+    /// Value by de Casteljau's algorithm.
+    fn at(&self, t: f64) -> f64 {
+        let step = |a: f64, b: f64| a + t * (b - a);
+        let [a, b, c, d] = self.0;
+        let (ab, bc, cd) = (step(a, b), step(b, c), step(c, d));
+        step(step(ab, bc), step(bc, cd))
+    }
+
+    /// Roots in order, a double one once. None if the cubic is zero everywhere: then all points lie in one
+    /// plane.
+    pub fn roots(&self) -> [Option<f64>; 3] {
+        let [a, b, c, d] = self.0;
+        let zero = ROUNDING * self.0.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let mut found = [None; 3];
+        if self.0.iter().all(|value| *value > zero) || self.0.iter().all(|value| *value < -zero) {
+            return found;
+        }
+        let turns = quadratic_roots([b - a, c - b, d - c]).filter(|t| *t > 0.0 && *t < 1.0);
+        let (mut from, mut count) = (0.0, 0);
+        for to in turns.chain([1.0]) {
+            let root = self.monotone_root(from, to, zero);
+            // A turning point that is a root belongs to two pieces.
+            let again = |t: f64| count > 0 && found[count - 1].is_some_and(|last| t - last < 1e-12);
+            if let Some(t) = root.filter(|t| !again(*t))
+                && count < 3
+            {
+                found[count] = Some(t);
+                count += 1;
+            }
+            from = to;
+        }
+        found
+    }
+
+    /// Root in a monotonic piece.
+    fn monotone_root(&self, from: f64, to: f64, zero: f64) -> Option<f64> {
+        let (mut low, mut high) = (from, to);
+        let (first, last) = (self.at(low), self.at(high));
+        if first.abs() <= zero {
+            return (last.abs() > zero).then_some(low);
+        }
+        if last.abs() <= zero {
+            return Some(high);
+        }
+        if first * last > 0.0 {
+            return None;
+        }
+        while high - low > 2.0 * f64::EPSILON * high {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if self.at(middle) * first > 0.0 { low = middle } else { high = middle }
+        }
+        Some(0.5 * (low + high))
+    }
+}
+
+/// Real roots of a quadratic by its Bernstein coefficients, in order and unbounded; a double root may occur
+/// twice.
+pub(super) fn quadratic_roots([a, b, c]: [f64; 3]) -> impl Iterator<Item = f64> {
+    // a (1 - t)^2 + 2 b t (1 - t) + c t^2 = p t^2 + 2 q t + a
+    let (p, q) = (a - 2.0 * b + c, b - a);
+    let discriminant = q * q - p * a;
+    let root = libm::sqrt(discriminant.max(0.0));
+    // Computes the larger root first, which avoids cancellation.
+    let far = if q > 0.0 { -q - root } else { root - q };
+    let roots = if discriminant < 0.0 { [f64::NAN; 2] } else { [far / p, a / far] };
+    let sorted = if roots[0] > roots[1] { [roots[1], roots[0]] } else { roots };
+    sorted.into_iter().filter(|t| t.is_finite())
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::generator::tests::{Uniform, turned, warped};
     use super::*;
-    use crate::caustics::generator::tests::{Uniform, turned, warped};
 
     #[test]
-    fn every_place_in_a_beam_is_found() {
+    fn every_position_in_a_beam_is_found() {
         let (mut random, mut several) = (Uniform::new(1), 0);
         for round in 0..4000 {
             let beam = match round % 4 {
@@ -159,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn three_hits_there_are() {
+    fn a_point_can_have_three_hits() {
         let mut random = Uniform::new(7);
         let most = (0..3000).map(|_| {
             let beam = turned(&mut random);
@@ -171,7 +268,7 @@ mod tests {
 
     #[test]
     fn points_outside_are_outside() {
-        // Brute force: the triangle at many times, its plane crossed between two of them.
+        // Brute force: counts how often the triangle's plane crosses the point over many times.
         let mut random = Uniform::new(3);
         let mut outside = 0;
         for _ in 0..400 {
@@ -205,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jacobian_is_the_derivative_and_its_sign_says_where_sides_cross() {
+    fn the_jacobian_is_the_derivative_and_its_sign_shows_crossed_sides() {
         let mut random = Uniform::new(5);
         let mut crossed = 0;
         for round in 0..500 {
@@ -219,8 +316,8 @@ mod tests {
             let d2 = (moved([a - h, b, c + h], hit.t) - here) / h;
             let dt = (moved(hit.weights, hit.t + h) - here) / h;
             let by_difference = d1.cross(d2).dot(dt);
-            let off = (by_difference - beam.jacobian(&hit)).abs();
-            assert!(off < 1e-3 * (1.0 + by_difference.abs()), "{by_difference}: {off}");
+            let difference = (by_difference - beam.jacobian(&hit)).abs();
+            assert!(difference < 1e-3 * (1.0 + by_difference.abs()), "{by_difference}: {difference}");
             if let Some(sign) = beam.sign(hit.t) {
                 assert!(sign * beam.jacobian(&hit) >= -1e-12);
             } else {
@@ -230,5 +327,39 @@ mod tests {
         assert!(crossed > 20, "{crossed}");
         let straight = warped(&mut random, 0.0);
         assert_eq!(straight.crossing(), 0.0);
+    }
+
+    /// A cubic through its values at four positions.
+    fn with_roots(roots: [f64; 3], scale: f64) -> Cubic {
+        let at = |t: f64| scale * (t - roots[0]) * (t - roots[1]) * (t - roots[2]);
+        let [f0, f1, f2, f3] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(at);
+        let b = (-5.0 * f0 + 18.0 * f1 - 9.0 * f2 + 2.0 * f3) / 6.0;
+        let c = (2.0 * f0 - 9.0 * f1 + 18.0 * f2 - 5.0 * f3) / 6.0;
+        Cubic([f0, b, c, f3])
+    }
+
+    #[test]
+    fn roots_are_found() {
+        for roots in
+            [[0.2, 0.5, 0.9], [-1.0, 0.3, 4.0], [0.1, 0.11, 0.12], [0.0, 0.25, 1.0], [-3.0, -2.0, 7.0]]
+        {
+            for scale in [1e-6, 1.0, -1e7] {
+                let found = with_roots(roots, scale).roots();
+                let inside: Vec<f64> = roots.into_iter().filter(|t| (0.0..=1.0).contains(t)).collect();
+                let found: Vec<f64> = found.into_iter().flatten().collect();
+                assert_eq!(found.len(), inside.len(), "{roots:?}: {found:?}");
+                assert!(found.iter().zip(&inside).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+            }
+        }
+        assert_eq!(Cubic([0.0; 4]).roots(), [None; 3]);
+    }
+
+    #[test]
+    fn quadratics_are_solved() {
+        let found: Vec<f64> = quadratic_roots([-1.0, 0.0, 1.0]).collect();
+        assert_eq!(found, [0.5], "a line");
+        let found: Vec<f64> = quadratic_roots([2.0, -3.0, 2.0]).collect();
+        assert!(found.len() == 2 && found.iter().all(|t| (10.0 * t * t - 10.0 * t + 2.0).abs() < 1e-12));
+        assert_eq!(quadratic_roots([1.0, 1.0, 1.0]).count(), 0);
     }
 }

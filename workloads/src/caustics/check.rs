@@ -1,4 +1,4 @@
-//! Coverage against brute force.
+//! Coverage of a method, compared with brute force.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -7,19 +7,19 @@ use super::draw::draw_with_work;
 use super::eye::Seen;
 use super::{Beam, Eye, Floor, Method};
 
-/// What a method covers of what it has to.
+/// Coverage of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Found {
-    /// Pairs of a pixel and a beam that lights the point of the floor seen in its middle.
+pub struct Coverage {
+    /// Pairs of a pixel and a beam that lights the floor at the pixel's centre.
     pub lit: u64,
-    /// Of these, those that the method leaves out: there must be none.
+    /// Pairs that the method misses (false negatives); must be 0.
     pub missed: u64,
-    /// Pairs by how many times the beam hits the point: once, twice, three times. A beam that folds passes a point more than once.
+    /// Pairs by number of hits: one, two, three. A folded beam hits a point more than once.
     pub by_hits: [u64; 3],
 }
 
-impl Found {
-    /// What was found in both.
+impl Coverage {
+    /// Sum of both.
     #[must_use]
     pub fn and(self, other: &Self) -> Self {
         let by_hits = [0, 1, 2].map(|n| self.by_hits[n] + other.by_hits[n]);
@@ -27,8 +27,8 @@ impl Found {
     }
 }
 
-/// Tests every beam at the point of the floor that every pixel sees, and looks which of them a method leaves out.
-pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Found {
+/// Tests every beam at the floor point of every pixel, and counts the pairs that a method misses.
+pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Coverage {
     let (_, mut work) = draw_with_work(beams, eye, method, None, true);
     work.sort_by_key(|work| (work.beam, work.tile));
     let (width, height) = (eye.viewport().width(), eye.viewport().height());
@@ -38,14 +38,15 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
         let at = work.binary_search_by_key(&(beam, tile), |work| (work.beam, work.tile));
         at.is_ok_and(|at| work[at].pixels >> (y % 8 * 8 + x % 8) & 1 != 0)
     };
-    let boxed = |seen: Seen| (Room::of(&seen.image), seen);
-    let seen: Vec<Option<(Room, Seen)>> = beams.iter().map(|beam| eye.see(beam).map(boxed)).collect();
+    let bounded = |seen: Seen| (BoundingBox::of(&seen.image), seen);
+    let seen: Vec<Option<(BoundingBox, Seen)>> =
+        beams.iter().map(|beam| eye.see(beam).map(bounded)).collect();
     let row = |y: u32| {
-        let mut found = Found::default();
+        let mut found = Coverage::default();
         for x in 0..width {
-            let Some(point) = floor.point(eye, eye.middle([x, y])) else { continue };
+            let Some(point) = floor.point(eye, eye.pixel_centre([x, y])) else { continue };
             for (number, seen) in (0..).zip(&seen) {
-                let near = seen.as_ref().filter(|(room, _)| room.holds(point));
+                let near = seen.as_ref().filter(|(bounds, _)| bounds.contains(point));
                 let hits = near.map_or(0, |(_, seen)| seen.image.inside(point).count());
                 if hits > 0 {
                     found.lit += 1;
@@ -56,25 +57,25 @@ pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Fo
         }
         found
     };
-    (0..height).into_par_iter().map(row).reduce(Found::default, |a, b| a.and(&b))
+    (0..height).into_par_iter().map(row).reduce(Coverage::default, |a, b| a.and(&b))
 }
 
-/// The box about the corners of a beam, with room for more than rounding: what is not in it cannot be in the beam.
-struct Room {
+/// Bounding box of a beam's corners, with a margin for rounding. Points outside are outside the beam.
+struct BoundingBox {
     low: DVec3,
     high: DVec3,
 }
 
-impl Room {
+impl BoundingBox {
     fn of(beam: &Beam) -> Self {
         let corners = || beam.open.iter().chain(&beam.close).copied();
         let low = corners().fold(DVec3::INFINITY, DVec3::min);
         let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let room = DVec3::splat(1e-3 * (1.0 + (high - low).max_element()));
-        Self { low: low - room, high: high + room }
+        let bounds = DVec3::splat(1e-3 * (1.0 + (high - low).max_element()));
+        Self { low: low - bounds, high: high + bounds }
     }
 
-    fn holds(&self, point: DVec3) -> bool {
+    fn contains(&self, point: DVec3) -> bool {
         point.cmpge(self.low).all() && point.cmple(self.high).all()
     }
 }
@@ -85,15 +86,15 @@ mod tests {
     use crate::caustics::generator::tests::{Uniform, turned, warped};
 
     #[test]
-    fn no_point_of_a_beam_is_far_from_it() {
+    fn every_point_of_a_beam_is_in_its_box() {
         let mut random = Uniform::new(8);
         for round in 0..2000 {
             let beam = if round % 2 == 0 { warped(&mut random, 0.8) } else { turned(&mut random) };
             let inside = beam.point(&random.hit());
-            let room = Room::of(&beam);
-            assert!(room.holds(inside));
+            let bounds = BoundingBox::of(&beam);
+            assert!(bounds.contains(inside));
             let far = inside + DVec3::splat(12.0);
-            assert!(!room.holds(far) && beam.inside(far).count() == 0);
+            assert!(!bounds.contains(far) && beam.inside(far).count() == 0);
         }
     }
 }

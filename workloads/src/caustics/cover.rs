@@ -1,4 +1,4 @@
-//! The pixels whose middle a method covers.
+//! The pixels whose centre a method covers.
 
 use std::ops::Range;
 
@@ -6,37 +6,37 @@ use glam::DVec3;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
 use pipeline::traversal::{TimeIntervals, time_interval};
 
-use super::bound::Body;
+use super::bound::BoundingVolume;
 use super::eye::Seen;
 use super::{Eye, Method};
 
 /// Side of a tile in pixels.
 pub(super) const TILE_PX: u32 = 8;
 
-/// Rows of tiles, in which beams are rasterized one after the other.
+/// Coverage masks of rows of tiles, filled by one beam at a time.
 pub(super) struct Cover<'a> {
     eye: &'a Eye,
     method: Method,
     grid: Grid,
-    /// The first row of pixels.
+    /// First row of pixels.
     first_row: u32,
-    /// Of each tile the pixels that the beam at hand covers.
+    /// Per tile, the pixels that the current beam covers.
     masks: Vec<u64>,
     used: Vec<u32>,
-    body: Body,
-    /// Tiles tested that may be touched.
+    volume: BoundingVolume,
+    /// Tiles tested.
     pub tiles: u64,
     /// Pixels tested.
     pub tests: u64,
 }
 
-/// The times at which the middle of a pixel is in a beam, by the face that is seen.
+/// Times at which the centre of a pixel is in a beam, per visible face.
 pub(super) fn times(eye: &Eye, seen: &Seen, at: [f64; 2]) -> [TimeIntervals; 2] {
     time_interval(&seen.triangle, eye.shear(), at[0], at[1])
 }
 
 impl<'a> Cover<'a> {
-    /// The tiles in these rows of tiles of the image.
+    /// Masks for these rows of tiles of the image.
     pub fn new(eye: &'a Eye, method: Method, rows: Range<u32>) -> Self {
         let [half_width, half_height] = eye.viewport().half_px().map(f64::from);
         let (side, first_row) = (f64::from(TILE_PX), rows.start * TILE_PX);
@@ -45,18 +45,28 @@ impl<'a> Cover<'a> {
         let origin = [-half_width, f64::from(first_row) - half_height];
         let grid = Grid { origin, tile: [side; 2], columns, rows: count };
         let masks = vec![0; (columns * count) as usize];
-        Self { eye, method, grid, first_row, masks, used: Vec::new(), body: Body::new(), tiles: 0, tests: 0 }
+        Self {
+            eye,
+            method,
+            grid,
+            first_row,
+            masks,
+            used: Vec::new(),
+            volume: BoundingVolume::new(),
+            tiles: 0,
+            tests: 0,
+        }
     }
 
-    /// Hands `each` tile, as its first pixel and a mask of 8 by 8, the pixels of it that the method covers.
+    /// Passes every tile that the method covers to `each`, as its first pixel and a mask of 8 by 8 pixels.
     pub fn each(&mut self, seen: &Seen, mut each: impl FnMut([u32; 2], u64)) {
         match self.method {
             Method::Moving => self.moving(seen),
             method => {
-                let mut body = std::mem::take(&mut self.body);
-                method.bodies(&seen.image, &mut body);
-                body.iter().for_each(|face| self.face(face));
-                self.body = body;
+                let mut volume = std::mem::take(&mut self.volume);
+                method.bounding_volumes(&seen.image, &mut volume);
+                volume.iter().for_each(|face| self.face(face));
+                self.volume = volume;
             }
         }
         let mut used = std::mem::take(&mut self.used);
@@ -72,11 +82,11 @@ impl<'a> Cover<'a> {
         [column * TILE_PX, self.first_row + row * TILE_PX]
     }
 
-    /// The triangle as it moves.
+    /// Rasterizes the moving triangle.
     fn moving(&mut self, seen: &Seen) {
         let [open, close] = [seen.image.open, seen.image.close].map(|end| end.map(|p| p.to_array()));
         let Some(triangle) = MovingTriangle::new(open, close) else { return };
-        let rasterizer = Rasterizer::new(View::orthographic()).halving(HALVINGS);
+        let rasterizer = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS);
         let (eye, grid) = (self.eye, self.grid);
         rasterizer.rasterize(&triangle, &grid, |tile, touch| {
             let reach = reach(seen, touch);
@@ -84,15 +94,15 @@ impl<'a> Cover<'a> {
         });
     }
 
-    /// A face of a body, where it is a back face: what is convex has one at each pixel that it covers, and a body that winds about a point
-    /// has one behind it.
+    /// Rasterizes a back face of a bounding volume. A convex volume has one at each pixel that it covers; a
+    /// volume that winds around a point has one behind it.
     fn face(&mut self, face: &[DVec3; 3]) {
         let edge = |i: usize, j: usize, [x, y]: [f64; 2]| {
             let (a, b) = (face[i], face[j]);
             (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
         };
         let corners = face.map(|p| p.to_array());
-        // Depth grows away from the eye.
+        // Depth increases away from the camera.
         if (face[1] - face[0]).cross(face[2] - face[0]).z <= 0.0 {
             return;
         }
@@ -108,7 +118,7 @@ impl<'a> Cover<'a> {
         });
     }
 
-    /// Tests the pixels of a tile that may be within reach and are not known to be covered.
+    /// Tests the pixels of a tile that are within reach and not yet covered.
     fn test(&mut self, [column, row]: [u32; 2], reach: [[f64; 2]; 2], covered: impl Fn([f64; 2]) -> bool) {
         self.tiles += 1;
         let tile = row * self.grid.columns + column;
@@ -117,7 +127,7 @@ impl<'a> Cover<'a> {
         let (before, mut mask) = (self.masks[tile as usize], self.masks[tile as usize]);
         for bit in (0..64_u32).filter(|bit| before >> bit & 1 == 0) {
             let pixel = [x0 + bit % TILE_PX, y0 + bit / TILE_PX];
-            let at = self.eye.middle(pixel);
+            let at = self.eye.pixel_centre(pixel);
             let near = (0..2).all(|axis| (reach[axis][0]..=reach[axis][1]).contains(&at[axis]));
             if near && pixel[0] < width && pixel[1] < height {
                 self.tests += 1;
@@ -131,11 +141,11 @@ impl<'a> Cover<'a> {
     }
 }
 
-/// How often the time of a tile is halved.
-const HALVINGS: u32 = 2;
+/// Most halvings of a tile's time.
+const MAX_HALVINGS: u32 = 2;
 const EVERYWHERE: [[f64; 2]; 2] = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
 
-/// Where the corners are while a tile may be touched, with room for rounding.
+/// Bounding box of the corners while a tile may be touched, with a margin for rounding.
 fn reach(seen: &Seen, touch: &Touch) -> [[f64; 2]; 2] {
     let ends = touch.t.map(|t| seen.image.corners(t));
     [0, 1].map(|axis| {
@@ -151,7 +161,7 @@ mod tests {
     use super::*;
     use crate::caustics::generator::tests::{Uniform, warped};
 
-    /// Any point of any beam is within the times found for its place on the image, and in the tile it lies in.
+    /// Any point of any beam is within the times found at its pixel, and in a tile that is found.
     #[test]
     fn every_point_of_a_beam_is_covered() {
         let view = [DVec3::new(0.0, 0.0, -9.0), DVec3::ZERO, DVec3::new(0.3, 1.0, 0.0)];

@@ -1,4 +1,4 @@
-//! All beams, one after the other, into an image.
+//! Drawing of beams into an image.
 
 use rayon::prelude::*;
 
@@ -6,60 +6,61 @@ use super::cover::{Cover, TILE_PX};
 use super::eye::Seen;
 use super::{Beam, Eye, Light, Method};
 
-/// What was drawn, pixels row by row from the top left.
+/// An image of light with its work; pixels row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// The light of each pixel, in the unit of what was asked for ([`Light`]); empty where nothing was.
+    /// Light of each pixel, in the unit of the requested [`Light`]; empty if none was requested.
     pub light: Vec<f64>,
     /// Shader executions of each pixel.
     pub runs: Vec<u32>,
-    /// Executions that found light.
+    /// Shader executions that found light.
     pub useful: u64,
-    /// Tiles of 8x8 pixels found to be touched, of beams or faces of bodies.
+    /// Tiles of 8x8 pixels touched, by beams or faces of bounding volumes.
     pub tiles: u64,
-    /// Pixels whose middle was tested.
+    /// Pixels tested.
     pub tests: u64,
-    /// Beams that could not be drawn: without any volume, or reaching behind the camera.
-    pub left_out: u64,
+    /// Beams that were skipped, because they have no volume or reach behind the camera.
+    pub skipped: u64,
 }
 
-/// One tile of one beam, told in the order in which hardware would meet it.
+/// One tile of one beam, in the order in which hardware processes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Covered {
-    /// The beam.
+    /// Index of the beam.
     pub beam: u32,
-    /// The tile of 8x8 pixels, row by row from the top left.
+    /// Tile of 8x8 pixels, row by row from the top left.
     pub tile: u32,
-    /// Its pixels that are shaded, one bit each, row by row.
+    /// Mask of shaded pixels, row by row.
     pub pixels: u64,
 }
 
-/// Rows of tiles that are drawn together.
+/// Rows of tiles per parallel task.
 const BAND_TILES: u32 = 2;
 
 impl Picture {
-    /// Shader executions in all.
+    /// Total shader executions.
     pub fn total_runs(&self) -> u64 {
         self.runs.iter().map(|runs| u64::from(*runs)).sum()
     }
 
-    /// The share of them that finds light; 0 where nothing runs.
+    /// Share of shader executions that find light; 0 if there are none.
     pub fn useful_share(&self) -> f64 {
         self.useful as f64 / self.total_runs().max(1) as f64
     }
 
-    /// The largest difference of the light of a pixel from that of another picture of the same view.
+    /// Largest difference of a pixel's light from that in another image of the same view.
     pub fn farthest(&self, other: &Self) -> f64 {
         self.light.iter().zip(&other.light).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 }
 
-/// Draws `beams` by `method`. With `light` it is summed up, in the order of the beams; without, executions are counted only.
+/// Draws `beams` by `method`. With `light`, sums the light in the order of the beams; otherwise counts
+/// executions only.
 pub fn draw(beams: &[Beam], eye: &Eye, method: Method, light: Option<Light>) -> Picture {
     draw_with_work(beams, eye, method, light, false).0
 }
 
-/// The same, with the work of every tile where that is asked for: beam by beam, and tile by tile in each band of rows.
+/// The same, with the work of every tile if `log`, sorted by beam and tile.
 pub(super) fn draw_with_work(
     beams: &[Beam],
     eye: &Eye,
@@ -78,8 +79,8 @@ pub(super) fn draw_with_work(
             band
         })
         .collect();
-    let left_out = seen.iter().filter(|seen| seen.is_none()).count() as u64;
-    let mut all = Picture { light: Vec::new(), runs: Vec::new(), useful: 0, tiles: 0, tests: 0, left_out };
+    let skipped = seen.iter().filter(|seen| seen.is_none()).count() as u64;
+    let mut all = Picture { light: Vec::new(), runs: Vec::new(), useful: 0, tiles: 0, tests: 0, skipped };
     let mut work = Vec::new();
     for band in bands {
         all.light.extend(band.light);
@@ -92,7 +93,7 @@ pub(super) fn draw_with_work(
     (all, work)
 }
 
-/// Some rows of the image.
+/// A band of rows of tiles.
 struct Band {
     rows: [u32; 2],
     light: Vec<f64>,
@@ -128,15 +129,15 @@ impl Band {
     }
 
     fn shade(&mut self, eye: &Eye, seen: &Seen, light: Option<Light>, first: [u32; 2], pixels: u64) {
-        let mut left = pixels;
-        while left != 0 {
-            let bit = left.trailing_zeros();
-            left &= left - 1;
+        let mut unshaded = pixels;
+        while unshaded != 0 {
+            let bit = unshaded.trailing_zeros();
+            unshaded &= unshaded - 1;
             let pixel = [first[0] + bit % TILE_PX, first[1] + bit / TILE_PX];
             let place = ((pixel[1] - self.rows[0] * TILE_PX) * eye.viewport().width() + pixel[0]) as usize;
             self.runs[place] += 1;
             if let Some(light) = light {
-                let found = light.shade(eye, seen, eye.middle(pixel));
+                let found = light.shade(eye, seen, eye.pixel_centre(pixel));
                 self.light[place] += found;
                 self.useful += u64::from(found > 0.0);
             }

@@ -1,4 +1,4 @@
-//! Where the light is looked at from.
+//! Orthographic views of the light.
 
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use pipeline::geometry::Projection;
@@ -13,29 +13,30 @@ use super::Beam;
 pub struct Eye {
     projection: Projection,
     viewport: Viewport,
-    /// Pixels in a metre.
+    /// Pixels per metre.
     scale_px: f64,
-    /// From view space to the world.
+    /// Transformation from view space to world space.
     pose: DAffine3,
 }
 
-/// A beam as the rasterizer gets it.
+/// A beam as the rasterizer sees it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// The beam in the world.
+    /// The beam in world space.
     pub world: Beam,
-    /// The same in pixels and depth, from the numbers that the rasterizer has.
+    /// The beam in pixels and depth, from the rasterizer's rounded coordinates.
     pub image: Beam,
-    /// The triangle that moves from one of its ends to the other.
+    /// The moving triangle, from one end of the beam to the other.
     pub triangle: Triangle,
 }
 
-/// Nothing is cut off in front of an orthographic camera that stands this far behind what it looks at.
+/// Distance of the near plane. The camera stands far behind the scene, so it clips nothing.
 const NEAR: f32 = 1e-6;
 
 impl Eye {
-    /// A view from `from` at `target`, its image upright where `up` is, `half_height` metres high on either side of the middle. `None`
-    /// where `from` is `target`, `up` is along the view, or something is not finite or not above zero.
+    /// A view from `from` at `target`, with `up` upwards in the image, and `half_height` metres above and
+    /// below the centre. `None` if `from` equals `target`, `up` is parallel to the view, or a value is not
+    /// finite and positive.
     pub fn new([from, target, up]: [DVec3; 3], half_height: f64, [width, height]: [u32; 2]) -> Option<Self> {
         let viewport = Viewport::new(width, height)?;
         let forward = (target - from).try_normalize()?;
@@ -54,39 +55,39 @@ impl Eye {
         })
     }
 
-    /// The size of the image.
+    /// Image size.
     pub fn viewport(&self) -> Viewport {
         self.viewport
     }
 
-    /// Pixels in a metre.
+    /// Pixels per metre.
     pub fn scale_px(&self) -> f64 {
         self.scale_px
     }
 
-    /// How the rasterizer sees points.
+    /// Projection shear of the rasterizer.
     pub(super) fn shear(&self) -> &Shear {
         &self.projection.shear
     }
 
-    /// The middle of a pixel, in pixels from the middle of the image.
-    pub(super) fn middle(&self, [column, row]: [u32; 2]) -> [f64; 2] {
-        let middle = |at: u32, side: u32| f64::from(at) + 0.5 - 0.5 * f64::from(side);
-        [middle(column, self.viewport.width()), middle(row, self.viewport.height())]
+    /// Centre of a pixel, in pixels from the centre of the image.
+    pub(super) fn pixel_centre(&self, [column, row]: [u32; 2]) -> [f64; 2] {
+        let pixel_centre = |at: u32, side: u32| f64::from(at) + 0.5 - 0.5 * f64::from(side);
+        [pixel_centre(column, self.viewport.width()), pixel_centre(row, self.viewport.height())]
     }
 
-    /// The place in the world of a point of the image at this depth.
+    /// World position of an image point at a depth.
     pub fn world(&self, [x, y]: [f64; 2], depth: f64) -> DVec3 {
         self.pose.transform_point3(DVec3::new(x / self.scale_px, -y / self.scale_px, depth))
     }
 
-    /// Where a point of the world is: pixels from the middle of the image, and depth.
+    /// Image position of a world point: pixels from the centre, and depth.
     pub fn image(&self, point: DVec3) -> DVec3 {
         let p = self.pose.inverse().transform_point3(point);
         DVec3::new(p.x * self.scale_px, -p.y * self.scale_px, p.z)
     }
 
-    /// A beam as it is seen, or `None` where it has no volume at all or reaches behind the camera.
+    /// The beam in this view; `None` if it has no volume or reaches behind the camera.
     pub(super) fn see(&self, beam: &Beam) -> Option<Seen> {
         let vertices =
             [0, 1, 2].map(|k| self.projection.vertex(beam.open[k].as_vec3(), beam.close[k].as_vec3()));

@@ -1,11 +1,11 @@
-//! `quintile run caustics`.
+//! The job `quintile run caustics`.
 
 use activity::{Event, PacketCounts};
 use glam::{DVec3, Vec3};
 use pipeline::PipelineSpec;
 use serde::{Deserialize, Serialize};
 
-use super::doubt::{crossing, doubts};
+use super::accuracy::{accuracy_warnings, crossing};
 use super::draw::{Covered, draw_with_work};
 use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};
@@ -16,37 +16,39 @@ use crate::job::{
 };
 use crate::scene::Settings;
 
-/// What is looked at.
+/// View of the light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Look {
-    /// The light in the water, from the side.
+pub enum LightView {
+    /// Light in the water, from the side.
     #[default]
     Volume,
-    /// The light on the floor, from above.
+    /// Light on the floor, from above.
     Floor,
 }
 
-/// Water in waves under the sun.
+/// Options of the job: water with waves under the sun.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// Squares of two generator triangles along each side, 1 to 1024. 255 make the 130,050 volumes of the paper's ocean.
+    /// Squares of two generator triangles along each side, 1 to 1024. 255 give the 130,050 volumes of the
+    /// paper's ocean.
     pub cells: u32,
     /// Length of a side in metres.
     pub side_m: f64,
     /// Depth in metres.
     pub depth_m: f64,
-    /// Length of the longest waves in metres; the shortest are a third of that.
+    /// Length of the longest waves in metres; the shortest are a third of it.
     pub wave_m: f64,
-    /// Root mean square of the slope of the surface, 0 to 1.
+    /// Root mean square of the surface slope, 0 to 1.
     pub slope: f64,
-    /// How far every other column of corners lies down its light, as a part of its way, 0 to 0.9: the light stays, sides of beams cross.
+    /// Offset of every other column of corners along its light, as a share of its length, 0 to 0.9. The light
+    /// stays the same, but sides of beams cross.
     pub pleat: f64,
     /// How beams are rasterized.
     pub method: Method,
-    /// What is looked at.
-    pub look: Look,
+    /// View of the light.
+    pub look: LightView,
 }
 
 impl Default for Options {
@@ -59,7 +61,7 @@ impl Default for Options {
             slope: 0.15,
             pleat: 0.0,
             method: Method::Moving,
-            look: Look::Volume,
+            look: LightView::Volume,
         }
     }
 }
@@ -86,20 +88,20 @@ impl Options {
     }
 }
 
-/// The job.
+/// The job and its ocean.
 struct Caustics {
     options: Options,
     ocean: Ocean,
     settings: Settings,
 }
 
-/// An image of light without samples, lens or shutter: a frame is an instant.
+/// Run options in use. The image has no samples, lens or shutter; a frame is an instant.
 pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 
 /// Makes the job `caustics`.
 ///
 /// # Errors
-/// [`LoadError`] when an option or a setting makes no sense.
+/// [`LoadError`] for an invalid option or setting.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: Options = options.read()?;
     options.check()?;
@@ -109,26 +111,27 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     let Options { cells, side_m, depth_m, wave_m, slope, .. } = options;
     let mut ocean = Ocean::new(cells, side_m, depth_m, [wave_m, slope], request.seed);
     ocean.pleat = options.pleat;
-    if options.look == Look::Floor {
+    if options.look == LightView::Floor {
         ocean.overshoot = 0.02;
     }
     Ok(Box::new(Caustics { options, ocean, settings }))
 }
 
-/// Bytes of a vertex at both ends of a beam, operations of the vertex shader that refracts the light and follows it to the floor, and
-/// multiply-adds that set a moving triangle up.
+/// Bytes of a vertex at both ends of a beam, operations of the vertex shader that refracts the light and
+/// follows it to the floor, and multiply-adds of the set-up of a moving triangle.
 const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 70, setup_madds: 60 };
-/// Multiply-adds of a conservative test of a tile: four sides at both ends of time, three edges at eight corners, planes of depth.
+/// Multiply-adds of a conservative tile test: four sides at both times, three edges at eight corners, and
+/// planes of depth.
 const TILE_MADDS: u32 = 180;
 /// Multiply-adds of the exact times at a pixel.
 const TIME_MADDS: u32 = 60;
-/// Bytes of a pixel of the buffer that light is summed up in.
+/// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
 /// Pixels of a tile.
 const TILE_PIXELS: u64 = 64;
 
 impl Draws for Caustics {
-    /// The time of the waves, in seconds.
+    /// Time of the waves, in seconds.
     type Input = f64;
 
     fn settings(&self) -> &Settings {
@@ -145,7 +148,7 @@ impl Draws for Caustics {
         let method = self.options.method;
         let (picture, work) = draw_with_work(&beams, &eye, method, Some(self.light()), true);
         let mut passes = Passes::new(&spec.memory, emit)?;
-        self.tell(&beams, &eye, &work, &mut passes);
+        self.emit_packets(&beams, &eye, &work, &mut passes);
         let (counts, triangles) = passes.finish();
         Ok(Drawn {
             image: toned(&picture.light),
@@ -154,7 +157,7 @@ impl Draws for Caustics {
             moving: method == Method::Moving,
             lens: false,
             facts: facts(&picture, &beams),
-            warnings: doubts(&self.ocean, &beams),
+            warnings: accuracy_warnings(&self.ocean, &beams),
         })
     }
 }
@@ -162,30 +165,30 @@ impl Draws for Caustics {
 impl Caustics {
     fn light(&self) -> Light {
         match self.options.look {
-            Look::Volume => Light::Volume,
-            Look::Floor => Light::Floor(Floor { height_m: -self.options.depth_m }),
+            LightView::Volume => Light::Volume,
+            LightView::Floor => Light::Floor(Floor { height_m: -self.options.depth_m }),
         }
     }
 
-    /// From the side, a little above and askew, or straight from above: all of the water is in the image.
+    /// A camera slightly above the side, or straight above. All of the water is in the image.
     fn eye(&self) -> Option<Eye> {
         let Options { side_m, depth_m, .. } = self.options;
         let size @ [width, height] = [self.settings.width, self.settings.height];
         let aspect = f64::from(width) / f64::from(height);
         let middle = DVec3::new(0.12 * depth_m, -0.5 * depth_m, 0.07 * depth_m);
-        let far = 4.0 * (side_m + depth_m);
+        let distance = 4.0 * (side_m + depth_m);
         let (toward, up, needed) = match self.options.look {
-            Look::Volume => {
+            LightView::Volume => {
                 let high = 0.5 * (depth_m + 0.5 * side_m);
                 (DVec3::new(0.3, 0.35, 1.0).normalize(), DVec3::Y, [0.72 * side_m, high])
             }
-            Look::Floor => (DVec3::Y, DVec3::NEG_Z, [0.55 * side_m; 2]),
+            LightView::Floor => (DVec3::Y, DVec3::NEG_Z, [0.55 * side_m; 2]),
         };
-        Eye::new([middle + far * toward, middle, up], needed[1].max(needed[0] / aspect), size)
+        Eye::new([middle + distance * toward, middle, up], needed[1].max(needed[0] / aspect), size)
     }
 
-    /// The work as packets: one draw of all beams, and each tile of each.
-    fn tell(&self, beams: &[Beam], eye: &Eye, work: &[Covered], passes: &mut Passes<'_>) {
+    /// Emits the work as packets: one draw of all beams, and each tile of each beam.
+    fn emit_packets(&self, beams: &[Beam], eye: &Eye, work: &[Covered], passes: &mut Passes<'_>) {
         let triangles = beams.len() * self.options.method.triangles();
         let pixels = eye.viewport().pixels() as u64;
         let tiles =
@@ -198,7 +201,7 @@ impl Caustics {
             let mut counts = PacketCounts::default();
             counts[Event::TilesVisited] = 1;
             counts[Event::TileMadds] = TILE_MADDS;
-            // The middle of a pixel is its only sample, tested at all times at once.
+            // The pixel centre is its only sample, tested at all times at once.
             counts[Event::SamplesTested] = runs;
             counts[Event::SamplesHit] = runs;
             counts[Event::SampleMadds] = TIME_MADDS * runs;
@@ -225,12 +228,12 @@ fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
         ("shader_executions_per_pixel", runs / picture.runs.len().max(1) as f64),
         ("executions_that_find_light", picture.useful as f64 / runs.max(1.0)),
         ("crossed_share_of_length", crossing(beams)),
-        ("beams_left_out", picture.left_out as f64),
+        ("beams_left_out", picture.skipped as f64),
     ];
     facts.into_iter().map(|(name, value)| Fact { name, value }).collect()
 }
 
-/// Light as colour: bright enough that one pixel in a hundred is white.
+/// Tone-maps light to colours; one lit pixel in a hundred is white.
 fn toned(light: &[f64]) -> Vec<Vec3> {
     let mut sorted: Vec<f64> = light.iter().copied().filter(|light| *light > 0.0).collect();
     sorted.sort_by(f64::total_cmp);
@@ -238,7 +241,7 @@ fn toned(light: &[f64]) -> Vec<Vec3> {
     light.iter().map(|light| (light / white) as f32 * TINT).collect()
 }
 
-/// The colour of light in water.
+/// Colour of light in water.
 const TINT: Vec3 = Vec3::new(0.55, 0.9, 1.0);
 
 #[cfg(test)]
@@ -256,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn every_look_and_method_is_told_whole() {
+    fn every_view_and_method_emits_all_packets() {
         for look in ["volume", "floor"] {
             let ours = drawn(&[("cells", "12"), ("wave_m", "18"), ("look", look)]);
             assert!(ours.warnings.is_empty() && ours.moving, "{:?}", ours.warnings);
@@ -280,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn options_that_make_no_sense_are_named() {
+    fn invalid_options_are_named() {
         let overrides = Overrides::default();
         for (name, value) in [
             ("cells", "0"),

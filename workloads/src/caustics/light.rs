@@ -1,4 +1,4 @@
-//! How much light of a beam a pixel gathers: what the pixel shader computes.
+//! Light of a beam at a pixel: the pixel shader.
 
 use glam::DVec3;
 
@@ -6,30 +6,32 @@ use super::cover::times;
 use super::eye::Seen;
 use super::{Eye, Hit};
 
-/// A level floor that receives light.
+/// A horizontal floor that receives light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
-    /// Its height in metres.
+    /// Height in metres.
     pub height_m: f64,
 }
 
-/// What is drawn.
+/// Quantity that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// Light in the volume: the fluence along the ray of a pixel, in watts per metre. Times what is scattered it is what an eye
-    /// sees.
+    /// Light in the volume: fluence along the ray of a pixel, in watts per metre. Times the scattering
+    /// coefficient, it is what a camera sees.
     Volume,
-    /// Irradiance on a floor, in watts per square metre, seen from above or from below alike.
+    /// Irradiance on a floor, in watts per square metre, from either side.
     Floor(Floor),
 }
 
-/// Multiply-adds of one shader execution, counted by hand from the code below: three edges and their quadratics, both faces, the area at
-/// three places and the integral; or the cubic of the inside test, some thirty halvings, and weights and Jacobian of a hit.
+/// Multiply-adds of one shader execution in the volume, counted from the code below: three edges and their
+/// quadratics, both faces, the area at three positions and the integral.
 const VOLUME_OPS: u32 = 120;
+/// The same on a floor: the cubic of the inside test, some thirty halvings, and weights and Jacobian of a
+/// hit.
 const FLOOR_OPS: u32 = 260;
 
 impl Light {
-    /// What an execution of the shader costs, in multiply-adds.
+    /// Cost of a shader execution, in multiply-adds.
     pub const fn ops(&self) -> u32 {
         match self {
             Self::Volume => VOLUME_OPS,
@@ -37,7 +39,7 @@ impl Light {
         }
     }
 
-    /// The light of a beam at the middle of a pixel.
+    /// Light of a beam at a pixel centre.
     pub(super) fn shade(&self, eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
         match self {
             Self::Volume => fluence_along(eye, seen, at),
@@ -46,8 +48,9 @@ impl Light {
     }
 }
 
-/// Fluence is `2 flux |dx/dt| / |det(dx/db1, dx/db2, dx/dt)|`, and along a ray `dz / |det(dx/db1, dx/db2, dx/dt)|` is `dt` over twice the
-/// area of the triangle on the image, so its integral is one over the times at which the pixel is inside.
+/// Integral of the fluence along a ray. Fluence is `2 flux |dx/dt| / |det(dx/db1, dx/db2, dx/dt)|`. Along a
+/// ray, `dz / |det(dx/db1, dx/db2, dx/dt)|` is `dt` over twice the area of the triangle in the image. So the
+/// integral runs over the times at which the pixel is inside.
 fn fluence_along(eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
     let scale = eye.scale_px();
     let areas = seen.image.areas().map(|area| area.z);
@@ -60,7 +63,8 @@ fn fluence_along(eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
     2.0 * seen.world.flux_w * scale * scale * sum
 }
 
-/// `|dx/dt|` where the ray meets the triangle. It varies little within a beam, so one place stands for an interval.
+/// `|dx/dt|` where the ray meets the triangle. It varies little within a beam, so one value represents an
+/// interval.
 fn speed(seen: &Seen, [x, y]: [f64; 2], t: f64) -> f64 {
     let corners = seen.image.corners(t);
     let edge = |i: usize, j: usize| {
@@ -73,13 +77,15 @@ fn speed(seen: &Seen, [x, y]: [f64; 2], t: f64) -> f64 {
     seen.world.motion(&Hit { weights, t }).length()
 }
 
-/// The integral of `1 / |area|` between two times at which a pixel is inside all the while, so that the quadratic `area` keeps its sign:
-/// with `B` its polar form at both times and `w^2 = B^2 - area(from) area(to)` it is `(to - from) atanh(w / B) / w`.
+/// Integral of `1 / |area|` over an interval in which a pixel is inside, so that the quadratic `area` keeps
+/// its sign. With `B` its polar form at both times and `w^2 = B^2 - area(from) area(to)`, it is `(to - from)
+/// atanh(w / B) / w`.
 fn over_area(area: [f64; 3], from: f64, to: f64) -> f64 {
     let polar = |s: f64, t: f64| {
         (1.0 - s) * (1.0 - t) * area[0] + ((1.0 - s) * t + s * (1.0 - t)) * area[1] + s * t * area[2]
     };
-    // At a focus the light is as bright as numbers can tell; a pixel whose middle is right on it would be infinitely bright.
+    // At a focus the light is limited by floating-point precision. A pixel centre exactly on it would be
+    // infinitely bright.
     let least = f64::EPSILON * area.iter().fold(1e-200, |most: f64, a| most.max(a.abs()));
     let sign = if polar(from, from) + polar(to, to) < 0.0 { -1.0 } else { 1.0 };
     let [first, last] = [from, to].map(|t| (sign * polar(t, t)).max(least));
@@ -89,7 +95,7 @@ fn over_area(area: [f64; 3], from: f64, to: f64) -> f64 {
     let per_length = if w <= 1e-6 * middle.abs() {
         1.0 / middle.max(least)
     } else if squared > 0.0 {
-        // atanh(w / middle) / w, without losing middle - w = first last / (middle + w).
+        // atanh(w / middle) / w, without cancellation: middle - w = first last / (middle + w).
         let sum = middle.abs() + w;
         libm::log(sum * sum / (first * last)) / (2.0 * w)
     } else {
@@ -99,7 +105,7 @@ fn over_area(area: [f64; 3], from: f64, to: f64) -> f64 {
 }
 
 impl Floor {
-    /// The irradiance of every hit: `2 flux |dx/dt . n| / |det(dx/db1, dx/db2, dx/dt)|`.
+    /// Irradiance of all hits: `2 flux |dx/dt . n| / |det(dx/db1, dx/db2, dx/dt)|`.
     fn irradiance(&self, eye: &Eye, seen: &Seen, at: [f64; 2]) -> f64 {
         let Some(point) = self.point(eye, at) else { return 0.0 };
         let scale = eye.scale_px();
@@ -111,7 +117,7 @@ impl Floor {
         seen.image.inside(point).map(of).sum()
     }
 
-    /// The point of the floor that a point of the image shows, in pixels and depth; none where the floor is seen edge on.
+    /// Floor point at an image position, in pixels and depth; `None` if the floor is seen edge-on.
     pub fn point(&self, eye: &Eye, at: [f64; 2]) -> Option<DVec3> {
         let (near, ahead) = (eye.world(at, 0.0), eye.world(at, 1.0));
         let depth = (self.height_m - near.y) / (ahead.y - near.y);
@@ -125,7 +131,7 @@ mod tests {
 
     #[test]
     fn the_integral_over_the_area_is_that_of_many_steps() {
-        // Two real roots outside, none, a line, a constant, a double root, and one that falls.
+        // Two real roots outside, no roots, a line, a constant, a double root, and a negative area.
         for area in [
             [2.0, 3.0, 1.0],
             [1.0, 0.2, 1.0],

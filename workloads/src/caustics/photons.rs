@@ -1,4 +1,4 @@
-//! Light by random rays, for comparison: nothing of it is shared with how beams are rasterized.
+//! Light by random rays, as a reference. It shares no code with the rasterization of beams.
 
 use glam::{DVec2, DVec3};
 use pipeline::random::{mix, unit};
@@ -7,26 +7,26 @@ use rayon::prelude::*;
 use super::generator::Ocean;
 use super::{Beam, Eye, Floor};
 
-/// Squares of pixels of an image, row by row from the top left, in which light is summed up.
+/// Squares of pixels that light is summed in, row by row from the top left.
 #[derive(Clone, Copy, Debug)]
 pub struct Squares<'a> {
-    /// The image.
+    /// View of the image.
     pub eye: &'a Eye,
-    /// Pixels along a side of a square; those at the right and at the bottom may be cut.
+    /// Pixels along a side of a square. Squares at the right and bottom may be smaller.
     pub side_px: u32,
 }
 
-/// Photons are thrown in so many groups, each with sums of its own.
+/// Groups of photons, each with its own sums.
 const GROUPS: u32 = 32;
 
 impl Squares<'_> {
-    /// Squares across and down.
+    /// Number of squares across and down.
     pub fn size(&self) -> [usize; 2] {
         let viewport = self.eye.viewport();
         [viewport.width(), viewport.height()].map(|side| side.div_ceil(self.side_px) as usize)
     }
 
-    /// Sums over an image, times the area of a pixel in square metres.
+    /// Sums of an image's light, times the area of a pixel in square metres.
     pub fn of_image(&self, light: &[f64]) -> Vec<f64> {
         let (width, side) = (self.eye.viewport().width() as usize, self.side_px as usize);
         let [columns, rows] = self.size();
@@ -38,8 +38,8 @@ impl Squares<'_> {
         sums
     }
 
-    /// The light of `rays` by `rays` rays that arrives on the floor, in watts: one from a random place of each small square of the water,
-    /// refracted at the waves themselves.
+    /// Light of `rays` by `rays` rays on the floor, in watts. One ray starts at a random position in each
+    /// small square of the water, and is refracted at the true waves.
     pub fn on_floor(&self, ocean: &Ocean, time_s: f64, floor: &Floor, [rays, seed]: [u32; 2]) -> Vec<f64> {
         let step_m = ocean.side_m / f64::from(rays);
         self.sum(|group, sums| {
@@ -54,9 +54,10 @@ impl Squares<'_> {
         })
     }
 
-    /// The light of beams in the volume, in watts times metres: `photons` rays of each, interpolated between its corners, at a random place each
-    /// that stands for all of its length. Places are those of an additive recurrence (Roberts 2018, "The unreasonable effectiveness of
-    /// quasirandom sequences"), turned by a random number for each beam.
+    /// Light of beams in the volume, in watts times metres. Each beam gets `photons` rays, interpolated
+    /// between its corners, and each ray one random position that represents its whole length. The positions
+    /// are an additive recurrence (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"),
+    /// shifted randomly per beam.
     pub fn in_volume(&self, beams: &[Beam], photons: u32) -> Vec<f64> {
         self.sum(|group, sums| {
             for (number, beam) in (0..).zip(beams).skip(group as usize).step_by(GROUPS as usize) {
@@ -87,7 +88,7 @@ impl Squares<'_> {
         }
     }
 
-    /// Groups are added up in their order, whatever thread they were thrown by.
+    /// Sums all groups in order, independent of threads.
     fn sum(&self, group: impl Fn(u32, &mut [f64]) + Sync) -> Vec<f64> {
         let [columns, rows] = self.size();
         let one = |number: u32| {
@@ -100,16 +101,16 @@ impl Squares<'_> {
     }
 }
 
-/// The mean difference of `found` from `known`, as a part of the mean of `known`.
+/// Mean absolute difference of `found` from `known`, relative to the mean of `known`.
 pub fn error(found: &[f64], known: &[f64]) -> f64 {
     let apart: f64 = found.iter().zip(known).map(|(a, b)| (a - b).abs()).sum();
     apart / known.iter().sum::<f64>()
 }
 
-/// Powers of one over the root of `x^4 = x + 1`.
+/// Powers of the inverse root of `x^4 = x + 1`.
 const RECURRENCE: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
 
-/// The upper right half of the unit square put upon the lower left one.
+/// Folds the upper right half of the unit square onto the lower left.
 fn folded([b, c]: [f64; 2]) -> [f64; 2] {
     if b + c > 1.0 { [1.0 - b, 1.0 - c] } else { [b, c] }
 }
@@ -127,9 +128,9 @@ mod tests {
         Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 8.0, [pixels; 2]).unwrap()
     }
 
-    /// Still water under light from above: every square gets what falls on it, and loses what is reflected.
+    /// Flat water under vertical light: every square gets the incident light less the reflected share.
     #[test]
-    fn flat_water_lights_evenly() {
+    fn flat_water_lights_uniformly() {
         let mut ocean = Ocean::new(4, 16.0, 5.0, [4.0, 0.0], 1);
         ocean.sun = DVec3::NEG_Y;
         let eye = above(64);

@@ -1,4 +1,4 @@
-//! Files of collision detection: which of them make a case, and what it holds.
+//! Input files of collision detection.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,44 +8,45 @@ use crate::error::LoadError;
 use crate::import::Format;
 use crate::visibility::{Kind, MovingMesh, load_mts, moving};
 
-/// What a case can be loaded from, for messages.
+/// Accepted files, for messages.
 const KNOWN: &str = ".mts, and .ply, .obj or .off two by two (each also gzipped)";
 
-/// Objects that may collide, and where they came from.
+/// A case: objects that may collide.
 #[derive(Clone, Debug)]
 pub struct CollisionCase {
-    /// The name of the file without its ending.
+    /// File name without its extension.
     pub id: String,
-    /// An object each.
+    /// The objects.
     pub objects: Vec<MovingMesh>,
-    /// How far a coordinate may be from that of the file.
+    /// Largest error of a coordinate compared with the file.
     pub uncertainty: f64,
 }
 
-/// The files of a case, not read yet.
+/// Files of a case, before reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CaseFiles {
-    /// The name of the first file without its ending.
+    /// Name of the first file without its extension.
     pub id: String,
     start: PathBuf,
     content: Content,
 }
 
-/// What the files of a case hold.
+/// Content of the files of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Content {
-    /// All of it in one.
+    /// All objects, in one file.
     Objects,
-    /// A mesh at time 0 in the first, and at time 1 in another.
+    /// A mesh at time 0 in the first file, and at time 1 in another.
     Ends(Format, PathBuf, Format),
 }
 
 impl CaseFiles {
-    /// Which of `files` go together: an `.mts` alone, PLY, OBJ and OFF files two by two. Of a file that cannot be read its name says what it is.
+    /// Groups `files` into cases: an `.mts` file alone, PLY, OBJ and OFF files in pairs. If a file cannot be
+    /// read, its name decides the format.
     ///
     /// # Errors
-    /// [`LoadError::is_usage`] for folders, files of no known kind or without a partner, and cases of one id; else a file that cannot be
-    /// read and whose name says nothing.
+    /// [`LoadError::is_usage`] for folders, unknown formats, files without a partner, and duplicate ids; else
+    /// a file that cannot be read and whose name gives no format.
     pub fn of(files: &[impl AsRef<Path>]) -> Result<Vec<Self>, LoadError> {
         let mut files = files.iter().map(AsRef::as_ref);
         if let Some(folder) = files.clone().find(|path| path.is_dir()) {
@@ -74,11 +75,11 @@ impl CaseFiles {
         Ok(cases)
     }
 
-    /// Reads them. The parts of a mesh that hang together are its objects; coordinates of PLY, OBJ and OFF files were
-    /// most likely rounded to f32 when they were written, and how far off that may be is given with them.
+    /// Reads the case. The connected components of a mesh are its objects. Coordinates of PLY, OBJ and OFF
+    /// files were probably rounded to f32; the uncertainty allows for that.
     ///
     /// # Errors
-    /// What is broken, and where.
+    /// Invalid content, with its place in the file.
     pub fn load(&self) -> Result<CollisionCase, LoadError> {
         let id = self.id.clone();
         let Content::Ends(opening, end, closing) = &self.content else {
@@ -86,18 +87,18 @@ impl CaseFiles {
         };
         let mesh = moving((&self.start, *opening), (end, *closing))?;
         let largest = mesh.open.iter().chain(&mesh.close).map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        // Below the smallest normal number what is rounded away is no share of the number.
+        // For subnormal numbers, the rounding error is absolute.
         let uncertainty = (largest * f64::from(f32::EPSILON)).max(f64::from(f32::from_bits(1)));
         Ok(CollisionCase { id, objects: components(&mesh), uncertainty })
     }
 
-    /// The first of them.
+    /// The first file.
     pub fn start(&self) -> &Path {
         &self.start
     }
 }
 
-/// Loads cases of collision detection: an `.mts` each with its objects, or two PLY, OBJ or OFF files as the two instants of a mesh.
+/// Loads cases: an `.mts` file each with its objects, or two PLY, OBJ or OFF files with a mesh at both times.
 ///
 /// # Errors
 /// As [`CaseFiles::of`] and [`CaseFiles::load`], at the first file.
@@ -108,7 +109,7 @@ pub fn load_cases(files: &[impl AsRef<Path>]) -> Result<Vec<CollisionCase>, Load
 /// Loads the objects of one `.mts` file.
 ///
 /// # Errors
-/// [`LoadError::is_usage`] for any other kind of file; else what is broken, and where.
+/// [`LoadError::is_usage`] for any other format; else invalid content, with its place in the file.
 pub(crate) fn load_objects(file: &Path) -> Result<Vec<MovingMesh>, LoadError> {
     match kind(file) {
         Ok(Kind::Mts) => load_mts(file),
@@ -131,7 +132,7 @@ fn kind(path: &Path) -> Result<Kind, LoadError> {
     }
 }
 
-/// The name of a file without `.mts`, `.mts.gz` and the like.
+/// File name without `.mts`, `.mts.gz` and similar extensions.
 fn stem(path: &Path) -> String {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let bare = name.strip_suffix(".gz").unwrap_or(&name);
@@ -149,7 +150,7 @@ fn no_partner(file: &Path) -> LoadError {
     ))
 }
 
-/// Rows of two cases could not be told apart.
+/// Error for two cases whose rows would have the same id.
 fn same_id(one: &CaseFiles, other: &CaseFiles) -> LoadError {
     let [first, second] = [one, other].map(|case| case.start.display());
     if one.start == other.start {

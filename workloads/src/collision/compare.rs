@@ -1,53 +1,52 @@
-//! Two objects in one pass: where and when both may touch, and which triangles may.
+//! Comparison of two objects in one pass: bounds of the contacts, and triangles that may touch.
 
-use super::bounds::Bounds;
-use super::buffer::{TzBox, TzBuffer};
-use super::pass::{Effort, Fragment, Part, Pass};
+use super::bounds::{Bounds, TzBox, TzBuffer};
+use super::pass::{Fragment, FragmentBudget, Part, Pass};
 
-/// Buffers used over and over.
+/// Reused buffers.
 #[derive(Default)]
 pub(super) struct Scratch {
     boxes: [TzBuffer; 2],
-    fragments: [Vec<Kept>; 2],
+    fragments: [Vec<StoredFragment>; 2],
 }
 
-/// A fragment that is looked at again when it is known which tiles are left.
-struct Kept {
+/// A fragment that is compared with the overlapping tiles after the pass.
+struct StoredFragment {
     place: u32,
     item: u32,
     inside: TzBox,
 }
 
-/// What is told of a pass while it goes on.
-pub(super) trait Watch {
-    /// A part is drawn: the first (0) or the second of a pair.
+/// Observer of the work of a pass.
+pub(super) trait Observer {
+    /// Reports that a part is drawn: the first (0) or the second (1) of a pair.
     fn part(&mut self, _pass: &Pass, _which: usize, _part: Part<'_>) {}
-    /// A fragment of it.
+    /// Reports a fragment of the part.
     fn fragment(&mut self, _pass: &Pass, _which: usize, _fragment: &Fragment) {}
-    /// Both may touch in a tile.
-    fn left(&mut self, _pass: &Pass, _tile: [u32; 2]) {}
+    /// Reports a tile in which both objects may touch.
+    fn overlap(&mut self, _pass: &Pass, _tile: [u32; 2]) {}
 }
 
-/// Nobody watches.
-impl Watch for () {}
+/// No observer.
+impl Observer for () {}
 
-/// What of each bin is left after a pass, and what was done for it.
+/// Result of a pass.
 pub(super) struct Survivors {
-    /// By bin, where and when both may touch.
+    /// Bounds of the contacts in each time bin.
     pub bins: Vec<Option<Bounds>>,
-    /// Tiles, in any bin, in which they may.
+    /// Overlapping tiles of all time bins.
     pub tiles: u64,
-    /// Triangles of the first and the second that may touch, and when: some of them.
+    /// Some pairs of triangles that may touch, each with a time.
     pub suspects: Vec<([u32; 2], f64)>,
-    /// For each place in the two lists, whether its triangle may touch anything.
+    /// For each triangle of the two lists, whether it may touch anything.
     pub alive: [Vec<bool>; 2],
 }
 
-/// So many suspects are named in a pass.
-const MOST_SUSPECTS: usize = 48;
+/// Most suspect pairs per pass.
+const MAX_SUSPECTS: usize = 48;
 
 impl Survivors {
-    /// Nothing is left yet of `bins`.
+    /// An empty result of so many `bins`.
     pub fn none(bins: usize, parts: [Part<'_>; 2]) -> Self {
         Self {
             bins: vec![None; bins],
@@ -57,36 +56,37 @@ impl Survivors {
         }
     }
 
-    /// Adds what is left of the bins that come next.
+    /// Appends the result of the next time bins.
     pub fn join(&mut self, next: Self) {
         self.bins.extend(next.bins);
         self.tiles += next.tiles;
-        let room = MOST_SUSPECTS.saturating_sub(self.suspects.len());
+        let room = MAX_SUSPECTS.saturating_sub(self.suspects.len());
         self.suspects.extend(next.suspects.into_iter().take(room));
         for (alive, next) in self.alive.iter_mut().zip(next.alive) {
             alive.iter_mut().zip(next).for_each(|(alive, next)| *alive |= next);
         }
     }
 
-    /// Notes that both may touch within `found`.
+    /// Adds an overlapping tile with its bounds.
     fn add(&mut self, bin: usize, found: &Bounds, triangles: [u32; 2]) {
         let known = self.bins[bin].get_or_insert(Bounds::NOTHING);
         *known = known.hull(found);
         self.tiles += 1;
-        if self.suspects.len() < MOST_SUSPECTS {
+        if self.suspects.len() < MAX_SUSPECTS {
             self.suspects.push((triangles, 0.5 * (found.time[0] + found.time[1])));
         }
     }
 }
 
-/// Marks the triangles alive of which a fragment meets the boxes of the other part.
-fn mark(alive: &mut [bool], fragments: &[Kept], others: &TzBuffer) {
-    for kept in fragments {
-        alive[kept.item as usize] |= others.at(kept.place).meet(kept.inside.t, kept.inside.z).is_some();
+/// Marks the triangles that have a fragment which meets a box of the other part.
+fn mark(alive: &mut [bool], fragments: &[StoredFragment], others: &TzBuffer) {
+    for stored in fragments {
+        alive[stored.item as usize] |=
+            others.at(stored.place).meet(stored.inside.t, stored.inside.z).is_some();
     }
 }
 
-/// What is compared and how: a pass, the two parts, and what of each bin is left.
+/// Parameters of a comparison: pass, parts, and remaining bounds of each time bin.
 pub(super) struct Comparison<'a> {
     pub pass: &'a Pass,
     pub parts: [Part<'a>; 2],
@@ -94,109 +94,110 @@ pub(super) struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Draws part `which` into the boxes of its tiles, and keeps its fragments; `None` where that takes more than `effort`.
+    /// Draws part `which` into its boxes and stores its fragments; `None` if they exceed `budget`.
     fn fill(
         &self,
         which: usize,
         scratch: &mut Scratch,
-        effort: &mut Effort,
-        watch: &mut impl Watch,
+        budget: &mut FragmentBudget,
+        observer: &mut impl Observer,
     ) -> Option<()> {
-        let (boxes, kept) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
-        kept.clear();
-        self.boxed(which, boxes, effort, watch, |kept_one| kept.push(kept_one))
+        let (boxes, stored) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
+        stored.clear();
+        self.boxed(which, boxes, budget, observer, |fragment| stored.push(fragment))
     }
 
-    /// Draws part `which` into the boxes of its tiles, and hands `each` of its fragments; as above.
+    /// Draws part `which` into its boxes and passes its fragments to `each`; `None` if they exceed `budget`.
     fn boxed(
         &self,
         which: usize,
         boxes: &mut TzBuffer,
-        effort: &mut Effort,
-        watch: &mut impl Watch,
-        mut each: impl FnMut(Kept),
+        budget: &mut FragmentBudget,
+        observer: &mut impl Observer,
+        mut each: impl FnMut(StoredFragment),
     ) -> Option<()> {
         boxes.clear(self.pass.tiles() * self.bins.len());
-        watch.part(self.pass, which, self.parts[which]);
-        let all = self.pass.draw(self.parts[which], self.bins, effort, |fragment| {
-            watch.fragment(self.pass, which, fragment);
+        observer.part(self.pass, which, self.parts[which]);
+        let all = self.pass.draw(self.parts[which], self.bins, budget, |fragment| {
+            observer.fragment(self.pass, which, fragment);
             let place = self.pass.place(fragment.tile, fragment.bin);
             boxes.add(place, &fragment.inside);
-            each(Kept { place, item: fragment.item, inside: fragment.inside });
+            each(StoredFragment { place, item: fragment.item, inside: fragment.inside });
         });
         all.then_some(())
     }
 
-    /// The part of a bin in which both may touch, when they may within `[t, z]` of a tile.
-    fn left_of(&self, tile: [u32; 2], bin: usize, [t, z]: [[f64; 2]; 2]) -> Option<Bounds> {
+    /// Remaining bounds of a time bin, intersected with a tile and its times and depths.
+    fn remaining(&self, tile: [u32; 2], bin: usize, [t, z]: [[f64; 2]; 2]) -> Option<Bounds> {
         self.bins[bin].and_then(|allowed| allowed.meet(&self.pass.bounds(tile, t, z)))
     }
 
-    /// The first part's box in each tile against each fragment of the second (Fig. 5, right), both in a bin of time. `None` where
-    /// that takes more than `effort`.
+    /// Compares the first part's box in each tile with each fragment of the second, per time bin (thesis,
+    /// Paper VI, Fig. 5, right). `None` if the fragments exceed `budget`.
     pub fn fragments_against_boxes(
         &self,
         scratch: &mut Scratch,
-        effort: &mut Effort,
-        watch: &mut impl Watch,
+        budget: &mut FragmentBudget,
+        observer: &mut impl Observer,
     ) -> Option<Survivors> {
-        let mut left = Survivors::none(self.bins.len(), self.parts);
-        self.fill(0, scratch, effort, watch)?;
+        let mut result = Survivors::none(self.bins.len(), self.parts);
+        self.fill(0, scratch, budget, observer)?;
         let [boxes, met] = &mut scratch.boxes;
         met.clear(self.pass.tiles() * self.bins.len());
-        watch.part(self.pass, 1, self.parts[1]);
-        let all = self.pass.draw(self.parts[1], self.bins, effort, |fragment| {
+        observer.part(self.pass, 1, self.parts[1]);
+        let all = self.pass.draw(self.parts[1], self.bins, budget, |fragment| {
             let Fragment { tile, bin, item, inside } = *fragment;
-            watch.fragment(self.pass, 1, fragment);
+            observer.fragment(self.pass, 1, fragment);
             let place = self.pass.place(tile, bin);
             let known = boxes.at(place);
             let Some(both) = known.meet(inside.t, inside.z) else { return };
-            let Some(found) = self.left_of(tile, bin, both) else { return };
-            left.add(bin, &found, [known.triangle, inside.triangle]);
-            left.alive[1][item as usize] = true;
+            let Some(found) = self.remaining(tile, bin, both) else { return };
+            result.add(bin, &found, [known.triangle, inside.triangle]);
+            result.alive[1][item as usize] = true;
             met.add(place, &TzBox { t: both[0], z: both[1], triangle: inside.triangle });
-            watch.left(self.pass, tile);
+            observer.overlap(self.pass, tile);
         });
-        mark(&mut left.alive[0], &scratch.fragments[0], met);
-        all.then_some(left)
+        mark(&mut result.alive[0], &scratch.fragments[0], met);
+        all.then_some(result)
     }
 
-    /// The boxes of both in each tile (Fig. 5, left), in a bin of time; as above.
+    /// Compares the boxes of both parts in each tile, per time bin (Fig. 5, left). `None` if the fragments
+    /// exceed `budget`.
     pub fn boxes_against_boxes(
         &self,
         scratch: &mut Scratch,
-        effort: &mut Effort,
-        watch: &mut impl Watch,
+        budget: &mut FragmentBudget,
+        observer: &mut impl Observer,
     ) -> Option<Survivors> {
-        let mut left = Survivors::none(self.bins.len(), self.parts);
-        self.fill(0, scratch, effort, watch)?;
-        self.fill(1, scratch, effort, watch)?;
+        let mut result = Survivors::none(self.bins.len(), self.parts);
+        self.fill(0, scratch, budget, observer)?;
+        self.fill(1, scratch, budget, observer)?;
         let [first, second] = &scratch.boxes;
         for (place, one) in first.used() {
             let other = second.at(place);
             let (tile, bin) = self.pass.at(place);
             let Some(both) = one.meet(other.t, other.z) else { continue };
-            if let Some(found) = self.left_of(tile, bin, both) {
-                left.add(bin, &found, [one.triangle, other.triangle]);
-                watch.left(self.pass, tile);
+            if let Some(found) = self.remaining(tile, bin, both) {
+                result.add(bin, &found, [one.triangle, other.triangle]);
+                observer.overlap(self.pass, tile);
             }
         }
-        for (which, alive) in left.alive.iter_mut().enumerate() {
+        for (which, alive) in result.alive.iter_mut().enumerate() {
             mark(alive, &scratch.fragments[which], &scratch.boxes[1 - which]);
         }
-        Some(left)
+        Some(result)
     }
 
-    /// Depths alone: tiles in which the second is in front of the farthest of the first, and behind its nearest. `None` where that takes
-    /// more than `effort`.
+    /// Overlapping tiles by depths alone: where the second part is in front of the first's farthest depth,
+    /// and where it is behind the nearest. `None` if the fragments exceed `budget`.
     pub fn depths(
         &self,
         scratch: &mut Scratch,
-        effort: &mut Effort,
-        watch: &mut impl Watch,
+        budget: &mut FragmentBudget,
+        observer: &mut impl Observer,
     ) -> Option<[u64; 2]> {
         for which in [0, 1] {
-            self.boxed(which, &mut scratch.boxes[which], effort, watch, |_| ())?;
+            self.boxed(which, &mut scratch.boxes[which], budget, observer, |_| ())?;
         }
         let [first, second] = &scratch.boxes;
         let both = || {

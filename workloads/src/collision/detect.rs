@@ -1,42 +1,152 @@
-//! All pairs of a case.
+//! Detection of potentially colliding pairs: the broad phase, and the search of each pair.
 
 use rayon::prelude::*;
 
-use super::compare::Scratch;
-use super::{Object, Search, Verdict, candidates};
+use super::compare::{Observer, Scratch};
+use super::contact_probe;
+use super::object::Object;
+use super::pair::Pair;
+use super::reference_frame::InFrame;
+use super::search::{Method, Search, Verdict};
 
-/// What is known of objects `a` and `b`, `a < b`.
+/// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// The number of one object.
+    /// Index of one object.
     pub a: usize,
-    /// That of the other, which is greater.
+    /// Index of the other object, which is greater.
     pub b: usize,
-    /// Whether they may collide.
+    /// Whether the objects may collide.
     pub verdict: Verdict,
 }
 
-/// The verdict on every pair whose swept boxes touch, in order; all other pairs are apart. Uses the threads of the pool it is
-/// called in; the answers do not depend on them.
+/// Verdicts on all pairs whose swept boxes touch, in order; all other pairs are apart. Runs on the current
+/// thread pool; the results do not depend on the number of threads.
 pub fn detect(objects: &[Object], search: &Search) -> Vec<Answer> {
     detect_each(&[objects], search, || ()).pop().unwrap_or_default()
 }
 
-/// The same for the objects of each of several cases, whose pairs share the threads; `done` is called, by any thread, for every
-/// pair that is known.
+/// The same for the objects of several cases, whose pairs share the threads. `done` is called by any thread
+/// after each pair.
 pub fn detect_each(cases: &[&[Object]], search: &Search, done: impl Fn() + Sync) -> Vec<Vec<Answer>> {
     let of_case =
         |(case, objects): (usize, &&[Object])| candidates(objects).into_iter().map(move |pair| (case, pair));
     let pairs: Vec<_> = cases.iter().enumerate().flat_map(of_case).collect();
-    let looked_at = |scratch: &mut Scratch, &(case, (a, b)): &(usize, (usize, usize))| {
+    let search_pair = |scratch: &mut Scratch, &(case, (a, b)): &(usize, (usize, usize))| {
         let verdict = search.pair(&cases[case][a], &cases[case][b], scratch);
         done();
         Answer { a, b, verdict }
     };
-    let found: Vec<Answer> = pairs.par_iter().map_init(Scratch::default, looked_at).collect();
+    let found: Vec<Answer> = pairs.par_iter().map_init(Scratch::default, search_pair).collect();
     let mut answers = vec![Vec::new(); cases.len()];
     for ((case, _), answer) in pairs.into_iter().zip(found) {
         answers[case].push(answer);
     }
     answers
+}
+
+/// Largest coordinate of a pair that is scaled up, so that products of three coordinates do not underflow.
+pub(super) const MAX_SCALED_COORDINATE: f64 = 1e-60;
+
+/// Power of two that scales a small number to about one, at most 2^1000. The product is exact.
+pub(super) fn upscale_factor(small: f64) -> f64 {
+    const BIAS: u64 = 1023;
+    let exponent = BIAS.saturating_sub(small.to_bits() >> 52).min(1000);
+    f64::from_bits((BIAS + exponent) << 52)
+}
+
+impl Search {
+    /// Whether `a` and `b` may collide.
+    pub(super) fn pair(&self, a: &Object, b: &Object, scratch: &mut Scratch) -> Verdict {
+        self.pair_observed(a, b, scratch, &mut ())
+    }
+
+    /// The same, with an `observer` of the passes.
+    pub(super) fn pair_observed(
+        &self,
+        a: &Object,
+        b: &Object,
+        scratch: &mut Scratch,
+        observer: &mut impl Observer,
+    ) -> Verdict {
+        let largest = a.largest().max(b.largest());
+        if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
+            let factor = upscale_factor(largest);
+            let [one, other] = [a, b].map(|object| object.scaled(factor));
+            return self.searched([&one, &other], scratch, observer).scaled(1.0 / factor);
+        }
+        self.searched([a, b], scratch, observer)
+    }
+
+    fn searched(
+        &self,
+        objects: [&Object; 2],
+        scratch: &mut Scratch,
+        observer: &mut impl Observer,
+    ) -> Verdict {
+        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
+        let by_depth = self.method == Method::DepthOnly;
+        if by_depth && !self.zoom {
+            return pair.by_depth(scratch, observer);
+        }
+        if !pair.tighten() {
+            return Verdict::Apart;
+        }
+        if !self.zoom {
+            return pair.once(scratch, observer);
+        }
+        if contact_probe::finds_contact(pair.parts(), &pair.window) {
+            return pair.maybe(0, true);
+        }
+        if by_depth {
+            return pair.refine_by_depth(scratch, observer);
+        }
+        let Some(seen) = InFrame::new(pair.parts(), &pair.window) else {
+            return pair.refine(scratch, observer);
+        };
+        let in_frame = Pair::new(seen.objects.each_ref(), pair.window.time, self);
+        in_frame.map_or(Verdict::Apart, |mut in_frame| seen.to_world(in_frame.refine(scratch, observer)))
+    }
+}
+
+/// Pairs `(a, b)`, `a < b`, of objects whose swept boxes touch, in order. The method is sort and sweep along
+/// x (Cohen et al. 1995, "I-COLLIDE", section 3.2.1, on one axis).
+pub fn candidates(objects: &[Object]) -> Vec<(usize, usize)> {
+    let mut order: Vec<usize> = (0..objects.len()).filter(|&object| !objects[object].is_empty()).collect();
+    let from = |object: usize| objects[object].bounds.space[0][0];
+    order.sort_by(|&a, &b| from(a).total_cmp(&from(b)).then(a.cmp(&b)));
+    let mut pairs = Vec::new();
+    for (place, &a) in order.iter().enumerate() {
+        let last = objects[a].bounds.space[0][1];
+        for &b in order[place + 1..].iter().take_while(|&&b| from(b) <= last) {
+            if objects[a].bounds.meet(&objects[b].bounds).is_some() {
+                pairs.push((a.min(b), a.max(b)));
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use pipeline::random::mix;
+
+    use super::*;
+
+    #[test]
+    fn the_sweep_finds_the_same_pairs_as_brute_force() {
+        let at = |n: u64| (mix(n) % 1000) as f64;
+        let object = |n: u64| {
+            let [x, y, z] = [at(3 * n), at(3 * n + 1), at(3 * n + 2)];
+            let near = [[x, y, z], [x + 220.0, y, z], [x, y + 190.0, z + 250.0]];
+            Object::from_ends(vec![[near, near]], 0.0).unwrap()
+        };
+        let objects: Vec<_> = (0..60).map(object).chain(Object::from_ends(vec![], 0.0)).collect();
+        let touch = |a: usize, b: usize| objects[a].bounds.meet(&objects[b].bounds).is_some();
+        let all = (0..60).flat_map(|a| (a + 1..60).map(move |b| (a, b))).filter(|&(a, b)| touch(a, b));
+        let all: Vec<_> = all.collect();
+        assert!(all.len() > 20, "{}", all.len());
+        assert_eq!(candidates(&objects), all);
+    }
 }

@@ -1,4 +1,4 @@
-//! `quintile run ccd`: collision detection as the hardware would do it, three passes for each pair.
+//! The job `quintile run ccd`: collision detection on the modelled hardware, in three passes per pair.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use warnings::{Code, Warning};
 
 use super::cases::load_objects;
 use super::compare::Scratch;
-use super::easel::{Easel, Sheet};
+use super::emitter::{Emitted, PacketEmitter};
 use super::families::swarm_of;
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
@@ -17,19 +17,19 @@ use crate::job::{
 };
 use crate::scene::Settings;
 
-/// What is drawn, and how.
+/// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// An .mts file; without it balls fly about.
+    /// An `.mts` file; without it, balls move at random.
     pub file: Option<PathBuf>,
-    /// Balls, 2 to 100.
+    /// Number of balls, 2 to 100.
     pub balls: u32,
     /// Tiles across each image, 1 to 1024.
     pub resolution: u32,
-    /// Bins of time in a tile, 1 to 256.
+    /// Time bins per tile, 1 to 256.
     pub bins: u32,
-    /// What is compared.
+    /// What a pass compares.
     pub method: Method,
 }
 
@@ -66,26 +66,26 @@ impl Options {
                 format!("{} holds no objects, so nothing can collide; give another file", file.display());
             return Err(LoadError::Setting { setting: "file", message });
         }
-        // What an .mts file says is exact.
+        // Coordinates of an `.mts` file are exact.
         let objects: Option<Vec<Object>> = meshes.iter().map(|mesh| Object::new(mesh, 0.0)).collect();
         objects.ok_or_else(|| broken("a coordinate is beyond 1e60 or not a number; scale it"))
     }
 }
 
-/// The job.
+/// The job and its objects.
 struct Collision {
     search: Search,
     objects: Vec<Object>,
     settings: Settings,
 }
 
-/// Images are squares, looked at through the middles of pixels over the whole of the time.
+/// Run options that the job replaces. Its images are squares, sampled at pixel centres over the whole time.
 pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "resolution")] };
 
 /// Makes the job `ccd`.
 ///
 /// # Errors
-/// [`LoadError`] when an option makes no sense, or the file cannot be read.
+/// [`LoadError`] for an invalid option, or a file that cannot be read.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: Options = options.read()?;
     options.check()?;
@@ -96,13 +96,13 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     Ok(Box::new(Collision { search, objects: options.objects(request.seed)?, settings }))
 }
 
-/// Above this share of candidates, most of what is near is kept.
-const MOST_KEPT: f64 = 0.9;
-/// Fewer candidates than this say little.
-const FEWEST: usize = 4;
+/// Share of kept candidates above which a warning is given.
+const MAX_KEPT_SHARE: f64 = 0.9;
+/// Least number of candidates for the warning.
+const MIN_CANDIDATES: usize = 4;
 
 impl Draws for Collision {
-    /// Every frame searches the same motion.
+    /// All frames search the same motion.
     type Input = ();
 
     fn settings(&self) -> &Settings {
@@ -119,16 +119,18 @@ impl Draws for Collision {
     }
 
     fn draw(&self, (): &(), spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
-        let mut easel = Easel::new(&self.search, &self.objects, spec, Passes::new(&spec.memory, emit)?);
+        let mut emitter =
+            PacketEmitter::new(&self.search, &self.objects, spec, Passes::new(&spec.memory, emit)?);
         let pairs = candidates(&self.objects);
         let mut scratch = Scratch::default();
         let mut kept = 0_u32;
         for &(a, b) in &pairs {
-            let verdict = self.search.watched(&self.objects[a], &self.objects[b], &mut scratch, &mut easel);
-            easel.flush();
+            let verdict =
+                self.search.pair_observed(&self.objects[a], &self.objects[b], &mut scratch, &mut emitter);
+            emitter.flush();
             kept += u32::from(matches!(verdict, Verdict::Maybe { .. }));
         }
-        let Sheet { image, counts, triangles, fragments } = easel.finish();
+        let Emitted { image, counts, triangles, fragments } = emitter.finish();
         let fact = |name, value| Fact { name, value };
         let facts = vec![
             fact("pairs_whose_boxes_touch", pairs.len() as f64),
@@ -141,7 +143,7 @@ impl Draws for Collision {
 }
 
 fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
-    (pairs >= FEWEST && f64::from(kept) > MOST_KEPT * pairs as f64).then(|| {
+    (pairs >= MIN_CANDIDATES && f64::from(kept) > MAX_KEPT_SHARE * pairs as f64).then(|| {
         let message = format!(
             "{kept} of {pairs} pairs whose swept boxes touch may collide: images tell hardly any apart, as where surfaces slide along \
              each other; raise `resolution` and `bins`, or use `quintile ccd`, which looks closer"
@@ -174,7 +176,7 @@ mod tests {
             assert_eq!(drawn.image.len(), 48 * 16);
             let fact = |name| drawn.facts.iter().find(|fact| fact.name == name).unwrap().value;
             assert_eq!(drawn.counts[Event::SamplesHit] as f64, fact("fragments"), "{method}");
-            // Both objects have boxes of their own where these are compared, else the second only reads.
+            // Each object has its own boxes when boxes are compared; otherwise the second only reads.
             let writes = drawn.counts[Event::DepthWrites] == drawn.counts[Event::SamplesHit];
             assert_eq!(writes, method == "box_box", "{method}");
             let objects = swarm_of(6, 1);
@@ -188,13 +190,13 @@ mod tests {
     }
 
     #[test]
-    fn options_that_make_no_sense_are_refused() {
+    fn invalid_options_are_refused() {
         assert!(made(&[("resolution", "0")]).is_err() && made(&[("bins", "257")]).is_err());
         assert!(made(&[("balls", "1")]).is_err() && made(&[("file", "nowhere.mts")]).is_err());
     }
 
     #[test]
-    fn pairs_that_are_all_kept_are_told() {
+    fn a_warning_reports_that_most_pairs_are_kept() {
         assert!(near_everywhere(10, 10).is_some() && near_everywhere(10, 9).is_none());
         assert!(near_everywhere(3, 3).is_none());
     }

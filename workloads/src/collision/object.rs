@@ -1,80 +1,85 @@
-//! What may collide.
+//! Moving objects made of triangles.
 
 use glam::DVec3;
-use pipeline::conservative::LEAST_UNCERTAINTY;
+use pipeline::conservative::MIN_UNCERTAINTY;
 
+use super::bounds::times_inside;
 use super::bounds::{Bounds, Ends};
-use super::window::times_inside;
 use crate::visibility::MovingMesh;
 
-/// Triangles that move as one.
+/// An object: triangles, each with linear motion from time 0 to time 1.
 #[derive(Clone, Debug)]
 pub struct Object {
     pub(super) triangles: Vec<Ends>,
-    /// The swept box of each.
+    /// Swept box of each triangle.
     pub(super) boxes: Vec<Bounds>,
-    /// The swept box of all.
+    /// Swept box of the object.
     pub(super) bounds: Bounds,
-    /// How far a coordinate may be from what was meant.
+    /// Largest error of a coordinate.
     pub(super) uncertainty: f64,
 }
 
-/// The largest coordinate that may be: products of three stay finite.
-const LARGEST: f64 = 1e60;
+/// Largest accepted coordinate. Products of three stay finite.
+const MAX_COORDINATE: f64 = 1e60;
 
 impl Object {
-    /// The triangles of a mesh; coordinates may be off by up to `uncertainty`. `None` where one is beyond 1e60 or not a number.
+    /// Takes the triangles of a mesh, whose coordinates may be off by up to `uncertainty`. `None` if a
+    /// coordinate is NaN or beyond 1e60.
     pub fn new(mesh: &MovingMesh, uncertainty: f64) -> Option<Self> {
         let corner = |end: &[DVec3], vertex: u32| end[vertex as usize].to_array();
         let ends = |corners: &[u32; 3]| [&mesh.open, &mesh.close].map(|end| corners.map(|v| corner(end, v)));
         Self::from_ends(mesh.triangles.iter().map(ends).collect(), uncertainty)
     }
 
-    /// Triangles given by their corners at both times.
+    /// Takes triangles by their corners at both times; as [`new`](Self::new).
     pub fn from_ends(triangles: Vec<Ends>, uncertainty: f64) -> Option<Self> {
-        let fits = |at: &f64| at.abs() <= LARGEST;
-        // What differences of a coordinate and its uncertainty are rounded by.
+        let fits = |at: &f64| at.abs() <= MAX_COORDINATE;
+        // Allows for rounding in differences of a coordinate and its uncertainty.
         let uncertainty = 1.001 * uncertainty;
         if !triangles.as_flattened().as_flattened().as_flattened().iter().all(fits) {
             return None;
         }
-        Some(Self::fitted(triangles, uncertainty))
+        Some(Self::with_boxes(triangles, uncertainty))
     }
 
-    /// How far its corners go from time 0 to time 1, by some of them.
-    pub(super) fn way(&self) -> [f64; 3] {
-        const SOME: usize = 64;
-        let some = self.triangles.iter().step_by(self.triangles.len().div_ceil(SOME).max(1));
-        let count = (3 * some.len()).max(1) as f64;
+    /// Mean translation of the corners from time 0 to time 1, from up to 64 triangles.
+    pub(super) fn translation(&self) -> [f64; 3] {
+        const SAMPLED_TRIANGLES: usize = 64;
+        let sampled = self.triangles.iter().step_by(self.triangles.len().div_ceil(SAMPLED_TRIANGLES).max(1));
+        let count = (3 * sampled.len()).max(1) as f64;
         [0, 1, 2].map(|axis| {
-            let way = |[open, close]: &Ends| (0..3).map(|k| close[k][axis] - open[k][axis]).sum::<f64>();
-            some.clone().map(way).sum::<f64>() / count
+            let translation =
+                |[open, close]: &Ends| (0..3).map(|k| close[k][axis] - open[k][axis]).sum::<f64>();
+            sampled.clone().map(translation).sum::<f64>() / count
         })
     }
 
-    /// Some of its triangles seen from a frame of reference that goes `way` from time 0 to time 1.
-    pub(super) fn less(&self, list: &[u32], way: [f64; 3]) -> Self {
-        let seen = |[open, close]: &Ends| [*open, close.map(|p| [0, 1, 2].map(|axis| p[axis] - way[axis]))];
+    /// The triangles of `list` in a frame of reference that is translated by `translation` from time 0 to
+    /// time 1.
+    pub(super) fn in_frame(&self, list: &[u32], translation: [f64; 3]) -> Self {
+        let seen =
+            |[open, close]: &Ends| [*open, close.map(|p| [0, 1, 2].map(|axis| p[axis] - translation[axis]))];
         let triangles: Vec<Ends> = list.iter().map(|&n| seen(&self.triangles[n as usize])).collect();
         let coordinates = triangles.as_flattened().as_flattened().as_flattened();
-        let largest = coordinates.iter().chain(&way).fold(0.0, |largest: f64, at| largest.max(at.abs()));
-        // A difference is off by half a unit of its last place.
-        Self::fitted(triangles, self.uncertainty + f64::EPSILON * largest)
+        let largest =
+            coordinates.iter().chain(&translation).fold(0.0, |largest: f64, at| largest.max(at.abs()));
+        // A difference has an error of half an ulp.
+        Self::with_boxes(triangles, self.uncertainty + f64::EPSILON * largest)
     }
 
-    /// The same `factor` times as large, a power of two.
+    /// The object scaled by `factor`, a power of two.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         let scaled = |ends: &Ends| ends.map(|end| end.map(|p| p.map(|at| at * factor)));
-        Self::fitted(self.triangles.iter().map(scaled).collect(), self.uncertainty * factor)
+        Self::with_boxes(self.triangles.iter().map(scaled).collect(), self.uncertainty * factor)
     }
 
-    /// The largest coordinate that it reaches.
+    /// Largest absolute coordinate of the swept box.
     pub(super) fn largest(&self) -> f64 {
         self.bounds.space.as_flattened().iter().fold(0.0, |largest, at| largest.max(at.abs()))
     }
 
-    /// With its boxes.
-    fn fitted(triangles: Vec<Ends>, uncertainty: f64) -> Self {
+    /// Computes the swept boxes.
+    fn with_boxes(triangles: Vec<Ends>, uncertainty: f64) -> Self {
         let swept = |ends: &Ends| Bounds::of(ends.as_flattened().iter().copied()).inflated(uncertainty);
         let boxes: Vec<Bounds> = triangles.iter().map(swept).collect();
         let bounds =
@@ -82,42 +87,42 @@ impl Object {
         Self { triangles, boxes, bounds, uncertainty }
     }
 
-    /// The same, its coordinates unsure by `relative` of the largest.
+    /// The object with its uncertainty raised by the share `relative` of its largest coordinate.
     #[must_use]
     pub fn loosened(&self, relative: f64) -> Self {
         let coordinates = self.triangles.as_flattened().as_flattened().as_flattened();
         let largest = coordinates.iter().fold(0.0, |largest: f64, at| largest.max(at.abs()));
-        Self::fitted(self.triangles.clone(), self.uncertainty + relative * largest)
+        Self::with_boxes(self.triangles.clone(), self.uncertainty + relative * largest)
     }
 
-    /// Its triangles.
+    /// Number of triangles.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// Whether it has none.
+    /// Whether the object has no triangles.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    /// How far a coordinate may be off at least, which pays for products that are too small to be numbers. Boxes are exact without.
-    pub(super) fn unsure(&self) -> f64 {
-        self.uncertainty.max(LEAST_UNCERTAINTY)
+    /// Uncertainty for the rasterizer, large enough for products that underflow. The boxes do not need it.
+    pub(super) fn raster_uncertainty(&self) -> f64 {
+        self.uncertainty.max(MIN_UNCERTAINTY)
     }
 
-    /// The times at which a triangle may be inside a box of space and time.
+    /// Times at which a triangle may be inside a box of space and time.
     pub(super) fn times_inside(&self, triangle: u32, within: &Bounds) -> Option<[f64; 2]> {
         let triangle = triangle as usize;
-        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.unsure())
+        times_inside(&self.triangles[triangle], &self.boxes[triangle], within, self.raster_uncertainty())
     }
 
-    /// The box that it sweeps.
+    /// Swept box.
     pub fn bounds(&self) -> &Bounds {
         &self.bounds
     }
 }
 
-/// The parts of a mesh that hang together by shared vertices, in the order of their first triangles.
+/// Connected components of a mesh, by shared vertices, in the order of their first triangles.
 pub fn components(mesh: &MovingMesh) -> Vec<MovingMesh> {
     let mut parents: Vec<u32> = (0..mesh.open.len() as u32).collect();
     for [a, b, c] in &mesh.triangles {
@@ -144,7 +149,7 @@ pub fn components(mesh: &MovingMesh) -> Vec<MovingMesh> {
     parts
 }
 
-/// The root of a vertex; paths are halved on the way.
+/// Root of a vertex in the union-find forest, with path halving.
 fn find(parents: &mut [u32], mut vertex: u32) -> u32 {
     while parents[vertex as usize] != vertex {
         parents[vertex as usize] = parents[parents[vertex as usize] as usize];
@@ -158,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_shares_a_vertex_hangs_together() {
+    fn triangles_that_share_a_vertex_are_one_component() {
         let points = vec![DVec3::ZERO; 9];
         let triangles = vec![[0, 1, 2], [3, 4, 5], [2, 6, 7], [8, 8, 5]];
         let mesh = MovingMesh { open: points.clone(), close: points, triangles };
@@ -167,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_is_refused() {
+    fn nan_and_large_coordinates_are_refused() {
         let mut ends = [[[0.0; 3]; 3]; 2];
         assert!(Object::from_ends(vec![ends], 0.0).is_some());
         for bad in [f64::NAN, f64::INFINITY, -2e60] {

@@ -1,104 +1,112 @@
-//! A pair of objects with what is left of it, and how it is looked at once.
+//! A pair of objects, the space and time that remain of it, and its search with and without refinement.
 
 use super::bounds::Bounds;
-use super::compare::{Comparison, Scratch, Survivors, Watch};
-use super::crossing::cross;
-use super::depth_only;
+use super::compare::{Comparison, Observer, Scratch, Survivors};
+use super::contact_probe::cross;
 use super::object::Object;
-use super::pass::{Effort, Fit, Part, Pass};
+use super::pass::{Fit, FragmentBudget, Part, Pass, Tiling};
 use super::search::{Method, Search, Verdict};
 
-/// Tiles in any bin that are held at once, about 50 bytes each for each of the two.
-const MOST_PLACES: usize = 1 << 21;
+/// Most tiles, over all time bins, in memory at once; each takes about 50 bytes per object.
+const MAX_TILES_IN_MEMORY: usize = 1 << 21;
 
-/// What a round has left.
+/// Result of a round with overlapping tiles.
 pub(super) struct Round {
     pub window: Bounds,
-    /// Tiles in which both may touch.
+    /// Tiles in which both objects may touch.
     pub tiles: u64,
-    /// Whether two triangles were seen to cross or to share a corner.
+    /// Whether two triangles were found to cross or to share a corner.
     pub seen: bool,
 }
 
-/// How a round ends.
+/// Result of a round.
 pub(super) enum Outcome {
-    /// Nothing touches.
+    /// The objects are apart.
     Apart,
-    /// It would take too long.
-    GaveUp,
-    /// Something may.
-    Left(Round),
+    /// The fragments exceeded the budget.
+    BudgetExceeded,
+    /// The objects may touch.
+    Overlap(Round),
 }
 
-/// How closely a round looks.
+/// Parameters of the passes of a round.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Look {
+pub(super) struct PassParams {
     pub resolution: u32,
     pub bins: u32,
     pub fit: Fit,
 }
 
-/// A pair with what is left of it.
+/// A pair of objects and its remaining search window.
 pub(super) struct Pair<'a> {
     objects: [&'a Object; 2],
-    /// The triangles of each that may be in the window.
+    /// Triangles of each object that may be in the window.
     lists: [Vec<u32>; 2],
     pub window: Bounds,
     pub search: &'a Search,
 }
 
 impl<'a> Pair<'a> {
-    /// All triangles of both, in what their boxes share during `time`; `None` where that is nothing.
+    /// All triangles of both objects, in the intersection of their boxes during `time`; `None` if that is
+    /// empty.
     pub fn new(objects: [&'a Object; 2], time: [f64; 2], search: &'a Search) -> Option<Self> {
         let shared = objects[0].bounds.meet(&objects[1].bounds)?;
         let lists = objects.map(|object| (0..object.len() as u32).collect());
         Some(Self { objects, lists, window: Bounds { time, ..shared }, search })
     }
 
-    /// Without time, as the method knows none.
-    pub fn by_depth(&self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
+    /// Searches by depths alone, without time bins.
+    pub fn by_depth(&self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
         let resolution = self.search.resolution;
-        match self.depths(resolution, &mut Effort::endless(), scratch, watch) {
+        match self.depths(resolution, &mut FragmentBudget::unlimited(), scratch, observer) {
             Some(0) => Verdict::Apart,
             tiles => self.maybe(tiles.unwrap_or(0), false),
         }
     }
 
-    /// Tiles that keep both together by their depths alone, none where they are apart; `None` where that takes more than `effort`.
+    /// Fewest overlapping tiles of the six passes by depths alone; 0 means apart. `None` if the fragments
+    /// exceed `budget`.
     pub fn depths(
         &self,
         resolution: u32,
-        effort: &mut Effort,
+        budget: &mut FragmentBudget,
         scratch: &mut Scratch,
-        watch: &mut impl Watch,
+        observer: &mut impl Observer,
     ) -> Option<u64> {
-        let across = (resolution, self.grain());
-        depth_only::tiles(self.parts(), &self.window, across, effort, scratch, watch)
+        let tiling = Tiling { resolution, min_width: self.min_tile_width() };
+        let mut fewest = u64::MAX;
+        for axis in 0..3 {
+            let pass = Pass::new(axis, &self.window, tiling, Fit::Edges);
+            let comparison = Comparison { pass: &pass, parts: self.parts(), bins: &[Some(self.window)] };
+            let [in_front, behind] = comparison.depths(scratch, budget, observer)?;
+            fewest = fewest.min(in_front).min(behind);
+        }
+        Some(fewest)
     }
 
-    /// At the resolution asked for.
-    pub fn once(&mut self, scratch: &mut Scratch, watch: &mut impl Watch) -> Verdict {
+    /// Searches once, at the requested resolution.
+    pub fn once(&mut self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
         let Search { resolution, bins, .. } = *self.search;
-        let look = Look { resolution, bins, fit: Fit::Edges };
-        match self.round(look, &mut Effort::endless(), scratch, watch) {
+        let params = PassParams { resolution, bins, fit: Fit::Edges };
+        match self.round(params, &mut FragmentBudget::unlimited(), scratch, observer) {
             Outcome::Apart => Verdict::Apart,
-            Outcome::GaveUp => self.maybe(0, false),
-            Outcome::Left(Round { window, tiles, seen }) => Verdict::Maybe { bounds: window, tiles, seen },
+            Outcome::BudgetExceeded => self.maybe(0, false),
+            Outcome::Overlap(Round { window, tiles, seen }) => Verdict::Maybe { bounds: window, tiles, seen },
         }
     }
 
-    /// What is left of it may collide.
+    /// The verdict that the pair may collide within the window.
     pub fn maybe(&self, tiles: u64, seen: bool) -> Verdict {
         Verdict::Maybe { bounds: self.window, tiles, seen }
     }
 
-    /// Tiles narrower than this tell nothing more: their borders are rounded, and corners are unsure, by as much.
-    pub fn grain(&self) -> f64 {
-        let unsure = self.objects.iter().map(|object| object.unsure());
-        unsure.fold(self.window.rounding(), f64::max)
+    /// Least useful width of a tile. Rounding of borders and uncertainty of corners are as large.
+    pub fn min_tile_width(&self) -> f64 {
+        let raster_uncertainty = self.objects.iter().map(|object| object.raster_uncertainty());
+        raster_uncertainty.fold(self.window.rounding(), f64::max)
     }
 
-    /// How many are left.
+    /// Triangles of both objects in the window.
     pub fn triangles(&self) -> usize {
         self.lists.iter().map(Vec::len).sum()
     }
@@ -107,7 +115,8 @@ impl<'a> Pair<'a> {
         [0, 1].map(|which| Part { object: self.objects[which], list: &self.lists[which] })
     }
 
-    /// Drops the triangles that are never in the window, and of the window what no triangle is in. Says whether anything is left.
+    /// Drops triangles that are never in the window, and shrinks the window to the rest. `false` if nothing
+    /// remains.
     pub fn tighten(&mut self) -> bool {
         for which in 0..2 {
             let (object, window) = (self.objects[which], self.window);
@@ -119,63 +128,65 @@ impl<'a> Pair<'a> {
                 true
             });
             match self.window.meet(&within) {
-                Some(left) => self.window = left,
+                Some(remaining) => self.window = remaining,
                 None => return false,
             }
         }
         true
     }
 
-    /// Three passes. Where it is looked closer, triangles that touch nothing are dropped on the way.
+    /// Runs three passes. When refining, drops triangles that touch nothing after each pass.
     pub fn round(
         &mut self,
-        look: Look,
-        effort: &mut Effort,
+        params: PassParams,
+        budget: &mut FragmentBudget,
         scratch: &mut Scratch,
-        watch: &mut impl Watch,
+        observer: &mut impl Observer,
     ) -> Outcome {
-        let mut left = slices(&self.window, look.bins);
+        let mut remaining = time_bins(&self.window, params.bins);
         let (mut tiles, mut seen) = (0, false);
         for axis in 0..3 {
-            let Some(hull) = joined(&left) else { return Outcome::Apart };
-            let pass = Pass::new(axis, &hull, (look.resolution, self.grain()), look.fit);
-            let Some(found) = self.compare(&pass, &left, effort, scratch, watch) else {
-                return Outcome::GaveUp;
+            let Some(hull) = joined(&remaining) else { return Outcome::Apart };
+            let tiling = Tiling { resolution: params.resolution, min_width: self.min_tile_width() };
+            let pass = Pass::new(axis, &hull, tiling, params.fit);
+            let Some(found) = self.compare(&pass, &remaining, budget, scratch, observer) else {
+                return Outcome::BudgetExceeded;
             };
             tiles = found.tiles;
-            seen |= self.search.zoom && self.is_seen(&found);
+            seen |= self.search.zoom && self.has_crossing(&found);
             if self.search.zoom {
                 self.keep(&found);
             }
-            left = found.bins;
+            remaining = found.bins;
             if seen {
                 break;
             }
         }
-        joined(&left).map_or(Outcome::Apart, |window| Outcome::Left(Round { window, tiles, seen }))
+        joined(&remaining).map_or(Outcome::Apart, |window| Outcome::Overlap(Round { window, tiles, seen }))
     }
 
-    /// Both in one pass, as many bins at once as fit in memory; `None` where that takes more than `effort`.
+    /// Compares both objects in one pass, in chunks of time bins that fit in memory; `None` if the fragments
+    /// exceed `budget`.
     fn compare(
         &self,
         pass: &Pass,
-        left: &[Option<Bounds>],
-        effort: &mut Effort,
+        remaining: &[Option<Bounds>],
+        budget: &mut FragmentBudget,
         scratch: &mut Scratch,
-        watch: &mut impl Watch,
+        observer: &mut impl Observer,
     ) -> Option<Survivors> {
         let mut all = Survivors::none(0, self.parts());
-        for bins in left.chunks((MOST_PLACES / pass.tiles()).max(1)) {
+        for bins in remaining.chunks((MAX_TILES_IN_MEMORY / pass.tiles()).max(1)) {
             let comparison = Comparison { pass, parts: self.parts(), bins };
             all.join(match self.search.method {
-                Method::BoxBox => comparison.boxes_against_boxes(scratch, effort, watch),
-                _ => comparison.fragments_against_boxes(scratch, effort, watch),
+                Method::BoxBox => comparison.boxes_against_boxes(scratch, budget, observer),
+                _ => comparison.fragments_against_boxes(scratch, budget, observer),
             }?);
         }
         Some(all)
     }
 
-    /// Keeps the triangles that are alive.
+    /// Keeps the triangles marked as alive.
     fn keep(&mut self, found: &Survivors) {
         for (list, alive) in self.lists.iter_mut().zip(&found.alive) {
             let mut alive = alive.iter();
@@ -183,8 +194,8 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// Whether any of the suspects cross.
-    fn is_seen(&self, found: &Survivors) -> bool {
+    /// Whether any of the suspect pairs of triangles cross.
+    fn has_crossing(&self, found: &Survivors) -> bool {
         found.suspects.iter().any(|&([a, b], t)| {
             let [one, other] = self.objects;
             cross(&one.triangles[a as usize], &other.triangles[b as usize], t)
@@ -192,8 +203,8 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// The window cut into equal bins of time; neighbours share the instant between them.
-fn slices(window: &Bounds, bins: u32) -> Vec<Option<Bounds>> {
+/// The window split into equal time bins. Neighbours share the instant between them.
+fn time_bins(window: &Bounds, bins: u32) -> Vec<Option<Bounds>> {
     let [first, last] = window.time;
     let bins = if first == last { 1 } else { bins };
     let border = |bin: u32| {
@@ -202,7 +213,188 @@ fn slices(window: &Bounds, bins: u32) -> Vec<Option<Bounds>> {
     (0..bins).map(|bin| Some(Bounds { time: [border(bin), border(bin + 1)], ..*window })).collect()
 }
 
-/// The box around what is left of all bins.
+/// Bounding box of the remaining bins.
 fn joined(bins: &[Option<Bounds>]) -> Option<Bounds> {
     bins.iter().flatten().copied().reduce(|a, b| a.hull(&b))
+}
+
+/// Refinement ends when a round keeps more than this share of space and time, and of the triangles.
+const MAX_REMAINING_SHARE: f64 = 0.5;
+/// Least number of tiles across in the first round.
+const MIN_FIRST_TILES: u32 = 8;
+/// Triangles per tile above which the first round uses more tiles.
+const TRIANGLES_PER_TILE: f64 = 16.0;
+/// Triangles above which a round starts with boxes instead of edges.
+const MIN_TRIANGLES_FOR_BOXES: usize = 64;
+/// Triangles up to which edges are tried before smaller tiles. They leave fewer fragments, which pays for the
+/// smaller tiles. For more triangles, boxes cull most at less cost.
+const MAX_TRIANGLES_FOR_EDGES: usize = 1024;
+/// Most fragments for a pair of few triangles. They are cheap, and often nearly touch.
+const MAX_FRAGMENTS: u64 = 1 << 18;
+/// Least number of fragments for a pair.
+const MIN_FRAGMENTS: u64 = 1 << 16;
+/// Reduction of the budget per triangle, down to [`MIN_FRAGMENTS`].
+const FRAGMENTS_LESS_PER_TRIANGLE: u64 = 128;
+/// Additional fragments per triangle.
+const FRAGMENTS_PER_TRIANGLE: u64 = 4;
+/// Most rounds. As many halve space and time down to the precision of a double.
+const MAX_ROUNDS: u32 = 64;
+
+/// Triangles per part that are sampled for its speed.
+const SAMPLED_TRIANGLES: usize = 64;
+
+impl Pair<'_> {
+    /// Searches with few tiles, then with more; smaller windows give smaller tiles. Many triangles are tested
+    /// by their boxes until that no longer helps, the remaining ones by their edges.
+    pub fn refine(&mut self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
+        if !self.tighten() {
+            return Verdict::Apart;
+        }
+        let most = self.search.resolution;
+        let mut budget = self.budget();
+        let mut fit = if self.triangles() > MIN_TRIANGLES_FOR_BOXES { Fit::Boxes } else { Fit::Edges };
+        let first = (self.triangles() as f64 / TRIANGLES_PER_TILE).sqrt() as u32;
+        let (mut resolution, mut last) = (first.max(MIN_FIRST_TILES).min(most), self.maybe(0, false));
+        for _ in 0..MAX_ROUNDS {
+            let (before, triangles) = (self.window, self.triangles());
+            let params = PassParams { resolution, bins: self.bins(resolution), fit };
+            let round = match self.round(params, &mut budget, scratch, observer) {
+                Outcome::Apart => return Verdict::Apart,
+                Outcome::BudgetExceeded => break,
+                Outcome::Overlap(round) => round,
+            };
+            self.window = round.window;
+            last = self.maybe(round.tiles, round.seen);
+            if round.seen {
+                break;
+            }
+            if !self.tighten() {
+                return Verdict::Apart;
+            }
+            if self.triangles() <= MIN_TRIANGLES_FOR_BOXES {
+                fit = Fit::Edges;
+            }
+            let window_remains = round.window.share_of(&before) > MAX_REMAINING_SHARE;
+            let triangles_remain = self.triangles() as f64 > MAX_REMAINING_SHARE * triangles as f64;
+            let can_double = window_remains && resolution < most;
+            match fit {
+                Fit::Boxes
+                    if triangles_remain && (!can_double || self.triangles() <= MAX_TRIANGLES_FOR_EDGES) =>
+                {
+                    fit = Fit::Edges
+                }
+                _ if can_double => resolution = (2 * resolution).min(most),
+                Fit::Edges if triangles_remain && window_remains => break,
+                _ => {}
+            }
+        }
+        last
+    }
+
+    /// Searches by depths alone, with few tiles, then with more. Objects that few tiles separate are apart. A
+    /// pair that exceeds its budget stays.
+    pub fn refine_by_depth(&self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
+        let most = self.search.resolution;
+        let (mut budget, mut resolution, mut last) = (self.budget(), MIN_FIRST_TILES.min(most), 0);
+        while let Some(tiles) = self.depths(resolution, &mut budget, scratch, observer) {
+            if tiles == 0 {
+                return Verdict::Apart;
+            }
+            last = tiles;
+            if resolution == most {
+                break;
+            }
+            resolution = (2 * resolution).min(most);
+        }
+        self.maybe(last, false)
+    }
+
+    /// Fragment budget of the pair.
+    fn budget(&self) -> FragmentBudget {
+        let triangles = self.triangles() as u64;
+        let few = MAX_FRAGMENTS.saturating_sub(FRAGMENTS_LESS_PER_TRIANGLE * triangles).max(MIN_FRAGMENTS);
+        FragmentBudget::of(few + FRAGMENTS_PER_TRIANGLE * triangles)
+    }
+
+    /// Time bins in which a triangle moves by about one tile, limited by the requested number.
+    fn bins(&self, resolution: u32) -> u32 {
+        let ([first, last], min_tile_width) = (self.window.time, self.min_tile_width());
+        let step = |part: &Part<'_>| {
+            let sampled = part.list.iter().step_by(part.list.len().div_ceil(SAMPLED_TRIANGLES).max(1));
+            let moved = |triangle: &u32| {
+                let [open, close] = &part.object.triangles[*triangle as usize];
+                let moved = |axis: usize| {
+                    let extent = self.window.space[axis][1] - self.window.space[axis][0];
+                    let distance = (close[0][axis] - open[0][axis]).abs() * (last - first);
+                    if extent > 0.0 {
+                        distance / (extent / f64::from(resolution)).max(min_tile_width)
+                    } else {
+                        0.0
+                    }
+                };
+                moved(0).max(moved(1)).max(moved(2))
+            };
+            sampled.clone().map(moved).sum::<f64>() / sampled.len().max(1) as f64
+        };
+        let step = self.parts().iter().map(step).fold(0.0, f64::max);
+        (step.ceil() as u32).clamp(1, self.search.bins)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::families::slide;
+    use super::super::pass::{Fragment, Pass};
+    use super::super::{Method, Object, Search, detect};
+    use super::*;
+
+    /// Counts fragments.
+    struct Drawn(u64);
+
+    impl Observer for Drawn {
+        fn fragment(&mut self, _: &Pass, _: usize, _: &Fragment) {
+            self.0 += 1;
+        }
+    }
+
+    /// Two triangles that are closer than any tile can separate.
+    #[test]
+    fn refinement_ends_with_every_method() {
+        let slanted = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
+        let object = |x: f64| Object::from_ends(vec![[slanted(x); 2]], 0.0).unwrap();
+        for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
+            let search = Search { resolution: 1024, bins: 16, method, zoom: true };
+            let mut drawn = Drawn(0);
+            let verdict =
+                search.pair_observed(&object(0.0), &object(1e-7), &mut Scratch::default(), &mut drawn);
+            assert!(verdict.may_collide() && drawn.0 <= MAX_FRAGMENTS + 8, "{method:?}: {}", drawn.0);
+        }
+    }
+
+    #[test]
+    fn more_tiles_keep_no_more_plates_that_slide_along_each_other() {
+        for gap in [0.03, 0.1] {
+            let kept = |resolution: u32| {
+                let search = Search { resolution, ..Search::default() };
+                let keeps = |seed: &u64| detect(&slide(*seed, gap), &search)[0].verdict.may_collide();
+                (0..8).filter(keeps).count()
+            };
+            let kept = [8, 16, 64].map(kept);
+            assert!(kept.is_sorted_by(|few, more| few >= more), "gap {gap}: {kept:?}");
+        }
+    }
+
+    /// A corner that runs into the middle of a triangle. The remaining window soon reaches the precision of a
+    /// double.
+    #[test]
+    fn refinement_ends_at_the_precision_of_a_double() {
+        let floor = [[0.0, 0.0, 0.1], [1.0, 0.0, 0.2], [0.0, 1.0, 0.4]];
+        let falling = |z: f64| [[0.3, 0.3, z], [0.31, 0.3, z + 1.0], [0.3, 0.32, z + 1.0]];
+        let [a, b] =
+            [[floor; 2], [falling(1.0), falling(0.22)]].map(|ends| Object::from_ends(vec![ends], 0.0));
+        let mut drawn = Drawn(0);
+        let search = Search::default();
+        let verdict = search.pair_observed(&a.unwrap(), &b.unwrap(), &mut Scratch::default(), &mut drawn);
+        assert!(verdict.may_collide() && drawn.0 < MAX_FRAGMENTS / 4, "{}: {verdict:?}", drawn.0);
+    }
 }

@@ -1,36 +1,37 @@
-//! The passes of the paper and nothing else (thesis, Paper VI, section 3): both objects drawn whole along each of the three axes,
-//! over all of the space that either sweeps, one box of time and depth a pixel. Nothing is narrowed on the CPU, no pass knows of
-//! another, and all are drawn.
+//! The passes of the paper alone (thesis, Paper VI, section 3). Both objects are drawn whole along each of
+//! the three axes, over all of the space that either sweeps, with one box of time and depth per pixel. The
+//! CPU narrows nothing, the passes are independent, and all of them are drawn.
 
 use super::bounds::Bounds;
-use super::compare::{Comparison, Scratch, Watch};
+use super::compare::{Comparison, Observer, Scratch};
+use super::detect::{MAX_SCALED_COORDINATE, upscale_factor};
 use super::object::Object;
-use super::pass::{Effort, Fit, Fragment, Part, Pass};
-use super::run::{TINY, enlarging};
+use super::pass::{Fit, Fragment, FragmentBudget, Part, Pass, Tiling};
 use super::search::Method;
 
-/// What the passes have drawn, and what they have left of a pair.
+/// Work of the passes, and the overlapping pixels of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Drawn {
-    /// Passes: three with boxes of time and depth, six by depth alone.
+pub struct PlainResult {
+    /// Number of passes: three with boxes of time and depth, six by depth alone.
     pub passes: u64,
-    /// Objects drawn; one by depth alone serves both directions.
+    /// Objects drawn. By depth alone, one drawing serves both directions.
     pub draws: u64,
-    /// Triangles of these.
+    /// Triangles of the objects drawn.
     pub triangles: u64,
-    /// Pixels that triangles may touch.
+    /// Fragments: pairs of a triangle and a pixel that it may touch.
     pub fragments: u64,
-    /// Pixels in which both objects may touch, seen along x, y and z; by depth alone those of the direction with fewer.
-    pub left: [u64; 3],
+    /// Pixels in which both objects may touch, seen along x, y and z. By depth alone, those of the direction
+    /// with fewer.
+    pub overlaps: [u64; 3],
 }
 
-impl Drawn {
-    /// Whether the pair stays in the potentially colliding set: no projection separates it.
+impl PlainResult {
+    /// Whether the pair stays in the potentially colliding set, because no projection separates it.
     pub fn may_collide(&self) -> bool {
-        self.left.iter().all(|pixels| *pixels > 0)
+        self.overlaps.iter().all(|pixels| *pixels > 0)
     }
 
-    /// Adds what another pair took; what is left of pairs is not added up.
+    /// Adds the work of another pair; keeps the overlapping pixels of this one.
     #[must_use]
     pub fn and(self, other: &Self) -> Self {
         Self {
@@ -38,12 +39,12 @@ impl Drawn {
             draws: self.draws + other.draws,
             triangles: self.triangles + other.triangles,
             fragments: self.fragments + other.fragments,
-            left: self.left,
+            overlaps: self.overlaps,
         }
     }
 }
 
-impl Watch for Drawn {
+impl Observer for PlainResult {
     fn part(&mut self, _: &Pass, _: usize, part: Part<'_>) {
         self.draws += 1;
         self.triangles += part.list.len() as u64;
@@ -54,7 +55,7 @@ impl Watch for Drawn {
     }
 }
 
-/// Draws pairs by one method at one resolution; its buffers are used over and over.
+/// Draws pairs by one method at one resolution, with reused buffers.
 pub struct PlainPasses {
     method: Method,
     resolution: u32,
@@ -62,53 +63,55 @@ pub struct PlainPasses {
 }
 
 impl PlainPasses {
-    /// With `resolution` pixels across, 1 to 1024.
+    /// Makes passes with `resolution` pixels across, 1 to 1024.
     pub fn new(method: Method, resolution: u32) -> Self {
         Self { method, resolution, scratch: Scratch::default() }
     }
 
     /// Draws both objects in every pass.
-    pub fn pair(&mut self, a: &Object, b: &Object) -> Drawn {
+    pub fn pair(&mut self, a: &Object, b: &Object) -> PlainResult {
         let largest = a.largest().max(b.largest());
-        if largest > 0.0 && largest < TINY {
-            let factor = enlarging(largest);
-            return self.drawn([&a.scaled(factor), &b.scaled(factor)]);
+        if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
+            let factor = upscale_factor(largest);
+            return self.draw_pair([&a.scaled(factor), &b.scaled(factor)]);
         }
-        self.drawn([a, b])
+        self.draw_pair([a, b])
     }
 
-    fn drawn(&mut self, objects: [&Object; 2]) -> Drawn {
-        let mut drawn = Drawn::default();
+    fn draw_pair(&mut self, objects: [&Object; 2]) -> PlainResult {
+        let mut result = PlainResult::default();
         if objects.iter().any(|object| object.is_empty()) {
-            return drawn;
+            return result;
         }
         let window = Bounds { time: [0.0, 1.0], ..objects[0].bounds.hull(&objects[1].bounds) };
-        let grain = objects.iter().map(|object| object.unsure()).fold(window.rounding(), f64::max);
+        let min_width =
+            objects.iter().map(|object| object.raster_uncertainty()).fold(window.rounding(), f64::max);
         let lists = objects.map(|object| (0..object.len() as u32).collect::<Vec<_>>());
         let parts = [0, 1].map(|which| Part { object: objects[which], list: &lists[which] });
         for axis in 0..3 {
-            let pass = Pass::new(axis, &window, (self.resolution, grain), Fit::Edges);
+            let tiling = Tiling { resolution: self.resolution, min_width };
+            let pass = Pass::new(axis, &window, tiling, Fit::Edges);
             let comparison = Comparison { pass: &pass, parts, bins: &[Some(window)] };
-            drawn.left[axis] = self.left(&comparison, &mut drawn);
-            drawn.passes += if self.method == Method::DepthOnly { 2 } else { 1 };
+            result.overlaps[axis] = self.overlaps(&comparison, &mut result);
+            result.passes += if self.method == Method::DepthOnly { 2 } else { 1 };
         }
-        drawn
+        result
     }
 
-    /// Pixels in which both may touch in a pass.
-    fn left(&mut self, comparison: &Comparison<'_>, drawn: &mut Drawn) -> u64 {
-        let (scratch, effort) = (&mut self.scratch, &mut Effort::endless());
-        // Effort has no end, so that there always is an answer; a pair without one would have to stay.
+    /// Pixels of a pass in which both objects may touch.
+    fn overlaps(&mut self, comparison: &Comparison<'_>, result: &mut PlainResult) -> u64 {
+        let (scratch, budget) = (&mut self.scratch, &mut FragmentBudget::unlimited());
+        // The budget is unlimited, so there always is a result. Without one, the pair would have to stay.
         match self.method {
             Method::DepthOnly => {
-                comparison.depths(scratch, effort, drawn).map_or(1, |[front, behind]| front.min(behind))
+                comparison.depths(scratch, budget, result).map_or(1, |[front, behind]| front.min(behind))
             }
             Method::BoxBox => {
-                comparison.boxes_against_boxes(scratch, effort, drawn).map_or(1, |left| left.tiles)
+                comparison.boxes_against_boxes(scratch, budget, result).map_or(1, |overlaps| overlaps.tiles)
             }
-            Method::FragmentBox => {
-                comparison.fragments_against_boxes(scratch, effort, drawn).map_or(1, |left| left.tiles)
-            }
+            Method::FragmentBox => comparison
+                .fragments_against_boxes(scratch, budget, result)
+                .map_or(1, |overlaps| overlaps.tiles),
         }
     }
 }
@@ -125,33 +128,33 @@ mod tests {
             for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
                 let mut passes = PlainPasses::new(method, 16);
                 for &(a, b) in &case.collide {
-                    let drawn = passes.pair(&case.objects[a], &case.objects[b]);
-                    assert!(drawn.may_collide(), "{} {a} {b} {method:?}", case.family);
-                    assert!(drawn.fragments > 0 && drawn.draws == 6);
-                    assert_eq!(drawn.passes, if method == Method::DepthOnly { 6 } else { 3 });
+                    let result = passes.pair(&case.objects[a], &case.objects[b]);
+                    assert!(result.may_collide(), "{} {a} {b} {method:?}", case.family);
+                    assert!(result.fragments > 0 && result.draws == 6);
+                    assert_eq!(result.passes, if method == Method::DepthOnly { 6 } else { 3 });
                 }
             }
         }
     }
 
-    /// What the CPU narrows first is a subset of what the passes see.
+    /// A pair that the passes separate is separated with narrowing on the CPU as well.
     #[test]
-    fn what_passes_clear_alone_is_cleared_with_help_as_well() {
+    fn pairs_that_plain_passes_separate_are_separated_by_the_search() {
         let search = Search { resolution: 32, bins: 1, method: Method::FragmentBox, zoom: false };
         let (mut alone, mut helped) = (0, 0);
         for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
-            let drawn = PlainPasses::new(Method::FragmentBox, 32).pair(&case.objects[0], &case.objects[1]);
+            let result = PlainPasses::new(Method::FragmentBox, 32).pair(&case.objects[0], &case.objects[1]);
             let answers = detect(&case.objects, &search);
             helped += usize::from(answers.iter().all(|answer| !answer.verdict.may_collide()));
-            alone += usize::from(!drawn.may_collide());
+            alone += usize::from(!result.may_collide());
         }
         assert!(alone > 0 && alone <= helped, "{alone} of {helped}");
     }
 
     #[test]
-    fn what_is_empty_is_apart() {
+    fn empty_objects_are_apart() {
         let none = Object::from_ends(Vec::new(), 0.0).unwrap();
-        let drawn = PlainPasses::new(Method::BoxBox, 8).pair(&none, &none);
-        assert!(!drawn.may_collide() && drawn.draws == 0);
+        let result = PlainPasses::new(Method::BoxBox, 8).pair(&none, &none);
+        assert!(!result.may_collide() && result.draws == 0);
     }
 }

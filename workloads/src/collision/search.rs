@@ -1,32 +1,32 @@
-//! How a pair of objects is searched, and what is found.
+//! Parameters and result of the search of a pair.
 
 use serde::{Deserialize, Serialize};
 
 use super::bounds::Bounds;
 
-/// What is compared in a tile.
+/// What a pass compares in a tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Each fragment of one object with the box of the other (Fig. 5, right).
+    /// Each fragment of one object with the box of the other (thesis, Paper VI, Fig. 5, right).
     #[default]
     FragmentBox,
-    /// The boxes of both (Fig. 5, left).
+    /// The boxes of both objects (Fig. 5, left).
     BoxBox,
     /// Depths alone, in six passes (Govindaraju et al. 2003, "CULLIDE").
     DepthOnly,
 }
 
-/// How closely a pair is looked at.
+/// Parameters of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Search {
     /// Tiles across, 1 to 1024.
     pub resolution: u32,
-    /// Bins of time in a tile, 1 to 256.
+    /// Time bins per tile, 1 to 256.
     pub bins: u32,
     /// What is compared.
     pub method: Method,
-    /// Whether to look again, closer, at what is left of space and time.
+    /// Whether to refine: search the remaining space and time again with smaller tiles.
     pub zoom: bool,
 }
 
@@ -36,37 +36,37 @@ impl Default for Search {
     }
 }
 
-/// What is known of a pair.
+/// Result of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// They do not collide.
+    /// The objects do not collide.
     Apart,
-    /// They may, and if so, then within `bounds`.
+    /// The objects may collide; every contact lies within `bounds`.
     Maybe {
-        /// Where and when.
+        /// Space and time that contain every contact.
         bounds: Bounds,
-        /// Tiles in which they may, in the last pass that was looked at.
+        /// Overlapping tiles of the last pass.
         tiles: u64,
-        /// Whether two triangles were seen to cross or to share a corner, as far as rounding can tell.
+        /// Whether two triangles were found to cross or to share a corner, beyond rounding errors.
         seen: bool,
     },
 }
 
 impl Verdict {
-    /// The same `factor` times as large.
+    /// Scales the bounds by `factor`.
     pub(super) fn scaled(self, factor: f64) -> Self {
         let Self::Maybe { bounds, tiles, seen } = self else { return self };
         let space = bounds.space.map(|range| range.map(|at| at * factor));
         Self::Maybe { bounds: Bounds { space, ..bounds }, tiles, seen }
     }
 
-    /// Whether the pair has to stay.
+    /// Whether the pair stays in the potentially colliding set.
     pub fn may_collide(&self) -> bool {
         *self != Self::Apart
     }
 
-    /// Whether two triangles were seen to cross or to share a corner.
-    pub fn is_seen(&self) -> bool {
+    /// Whether two triangles were found to cross or to share a corner.
+    pub fn is_contact(&self) -> bool {
         matches!(self, Self::Maybe { seen: true, .. })
     }
 }

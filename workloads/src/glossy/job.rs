@@ -1,4 +1,4 @@
-//! Glossy reflection or refraction as a job: the map, and the scene with the map on its receiver.
+//! The job `glossy`: the map, and the scene with the map on its receiver.
 
 use activity::Event;
 use glam::{DVec3, Vec3};
@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::map::Map;
+use super::receiver::ReceiverShader;
 use super::receiver::{Effect, Receiver};
 use super::stage::{receiver, stage};
-use super::surface::ReceiverShader;
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::scene::{Frame, Overrides, Scene, Settings};
@@ -19,21 +19,21 @@ use crate::scene::{Frame, Overrides, Scene, Settings};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// A built-in scene or a file; the stage of this workload without it.
+    /// A built-in scene or a file; without it, the test scene of this workload.
     pub scene: Option<String>,
-    /// Middle of the receiver, which lies in a plane of constant height and is seen from above; scene units.
+    /// Centre of the receiver, a horizontal rectangle seen from above; scene units.
     pub centre: [f64; 3],
     /// Half of its sides along x and z, scene units.
     pub half: [f64; 2],
-    /// Refraction instead of reflection, with this index.
+    /// Refractive index, for refraction instead of reflection.
     pub index: Option<f64>,
-    /// Radius of the lens, scene units: the roughness. 0 is a mirror.
+    /// Roughness: radius of the lens, scene units. 0 is a mirror.
     pub roughness: f64,
     /// Texels of the map from the near to the far side of the receiver.
     pub texels: u32,
-    /// Samples of a texel.
+    /// Samples per texel.
     pub map_samples: u32,
-    /// Share of light from straight above that goes into the map; the rest shows the surface's own colour.
+    /// Share of reflected light at normal incidence; the rest shows the surface's own colour.
     pub fresnel: f32,
 }
 
@@ -56,17 +56,20 @@ impl Default for Options {
 impl Options {
     fn check(&self) -> Result<(), LoadError> {
         let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
-        if !self.half.iter().all(|half| (LEAST..=FARTHEST).contains(half)) {
-            return refused("half", format!("{:?}: both have to be {LEAST:e} to {FARTHEST:e}", self.half));
+        if !self.half.iter().all(|half| (MIN_LENGTH..=MAX_LENGTH).contains(half)) {
+            return refused(
+                "half",
+                format!("{:?}: both have to be {MIN_LENGTH:e} to {MAX_LENGTH:e}", self.half),
+            );
         }
-        if !self.centre.iter().all(|at| (-FARTHEST..=FARTHEST).contains(at)) {
-            let message = format!("{:?}: all have to be -{FARTHEST:e} to {FARTHEST:e}", self.centre);
+        if !self.centre.iter().all(|at| (-MAX_LENGTH..=MAX_LENGTH).contains(at)) {
+            let message = format!("{:?}: all have to be -{MAX_LENGTH:e} to {MAX_LENGTH:e}", self.centre);
             return refused("centre", message);
         }
-        let most = WIDEST * self.half[0].min(self.half[1]);
-        if self.roughness != 0.0 && !(LEAST..=most).contains(&self.roughness) {
+        let most = MAX_RADIUS_PER_HALF_SIDE * self.half[0].min(self.half[1]);
+        if self.roughness != 0.0 && !(MIN_LENGTH..=most).contains(&self.roughness) {
             let why = format!(
-                "{:?}: it has to be 0, or a radius of {LEAST:e} to {most:?} scene units, {WIDEST} times the receiver's",
+                "{:?}: it has to be 0, or a radius of {MIN_LENGTH:e} to {most:?} scene units, {MAX_RADIUS_PER_HALF_SIDE} times the receiver's",
                 self.roughness
             );
             return refused("roughness", format!("{why} smaller half side"));
@@ -84,7 +87,7 @@ impl Options {
     }
 }
 
-/// The job.
+/// The job with its scene and receiver.
 pub struct Glossy {
     scene: Scene,
     receiver: Receiver,
@@ -96,19 +99,20 @@ fn refused(error: impl std::fmt::Display) -> JobError {
     JobError::Setting(error.to_string())
 }
 
-/// The widest lens over the receiver's smaller half side: far beyond where it stands for a surface.
-const WIDEST: f64 = 100.0;
-/// Lengths and coordinates that single precision holds with room for their products.
-const LEAST: f64 = 1e-15;
-const FARTHEST: f64 = 1e15;
+/// Largest lens radius relative to the receiver's smaller half side, far beyond any surface.
+const MAX_RADIUS_PER_HALF_SIDE: f64 = 100.0;
+/// Least length, in scene units, whose products single precision represents.
+const MIN_LENGTH: f64 = 1e-15;
+/// Largest length or coordinate, in scene units.
+const MAX_LENGTH: f64 = 1e15;
 /// Linear RGB radiance of the receiver's own surface.
 const BASE: Vec3 = Vec3::new(0.10, 0.11, 0.12);
 
 impl Glossy {
-    /// A glossy receiver in the scene of `options`, settings changed by `overrides`.
+    /// Makes a glossy receiver in the scene of `options`, with settings changed by `overrides`.
     ///
     /// # Errors
-    /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
+    /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
     pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene = match &options.scene {
             Some(name) => crate::load(name)?,
@@ -141,11 +145,13 @@ impl Glossy {
         SampleTable::new(&SampleSpec::default(), samples, self.seed).map_err(refused)
     }
 
-    /// The scene with the map on its receiver.
+    /// Renders the scene with the map on its receiver.
     fn show(
         &self,
-        (map, texels): (&Map, &[Vec3]),
-        (camera, mut draws): (&Camera, Vec<Draw<'_>>),
+        map: &Map,
+        texels: &[Vec3],
+        camera: &Camera,
+        mut draws: Vec<Draw<'_>>,
         spec: &PipelineSpec,
         emit: Emit<'_>,
     ) -> Result<Rendered, JobError> {
@@ -201,7 +207,7 @@ impl Draws for Glossy {
             Fact { name: "map_samples_tested", value: counts[Event::SamplesTested] as f64 },
             Fact { name: "blur_at_height_1", value: map.blur(1.0) },
         ];
-        let image = self.show((&map, &texels), (&frame.camera, draws), spec, &mut shifted(1, emit))?;
+        let image = self.show(&map, &texels, &frame.camera, draws, spec, &mut shifted(1, emit))?;
         counts += &image.counts;
         let (triangles, moving) = (2 * frame.triangle_count() + 2, frame.is_moving());
         let warnings = self.regime_warnings();
@@ -209,13 +215,13 @@ impl Draws for Glossy {
     }
 }
 
-/// Samples are those of the usual table.
+/// Run options in use.
 pub(crate) const FLAGS: Flags = Flags {
     uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Lens, Flag::Focus, Flag::Clip, Flag::Camera],
     instead: &[],
 };
 
-/// The job by its options.
+/// Makes the job from its options.
 ///
 /// # Errors
 /// As [`Glossy::new`].

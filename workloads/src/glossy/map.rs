@@ -1,4 +1,4 @@
-//! The map of a receiver: what each of its texels sees through the lens.
+//! The map of a receiver: the light that each texel gathers through the lens.
 
 use activity::Counts;
 use glam::{DVec3, Vec2, Vec3};
@@ -13,7 +13,7 @@ use crate::error::LoadError;
 use crate::job::{Emit, JobError, shifted};
 use crate::scene::camera::Stand;
 
-/// The camera of a map and the texels of the receiver.
+/// A map: its camera, and the texels of the receiver.
 #[derive(Clone, Copy, Debug)]
 pub struct Map {
     camera: Camera,
@@ -24,20 +24,22 @@ pub struct Map {
     pub viewport: Viewport,
 }
 
-/// The directions that a point of the receiver gathers from.
+/// Directions that a point of the receiver gathers light from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lobe {
-    /// Those through the lens, as the map has them.
+    /// Directions through the lens, as in the map.
     Lens,
-    /// A cone about the direction to the middle of the lens, the same everywhere: that of the lens at the middle of the receiver.
+    /// A cone around the direction to the lens centre. It has the same angle everywhere: that of the lens at
+    /// the receiver's centre.
     Cone,
 }
 
 impl Map {
-    /// The map of `receiver`, `rows` texels high, for an eye at `eye` that looks along `along`, through a lens of `radius` scene units.
+    /// Makes the map of `receiver`, `rows` texels high, for a viewer at `eye` who looks along `along`,
+    /// through a lens of `radius` scene units.
     ///
     /// # Errors
-    /// When the eye is not above the receiver, or a length cannot be.
+    /// [`LoadError`] if the viewer is not above the receiver, or a length is invalid.
     pub fn new(
         receiver: &Receiver,
         (eye, along): (DVec3, DVec3),
@@ -77,7 +79,7 @@ impl Map {
         &self.camera
     }
 
-    /// Distance of the eye from the plane, scene units.
+    /// Distance of the map's camera from the plane, scene units.
     pub fn distance(&self) -> f64 {
         (self.receiver.centre - self.stand.eye).dot(self.stand.forward)
     }
@@ -87,7 +89,7 @@ impl Map {
         2.0 * self.receiver.half[1] / f64::from(self.viewport.height())
     }
 
-    /// How wide the lens makes the image of a point so high above (or deep below) the plane, on the plane; scene units.
+    /// Width of the blur on the plane of a point at this height above (or depth below) it, scene units.
     pub fn blur(&self, height: f64) -> f64 {
         2.0 * self.radius * height / (self.distance() + height)
     }
@@ -104,10 +106,10 @@ impl Map {
         })
     }
 
-    /// The map in one pass, each texel the mean of its samples.
+    /// Renders the map in one pass; a texel is the mean of its samples.
     ///
     /// # Errors
-    /// When the hardware cannot be built.
+    /// [`JobError`] if the hardware cannot be built.
     pub fn one_pass(
         &self,
         draws: &[Draw<'_>],
@@ -120,10 +122,11 @@ impl Map {
         Ok((rendered.image, rendered.counts))
     }
 
-    /// The map by accumulation: a pass through a pinhole for each sample of a set, which all texels share (Diefenbach and Badler 1997).
+    /// Renders the map by accumulation: one pinhole pass per sample of a set that all texels share
+    /// (Diefenbach and Badler 1997).
     ///
     /// # Errors
-    /// When the hardware cannot be built.
+    /// [`JobError`] if the hardware cannot be built.
     pub fn accumulated(
         &self,
         draws: &[Draw<'_>],
@@ -147,8 +150,8 @@ impl Map {
         Ok((sum, counts))
     }
 
-    /// The map by brute force: for every sample of every texel a ray against all triangles, whose colours are those of `colours`, draw by
-    /// draw. Tables are added up.
+    /// Computes the map by brute force: one ray per sample of every texel against all triangles, with a
+    /// colour per draw. The result is the mean over all tables.
     pub fn by_rays(
         &self,
         (rays, colours): (&Rays, &[Vec3]),
@@ -176,7 +179,7 @@ impl Map {
         (0..self.viewport.pixels()).into_par_iter().map(texel).collect()
     }
 
-    /// The ray of a sample, from the lens; it meets the plane at 1.
+    /// Ray of a sample, from the lens; it meets the plane at parameter 1.
     fn ray(&self, [px, py]: [u32; 2], sample: &Sample, lobe: Lobe) -> (DVec3, DVec3) {
         let size = [self.viewport.width(), self.viewport.height()].map(f64::from);
         let x = (f64::from(px) + f64::from(sample.x) - 0.5 * size[0]) * self.texel();

@@ -1,23 +1,23 @@
 //! Glossy reflection and refraction on planar receivers (thesis, Paper VI, section 6).
 //!
-//! The receiver is the focus plane, the near plane and the viewport of a camera with a lens: at the mirrored place of the viewer, or at the
-//! place along the plane's normal from which the refracted middle ray comes. Seen through the receiver, what touches it is sharp and
-//! what is far from it is blurred. One four-dimensional pass makes the map, pre-filtered by the resolve; the lens radius is the roughness.
+//! The receiver is the focus plane, the near plane and the viewport of a camera with a lens. The camera is at
+//! the mirrored position of the viewer, or at the position along the plane's normal that the refracted
+//! central ray comes from. Objects that touch the receiver are sharp, and far ones are blurred. One 4D pass
+//! makes the map, filtered by the resolve. The lens radius is the roughness.
 //!
-//! - [`Receiver`], [`Effect`]: the rectangle, and the eye that looks through it.
-//! - [`Map`]: the camera of a map, in [one pass](Map::one_pass), by [accumulation](Map::accumulated), and by
-//!   [rays](Map::by_rays), the brute force reference.
-//! - [`job`]: the map on its receiver as a job, [`stage`] the scene it draws.
+//! - [`Receiver`], [`Effect`]: the rectangle, and the camera position for it; [`ReceiverShader`]: its
+//!   shading.
+//! - [`Map`]: the map in [one pass](Map::one_pass), by [accumulation](Map::accumulated), and by
+//!   [rays](Map::by_rays), the brute-force reference.
+//! - [`job()`]: the workload; [`stage()`]: its scene.
 
 mod job;
 mod map;
 mod receiver;
 mod stage;
-mod surface;
 
 pub(crate) use job::FLAGS;
 pub use job::{Glossy, Options, job};
 pub use map::{Lobe, Map};
-pub use receiver::{Effect, Receiver};
+pub use receiver::{Effect, Receiver, ReceiverShader};
 pub use stage::{receiver, stage};
-pub use surface::ReceiverShader;

@@ -1,4 +1,4 @@
-//! The scene that is drawn: posts that stand on the receiver, and a bar that hovers above it.
+//! The test scene: posts that stand on the receiver, and a bar above it.
 
 use glam::{DVec3, Vec3};
 
@@ -8,11 +8,11 @@ use crate::material::Material;
 use crate::scene::{Graph, Local, Node, Parts, Rig, Scene, SceneCamera, Settings, Trs, View, tan_half};
 use crate::shapes;
 
-/// The scene without its receiver; `below` turns it over, for what is seen by refraction. Colours are unlit, so that a colour is all there is
-/// to a triangle.
+/// Makes the scene without its receiver; `below` mirrors it vertically, for refraction. Materials are unlit,
+/// so that every triangle has a constant colour.
 ///
 /// # Errors
-/// None that is expected: the scene is tested.
+/// None are expected: the scene is tested.
 pub fn stage(below: bool) -> Result<Scene, LoadError> {
     let mut parts = Parts::new("glossy");
     fill(&mut parts.graph, if below { -1.0 } else { 1.0 });
@@ -26,7 +26,7 @@ pub fn stage(below: bool) -> Result<Scene, LoadError> {
     Scene::new(parts)
 }
 
-/// The receiver of the stage.
+/// Receiver of the test scene.
 pub fn receiver() -> Receiver {
     Receiver::lying(DVec3::ZERO, [1.8, 1.2])
 }

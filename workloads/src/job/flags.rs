@@ -1,9 +1,9 @@
-//! Flags that change the settings of a scene: which of them a job has a use for.
+//! Run options (flags) that change the settings of a scene, and which of them a job uses.
 
 use crate::error::LoadError;
 use crate::scene::Overrides;
 
-/// One of [`Overrides`]. Frames and their rate are of use to every job.
+/// One of [`Overrides`]. All jobs use frames and frame rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flag {
     Size,
@@ -16,23 +16,23 @@ pub(crate) enum Flag {
     Camera,
 }
 
-/// What a job makes of them.
+/// Flags that a job uses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flags {
-    /// Those that it has a use for; the others would change nothing and are refused.
+    /// Used flags; others would have no effect and are refused.
     pub uses: &'static [Flag],
-    /// Options of the job that do what some of the others would do.
+    /// Job options that replace an unused flag.
     pub instead: &'static [(Flag, &'static str)],
 }
 
 impl Flags {
-    /// Refuses what would be ignored; `job` is its name.
+    /// Refuses flags without effect; `job` is the job's name.
     pub fn check(&self, job: &str, overrides: &Overrides) -> Result<(), LoadError> {
         let Some(flag) = given(overrides).find(|flag| !self.uses.contains(flag)) else { return Ok(()) };
         let option = self.instead.iter().find(|(other, _)| *other == flag);
-        let mend = option
+        let remedy = option
             .map_or("leave it out".to_owned(), |(_, option)| format!("give --set {option}=... instead"));
-        let message = format!("the workload `{job}` has no use for it: {mend}");
+        let message = format!("the workload `{job}` has no use for it: {remedy}");
         Err(LoadError::Setting { setting: flag.name(), message })
     }
 }
@@ -52,9 +52,9 @@ impl Flag {
     }
 }
 
-/// The flags that were given.
+/// Flags with a value.
 fn given(overrides: &Overrides) -> impl Iterator<Item = Flag> {
-    // Taken apart whole, so that none that is added later is forgotten.
+    // The full pattern makes the compiler report new fields.
     let Overrides {
         size,
         samples,

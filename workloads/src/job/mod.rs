@@ -1,14 +1,13 @@
-//! Jobs: work for the rasterizer that is more than one rendering of a scene.
+//! Jobs: work for the rasterizer beyond one rendering of a scene.
 //!
-//! A [`Job`] draws frames as a scene does, in passes of its own, and hands every packet of work to whoever asked, so that it
-//! can be timed and turned into watts. [`crate::catalog`] makes one by name from its options ([`OptionSource`]).
+//! A [`Job`] draws frames like a scene, but in its own passes. It emits every packet of work, for timing and
+//! power models. [`crate::catalog`] makes jobs by name from their options ([`OptionSource`]).
 
 mod flags;
 mod options;
 mod passes;
 #[cfg(test)]
 pub(crate) mod testing;
-mod words;
 
 use activity::{Counts, LineAccess, Packet};
 use glam::Vec3;
@@ -25,10 +24,10 @@ pub use options::OptionSource;
 pub(crate) use options::must_hold;
 pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
-/// Where the packets of a frame go, with the lines each asks the L2 for, in the order of the modelled hardware.
+/// Receiver of a frame's packets, each with its L2 accesses, in the order of the modelled hardware.
 pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
 
-/// Packets go out as those of passes from `first` on.
+/// Shifts pass numbers of packets by `first`.
 pub(crate) fn shifted<'e>(
     first: u16,
     emit: &'e mut (dyn FnMut(&Packet, &[LineAccess]) + 'e),
@@ -36,89 +35,91 @@ pub(crate) fn shifted<'e>(
     move |packet, lines| emit(&Packet { pass: packet.pass.saturating_add(first), ..*packet }, lines)
 }
 
-/// A number that a job found out.
+/// A result of a job.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fact {
-    /// Its name, with its unit.
+    /// Name, with unit.
     pub name: &'static str,
-    /// Its value.
+    /// Value.
     pub value: f64,
 }
 
-/// What a job drew in one frame.
+/// Result of one frame of a job.
 #[derive(Clone, Debug, Default)]
 pub struct Drawn {
     /// Linear RGB radiance of each pixel, row by row from the top left.
     pub image: Vec<Vec3>,
-    /// How often each event happened, in all passes.
+    /// Event counts, of all passes.
     pub counts: Counts,
     /// Triangles drawn, in all passes.
     pub triangles: usize,
-    /// Whether time is a dimension of what was drawn.
+    /// Whether time is a dimension of the rendering.
     pub moving: bool,
-    /// Whether the lens is.
+    /// Whether the lens is a dimension of the rendering.
     pub lens: bool,
-    /// What was found out.
+    /// Results.
     pub facts: Vec<Fact>,
-    /// Regimes in which its methods are known to be bad.
+    /// Warnings about limitations of the methods.
     pub warnings: Vec<Warning>,
 }
 
-/// How a job draws: it prepares the input of a frame, and draws from that alone.
+/// Implementation of a job: prepares the input of a frame, and draws from that alone.
 ///
-/// [`draw`](Self::draw) does not know the number of the frame, so whatever differs between frames is in the input, and frames
-/// with equal inputs can be drawn once. Derive `Serialize` for the input: a field that is added later is compared, too.
+/// [`draw`](Self::draw) does not receive the frame number. So everything that differs between frames is in
+/// the input, and frames with equal inputs are drawn once. Derive `Serialize` for the input, so that new
+/// fields are compared, too.
 pub trait Draws: Sync + Send {
-    /// Everything that changes from frame to frame.
+    /// Data that changes from frame to frame.
     type Input: Serialize;
 
     /// Size of the image, frames and frame rate.
     fn settings(&self) -> &Settings;
 
-    /// Warnings about what it was made from, such as a scene file.
+    /// Warnings about the job's sources, such as a scene file.
     fn warnings(&self) -> &[Warning] {
         &[]
     }
 
-    /// What its images show, for captions; empty where that is plain.
+    /// Content of the images, for captions; empty if it is obvious.
     fn shows(&self) -> &'static str {
         ""
     }
 
-    /// The input of frame `number`.
+    /// Prepares the input of frame `number`.
     ///
     /// # Errors
-    /// When the frame cannot be made.
+    /// [`JobError`] if the frame cannot be made.
     fn input(&self, number: u32) -> Result<Self::Input, JobError>;
 
-    /// Draws a frame on the hardware `spec`. Warnings may come again in every frame.
+    /// Draws a frame on the hardware `spec`. Every frame may repeat warnings.
     ///
     /// # Errors
-    /// When the hardware cannot be built or the frame cannot be drawn.
+    /// [`JobError`] if the hardware cannot be built or the frame cannot be drawn.
     fn draw(&self, input: &Self::Input, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
 }
 
-/// Work for the rasterizer that is more than one rendering of a scene: every type that [`Draws`].
+/// A job: work for the rasterizer beyond one rendering of a scene. Every type that implements [`Draws`] is a
+/// job.
 pub trait Job: Sync + Send {
     /// Size of the image, frames and frame rate.
     fn settings(&self) -> &Settings;
 
-    /// The fingerprint of the input of frame `number`. Frames with the same fingerprint are drawn alike.
+    /// Fingerprint of the input of frame `number`. Frames with equal fingerprints have equal results.
     ///
     /// # Errors
-    /// When the frame cannot be made.
+    /// [`JobError`] if the frame cannot be made.
     fn fingerprint(&self, number: u32) -> Result<Fingerprint, JobError>;
 
-    /// Warnings about what it was made from, such as a scene file.
+    /// Warnings about the job's sources, such as a scene file.
     fn warnings(&self) -> &[Warning];
 
-    /// What its images show, for captions; empty where that is plain.
+    /// Content of the images, for captions; empty if it is obvious.
     fn shows(&self) -> &'static str;
 
     /// Draws frame `number` on the hardware `spec`.
     ///
     /// # Errors
-    /// When the hardware cannot be built or the frame cannot be made.
+    /// [`JobError`] if the hardware cannot be built or the frame cannot be made.
     fn frame(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
 }
 
@@ -144,7 +145,7 @@ impl<D: Draws> Job for D {
     }
 }
 
-/// Why a frame of a job could not be drawn.
+/// Reason why a frame could not be drawn.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the variants are the sources, documented there")]
 pub enum JobError {
@@ -154,16 +155,16 @@ pub enum JobError {
     Frame(#[from] FrameError),
     #[error(transparent)]
     Fingerprint(#[from] FingerprintError),
-    /// Two settings that cannot be together, or one that cannot be.
+    /// Invalid or incompatible settings.
     #[error("{0}")]
     Setting(String),
 }
 
-/// What a job is made from besides its own options.
+/// Parameters of a job besides its own options.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
-    /// Changes to its settings.
+    /// Changes to the settings.
     pub overrides: &'a Overrides,
-    /// Seed of everything random in it.
+    /// Seed of all random numbers.
     pub seed: u64,
 }

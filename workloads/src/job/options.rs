@@ -1,31 +1,32 @@
-//! Options of a job: a RON file, and single values over it.
+//! Options of a job: a RON file, then single values.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use activity::spec;
+use activity::spec::suggestion;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Number, Value};
 
-use super::words::{clipped, plain};
 use crate::error::LoadError;
 
-/// Where the options of a job come from; what is not named has its default.
+/// Sources of a job's options; others have defaults.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OptionSource {
-    /// A file in RON.
+    /// RON file.
     pub file: Option<PathBuf>,
-    /// Names and values that come after it. A value is a number, `true`, a list such as `[1, 2]`, what RON has in round brackets, such as
-    /// `(pitch: 4.5)`, or else text.
+    /// Names and values that override the file. A value is a number, `true`, a list such as `[1, 2]`, RON in
+    /// parentheses such as `(pitch: 4.5)`, or text.
     pub set: Vec<(String, String)>,
 }
 
 impl OptionSource {
-    /// The options.
+    /// Reads the options.
     ///
     /// # Errors
-    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Setting`] for a value that was set.
+    /// [`LoadError::Spec`] with the place in the file, [`LoadError::Setting`] for a single value.
     pub fn read<T: Default + Serialize + DeserializeOwned>(&self) -> Result<T, LoadError> {
         let mut options = self.file.as_deref().map(spec::load).transpose()?.unwrap_or_default();
         for (name, value) in &self.set {
@@ -35,7 +36,7 @@ impl OptionSource {
     }
 }
 
-/// Refuses the first option that does not hold; each with its name and what it may be.
+/// Refuses the first check that fails; each has an option name, a condition, and the allowed values.
 pub(crate) fn must_hold<const N: usize>(
     checks: [(&'static str, bool, &'static str); N],
 ) -> Result<(), LoadError> {
@@ -47,7 +48,7 @@ pub(crate) fn must_hold<const N: usize>(
     }
 }
 
-/// `options` with one of them changed.
+/// `options` with one value changed.
 fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -> Result<T, LoadError> {
     let refused = |message: String| LoadError::Setting { setting: "set", message };
     let Ok(Value::Object(fields)) = serde_json::to_value(options) else {
@@ -55,28 +56,31 @@ fn with<T: Serialize + DeserializeOwned>(options: &T, name: &str, value: &str) -
     };
     let Some(known) = fields.get(name) else {
         let known: Vec<&str> = fields.keys().map(String::as_str).collect();
-        return Err(refused(format!("unknown option `{name}`, {}", spec::suggestion(name, &known))));
+        return Err(refused(format!("unknown option `{name}`, {}", suggestion(name, &known))));
     };
     let read = |value: Value| {
         let mut changed = fields.clone();
         changed.insert(name.to_owned(), value);
         serde_json::from_value(Value::Object(changed)).map_err(|error| error.to_string())
     };
-    let (typed, told) = (parsed(value), |message: String| refused(format!("{name}: {message}")));
+    let (typed, reported) = (parsed(value), |message: String| refused(format!("{name}: {message}")));
     if let Value::Object(known) = known {
-        inside(known, (value, &typed), |value| read(value).map(|_: T| ())).map_err(told)?;
+        check_fields(known, (value, &typed), |value| read(value).map(|_: T| ())).map_err(reported)?;
     }
     read(typed).or_else(|error| {
-        // What looks like a number may be a name.
+        // A value that looks like a number may be a name.
         let as_text = read(Value::String(value.to_owned()));
         as_text.map_err(|as_name| {
-            told(plain(value, if as_name.starts_with("unknown variant") { &as_name } else { &error }))
+            reported(user_message(
+                value,
+                if as_name.starts_with("unknown variant") { &as_name } else { &error },
+            ))
         })
     })
 }
 
-/// Refuses what cannot be in the place of values that have names, and says which of them it is.
-fn inside(
+/// Checks a struct value field by field, and names the invalid field.
+fn check_fields(
     known: &Map<String, Value>,
     (value, typed): (&str, &Value),
     read: impl Fn(Value) -> Result<(), String>,
@@ -84,23 +88,23 @@ fn inside(
     let names: Vec<&str> = known.keys().map(String::as_str).collect();
     let Value::Object(typed) = typed else {
         let (name, example) = known.iter().next().ok_or("nothing can be set in it")?;
-        let (value, names) = (clipped(value), names.join(", "));
+        let (value, names) = (shortened(value), names.join(", "));
         return Err(format!(
             "`{value}` names no value: write it as ({name}: {example}); known here: {names}"
         ));
     };
     for (name, value_of_it) in typed {
         if !known.contains_key(name) {
-            return Err(format!("there is no `{name}`; {}", spec::suggestion(name, &names)));
+            return Err(format!("there is no `{name}`; {}", suggestion(name, &names)));
         }
         let mut changed = known.clone();
         changed.insert(name.clone(), value_of_it.clone());
-        read(Value::Object(changed)).map_err(|error| format!("{name}: {}", plain(value, &error)))?;
+        read(Value::Object(changed)).map_err(|error| format!("{name}: {}", user_message(value, &error)))?;
     }
     Ok(())
 }
 
-/// A value as it was written on the command line.
+/// Parses a value from the command line.
 fn parsed(value: &str) -> Value {
     let text = || Value::String(value.to_owned());
     if value.starts_with(['(', '[']) {
@@ -108,9 +112,62 @@ fn parsed(value: &str) -> Value {
             ron::from_str::<ron::Value>(value).ok().and_then(|value| serde_json::to_value(value).ok());
         return as_ron.unwrap_or_else(text);
     }
-    // JSON has no `.5`.
+    // JSON does not allow `.5`.
     let number = || value.parse().ok().and_then(Number::from_f64).map(Value::Number);
     serde_json::from_str(value).ok().or_else(number).unwrap_or_else(text)
+}
+
+/// Value types of `serde` messages, with descriptions for users.
+const KINDS: [(&str, &str); 11] = [
+    ("u8", "a whole number from 0 to 255"),
+    ("u16", "a whole number from 0 to 65535"),
+    ("u32", "a whole number from 0 to 4294967295"),
+    ("u64", "a whole number from 0 on"),
+    ("usize", "a whole number from 0 on"),
+    ("f32", "a finite number"),
+    ("f64", "a finite number"),
+    ("a boolean", "true or false"),
+    ("a string", "text"),
+    ("path string", "the path of a file"),
+    ("a sequence", "a list in brackets, with commas between"),
+];
+
+/// Rewrites a `serde` error about `value` for users.
+pub(super) fn user_message(value: &str, error: &str) -> String {
+    let expected = error.split_once(", expected ").map_or("", |(_, expected)| expected);
+    let value = &*shortened(value);
+    if error.starts_with("unknown variant") {
+        let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+        return format!("there is no `{value}`; {}", suggestion(value, &names));
+    }
+    if expected == "fewer elements in array" {
+        return format!("`{value}` has too many values in a list");
+    }
+    if error.starts_with("invalid") && !expected.is_empty() {
+        return format!("`{value}` is not {}", kind(expected));
+    }
+    format!("`{value}`: {error}")
+}
+
+/// The value, shortened if it is long.
+pub(super) fn shortened(value: &str) -> Cow<'_, str> {
+    const MAX_CHARS: usize = 60;
+    match value.char_indices().nth(MAX_CHARS) {
+        None => value.into(),
+        Some((end, _)) => format!("{}...", &value[..end]).into(),
+    }
+}
+
+fn kind(expected: &str) -> String {
+    let list = |count: &str| format!("a list of {count} values in brackets, with commas between");
+    if let Some(count) = expected.strip_prefix("an array of length ") {
+        return list(count);
+    }
+    if let Some(rest) = expected.strip_prefix("a tuple of size ") {
+        return list(rest);
+    }
+    let known = KINDS.iter().find(|(name, _)| *name == expected);
+    known.map_or_else(|| expected.to_owned(), |(_, what)| (*what).to_owned())
 }
 
 #[cfg(test)]
@@ -174,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_set_is_told() {
+    fn invalid_values_are_reported() {
         assert_eq!(set(&[("boxs", "8")]).unwrap_err(), "set: unknown option `boxs`, did you mean `boxes`?");
         assert!(set(&[("boxes", "-1")]).unwrap_err().starts_with("set: boxes: `-1` is not a whole number"));
         let unknown = set(&[("method", "convex-hull")]).unwrap_err();
@@ -182,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_looks_like_a_number_may_be_written_short_or_be_a_name() {
+    fn values_that_look_like_numbers_may_be_short_or_names() {
         let changed = set(&[("depth", ".5"), ("scene", "5"), ("light", "(radius: .25)")]).unwrap();
         assert_eq!(
             (changed.depth, changed.scene.as_deref(), changed.light.radius),
@@ -190,14 +247,17 @@ mod tests {
         );
         let long = "9".repeat(400);
         for (value, typed) in [("inf", "inf"), ("nan", "nan"), ("1e999", "1e999"), (&*long, "999...")] {
-            let told = set(&[("depth", value)]).unwrap_err();
-            assert!(told.starts_with(&format!("set: depth: `{}", typed.trim_end_matches('.'))), "{told}");
-            assert!(told.ends_with("is not a finite number") && told.len() < 120, "{told}");
+            let reported = set(&[("depth", value)]).unwrap_err();
+            assert!(
+                reported.starts_with(&format!("set: depth: `{}", typed.trim_end_matches('.'))),
+                "{reported}"
+            );
+            assert!(reported.ends_with("is not a finite number") && reported.len() < 120, "{reported}");
         }
     }
 
     #[test]
-    fn what_is_inside_round_brackets_is_told_by_its_name() {
+    fn errors_in_struct_values_name_the_field() {
         for (value, says) in [
             (
                 "(1, 2)",
@@ -211,8 +271,8 @@ mod tests {
             ),
             ("(radius: inf)", "light: radius: `(radius: inf)` is not a finite number"),
         ] {
-            let told = set(&[("light", value)]).unwrap_err();
-            assert!(told.starts_with(&format!("set: {says}")), "{told}");
+            let reported = set(&[("light", value)]).unwrap_err();
+            assert!(reported.starts_with(&format!("set: {says}")), "{reported}");
         }
     }
 
@@ -227,5 +287,36 @@ mod tests {
         std::fs::write(file.path(), "(boxs: 16)").unwrap();
         let error = OptionSource { file: Some(file.path().to_owned()), set }.read::<Options>().unwrap_err();
         assert!(error.to_string().contains(":1:"), "{error}");
+    }
+
+    fn reported<T: DeserializeOwned>(value: Value, typed: &str) -> String {
+        user_message(typed, &serde_json::from_value::<T>(value).err().unwrap().to_string())
+    }
+
+    #[test]
+    fn types_are_described_for_users() {
+        assert_eq!(reported::<u32>((-1).into(), "-1"), "`-1` is not a whole number from 0 to 4294967295");
+        assert_eq!(reported::<f64>("wide".into(), "wide"), "`wide` is not a finite number");
+        assert_eq!(reported::<bool>(2.into(), "2"), "`2` is not true or false");
+        assert!(reported::<[f64; 3]>(2.into(), "2").starts_with("`2` is not a list of 3 values"));
+        assert_eq!(
+            reported::<[f64; 1]>(serde_json::json!([1, 2]), "[1, 2]"),
+            "`[1, 2]` has too many values in a list"
+        );
+        assert!(
+            reported::<(f64, f64)>(serde_json::json!([1]), "[1]")
+                .starts_with("`[1]` is not a list of 2 values")
+        );
+    }
+
+    #[test]
+    fn messages_of_serde_do_not_show() {
+        for reported in [
+            reported::<u8>(300.into(), "300"),
+            reported::<String>(1.into(), "1"),
+            reported::<Vec<u8>>(1.into(), "1"),
+        ] {
+            assert!(!reported.contains("invalid") && !reported.contains("expected"), "{reported}");
+        }
     }
 }

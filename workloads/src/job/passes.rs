@@ -1,4 +1,4 @@
-//! Passes that a job walks by itself: each piece of work as a packet, with what it asks of the caches.
+//! Passes of a job: each piece of work as a packet, with its memory accesses.
 
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind};
 use pipeline::MemorySpec;
@@ -6,43 +6,43 @@ use pipeline::memory::{CacheError, LINE_BYTES, MemorySystem};
 
 use super::Emit;
 
-/// Triangles whose vertices travel in one packet.
+/// Triangles per vertex packet.
 const BATCH: usize = 16;
-/// Bytes of a pixel of the image.
+/// Bytes per pixel of the image.
 const PIXEL_BYTES: u64 = 4;
 
-/// What the front end does for the triangles of a draw.
+/// Front-end work per vertex and triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrontEnd {
-    /// Bytes of a vertex, at both ends of the shutter where it moves.
+    /// Bytes of a vertex, at both ends of the shutter if it moves.
     pub vertex_bytes: u32,
     /// Operations of the vertex shader, for all ends.
     pub vertex_ops: u32,
-    /// Multiply-adds that set a triangle up.
+    /// Multiply-adds of triangle set-up.
     pub setup_madds: u32,
 }
 
 /// Work of one triangle, or of a whole buffer, in one tile.
 #[derive(Clone, Copy, Debug)]
 pub struct TileWork {
-    /// The tile, row by row from the top left.
+    /// Tile, row by row from the top left.
     pub tile: u32,
-    /// The triangle, counted through the pass.
+    /// Triangle, numbered within the pass.
     pub triangle: u32,
-    /// What is counted besides the lines of memory.
+    /// Event counts, without memory events.
     pub counts: PacketCounts,
 }
 
-/// Bytes of a buffer that are touched.
+/// An access to a range of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Touch {
-    /// The first byte.
+    /// Address of the first byte.
     pub address: u64,
-    /// How many.
+    /// Number of bytes.
     pub bytes: u64,
-    /// Whether they change.
+    /// Whether the access writes.
     pub write: bool,
-    /// Whether they were cleared and not written since, so that nothing has to be fetched.
+    /// Whether the range is cleared and unwritten, so that nothing is fetched.
     pub fresh: bool,
 }
 
@@ -53,37 +53,37 @@ impl Touch {
     }
 }
 
-/// The passes of a frame: packets go out as they come, and their counts are added up.
+/// Passes of a frame: emits packets and sums their counts.
 pub struct Passes<'a> {
     memory: MemorySystem,
     emit: Emit<'a>,
     counts: Counts,
     pass: u16,
-    /// Triangles of the pass so far.
+    /// Triangles of the current pass so far.
     triangles: u32,
     triangles_in_all: usize,
 }
 
 impl<'a> Passes<'a> {
-    /// Before the first pass, with empty caches.
+    /// Starts the first pass, with empty caches.
     ///
     /// # Errors
-    /// When a cache of `spec` cannot be built.
+    /// [`CacheError`] if a cache of `spec` cannot be built.
     pub fn new(spec: &MemorySpec, emit: Emit<'a>) -> Result<Self, CacheError> {
         let memory = MemorySystem::new(spec)?;
         Ok(Self { memory, emit, counts: Counts::default(), pass: 0, triangles: 0, triangles_in_all: 0 })
     }
 
-    /// Ends a pass: packets from here on belong to the next.
+    /// Ends the pass; later packets belong to the next.
     pub fn next(&mut self) {
         (self.pass, self.triangles) = (self.pass.saturating_add(1), 0);
     }
 
-    /// A draw of `triangles` triangles, three vertices each, that lie in memory from `address` on.
+    /// Emits a draw of `triangles` triangles with three vertices each, which are in memory from `address` on.
     pub fn draw(&mut self, triangles: usize, address: u64, front_end: &FrontEnd) {
         let mut start = Packet::new(PacketKind::Draw, self.pass, 0, self.triangles);
         start.counts[Event::Draws] = 1;
-        self.tell(&start);
+        self.emit_packet(&start);
         let bytes = u64::from(front_end.vertex_bytes);
         for first in (0..triangles).step_by(BATCH) {
             let vertices = 3 * BATCH.min(triangles - first) as u32;
@@ -99,13 +99,13 @@ impl<'a> Passes<'a> {
             counts[Event::SetupMadds] = vertices / 3 * front_end.setup_madds;
             let from = address + 3 * first as u64 * bytes;
             self.memory.vertices(from, u64::from(vertices) * bytes, counts);
-            self.tell(&packet);
+            self.emit_packet(&packet);
             self.triangles += vertices / 3;
         }
         self.triangles_in_all += triangles;
     }
 
-    /// Work in a tile that touches what is given of depth buffers, then of colour buffers.
+    /// Emits work in a tile, with accesses to depth buffers and colour buffers.
     pub fn tile(&mut self, work: &TileWork, depth: &[Touch], colour: &[Touch]) {
         let mut packet = Packet::new(PacketKind::Tile, self.pass, work.tile, work.triangle);
         packet.counts = work.counts;
@@ -117,11 +117,11 @@ impl<'a> Passes<'a> {
             let counts = &mut packet.counts;
             touch.lines().for_each(|line| self.memory.colour(line, touch.write, touch.fresh, counts));
         }
-        self.tell(&packet);
+        self.emit_packet(&packet);
     }
 
-    /// Writes `pixels` pixels of an image that lies at `address`, a packet for each tile of `tile_pixels`, and empties the caches
-    /// of it.
+    /// Emits the writes of `pixels` pixels at `address`, one packet per tile of `tile_pixels`, and flushes
+    /// the caches.
     pub fn resolve(&mut self, address: u64, pixels: u64, tile_pixels: u32) {
         let tile_pixels = u64::from(tile_pixels.max(1));
         for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
@@ -132,22 +132,22 @@ impl<'a> Passes<'a> {
             let counts = &mut packet.counts;
             let written = Touch { address, bytes, write: true, fresh: true };
             written.lines().for_each(|line| self.memory.colour(line, true, true, counts));
-            self.tell(&packet);
+            self.emit_packet(&packet);
         }
         let mut last = Packet::new(PacketKind::Resolve, self.pass, 0, u32::MAX);
         self.memory.finish(address..address + pixels * PIXEL_BYTES, &mut last.counts);
-        self.tell(&last);
+        self.emit_packet(&last);
     }
 
-    /// What all passes counted, and the triangles they drew.
+    /// Event counts and triangles of all passes.
     pub fn finish(self) -> (Counts, usize) {
         (self.counts, self.triangles_in_all)
     }
 
-    fn tell(&mut self, packet: &Packet) {
+    fn emit_packet(&mut self, packet: &Packet) {
         self.counts += &packet.counts;
         (self.emit)(packet, self.memory.log());
-        self.memory.forget();
+        self.memory.clear_log();
     }
 }
 
@@ -168,11 +168,11 @@ mod tests {
     };
 
     #[test]
-    fn counts_are_the_sum_of_packets_and_lines_are_told_once() {
+    fn counts_are_the_sum_of_packets_and_lines_are_emitted_once() {
         let (mut sum, mut lines, mut kinds) = (Counts::default(), 0, Vec::new());
-        let mut emit = |packet: &Packet, asked: &[LineAccess]| {
+        let mut emit = |packet: &Packet, accesses: &[LineAccess]| {
             sum += &packet.counts;
-            lines += asked.len();
+            lines += accesses.len();
             kinds.push((packet.kind, packet.pass));
         };
         let mut passes = Passes::new(&MEMORY, &mut emit).unwrap();

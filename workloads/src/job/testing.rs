@@ -3,7 +3,7 @@
 use pipeline::depth::DepthSpec;
 use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Shading};
 
-/// Small caches, and everything switched on.
+/// Small caches, with all features on.
 pub(crate) fn hardware() -> PipelineSpec {
     let lines = CacheSpec::lru(256, 4);
     let compression = Default::default();

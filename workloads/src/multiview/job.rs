@@ -1,4 +1,4 @@
-//! Multi-view as a job.
+//! The job `multiview`.
 
 use activity::Event;
 use pipeline::{CacheSpec, Draw, PipelineSpec, Viewport};
@@ -12,42 +12,42 @@ use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
-/// How views become the one image that is shown.
+/// Arrangement of the views in the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Show {
-    /// Side by side, the left eye's first: for parallel eyes. Each view has its share of the width.
+    /// Side by side, the left eye's view first, for parallel viewing. The views share the width.
     #[default]
     SideBySide,
     /// Interlaced for a lenticular panel.
     Interlaced,
-    /// One view alone.
+    /// One view.
     One,
 }
 
-/// Options of the job. Samples of a pixel are those of each view.
+/// Options of the job. The samples per pixel are those of each view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
     /// A built-in scene or a file.
     pub scene: String,
-    /// Views.
+    /// Number of views.
     pub views: u32,
-    /// From one view to the next, scene units.
+    /// Distance between neighbouring views, scene units.
     pub spacing: f64,
     /// Radius of a view's aperture, scene units.
     pub aperture: f64,
-    /// Steps of the camera line that a view's box filter takes; 0 for small lenses apart.
+    /// Steps of the camera line that a view's box filter covers; 0 for separate small lenses.
     pub overlap: u32,
-    /// Depth at which all views agree, scene units; that of the scene's lens without it.
+    /// Depth of zero disparity, scene units; by default that of the scene's lens.
     pub focus: Option<f32>,
     /// How the views are shown.
     pub show: Show,
-    /// The panel, where they are interlaced.
+    /// Panel for interlaced views.
     pub panel: Panel,
-    /// View by view instead of one pass: the same images at another cost.
+    /// Whether to render view by view instead of in one pass: the same images at another cost.
     pub view_by_view: bool,
-    /// Whether the frame is drawn once more with a cache that holds everything, to tell what the cache misses.
+    /// Whether to render the frame once more with an infinite cache, to measure the cache's misses.
     pub check_cache: bool,
 }
 
@@ -70,14 +70,14 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Where the views are.
+    /// Layout of the views.
     pub fn layout(&self) -> Layout {
         let Self { views, spacing, aperture, overlap, .. } = *self;
         Layout { views, spacing, aperture, overlap }
     }
 }
 
-/// The job.
+/// The job with its scene and layout.
 pub struct MultiView {
     scene: Scene,
     options: Options,
@@ -87,12 +87,13 @@ pub struct MultiView {
 }
 
 impl MultiView {
-    /// Views of the scene of `options`, settings changed by `overrides`: without a size 320x180 pixels for each view.
+    /// Makes the views of the scene of `options`, with settings changed by `overrides`. The default size is
+    /// 320x180 pixels per view.
     ///
     /// # Errors
-    /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
+    /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
     pub fn new(options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
-        // Views agree at a depth whether or not the scene has a lens to focus.
+        // The views need a depth of zero disparity even if the scene has no lens.
         let options = Options { focus: options.focus.or(overrides.focus), ..options };
         let (size, focus) = (overrides.size.or(Some((320, 180))), None);
         let scene =
@@ -138,11 +139,11 @@ impl MultiView {
         }
     }
 
-    /// A view that depends on the direction to the viewer is shaded for the middle of the line only.
+    /// Warns about view-dependent materials: they are shaded for the middle of the line only.
     fn angle_warning(&self, rig: &Rig) -> Option<Warning> {
         let angle = rig.degrees();
         let shiny = self.scene.materials().iter().any(|material| !material.unlit);
-        (shiny && angle > MOST_DEG).then(|| {
+        (shiny && angle > MAX_VIEW_ANGLE_DEG).then(|| {
             let message = format!(
                 "views see the same point from up to {angle:.0} degrees apart, and shading is that of their middle: highlights do \
                  not move with the viewer"
@@ -152,12 +153,12 @@ impl MultiView {
     }
 }
 
-/// Views farther apart than this, seen from what is in focus, show highlights at visibly wrong places.
-pub const MOST_DEG: f64 = 6.0;
+/// Angle between views, in degrees, above which highlights are visibly misplaced.
+pub const MAX_VIEW_ANGLE_DEG: f64 = 6.0;
 /// A cache that holds everything.
-const ALL: CacheSpec = CacheSpec::lru(1 << 22, 16);
-/// The shader runs over those with a cache that holds everything, beyond which the cache is too small.
-pub const MOST_RUNS: f64 = 1.25;
+const INFINITE_CACHE: CacheSpec = CacheSpec::lru(1 << 22, 16);
+/// Shader executions, relative to those with an infinite cache, above which the cache is too small.
+pub const MAX_RUNS_OVER_INFINITE_CACHE: f64 = 1.25;
 
 impl Draws for MultiView {
     type Input = Frame;
@@ -189,7 +190,7 @@ impl Draws for MultiView {
         ];
         let mut warnings: Vec<_> = self.angle_warning(&rig).into_iter().collect();
         if self.options.check_cache {
-            let value = over_everything(&rig, &draws, &to, &views)?;
+            let value = runs_over_infinite_cache(&rig, &draws, &to, &views)?;
             facts.push(Fact { name: "invocations_over_those_with_all_in_cache", value });
             warnings.extend(cache_warning(value, spec));
         }
@@ -199,10 +200,15 @@ impl Draws for MultiView {
     }
 }
 
-/// The shader runs of `views` over those of one pass with a cache that holds everything.
-fn over_everything(rig: &Rig, draws: &[Draw<'_>], to: &Target<'_>, views: &Views) -> Result<f64, JobError> {
-    let everything = PipelineSpec { shading_cache: ALL, ..*to.spec };
-    let to = Target { spec: &everything, ..*to };
+/// Shader executions of `views`, relative to one pass with an infinite cache.
+fn runs_over_infinite_cache(
+    rig: &Rig,
+    draws: &[Draw<'_>],
+    to: &Target<'_>,
+    views: &Views,
+) -> Result<f64, JobError> {
+    let infinite = PipelineSpec { shading_cache: INFINITE_CACHE, ..*to.spec };
+    let to = Target { spec: &infinite, ..*to };
     let least = rig.one_pass(draws, &to, &mut |_, _| ())?.counts[Event::PixelInvocations];
     Ok(views.counts[Event::PixelInvocations] as f64 / least.max(1) as f64)
 }
@@ -212,7 +218,7 @@ fn per_pixel(views: &Views, viewport: Viewport) -> f64 {
 }
 
 fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
-    (ratio > MOST_RUNS).then(|| {
+    (ratio > MAX_RUNS_OVER_INFINITE_CACHE).then(|| {
         let message = format!(
             "the shader runs {ratio:.2} times as often as with a cache that holds everything: {} entries are fewer than are in use at \
              a time; a larger cache, or fewer views and samples",
@@ -222,13 +228,13 @@ fn cache_warning(ratio: f64, spec: &PipelineSpec) -> Option<Warning> {
     })
 }
 
-/// The lens that counts is the one that holds all views.
+/// Run options in use. The camera's lens is the one that contains all views.
 pub(crate) const FLAGS: Flags = Flags {
     uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Focus, Flag::Clip, Flag::Camera],
     instead: &[(Flag::Lens, "aperture")],
 };
 
-/// The job by its options.
+/// Makes the job from its options.
 ///
 /// # Errors
 /// As [`MultiView::new`].

@@ -1,4 +1,4 @@
-//! Where views are on the camera line.
+//! Layout of views on the camera line.
 
 use std::ops::Range;
 
@@ -7,18 +7,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::LoadError;
 
-/// Views on a camera line, from left to right, all the same distance apart.
+/// Equidistant views on a camera line, from left to right.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Layout {
-    /// How many.
+    /// Number of views.
     pub views: u32,
-    /// From one to the next, scene units.
+    /// Distance between neighbouring views, scene units.
     pub spacing: f64,
-    /// Radius of each view's aperture across the line, and along it where views are apart; scene units.
+    /// Radius of each view's aperture across the line, and along it for separate lenses; scene units.
     pub aperture: f64,
-    /// How many steps of the line the box filter of a view takes: 1 for views side by side, 2 for views that overlap by half, and so
-    /// on. 0 for views apart, each with a small lens of its own.
+    /// Steps of the line that a view's box filter covers: 1 for adjacent views, 2 for views that overlap by
+    /// half, and so on. 0 for separate views, each with a small lens.
     pub overlap: u32,
 }
 
@@ -28,22 +28,23 @@ impl Default for Layout {
     }
 }
 
-/// The most views: their samples have to fit in a pixel.
-const MOST_VIEWS: u32 = 128;
+/// Most views, so that their samples fit in a pixel.
+const MAX_VIEWS: u32 = 128;
 
-/// The shortest length: single precision holds it.
-const SHORTEST: f64 = 1e-35;
+/// Least length in scene units that single precision represents.
+const MIN_LENGTH: f64 = 1e-35;
 
-/// Half the camera line over the radius of an aperture, at most: a hundredth of what single precision tells apart.
-const LONGEST: f64 = 1e5;
+/// Largest half length of the camera line relative to the aperture, a hundredth of single precision's
+/// resolution.
+const MAX_RADIUS_PER_APERTURE: f64 = 1e5;
 
 impl Layout {
-    /// Two small lenses of radius `aperture`, their middles `spacing` apart.
+    /// Two small lenses of radius `aperture`, with centres `spacing` apart.
     pub const fn stereo(spacing: f64, aperture: f64) -> Self {
         Self { views: 2, spacing, aperture, overlap: 0 }
     }
 
-    /// `views` on a line of the given length, each with a box filter that overlaps half of the next.
+    /// `views` views on a line of the given length, with box filters that overlap by half.
     pub fn line(views: u32, length: f64, aperture: f64) -> Self {
         Self { views, spacing: length / f64::from(views + 1), aperture, overlap: 2 }
     }
@@ -51,17 +52,17 @@ impl Layout {
     /// Checks every value.
     ///
     /// # Errors
-    /// Names the first that cannot be, and what would do.
+    /// [`LoadError`] with the first invalid value, and a valid one.
     pub fn check(&self) -> Result<(), LoadError> {
         let refused = |setting, message| Err(LoadError::Setting { setting, message });
-        if !(1..=MOST_VIEWS).contains(&self.views) {
-            return refused("views", format!("{}: there can be 1 to {MOST_VIEWS}", self.views));
+        if !(1..=MAX_VIEWS).contains(&self.views) {
+            return refused("views", format!("{}: there can be 1 to {MAX_VIEWS}", self.views));
         }
         for (setting, value) in [("spacing", self.spacing), ("aperture", self.aperture)] {
-            if !(value >= SHORTEST && value.is_finite()) {
+            if !(value >= MIN_LENGTH && value.is_finite()) {
                 return refused(
                     setting,
-                    format!("{value:?}: it has to be a finite length of {SHORTEST:e} or more"),
+                    format!("{value:?}: it has to be a finite length of {MIN_LENGTH:e} or more"),
                 );
             }
         }
@@ -75,10 +76,10 @@ impl Layout {
         if self.overlap > 16 {
             return refused("overlap", format!("{}: a filter takes 0 to 16 steps", self.overlap));
         }
-        if self.radius() > LONGEST * self.aperture {
+        if self.radius() > MAX_RADIUS_PER_APERTURE * self.aperture {
             let message = format!(
                 "{:e}: half the line of views is {:e} long, and single precision keeps nothing of lenses of radius {:e} on it: it has to be at most \
-                 {LONGEST} of them; move the views closer or widen the aperture",
+                 {MAX_RADIUS_PER_APERTURE} of them; move the views closer or widen the aperture",
                 self.spacing,
                 self.radius(),
                 self.aperture
@@ -88,12 +89,12 @@ impl Layout {
         Ok(())
     }
 
-    /// Parts of the lens that have samples of their own.
+    /// Number of strips of the lens that have their own samples.
     pub fn strips(&self) -> u32 {
         self.views + self.overlap.max(1) - 1
     }
 
-    /// Half the length of the camera line, or of the lens across it where that is more; scene units.
+    /// Half the length of the camera line, or of the lens across it if that is longer; scene units.
     pub fn radius(&self) -> f64 {
         let along = match self.overlap {
             0 => 0.5 * f64::from(self.views - 1) * self.spacing + self.aperture,
@@ -102,12 +103,12 @@ impl Layout {
         along.max(self.aperture)
     }
 
-    /// The middle of a view's part of the line, in lens coordinates.
+    /// Centre of a view on the line, in lens coordinates.
     pub fn middle(&self, view: u32) -> f64 {
         (f64::from(view) - 0.5 * f64::from(self.views - 1)) * self.spacing / self.radius()
     }
 
-    /// The regions of the lens, strip by strip.
+    /// Lens regions, one per strip.
     pub fn regions(&self) -> LensRegions {
         let (radius, steps) = (self.radius(), f64::from(self.strips()));
         let high = ((self.aperture / radius) as f32).min(1.0);
@@ -124,7 +125,7 @@ impl Layout {
         LensRegions::Rectangles((0..self.strips()).map(region).collect())
     }
 
-    /// The samples of each view, where each strip has `per_strip`.
+    /// Range of samples of each view, with `per_strip` samples per strip.
     pub fn runs(&self, per_strip: u32) -> Vec<Range<u32>> {
         let strips = self.overlap.max(1);
         (0..self.views).map(|view| view * per_strip..(view + strips) * per_strip).collect()
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused() {
+    fn invalid_layouts_are_refused() {
         let base = Layout::default();
         for bad in [
             Layout { views: 0, ..base },

@@ -1,67 +1,70 @@
-//! Interlacing for a display behind a sheet of slanted cylindrical lenses.
+//! Interlacing for a display with slanted lenticular lenses.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::LoadError;
 
-/// A panel with vertical stripes of red, green and blue subpixels under lenticular lenses. Subpixel `k` of row `l` (columns times three plus
-/// channel) shows the view
+/// A panel with vertical stripes of red, green and blue subpixels under lenticular lenses. Subpixel `k` of
+/// row `l` (three times the column plus the channel) shows the view
 ///
 /// ```text
 /// floor(views frac((k + offset - 3 l slant) / pitch))
 /// ```
 ///
-/// (van Berkel 1999, equation 1), counted from the left eye's side.
+/// (van Berkel 1999, equation 1), counted from the left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Panel {
-    /// Subpixels under a lens, along a row.
+    /// Subpixels per lens, along a row.
     pub pitch: f64,
     /// Tangent of the angle between the lenses and the columns.
     pub slant: f64,
-    /// Where the first lens starts, in subpixels.
+    /// Start of the first lens, in subpixels.
     pub offset: f64,
 }
 
-/// The panel that van Berkel describes: seven views, 3.5 subpixels and a slant of 1/6.
+/// The panel of van Berkel: seven views, 3.5 subpixels and a slant of 1/6.
 impl Default for Panel {
     fn default() -> Self {
         Self { pitch: 3.5, slant: 1.0 / 6.0, offset: 0.0 }
     }
 }
 
-/// Subpixels, and tangents, beyond which a panel is none: all of an image lies under one lens.
-const MOST: f64 = 1e6;
+/// Largest number of subpixels, and tangent; beyond it, the whole image lies under one lens.
+const MAX_SUBPIXELS: f64 = 1e6;
 
 impl Panel {
     /// Checks every value.
     ///
     /// # Errors
-    /// Names the first that cannot be.
+    /// [`LoadError`] with the first invalid value.
     pub fn check(&self) -> Result<(), LoadError> {
         let refused = |message| Err(LoadError::Setting { setting: "panel", message });
-        if !(1.0..=MOST).contains(&self.pitch) {
-            return refused(format!("pitch {:?}: a lens covers 1 to {MOST} subpixels", self.pitch));
+        if !(1.0..=MAX_SUBPIXELS).contains(&self.pitch) {
+            return refused(format!("pitch {:?}: a lens covers 1 to {MAX_SUBPIXELS} subpixels", self.pitch));
         }
         for (name, value) in [("slant", self.slant), ("offset", self.offset)] {
-            if !(-MOST..=MOST).contains(&value) {
-                return refused(format!("{name} {value:?}: it has to be -{MOST} to {MOST}"));
+            if !(-MAX_SUBPIXELS..=MAX_SUBPIXELS).contains(&value) {
+                return refused(format!(
+                    "{name} {value:?}: it has to be -{MAX_SUBPIXELS} to {MAX_SUBPIXELS}"
+                ));
             }
         }
         Ok(())
     }
 
-    /// The view, of `views`, that a channel of a pixel shows.
+    /// View, of `views`, that a channel of a pixel shows.
     pub fn view(&self, [column, row]: [u32; 2], channel: u32, views: u32) -> u32 {
         let along = f64::from(3 * column + channel) + self.offset - 3.0 * f64::from(row) * self.slant;
         let part = along / self.pitch;
         let part = part - libm::floor(part);
-        // Panels are made so that subpixels meet views exactly: rounding must not put them into the one before.
+        // Panels are designed so that subpixels meet views exactly. The offset keeps rounding from selecting
+        // the previous view.
         ((part * f64::from(views) + 1e-9) as u32).min(views.saturating_sub(1))
     }
 
-    /// The image of the panel, each channel of a pixel from the view that is seen through its lens. All images are `width` wide.
+    /// Interlaces the images; all are `width` wide.
     pub fn interlace(&self, images: &[Vec<Vec3>], width: u32) -> Vec<Vec3> {
         let pixels = images.first().map_or(0, Vec::len);
         let pixel = |place: usize| {
@@ -85,7 +88,8 @@ mod tests {
         }
     }
 
-    /// Figure 3 of van Berkel 1999: seven views in a pattern that repeats after seven subpixels and two rows; all as often.
+    /// Figure 3 of van Berkel 1999: seven views in a pattern with a period of seven subpixels and two rows,
+    /// all with the same frequency.
     #[test]
     fn every_view_has_an_equal_share_of_the_panel() {
         let (panel, mut shares) = (Panel::default(), [0_u32; 7]);

@@ -1,21 +1,21 @@
-//! What one pass is held against besides view by view.
+//! Other methods of multi-view rendering, for comparison.
 
 use activity::Counts;
 use glam::{Affine3A, Vec3};
 use pipeline::sampling::Sample;
 use pipeline::{Camera, Draw, Geometry, Lens, PipelineSpec, Shading};
 
+use super::rig::{OwnLens, Run};
 use super::rig::{Rig, Target, Views, settings};
-use super::samples::{OwnLens, Run};
 use crate::accumulation::{SharedSamples, pinhole};
 use crate::job::{Emit, JobError, shifted};
 
 impl Rig {
-    /// Accumulation buffering (Haeberli and Akeley 1990): for each sample of each view a pass of still geometry through a pinhole, all
-    /// pixels sharing its place on the lens and in time. Samples that views share are rendered once.
+    /// Accumulation buffering (Haeberli and Akeley 1990): one pinhole pass of still geometry per sample of
+    /// each view. All pixels share the samples of lens and time. Samples that views share are rendered once.
     ///
     /// # Errors
-    /// When the hardware cannot be built.
+    /// [`JobError`] if the hardware cannot be built.
     pub fn accumulated(
         &self,
         draws: &[Draw<'_>],
@@ -23,7 +23,7 @@ impl Rig {
         emit: Emit<'_>,
     ) -> Result<Views, JobError> {
         let refused = |error: &dyn std::fmt::Display| JobError::Setting(error.to_string());
-        // The places of one pixel of the table serve all.
+        // The samples of one pixel of the table serve all pixels.
         let set = SharedSamples::new(self.table.pixel(0, 0).to_vec())
             .ok_or_else(|| JobError::Setting("too many samples".to_owned()))?;
         let mut views = Views { images: Vec::new(), counts: Counts::default(), passes: 0 };
@@ -51,12 +51,12 @@ impl Rig {
         Ok(views)
     }
 
-    /// Each view with a camera and a lens of its own in the middle of its part of the line, and with the same samples, every one of
-    /// them shaded where it is: what shading once for all views leaves out. (Under overlapping filters a view's lens is as wide as
-    /// its box.)
+    /// Renders each view with its own camera and lens at its part of the line, and with the same samples,
+    /// each shaded where it is. This shows the error of shading once for all views. (With overlapping
+    /// filters, a view's lens is as wide as its box.)
     ///
     /// # Errors
-    /// When the hardware cannot be built.
+    /// [`JobError`] if the hardware cannot be built.
     pub fn own_cameras(&self, draws: &[Draw<'_>], to: &Target<'_>) -> Result<Vec<Vec<Vec3>>, JobError> {
         let refused = |error: &dyn std::fmt::Display| JobError::Setting(error.to_string());
         let spec = PipelineSpec { shading: Shading::PerSample, ..*to.spec };
@@ -81,7 +81,7 @@ impl Rig {
     }
 }
 
-/// The camera as it stands at time `t`.
+/// The camera at time `t`.
 fn frozen(camera: &Camera, t: f32) -> Result<Camera, pipeline::CameraError> {
     let (open, close) = (camera.open(), camera.close());
     let matrix = open.matrix3 + (close.matrix3 - open.matrix3) * t;

@@ -1,4 +1,4 @@
-//! `quintile run occlusion`.
+//! The job `quintile run occlusion`.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use pipeline::{Cull, Draw, Geometry, PipelineSpec, Shader, ShaderCost, ShadingPo
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::{Answer, MovingBox, Pyramid, Queries, Yard, YardSpec, depths};
+use super::{Answer, MovingBox, Pyramid, Queries, WallScene, WallSceneSpec, depths};
 use crate::error::LoadError;
 use crate::job::{
     Drawn, Draws, Emit, Fact, Flag, Flags, FrontEnd, Job, JobError, OptionSource, Passes, Request, TileWork,
@@ -21,25 +21,25 @@ use crate::job::{
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
 
-/// Walls, boxes behind them, and how these are asked for.
+/// Options of the job: walls, boxes behind them, and the queries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// Walls, 0 to 1000.
+    /// Number of walls, 0 to 1000.
     pub walls: u32,
-    /// Slats of a wall, 1 to 1000.
+    /// Slats per wall, 1 to 1000.
     pub slats: u32,
-    /// The part of a wall that is gaps between slats, 0 to 1.
+    /// Share of a wall that is gaps between slats, 0 to 1.
     pub gaps: f32,
-    /// Boxes, 0 to 100000.
+    /// Number of boxes, 0 to 100000.
     pub objects: u32,
-    /// Motion of walls while the shutter is open, in metres; a wall is 3 wide.
+    /// Motion of walls during the shutter, in metres; a wall is 3 wide.
     pub motion: f32,
-    /// Radius of the lens in metres, 0 to 1; it is focused in front of all.
+    /// Radius of the lens in metres, 0 to 1; it is focused in front of everything.
     pub lens: f32,
-    /// Side of a tile of the first level in pixels: 1 to 256.
+    /// Side of a tile of the first level in pixels, 1 to 256.
     pub tile_px: u32,
-    /// Boxes of lens and time in a tile, along u, v and t, 1 to 16 each.
+    /// Boxes of lens and time per tile, along u, v and t, 1 to 16 each.
     pub boxes: [u32; 3],
 }
 
@@ -73,15 +73,15 @@ impl Options {
     }
 }
 
-/// The job.
+/// The job and its scene.
 struct Occlusion {
     options: Options,
     settings: Settings,
     samples: Arc<dyn SampleSource>,
-    yard: Yard,
+    wall_scene: WallScene,
 }
 
-/// The yard has a lens and a motion of its own.
+/// Run options in use. The scene has its own lens and motion.
 pub(crate) const FLAGS: Flags = Flags {
     uses: &[Flag::Size, Flag::Samples, Flag::Table],
     instead: &[(Flag::Lens, "lens"), (Flag::Shutter, "motion")],
@@ -90,7 +90,7 @@ pub(crate) const FLAGS: Flags = Flags {
 /// Makes the job `occlusion`.
 ///
 /// # Errors
-/// [`LoadError`] when an option or a setting makes no sense.
+/// [`LoadError`] for an invalid option or setting.
 pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: Options = options.read()?;
     options.check()?;
@@ -98,20 +98,21 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
     let settings = settings.with(request.overrides)?;
     let samples = SampleChoice::load(&settings.table)?.source(settings.samples, request.seed)?.into();
     let Options { walls, slats, gaps, objects, motion, lens, .. } = options;
-    let spec = YardSpec { walls, slats, gaps, boxes: objects, motion, lens, seed: request.seed };
+    let spec = WallSceneSpec { walls, slats, gaps, boxes: objects, motion, lens, seed: request.seed };
     let refused =
         || LoadError::Setting { setting: "lens", message: format!("{lens}: there is no such lens") };
-    let yard = spec.yard().ok_or_else(refused)?;
-    Ok(Box::new(Occlusion { options, settings, samples, yard }))
+    let wall_scene = spec.wall_scene().ok_or_else(refused)?;
+    Ok(Box::new(Occlusion { options, settings, samples, wall_scene }))
 }
 
-/// Bytes of a corner of a box at both ends, its transformation, and the set-up of its triangles.
+/// Bytes of a box corner at both times, its transformation, and the set-up of its triangles.
 const FRONT_END: FrontEnd = FrontEnd { vertex_bytes: 24, vertex_ops: 24, setup_madds: 77 };
-/// A quarter of the tiles half covered: occluders are small, and what they hide together is not found hidden.
-pub const HALF_COVERED: f64 = 0.25;
+/// Share of half-covered tiles above which a warning is given. Small occluders hide objects together, which a
+/// farthest depth per tile cannot detect.
+pub const MAX_HALF_COVERED_SHARE: f64 = 0.25;
 
 impl Draws for Occlusion {
-    /// Every frame is the same shutter interval.
+    /// All frames show the same shutter interval.
     type Input = ();
 
     fn settings(&self) -> &Settings {
@@ -128,9 +129,9 @@ impl Draws for Occlusion {
             .ok_or_else(|| refused("the image has no area"))?;
         let background = Vec3::new(0.02, 0.03, 0.05);
         let settings = pipeline::Settings { spec, viewport, samples: &*self.samples, background };
-        let wall = self.yard.walls(&WALL).map_err(|error| JobError::Setting(error.to_string()))?;
+        let wall = self.wall_scene.walls(&WALL).map_err(|error| JobError::Setting(error.to_string()))?;
         let mut counts = Counts::default();
-        let camera = &self.yard.camera;
+        let camera = &self.wall_scene.camera;
         counts += &render_with_heat(camera, &[wall], &settings, &[], &mut *emit)?.0.counts;
         let depths = depths(camera, &[wall], &settings)?;
         let grid = BoxGrid::new(self.options.boxes, camera.lens().is_some())
@@ -138,10 +139,10 @@ impl Draws for Occlusion {
         let pyramid = Pyramid::new(viewport, &*self.samples, &depths, self.options.tile_px, grid);
         let projection = Projection::new(camera, viewport);
         let queries = Queries::new(&pyramid, &projection);
-        let answers: Vec<Answer> = self.yard.boxes.iter().map(|object| queries.ask(object)).collect();
-        counts += &tell(&answers, spec, &mut *emit)?;
+        let answers: Vec<Answer> = self.wall_scene.boxes.iter().map(|object| queries.ask(object)).collect();
+        counts += &emit_packets(&answers, spec, &mut *emit)?;
         let seen: Vec<&MovingBox> = self
-            .yard
+            .wall_scene
             .boxes
             .iter()
             .zip(&answers)
@@ -157,7 +158,7 @@ impl Draws for Occlusion {
         Ok(Drawn {
             image: rendered.image,
             counts,
-            triangles: 2 * self.yard.triangles.len() + triangles.len() + 12 * answers.len(),
+            triangles: 2 * self.wall_scene.triangles.len() + triangles.len() + 12 * answers.len(),
             moving: self.options.motion > 0.0,
             lens: camera.lens().is_some(),
             facts: facts(&answers),
@@ -166,8 +167,9 @@ impl Draws for Occlusion {
     }
 }
 
-/// The queries as packets of a pass of their own: the farthest depths lie in a fast memory beside the tile tests, so that no cache is asked.
-fn tell(answers: &[Answer], spec: &PipelineSpec, emit: Emit<'_>) -> Result<Counts, JobError> {
+/// Emits the queries as packets of their own pass. The farthest depths are in fast memory beside the tile
+/// tests, so no cache is accessed.
+fn emit_packets(answers: &[Answer], spec: &PipelineSpec, emit: Emit<'_>) -> Result<Counts, JobError> {
     let mut passes = Passes::new(&spec.memory, emit)?;
     passes.next();
     passes.draw(12 * answers.len(), 0, &FRONT_END);
@@ -215,23 +217,23 @@ fn warnings(answers: &[Answer], half_covered: f64) -> Vec<Warning> {
             "{:.0} % of the tiles are covered for most of their samples, but not for all (a warning from {:.0} % on): many small occluders hide \
              objects together, and a farthest depth for each tile does not know it; smaller tiles and more boxes of lens and time help",
             100.0 * half_covered,
-            100.0 * HALF_COVERED
+            100.0 * MAX_HALF_COVERED_SHARE
         )
     };
-    // Where nothing is asked for, nothing is found in vain.
-    (half_covered > HALF_COVERED && !answers.is_empty())
+    // Without queries there are no false positives.
+    (half_covered > MAX_HALF_COVERED_SHARE && !answers.is_empty())
         .then(|| Warning::new(Code::OcclusionSmallOccluders, message()))
         .into_iter()
         .collect()
 }
 
-/// A colour under a light that comes from the eye.
-struct Plain(Vec3);
+/// A diffuse colour, lit from the camera.
+struct Headlight(Vec3);
 
-const WALL: Plain = Plain(Vec3::new(0.55, 0.5, 0.42));
-const BOX: Plain = Plain(Vec3::new(0.75, 0.25, 0.12));
+const WALL: Headlight = Headlight(Vec3::new(0.55, 0.5, 0.42));
+const BOX: Headlight = Headlight(Vec3::new(0.75, 0.25, 0.12));
 
-impl Shader for Plain {
+impl Shader for Headlight {
     fn cost(&self) -> ShaderCost {
         ShaderCost { pixel_ops: 12, vertex_ops: 24 }
     }

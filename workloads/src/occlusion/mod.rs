@@ -1,25 +1,24 @@
-//! Occlusion queries in five dimensions (thesis, Paper VI, section 3).
+//! Occlusion queries in 5D (thesis, Paper VI, section 3).
 //!
-//! Is an object hidden behind what was drawn, at all times and from everywhere on the lens? A *sampled* query draws the box about it and
-//! counts the samples that pass the depth test. A query by *intervals* touches no sample: over a tile the tile test leaves a box
-//! of lens and time and an interval of depth, which is compared with the farthest depth stored for each box of lens and time of the
-//! tile. Both answer for the samples there are.
+//! A query tests whether an object is hidden behind the drawn scene, at all times and from all of the lens. A
+//! *sampled* query draws the object's bounding box and counts the samples that pass the depth test. An
+//! *interval* query uses no samples. In each tile, the tile test gives a box of lens and time and a depth
+//! interval, which is compared with the farthest stored depths of the tile. Both answer for the samples of
+//! the image.
 //!
 //! - [`Pyramid`]: the farthest depths of tiles, by boxes of lens and time, level by level.
-//! - [`MovingBox`]: the box about an object, at both ends of the shutter.
-//! - [`Queries`]: the query by intervals. *It never calls hidden what a sample sees.*
-//! - [`Samples`]: the query by samples.
-//! - [`Yard`]: walls, whole or in slats, with boxes behind them.
+//! - [`MovingBox`]: the bounding box of an object, at both ends of the shutter.
+//! - [`Queries`]: interval queries. *A visible object is never reported as hidden.*
+//! - [`Samples`]: sampled queries.
+//! - [`WallScene`]: walls, solid or slatted, with boxes behind them.
 
 mod job;
 mod pyramid;
 mod query;
-mod sampled;
-mod yard;
+mod walls;
 
 pub(crate) use job::FLAGS;
-pub use job::{HALF_COVERED, Options, job};
+pub use job::{MAX_HALF_COVERED_SHARE, Options, job};
 pub use pyramid::Pyramid;
-pub use query::{Answer, MovingBox, Queries};
-pub use sampled::{Samples, Seen, depths};
-pub use yard::{Yard, YardSpec};
+pub use query::{Answer, MovingBox, Queries, SampledAnswer, Samples, depths};
+pub use walls::{WallScene, WallSceneSpec};

@@ -1,10 +1,10 @@
-//! The farthest stored depths, level by level.
+//! The farthest stored depths of tiles, level by level.
 
 use pipeline::Viewport;
 use pipeline::depth::BoxGrid;
 use pipeline::sampling::{Sample, SampleSource};
 
-/// The farthest depth of each tile for each box of lens and time, and of tiles of twice the side, and so on.
+/// Farthest depth of each tile and box of lens and time, with tile sides that double per level.
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     viewport: Viewport,
@@ -22,8 +22,9 @@ struct Level {
 }
 
 impl Pyramid {
-    /// Of an image whose samples, from `source`, have `depths` in the order `(y width + x) per_pixel + index`, infinite where nothing is.
-    /// Tiles of the first level have a side of `tile_px` pixels, 1 or more.
+    /// Makes the pyramid of an image. The samples of `source` have `depths` in the order `(y width + x)
+    /// per_pixel + index`, infinite for no hit. Tiles of the first level have a side of `tile_px` pixels, 1
+    /// or more.
     pub fn new(
         viewport: Viewport,
         source: &dyn SampleSource,
@@ -55,17 +56,17 @@ impl Pyramid {
         this
     }
 
-    /// How lens and time are divided.
+    /// Division of lens and time.
     pub fn grid(&self) -> &BoxGrid {
         &self.grid
     }
 
-    /// The size of the image.
+    /// Image size.
     pub fn viewport(&self) -> Viewport {
         self.viewport
     }
 
-    /// How many levels there are; the last one has one tile.
+    /// Number of levels; the last one has one tile.
     pub fn levels(&self) -> usize {
         self.levels.len()
     }
@@ -80,14 +81,14 @@ impl Pyramid {
         [self.levels[level].columns, self.levels[level].rows]
     }
 
-    /// No sample of a box of a tile is farther than this.
+    /// Farthest depth of a box of a tile.
     pub fn farthest(&self, level: usize, [column, row]: [u32; 2], index: usize) -> f32 {
         let level = &self.levels[level];
         level.farthest[(row * level.columns + column) as usize * self.grid.len() + index]
     }
 
-    /// The share of tiles that most samples, but not all, find covered: there the farthest depth is that of the gaps, and small occluders hide
-    /// nothing.
+    /// Share of tiles in which most, but not all, samples are covered. Their farthest depth is that of the
+    /// gaps, so small occluders hide nothing.
     pub fn half_covered(&self) -> f64 {
         let [columns, rows] = self.size(0);
         self.half_covered as f64 / f64::from(columns * rows)
@@ -95,13 +96,13 @@ impl Pyramid {
 }
 
 impl Level {
-    /// A level without samples: a box that has none hides everything, as no sample of it sees anything.
+    /// A level without samples. A box without samples hides everything, as nothing is visible in it.
     fn empty(viewport: Viewport, side_px: u32, boxes: usize) -> Self {
         let (columns, rows) = (viewport.width().div_ceil(side_px), viewport.height().div_ceil(side_px));
         Self { columns, rows, farthest: vec![f32::NEG_INFINITY; (columns * rows) as usize * boxes] }
     }
 
-    /// Tiles of twice the side.
+    /// The next level, with tiles of twice the side.
     fn above(&self, viewport: Viewport, side_px: u32, boxes: usize) -> Self {
         let mut above = Self::empty(viewport, side_px, boxes);
         for (tile, of_tile) in (0..).zip(self.farthest.chunks_exact(boxes)) {
@@ -121,7 +122,7 @@ mod tests {
     use pipeline::{LensShape, SampleTable};
 
     #[test]
-    fn every_level_knows_the_farthest_of_its_samples() {
+    fn every_level_has_the_farthest_depth_of_its_samples() {
         let viewport = Viewport::new(37, 21).unwrap();
         let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
         let depth = |n: usize| (pipeline::random::mix(n as u64) % 1000) as f32;

@@ -1,24 +1,28 @@
-//! The query by intervals.
+//! Occlusion queries, by intervals and by samples.
 
+use activity::Event;
 use glam::Vec3;
-use pipeline::Cull;
 use pipeline::depth::{Bounder, DepthBound, interval_madds, set_up_madds};
+use pipeline::frame::{render_depth, visibility};
 use pipeline::geometry::Projection;
+use pipeline::memory::CacheError;
 use pipeline::setup::{Outcome, Triangle, bounds, madds, set_up};
 use pipeline::traversal::{Box5, TileRect, narrow_counted};
+use pipeline::{Camera, Cull, Draw, Features, Geometry, PipelineSpec, Settings};
 
 use super::Pyramid;
+use crate::visibility::Unshaded;
 
-/// A box along the axes whose corners move on straight lines.
+/// An axis-aligned box whose corners move linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingBox {
-    /// Its lowest and highest corner when the shutter opens.
+    /// Lowest and highest corner at shutter open.
     pub open: [Vec3; 2],
-    /// When it closes.
+    /// Lowest and highest corner at shutter close.
     pub close: [Vec3; 2],
 }
 
-/// The faces of a box, two triangles each, by the bits of its corners.
+/// Faces of a box, two triangles each; the bits of a corner index select the upper coordinate of an axis.
 const FACES: [[u32; 3]; 12] = [
     [0, 2, 3],
     [0, 3, 1],
@@ -35,10 +39,10 @@ const FACES: [[u32; 3]; 12] = [
 ];
 
 impl MovingBox {
-    /// Its triangles, by number of corner.
+    /// Triangles, by corner index.
     pub const TRIANGLES: [[u32; 3]; 12] = FACES;
 
-    /// The corners when the shutter opens, and when it closes.
+    /// Corners at shutter open and at shutter close.
     pub fn corners(&self) -> [[Vec3; 8]; 2] {
         [self.open, self.close].map(|[low, high]| {
             std::array::from_fn(|corner| {
@@ -49,34 +53,34 @@ impl MovingBox {
     }
 }
 
-/// What a query found, and what it took.
+/// Result and cost of an interval query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Answer {
-    /// Whether no sample can see the object.
+    /// Whether the object is hidden from all samples.
     pub hidden: bool,
     /// Triangles set up.
     pub triangles: u64,
     /// Tiles tested, on all levels.
     pub tiles: u64,
-    /// Depth intervals compared with a farthest depth, of four bytes.
+    /// Depth intervals compared with a farthest depth of four bytes.
     pub compared: u64,
-    /// Multiply-adds of all that.
+    /// Multiply-adds of the whole query.
     pub madds: u64,
 }
 
 impl Answer {
-    /// Tests of any kind.
+    /// Number of tests.
     pub fn tests(&self) -> u64 {
         self.tiles + self.compared
     }
 
-    /// Bytes of stored depth that were read.
+    /// Bytes of stored depth read.
     pub fn bytes(&self) -> u64 {
         4 * self.compared
     }
 }
 
-/// Queries against one pyramid.
+/// Interval queries against one pyramid.
 #[derive(Clone, Copy, Debug)]
 pub struct Queries<'a> {
     pyramid: &'a Pyramid,
@@ -84,24 +88,25 @@ pub struct Queries<'a> {
     bound: DepthBound,
 }
 
-/// A triangle of a box, ready to be looked for.
+/// A triangle of a box, after set-up.
 struct Side {
     triangle: Triangle,
     bounder: Bounder,
 }
 
 impl<'a> Queries<'a> {
-    /// Against `pyramid`, whose depths were drawn through `projection`.
+    /// Makes queries against `pyramid`, whose depths were drawn through `projection`.
     pub fn new(pyramid: &'a Pyramid, projection: &'a Projection) -> Self {
         Self { pyramid, projection, bound: DepthBound::LocalPlanes }
     }
 
-    /// Whether the box, and with it all that is inside, is hidden. Ends as soon as a tile of the first level says no.
+    /// Whether the box, and everything inside, is hidden. Ends at the first tile of the first level that may
+    /// see it.
     pub fn ask(&self, object: &MovingBox) -> Answer {
         let mut answer = Answer::default();
         let [open, close] = object.corners();
         let vertices: [_; 8] = std::array::from_fn(|n| self.projection.vertex(open[n], close[n]));
-        // Where the near plane cuts the box open, what is inside may be seen without any of its sides.
+        // If the near plane clips the box, its content may be visible without its sides.
         let near = self.projection.near;
         if vertices.iter().any(|vertex| vertex.open[2] <= near || vertex.close[2] <= near) {
             return answer;
@@ -111,7 +116,7 @@ impl<'a> Queries<'a> {
         answer.hidden = (0..).zip(FACES).all(|(id, corners)| {
             let three = corners.map(|corner| &vertices[corner as usize]);
             let Outcome::Ready(triangle) = set_up(id, three, Cull::None, shear, near, half_px) else {
-                // No sample sees a triangle without area.
+                // A triangle without area is invisible.
                 return true;
             };
             answer.triangles += 1;
@@ -123,7 +128,7 @@ impl<'a> Queries<'a> {
         answer
     }
 
-    /// Whether a triangle is hidden, beginning at the level where it touches four tiles at most.
+    /// Whether a triangle is hidden, starting at the level where it touches four tiles at most.
     fn triangle(&self, side: &Side, answer: &mut Answer) -> bool {
         let pixels = bounds(&side.triangle, &self.projection.shear, self.pyramid.viewport());
         if pixels.is_empty() {
@@ -140,7 +145,7 @@ impl<'a> Queries<'a> {
         })
     }
 
-    /// Whether it is hidden in a tile: there, or in all tiles in it.
+    /// Whether the triangle is hidden in a tile, directly or in all of its child tiles.
     fn tile(
         &self,
         side: &Side,
@@ -152,10 +157,10 @@ impl<'a> Queries<'a> {
         let (shear, px) = (&self.projection.shear, self.pyramid.side_px(level));
         let rect = TileRect::new(self.pyramid.viewport(), [column * px, row * px], px);
         answer.tiles += 1;
-        let (left, madds) = narrow_counted::<f64>(&side.triangle, shear, &rect, within);
+        let (narrowed, madds) = narrow_counted::<f64>(&side.triangle, shear, &rect, within);
         answer.madds += u64::from(madds);
-        let Some(left) = left else { return true };
-        if self.behind(side, level, [column, row], &rect, &left, answer) {
+        let Some(narrowed) = narrowed else { return true };
+        if self.behind(side, level, [column, row], &rect, &narrowed, answer) {
             return true;
         }
         if level == 0 {
@@ -164,11 +169,11 @@ impl<'a> Queries<'a> {
         let [columns, rows] = self.pyramid.size(level - 1);
         (2 * row..(2 * row + 2).min(rows)).all(|row| {
             (2 * column..(2 * column + 2).min(columns))
-                .all(|column| self.tile(side, level - 1, [column, row], &left, answer))
+                .all(|column| self.tile(side, level - 1, [column, row], &narrowed, answer))
         })
     }
 
-    /// Whether it lies behind all that is stored in every box of lens and time that it may touch.
+    /// Whether the triangle is behind the stored depths in every box of lens and time that it may touch.
     fn behind(
         &self,
         side: &Side,
@@ -183,6 +188,87 @@ impl<'a> Queries<'a> {
             answer.compared += 1;
             answer.madds += u64::from(madds);
             side.bounder.over(rect, &part)[0] > self.pyramid.farthest(level, tile, index)
+        })
+    }
+}
+
+/// The depth buffer that sampled queries are compared with.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// The camera.
+    pub camera: &'a Camera,
+    /// The hardware and the samples.
+    pub settings: &'a Settings<'a>,
+    /// Depth of every sample in the order `(y width + x) per_pixel + index`, infinite for no hit.
+    pub depths: &'a [f32],
+}
+
+/// Result and cost of a sampled query.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SampledAnswer {
+    /// Samples that pass the depth test.
+    pub passed: u64,
+    /// Samples tested.
+    pub tested: u64,
+    /// Tiles tested.
+    pub tiles: u64,
+    /// Samples inside the box, each of which reads a stored depth of four bytes.
+    pub hit: u64,
+    /// Multiply-adds of the whole query.
+    pub madds: u64,
+}
+
+impl SampledAnswer {
+    /// Number of tests, including depth tests.
+    pub fn tests(&self) -> u64 {
+        self.tested + self.tiles + self.hit
+    }
+
+    /// Bytes of stored depth read.
+    pub fn bytes(&self) -> u64 {
+        4 * self.hit
+    }
+}
+
+/// Depth of every sample of `draws`, as [`Samples`] needs it.
+///
+/// # Errors
+/// [`CacheError`] if a cache of the hardware cannot be built.
+pub fn depths(camera: &Camera, draws: &[Draw<'_>], settings: &Settings<'_>) -> Result<Vec<f32>, CacheError> {
+    Ok(visibility(camera, draws, settings)?.into_iter().map(depth).collect())
+}
+
+/// Depth of a visible sample.
+fn depth((_, bits): (u32, u32)) -> f32 {
+    f32::from_bits(bits)
+}
+
+impl Samples<'_> {
+    /// Counts the samples that see the box, by drawing it alone.
+    ///
+    /// # Errors
+    /// [`CacheError`] if a cache of the hardware cannot be built.
+    pub fn ask(&self, object: &MovingBox) -> Result<SampledAnswer, CacheError> {
+        let [open, close] = object.corners();
+        // A geometry is refused only for values that are not finite, which are invisible.
+        let Ok(geometry) = Geometry::new(&open, &close, &MovingBox::TRIANGLES) else {
+            return Ok(SampledAnswer::default());
+        };
+        let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
+        // A sampled query has no stored depths of tiles.
+        let features = Features { z_max: false, ..self.settings.spec.features };
+        let spec = PipelineSpec { features, ..*self.settings.spec };
+        let settings = Settings { spec: &spec, ..*self.settings };
+        let (own, counts) = render_depth(self.camera, &draws, &settings, |_, _| ())?;
+        let passes = |(own, stored): &(f32, &f32)| own.is_finite() && own <= stored;
+        let passed = own.into_iter().map(depth).zip(self.depths).filter(passes).count() as u64;
+        let all = |events: &[Event]| events.iter().map(|event| counts[*event]).sum();
+        Ok(SampledAnswer {
+            passed,
+            tested: counts[Event::SamplesTested] + counts[Event::SamplesScreened],
+            tiles: all(&[Event::TilesVisited, Event::CoarseTilesVisited]),
+            hit: counts[Event::SamplesHit],
+            madds: all(&[Event::SetupMadds, Event::TileMadds, Event::ScreenMadds, Event::SampleMadds]),
         })
     }
 }

@@ -1,8 +1,9 @@
-//! `sampling` as a job: voids are drawn and the samples that hit them are the candidates (thesis, Paper VI, section 5, Fig. 11).
+//! The job `sampling`: uncovered regions are drawn, and the samples that hit them are the candidates (thesis,
+//! Paper VI, section 5, Fig. 11).
 //!
-//! In each round every void is a square of two triangles; as voids do not overlap, the depth test keeps nothing away. Each sample
-//! is new in every round, so no place is favoured. What the samples leave, finer than the pixels, is finished by
-//! [`super::poisson`] on the host; the facts say how much that is.
+//! In each round, every uncovered cell is drawn as a square of two triangles. The cells do not overlap, so
+//! the depth test rejects nothing. Every round uses new samples, so the points have no bias. Regions smaller
+//! than a pixel are filled by [`super::poisson`] on the host; the facts give the share.
 
 use activity::{Counts, LineAccess, Packet};
 use glam::{Vec3, Vec4};
@@ -18,15 +19,15 @@ use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::Settings;
 
-/// What can be set.
+/// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// Least distance of points, 0.005 to 0.5.
+    /// Minimum distance of points, 0.005 to 0.5.
     pub radius: f64,
-    /// Rounds of darts that are drawn, 1 to 8.
+    /// Rounds that are rasterized, 1 to 8.
     pub rounds: u32,
-    /// A torus rather than a box.
+    /// Whether the domain is a torus instead of a box.
     pub periodic: bool,
 }
 
@@ -36,17 +37,17 @@ impl Default for Options {
     }
 }
 
-/// The job.
+/// The job, its settings and its seed.
 struct Sampling {
     options: Options,
     settings: Settings,
     seed: u64,
 }
 
-/// Samples are new in every round, of no table; there is nothing that moves or is out of focus.
+/// Run options in use. Samples are new in every round, and nothing moves or is out of focus.
 pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size, Flag::Samples], instead: &[] };
 
-/// The job called `sampling`.
+/// Makes the job `sampling`.
 ///
 /// # Errors
 /// [`LoadError::Setting`] for an option out of range.
@@ -67,7 +68,7 @@ pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<d
     Ok(Box::new(Sampling { options, settings, seed: request.seed }))
 }
 
-/// Appends a candidate to a list: an address, a compare and the two coordinates.
+/// A shader that appends a candidate to a list: an address, a compare and two coordinates.
 struct Append;
 
 impl Shader for Append {
@@ -80,30 +81,31 @@ impl Shader for Append {
     }
 }
 
-/// Points whose first darts were samples of rasterized voids.
+/// Points of which the first were samples of rasterized cells.
 #[derive(Debug)]
 pub struct Rasterized {
     /// The points, maximal.
     pub found: PoissonDisk<2>,
-    /// How many of them come from samples.
+    /// Number of points that come from samples.
     pub drawn: usize,
-    /// Samples that hit a void.
+    /// Samples that hit an uncovered cell.
     pub candidates: u64,
     /// Triangles drawn.
     pub triangles: usize,
-    /// Rounds, a pass each.
+    /// Rounds, one pass each.
     pub passes: u16,
-    /// What was done.
+    /// Event counts.
     pub counts: Counts,
 }
 
-/// Points of the unit square, with `samples` in each of `side` by `side` pixels.
+/// Points of the unit square, from `side` by `side` pixels with `samples` each.
 ///
 /// # Errors
-/// When an option or the hardware cannot be.
+/// [`JobError`] for an invalid option or hardware.
 pub fn rasterized(
     options: Options,
-    [side, samples]: [u32; 2],
+    side: u32,
+    samples: u32,
     seed: u64,
     spec: &PipelineSpec,
 ) -> Result<Rasterized, JobError> {
@@ -111,9 +113,9 @@ pub fn rasterized(
     Sampling { options, settings, seed }.points(0, spec, &mut |_, _| ())
 }
 
-/// What the rounds have done so far.
+/// Totals of the rounds so far.
 #[derive(Default)]
-struct Done {
+struct Totals {
     counts: Counts,
     triangles: usize,
     candidates: u64,
@@ -121,53 +123,55 @@ struct Done {
 }
 
 impl Sampling {
-    /// All rounds, and what the host adds to them.
+    /// Runs all rounds, then completes the points on the host.
     fn points(&self, number: u32, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Rasterized, JobError> {
         let domain = if self.options.periodic { Domain::Torus } else { Domain::Box };
         let seed = mix(self.seed.wrapping_add(u64::from(number)));
-        let asked = PoissonSpec { radius: self.options.radius, domain, seed, spacing: Spacing::Double };
-        let mut done = Done::default();
-        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, spec, &mut done, emit);
-        let (found, drawn) = poisson_disk_drawn(&asked, self.options.rounds, draw)?
+        let requested = PoissonSpec { radius: self.options.radius, domain, seed, spacing: Spacing::Double };
+        let mut totals = Totals::default();
+        let draw = |cubes: &[Cube<2>]| self.round(cubes, number, spec, &mut totals, emit);
+        let (found, drawn) = poisson_disk_drawn(&requested, self.options.rounds, draw)?
             .map_err(|error| JobError::Setting(error.to_string()))?;
-        let Done { counts, triangles, candidates, round } = done;
+        let Totals { counts, triangles, candidates, round } = totals;
         Ok(Rasterized { found, drawn, candidates, triangles, passes: round, counts })
     }
 
-    /// Draws the voids of a round and takes the samples that hit, in random order.
+    /// Draws the uncovered cells of a round and returns the samples that hit, in random order.
     fn round(
         &self,
         cubes: &[Cube<2>],
         frame: u32,
         spec: &PipelineSpec,
-        done: &mut Done,
+        totals: &mut Totals,
         emit: Emit<'_>,
     ) -> Result<Vec<[f64; 2]>, JobError> {
         let side = self.settings.height;
-        let seed = mix(self.seed ^ u64::from(frame) << 32 ^ u64::from(done.round));
-        let wrong = || JobError::Setting(format!("{side} pixels, {} samples", self.settings.samples));
+        let seed = mix(self.seed ^ u64::from(frame) << 32 ^ u64::from(totals.round));
+        let invalid = || JobError::Setting(format!("{side} pixels, {} samples", self.settings.samples));
         let samples =
-            HashedSamples::new(seed, side, self.settings.samples, LensShape::Square).ok_or_else(wrong)?;
-        let (viewport, camera) = (Viewport::new(side, side).ok_or_else(wrong)?, camera().ok_or_else(wrong)?);
+            HashedSamples::new(seed, side, self.settings.samples, LensShape::Square).ok_or_else(invalid)?;
+        let (viewport, camera) =
+            (Viewport::new(side, side).ok_or_else(invalid)?, camera().ok_or_else(invalid)?);
         let (corners, triangles) = squares(cubes);
         let geometry =
             Geometry::new(&corners, &corners, &triangles).map_err(|e| JobError::Setting(e.to_string()))?;
         let draws = [Draw { geometry, shader: &Append, cull: Cull::None }];
         let settings = pipeline::Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
-        let pass = done.round;
-        let mut tell = |packet: &Packet, lines: &[LineAccess]| emit(&Packet { pass, ..*packet }, lines);
-        let (rendered, _) = render_with_heat(&camera, &draws, &settings, &[], &mut tell)?;
+        let pass = totals.round;
+        let mut emit_in_pass =
+            |packet: &Packet, lines: &[LineAccess]| emit(&Packet { pass, ..*packet }, lines);
+        let (rendered, _) = render_with_heat(&camera, &draws, &settings, &[], &mut emit_in_pass)?;
         let seen = visibility(&camera, &draws, &settings)?;
         let candidates = hits(&seen, side, &samples, seed);
-        done.counts += &rendered.counts;
-        done.triangles += triangles.len();
-        done.candidates += candidates.len() as u64;
-        done.round += 1;
+        totals.counts += &rendered.counts;
+        totals.triangles += triangles.len();
+        totals.candidates += candidates.len() as u64;
+        totals.round += 1;
         Ok(candidates)
     }
 }
 
-/// Two triangles for each square.
+/// Two triangles per square.
 fn squares(cubes: &[Cube<2>]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let corner = |cube: &Cube<2>, n: u32| {
         let [x, y] = [0, 1].map(|k| (cube.low[k] + f64::from(n >> k & 1) * cube.side) as f32);
@@ -178,7 +182,7 @@ fn squares(cubes: &[Cube<2>]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (corners, (0..cubes.len() as u32).flat_map(|n| two(4 * n)).collect())
 }
 
-/// The places of samples that see a triangle, in an order of their own.
+/// Positions of the samples that hit a triangle, in pseudo-random order.
 fn hits(seen: &[(u32, u32)], side: u32, samples: &HashedSamples, seed: u64) -> Vec<[f64; 2]> {
     let per_pixel = samples.per_pixel();
     let mut own = vec![pipeline::sampling::Sample::default(); per_pixel as usize];
@@ -197,7 +201,7 @@ fn hits(seen: &[(u32, u32)], side: u32, samples: &HashedSamples, seed: u64) -> V
     found.into_iter().map(|(_, at)| at).collect()
 }
 
-/// Points as white squares on black.
+/// The points as white squares on black.
 fn picture(points: &[[f64; 2]], side: u32, radius: f64) -> Vec<Vec3> {
     let mut image = vec![Vec3::ZERO; (side * side) as usize];
     let (half, last) = ((0.15 * radius * f64::from(side)) as i64, i64::from(side) - 1);
@@ -213,7 +217,7 @@ fn picture(points: &[[f64; 2]], side: u32, radius: f64) -> Vec<Vec3> {
 }
 
 impl Draws for Sampling {
-    /// The number of the frame, which seeds its points.
+    /// Frame number, which seeds the points.
     type Input = u32;
 
     fn settings(&self) -> &Settings {
@@ -232,8 +236,8 @@ impl Draws for Sampling {
             fact("points", found.points.len() as f64),
             fact("points_from_samples", drawn as f64),
             fact("candidates_from_samples", candidates as f64),
-            fact("voids", found.voids as f64),
-            fact("thin_voids", found.thin_voids as f64),
+            fact("voids", found.uncovered as f64),
+            fact("thin_voids", found.thin_regions as f64),
         ];
         let image = picture(&found.points, self.settings.height, self.options.radius);
         Ok(Drawn { image, counts, triangles, facts, ..Drawn::default() })
@@ -270,8 +274,9 @@ mod tests {
     }
 
     #[test]
-    fn points_of_drawn_voids_keep_their_distance_and_no_other_fits() {
-        let asked = PoissonSpec { radius: 0.07, domain: Domain::Torus, seed: 1, spacing: Spacing::Double };
+    fn points_of_drawn_regions_are_maximal_poisson_disk_points() {
+        let requested =
+            PoissonSpec { radius: 0.07, domain: Domain::Torus, seed: 1, spacing: Spacing::Double };
         let stream = super::super::random::Stream::new(1, 1);
         let draw = |cubes: &[Cube<2>]| {
             let near = |n: u64| {
@@ -280,7 +285,7 @@ mod tests {
             };
             Ok::<_, ()>((0..500).map(near).collect())
         };
-        let (found, drawn) = poisson_disk_drawn::<2, _>(&asked, 4, draw).unwrap().unwrap();
+        let (found, drawn) = poisson_disk_drawn::<2, _>(&requested, 4, draw).unwrap().unwrap();
         assert!(drawn > 50 && drawn <= found.points.len());
         for (number, a) in found.points.iter().enumerate() {
             assert!(!found.points[..number].iter().any(|b| closer(a, b, 0.07, Domain::Torus)));

@@ -1,4 +1,4 @@
-//! Soft shadows as a job: the map, the samples that are seen, and their shading.
+//! The job `soft_shadows`: the shadow map, the visible samples, and their shading.
 
 use std::collections::HashSet;
 
@@ -11,8 +11,7 @@ use warnings::{Code, Warning};
 
 use super::light::{AreaLight, LightSpec};
 use super::look_up::look_up_packets;
-use super::map::ShadowMap;
-use super::sees::{Method, see};
+use super::map::{Method, Renderer, ShadowMap, View, depth_pass};
 use super::shade::{Shadows, World};
 use super::stage::stage;
 use crate::accumulation::SharedSamples;
@@ -24,18 +23,18 @@ use crate::scene::{Frame, Overrides, Scene, Settings};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// A built-in scene or a file; the stage of this workload without it.
+    /// A built-in scene or a file; without it, the test scene of this workload.
     pub scene: Option<String>,
-    /// The light.
+    /// The area light.
     pub light: LightSpec,
     /// Texels of the map across and down, even.
     pub map_px: u32,
-    /// Depth by which a point may lie behind what the map holds and still be lit, scene units.
+    /// Depth bias: how far a point may lie behind the stored depth and still be lit, in scene units.
     pub bias: f64,
-    /// Places `(u, v, t)` of one's own instead of the first points of a scrambled Sobol sequence: the first of them, as many as samples; where
-    /// they are fewer, they come again.
+    /// User-defined samples `(u, v, t)` instead of the first points of a scrambled Sobol sequence. As many as
+    /// there are samples per pixel are used; if there are fewer, they repeat.
     pub points: Option<Vec<(f32, f32, f32)>>,
-    /// Accumulation buffering instead of one pass: the same image at another cost.
+    /// Whether to use accumulation instead of one pass: the same image at another cost.
     pub accumulate: bool,
 }
 
@@ -60,7 +59,7 @@ impl Options {
     }
 }
 
-/// The job.
+/// The job with its scene, light and samples.
 pub struct SoftShadows {
     scene: Scene,
     light: AreaLight,
@@ -69,10 +68,11 @@ pub struct SoftShadows {
 }
 
 impl SoftShadows {
-    /// Soft shadows in the scene of `options`, settings changed by `overrides`. The samples of a pixel are the size of the set.
+    /// Makes soft shadows in the scene of `options`, with settings changed by `overrides`. The set has as
+    /// many samples as a pixel.
     ///
     /// # Errors
-    /// [`LoadError`] when the scene cannot be loaded or an option makes no sense.
+    /// [`LoadError`] for a scene that cannot be loaded, or an invalid option.
     pub fn new(mut options: Options, overrides: &Overrides, seed: u64) -> Result<Self, LoadError> {
         let scene = options.scene.as_deref().map_or_else(stage, crate::load)?.with_overrides(overrides)?;
         options.light.move_by(-scene.origin());
@@ -96,7 +96,7 @@ impl SoftShadows {
         if self.options.accumulate { Method::Accumulation } else { Method::OnePass }
     }
 
-    /// Passes that make the map.
+    /// Number of passes for the map.
     fn passes(&self) -> u16 {
         if self.options.accumulate { self.set.samples().len() as u16 } else { 1 }
     }
@@ -110,13 +110,13 @@ impl SoftShadows {
         ]
     }
 
-    /// Where the set or the bias is known to be bad.
+    /// Warnings about too few samples and an unsuitable bias.
     fn regime_warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
         warnings.extend(self.banding());
         let texel = self.light.texel_width(DVec3::from_array(self.options.light.target), self.options.map_px);
         let bias = self.options.bias;
-        if bias < Self::BIAS_TEXELS[0] * texel || bias > Self::BIAS_TEXELS[1] * texel {
+        if bias < Self::BIAS_RANGE_TEXELS[0] * texel || bias > Self::BIAS_RANGE_TEXELS[1] * texel {
             let message = format!(
                 "the bias is {bias} and a texel of the map {texel:.3} scene units wide at the target: with less than half a texel \
                  surfaces shade themselves (acne), with more than eight shadows come off what throws them"
@@ -126,27 +126,27 @@ impl SoftShadows {
         warnings
     }
 
-    /// Samples at one place are one step of a penumbra, however many they are.
+    /// Warns about banding: equal samples give only one step of a penumbra.
     fn banding(&self) -> Option<Warning> {
-        // Zero has two signs and is one place.
+        // Adding zero makes -0.0 equal to 0.0.
         let place = |Sample { u, v, t, .. }: &Sample| [u, v, t].map(|of| (of + 0.0).to_bits());
         let (count, fewest) =
-            (self.set.samples().iter().map(place).collect::<HashSet<_>>().len(), Self::FEWEST);
-        let mend = match &self.options.points {
+            (self.set.samples().iter().map(place).collect::<HashSet<_>>().len(), Self::MIN_SAMPLES);
+        let remedy = match &self.options.points {
             Some(_) => format!("{fewest} or more `points` that differ, and as many --samples"),
             None => format!("--samples {fewest} or more"),
         };
         (count < fewest).then(|| {
             let message =
-                format!("{count} places on the light: penumbras show as {count} steps (bands); {mend}");
+                format!("{count} places on the light: penumbras show as {count} steps (bands); {remedy}");
             Warning::new(Code::ShadowBanding, message)
         })
     }
 
-    /// With fewer places than this a penumbra shows as bands.
-    const FEWEST: usize = 16;
-    /// Widths of a texel between which the bias works.
-    const BIAS_TEXELS: [f64; 2] = [0.5, 8.0];
+    /// Least number of different samples that hides the bands of a penumbra.
+    const MIN_SAMPLES: usize = 16;
+    /// Range of the bias that works, in texel widths.
+    const BIAS_RANGE_TEXELS: [f64; 2] = [0.5, 8.0];
 }
 
 impl Draws for SoftShadows {
@@ -169,38 +169,40 @@ impl Draws for SoftShadows {
         let (draws, albedos) = parts(&self.scene, frame)?;
         let viewport = Viewport::new(settings.width, settings.height)
             .ok_or_else(|| JobError::Setting("an image of no size".to_owned()))?;
-        let (camera, how, each) = (frame.camera.with_lens(None), (self.method(), spec), self.passes());
-        let map = ShadowMap::new((&self.light, &draws), self.options.map_px, &self.set, how, emit)?;
-        let seen = see((&camera, &draws), viewport, &self.set, how, &mut shifted(each, emit))?;
-        let world = World::new((&camera, &draws), viewport, &self.light, &albedos, self.scene.background());
-        let looks = (&self.set as &dyn SampleSource, &seen.samples[..]);
-        let shaded = look_up_packets(&world, looks, &map, spec, &mut shifted(2 * each, emit))?;
+        let (camera, each) = (frame.camera.with_lens(None), self.passes());
+        let (view, renderer) =
+            (View { camera: &camera, draws: &draws }, Renderer { method: self.method(), spec });
+        let map = ShadowMap::new(&self.light, &draws, self.options.map_px, &self.set, renderer, emit)?;
+        let visible = depth_pass(&view, viewport, &self.set, renderer, &mut shifted(each, emit))?;
+        let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
+        let lookups = (&self.set as &dyn SampleSource, &visible.samples[..]);
+        let shaded = look_up_packets(&world, lookups, &map, spec, &mut shifted(2 * each, emit))?;
         let shadows = Shadows::Map { map: &map, bias: self.options.bias };
-        let image = world.image(&self.set, &seen.samples, shadows);
+        let image = world.image(&self.set, &visible.samples, shadows);
         let mut counts = map.counts;
-        counts += &seen.counts;
+        counts += &visible.counts;
         counts += &shaded;
-        let triangles = map.triangles + seen.triangles;
+        let triangles = map.triangles + visible.triangles;
         let facts = self.facts(&map, &shaded);
         let (moving, warnings) = (frame.is_moving(), self.regime_warnings());
         Ok(Drawn { image, counts, triangles, moving, lens: true, facts, warnings })
     }
 }
 
-/// The draws of a frame, both faces seen, and the reflectance of each.
+/// The draws of a frame without culling, and the reflectance of each.
 pub(crate) fn parts<'a>(scene: &'a Scene, frame: &'a Frame) -> Result<(Vec<Draw<'a>>, Vec<Vec3>), JobError> {
     let draws = frame.draws(scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();
     let drawn = frame.meshes.iter().filter(|mesh| !mesh.triangles.is_empty());
     Ok((draws, drawn.map(|mesh| scene.materials()[mesh.material].base_color).collect()))
 }
 
-/// The lens of the map is the light; the camera is a pinhole, whatever the scene says.
+/// Run options in use. The lens of the map is the light; the camera is a pinhole.
 pub(crate) const FLAGS: Flags = Flags {
     uses: &[Flag::Size, Flag::Samples, Flag::Shutter, Flag::Clip, Flag::Camera],
     instead: &[(Flag::Table, "points")],
 };
 
-/// The job by its options.
+/// Makes the job from its options.
 ///
 /// # Errors
 /// As [`SoftShadows::new`].

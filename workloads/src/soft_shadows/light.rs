@@ -8,19 +8,19 @@ use crate::error::LoadError;
 use crate::scene::camera::Stand;
 use crate::scene::{View, tan_half};
 
-/// Where a light is and what it shines at.
+/// Position, target and size of an area light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LightSpec {
-    /// Its middle, scene units.
+    /// Centre, scene units.
     pub position: [f64; 3],
-    /// What it faces, scene units.
+    /// Target point, scene units.
     pub target: [f64; 3],
-    /// Its radius, scene units; the shape is that of the samples' lens.
+    /// Radius, scene units. The shape is that of the samples' lens.
     pub radius: f64,
-    /// The angle its map sees, in degrees, across and down.
+    /// Field of view of its map in degrees, across and down.
     pub fov_deg: f64,
-    /// Depth below which nothing throws a shadow, scene units.
+    /// Near depth of shadow casters, scene units.
     pub near: f64,
 }
 
@@ -31,35 +31,35 @@ impl Default for LightSpec {
 }
 
 impl LightSpec {
-    /// Moves the light and what it faces.
-    pub(super) fn move_by(&mut self, way: DVec3) {
+    /// Translates the light and its target.
+    pub(super) fn move_by(&mut self, distance: DVec3) {
         for point in [&mut self.position, &mut self.target] {
-            *point = (DVec3::from_array(*point) + way).to_array();
+            *point = (DVec3::from_array(*point) + distance).to_array();
         }
     }
 
-    /// Refuses an angle or a length that cannot be, `way` scene units from the target.
-    fn must_fit(&self, way: f64) -> Result<(), String> {
+    /// Checks angle and lengths, at distance `distance` from the target.
+    fn check(&self, distance: f64) -> Result<(), String> {
         let Self { radius, fov_deg, near, .. } = *self;
-        let widest = WIDEST * way;
+        let widest = MAX_RADIUS_PER_DISTANCE * distance;
         if !(1.0..=170.0).contains(&fov_deg) {
             return Err(format!("fov_deg {fov_deg:?}: a map sees 1 to 170 degrees"));
         }
-        if near >= way {
+        if near >= distance {
             return Err(format!(
-                "near {near:?}: nothing before the target would throw a shadow; it has to be below {way:?}, the way to it"
+                "near {near:?}: nothing before the target would throw a shadow; it has to be below {distance:?}, the way to it"
             ));
         }
-        if !(SMALLEST..=widest).contains(&radius) {
+        if !(MIN_RADIUS..=widest).contains(&radius) {
             return Err(format!(
-                "radius {radius:?}: it has to be {SMALLEST:e} to {widest:?} scene units, {WIDEST} times the way to the target"
+                "radius {radius:?}: it has to be {MIN_RADIUS:e} to {widest:?} scene units, {MAX_RADIUS_PER_DISTANCE} times the way to the target"
             ));
         }
         Ok(())
     }
 }
 
-/// An area light: its camera, whose lens is the light.
+/// An area light: a camera whose lens is the light.
 #[derive(Clone, Copy, Debug)]
 pub struct AreaLight {
     stand: Stand,
@@ -68,19 +68,19 @@ pub struct AreaLight {
     camera: Camera,
 }
 
-/// As good as infinitely far, in scene units: the lens moves the image of a texel by less than its rounding.
-const INFINITY: f32 = 1e30;
+/// Focus at infinity, in scene units: the lens moves a texel's image by less than rounding.
+const FAR_FOCUS: f32 = 1e30;
 
-/// The widest light over its distance from the target: beyond it the map sees nothing of what is lit.
-const WIDEST: f64 = 100.0;
-/// The smallest, in scene units: single precision holds it.
-const SMALLEST: f64 = 1e-30;
+/// Largest radius relative to the target's distance. The map of a wider light contains nothing that is lit.
+const MAX_RADIUS_PER_DISTANCE: f64 = 100.0;
+/// Smallest radius in scene units that single precision represents.
+const MIN_RADIUS: f64 = 1e-30;
 
 impl AreaLight {
-    /// The light that is described.
+    /// Makes the light of a specification.
     ///
     /// # Errors
-    /// When it faces nowhere, or a length or angle cannot be.
+    /// [`LoadError`] if light and target coincide, or a length or angle is out of range.
     pub fn new(spec: &LightSpec) -> Result<Self, LoadError> {
         let refused = |message: String| LoadError::Setting { setting: "light", message };
         let position = DVec3::from_array(spec.position);
@@ -88,27 +88,28 @@ impl AreaLight {
         let stand = stand.ok_or_else(|| {
             refused("position and target coincide or are not finite: move one of them".to_owned())
         })?;
-        let way = (DVec3::from_array(spec.target) - position).length();
-        spec.must_fit(way).map_err(refused)?;
+        let distance = (DVec3::from_array(spec.target) - position).length();
+        spec.check(distance).map_err(refused)?;
         let view = View::Perspective { tan_half_height: tan_half(spec.fov_deg) };
         let camera = view.camera(stand.pose(), spec.near as f32).map_err(|e| refused(e.to_string()))?;
-        let lens = Lens::new(spec.radius as f32, INFINITY).map_err(|e| refused(e.to_string()))?;
+        let lens = Lens::new(spec.radius as f32, FAR_FOCUS).map_err(|e| refused(e.to_string()))?;
         let camera = camera.with_lens(Some(lens));
         Ok(Self { stand, radius: spec.radius, tan_half: tan_half(spec.fov_deg), camera })
     }
 
-    /// The camera that renders its map.
+    /// Camera of its map.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The place `(u, v)` of the light in the world.
+    /// World position of the point `(u, v)` of the light.
     pub fn point(&self, [u, v]: [f32; 2]) -> DVec3 {
         let [u, v] = [u, v].map(|c| f64::from(c) * self.radius);
         self.stand.eye + u * self.stand.right + v * self.stand.up
     }
 
-    /// The texel of a map `side` texels wide and the depth at which place `(u, v)` of the light sees `point`; nothing beyond the map.
+    /// Texel of a map `side` texels wide, and depth, at which the point `(u, v)` of the light sees `point`;
+    /// `None` outside the map.
     pub fn texel(&self, point: Vec3, lens: [f32; 2], side: u32) -> Option<([u32; 2], f64)> {
         let seen = self.stand.view(point.as_dvec3());
         let [u, v] = lens.map(|c| f64::from(c) * self.radius);
@@ -118,12 +119,12 @@ impl AreaLight {
         inside.then(|| (at.map(|c| c as u32), seen.z))
     }
 
-    /// How wide a texel is at the light's target, scene units.
+    /// Width of a texel at the light's target, scene units.
     pub fn texel_width(&self, target: DVec3, side: u32) -> f64 {
         2.0 * self.tan_half * self.stand.depth(target).max(0.0) / f64::from(side)
     }
 
-    /// World to camera, for those who project themselves.
+    /// Transformation from world to camera space.
     pub fn pose(&self) -> DAffine3 {
         DAffine3::from_cols_array(&self.camera.open().to_cols_array().map(f64::from))
     }
@@ -134,12 +135,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_middle_of_the_light_sees_its_target_in_the_middle() {
+    fn the_centre_of_the_light_sees_its_target_in_the_centre() {
         let spec =
             LightSpec { position: [0.0, 4.0, 0.0], radius: 0.5, fov_deg: 90.0, ..LightSpec::default() };
         let light = AreaLight::new(&spec).unwrap();
         assert_eq!(light.texel(Vec3::new(0.01, 0.0, 0.01), [0.0; 2], 64).map(|(_, w)| w), Some(4.0));
-        // Half a unit at depth 4, of 8 units over 64 texels: four texels, the other way round.
+        // Half a unit at depth 4, of 8 units over 64 texels, is four texels in the opposite direction.
         let [right, up] = [light.point([1.0, 0.0]), light.point([0.0, 1.0])];
         assert!((right - light.point([0.0; 2])).length() == 0.5 && (up - right).length() > 0.5);
         let shifted = |lens| light.texel(Vec3::new(0.01, 0.0, 0.01), lens, 64).unwrap().0;
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_light_that_cannot_be_is_refused() {
+    fn invalid_lights_are_refused() {
         let base = LightSpec::default();
         for bad in [
             LightSpec { target: base.position, ..base },

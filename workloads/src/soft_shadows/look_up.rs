@@ -1,4 +1,4 @@
-//! What shading by a shadow map costs: every sample looks into the map through the texture cache.
+//! Packets of shading with a shadow map: every sample reads the map through the texture cache.
 
 use activity::{Counts, Event, Packet, PacketKind};
 use pipeline::PipelineSpec;
@@ -9,16 +9,16 @@ use super::map::ShadowMap;
 use super::shade::World;
 use crate::job::{Emit, JobError};
 
-/// Operations of one sample: its vertices at its time (15), the weights of its point (12), the point (9), the normal (15), the point
-/// in the light's map (14), the comparison (2), Lambert's law (9).
+/// Operations per sample: vertices at its time (15), weights of its point (12), the point (9), the normal
+/// (15), the point in the light's map (14), the comparison (2), Lambert's law (9).
 const OPS: u32 = 76;
-/// Bytes of a depth of the map and of a pixel of the image.
+/// Bytes of a stored depth and of an image pixel.
 const BYTES: u64 = 4;
 
-/// Emits the packets of the pass that shades `seen`, a tile each, and counts what they hold.
+/// Emits the packets of the pass that shades the visible samples, one per tile, and returns their sum.
 ///
 /// # Errors
-/// When a cache of `spec` cannot be built.
+/// [`JobError`] if a cache of `spec` cannot be built.
 pub fn look_up_packets(
     world: &World<'_>,
     (samples, seen): (&dyn SampleSource, &[(u32, u32)]),
@@ -29,9 +29,9 @@ pub fn look_up_packets(
     let mut memory = MemorySystem::new(&spec.memory)?;
     let image = map.bytes().next_multiple_of(LINE_BYTES);
     let (width, height) = (world.viewport.width(), world.viewport.height());
-    let (side, each) = (spec.tile_px, samples.per_pixel() as usize);
+    let (side, per_pixel) = (spec.tile_px, samples.per_pixel() as usize);
     let mut counts = Counts::default();
-    let mut at = vec![Sample::default(); each];
+    let mut at = vec![Sample::default(); per_pixel];
     let tiles = (0..height)
         .step_by(side as usize)
         .flat_map(|y| (0..width).step_by(side as usize).map(move |x| [x, y]));
@@ -42,7 +42,7 @@ pub fn look_up_packets(
         {
             let pixel = py as usize * width as usize + px as usize;
             samples.pixel_into(px, py, &mut at);
-            for (index, (sample, (triangle, _))) in at.iter().zip(&seen[pixel * each..]).enumerate() {
+            for (index, (sample, (triangle, _))) in at.iter().zip(&seen[pixel * per_pixel..]).enumerate() {
                 let Some(point) = world.position([px, py], sample, *triangle) else { continue };
                 packet.counts[Event::PixelInvocations] += 1;
                 packet.counts[Event::ShaderOps] += OPS;
@@ -56,7 +56,7 @@ pub fn look_up_packets(
         }
         counts += &packet.counts;
         emit(&packet, memory.log());
-        memory.forget();
+        memory.clear_log();
     }
     let mut last = Packet::new(PacketKind::Resolve, 0, 0, u32::MAX);
     memory.finish(image..image + world.viewport.pixels() as u64 * BYTES, &mut last.counts);

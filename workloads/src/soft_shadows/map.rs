@@ -1,39 +1,41 @@
-//! The shadow map: for each texel and each `(u, v, t)` of the set the depth of what the light sees.
+//! Depth passes over a fixed set of samples, and the shadow map made by them.
 
 use activity::Counts;
 use glam::Vec3;
+use pipeline::frame::render_depth;
 use pipeline::sampling::Sample;
-use pipeline::{Draw, PipelineSpec, Viewport};
+use pipeline::{Camera, Draw, PipelineSpec, Settings, Viewport};
 
 use super::light::AreaLight;
-use super::sees::{Method, see};
-use crate::accumulation::SharedSamples;
-use crate::job::{Emit, JobError};
+use crate::accumulation::{SharedSamples, Snapshot, SnapshotError};
+use crate::job::{Emit, JobError, shifted};
 
-/// An array of shadow maps, one for each place on the light and in time.
+/// An array of shadow maps, one per sample of light and time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShadowMap {
     side: u32,
     set: SharedSamples,
-    /// In the order `(y side + x) n + index`, infinite where nothing is seen.
+    /// Depths in the order `(y side + x) n + index`, infinite for no hit.
     depths: Vec<f32>,
-    /// What it took to make.
+    /// Event counts.
     pub counts: Counts,
-    /// Triangles drawn for it, in all passes.
+    /// Triangles drawn, in all passes.
     pub triangles: usize,
 }
 
 impl ShadowMap {
-    /// The map of `side` texels squared of a light, all texels looking through their middles at the places of `set`.
+    /// Makes a light's map of `side` by `side` texels. All texels are sampled at their centres, with the lens
+    /// and time samples of `set`.
     ///
     /// # Errors
-    /// When the hardware cannot be built, or `side` is odd: a ray through the middle of the map has no slope that would hide what is
-    /// left of a focus at infinity.
+    /// [`JobError`] if the hardware cannot be built, or `side` is odd. A ray through the exact centre of the
+    /// map has no slope to absorb the rest of a focus at infinity.
     pub fn new(
-        (light, draws): (&AreaLight, &[Draw<'_>]),
+        light: &AreaLight,
+        draws: &[Draw<'_>],
         side: u32,
         set: &SharedSamples,
-        (method, spec): (Method, &PipelineSpec),
+        renderer: Renderer<'_>,
         emit: Emit<'_>,
     ) -> Result<Self, JobError> {
         let viewport = Viewport::new(side, side).filter(|_| side.is_multiple_of(2));
@@ -41,7 +43,7 @@ impl ShadowMap {
             || JobError::Setting(format!("map_px {side}: a shadow map has an even number of texels"));
         let viewport = viewport.ok_or_else(refused)?;
         let set = set.centred();
-        let seen = see((light.camera(), draws), viewport, &set, (method, spec), emit)?;
+        let seen = depth_pass(&View { camera: light.camera(), draws }, viewport, &set, renderer, emit)?;
         let depths = seen.samples.into_iter().map(|(_, depth)| f32::from_bits(depth)).collect();
         Ok(Self { side, set, depths, counts: seen.counts, triangles: seen.triangles })
     }
@@ -51,12 +53,12 @@ impl ShadowMap {
         self.side
     }
 
-    /// The places on the light and in time.
+    /// Samples of light and time.
     pub fn set(&self) -> &[Sample] {
         self.set.samples()
     }
 
-    /// All depths, for comparing maps.
+    /// All depths.
     pub fn depths(&self) -> &[f32] {
         &self.depths
     }
@@ -66,7 +68,8 @@ impl ShadowMap {
         4 * self.depths.len() as u64
     }
 
-    /// The place in [`Self::depths`] that decides about a point at place `index` of the set, and its depth; nothing beyond the map.
+    /// Index in [`Self::depths`] that decides about a point for sample `index` of the set, and the point's
+    /// depth; `None` outside the map.
     pub fn place(&self, light: &AreaLight, point: Vec3, index: usize) -> Option<(usize, f64)> {
         let Sample { u, v, .. } = self.set.samples()[index];
         let ([x, y], depth) = light.texel(point, [u, v], self.side)?;
@@ -74,8 +77,86 @@ impl ShadowMap {
         Some((texel * self.set.samples().len() + index, depth))
     }
 
-    /// Whether a point is lit at place `index` of the set: nothing is seen nearer than it by more than `bias` scene units.
+    /// Whether a point is lit for sample `index` of the set: no stored depth is nearer by more than `bias`
+    /// scene units.
     pub fn is_lit(&self, light: &AreaLight, point: Vec3, index: usize, bias: f64) -> bool {
         self.place(light, point, index).is_none_or(|(at, depth)| depth - bias <= f64::from(self.depths[at]))
     }
+}
+
+/// How the samples of a set are rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// All in one 5D pass.
+    OnePass,
+    /// Each in its own pass, with still geometry and a pinhole.
+    Accumulation,
+}
+
+/// Geometry in front of a camera.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// The camera.
+    pub camera: &'a Camera,
+    /// The geometry.
+    pub draws: &'a [Draw<'a>],
+}
+
+/// How depths are rendered, and on which hardware.
+#[derive(Clone, Copy)]
+pub struct Renderer<'a> {
+    /// One pass, or accumulation.
+    pub method: Method,
+    /// The hardware.
+    pub spec: &'a PipelineSpec,
+}
+
+/// Result of a depth pass: the visible triangle of each sample (`u32::MAX` for none) and the bits of its
+/// depth, in the order `(y width + x) n + index`.
+pub struct DepthPass {
+    /// Triangles and depths.
+    pub samples: Vec<(u32, u32)>,
+    /// Event counts.
+    pub counts: Counts,
+    /// Triangles drawn, in all passes.
+    pub triangles: usize,
+}
+
+/// Renders the depths of `draws` in `camera`, at the samples of `set`.
+///
+/// # Errors
+/// [`JobError`] if the hardware cannot be built.
+pub fn depth_pass(
+    view: &View<'_>,
+    viewport: Viewport,
+    set: &SharedSamples,
+    renderer: Renderer<'_>,
+    emit: Emit<'_>,
+) -> Result<DepthPass, JobError> {
+    let View { camera, draws } = *view;
+    let Renderer { method, spec } = renderer;
+    let triangles_per_pass: usize = draws.iter().map(|draw| draw.geometry.triangles().len()).sum();
+    if method == Method::OnePass {
+        let settings = Settings { spec, viewport, samples: set, background: Vec3::ZERO };
+        let (samples, counts) = render_depth(camera, draws, &settings, emit)?;
+        return Ok(DepthPass { samples, counts, triangles: triangles_per_pass });
+    }
+    let per_pixel = set.samples().len();
+    let mut seen = DepthPass {
+        samples: vec![(0, 0); viewport.pixels() * per_pixel],
+        counts: Counts::default(),
+        triangles: 0,
+    };
+    for (index, at) in set.samples().iter().enumerate() {
+        let failed = |error: SnapshotError| JobError::Setting(error.to_string());
+        let snapshot = Snapshot::new(camera, draws, viewport, at).map_err(failed)?;
+        let still = snapshot.draws().map_err(failed)?;
+        let samples = set.still(index);
+        let settings = Settings { spec, viewport, samples: &samples, background: Vec3::ZERO };
+        let (one, counts) = render_depth(&snapshot.camera, &still, &settings, shifted(index as u16, emit))?;
+        seen.counts += &counts;
+        seen.triangles += triangles_per_pass;
+        seen.samples.iter_mut().skip(index).step_by(per_pixel).zip(one).for_each(|(into, from)| *into = from);
+    }
+    Ok(seen)
 }

@@ -1,20 +1,20 @@
-//! Motion-blurred soft shadows from a five-dimensional shadow map (thesis, Paper VI, section 7).
+//! Motion-blurred soft shadows from a 5D shadow map (thesis, Paper VI, section 7).
 //!
-//! The lens of the light's camera is the area of the light, focused at infinity, and all texels share a small fixed set of places on
-//! it and in time. So the map is an array of ordinary shadow maps, one for each `(u, v, t)`, made in one pass ([`Method::OnePass`])
-//! rather than in as many ([`Method::Accumulation`]). The pass that is shaded has the same set, and each of its
-//! samples looks into the map of its own `(u, v, t)` ([`World::image`]).
+//! The lens of the light's camera is the area of the light, focused at infinity. All texels share a small
+//! fixed set of light and time samples. So the map is an array of ordinary shadow maps, one per `(u, v, t)`.
+//! It is made in one pass ([`Method::OnePass`]) or in one pass per sample ([`Method::Accumulation`]). The
+//! shading pass uses the same set, and each of its samples reads the map of its own `(u, v, t)`
+//! ([`World::image`]).
 //!
-//! - [`AreaLight`]: the light and where it sees a point.
-//! - [`ShadowMap`]: both ways of making one, and looking into it.
-//! - [`World`]: what is shaded: by a map, or by rays as the truth.
-//! - [`job`]: all of it as a job, [`stage`] the scene it draws unless told otherwise.
+//! - [`AreaLight`]: the light as a camera.
+//! - [`ShadowMap`]: both ways of making a map, and look-ups.
+//! - [`World`]: shading, with a map or with rays as the ground truth.
+//! - [`job()`]: the workload; [`stage()`]: its default scene.
 
 mod job;
 mod light;
 mod look_up;
 mod map;
-mod sees;
 mod shade;
 mod stage;
 
@@ -22,7 +22,6 @@ pub(crate) use job::FLAGS;
 pub use job::{Options, SoftShadows, job};
 pub use light::{AreaLight, LightSpec};
 pub use look_up::look_up_packets;
-pub use map::ShadowMap;
-pub use sees::{Method, Seen, see};
+pub use map::{DepthPass, Method, Renderer, ShadowMap, View, depth_pass};
 pub use shade::{Shadows, World};
 pub use stage::stage;

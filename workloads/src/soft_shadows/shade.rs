@@ -1,53 +1,54 @@
-//! The pass that is shaded: each sample by itself, as what is lit depends on its time and its place on the light.
+//! The shading pass. Each sample is shaded alone, because its light depends on its time and its point of the
+//! light.
 
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
 use pipeline::sample_test::exact::weights;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
-use pipeline::{Camera, Draw, Viewport};
+use pipeline::{Camera, Viewport};
 use rayon::prelude::*;
 
 use super::light::AreaLight;
-use super::map::ShadowMap;
+use super::map::{ShadowMap, View};
 use crate::accumulation::Rays;
 
-/// Light that comes from everywhere, as a part of what the light sends to a surface that faces it.
+/// Ambient light, relative to the light on a surface that faces the light.
 const AMBIENT: f32 = 0.18;
 
-/// What decides whether a point is lit.
+/// Source of the shadows.
 #[derive(Clone, Copy)]
 pub enum Shadows<'a> {
-    /// A shadow map; points less than `bias` scene units behind what it holds are lit.
+    /// A shadow map; points less than `bias` scene units behind the stored depth are lit.
     Map {
         /// The map.
         map: &'a ShadowMap,
-        /// Scene units.
+        /// Depth bias, scene units.
         bias: f64,
     },
-    /// Rays to the light, against all triangles: the truth.
+    /// Rays to the light, against all triangles: the ground truth.
     Rays,
-    /// Nothing throws a shadow.
+    /// No shadows.
     None,
 }
 
-/// A frame as it is shaded: what there is, who looks and what shines.
+/// A frame to be shaded: surfaces, camera and light.
 pub struct World<'a> {
-    /// Who looks, through a pinhole.
+    /// The camera, a pinhole.
     pub camera: &'a Camera,
     /// Size of the image.
     pub viewport: Viewport,
-    /// What shines.
+    /// The light.
     pub light: &'a AreaLight,
     /// Linear RGB reflectance of each draw.
     pub albedos: &'a [Vec3],
-    /// Linear RGB radiance where nothing is hit.
+    /// Linear RGB radiance of the background.
     pub background: Vec3,
     rays: Rays,
     projection: Projection,
 }
 
-/// A point of a surface that a sample sees.
+/// Surface point of a sample.
 struct Point {
     place: DVec3,
     normal: DVec3,
@@ -56,46 +57,47 @@ struct Point {
 }
 
 impl<'a> World<'a> {
-    /// The world of a frame.
+    /// Makes the world of a frame.
     pub fn new(
-        (camera, draws): (&'a Camera, &[Draw<'_>]),
+        view: &View<'a>,
         viewport: Viewport,
         light: &'a AreaLight,
         albedos: &'a [Vec3],
         background: Vec3,
     ) -> Self {
+        let View { camera, draws } = *view;
         let projection = Projection::new(camera, viewport);
         Self { camera, viewport, light, albedos, background, rays: Rays::new(draws), projection }
     }
 
-    /// The image: the mean over the samples of each pixel, in their order, each shaded by what it sees.
+    /// Renders the image: the mean over each pixel's samples, in order.
     pub fn image(&self, samples: &dyn SampleSource, seen: &[(u32, u32)], shadows: Shadows<'_>) -> Vec<Vec3> {
-        let (width, each) = (self.viewport.width(), samples.per_pixel() as usize);
+        let (width, per_pixel) = (self.viewport.width(), samples.per_pixel() as usize);
         let pixel = |(place, seen): (usize, &[(u32, u32)])| {
             let [px, py] = [place as u32 % width, place as u32 / width];
-            let mut at = vec![Sample::default(); each];
+            let mut at = vec![Sample::default(); per_pixel];
             samples.pixel_into(px, py, &mut at);
             let colours = at.iter().zip(seen).enumerate();
             let colours = colours.map(|(index, (sample, (triangle, _)))| {
                 self.point([px, py], sample, *triangle)
                     .map_or(self.background, |point| self.shade(&point, sample, index, shadows))
             });
-            colours.sum::<Vec3>() / each as f32
+            colours.sum::<Vec3>() / per_pixel as f32
         };
-        seen.par_chunks_exact(each).enumerate().map(pixel).collect()
+        seen.par_chunks_exact(per_pixel).enumerate().map(pixel).collect()
     }
 
-    /// The share of samples that see a surface which faces the light and are lit, and of those that are not.
+    /// For each sample, whether its point is lit; `None` if it sees no surface that faces the light.
     pub fn lit_and_unlit(
         &self,
         samples: &dyn SampleSource,
         seen: &[(u32, u32)],
         shadows: Shadows<'_>,
     ) -> Vec<Option<bool>> {
-        let (width, each) = (self.viewport.width(), samples.per_pixel() as usize);
+        let (width, per_pixel) = (self.viewport.width(), samples.per_pixel() as usize);
         let pixel = |(place, seen): (usize, &[(u32, u32)])| {
             let [px, py] = [place as u32 % width, place as u32 / width];
-            let mut at = vec![Sample::default(); each];
+            let mut at = vec![Sample::default(); per_pixel];
             samples.pixel_into(px, py, &mut at);
             let of = |(index, (sample, (triangle, _))): (usize, (&Sample, &(u32, u32)))| {
                 let point = self.point([px, py], sample, *triangle)?;
@@ -104,10 +106,10 @@ impl<'a> World<'a> {
             };
             at.iter().zip(seen).enumerate().map(of).collect::<Vec<_>>()
         };
-        seen.par_chunks_exact(each).enumerate().flat_map_iter(pixel).collect()
+        seen.par_chunks_exact(per_pixel).enumerate().flat_map_iter(pixel).collect()
     }
 
-    /// The world position that each sample sees, for those who count what looking it up costs.
+    /// World position of a sample's point, for counting the cost of the look-up.
     pub fn position(&self, pixel: [u32; 2], sample: &Sample, triangle: u32) -> Option<Vec3> {
         self.point(pixel, sample, triangle).map(|point| point.place.as_vec3())
     }
@@ -131,7 +133,7 @@ impl<'a> World<'a> {
         Some(Point { place, normal, albedo, triangle })
     }
 
-    /// Lambert's law under one place of the light, and light from everywhere.
+    /// Lambert's law for one point of the light, plus ambient light.
     fn shade(&self, point: &Point, sample: &Sample, index: usize, shadows: Shadows<'_>) -> Vec3 {
         let toward = (self.light.point([sample.u, sample.v]) - point.place).normalize_or_zero();
         let facing = point.normal.dot(toward).max(0.0) as f32;
@@ -144,7 +146,7 @@ impl<'a> World<'a> {
             Shadows::Map { map, bias } => map.is_lit(self.light, point.place.as_vec3(), index, bias),
             Shadows::Rays => {
                 let light = self.light.point([sample.u, sample.v]);
-                !self.rays.blocked(point.place, light, sample.t, point.triangle)
+                !self.rays.is_blocked(point.place, light, sample.t, point.triangle)
             }
             Shadows::None => true,
         }

@@ -1,4 +1,4 @@
-//! The scene that is drawn unless told otherwise: bars, a gate and boxes that fly over a floor.
+//! The default scene: bars, a gate and boxes that move over a floor.
 
 use glam::{DVec3, Vec3};
 
@@ -9,10 +9,11 @@ use crate::scene::{
 };
 use crate::shapes;
 
-/// The scene: contact shadows under boxes, a penumbra that widens along a leaning post, and shadows that move.
+/// Makes the scene. It has contact shadows under boxes, a penumbra that widens along a leaning post, and
+/// moving shadows.
 ///
 /// # Errors
-/// None that is expected: the scene is tested.
+/// None are expected: the scene is tested.
 pub fn stage() -> Result<Scene, LoadError> {
     let mut parts = Parts::new("soft shadows");
     fill(&mut parts.graph);
@@ -38,11 +39,11 @@ fn fill(graph: &mut Graph) {
         graph.hang(mesh, node);
     };
     let still = Motion::default;
-    let flies = |x: f64, y: f64, z: f64| Motion { velocity: DVec3::new(x, y, z), spin: None };
+    let moves = |x: f64, y: f64, z: f64| Motion { velocity: DVec3::new(x, y, z), spin: None };
     let spins = |rate_hz| Motion { spin: Spin::new(DVec3::Y, rate_hz), ..Motion::default() };
     put(shapes::plane(12.0, 1, 1.0, floor), [0.0; 3], still());
     put(shapes::cuboid(Vec3::new(0.5, 0.5, 0.5), red), [-1.4, 0.25, 0.6], still());
     put(shapes::cuboid(Vec3::new(0.12, 1.6, 0.12), green), [0.9, 0.8, -0.9], still());
     put(shapes::cuboid(Vec3::new(1.7, 0.10, 0.16), blue), [-0.3, 1.0, -0.4], spins(5.0));
-    put(shapes::cuboid(Vec3::splat(0.4), red), [0.3, 0.9, 1.0], flies(60.0, 0.0, 0.0));
+    put(shapes::cuboid(Vec3::splat(0.4), red), [0.3, 0.9, 1.0], moves(60.0, 0.0, 0.0));
 }

@@ -1,4 +1,4 @@
-//! What every sample sees, found without any tile, box or bin: all triangles against all samples.
+//! Brute-force visibility: all triangles against all samples, without tiles, boxes or bins.
 
 use pipeline::geometry::Projection;
 use pipeline::sample_test::{Hits, Target, test_run};
@@ -7,7 +7,7 @@ use pipeline::setup::{Outcome, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect};
 use pipeline::{Camera, Draw, Viewport};
 
-/// The triangles of `draws` that set-up lets pass, numbered through all draws.
+/// The triangles of `draws` that pass set-up, numbered through all draws.
 pub fn set_up_all<'a>(
     camera: &Camera,
     draws: &'a [Draw<'a>],
@@ -25,8 +25,9 @@ pub fn set_up_all<'a>(
     })
 }
 
-/// The triangle each sample sees and the bits of its depth, as [`visibility`](pipeline::frame::visibility) gives them, from
-/// all triangles against all samples with no dimension dropped.
+/// Visible triangle of each sample and the bits of its depth, in the form of
+/// [`visibility`](pipeline::frame::visibility). All triangles are tested against all samples in all
+/// dimensions.
 pub fn brute_force(
     camera: &Camera,
     draws: &[Draw<'_>],
@@ -36,7 +37,8 @@ pub fn brute_force(
     within_bounds(camera, draws, viewport, source, |_, _| Some(Box5::whole(true)))
 }
 
-/// The same where `bound` says for each triangle and tile of 8x8 pixels in which part of lens and time to test samples.
+/// The same, but only within the part of lens and time that `bound` returns for each triangle and tile of 8x8
+/// pixels.
 pub fn within_bounds(
     camera: &Camera,
     draws: &[Draw<'_>],

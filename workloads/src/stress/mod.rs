@@ -1,10 +1,10 @@
 //! The failure catalogue: families of triangles from harmless to hopeless, each swept along one parameter.
 //!
-//! A [`Family`] makes a [`StressScene`] from a value of its parameter, a [`Size`] and a seed, the same bits each time. What the
-//! methods make of it is measured elsewhere (`quintile stress`).
+//! A [`Family`] makes a [`StressScene`] from a value of its parameter, a [`Size`] and a seed,
+//! deterministically. `quintile stress` measures the methods on it.
 
 mod brute;
-mod easel;
+mod builder;
 mod lens;
 mod mesh;
 mod motion;
@@ -17,123 +17,160 @@ use pipeline::{
 };
 
 pub use brute::{brute_force, set_up_all, within_bounds};
-use easel::Easel;
+use builder::SceneBuilder;
 pub use soup::Soup;
 
-/// Triangles of one kind of trouble, and how to have more or less of it.
+/// A family of triangles with one kind of difficulty, and its parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// Description, in a line.
     pub what: &'static str,
-    /// What the parameter is, with its unit.
+    /// Meaning of the parameter, with its unit.
     pub parameter: &'static str,
     /// Values of the parameter, harmless ones first.
     pub values: &'static [f64],
-    /// How many of the last values are left out where time is short.
+    /// Number of slow last values, which quick runs skip.
     pub slow: usize,
-    paint: fn(&mut Easel, f64) -> Result<(), StressError>,
+    build: fn(&mut SceneBuilder, f64) -> Result<(), StressError>,
 }
 
-/// How large a scene of a family is.
+/// Size of a scene of a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
-    /// Side of the image in pixels, a power of two, so that places on it are exact.
+    /// Side of the image in pixels, a power of two so that positions are exact.
     pub side_px: u32,
-    /// Triangles; meshes and families that sweep their number have their own.
+    /// Number of triangles; meshes and families that sweep it have their own.
     pub triangles: u32,
 }
 
 impl Size {
-    /// The size the book's numbers are of.
+    /// Size of the results in the book.
     pub const FULL: Self = Self { side_px: 128, triangles: 300 };
-    /// A size for a first look.
+    /// Size of a quick run.
     pub const QUICK: Self = Self { side_px: 64, triangles: 100 };
-    /// A size for tests.
+    /// Size for tests.
     pub const SMALL: Self = Self { side_px: 32, triangles: 30 };
 }
 
-/// Samples in each pixel.
+/// Samples per pixel.
 pub const PER_PIXEL: u32 = 4;
 
-/// Triangles in world space at both ends of the shutter, with the camera and the samples that look at them.
+/// A stress scene: triangles in world space at both ends of the shutter, camera and samples.
 #[derive(Clone, Debug)]
 pub struct StressScene {
     /// The camera.
     pub camera: Camera,
     /// Size of the image.
     pub viewport: Viewport,
-    /// Where and when each pixel looks.
+    /// Sample table.
     pub samples: SampleTable,
-    /// Vertices when the shutter opens.
+    /// Vertices at shutter open.
     pub open: Vec<glam::Vec3>,
-    /// Vertices when it closes.
+    /// Vertices at shutter close.
     pub close: Vec<glam::Vec3>,
-    /// The corners of each triangle.
+    /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Why a scene of a family cannot be made.
+/// Reason why a scene cannot be made.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum StressError {
-    /// The value makes no camera.
+    /// The camera is invalid.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The samples cannot be made.
+    /// The samples are invalid.
     #[error(transparent)]
     Samples(#[from] TableError),
-    /// The value makes no vertices.
+    /// The vertices are invalid.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// The image cannot be of this size.
+    /// The image size is invalid.
     #[error("an image of {0} pixels a side; it has to be a power of two from 8 to 16384")]
     Side(u32),
 }
 
 impl Family {
-    /// The scene at `value` of the parameter; `seed` decides everything random.
+    /// Makes the scene at `value` of the parameter, with random numbers from `seed`.
     ///
     /// # Errors
-    /// When `value` or `size` make no scene. The family's own values do.
+    /// [`StressError`] if `value` or `size` is invalid. The family's own values are valid.
     pub fn scene(&self, value: f64, size: Size, seed: u64) -> Result<StressScene, StressError> {
         let side = size.side_px;
         let viewport = Viewport::new(side, side).filter(|_| side.is_power_of_two() && side >= 8);
         let viewport = viewport.ok_or(StressError::Side(side))?;
         let samples = SampleTable::low_discrepancy(PER_PIXEL, seed, LensShape::Disk)?;
-        let mut easel = Easel::new(size, viewport, samples, seed)?;
-        (self.paint)(&mut easel, value)?;
-        let scene = easel.finish();
+        let mut builder = SceneBuilder::new(size, viewport, samples, seed)?;
+        (self.build)(&mut builder, value)?;
+        let scene = builder.finish();
         Geometry::new(&scene.open, &scene.close, &scene.triangles)?;
         Ok(scene)
     }
 
-    /// The values to sweep: all, or without the slow ones.
+    /// Values to sweep, without the slow ones if `quick`.
     pub fn sweep(&self, quick: bool) -> &'static [f64] {
         &self.values[..self.values.len() - if quick { self.slow } else { 0 }]
     }
 }
 
 impl StressScene {
-    /// The triangles as the pipeline takes them, both faces drawn.
+    /// The draw of the triangles, without culling.
     ///
     /// # Errors
-    /// None for the scene of a family; [`DrawError`] where its vertices were changed.
+    /// None for an unchanged scene of a family; otherwise [`DrawError`] for invalid vertices.
     pub fn draw<'a>(&'a self, shader: &'a dyn Shader) -> Result<Draw<'a>, DrawError> {
         let close = if self.open == self.close { &self.open } else { &self.close };
         Ok(Draw { geometry: Geometry::new(&self.open, close, &self.triangles)?, shader, cull: Cull::None })
     }
 }
 
-/// Every family, by what makes the trouble: shape, motion, lens, meshes.
+/// All families, by cause: shape, motion, lens, meshes.
 pub fn families() -> impl Iterator<Item = &'static Family> {
     [shape::FAMILIES, motion::FAMILIES, lens::FAMILIES, mesh::FAMILIES].into_iter().flatten()
 }
 
-/// The family called `name`.
+/// The family with a name.
 pub fn family(name: &str) -> Option<&'static Family> {
     families().find(|family| family.name == name)
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_family_is_deterministic_at_every_value() {
+        for family in families() {
+            assert!(family.values.len() > family.slow + 1, "{}", family.name);
+            for &value in family.sweep(true) {
+                let [once, again, other] =
+                    [1, 1, 2].map(|seed| family.scene(value, Size::SMALL, seed).unwrap());
+                assert!(!once.triangles.is_empty(), "{} at {value}", family.name);
+                assert_eq!(
+                    (&once.open, &once.close),
+                    (&again.open, &again.close),
+                    "{} at {value}",
+                    family.name
+                );
+                assert_eq!(once.triangles.len(), other.triangles.len());
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_unique_and_found() {
+        for known in families() {
+            assert_eq!(family(known.name).map(|found| found.what), Some(known.what));
+            assert_eq!(families().filter(|other| other.name == known.name).count(), 1);
+        }
+        assert!(family("no such family").is_none());
+    }
+
+    #[test]
+    fn sides_other_than_powers_of_two_are_refused() {
+        let family = family("slivers").unwrap();
+        let error = family.scene(1.0, Size { side_px: 100, triangles: 3 }, 1).unwrap_err();
+        assert!(error.to_string().contains("100"), "{error}");
+    }
+}

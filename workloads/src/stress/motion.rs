@@ -1,8 +1,8 @@
-//! Trouble by motion: too fast, out of step, turning over, through the camera.
+//! Families about motion: too fast, incoherent, rotating, through the camera.
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::easel::Easel;
+use super::builder::SceneBuilder;
 use super::{Family, StressError};
 
 pub(super) const FAMILIES: &[Family] = &[
@@ -12,7 +12,7 @@ pub(super) const FAMILIES: &[Family] = &[
         parameter: "way in one shutter (images)",
         values: &[0.0, 0.01, 0.1, 1.0, 10.0, 100.0],
         slow: 0,
-        paint: speed,
+        build: speed,
     },
     Family {
         name: "out-of-step",
@@ -20,7 +20,7 @@ pub(super) const FAMILIES: &[Family] = &[
         parameter: "way of each corner (pixels)",
         values: &[0.0, 1.0, 8.0, 32.0, 128.0],
         slow: 0,
-        paint: out_of_step,
+        build: out_of_step,
     },
     Family {
         name: "facing",
@@ -28,7 +28,7 @@ pub(super) const FAMILIES: &[Family] = &[
         parameter: "turn in one shutter (degrees)",
         values: &[0.0, 30.0, 60.0, 90.0, 120.0, 180.0],
         slow: 0,
-        paint: facing,
+        build: facing,
     },
     Family {
         name: "behind",
@@ -36,7 +36,7 @@ pub(super) const FAMILIES: &[Family] = &[
         parameter: "depth of the corner (scene units)",
         values: &[4.0, 1.0, 0.3, 0.1, 0.0, -1.0, -4.0],
         slow: 0,
-        paint: behind,
+        build: behind,
     },
     Family {
         name: "through-camera",
@@ -44,52 +44,53 @@ pub(super) const FAMILIES: &[Family] = &[
         parameter: "depth at closing (scene units)",
         values: &[5.0, 2.0, 0.5, 0.0, -1.0, -5.0],
         slow: 0,
-        paint: through_camera,
+        build: through_camera,
     },
 ];
 
-fn speed(easel: &mut Easel, screens: f64) -> Result<(), StressError> {
-    let way_px = screens * easel.side();
-    for _ in 0..easel.size.triangles {
-        let (spot, corners) = (easel.spot(), easel.corners(8.0));
-        let (w, drift, when) = (easel.octaves(2.0, 16.0), easel.heading() * way_px, easel.between(0.0, 1.0));
-        // It is on the image at some time, not always at the opening.
-        let from = spot - drift * when;
-        let open = corners.map(|corner| easel.at(from + corner, w));
-        let close = corners.map(|corner| easel.at(from + corner + drift, w));
-        easel.triangle(open, close);
+fn speed(builder: &mut SceneBuilder, screens: f64) -> Result<(), StressError> {
+    let way_px = screens * builder.side();
+    for _ in 0..builder.size.triangles {
+        let (position, corners) = (builder.position(), builder.corners(8.0));
+        let (w, drift, when) =
+            (builder.octaves(2.0, 16.0), builder.direction() * way_px, builder.between(0.0, 1.0));
+        // The triangle crosses the image at some time, not necessarily at shutter open.
+        let from = position - drift * when;
+        let open = corners.map(|corner| builder.at(from + corner, w));
+        let close = corners.map(|corner| builder.at(from + corner + drift, w));
+        builder.triangle(open, close);
     }
     Ok(())
 }
 
-fn out_of_step(easel: &mut Easel, way_px: f64) -> Result<(), StressError> {
-    for _ in 0..easel.size.triangles {
-        let (spot, corners, w) = (easel.spot(), easel.corners(12.0), easel.octaves(2.0, 16.0));
-        let open = corners.map(|corner| easel.at(spot + corner, w));
+fn out_of_step(builder: &mut SceneBuilder, way_px: f64) -> Result<(), StressError> {
+    for _ in 0..builder.size.triangles {
+        let (position, corners, w) = (builder.position(), builder.corners(12.0), builder.octaves(2.0, 16.0));
+        let open = corners.map(|corner| builder.at(position + corner, w));
         let close = corners.map(|corner| {
             let (drift, deeper) =
-                (easel.heading() * way_px, easel.between(-0.5, 0.5) * way_px.min(8.0) / 8.0);
-            easel.at(spot + corner + drift, w * (1.0 + deeper))
+                (builder.direction() * way_px, builder.between(-0.5, 0.5) * way_px.min(8.0) / 8.0);
+            builder.at(position + corner + drift, w * (1.0 + deeper))
         });
-        easel.triangle(open, close);
+        builder.triangle(open, close);
     }
     Ok(())
 }
 
-fn facing(easel: &mut Easel, degrees: f64) -> Result<(), StressError> {
-    for _ in 0..easel.size.triangles {
-        let (spot, corners, axis) = (easel.spot(), easel.corners(20.0), easel.heading());
-        let w = easel.octaves(3.0, 12.0);
-        let (middle, unit) = (easel.at(spot, w), w / easel.scale());
+fn facing(builder: &mut SceneBuilder, degrees: f64) -> Result<(), StressError> {
+    for _ in 0..builder.size.triangles {
+        let (position, corners, axis) = (builder.position(), builder.corners(20.0), builder.direction());
+        let w = builder.octaves(3.0, 12.0);
+        let (middle, unit) = (builder.at(position, w), w / builder.scale());
         let turn = rotation(axis, degrees.to_radians());
         let open = corners.map(|corner| middle + (corner * unit).extend(0.0));
         let close = corners.map(|corner| middle + turn * (corner * unit).extend(0.0));
-        easel.triangle(open, close);
+        builder.triangle(open, close);
     }
     Ok(())
 }
 
-/// A turn by `angle` about `axis` in the image plane (Rodrigues 1840), through `libm`.
+/// Rotation by `angle` around `axis` in the image plane (Rodrigues 1840), computed with `libm`.
 fn rotation(axis: DVec2, angle: f64) -> DMat3 {
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     let k = DMat3::from_cols(
@@ -100,28 +101,28 @@ fn rotation(axis: DVec2, angle: f64) -> DMat3 {
     DMat3::IDENTITY + k * sin + k * k * (1.0 - cos)
 }
 
-fn behind(easel: &mut Easel, depth: f64) -> Result<(), StressError> {
-    for _ in 0..easel.size.triangles {
-        let (spot, corners, w) = (easel.spot(), easel.corners(16.0), easel.octaves(2.0, 8.0));
-        let drift = easel.heading() * 4.0;
-        let aside = easel.spot() / easel.scale();
+fn behind(builder: &mut SceneBuilder, depth: f64) -> Result<(), StressError> {
+    for _ in 0..builder.size.triangles {
+        let (position, corners, w) = (builder.position(), builder.corners(16.0), builder.octaves(2.0, 8.0));
+        let drift = builder.direction() * 4.0;
+        let aside = builder.position() / builder.scale();
         let ends = [DVec2::ZERO, drift].map(|drift| {
-            let front = [0, 1].map(|k| easel.at(spot + corners[k] + drift, w));
-            [front[0], front[1], (aside + drift / easel.scale()).extend(depth)]
+            let front = [0, 1].map(|k| builder.at(position + corners[k] + drift, w));
+            [front[0], front[1], (aside + drift / builder.scale()).extend(depth)]
         });
-        easel.triangle(ends[0], ends[1]);
+        builder.triangle(ends[0], ends[1]);
     }
     Ok(())
 }
 
-fn through_camera(easel: &mut Easel, depth: f64) -> Result<(), StressError> {
-    for _ in 0..easel.size.triangles {
-        let (spot, corners) = (easel.spot() * 0.25, easel.corners(12.0));
-        let (w, late) = (easel.between(6.0, 10.0), easel.between(-0.5, 0.5));
-        let middle = easel.at(spot, w);
-        let open = corners.map(|corner| middle + (corner * (6.0 / easel.scale())).extend(0.0));
+fn through_camera(builder: &mut SceneBuilder, depth: f64) -> Result<(), StressError> {
+    for _ in 0..builder.size.triangles {
+        let (position, corners) = (builder.position() * 0.25, builder.corners(12.0));
+        let (w, late) = (builder.between(6.0, 10.0), builder.between(-0.5, 0.5));
+        let middle = builder.at(position, w);
+        let open = corners.map(|corner| middle + (corner * (6.0 / builder.scale())).extend(0.0));
         let way = DVec3::new(0.0, 0.0, depth + late - w);
-        easel.triangle(open, open.map(|corner| corner + way));
+        builder.triangle(open, open.map(|corner| corner + way));
     }
     Ok(())
 }

@@ -1,67 +1,67 @@
-//! Triangles strewn over the image whose blur is known in pixels, for measuring how cost grows.
+//! Random triangles with a known blur in pixels, for measuring how the cost grows.
 
 use std::ops::Range;
 
 use glam::DVec2;
 use pipeline::{Geometry, LensShape, SampleTable, Viewport};
 
-use super::easel::Easel;
+use super::builder::SceneBuilder;
 use super::{PER_PIXEL, Size, StressError, StressScene};
 
-/// Triangles of one size strewn over the image that together cover it so many times, however many they are: a scene cut
-/// ever finer. Each moves straight and without turning.
+/// Random triangles of one size that together cover the image a given number of times, whatever their count.
+/// Each is translated linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Soup {
-    /// Size of the image, and how many triangles.
+    /// Image size and number of triangles.
     pub size: Size,
-    /// Area of all triangles over that of the image.
+    /// Total area of the triangles, relative to the image.
     pub layers: f64,
-    /// Pixels that each moves across the image while the shutter is open.
+    /// Motion across the image during the shutter, in pixels.
     pub motion_px: f64,
-    /// Diameter in pixels of the circle that the lens makes of the middle of a triangle, to within some per cent.
+    /// Diameter in pixels of the circle of confusion at the middle of a triangle, within a few per cent.
     pub defocus_px: f64,
 }
 
-/// Depths of triangles, far from where the lens is sharp: all are blurred alike.
+/// Depths of triangles, far behind the focus so that all have a similar blur.
 const DEPTHS: Range<f64> = 9.0..11.0;
-/// Depth at which the lens is sharp.
+/// Focus depth.
 const FOCUS: f64 = 1.0;
 
 impl Soup {
-    /// The scene; `seed` decides where triangles are and where they go.
+    /// Makes the scene; `seed` determines positions and directions.
     ///
     /// # Errors
-    /// When there is no image of that size or no lens of that blur.
+    /// [`StressError`] for an invalid image size or lens.
     pub fn scene(&self, seed: u64) -> Result<StressScene, StressError> {
         let side = self.size.side_px;
         let viewport = Viewport::new(side, side).ok_or(StressError::Side(side))?;
         let samples = SampleTable::low_discrepancy(PER_PIXEL, seed, LensShape::Disk)?;
-        let mut easel = Easel::new(self.size, viewport, samples, seed)?;
-        // The blur at depth z over that at infinity is 1 - focus / z.
-        let far = 1.0 - FOCUS / (0.5 * (DEPTHS.start + DEPTHS.end));
-        easel.lens(0.5 * self.defocus_px / far, FOCUS)?;
-        (0..self.size.triangles).for_each(|_| self.strew(&mut easel));
-        let scene = easel.finish();
+        let mut builder = SceneBuilder::new(self.size, viewport, samples, seed)?;
+        // The blur at depth z relative to that at infinity is 1 - focus / z.
+        let blur_share = 1.0 - FOCUS / (0.5 * (DEPTHS.start + DEPTHS.end));
+        builder.lens(0.5 * self.defocus_px / blur_share, FOCUS)?;
+        (0..self.size.triangles).for_each(|_| self.add_triangle(&mut builder));
+        let scene = builder.finish();
         Geometry::new(&scene.open, &scene.close, &scene.triangles)?;
         Ok(scene)
     }
 
-    /// Side of a triangle in pixels; one with equal sides has the area sqrt(3)/4 side^2.
+    /// Side of a triangle in pixels; the area of an equilateral one is sqrt(3)/4 side^2.
     fn side_px(&self) -> f64 {
         let image = f64::from(self.size.side_px);
         image * libm::sqrt(4.0 * self.layers / (libm::sqrt(3.0) * f64::from(self.size.triangles)))
     }
 
-    fn strew(&self, easel: &mut Easel) {
-        let (spot, half_way) = (easel.spot(), 0.5 * self.motion_px * easel.heading());
-        let depth = easel.between(DEPTHS.start, DEPTHS.end);
-        // As steep as a triangle turned anyhow is on the average, and always before the camera.
-        let tilt = 0.5 * (self.side_px() / easel.scale()).min(1.0);
-        let corners = easel.corners(self.side_px());
-        let depths = [0, 1, 2].map(|_| depth * (1.0 + tilt * easel.between(-1.0, 1.0)));
-        let at = |k: usize, shift: DVec2| easel.at(spot + corners[k] + shift, depths[k]);
+    fn add_triangle(&self, builder: &mut SceneBuilder) {
+        let (position, half_way) = (builder.position(), 0.5 * self.motion_px * builder.direction());
+        let depth = builder.between(DEPTHS.start, DEPTHS.end);
+        // The mean tilt of a randomly rotated triangle, limited to stay in front of the camera.
+        let tilt = 0.5 * (self.side_px() / builder.scale()).min(1.0);
+        let corners = builder.corners(self.side_px());
+        let depths = [0, 1, 2].map(|_| depth * (1.0 + tilt * builder.between(-1.0, 1.0)));
+        let at = |k: usize, shift: DVec2| builder.at(position + corners[k] + shift, depths[k]);
         let (open, close) = ([0, 1, 2].map(|k| at(k, -half_way)), [0, 1, 2].map(|k| at(k, half_way)));
-        easel.triangle(open, close);
+        builder.triangle(open, close);
     }
 }
 
@@ -73,7 +73,7 @@ mod tests {
     const SOUP: Soup =
         Soup { size: Size { side_px: 128, triangles: 200 }, layers: 4.0, motion_px: 24.0, defocus_px: 12.0 };
 
-    /// Where a vertex is seen through a place on the lens, in pixels from the middle.
+    /// Image position of a vertex through a lens position, in pixels from the centre.
     fn seen(scene: &StressScene, vertex: glam::Vec3, lens: Vec2) -> Vec2 {
         let optics = scene.camera.lens().unwrap();
         let shift = lens * optics.radius() * (1.0 / vertex.z - 1.0 / optics.focus());
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_move_and_blur_by_as_many_pixels_as_asked_for() {
+    fn triangles_move_and_blur_as_requested() {
         let scene = SOUP.scene(7).unwrap();
         for (open, close) in scene.open.iter().zip(&scene.close) {
             let moved = seen(&scene, *close, Vec2::ZERO) - seen(&scene, *open, Vec2::ZERO);

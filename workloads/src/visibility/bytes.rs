@@ -1,10 +1,10 @@
-//! Reading packed little-endian files without trusting their lengths.
+//! Reader of packed little-endian files, with checked lengths.
 
 use std::path::Path;
 
 use crate::error::{LoadError, Source};
 
-/// A file being read from its start.
+/// A file and the current read position.
 pub(super) struct Bytes<'a> {
     source: Source<'a>,
     data: &'a [u8],
@@ -12,7 +12,7 @@ pub(super) struct Bytes<'a> {
 }
 
 impl<'a> Bytes<'a> {
-    /// The bytes of a file that starts with `magic`.
+    /// Starts reading a file that begins with `magic`.
     pub fn new<const N: usize>(path: &'a Path, data: &'a [u8], magic: &[u8; N]) -> Result<Self, LoadError> {
         let mut bytes = Self { source: Source { path }, data, at: 0 };
         if bytes.take::<N>()? != *magic {
@@ -44,35 +44,34 @@ impl<'a> Bytes<'a> {
         self.take().map(f64::from_le_bytes)
     }
 
-    /// The next number, which has to be finite.
+    /// The next number, which must be finite.
     pub fn f32(&mut self) -> Result<f32, LoadError> {
         let value = self.take().map(f32::from_le_bytes)?;
         if value.is_finite() { Ok(value) } else { Err(self.wrong(format!("{value} is not a finite number"))) }
     }
 
-    /// How many bytes follow.
-    pub fn left(&self) -> u64 {
+    /// Number of remaining bytes.
+    pub fn remaining(&self) -> u64 {
         (self.data.len() - self.at) as u64
     }
 
-    /// That `count` records of `size` bytes and nothing else follow.
+    /// Checks that exactly `count` records of `size` bytes remain.
     pub fn expect_records(&self, count: u64, size: u64) -> Result<(), LoadError> {
-        let left = self.left();
+        let remaining = self.remaining();
         match count.checked_mul(size) {
-            Some(needed) if needed == left => Ok(()),
-            _ => {
-                Err(self
-                    .wrong(format!("{count} records of {size} bytes are announced, but {left} bytes follow")))
-            }
+            Some(needed) if needed == remaining => Ok(()),
+            _ => Err(self.wrong(format!(
+                "{count} records of {size} bytes are announced, but {remaining} bytes follow"
+            ))),
         }
     }
 
-    /// What is wrong at the place reached.
+    /// An error at the current position.
     pub fn wrong(&self, message: String) -> LoadError {
         self.wrong_in(format!("byte {}", self.at), message)
     }
 
-    /// What is wrong in a part that has a name.
+    /// An error in a named part.
     pub fn wrong_in(&self, place: impl Into<String>, message: String) -> LoadError {
         self.source.broken(place, message)
     }

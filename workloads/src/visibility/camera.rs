@@ -1,4 +1,4 @@
-//! From a description to a camera that stands somewhere at both ends of the shutter.
+//! Conversion of a camera description to a camera with a pose at both ends of the shutter.
 
 use glam::{Affine3A, DVec2, DVec3};
 use pipeline::{Camera, CameraError, Lens, LensShape, Viewport};
@@ -9,24 +9,24 @@ use crate::scene::fit::{Extent, Fit};
 use crate::scene::inside::Inside;
 use crate::scene::{CameraSpec, Side, Wrong, tan_half};
 
-/// The nearest thing seen, in parts of the depth of the target.
+/// Default near depth, relative to the depth of the target.
 const NEAR: f64 = 1e-3;
 
-/// A camera in its place.
+/// A camera with its poses and image.
 pub(super) struct View {
-    /// Where it stands when the shutter opens and when it closes.
+    /// Pose at shutter open and at shutter close.
     pub stands: [Stand; 2],
-    /// What it is in its own space.
+    /// The camera in its own space.
     pub camera: Camera,
-    /// The image.
+    /// Image size.
     pub viewport: Viewport,
 }
 
 impl CameraSpec {
-    /// Refuses what moving meshes have no use for, and cameras with a place that cannot be built.
+    /// Checks the fields that moving meshes do not support, and that a placed camera can be built.
     ///
     /// # Errors
-    /// The first field that is wrong.
+    /// The first invalid field.
     pub(super) fn check_for_meshes(&self) -> Result<(), Wrong> {
         let unused = "a shutter has two ends: give `end_position` and `end_target` instead";
         if !self.keyframes.is_empty() || self.interpolation.is_some() {
@@ -39,7 +39,7 @@ impl CameraSpec {
         if self.is_placed() { self.completed().stands_and_image().map(drop) } else { Ok(()) }
     }
 
-    /// The same camera with every default written out.
+    /// The camera with all defaults filled in.
     pub(super) fn completed(&self) -> Self {
         let [width, height] = self.size();
         let depth = self.target_depth();
@@ -60,7 +60,7 @@ impl CameraSpec {
         }
     }
 
-    /// Samples in a pixel.
+    /// Samples per pixel.
     pub(super) fn samples_per_pixel(&self) -> u32 {
         self.samples.unwrap_or(16)
     }
@@ -84,10 +84,10 @@ impl CameraSpec {
         self.lens_radius.unwrap_or(0.0)
     }
 
-    /// The camera in its place.
+    /// Builds the camera with its poses.
     ///
     /// # Errors
-    /// What is wrong with it: it is not placed, looks nowhere, or has a value out of the range of `f32`.
+    /// The first invalid field: a missing pose, a degenerate direction, or a value out of the range of `f32`.
     pub(super) fn stands_and_image(&self) -> Result<View, Wrong> {
         let open = self.stand("target", self.position, self.target, self.up)?;
         let (position, target) = (self.end_position.or(self.position), self.end_target.or(self.target));
@@ -114,7 +114,7 @@ impl CameraSpec {
         Stand::new(eye, along, up.map_or(DVec3::Y, DVec3::from)).ok_or_else(|| (place, message.to_owned()))
     }
 
-    /// What the camera is in its own space.
+    /// Builds the camera in its own space.
     fn camera(&self) -> Result<Camera, Wrong> {
         let out_of = |place| move |error: CameraError| (place, error.to_string());
         let near = self.near.unwrap_or(0.0) as f32;
@@ -135,8 +135,9 @@ impl CameraSpec {
     }
 }
 
-/// The camera placed inside `mesh` where that is asked for, else so that all of it is in view while the shutter is open, and
-/// whether it is so from all over the lens; `None` for a mesh without triangles or beyond the range of numbers.
+/// Fits the camera inside `mesh` if requested, otherwise so that all of it is in view during the shutter.
+/// Also returns whether this holds from all of the lens. `None` for a mesh without triangles or with extreme
+/// coordinates.
 pub(super) fn fit(spec: &CameraSpec, mesh: &MovingMesh) -> Option<(CameraSpec, bool)> {
     let (fit, fov_deg) = match spec.fitted {
         Some(Side::Inside) => {
@@ -160,7 +161,7 @@ pub(super) fn fit(spec: &CameraSpec, mesh: &MovingMesh) -> Option<(CameraSpec, b
     finite.then(|| (placed.completed(), fit.holds_lens))
 }
 
-/// The place from which all of `mesh` is in view.
+/// Pose from which all of `mesh` is in view.
 fn around(spec: &CameraSpec, mesh: &MovingMesh) -> Option<Fit> {
     let [width, height] = spec.size().map(f64::from);
     let tan = tan_half(spec.field_of_view());
@@ -187,12 +188,12 @@ mod tests {
     }
 
     #[test]
-    fn lens_and_near_follow_the_target_unless_told() {
-        let told = view(
+    fn lens_and_near_follow_the_target_by_default() {
+        let explicit = view(
             "(position: (0, 0, 5), target: (0, 0, 0), lens_radius: 0.5, focus: 3, near: 0.25, fov_deg: 90)",
         );
-        assert_eq!(told.camera.lens(), Some(Lens::new(0.5, 3.0).unwrap()));
-        assert_eq!((told.camera.near(), told.camera.half_height()), (0.25, 1.0));
+        assert_eq!(explicit.camera.lens(), Some(Lens::new(0.5, 3.0).unwrap()));
+        assert_eq!((explicit.camera.near(), explicit.camera.half_height()), (0.25, 1.0));
         let plain = view("(position: (0, 0, 5), target: (0, 0, 0), lens_radius: 0.5)");
         assert_eq!(plain.camera.lens(), Some(Lens::new(0.5, 5.0).unwrap()));
         assert_eq!(plain.camera.near(), 0.005);
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_meshes_have_no_use_for_is_refused_by_name() {
+    fn unsupported_fields_are_refused_by_name() {
         for (text, place, says) in [
             ("(focus: 3)", "focus", "give a `lens_radius`"),
             ("(position: (0, 0, 1e-60), target: (0, 0, 0))", "near", "above zero"),

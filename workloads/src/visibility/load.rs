@@ -1,18 +1,18 @@
-//! Any of the files that hold a moving mesh.
+//! Loading of all file formats with moving meshes.
 
 use std::path::Path;
 
-use super::mesh::MovingMesh;
+use super::mesh::{self, MovingMesh};
 use super::scene::{Subject, VisibilityScene};
-use super::{m5d, mts, pair};
+use super::{m5d, mts};
 use crate::error::LoadError;
 use crate::import::{Format, reader};
 use crate::scene::CameraSpec;
 
-/// What can be loaded, for messages.
+/// Accepted files, for messages.
 const KNOWN: &str = ".m5d, .mts, and .ply, .obj, .off or .stl, alone or as a pair (each also gzipped)";
 
-/// Kinds of files that hold a mesh or half of one.
+/// Formats with a mesh, or with one end of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     M5d,
@@ -21,12 +21,12 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// What the file at `path` begins as or, where that says nothing, what its name ends in.
+    /// Format by the first bytes of the file, or else by its name.
     pub fn of(path: &Path) -> Result<Self, LoadError> {
         let head = reader::head::<8>(path)?;
-        // An empty one is of no known kind.
+        // An empty file has no known format.
         if !head.is_empty() && path.metadata().is_ok_and(|data| !data.is_file()) {
-            return Err(no_file(path));
+            return Err(not_a_regular_file(path));
         }
         let begins = |magic: &[u8]| head.starts_with(magic);
         if begins(m5d::MAGIC) {
@@ -42,7 +42,7 @@ impl Kind {
         named.ok_or_else(|| LoadError::Kind { file: path.display().to_string(), known: KNOWN })
     }
 
-    /// What its name ends in.
+    /// Format by file name.
     pub fn named(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let bare = name.strip_suffix(".gz").unwrap_or(&name);
@@ -55,15 +55,15 @@ impl Kind {
     }
 }
 
-/// Loads the moving mesh in `files`: an `.m5d` or `.mts`, a PLY, OBJ, OFF or STL file that stays still, or two of them as the two
-/// ends of the shutter. `camera` is what [`CameraSpec::flag`] takes; without it an `.m5d` is seen by its own and the others
-/// by one that is fitted to them.
+/// Loads the moving mesh in `files`: an `.m5d` or `.mts`, a still PLY, OBJ, OFF or STL file, or two of these
+/// as the two ends of the shutter. `camera` is the argument of [`CameraSpec::flag`]. Without it an `.m5d`
+/// uses its own camera, and the others get a fitted one.
 ///
 /// # Errors
-/// [`LoadError`]: [`LoadError::is_usage`] for files that do not go together or are of no known kind and for mistakes in
-/// the camera; else what is broken, and where.
+/// [`LoadError`]: [`LoadError::is_usage`] for incompatible files, unknown formats and mistakes in the camera;
+/// else invalid content, with its place in the file.
 pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<VisibilityScene, LoadError> {
-    let spec = camera.map(described).transpose()?;
+    let spec = camera.map(parsed_camera).transpose()?;
     let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
     let kinds = files.iter().map(|path| Kind::of(path)).collect::<Result<Vec<_>, _>>()?;
     let (path, objects) = match (&files[..], &kinds[..]) {
@@ -72,29 +72,29 @@ pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<Visibili
             Some(_) => (*file, vec![m5d::world(&m5d::load(file)?)]),
         },
         ([file], [Kind::Mts]) => (*file, mts::load_mts(file)?),
-        ([file], [Kind::Surface(format)]) => (*file, vec![pair::still((file, *format))?]),
+        ([file], [Kind::Surface(format)]) => (*file, vec![mesh::still((file, *format))?]),
         ([start, end], [Kind::Surface(one), Kind::Surface(other)]) => {
-            (*start, vec![pair::moving((start, *one), (end, *other))?])
+            (*start, vec![mesh::moving((start, *one), (end, *other))?])
         }
         _ => return Err(wrong_number(&files, &kinds)),
     };
-    VisibilityScene::seen(Subject { path, objects }, &spec.unwrap_or_default())
+    VisibilityScene::from_subject(Subject { path, objects }, &spec.unwrap_or_default())
 }
 
-/// The camera that `text` describes, for a moving mesh.
-fn described(text: &str) -> Result<CameraSpec, LoadError> {
+/// Parses the camera for a moving mesh.
+fn parsed_camera(text: &str) -> Result<CameraSpec, LoadError> {
     let (spec, file) = CameraSpec::flag(text)?;
     spec.check_for_meshes().map_err(|wrong| CameraSpec::wrong(&file, wrong))?;
     Ok(spec)
 }
 
-/// Loads a mesh that stays still from a PLY, OBJ, OFF or STL file.
+/// Loads a still mesh from a PLY, OBJ, OFF or STL file.
 ///
 /// # Errors
 /// As [`load`].
 pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
     match Kind::of(path)? {
-        Kind::Surface(format) => pair::still((path, format)),
+        Kind::Surface(format) => mesh::still((path, format)),
         _ => Err(LoadError::Kind {
             file: path.display().to_string(),
             known: ".ply, .obj, .off and .stl (also gzipped)",
@@ -102,8 +102,8 @@ pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
     }
 }
 
-/// What was read to tell the kind would be missing from the contents.
-fn no_file(path: &Path) -> LoadError {
+/// Error for a pipe: the bytes read for the format would be missing from the content.
+fn not_a_regular_file(path: &Path) -> LoadError {
     let message =
         format!("{} is a pipe or a device, and it is read twice: write it to a file first", path.display());
     LoadError::Setting { setting: "files", message }

@@ -1,4 +1,4 @@
-//! `.m5d`: moving triangles with their camera.
+//! The `.m5d` format: moving triangles with their camera.
 
 use std::iter;
 use std::path::Path;
@@ -12,7 +12,7 @@ use super::scene::VisibilityScene;
 use crate::error::LoadError;
 use crate::import::reader;
 
-/// How the file begins.
+/// First bytes of the file.
 pub(super) const MAGIC: &[u8; 8] = b"M5DSCN1\0";
 
 const TRIANGLE_BYTES: u64 = 18 * 4;
@@ -22,10 +22,10 @@ pub(super) fn load(path: &Path) -> Result<VisibilityScene, LoadError> {
     parse(path, &reader::contents(path)?)
 }
 
-/// Reads `data`, which is an `.m5d` file that is not gzipped; `path` names it in messages.
+/// Parses `data`, an uncompressed `.m5d` file; `path` is for messages.
 ///
 /// # Errors
-/// When it is truncated, or holds values that make no camera or image.
+/// [`LoadError`] for a truncated file, or values that do not make a camera or image.
 pub fn parse(path: &Path, data: &[u8]) -> Result<VisibilityScene, LoadError> {
     let mut bytes = Bytes::new(path, data, MAGIC)?;
     let (count, _flags) = (bytes.u32()?, bytes.u32()?);
@@ -60,7 +60,7 @@ pub fn parse(path: &Path, data: &[u8]) -> Result<VisibilityScene, LoadError> {
     })
 }
 
-/// The corners of the triangles at both ends.
+/// Corners of the triangles at both ends of the shutter.
 fn corners(bytes: &mut Bytes<'_>, count: u32) -> Result<[Vec<Vec3>; 2], LoadError> {
     bytes.expect_records(u64::from(count), TRIANGLE_BYTES)?;
     let [mut open, mut close] = [0; 2].map(|_| Vec::with_capacity(3 * count as usize));
@@ -74,13 +74,17 @@ fn corners(bytes: &mut Bytes<'_>, count: u32) -> Result<[Vec<Vec3>; 2], LoadErro
     Ok([open, close])
 }
 
-/// The triangles in a right-handed world, for another camera: that of the file stands at the origin and looks at
-/// (0, 0, -1).
+/// The triangles in a right-handed world, for another camera. The file's own camera is at the origin and
+/// looks at (0, 0, -1).
 pub(super) fn world(scene: &VisibilityScene) -> MovingMesh {
-    let turned = |points: &[Vec3]| {
+    let mirrored = |points: &[Vec3]| {
         points.iter().map(|p| (*p * Vec3::new(1.0, 1.0, -1.0)).as_dvec3()).collect::<Vec<DVec3>>()
     };
-    MovingMesh { open: turned(&scene.open), close: turned(&scene.close), triangles: scene.triangles.clone() }
+    MovingMesh {
+        open: mirrored(&scene.open),
+        close: mirrored(&scene.close),
+        triangles: scene.triangles.clone(),
+    }
 }
 
 fn camera([tan_half, radius, focus, near]: [f64; 4]) -> Result<Camera, String> {

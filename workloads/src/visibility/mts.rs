@@ -1,7 +1,7 @@
-//! `.mts`: two instants of a moving scene of many objects, the format of public data for collision detection.
+//! The `.mts` format: two instants of a scene of many objects, used for public collision detection data.
 //!
-//! Little endian (`shared/ccd/README.md`): `MTS1`, the bytes of a scalar (4 or 8), the number of objects, zero; for each
-//! object its vertices and triangles; then, object after object, positions at time zero, positions at time one, indices.
+//! Little endian: `MTS1`, bytes per scalar (4 or 8), number of objects, zero; for each object its numbers of
+//! vertices and triangles; then, object after object, positions at time 0, positions at time 1, indices.
 
 use std::path::Path;
 
@@ -12,27 +12,29 @@ use super::mesh::MovingMesh;
 use crate::error::LoadError;
 use crate::import::reader;
 
-/// How the file begins.
+/// First bytes of the file.
 pub(super) const MAGIC: &[u8; 4] = b"MTS1";
 
-/// Bytes of the sizes of one object, and of the indices of one triangle.
+/// Bytes of the sizes of one object.
 const ENTRY_BYTES: u64 = 8;
+/// Bytes of the indices of one triangle.
 const TRIANGLE_BYTES: u64 = 12;
 
-/// Vertices and triangles of one object.
+/// Numbers of vertices and triangles of one object.
 type Size = [u32; 2];
 
-/// Reads the objects of the `.mts` file at `path`, gzipped or not. Their values are those of the file: `f64` holds
-/// every `f32`.
+/// Reads the objects of the `.mts` file at `path`, gzipped or not. Values are exact, as `f64` contains every
+/// `f32`.
 ///
 /// # Errors
-/// When it cannot be read, is damaged or truncated, or holds numbers that are not finite or indices out of range.
+/// [`LoadError`] if the file cannot be read, is damaged or truncated, or has values that are not finite or
+/// indices out of range.
 pub fn load_mts(path: &Path) -> Result<Vec<MovingMesh>, LoadError> {
     parse_mts(path, &reader::contents(path)?)
 }
 
-/// Reads `data`, which is not gzipped; `path` names it in messages. Takes memory for what `data` holds, whatever its
-/// header announces.
+/// Parses `data`, which is uncompressed; `path` is for messages. Allocates memory for the actual content
+/// only, whatever the header announces.
 ///
 /// # Errors
 /// As [`load_mts`].
@@ -56,39 +58,39 @@ pub fn parse_mts(path: &Path, data: &[u8]) -> Result<Vec<MovingMesh>, LoadError>
     sizes.iter().enumerate().map(|(object, size)| read_object(&mut bytes, object, *size, scalar)).collect()
 }
 
-/// Reads one number of a position.
+/// Reads one coordinate.
 type Scalar = fn(&mut Bytes<'_>) -> Result<f64, LoadError>;
 
 fn sizes(bytes: &mut Bytes<'_>, objects: u32) -> Result<Vec<Size>, LoadError> {
-    if u64::from(objects) * ENTRY_BYTES > bytes.left() {
-        let left = bytes.left();
+    if u64::from(objects) * ENTRY_BYTES > bytes.remaining() {
+        let remaining = bytes.remaining();
         let message =
-            format!("{objects} objects are announced, but only {left} bytes follow; get the file again");
+            format!("{objects} objects are announced, but only {remaining} bytes follow; get the file again");
         return Err(bytes.wrong_in("byte 8", message));
     }
     (0..objects).map(|_| Ok([bytes.u32()?, bytes.u32()?])).collect()
 }
 
-/// That what the sizes announce follows and nothing else.
+/// Checks that exactly the announced content follows.
 fn expect(bytes: &Bytes<'_>, sizes: &[Size], scalar_bytes: u32) -> Result<(), LoadError> {
     let vertex_bytes = 2 * 3 * u128::from(scalar_bytes);
     let mut needed = 0;
-    let left = u128::from(bytes.left());
+    let remaining = u128::from(bytes.remaining());
     for (object, [vertices, triangles]) in sizes.iter().enumerate() {
         needed += u128::from(*vertices) * vertex_bytes + u128::from(*triangles) * u128::from(TRIANGLE_BYTES);
-        if needed > left {
+        if needed > remaining {
             let message = format!(
                 "its {vertices} vertices and {triangles} triangles end at byte {needed} after the header, \
-                 but only {left} follow; the file is truncated: get it again"
+                 but only {remaining} follow; the file is truncated: get it again"
             );
             return Err(bytes.wrong_in(format!("object {object}"), message));
         }
     }
-    if needed == left {
+    if needed == remaining {
         return Ok(());
     }
     let message =
-        format!("{left} bytes follow the header, but its objects have {needed}; get the file again");
+        format!("{remaining} bytes follow the header, but its objects have {needed}; get the file again");
     Err(bytes.wrong(message))
 }
 
@@ -141,7 +143,7 @@ fn corners(
 mod tests {
     use super::*;
 
-    /// Objects of one triangle each, object `i` shifted by `i` and moving by one along y.
+    /// Objects of one triangle each; object `i` is shifted by `i` and moves by one along y.
     fn file(objects: u32, scalar_bytes: u32) -> Vec<u8> {
         let mut data = MAGIC.to_vec();
         [scalar_bytes, objects, 0].iter().for_each(|word| data.extend(word.to_le_bytes()));
@@ -166,7 +168,7 @@ mod tests {
         parse_mts(Path::new("a.mts"), data)
     }
 
-    fn says(data: &[u8], parts: &[&str]) {
+    fn assert_message(data: &[u8], parts: &[&str]) {
         let error = parse(data).unwrap_err();
         assert!(!error.is_usage());
         let text = error.to_string();
@@ -191,9 +193,9 @@ mod tests {
     #[test]
     fn broken_headers_say_where() {
         let good = file(2, 8);
-        says(b"MTS", &["truncated"]);
-        says(b"MTS2....", &["does not start with `MTS1`"]);
-        says(&good[..10], &["byte 8", "truncated"]);
+        assert_message(b"MTS", &["truncated"]);
+        assert_message(b"MTS2....", &["does not start with `MTS1`"]);
+        assert_message(&good[..10], &["byte 8", "truncated"]);
         for (at, word, parts) in [
             (4, 2, ["byte 4: scalars of 2 bytes", "4 or 8"]),
             (8, u32::MAX, ["byte 8: 4294967295 objects", "328 bytes follow"]),
@@ -204,21 +206,21 @@ mod tests {
         ] {
             let mut data = good.clone();
             data[at..at + 4].copy_from_slice(&u32::to_le_bytes(word));
-            says(&data, &parts);
+            assert_message(&data, &parts);
         }
     }
 
     #[test]
     fn broken_bodies_say_where() {
         let good = file(2, 8);
-        says(&good[..good.len() - 1], &["object 1", "only 311 follow", "get it again"]);
-        says(&[good.as_slice(), &[0]].concat(), &["313 bytes follow", "have 312"]);
+        assert_message(&good[..good.len() - 1], &["object 1", "only 311 follow", "get it again"]);
+        assert_message(&[good.as_slice(), &[0]].concat(), &["313 bytes follow", "have 312"]);
         let (first, second) = (32, 32 + 156);
         let mut nan = good.clone();
         nan[second + 72 + 24..second + 72 + 32].copy_from_slice(&f64::NAN.to_le_bytes());
-        says(&nan, &["object 1: vertex 1 at time 1 is [NaN, 1, 0]", "mend"]);
+        assert_message(&nan, &["object 1: vertex 1 at time 1 is [NaN, 1, 0]", "mend"]);
         let mut index = good;
         index[first + 144 + 8..first + 144 + 12].copy_from_slice(&3_u32.to_le_bytes());
-        says(&index, &["object 0: triangle 0 uses vertex 3, but there are only 3", "mend"]);
+        assert_message(&index, &["object 0: triangle 0 uses vertex 3, but there are only 3", "mend"]);
     }
 }

@@ -1,11 +1,11 @@
-//! What a visibility run is given, whichever files it came from.
+//! Input of a visibility run, from any file format.
 
 use std::ops::Range;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use pipeline::sampling::HashedSamples;
-use pipeline::{Camera, LensShape, Viewport};
+use pipeline::{Camera, LensShape, Shader, ShaderCost, ShadingPoint, Viewport};
 use warnings::Warning;
 
 use super::camera::{View, fit};
@@ -14,49 +14,49 @@ use crate::error::{LoadError, Source};
 use crate::scene::measure::lens_leaves_view;
 use crate::scene::{CameraSpec, Wrong};
 
-/// Moving triangles in camera space (x right, y up, z forward) with the camera and sampling they are to be seen by.
+/// Moving triangles in camera space (x right, y up, z forward), with camera and sampling.
 #[derive(Clone, Debug)]
 pub struct VisibilityScene {
     /// Size of the image.
     pub viewport: Viewport,
-    /// Samples in each pixel.
+    /// Samples per pixel.
     pub per_pixel: u32,
     /// Seed of hashed samples.
     pub seed: u64,
-    /// The camera, standing at the origin of its own space; a pinhole where the lens radius is zero.
+    /// The camera at the origin of its own space; a pinhole if the lens radius is zero.
     pub camera: Camera,
     /// Shape of the aperture.
     pub shape: LensShape,
-    /// Vertices when the shutter opens.
+    /// Vertices at shutter open.
     pub open: Vec<Vec3>,
-    /// Vertices when it closes.
+    /// Vertices at shutter close.
     pub close: Vec<Vec3>,
     /// Vertex indices of each triangle, all in range.
     pub triangles: Vec<[u32; 3]>,
-    /// The triangles of each object, in order; one object for files that know of none.
+    /// Triangle range of each object, in order; one object for formats without objects.
     pub objects: Vec<Range<u32>>,
-    /// The camera that was fitted, as a file, where none was given.
+    /// The fitted camera, if none was given.
     pub fitted: Option<CameraSpec>,
-    /// What there is to say of the scene, with stable codes.
+    /// Warnings about the scene.
     pub warnings: Vec<Warning>,
 }
 
-/// Meshes to be looked at, and the files that messages are about.
+/// Meshes with the file that messages name.
 pub(super) struct Subject<'a> {
-    /// The file of the meshes.
+    /// File of the meshes.
     pub path: &'a Path,
-    /// An object each.
+    /// The objects.
     pub objects: Vec<MovingMesh>,
 }
 
 impl VisibilityScene {
-    /// The hashed samples of the scene's seed, or `None` when their number is out of range.
+    /// Hashed samples with the scene's seed; `None` if their number is out of range.
     pub fn hashed_samples(&self) -> Option<HashedSamples> {
         HashedSamples::new(self.seed, self.viewport.width(), self.per_pixel, self.shape)
     }
 
-    /// `subject` as the camera described sees it, fitted where it has no place.
-    pub(super) fn seen(subject: Subject<'_>, spec: &CameraSpec) -> Result<Self, LoadError> {
+    /// `subject` in a camera's space; the camera is fitted if it has no pose.
+    pub(super) fn from_subject(subject: Subject<'_>, spec: &CameraSpec) -> Result<Self, LoadError> {
         let source = Source { path: subject.path };
         let (mesh, objects) =
             joined(subject.objects).map_err(|message| source.broken("triangles", message))?;
@@ -87,7 +87,7 @@ impl VisibilityScene {
     }
 }
 
-/// All objects as one mesh, and the triangles of each.
+/// Joins all objects to one mesh, with the triangle range of each.
 fn joined(objects: Vec<MovingMesh>) -> Result<(MovingMesh, Vec<Range<u32>>), String> {
     let mut ranges = Vec::with_capacity(objects.len());
     let count = |length: usize| {
@@ -106,8 +106,7 @@ fn joined(objects: Vec<MovingMesh>) -> Result<(MovingMesh, Vec<Range<u32>>), Str
     Ok((whole, ranges))
 }
 
-/// The vertices at both ends as the camera sees them, rounded once from what the file says. A still vertex before a
-/// still camera stays still to the last bit.
+/// Vertices in camera space at both ends, rounded once. A still vertex and a still camera stay exactly still.
 fn in_camera_space(view: &View, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], String> {
     let [open, close] = &view.stands;
     let see = |(stand, points): (&crate::scene::camera::Stand, &[glam::DVec3])| {
@@ -120,4 +119,18 @@ fn in_camera_space(view: &View, mesh: &MovingMesh) -> Result<[Vec<Vec3>; 2], Str
         seen.collect::<Result<Vec<_>, _>>()
     };
     Ok([see((open, &mesh.open))?, see((close, &mesh.close))?])
+}
+
+/// A shader without cost, for visibility alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Unshaded;
+
+impl Shader for Unshaded {
+    fn cost(&self) -> ShaderCost {
+        ShaderCost::default()
+    }
+
+    fn shade(&self, _at: &ShadingPoint, _texel: Vec4) -> Vec3 {
+        Vec3::ZERO
+    }
 }

@@ -1,6 +1,7 @@
-//! Sample tables in files.
+//! Files of sample tables and of results.
 
-use std::io::{self, Write};
+use std::io;
+use std::io::Write;
 use std::path::Path;
 
 use pipeline::Viewport;
@@ -9,7 +10,7 @@ use pipeline::sampling::{Sample, SampleSource};
 use super::bytes::Bytes;
 use crate::error::{LoadError, Source};
 
-/// A table of samples for a block of pixels of any size, tiled over the image.
+/// A sample table for a block of pixels of any size, repeated over the image.
 #[derive(Clone, Debug)]
 pub struct FixedSamples {
     width: u32,
@@ -24,18 +25,18 @@ impl FixedSamples {
     /// Reads the table at `path`.
     ///
     /// # Errors
-    /// When it cannot be read, is truncated, or holds samples out of range.
+    /// [`LoadError`] if the file cannot be read, is truncated, or has samples out of range.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
         let data = Source { path }.read()?;
         Self::parse(path, &data)
     }
 
-    /// Width and height in pixels; a larger image repeats them.
+    /// Width and height in pixels; larger images repeat the table.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
 
-    /// Reads `data`; `path` names it in messages.
+    /// Parses `data`; `path` is for messages.
     ///
     /// # Errors
     /// As [`Self::load`].
@@ -47,7 +48,7 @@ impl FixedSamples {
                 "{width}x{height} pixels of {per_pixel} samples; sides start at 1, and a pixel takes 1 to 256"
             )));
         }
-        // Sides of 2^32 make more samples than a u64 counts; no file holds so many either way.
+        // The product may exceed u64; no file is that large.
         let count = (u64::from(width) * u64::from(height)).saturating_mul(u64::from(per_pixel));
         bytes.expect_records(count, SAMPLE_BYTES)?;
         let mut samples = Vec::new();
@@ -82,10 +83,10 @@ impl SampleSource for FixedSamples {
     }
 }
 
-/// Writes the samples of every pixel of an image as a table that [`FixedSamples`] reads.
+/// Writes the samples of every pixel as a table for [`FixedSamples`].
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub fn write_samples(viewport: Viewport, source: &dyn SampleSource, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(b"M5DSMP1\0")?;
     for word in [viewport.width(), viewport.height(), source.per_pixel(), 0] {
@@ -101,12 +102,38 @@ pub fn write_samples(viewport: Viewport, source: &dyn SampleSource, out: &mut dy
     Ok(())
 }
 
+/// Writes the visible triangle of each sample (`u32::MAX` for none) and its depth (infinite for none), both
+/// in the order `(py * width + px) * per_pixel + s`. The header is `M5DHIT1\0`, width, height, samples per
+/// pixel, and zero.
+///
+/// # Errors
+/// Errors of `out`.
+pub fn write_hits(
+    viewport: Viewport,
+    per_pixel: u32,
+    triangles: &[u32],
+    depths: &[f32],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    out.write_all(b"M5DHIT1\0")?;
+    for word in [viewport.width(), viewport.height(), per_pixel, 0] {
+        out.write_all(&word.to_le_bytes())?;
+    }
+    for triangle in triangles {
+        out.write_all(&triangle.to_le_bytes())?;
+    }
+    for depth in depths {
+        out.write_all(&depth.to_le_bytes())?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn tables_survive_a_round_trip() {
         let table = pipeline::SampleTable::low_discrepancy(3, 5, pipeline::LensShape::Disk).unwrap();
         let (viewport, mut file) = (Viewport::new(70, 3).unwrap(), Vec::new());
         write_samples(viewport, &table, &mut file).unwrap();
@@ -129,8 +156,8 @@ mod tests {
     }
 
     #[test]
-    fn more_samples_than_can_be_counted_are_refused() {
-        // 2^31 by 2^31 pixels of 16 samples are 2^66, which is 0 in 64 bits.
+    fn sample_counts_beyond_64_bits_are_refused() {
+        // 2^31 by 2^31 pixels of 16 samples are 2^66, which wraps to 0 in 64 bits.
         let mut data = file(0.125);
         for (word, value) in [1_u32 << 31, 1 << 31, 16].into_iter().enumerate() {
             data[8 + 4 * word..][..4].copy_from_slice(&value.to_le_bytes());

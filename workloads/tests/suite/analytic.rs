@@ -1,4 +1,4 @@
-//! Scenes whose answer is known in closed form.
+//! Scenes with a closed-form solution.
 
 use crate::common::{Builder, Files, load_glb};
 use glam::{Quat, Vec3};
@@ -86,7 +86,7 @@ fn a_skin_with_targets_morphs_first_and_bends_then() {
     primitive["attributes"]["JOINTS_0"] = json!(joints);
     primitive["attributes"]["WEIGHTS_0"] = json!(weights);
     let half = 0.5f32.sqrt();
-    // The mesh's own node moves far away: a skinned mesh follows its joints alone.
+    // The mesh's own node moves far away, but a skinned mesh follows its joints alone.
     file.json["nodes"] = json!([
         {"mesh": 0, "skin": 0, "weights": [1.0], "translation": [100, 0, 0], "children": []},
         {"translation": [0, 0, 5]},
@@ -110,7 +110,7 @@ fn a_mirrored_node_keeps_its_facing() {
 }
 
 #[test]
-fn sparse_and_interleaved_accessors_give_their_numbers() {
+fn sparse_and_interleaved_accessors_are_read() {
     let mut file = Builder::new();
     let interleaved: Vec<u8> = [[0.0f32, 0.0, 0.0, 9.0], [1.0, 0.0, 0.0, 9.0], [0.0, 1.0, 0.0, 9.0]]
         .concat()
@@ -163,7 +163,7 @@ fn a_camera_on_a_moving_node_looks_down_minus_z() {
     file.json["scenes"][0]["nodes"] = json!([0, 1]);
     let scene = at_rate(load_glb(&file.bytes()).unwrap(), 4.0, 1.0);
     let camera = scene.frame(1).unwrap().camera;
-    // Half a turn about y makes -z of the node +z of the world, and x run the other way.
+    // Half a turn around y maps -z of the node to +z of the world, and flips x.
     near(camera.open().transform_point3(Vec3::new(1.0, 2.0, 5.0)), Vec3::new(-1.0, 2.0, 3.0));
     near(camera.close().transform_point3(Vec3::new(1.0, 2.0, 5.0)), Vec3::new(-1.0, 2.0, 1.0));
     assert_eq!(camera.near(), 0.25);
@@ -185,7 +185,7 @@ fn an_orthographic_camera_sees_twice_its_ymag_at_any_depth() {
     assert!(camera.is_orthographic() && scene.warnings().is_empty(), "{:?}", scene.warnings());
     assert_eq!((camera.half_height(), camera.near()), (2.0, 0.25));
     near(camera.open().transform_point3(Vec3::new(1.0, 2.0, 3.0)), Vec3::new(1.0, 2.0, 1.0));
-    // A near plane at zero, which the format allows, is left to the scene.
+    // A near plane at zero, which the format allows, is replaced by the scene.
     let touching = with(r#"{"xmag": 3.0, "ymag": 2.0, "zfar": 10.0, "znear": 0.0}"#).frame(0).unwrap().camera;
     assert!(touching.is_orthographic() && touching.near() > 0.0 && touching.near() < 0.01);
     for bad in [
@@ -244,12 +244,13 @@ fn ron_objects_turn_about_x_then_y_then_z_and_spin_about_their_own_axis() {
 }
 
 #[test]
-fn a_lens_focuses_on_the_target_unless_told() {
+fn a_lens_focuses_on_the_target_by_default() {
     let text = "(settings: (lens_radius: 0.1), camera: (position: (0, 0, 7), target: (0, 0, 1)), objects: [(shape: Sphere(radius: 1))])";
     let scene = workloads::load(Files::new().put("s.ron", text)).unwrap();
     assert_eq!(scene.frame(0).unwrap().camera.lens().unwrap().focus(), 6.0);
-    let told = scene.with_overrides(&Overrides { focus: Some(4.5), ..Overrides::default() }).unwrap();
-    assert_eq!(told.frame(0).unwrap().camera.lens().unwrap().focus(), 4.5);
-    let pinhole = told.with_overrides(&Overrides { lens_radius: Some(0.0), ..Overrides::default() }).unwrap();
+    let focused = scene.with_overrides(&Overrides { focus: Some(4.5), ..Overrides::default() }).unwrap();
+    assert_eq!(focused.frame(0).unwrap().camera.lens().unwrap().focus(), 4.5);
+    let pinhole =
+        focused.with_overrides(&Overrides { lens_radius: Some(0.0), ..Overrides::default() }).unwrap();
     assert!(pinhole.frame(0).unwrap().camera.lens().is_none());
 }

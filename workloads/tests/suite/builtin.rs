@@ -1,4 +1,4 @@
-//! What the built-in and the example scenes promise.
+//! Properties of the built-in and the example scenes.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ fn every_built_in_scene_loads_and_draws() {
 }
 
 #[test]
-fn the_default_scene_is_what_it_says() {
+fn the_default_scene_matches_its_description() {
     let scene = load("default").unwrap();
     let settings = scene.settings();
     assert_eq!((settings.width, settings.height, settings.frames.clone()), (1280, 720, 0..36));
@@ -49,7 +49,7 @@ fn the_tiny_scene_has_motion_lens_and_texture_in_few_triangles() {
 }
 
 #[test]
-fn scenes_are_the_same_to_the_bit_each_time() {
+fn scenes_are_deterministic() {
     for name in ["default", "tiny"] {
         assert_eq!(positions(&load(name).unwrap()), positions(&load(name).unwrap()));
     }

@@ -1,4 +1,4 @@
-//! Caustics against closed forms, photons, energy and brute force.
+//! Caustics, compared with closed forms, photons, energy conservation and brute force.
 
 use std::f64::consts::TAU;
 
@@ -14,12 +14,12 @@ fn ocean(cells: u32, slope: f64) -> Ocean {
     Ocean { overshoot: 0.02, ..Ocean::new(cells, 8.0, DEPTH, [3.0, slope], 5) }
 }
 
-/// From above, `across` metres wide and high.
+/// A view from above, `across` metres wide and high.
 fn above(across: f64, pixels: u32) -> Eye {
     Eye::new([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 0.5 * across, [pixels; 2]).unwrap()
 }
 
-/// From the side and a little above.
+/// A view from the side, slightly above.
 fn aside(pixels: [u32; 2]) -> Eye {
     Eye::new([DVec3::new(6.0, 7.0, 20.0), DVec3::new(0.5, -2.0, 0.0), DVec3::Y], 4.0, pixels).unwrap()
 }
@@ -29,7 +29,7 @@ fn flux_w(beams: &[Beam]) -> f64 {
 }
 
 #[test]
-fn every_method_draws_the_same_image_and_ours_runs_least() {
+fn every_method_draws_the_same_image_with_moving_triangles_cheapest() {
     for (slope, light) in [(0.15, Light::Volume), (0.3, Light::Floor(FLOOR)), (0.6, Light::Volume)] {
         let (beams, eye) = (ocean(10, slope).beams(0.0), aside([84, 56]));
         let ours = draw(&beams, &eye, Method::Moving, Some(light));
@@ -46,22 +46,23 @@ fn every_method_draws_the_same_image_and_ours_runs_least() {
     }
 }
 
-/// The same light through triangles that stand along it: sides cross for a tenth of the way, all methods still draw one image and miss nothing,
-/// the floor is as far from photons through the waves as with flat triangles, and only the bound without cuts loses light.
+/// Corners offset along the light: sides cross over a tenth of the length. All methods still draw the same
+/// image and miss nothing. The floor differs from photons by as much as without the offset. Only the bound
+/// without cuts loses light.
 #[test]
-fn crossed_sides_cost_bodies_their_use_and_the_uncut_bound_its_light() {
+fn crossed_sides_make_the_uncut_bound_lose_light() {
     let flat = Ocean { overshoot: 0.25, ..Ocean::new(24, 16.0, 8.0, [5.0, 0.3], 1) };
     let pleated = Ocean { pleat: 0.4, ..flat.clone() };
     let (eye, floor, side) = (above(8.0, 128), Floor { height_m: -8.0 }, aside([84, 56]));
     let squares = Squares { eye: &eye, side_px: 8 };
     let known = squares.on_floor(&flat, 0.0, &floor, [600, 1]);
-    let off = |ocean: &Ocean| {
+    let difference = |ocean: &Ocean| {
         let image = draw(&ocean.beams(0.0), &eye, Method::Moving, Some(Light::Floor(floor)));
         error(&squares.of_image(&image.light), &known)
     };
     let beams = pleated.beams(0.0);
     assert!(crossing(&beams) > 0.05 && crossing(&flat.beams(0.0)) < 0.01, "{}", crossing(&beams));
-    let (crossed, straight) = (off(&pleated), off(&flat));
+    let (crossed, straight) = (difference(&pleated), difference(&flat));
     assert!((crossed - straight).abs() < 0.03, "{crossed} {straight}");
     let ours = draw(&beams, &side, Method::Moving, Some(Light::Volume));
     for method in [Method::Refined, Method::Hull, Method::Prism] {
@@ -95,7 +96,7 @@ fn no_point_of_the_floor_in_a_beam_is_missed() {
     }
 }
 
-/// All light that enters arrives: on the floor, and in the volume as flux times path.
+/// All light that enters arrives: on the floor, and in the volume as flux times path length.
 #[test]
 fn energy_is_kept() {
     for slope in [0.05, 0.3] {
@@ -124,7 +125,7 @@ impl Photons {
         unit(mix(self.0))
     }
 
-    /// Where a photon of a random beam, in proportion to flux, starts and ends.
+    /// Start and end of a photon of a random beam, in proportion to flux.
     fn ray(&mut self, beams: &[Beam], until: &[f64]) -> [DVec3; 2] {
         let at = self.uniform() * until[until.len() - 1];
         let beam = &beams[until.partition_point(|sum| *sum < at)];
@@ -136,7 +137,7 @@ impl Photons {
     }
 }
 
-/// Chi-square of counts over expectations, and how many there are.
+/// Chi-square of counts against expectations, and the number of bins.
 fn chi_square(counts: &[f64], expected: &[f64]) -> (f64, f64) {
     let used = counts.iter().zip(expected).filter(|(_, expected)| **expected > 25.0);
     used.fold((0.0, 0.0), |(sum, bins), (count, expected)| {
@@ -144,9 +145,9 @@ fn chi_square(counts: &[f64], expected: &[f64]) -> (f64, f64) {
     })
 }
 
-/// The image on the floor is what photons leave there: in bins of 48x48 pixels, by chi-square.
+/// Photons on the floor follow the image, in bins of 48x48 pixels, by chi-square.
 #[test]
-fn photons_fall_where_the_image_is_bright() {
+fn photons_on_the_floor_follow_the_image() {
     let beams = ocean(24, 0.25).beams(0.0);
     let until: Vec<f64> = beams
         .iter()
@@ -176,17 +177,17 @@ fn photons_fall_where_the_image_is_bright() {
         counts[y * bins as usize + x] += 1.0;
     }
     let (chi, bins) = chi_square(&counts, &expected);
-    // Six standard deviations of a chi-square; the sum over pixels adds some of its own near caustics.
+    // Six standard deviations of chi-square; the image itself has an error near caustics.
     assert!(bins > 80.0 && chi < bins + 6.0 * (2.0 * bins).sqrt(), "{chi} in {bins} bins");
-    // And it is sharp: an image that is even does not pass.
+    // The test is sensitive: a uniform image fails.
     let mean = expected.iter().filter(|e| **e > 25.0).sum::<f64>() / bins;
     let even: Vec<f64> = expected.iter().map(|e| if *e > 25.0 { mean } else { 0.0 }).collect();
     assert!(chi_square(&counts, &even).0 > 10.0 * bins);
 }
 
-/// The light in the volume is the path of photons in what a pixel sees.
+/// Photon paths in the volume follow the image.
 #[test]
-fn photons_take_their_way_where_the_volume_is_bright() {
+fn photon_paths_follow_the_image_of_the_volume() {
     let beams = ocean(16, 0.25).beams(0.0);
     let until: Vec<f64> = beams
         .iter()
@@ -198,7 +199,7 @@ fn photons_take_their_way_where_the_volume_is_bright() {
     let (bins, fine) = ([24_u32, 16], 20);
     let eye = aside(bins.map(|bins| bins * fine));
     let image = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
-    // Places along rays, each standing for a part of the way.
+    // Random positions on rays, each of which represents a part of the path.
     let places = 200_000;
     let mut random = Photons(4);
     let (mut counts, mut expected) = (vec![0.0; 24 * 16], vec![0.0; 24 * 16]);
@@ -225,10 +226,10 @@ fn photons_take_their_way_where_the_volume_is_bright() {
     assert!(bins > 100.0 && chi < bins + 6.0 * (2.0 * bins).sqrt(), "{chi} in {bins} bins");
 }
 
-/// Sinusoidal water of small slope: `x' = x + Z (1 - 1/n) h'(x)`, irradiance the sum of `1 / |dx'/dx|` over the sheets, before and behind the
-/// focus.
+/// A sinusoidal surface of small slope: `x' = x + Z (1 - 1/n) h'(x)`. Irradiance is the sum of `1 / |dx'/dx|`
+/// over the sheets, before and behind the focus.
 #[test]
-fn one_wave_is_as_bright_as_the_closed_form() {
+fn one_wave_agrees_with_the_closed_form() {
     let (amplitude_m, number, bend) = (0.001, TAU, 1.0 - 1.0 / 1.33);
     let focus = 1.0 / (bend * amplitude_m * number * number);
     for (depth_m, allowed) in [(0.5 * focus, 0.01), (2.0 * focus, 0.03)] {
@@ -239,22 +240,22 @@ fn one_wave_is_as_bright_as_the_closed_form() {
         let floor = Light::Floor(Floor { height_m: -depth_m });
         let image = draw(&water.beams(0.0), &eye, Method::Moving, Some(floor));
         let enters = 1.0 - (0.33_f64 / 2.33).powi(2);
-        let (mut off, mut sum) = (0.0, 0.0);
+        let (mut difference, mut sum) = (0.0, 0.0);
         for column in 0..200 {
             let at = (f64::from(column) + 0.5) / 200.0 - 0.5;
             let known = 1000.0 * enters * sheets(at, depth_m * bend * amplitude_m * number, number);
-            // Next to the bright lines the closed form has no bound.
+            // The closed form diverges near the bright lines.
             if known < 5000.0 {
                 let found = (0..200).map(|row| image.light[row * 200 + column as usize]).sum::<f64>() / 200.0;
-                off += (found - known).abs();
+                difference += (found - known).abs();
                 sum += known;
             }
         }
-        assert!(off < allowed * sum, "{depth_m}: {}", off / sum);
+        assert!(difference < allowed * sum, "{depth_m}: {}", difference / sum);
     }
 }
 
-/// The sum of `1 / |dx'/dx|` over the places `x` of a wave that lead to `at`: `x' = x - reach sin(k x)`.
+/// Sum of `1 / |dx'/dx|` over all `x` of a wave that lead to `at`, with `x' = x - reach sin(k x)`.
 fn sheets(at: f64, reach: f64, number: f64) -> f64 {
     let steps = 40_000;
     let x = |n: i32| at - 1.0 + 2.0 * f64::from(n) / f64::from(steps);
@@ -263,9 +264,10 @@ fn sheets(at: f64, reach: f64, number: f64) -> f64 {
     crosses.map(|n| (1.0 - reach * number * (number * x(n)).cos()).abs().recip()).sum()
 }
 
-/// Behind a ball lens: irradiance on a plane across the axis is `h dh / (rho d rho)` over the sheets.
+/// Behind a ball lens, irradiance on a plane across the axis is the sum of `h dh / (rho d rho)` over the
+/// sheets.
 #[test]
-fn a_ball_lens_lights_a_wall_as_the_closed_form_says() {
+fn a_ball_lens_agrees_with_the_closed_form() {
     let reach_m = 4.0;
     let ball = BallLens {
         radius_m: 1.0,
@@ -275,7 +277,7 @@ fn a_ball_lens_lights_a_wall_as_the_closed_form_says() {
         segments: 240,
         reach_m: 1.01 * reach_m,
     };
-    // Its axis is x; turned so that it shines down.
+    // The axis is x; the rotation makes the light go down.
     let turn = |p: DVec3| DVec3::new(p.y, -p.x, p.z);
     let beams: Vec<Beam> = ball
         .beams()
@@ -287,7 +289,7 @@ fn a_ball_lens_lights_a_wall_as_the_closed_form_says() {
     let lands = |h: f64| {
         let (i, r) = (h.asin(), (h / 1.5).asin());
         let turned = 2.0 * (i - r);
-        // The line at distance h from the middle with normal (sin D, cos D).
+        // The line at distance h from the centre with normal (sin D, cos D).
         (h - reach_m * turned.sin()) / turned.cos()
     };
     for h in [0.05, 0.1, 0.15, 0.2, 0.25] {

@@ -1,10 +1,10 @@
-//! Every way a scene file can be bad gives one message with the file, the place and the mend, and no panic.
+//! Every kind of broken scene file gives one message with file, place and remedy, and never panics.
 
 use crate::common::{Builder, Files, expect, failure, load_glb};
 use serde_json::json;
 use workloads::load;
 
-/// The error of a file made broken, checked to be a failure (not a mistake of usage) that names the file.
+/// The error of a broken file, which must be a failure (not a mistake of usage) that names the file.
 fn broken(change: impl FnOnce(&mut Builder)) -> String {
     let mut file = Builder::triangle();
     change(&mut file);
@@ -24,7 +24,7 @@ fn a_truncated_glb_says_so_wherever_it_is_cut() {
 }
 
 #[test]
-fn a_header_shorter_than_itself_is_no_panic() {
+fn a_header_shorter_than_itself_never_panics() {
     let mut bytes = Builder::triangle().bytes();
     bytes[8..12].copy_from_slice(&3u32.to_le_bytes());
     let _ = load_glb(&bytes);
@@ -227,7 +227,7 @@ fn points_are_dropped_with_a_warning_and_alpha_is_drawn_opaque_with_one() {
     let scene = load_glb(&file.bytes()).unwrap();
     let warnings: Vec<_> =
         scene.warnings().iter().map(|warning| (warning.code.name(), warning.count)).collect();
-    // A mask at half does not cut away what is half there, and a blended material that is opaque is drawn as it should be.
+    // A mask at 0.5 keeps half-transparent texels, and an opaque blended material is drawn correctly.
     assert_eq!(warnings, [("alpha-ignored", 1), ("alpha-ignored", 1), ("primitive-dropped", 1)]);
     assert_eq!(scene.triangle_count(), 5);
     let text = broken(|file| file.json["meshes"][0]["primitives"][0]["mode"] = json!(1));
@@ -235,7 +235,7 @@ fn points_are_dropped_with_a_warning_and_alpha_is_drawn_opaque_with_one() {
 }
 
 #[test]
-fn mistakes_in_ron_have_a_place_and_a_mend() {
+fn mistakes_in_ron_have_a_place_and_a_remedy() {
     let files = Files::new();
     let sphere = "objects: [(shape: Sphere(radius: 1))]";
     let bad = [

@@ -1,4 +1,4 @@
-//! Flags of scenes given to workloads: what is taken changes what is drawn, and the rest is refused.
+//! Scene flags of workloads: used flags change the result, and others are refused.
 
 use crate::common::{expect, spec};
 use workloads::catalog::find;
@@ -7,7 +7,7 @@ use workloads::{LoadError, Overrides};
 
 type Change = fn(&mut Overrides);
 
-/// Flags by name, each with a value that no workload has by default.
+/// Flags by name, each with a value that is no workload's default.
 const FLAGS: [(&str, Change); 7] = [
     ("--size", |overrides| overrides.size = Some((24, 24))),
     ("--samples", |overrides| overrides.samples = Some(5)),
@@ -18,13 +18,13 @@ const FLAGS: [(&str, Change); 7] = [
     ("--clip", |overrides| overrides.clip = Some("Run".to_owned())),
 ];
 
-/// Options that make it quick.
+/// Options for quick runs.
 fn options(job: &str) -> OptionSource {
     let set: &[(&str, &str)] = match job {
         "ccd" => &[("balls", "3"), ("resolution", "8")],
         "caustics" => &[("cells", "8")],
         "sampling" => &[("radius", "0.1")],
-        // Its own scene is still, and this one is not.
+        // The default scene is still; this one moves.
         "glossy" => &[("texels", "16"), ("scene", "default"), ("centre", "[0, 0.01, 0]"), ("half", "[3, 2]")],
         "soft-shadows" => &[("map_px", "32")],
         "multiview" => &[("check_cache", "false")],
@@ -34,13 +34,13 @@ fn options(job: &str) -> OptionSource {
     OptionSource { file: None, set }
 }
 
-/// Frame 1, in which what moves does.
+/// Frame 1, in which moving objects have moved.
 fn drawn(job: &str, overrides: &Overrides) -> Result<Drawn, LoadError> {
     let job = find(job, &options(job), &Request { overrides, seed: 1 }).unwrap()?;
     Ok(job.frame(1, &spec(), &mut |_, _| ()).unwrap())
 }
 
-/// A small image, with a lens where there has to be one to be focused.
+/// A small image, with a lens if the focus needs one.
 fn usual(job: &str, flag: &str) -> Overrides {
     let size = (job != "ccd").then_some((32, 32));
     let lens_radius = (job == "glossy" && flag == "--focus").then_some(0.25);
@@ -48,7 +48,7 @@ fn usual(job: &str, flag: &str) -> Overrides {
 }
 
 #[test]
-fn flags_that_are_taken_change_what_is_drawn() {
+fn used_flags_change_the_result() {
     for (job, taken) in [
         ("caustics", &["--size"][..]),
         ("ccd", &[]),
@@ -70,7 +70,7 @@ fn flags_that_are_taken_change_what_is_drawn() {
                 }
                 Err(error) => {
                     assert!(!taken.contains(&flag) && error.is_usage(), "{job} {flag}: {error}");
-                    // The scenes in which there is something to choose are those of glTF files.
+                    // Only glTF scenes have something to choose.
                     let name = flag.trim_start_matches("--");
                     expect(&error.to_string(), &[if flag == "--clip" { name } else { flag }]);
                 }
@@ -80,7 +80,7 @@ fn flags_that_are_taken_change_what_is_drawn() {
 }
 
 #[test]
-fn options_that_do_the_same_are_named() {
+fn replacing_options_are_named() {
     for (job, flag, option) in [
         ("ccd", "--size", "--set resolution="),
         ("ccd", "--samples", "leave it out"),
@@ -98,7 +98,7 @@ fn options_that_do_the_same_are_named() {
     }
 }
 
-/// Views agree at a depth, and there need not be a lens for that.
+/// Zero disparity needs a depth, but no lens.
 #[test]
 fn views_of_a_scene_without_a_lens_are_focused() {
     let files = crate::common::Files::new();

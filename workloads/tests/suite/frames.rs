@@ -1,4 +1,4 @@
-//! Which frames are drawn from the same input, and that a frame does not depend on those rendered with it.
+//! Which frames have equal inputs, and independence of a frame from others in the run.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use workloads::{Fingerprint, Frame, Overrides, Scene, load};
 const OBJECTS: &str =
     "objects: [(shape: Sphere(radius: 1, segments: 8)), (shape: Plane(size: 6), position: (0, -1, 0))]";
 
-/// A scene of still objects with this camera.
+/// A scene of still objects with a given camera.
 fn seen_by(files: &Files, camera: &str, settings: &str) -> String {
     let text = format!(
         "(settings: (width: 32, height: 18, samples: 1, frames: (0, 6){settings}), camera: ({camera}), {OBJECTS})"
@@ -30,7 +30,7 @@ const PATHS: [&str; 4] = [
     "position: (-4, 1, 5), target: (0, 0, 0), keyframes: [(time_s: 0, target: (0, 0, 0)), (time_s: 1, target: (0, 0, 1))]",
 ];
 
-/// A still triangle seen from a camera on a node that moves.
+/// A still triangle, and a camera on a moving node.
 fn camera_node() -> Vec<u8> {
     let mut file = Builder::triangle();
     file.animate("translation", &[0.0, 1.0], (&[0.0, 0.0, 3.0, 0.0, 1.0, 4.0], "VEC3"), "LINEAR");
@@ -44,7 +44,7 @@ fn print(frame: &Frame) -> Fingerprint {
     Fingerprint::of(frame).unwrap()
 }
 
-/// How many frames of a scene differ, and how many there are.
+/// Number of different frames of a scene, and number of all.
 fn differ(scene: &Scene) -> (usize, usize) {
     let frames = scene.settings().frames.clone();
     let prints: HashSet<_> = frames.clone().map(|number| print(&scene.frame(number).unwrap())).collect();
@@ -72,7 +72,7 @@ fn still_frames_are_equal() {
     assert!(!scene.frame(0).unwrap().is_moving());
 }
 
-/// A clip that starts over exactly at a frame gives the frames of its first loop again.
+/// A clip with a period of whole frames repeats the frames of its first loop.
 #[test]
 fn frames_of_a_loop_come_again() {
     let mut file = Builder::triangle();
@@ -87,7 +87,7 @@ fn frames_of_a_loop_come_again() {
 type Change = fn(&mut Frame);
 
 #[test]
-fn everything_that_is_drawn_counts() {
+fn every_part_of_a_frame_counts() {
     let frame = load("tiny").unwrap().frame(1).unwrap();
     let moved = |points: &Arc<[Vec3]>| -> Arc<[Vec3]> {
         let mut points = points.to_vec();
@@ -118,12 +118,12 @@ fn everything_that_is_drawn_counts() {
         changed[2].meshes[mesh].name.push('!');
         prints.extend(changed.iter().map(print));
     }
-    // Still cameras that only lose their lens are the same camera.
+    // Still cameras without their lens are the same camera.
     assert_eq!(prints.len(), 1 + 5 + 3 * frame.meshes.len());
     assert_eq!(print(&frame), print(&frame.clone()));
 }
 
-/// What a surface looks like at one point, for its lamp.
+/// Shading of a surface at one point, which shows the lamp.
 fn shade(scene: &Scene, frame: &Frame) -> Vec3 {
     let at = ShadingPoint {
         position: Vec3::ZERO,
@@ -135,9 +135,10 @@ fn shade(scene: &Scene, frame: &Frame) -> Vec3 {
     frame.draws(scene).unwrap()[0].shader.shade(&at, Vec4::ONE)
 }
 
-/// Frame 3 alone has to be frame 3 of all: camera, focus and lamp are placed for the scene, not for the frames asked for.
+/// Frame 3 alone must equal frame 3 of a run: camera, focus and lamp are placed for the scene, not for the
+/// requested frames.
 #[test]
-fn a_frame_does_not_depend_on_those_rendered_with_it() {
+fn a_frame_does_not_depend_on_other_frames_of_the_run() {
     let files = Files::new();
     let fitted = format!(
         "(settings: (width: 32, height: 18, frames: (0, 6), lens_radius: 0.01), {})",
@@ -150,8 +151,8 @@ fn a_frame_does_not_depend_on_those_rendered_with_it() {
     names.extend(["default", "tiny"].map(str::to_owned));
     for name in names {
         let all = load(&name).unwrap();
-        let asked = |frames| Overrides { frames: Some(frames), ..Overrides::default() };
-        let alone = load(&name).unwrap().with_overrides(&asked(3..4)).unwrap();
+        let overrides = |frames| Overrides { frames: Some(frames), ..Overrides::default() };
+        let alone = load(&name).unwrap().with_overrides(&overrides(3..4)).unwrap();
         let (one, of_all) = (alone.frame(3).unwrap(), all.frame(3).unwrap());
         assert_eq!(print(&one), print(&of_all), "{name}");
         assert_eq!(shade(&alone, &one), shade(&all, &of_all), "{name}: the lamp");
@@ -166,8 +167,8 @@ fn what_leaves_a_fitted_view_is_reported() {
                 velocity: (9, 0, 0)), (shape: Sphere(radius: 1, segments: 8))])";
     let name = files.put("leaves.ron", text);
     let codes = |frames| {
-        let asked = Overrides { frames: Some(frames), ..Overrides::default() };
-        let scene = load(&name).unwrap().with_overrides(&asked).unwrap();
+        let overrides = Overrides { frames: Some(frames), ..Overrides::default() };
+        let scene = load(&name).unwrap().with_overrides(&overrides).unwrap();
         scene.warnings().iter().map(|warning| warning.code).collect::<Vec<_>>()
     };
     assert!(codes(0..4).is_empty() && codes(3..4).is_empty());

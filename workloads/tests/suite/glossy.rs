@@ -21,7 +21,8 @@ fn rmse(a: &[Vec3], b: &[Vec3]) -> f64 {
     (sum / (3.0 * a.len() as f64)).sqrt()
 }
 
-/// The map of a half plane of white at a height, its edge across the receiver; the brightness of each column.
+/// The map of a white half plane at a height, with its edge across the receiver, and the brightness of each
+/// column.
 fn edge(height: f64, radius: f64, effect: Effect) -> (Map, Vec<f64>) {
     let map = Map::new(&Receiver::lying(DVec3::ZERO, [1.0, 0.5]), EYE, effect, radius, 64).unwrap();
     let side = if effect == Effect::Reflection { 1.0 } else { -1.0 };
@@ -40,7 +41,8 @@ fn edge(height: f64, radius: f64, effect: Effect) -> (Map, Vec<f64>) {
     (map, (0..width).map(column).collect())
 }
 
-/// The width of a straight ramp, from the variance of its slope; the boxes of a texel and of a difference add their own.
+/// Width of a linear ramp, from the variance of its slope. The box filters of a texel and of a difference add
+/// their own variance.
 fn ramp(columns: &[f64]) -> f64 {
     let slopes: Vec<f64> = columns.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let total: f64 = slopes.iter().sum();
@@ -49,9 +51,9 @@ fn ramp(columns: &[f64]) -> f64 {
     (12.0 * (moment(2) - moment(1).powi(2)) - 2.0).max(0.0).sqrt()
 }
 
-/// Contact hardens: the blur is 2 R h / (d + h) wide on the plane, through a square lens a straight ramp.
+/// Contact hardening: the blur on the plane is 2 R h / (d + h) wide, through a square lens a linear ramp.
 #[test]
-fn the_blur_widens_with_the_distance_from_the_plane_as_geometry_says() {
+fn the_blur_widens_with_height_as_in_the_closed_form() {
     for effect in [Effect::Reflection, Effect::Refraction(1.4)] {
         let mut last = 0.0;
         for height in [0.05, 0.3, 1.0, 2.0] {
@@ -72,7 +74,7 @@ fn the_blur_widens_with_the_distance_from_the_plane_as_geometry_says() {
     );
 }
 
-/// What a texel sees is what a ray from the mirrored eye through it hits, texel by texel.
+/// Compares every texel with rays from the mirrored viewer.
 #[test]
 fn one_pass_accumulation_and_rays_agree() {
     for (effect, below) in [(Effect::Reflection, false), (Effect::Refraction(1.33), true)] {
@@ -90,7 +92,7 @@ fn one_pass_accumulation_and_rays_agree() {
         let sky = scene.background();
         let traced = map.by_rays((&rays, &colours), &[&samples as &dyn SampleSource], sky, Lobe::Lens);
         let drawn = map.one_pass(&draws, &samples, (&spec(), sky), &mut |_, _| ()).unwrap().0;
-        // The same samples, so all that may differ is what lies on an edge to rounding.
+        // The samples are the same, so only samples on edges may differ, by rounding.
         assert!(rmse(&drawn, &traced) < 2e-3, "{effect:?}: {}", rmse(&drawn, &traced));
         assert!(rmse(&drawn, &vec![sky; drawn.len()]) > 0.05, "there is something to see");
         let set = SharedSamples::interleaved(&SampleSpec::default(), 64, 3).unwrap();
@@ -102,7 +104,7 @@ fn one_pass_accumulation_and_rays_agree() {
 }
 
 #[test]
-fn more_samples_err_less() {
+fn more_samples_reduce_the_error() {
     let scene = stage(false).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(&scene).unwrap();
@@ -137,10 +139,10 @@ fn the_job_shows_the_map_on_its_receiver() {
     assert!(rmse(&image, &refracted) > 0.02);
 }
 
-/// A mirror without roughness: the pixel that sees a point of the receiver shows what is mirrored there.
+/// A perfect mirror: the pixel of a receiver point shows the mirrored scene.
 #[test]
 fn a_mirror_shows_what_is_mirrored() {
-    // Fine enough that the texture is hardly filtered: a pixel is a texel or two.
+    // The resolution keeps texture filtering small: a pixel is a texel or two.
     const WIDE: usize = 384;
     let options = Options { roughness: 0.0, fresnel: 1.0, texels: 256, map_samples: 4, ..Options::default() };
     let overrides = Overrides { size: Some((WIDE as u32, 216)), samples: Some(4), ..Overrides::default() };
@@ -173,7 +175,7 @@ fn a_mirror_shows_what_is_mirrored() {
 }
 
 #[test]
-fn bad_regimes_and_options_are_told() {
+fn limitations_and_invalid_options_are_reported() {
     assert_eq!(drawn(Options { roughness: 1.5, ..Options::default() }).1, ["lens-wider-than-receiver"]);
     for bad in [
         Options { roughness: -1.0, ..Options::default() },

@@ -1,5 +1,5 @@
-//! Headers that announce more than their files hold take no memory for it. A test binary of its own, as it looks at what
-//! the whole process has taken.
+//! Headers that announce more than their files contain must not allocate memory for it. The test looks at the
+//! memory of the whole process.
 #![cfg(target_os = "linux")]
 
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::common::{Files, failure};
 use workloads::visibility::{FixedSamples, load, parse_m5d, parse_mts};
 
-/// Most address space the process has had, in bytes: memory that is taken but never touched counts, too.
+/// Peak address space of the process, in bytes, including untouched memory.
 fn peak_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmPeak:")).unwrap();
@@ -22,23 +22,23 @@ fn words(magic: &[u8], words: &[u32]) -> Vec<u8> {
 
 #[test]
 fn a_header_alone_takes_no_memory() {
-    const MOST: u32 = u32::MAX;
+    const HUGE: u32 = u32::MAX;
     let before = peak_bytes();
     let path = Path::new("a");
     for scalar in [4, 8] {
         for header in [
-            [scalar, MOST, 0, 0, 0],
-            [scalar, 1, 0, MOST, 0],
-            [scalar, 1, 0, 0, MOST],
-            [scalar, 1, 0, MOST, MOST],
+            [scalar, HUGE, 0, 0, 0],
+            [scalar, 1, 0, HUGE, 0],
+            [scalar, 1, 0, 0, HUGE],
+            [scalar, 1, 0, HUGE, HUGE],
         ] {
             failure(parse_mts(path, &words(b"MTS1", &header)).unwrap_err());
         }
     }
-    let mut scene = words(b"M5DSCN1\0", &[MOST, 0, 64, 48, 4, 0, 7, 0]);
+    let mut scene = words(b"M5DSCN1\0", &[HUGE, 0, 64, 48, 4, 0, 7, 0]);
     [60.0_f64, 0.577, 0.25, 8.0, 0.1].iter().for_each(|number| scene.extend(number.to_le_bytes()));
     failure(parse_m5d(path, &scene).unwrap_err());
-    failure(FixedSamples::parse(path, &words(b"M5DSMP1\0", &[MOST, MOST, 256, 0])).unwrap_err());
+    failure(FixedSamples::parse(path, &words(b"M5DSMP1\0", &[HUGE, HUGE, 256, 0])).unwrap_err());
     let files = Files::new();
     let header = |kind: &str| {
         format!(
@@ -53,7 +53,7 @@ fn a_header_alone_takes_no_memory() {
         header("binary_little_endian").replace("vertex 99999999", "vertex 0") + "\u{7f}\u{7f}\u{7f}\u{7f}";
     failure(load(&[files.put("a.ply", list)], None).unwrap_err());
     let mut stl = vec![b' '; 80];
-    stl.extend(MOST.to_le_bytes());
+    stl.extend(HUGE.to_le_bytes());
     failure(load(&[files.put("a.stl", stl)], None).unwrap_err());
     for text in ["OFF\n100000000 100000000 0\n", "OFF\n4294967295 1 0\n", "OFF\n1 1 0\n0 0 0\n4294967295 0\n"]
     {
@@ -64,6 +64,6 @@ fn a_header_alone_takes_no_memory() {
             .unwrap_err(),
     );
     let taken = peak_bytes() - before;
-    // What any of these headers announces is gigabytes; what a thread's heap may set aside is not.
+    // Each of these headers announces gigabytes, far beyond what a thread's heap reserves.
     assert!(taken < 256 << 20, "{taken} bytes");
 }

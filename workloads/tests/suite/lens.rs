@@ -1,4 +1,4 @@
-//! A fitted camera is a camera whatever the lens: it can be built, and something is seen.
+//! A fitted camera is valid for every lens, and sees something.
 
 use crate::common::Files;
 use glam::Vec3;
@@ -12,7 +12,7 @@ const SIZE: (u32, u32) = (96, 54);
 /// Lens radius and focus depth.
 type Optics = (f32, Option<f32>);
 
-/// A sphere of radius 1 around the origin, without a camera of its own.
+/// A sphere of radius 1 around the origin, without its own camera.
 fn sphere((radius, focus): Optics) -> Scene {
     let files = Files::new();
     let scene = load(files.put("s.ron", "(objects: [(shape: Sphere(radius: 1))])")).unwrap();
@@ -24,7 +24,7 @@ fn warns(scene: &Scene) -> bool {
     scene.warnings().iter().any(|warning| warning.code == "lens-leaves-view")
 }
 
-/// Every vertex as a pinhole in the middle of the lens sees it: `|x|` and `|y|` in halves of the image, and depth.
+/// Every vertex through the lens centre: `|x|` and `|y|` in halves of the image, and depth.
 fn through_the_centre(scene: &Scene) -> Vec<Vec3> {
     let frame = scene.frame(0).unwrap();
     let tan = frame.camera.half_height();
@@ -49,7 +49,7 @@ fn every_lens_and_focus_gives_a_camera_with_everything_in_view_of_its_centre() {
             assert_eq!(camera.lens().unwrap().radius(), radius);
             assert!(camera.near().is_finite() && camera.near() > 0.0, "{optics:?}: {}", camera.near());
             let centre = camera.open().transform_point3(Vec3::ZERO);
-            // Not only in front of the camera, but near enough to be more than a dot.
+            // In front of the camera, and near enough to be more than a dot.
             assert!(centre.z > camera.near() && centre.z < 150.0, "{optics:?}: {centre}");
             for seen in through_the_centre(&scene) {
                 assert!(seen.x <= 1.0 && seen.y <= 1.0 && seen.z > camera.near(), "{optics:?}: {seen}");
@@ -59,7 +59,7 @@ fn every_lens_and_focus_gives_a_camera_with_everything_in_view_of_its_centre() {
 }
 
 #[test]
-fn a_lens_too_large_for_its_focus_is_warned_of_and_leaves_the_camera_where_a_pinhole_has_it() {
+fn a_lens_too_large_for_its_focus_is_warned_about_and_keeps_the_pinhole_position() {
     let pinhole = sphere((0.0, None)).frame(0).unwrap().camera;
     for optics in [(1.0, 0.5), (1.0, 1.0), (0.5, 1.0), (2.0, 3.0), (10.0, 0.1), (1e30, 1e-20)] {
         let scene = sphere((optics.0, Some(optics.1)));
@@ -70,9 +70,9 @@ fn a_lens_too_large_for_its_focus_is_warned_of_and_leaves_the_camera_where_a_pin
 }
 
 #[test]
-fn a_lens_that_can_be_held_is_held_close_to_the_limit() {
-    // The view is 0.92 tan(20 deg) = 0.335 high for each unit of depth: a lens of that part of its focus depth is too
-    // large from however far away, and every smaller one is held from somewhere.
+fn a_lens_near_the_limit_still_fits() {
+    // The view is 0.92 tan(20 deg) = 0.335 high per unit of depth. A lens of that share of its focus depth is
+    // too large at any distance; every smaller one fits at some distance.
     for (part, holds) in [(0.1, true), (0.2, true), (0.28, true), (0.34, false), (0.5, false)] {
         for focus in [0.7, 1.0, 3.0] {
             let scene = sphere((part * focus, Some(focus)));
@@ -81,7 +81,7 @@ fn a_lens_that_can_be_held_is_held_close_to_the_limit() {
     }
 }
 
-/// Pixels of the first frame in which something is seen.
+/// Pixels of the first frame that see something.
 fn pixels_hit(scene: &Scene) -> usize {
     let cache = CacheSpec::lru(256, 4);
     let spec = PipelineSpec {

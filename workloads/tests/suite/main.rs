@@ -1,4 +1,4 @@
-//! Tests of the whole crate, a subject in each file.
+//! Tests of the whole crate, one subject per file.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod analytic;

@@ -1,4 +1,4 @@
-//! Messages say which file, where in it, what is wrong and what to do; warnings come when they are due.
+//! Messages say which file, where in it, what is wrong and what to do; warnings come in the right cases.
 
 use crate::common::{Files, expect, failure};
 use workloads::catalog::find;
@@ -54,7 +54,7 @@ fn a_ply_header_that_cannot_be_used_says_what_to_do() {
 }
 
 #[test]
-fn nothing_to_draw_names_the_file_even_of_a_scene_with_a_name() {
+fn an_empty_scene_is_reported_with_its_file() {
     let files = Files::new();
     files.put("empty.obj", "v 0 0 0\n");
     let scene = files.put("s.ron", "(name: \"nice\", objects: [(file: \"empty.obj\")])");
@@ -91,7 +91,7 @@ fn materials_that_no_file_describes_are_a_warning_unless_the_scene_has_its_own()
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_pipe_is_told_from_a_file_that_was_cut() {
+fn a_pipe_and_a_truncated_file_have_different_messages() {
     use std::io::Write;
     use std::os::fd::AsRawFd;
     let (reader, mut writer) = std::io::pipe().unwrap();
@@ -102,13 +102,13 @@ fn a_pipe_is_told_from_a_file_that_was_cut() {
     expect(&error.to_string(), &["/dev/fd/", "is a pipe", "write it to a file"]);
 }
 
-/// Why a workload is not made with these options.
+/// The error of a workload with these options.
 fn refusal(job: &str, options: &OptionSource) -> Option<LoadError> {
     find(job, options, &Request { overrides: &Overrides::default(), seed: 1 }).unwrap().err()
 }
 
 #[test]
-fn options_out_of_range_say_what_would_do() {
+fn options_out_of_range_give_the_valid_range() {
     for (job, name, value, says) in [
         ("occlusion", "walls", "1001", "0 to 1000"),
         ("occlusion", "boxes", "[0, 1, 1]", "1 to 16"),
@@ -148,7 +148,7 @@ fn options_out_of_range_say_what_would_do() {
 }
 
 #[test]
-fn views_that_see_no_scene_in_common_are_refused() {
+fn views_without_a_common_scene_are_refused() {
     let set =
         [("aperture", "1e10"), ("spacing", "1e11")].map(|(name, value)| (name.into(), value.into())).to_vec();
     let error = refusal("multiview", &OptionSource { file: None, set }).unwrap();
@@ -157,7 +157,7 @@ fn views_that_see_no_scene_in_common_are_refused() {
 }
 
 #[test]
-fn options_that_are_no_numbers_are_refused() {
+fn nan_options_are_refused() {
     let files = Files::new();
     let numbers: [(&str, &[&str]); 6] = [
         ("occlusion", &["gaps: #", "motion: #", "lens: #"]),

@@ -1,4 +1,4 @@
-//! Views of a camera line in one pass.
+//! Multi-view rendering in one pass.
 
 use activity::Event;
 use glam::{Affine3A, Vec3};
@@ -20,7 +20,7 @@ fn scene() -> Scene {
     workloads::load("tiny").unwrap()
 }
 
-/// Hands the rig, what draws its frame, and a target to `run`.
+/// Passes rig, draws and a target to `run`.
 fn with<R>(
     scene: &Scene,
     (layout, samples): (Layout, u32),
@@ -60,16 +60,16 @@ fn one_pass_equals_view_by_view_bit_for_bit() {
 }
 
 #[test]
-fn views_see_depth_from_their_own_places() {
-    // The thrown box stands before what is in focus, so it moves the other way than the viewer.
+fn views_have_parallax() {
+    // The thrown box is in front of the focus, so it moves opposite to the viewer.
     let views = one_pass(&scene(), LAYOUTS[0], &spec());
     assert!(rmse(&views.images[0], &views.images[1]) > 0.01);
 }
 
-/// With every sample shaded where it is, a view of the wide lens differs from one through a lens of its own by the place that shading takes
-/// the eye to be at and by rounding, and by nothing where shading does not depend on the eye.
+/// With per-sample shading, a view of the wide lens differs from one through its own lens only by rounding
+/// and by the viewer position of shading. View-independent shading gives no difference.
 #[test]
-fn a_region_of_the_lens_is_a_lens_of_its_own() {
+fn a_region_of_the_lens_equals_a_separate_lens() {
     let scene = scene();
     let spec = PipelineSpec { shading: Shading::PerSample, ..spec() };
     with(&scene, LAYOUTS[0], &spec, |rig, draws, to| {
@@ -99,9 +99,9 @@ fn accumulation_converges_to_the_same_views() {
     });
 }
 
-/// A white strip that crosses the image, before a still camera and still before one that turns.
+/// A white strip that crosses the image of a still camera, and a still strip before a rotating camera.
 #[test]
-fn accumulation_blurs_what_moves_and_what_a_moving_camera_sees() {
+fn accumulation_blurs_moving_objects_and_moving_cameras() {
     let strip =
         |x: f32| [[x, -9.0], [x + 0.8, -9.0], [x + 0.8, 9.0], [x, 9.0]].map(|[x, y]| Vec3::new(x, y, 4.0));
     let still = Camera::new(Affine3A::IDENTITY, 0.5, 0.1).unwrap();
@@ -127,10 +127,10 @@ fn accumulation_blurs_what_moves_and_what_a_moving_camera_sees() {
     }
 }
 
-/// What is shaded for a view serves the next: two views cost less than two, and with a cache that holds everything no more than what
-/// only one of them sees; with a cache of nothing they cost as much as they are.
+/// Shading is shared: two views cost less than twice one view. With an infinite cache they cost no more than
+/// newly visible points; without a cache they cost the full sum.
 #[test]
-fn shading_is_reused_between_views_as_far_as_the_cache_goes() {
+fn shading_is_reused_between_views_within_the_cache() {
     let scene = scene();
     let with_cache = |entries, layout| {
         let spec = PipelineSpec { shading_cache: CacheSpec::lru(entries, 4.min(entries)), ..spec() };
@@ -170,7 +170,7 @@ fn the_job_shows_views_side_by_side_interlaced_or_alone() {
 }
 
 #[test]
-fn each_bad_regime_is_told() {
+fn each_limitation_is_reported() {
     let big = PipelineSpec { shading_cache: CacheSpec::lru(16_384, 4), ..spec() };
     let near = Options { spacing: 0.15, aperture: 0.05, ..Options::default() };
     assert_eq!(drawn(near.clone(), &big).1, Vec::<&str>::new());
@@ -178,7 +178,7 @@ fn each_bad_regime_is_told() {
     assert_eq!(drawn(near, &small).1, ["shading-cache-small"]);
     let wide = Options { spacing: 1.5, ..Options::default() };
     assert!(drawn(wide, &big).1.contains(&"view-dependent-shading"));
-    // The outermost rays meet at 5.7 and at 6.3 degrees: 0.2 and 0.22 to either side of the middle, 4 away.
+    // The outermost rays meet at 5.7 and at 6.3 degrees: 0.2 and 0.22 to either side of the centre, 4 away.
     for (spacing, codes) in [(0.3, &[][..]), (0.34, &["view-dependent-shading"])] {
         let at = Options { focus: Some(4.0), aperture: 0.05, spacing, ..Options::default() };
         assert_eq!(drawn(at, &big).1, codes);
@@ -186,7 +186,7 @@ fn each_bad_regime_is_told() {
 }
 
 #[test]
-fn bad_options_are_the_callers_mistake() {
+fn invalid_options_are_mistakes_of_usage() {
     let none = Overrides::default();
     for bad in [
         Options { views: 0, ..Options::default() },

@@ -1,4 +1,4 @@
-//! What holds whatever the scene: fitted cameras see everything, and no file makes the importers panic.
+//! Properties of all scenes: fitted cameras see everything, and importers never panic.
 
 use crate::common::{Builder, Files, load_glb};
 use glam::Vec3;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use serde_json::json;
 use workloads::{Frame, Overrides, load};
 
-/// Every vertex at both ends, seen from five points of the lens, lies in the image and beyond the near depth.
+/// Every vertex at both ends, from five points of the lens, lies in the image and beyond the near depth.
 fn all_in_view(frame: &Frame, aspect: f32) -> Result<(), TestCaseError> {
     let camera = &frame.camera;
     let tan = camera.half_height();
@@ -58,7 +58,7 @@ proptest! {
     }
 }
 
-/// A small file with a bit of everything.
+/// A small file with many features.
 fn rich() -> Vec<u8> {
     let mut file = Builder::triangle();
     let joints = file.accessor(&[0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0], 3, "VEC4", 5121);
@@ -84,7 +84,7 @@ fn rich() -> Vec<u8> {
     file.bytes()
 }
 
-/// Loading and, where that works, the first frame: an error is fine, a panic is not.
+/// Loads the file and its first frame: errors are fine, panics are not.
 fn survives(path: &str) {
     if let Ok(scene) = load(path)
         && let Ok(frame) = scene.frame(0)
@@ -94,7 +94,7 @@ fn survives(path: &str) {
 }
 
 #[test]
-fn the_rich_file_itself_is_fine() {
+fn the_undamaged_file_is_valid() {
     let scene = load_glb(&rich()).unwrap();
     scene.frame(1).unwrap().draws(&scene).unwrap();
 }
@@ -103,13 +103,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
 
     #[test]
-    fn no_damage_to_a_glb_makes_a_panic(
+    fn damaged_glb_files_never_panic(
         flips in prop::collection::vec((any::<prop::sample::Index>(), 0..8u8), 0..6),
         digits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 0..3),
         cut in any::<prop::sample::Index>(), cuts in any::<bool>(),
     ) {
         let mut bytes = rich();
-        // Changed digits keep the JSON readable, so damage reaches beyond the parser.
+        // Changed digits keep the JSON valid, so the damage reaches beyond the parser.
         let places: Vec<usize> = (0..bytes.len()).filter(|at| bytes[*at].is_ascii_digit()).collect();
         for (place, digit) in &digits {
             bytes[places[place.index(places.len())]] = *digit;
@@ -127,7 +127,7 @@ proptest! {
     }
 
     #[test]
-    fn no_damage_to_a_file_of_one_surface_makes_a_panic(
+    fn damaged_surface_files_never_panic(
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..5),
         binary in any::<bool>(),
     ) {

@@ -13,7 +13,7 @@ fn scene(name: &str) -> Scene {
 #[test]
 #[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
 fn every_scene_has_its_triangles_and_gives_every_frame() {
-    // Counts of the folder's README; SimpleSkin's eight are counted from its indices.
+    // Triangle counts of the folder's README; the eight of SimpleSkin are counted from its indices.
     let known = [
         ("ToyCar/ToyCar.gltf", 108_936, false),
         ("Fox.glb", 576, true),
@@ -63,7 +63,7 @@ fn simple_skin_bends_as_its_joint_turns() {
         let scene = scene(name);
         let overrides = Overrides { frame_rate_hz: Some(2.0), shutter: Some(0.5), ..Overrides::default() };
         let scene = scene.with_overrides(&overrides).unwrap();
-        // Keys at 0, 0.5 and 1 s: identity, then the file's (rounded) eighth and quarter turn about z.
+        // Keys at 0, 0.5 and 1 s: identity, then the file's (rounded) eighth and quarter turn around z.
         let keys = [(0.383f32, 0.924f32), (0.707, 0.707)]
             .map(|(z, w)| DQuat::from_xyzw(0.0, 0.0, f64::from(z), f64::from(w)).normalize());
         let frame = scene.frame(1).unwrap();

@@ -1,4 +1,4 @@
-//! Soft shadows from a five-dimensional shadow map.
+//! Soft shadows from a 5D shadow map.
 
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
@@ -9,15 +9,15 @@ use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
 use workloads::job::Job;
 use workloads::soft_shadows::{
-    AreaLight, LightSpec, Method, Options, ShadowMap, Shadows, SoftShadows, World, see,
+    AreaLight, LightSpec, Method, Options, Renderer, ShadowMap, Shadows, SoftShadows, View, World, depth_pass,
 };
 use workloads::visibility::Unshaded;
 
 use crate::common::{bits, spec};
 
-/// Samples at one place are one step of a penumbra, however many they are.
+/// Equal samples give only one step of a penumbra.
 #[test]
-fn places_that_differ_are_counted_for_the_bands() {
+fn only_different_samples_count_against_banding() {
     let many: Vec<_> = (0..16_u8).map(|n| (f32::from(n) / 16.0, 0.0, 0.0)).collect();
     let warned = |points: Option<Vec<(f32, f32, f32)>>, samples: u32| {
         let overrides = Overrides { size: Some((8, 8)), samples: Some(samples), ..Overrides::default() };
@@ -54,14 +54,14 @@ fn draw<'a>(open: &'a [Vec3], close: &'a [Vec3], triangles: &'a [[u32; 3]]) -> D
     Draw { geometry: Geometry::new(open, close, triangles).unwrap(), shader: &Unshaded, cull: Cull::None }
 }
 
-/// A light straight above, 4 units high.
+/// A light straight above, at height 4.
 fn above(radius: f64) -> AreaLight {
     let spec = LightSpec { position: [0.0, 4.0, 0.0], target: [0.0; 3], radius, fov_deg: 80.0, near: 0.1 };
     AreaLight::new(&spec).unwrap()
 }
 
 fn map(light: &AreaLight, draws: &[Draw<'_>], side: u32, set: &SharedSamples, method: Method) -> ShadowMap {
-    ShadowMap::new((light, draws), side, set, (method, &spec()), &mut |_, _| ()).unwrap()
+    ShadowMap::new(light, draws, side, set, Renderer { method, spec: &spec() }, &mut |_, _| ()).unwrap()
 }
 
 #[test]
@@ -88,9 +88,9 @@ fn one_pass_equals_accumulation_bit_for_bit() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
-    /// Random soup, turned light, any set: every depth of every texel has the same bits.
+    /// Random triangles, a rotated light, any set: all depths are equal bit for bit.
     #[test]
-    fn maps_are_equal_for_any_soup(seed in 0_u64..1 << 32, count in 1_u32..20, radius in 0.01_f64..2.0) {
+    fn maps_are_equal_for_random_triangles(seed in 0_u64..1 << 32, count in 1_u32..20, radius in 0.01_f64..2.0) {
         let mut state = seed;
         let mut number = || {
             state = pipeline::random::mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
@@ -114,10 +114,10 @@ proptest! {
     }
 }
 
-/// A half plane at height h over a floor, a square light of radius R at height H: the penumbra on the floor is 2 R h / (H - h) wide and the
-/// lit share falls across it in a straight line.
+/// A half plane at height h over a floor, and a square light of radius R at height H: the penumbra on the
+/// floor is 2 R h / (H - h) wide, and the lit share is a linear ramp.
 #[test]
-fn the_penumbra_is_as_wide_as_geometry_says() {
+fn the_penumbra_follows_the_closed_form() {
     let (edge, floor) = (quad(1.0, [0.0, 9.0], [-9.0, 9.0]), quad(0.0, [-9.0, 9.0], [-9.0, 9.0]));
     let draws = [draw(&floor, &floor, &TRIANGLES), draw(&edge, &edge, &TRIANGLES)];
     let light = above(0.6);
@@ -128,7 +128,7 @@ fn the_penumbra_is_as_wide_as_geometry_says() {
         let point = Vec3::new(x, 0.0, 0.3);
         (0..256).filter(|&index| map.is_lit(&light, point, index, 0.02)).count() as f64 / 256.0
     };
-    // Place u of the light sees the edge on the floor at -u R h / (H - h): here from -0.2 to 0.2.
+    // The point u of the light sees the edge on the floor at -u R h / (H - h): here from -0.2 to 0.2.
     for x in [-0.18, -0.1, -0.05, 0.0, 0.07, 0.15, 0.19] {
         let expected = 0.5 - f64::from(x) / 0.4;
         assert!((lit(x) - expected).abs() < 0.05, "{x}: {} {expected}", lit(x));
@@ -136,7 +136,7 @@ fn the_penumbra_is_as_wide_as_geometry_says() {
     assert_eq!((lit(-0.24), lit(0.24)), (1.0, 0.0));
 }
 
-/// A strip that crosses the light's only ray to a point is there for a share of the time.
+/// A strip that crosses the light's only ray to a point blocks it for a share of the time.
 #[test]
 fn motion_blurs_the_shadow_by_the_share_of_time() {
     let floor = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
@@ -147,12 +147,12 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
     let set = set(256, 9);
     let map = map(&light, &draws, 256, &set, Method::OnePass);
     let lit = (0..256).filter(|&index| map.is_lit(&light, Vec3::ZERO, index, 0.05)).count();
-    // The strip is 1 wide and moves by 4: over the point for a quarter of the time.
+    // The strip is 1 wide and moves by 4: it covers the point for a quarter of the time.
     assert!((lit as f64 / 256.0 - 0.75).abs() < 0.01, "{lit}");
 }
 
-/// Lambert's law: a floor seen from where the light is has the cosine of the angle it is seen under at the time of the sample, and what
-/// comes from everywhere; whichever way its triangles are wound.
+/// Lambert's law: a floor has the cosine of its angle to the light at the time of the sample, plus ambient
+/// light, with either winding.
 #[test]
 fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
     let light = above(1e-4);
@@ -166,10 +166,16 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
         let sample = Sample { x: 0.5, y: 0.5, t, ..Sample::default() };
         let set = SharedSamples::new(vec![sample; 3]).unwrap();
         let draws = [draw(&open, &close, &triangles)];
-        let seen =
-            see((&camera, &draws), viewport, &set, (Method::OnePass, &spec()), &mut |_, _| ()).unwrap();
-        let world =
-            World::new((&camera, &draws), viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
+        let view = View { camera: &camera, draws: &draws };
+        let seen = depth_pass(
+            &view,
+            viewport,
+            &set,
+            Renderer { method: Method::OnePass, spec: &spec() },
+            &mut |_, _| (),
+        )
+        .unwrap();
+        let world = World::new(&view, viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
         let image = world.image(&set, &seen.samples, Shadows::None);
         let normal = DVec3::new(-f64::from(t), 1.0, 0.0).normalize();
         for (place, pixel) in image.iter().enumerate() {
@@ -190,8 +196,16 @@ fn rays_and_a_fine_map_agree() {
     let light = AreaLight::new(&LightSpec::default()).unwrap();
     let viewport = Viewport::new(48, 27).unwrap();
     let (camera, set) = (frame.camera.with_lens(None), set(16, 5));
-    let seen = see((&camera, &draws), viewport, &set, (Method::OnePass, &spec()), &mut |_, _| ()).unwrap();
-    let world = World::new((&camera, &draws), viewport, &light, &[], Vec3::ZERO);
+    let view = View { camera: &camera, draws: &draws };
+    let seen = depth_pass(
+        &view,
+        viewport,
+        &set,
+        Renderer { method: Method::OnePass, spec: &spec() },
+        &mut |_, _| (),
+    )
+    .unwrap();
+    let world = World::new(&view, viewport, &light, &[], Vec3::ZERO);
     let map = map(&light, &draws, 512, &set, Method::OnePass);
     let of = |shadows| world.lit_and_unlit(&set, &seen.samples, shadows);
     let (by_map, by_rays) = (of(Shadows::Map { map: &map, bias: 0.02 }), of(Shadows::Rays));
@@ -200,7 +214,7 @@ fn rays_and_a_fine_map_agree() {
     let dark = by_rays.iter().flatten().filter(|lit| !**lit).count();
     assert!(facing > 10_000 && dark > 300, "{facing} {dark}");
     assert!(wrong * 100 < facing, "{wrong} of {facing} differ");
-    // Bias decides: without any, surfaces shade themselves; with far too much, shadows vanish.
+    // Without a bias surfaces shade themselves; with far too much, shadows vanish.
     let wrong = |bias| {
         let by_map = of(Shadows::Map { map: &map, bias });
         by_map.iter().zip(&by_rays).filter(|(a, b)| a != b).count()
@@ -210,7 +224,7 @@ fn rays_and_a_fine_map_agree() {
 }
 
 #[test]
-fn depths_are_all_that_the_passes_of_depth_write() {
+fn depth_passes_write_depths_only() {
     let floor = quad(0.0, [-9.0, 9.0], [-9.0, 9.0]);
     let (light, set) = (above(0.5), set(4, 1));
     let draws = [draw(&floor, &floor, &TRIANGLES)];
@@ -226,7 +240,7 @@ fn warned(options: Options, samples: u32) -> Vec<&'static str> {
 }
 
 #[test]
-fn each_bad_regime_is_told() {
+fn each_limitation_is_reported() {
     let small = Options { map_px: 64, bias: 0.2, ..Options::default() };
     assert_eq!(warned(small.clone(), 16), Vec::<&str>::new());
     assert_eq!(warned(small.clone(), 4), ["shadow-banding"]);
@@ -235,7 +249,7 @@ fn each_bad_regime_is_told() {
 }
 
 #[test]
-fn points_of_ones_own_are_the_set() {
+fn user_defined_points_are_the_set() {
     let points = vec![(0.5, -0.25, 0.0), (-1.0, 1.0, 0.5)];
     let spec = SampleSpec { pattern: Pattern::Given { points: points.clone() }, ..SampleSpec::default() };
     let set = SharedSamples::from_spec(&spec, 2, 1).unwrap();

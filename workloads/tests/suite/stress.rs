@@ -1,5 +1,5 @@
-//! Culling changes nothing on the failure catalogue: for every family and value, whatever tests are on, each sample sees what
-//! brute force over all samples says.
+//! Culling changes nothing on the failure catalogue: for every family, value and combination of tests, each
+//! sample sees the same as by brute force.
 
 use glam::Vec3;
 use pipeline::frame::visibility;
@@ -10,9 +10,9 @@ use pipeline::{Features, PipelineSpec, Settings};
 use workloads::stress::{Family, Size, StressScene, brute_force, families, family, within_bounds};
 use workloads::visibility::Unshaded;
 
-const NOTHING: u32 = u32::MAX;
+const NO_TRIANGLE: u32 = u32::MAX;
 
-/// No test, each test by itself, all but each, all, and all that pay.
+/// No test, each test alone, all but each, all, and all that pay off.
 fn combinations() -> impl Iterator<Item = Features> {
     let alone = [
         Features { lens_lines: true, ..Features::NONE },
@@ -52,13 +52,14 @@ fn differ(a: &[(u32, u32)], b: &[(u32, u32)]) -> usize {
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
-/// Holds every value of a family, in every combination of tests, against brute force; gives how many samples see anything.
-fn hold(family: &Family) -> usize {
+/// Compares every value of a family, in every combination of tests, with brute force; returns the number of
+/// covered samples.
+fn compare(family: &Family) -> usize {
     let mut hits = 0;
     for (&value, seed) in family.sweep(true).iter().zip(1..) {
         let scene = family.scene(value, Size::SMALL, seed).unwrap();
         let truth = truth(&scene);
-        hits += truth.iter().filter(|(triangle, _)| *triangle != NOTHING).count();
+        hits += truth.iter().filter(|(triangle, _)| *triangle != NO_TRIANGLE).count();
         for features in combinations() {
             let lost = differ(&seen(&scene, features), &truth);
             assert_eq!(lost, 0, "{} at {value} with {features:?}", family.name);
@@ -68,19 +69,19 @@ fn hold(family: &Family) -> usize {
 }
 
 #[test]
-fn no_family_loses_a_sample_to_any_combination_of_tests() {
+fn no_combination_of_tests_loses_a_sample() {
     for family in families() {
-        let hits = hold(family);
+        let hits = compare(family);
         assert!(hits > 200, "only {hits} samples see anything of {}: it shows little", family.name);
     }
 }
 
-/// An interval without its first fiftieth.
+/// An interval without its first 2 %.
 fn short([lo, hi]: [f32; 2]) -> [f32; 2] {
     [lo + 0.02 * (hi - lo), hi]
 }
 
-/// A deliberately wrong bound: what it does to the box that the side planes leave.
+/// A deliberately wrong bound: modifies the box that the side planes leave.
 type Mutant = fn(Box5) -> Option<Box5>;
 
 fn lost_to(mutant: Mutant, name: &str) -> usize {
@@ -123,21 +124,22 @@ fn results_do_not_depend_on_threads() {
     }
 }
 
-/// The camera sits inside a closed surface, so every sample sees it, whatever the place on the lens and the time: a hole at a
-/// shared edge would let one through.
+/// The camera is inside a closed surface, so every sample sees it at every lens position and time. A hole at
+/// a shared edge would let a sample through.
 #[test]
-fn no_sample_looks_out_of_a_closed_surface() {
+fn no_sample_escapes_a_closed_surface() {
     let family = family("inside-closed").unwrap();
     for &value in family.values {
         let scene = family.scene(value, Size { side_px: 64, triangles: 0 }, 1).unwrap();
         for features in [Features::NONE, Features::ALL] {
-            let out = seen(&scene, features).iter().filter(|(triangle, _)| *triangle == NOTHING).count();
+            let out = seen(&scene, features).iter().filter(|(triangle, _)| *triangle == NO_TRIANGLE).count();
             assert_eq!(out, 0, "{out} samples look out at {value}");
         }
     }
 }
 
-/// Each sample of the grid is covered by one triangle: drawn alone, triangles cover together what they cover in one draw.
+/// Each sample of the grid belongs to one triangle: triangles drawn one by one cover together what they cover
+/// in one draw.
 #[test]
 fn samples_on_shared_edges_and_vertices_have_one_owner() {
     let family = family("shared-edges").unwrap();
@@ -147,7 +149,7 @@ fn samples_on_shared_edges_and_vertices_have_one_owner() {
         for corners in &scene.triangles {
             let alone = StressScene { triangles: vec![*corners], ..scene.clone() };
             for (count, (triangle, _)) in owners.iter_mut().zip(seen(&alone, Features::ALL)) {
-                *count += u32::from(triangle != NOTHING);
+                *count += u32::from(triangle != NO_TRIANGLE);
             }
         }
         let together = seen(&scene, Features::ALL);
@@ -156,11 +158,11 @@ fn samples_on_shared_edges_and_vertices_have_one_owner() {
             let [x, y] = [place / 4 % 32, place / 4 / 32].map(|pixel| pixel as f64 - 16.0);
             let sample = scene.samples.pixel((x + 16.0) as u32, (y + 16.0) as u32)[place % 4];
             let [dx, dy, u, v, t] = [sample.x, sample.y, sample.u, sample.v, sample.t].map(f64::from);
-            // Half open: the sample is moved by an infinitely small step towards +x and, smaller still, +y.
+            // Half-open rule: the sample is moved by an infinitesimal step towards +x and, smaller still, +y.
             let at = [x + dx - u - 2.0 * t, y + dy + v - 2.0 * t].map(|c| c + 0.5 * reach);
             let expected = at.iter().all(|c| (0.0..reach).contains(c));
             assert_eq!(*count, u32::from(expected), "cells of {cell_px} pixels: {at:?} {sample:?}");
-            assert_eq!(*count, u32::from(triangle != NOTHING), "cells of {cell_px} pixels");
+            assert_eq!(*count, u32::from(triangle != NO_TRIANGLE), "cells of {cell_px} pixels");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Moving meshes for `quintile visibility`: what each kind of file becomes, and what is said of broken ones.
+//! Moving meshes for `quintile visibility`: every file format, and messages about broken files.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use workloads::visibility::{CameraSpec, VisibilityScene, load, parse_m5d, parse_
 
 const SQUARE: [[f32; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
 const HALVES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
-/// It looks at the origin from five units in front.
+/// A camera that looks at the origin from five units in front.
 const CAMERA: &str = "(width: 32, height: 16, samples: 4, position: (0, 0, 5), look_at: (0, 0, 0))";
 
 fn moved() -> [[f32; 3]; 4] {
@@ -26,7 +26,7 @@ fn pair(start: (&str, &str), end: (&str, &str)) -> Result<VisibilityScene, LoadE
 }
 
 #[test]
-fn every_kind_of_file_becomes_the_same_scene() {
+fn every_format_gives_the_same_scene() {
     let files = Files::new();
     let camera = files.put("c.ron", CAMERA);
     let starts = [files.put("a.ply", ply(&SQUARE, &HALVES)), files.put("a.obj", obj(&SQUARE, &HALVES))];
@@ -38,7 +38,7 @@ fn every_kind_of_file_becomes_the_same_scene() {
         starts.iter().flat_map(|start| ends.iter().map(|end| vec![start.clone(), end.clone()])).collect();
     let whole = mts(&SQUARE, &moved(), &HALVES);
     cases.push(vec![files.put("a.mts", &whole)]);
-    // Kinds are told by the contents, whatever the name.
+    // The content decides the format, whatever the name.
     cases.push(vec![files.put("no-name", gzip(&whole))]);
     for case in cases {
         let scene = load(&case, Some(&camera)).unwrap();
@@ -86,7 +86,7 @@ fn one_file_stays_still_and_an_end_of_the_camera_moves_it() {
 }
 
 #[test]
-fn a_fitted_camera_given_back_is_the_same_to_the_bit() {
+fn a_fitted_camera_survives_a_round_trip_exactly() {
     let files = Files::new();
     let mesh = files.put("a.mts", mts(&SQUARE, &moved(), &HALVES));
     let view = files.put("v.ron", "(width: 320, height: 200, lens_radius: 0.1, fov_deg: 50)");
@@ -102,7 +102,7 @@ fn a_fitted_camera_given_back_is_the_same_to_the_bit() {
 }
 
 #[test]
-fn a_lens_that_no_fitted_camera_can_hold_is_told() {
+fn a_lens_too_large_for_a_fitted_camera_is_reported() {
     let files = Files::new();
     let mesh = files.put("a.ply", ply(&SQUARE, &HALVES));
     let camera = files.put("c.ron", "(lens_radius: 50, focus: 1)");
@@ -124,7 +124,7 @@ fn an_m5d_under_the_camera_it_carries_is_itself() {
 }
 
 #[test]
-fn ends_that_differ_say_which_and_where() {
+fn different_topologies_are_reported_with_their_place() {
     let square = ply(&SQUARE, &HALVES);
     let text = failure(pair(("a.ply", &square), ("b.ply", &ply(&SQUARE, &HALVES[..1]))).unwrap_err());
     expect(&text, &["b.ply: triangles: it has 1 triangles, but", "a.ply has 2", "equal topology"]);
@@ -139,7 +139,7 @@ fn ends_that_differ_say_which_and_where() {
         let text = failure(pair(("a.obj", &one), ("b.obj", &other)).unwrap_err());
         expect(&text, &["b.obj: triangle 1: one vertex of", "is at [", "equal topology"]);
     }
-    // Joined in one file and torn in the other, whichever comes first.
+    // Vertices that are shared in one file and split in the other, in either order.
     let torn = [SQUARE.as_slice(), &[[9.0, 9.0, 9.0]]].concat();
     let torn = ply(&torn, &[HALVES[0], [4, 2, 3]]);
     for (start, end) in [
@@ -152,7 +152,7 @@ fn ends_that_differ_say_which_and_where() {
 }
 
 #[test]
-fn obj_files_whose_faces_differ_do_not_go_together_though_every_vertex_has_one_place() {
+fn obj_files_with_different_faces_are_incompatible() {
     let points = [SQUARE.as_slice(), &SQUARE.map(|[x, y, z]| [x + 4.0, y, z])].concat();
     let [one, other] = [[[0, 1, 2], [4, 5, 6]], [[4, 5, 6], [0, 1, 2]]].map(|faces| obj(&points, &faces));
     assert!(pair(("a.obj", &one), ("b.obj", &one)).is_ok());
@@ -179,7 +179,7 @@ fn collision_cases_name_folders_and_numbers_beyond_f32() {
     expect(&text, &["vertex 0 has a coordinate that is infinite or beyond f32 (3.4e38)"]);
 }
 
-/// A point in the middle of a segment; read as f32 it is not.
+/// A point in the middle of a segment; rounding to f32 moves it off.
 #[test]
 fn a_contact_below_the_smallest_normal_f32_is_not_missed() {
     let files = Files::new();
@@ -193,7 +193,7 @@ fn a_contact_below_the_smallest_normal_f32_is_not_missed() {
 }
 
 #[test]
-fn an_obj_whose_normals_split_vertices_still_matches() {
+fn obj_vertices_split_by_normals_still_match() {
     let points = obj(&SQUARE, &[]);
     let split = format!("{points}vn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n");
     let smooth = format!("{}vn 0 0 1\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1\n", obj(&moved(), &[]));
@@ -207,7 +207,7 @@ fn an_obj_whose_normals_split_vertices_still_matches() {
 }
 
 #[test]
-fn files_that_do_not_go_together_are_mistakes_of_usage() {
+fn incompatible_files_are_mistakes_of_usage() {
     let files = Files::new();
     let surface = files.put("a.ply", ply(&SQUARE, &HALVES));
     let whole = files.put("a.mts", mts(&SQUARE, &moved(), &HALVES));
@@ -255,7 +255,7 @@ fn broken_files_are_failures_that_name_them() {
     expect(&text, &["a.ply: vertices: vertex 2", "out of the range", "scale the mesh"]);
 }
 
-/// Bytes with some of them changed, and perhaps cut.
+/// Bytes with some changes, and possibly truncated.
 fn damaged(bytes: &[u8], flips: &[(prop::sample::Index, u8)], cut: Option<prop::sample::Index>) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for (place, to) in flips {
@@ -272,7 +272,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
     #[test]
-    fn no_damage_to_a_mesh_or_camera_makes_a_panic(
+    fn damaged_meshes_and_cameras_never_panic(
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..5),
         cut in prop::option::of(any::<prop::sample::Index>()),
     ) {
@@ -294,7 +294,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn no_damage_to_a_file_makes_loading_panic(
+    fn damaged_files_never_panic(
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::of(any::<prop::sample::Index>()),
     ) {
@@ -309,7 +309,7 @@ proptest! {
 }
 
 #[test]
-fn the_camera_in_the_book_is_one() {
+fn the_camera_in_the_book_is_valid() {
     let book =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/visibility.md"))
             .unwrap();

@@ -1,24 +1,24 @@
-//! Random triangles that stress one thing each, and samples on their edges.
+//! Random triangles that stress one property each, and samples on their edges.
 
-use super::{Look, Probe, Uniform, repeated, weight};
+use super::{Probe, SamplePosition, Uniform, repeated, weight};
 use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
 
-/// Scenes that stress one thing each.
+/// Scenes that stress one property each.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub moving: bool,
     pub lens: bool,
-    /// The view is orthographic; pixels are no lengths of the scene then.
+    /// Orthographic view; pixels are then no lengths of the scene.
     pub parallel: bool,
     /// A third of the vertices may be behind the camera.
     pub behind: bool,
     /// In the far corner of the largest image.
     pub far: bool,
-    /// Vertices nearly on a line.
+    /// Vertices nearly collinear.
     pub sliver: bool,
-    /// All lengths are multiplied by two to this.
+    /// Binary logarithm of a factor of all lengths.
     pub scale: i32,
 }
 
@@ -74,7 +74,8 @@ pub fn setting(case: Case, seed: u64) -> Setting {
     Setting { triangle, probe }
 }
 
-/// Four samples a pixel; where the edges of the triangle cross the tile, most lie on one as near as f32 can tell.
+/// Four samples per pixel; where the edges of the triangle cross the tile, most samples are on an edge within
+/// f32 precision.
 pub fn on_its_edges(
     r: &mut Uniform,
     triangle: &[MovingVertex; 3],
@@ -87,9 +88,9 @@ pub fn on_its_edges(
         let place = if lens { [r.within(-1.0, 1.0), r.within(-1.0, 1.0)] } else { [0.0; 2] };
         let mut sample = Sample { x: r.next(), y: r.next(), u: place[0], v: place[1], t: r.next() };
         let [u, v, t] = [sample.u, sample.v, sample.t].map(f64::from);
-        let look = Look { x: 0.0, y: 0.0, u, v, t };
+        let position = SamplePosition { x: 0.0, y: 0.0, u, v, t };
         let k = (r.next() * 3.0) as usize;
-        let [p, q] = [k, (k + 1) % 3].map(|corner| look.sheared(&triangle[corner], shear));
+        let [p, q] = [k, (k + 1) % 3].map(|corner| position.sheared(&triangle[corner], shear));
         let along = f64::from(r.next());
         let mix = |axis: usize| p[axis] + along * (q[axis] - p[axis]);
         let at = [0, 1].map(|axis| mix(axis) / weight(shear, mix(2)) - f64::from(origin_px[axis]));

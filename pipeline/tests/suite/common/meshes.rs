@@ -1,11 +1,11 @@
-//! Meshes on the homogeneous image plane whose triangles share vertices, and samples that lie on their edges.
+//! Meshes on the homogeneous image plane with shared vertices, and samples on their edges.
 
-use super::{Look, Uniform, repeated, weight};
+use super::{SamplePosition, Uniform, repeated, weight};
 use pipeline::sampling::Sample;
 use pipeline::*;
 use proptest::prelude::*;
 
-/// The dimensions in use.
+/// Dimensions in use.
 #[derive(Clone, Copy, Debug)]
 pub struct Dims {
     pub moving: bool,
@@ -33,8 +33,8 @@ impl Mesh {
     }
 }
 
-/// Samples of a tile of 8x8 pixels whose first is at `origin_px` from the centre of the image; most of them lie on edges or
-/// vertices of `mesh` as near as f32 can tell, the rest anywhere.
+/// Samples of a tile of 8x8 pixels whose first pixel is at `origin_px` from the centre of the image. Most are
+/// on edges or vertices of `mesh` within f32 precision, the rest anywhere.
 pub fn on_edges(r: &mut Uniform, mesh: &Mesh, shear: &Shear, origin_px: [f32; 2], dims: Dims) -> SampleTable {
     const PER_PIXEL: usize = 8;
     let mut pixels: Vec<Vec<Sample>> = vec![Vec::new(); 64];
@@ -47,10 +47,15 @@ pub fn on_edges(r: &mut Uniform, mesh: &Mesh, shear: &Shear, origin_px: [f32; 2]
         if !dims.lens {
             (sample.u, sample.v) = (0.0, 0.0);
         }
-        let look =
-            Look { x: 0.0, y: 0.0, u: f64::from(sample.u), v: f64::from(sample.v), t: f64::from(sample.t) };
+        let position = SamplePosition {
+            x: 0.0,
+            y: 0.0,
+            u: f64::from(sample.u),
+            v: f64::from(sample.v),
+            t: f64::from(sample.t),
+        };
         let triangle = mesh.triangles[(r.next() * mesh.triangles.len() as f32) as usize];
-        let [p, q] = [0, 1].map(|k| look.sheared(&mesh.vertices[triangle[k]], shear));
+        let [p, q] = [0, 1].map(|k| position.sheared(&mesh.vertices[triangle[k]], shear));
         let along = if r.next() < 0.2 { 0.0 } else { f64::from(r.next()) };
         let mix = |axis: usize| p[axis] + along * (q[axis] - p[axis]);
         let at = [0, 1].map(|axis| mix(axis) / weight(shear, mix(2)) - f64::from(origin_px[axis]));
@@ -79,14 +84,14 @@ pub fn random_shear(r: &mut Uniform, dims: Dims, reach: f32) -> Shear {
 }
 
 impl Dims {
-    /// A vertex at this place on the image and depth.
+    /// A vertex at this image position and depth.
     pub fn vertex(&self, at: [f32; 2], w: f32) -> [f32; 3] {
         let weight = if self.parallel { 1.0 } else { w };
         [at[0] * weight, at[1] * weight, w]
     }
 }
 
-/// The middle of the image, or the far corner of the largest one, where f32 pixels are coarse.
+/// Middle of the image, or the far corner of the largest one, where f32 pixels are coarse.
 pub fn place(far: bool) -> (Viewport, [u32; 2], [f32; 2]) {
     if far {
         let side = Viewport::MAX_PX;

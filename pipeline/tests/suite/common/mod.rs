@@ -1,4 +1,4 @@
-//! Random scenes and a brute-force image to hold the pipeline against.
+//! Random scenes, and a brute-force image as the reference.
 
 pub mod case;
 pub mod meshes;
@@ -13,7 +13,7 @@ use pipeline::sampling::{Sample, TileSamples};
 use pipeline::setup::{Outcome, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
-pub use probe::{Look, Probe, looks, repeated, weight};
+pub use probe::{Probe, SamplePosition, repeated, sample_positions, weight};
 use proptest::prelude::*;
 
 /// Counter-based uniform numbers in [0, 1).
@@ -34,7 +34,7 @@ impl Uniform {
     }
 }
 
-/// A shader whose colour is a function of the normal, so that it does not matter which.
+/// A shader whose colour is a function of the normal.
 pub struct Plain;
 
 impl Shader for Plain {
@@ -47,14 +47,14 @@ impl Shader for Plain {
     }
 }
 
-/// Triangle soup at both ends of the shutter, in front of a camera at the origin that looks down +z.
+/// Triangle soup at both ends of the shutter, in front of a camera at the origin that looks along +z.
 pub struct Soup {
     pub open: Vec<Vec3>,
     pub close: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// How wild a soup is.
+/// Kind of a soup.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     Still,
@@ -63,9 +63,9 @@ pub enum Kind {
     Crossing,
     /// Slivers, and triangles that turn over.
     Slivers,
-    /// Vertices on a coarse grid, shared and aligned with samples, so that ties abound.
+    /// Vertices on a coarse grid, shared and aligned with samples, so that ties are frequent.
     Grid,
-    /// Large layers, each a hair nearer than the one before, so that depth culling decides.
+    /// Large layers, each slightly nearer than the one before, so that depth culling matters.
     Layers,
 }
 
@@ -74,7 +74,7 @@ impl Kind {
         [Self::Still, Self::Moving, Self::Crossing, Self::Slivers, Self::Grid, Self::Layers];
 }
 
-/// Every kind, each as likely.
+/// All kinds with equal probability.
 pub fn kinds() -> impl Strategy<Value = Kind> {
     prop::sample::select(&Kind::ALL[..])
 }
@@ -112,7 +112,7 @@ impl Soup {
             }
         }
         if kind == Kind::Grid {
-            // With 50 rows and a half field of view of 0.7, this puts vertices on the corners of pixels at depth 4.
+            // With 50 rows and a half field of view of 0.7, this puts vertices on pixel corners at depth 4.
             let px = |c: f32| (c * 10.0).round() * (4.0 * 0.7 / 25.0);
             let snap = |p: &mut Vec3| *p = Vec3::new(px(p.x), px(p.y), 4.0);
             open.iter_mut().for_each(snap);
@@ -128,7 +128,7 @@ impl Soup {
     }
 }
 
-/// A table whose samples lie on the borders of pixels, shutter and lens and next to them, where tile tests round.
+/// A table whose samples are on or next to the borders of pixels, shutter and lens, where tile tests round.
 pub fn border_table(seed: u64) -> SampleTable {
     let below_one = 1.0 - f32::EPSILON / 2.0;
     let mut r = Uniform::new(seed);
@@ -141,10 +141,10 @@ pub fn border_table(seed: u64) -> SampleTable {
     SampleTable::programmed(4, seed, samples).unwrap()
 }
 
-/// How many ways there are to switch the tests on and off.
+/// Number of combinations of enabled tests.
 pub const SWITCHES: u32 = 1 << 7;
 
-/// One of them.
+/// One combination.
 pub fn switched(switches: u32) -> Features {
     let on = |bit: u32| switches & (1 << bit) != 0;
     Features {
@@ -180,7 +180,7 @@ pub fn spec(features: Features) -> PipelineSpec {
     }
 }
 
-/// What kind of camera; `lens.into()` is one in perspective.
+/// Kind of camera; `lens.into()` is one in perspective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optics {
     pub lens: bool,
@@ -195,14 +195,14 @@ impl From<bool> for Optics {
 
 pub fn camera(optics: impl Into<Optics>) -> Camera {
     let Optics { lens, parallel } = optics.into();
-    // Orthographic as large as the other is at depth 4, so that the grid lies on pixels in both.
+    // The orthographic view has the size of the perspective one at depth 4, so the grid is on pixels in both.
     let make = if parallel { Camera::orthographic } else { Camera::new };
     let camera = make(Affine3A::IDENTITY, if parallel { 2.8 } else { 0.7 }, 0.25).unwrap();
     camera.with_lens(lens.then(|| Lens::new(0.3, 6.0).unwrap()))
 }
 
-/// For every pixel and sample, pixel by pixel in rows: triangle (`u32::MAX` for none) and depth, from all triangles against all
-/// samples.
+/// Triangle (`u32::MAX` for none) and depth of every sample, pixel by pixel in rows, by testing all triangles
+/// against all samples.
 pub fn brute_force(
     soup: &Soup,
     cull: Cull,
@@ -241,7 +241,7 @@ pub fn brute_force(
                 else {
                     continue;
                 };
-                // The full path for everything: no dimension dropped.
+                // The full path for everything: no dimension is dropped.
                 ready.moving = true;
                 let within = Box5::whole(true);
                 let mut target = Target { depth: &mut depth, triangle: &mut triangle };
@@ -269,12 +269,13 @@ impl Shader for Flat {
     }
 }
 
-/// A camera at the origin for which `(x, y, z)` appears at `(x / z, -y / z)` pixels from the centre of the image.
+/// A camera at the origin for which `(x, y, z)` appears at `(x / z, -y / z)` pixels from the centre of the
+/// image.
 pub fn pixel_camera(viewport: Viewport, near: f32) -> Camera {
     Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, near).unwrap()
 }
 
-/// The triangles of one quad with corners `0, 1, 2, 3` in counter-clockwise order on the screen.
+/// Triangles of one quad with corners `0, 1, 2, 3` in counter-clockwise order on the screen.
 pub const QUAD: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
 /// A rectangle `x0..x1` by `y0..y1` in pixels from the centre of the image, `y` upwards, at depth `z`, for

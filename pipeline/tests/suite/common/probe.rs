@@ -1,4 +1,4 @@
-//! Samples, and single triangles tested against them.
+//! Samples of one tile, tested against single triangles.
 
 use pipeline::sample_test::{Hits, Target, test_run};
 use pipeline::sampling::{Sample, TileSamples};
@@ -6,7 +6,7 @@ use pipeline::setup::{Corner, Outcome, Triangle, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 
-/// One tile of samples, against which single triangles are tested into a fresh target.
+/// One tile of samples; single triangles are tested into a fresh target.
 pub struct Probe {
     pub samples: TileSamples,
     pub shear: Shear,
@@ -25,10 +25,10 @@ impl Probe {
         Self { samples, shear, near, half_px }
     }
 
-    /// Where and when the sample in `slot` looks.
-    pub fn at(&self, slot: usize) -> Look {
+    /// Position of the sample in `slot`.
+    pub fn at(&self, slot: usize) -> SamplePosition {
         let s = &self.samples;
-        Look {
+        SamplePosition {
             x: f64::from(s.x[slot]),
             y: f64::from(s.y[slot]),
             u: f64::from(s.u[slot]),
@@ -41,12 +41,12 @@ impl Probe {
         set_up(7, [&v[0], &v[1], &v[2]], cull, &self.shear, self.near, self.half_px)
     }
 
-    /// The box that leaves nothing out, of a camera with or without a lens.
+    /// The whole box, for a camera with or without a lens.
     pub fn whole(&self) -> Box5 {
         Box5::whole(!self.shear.is_none())
     }
 
-    /// The depth of every sample that sees `triangle`, and what the test reported.
+    /// Depth of every sample that sees `triangle`, and the result of the test.
     pub fn test(&self, triangle: &Triangle, within: &Box5) -> (Vec<Option<f32>>, Hits) {
         let mut depth = vec![f32::INFINITY; self.samples.len];
         let mut owner = vec![u32::MAX; self.samples.len];
@@ -57,7 +57,7 @@ impl Probe {
         (seen, hits)
     }
 
-    /// The depth of every sample that sees the triangle with these vertices.
+    /// Depth of every sample that sees the triangle with these vertices.
     pub fn see(&self, v: [MovingVertex; 3], cull: Cull) -> Vec<Option<f32>> {
         match self.set_up(v, cull) {
             Outcome::Ready(triangle) => self.test(&triangle, &self.whole()).0,
@@ -65,7 +65,7 @@ impl Probe {
         }
     }
 
-    /// The same where set-up may not drop the triangle for having no area: what the sample test alone says.
+    /// The same without dropping triangles of no area in set-up: the sample test alone.
     pub fn see_without_area(&self, v: [MovingVertex; 3], cull: Cull) -> Vec<Option<f32>> {
         let still = |open| MovingVertex { open, close: open };
         let any = [[0.0, 0.0, 64.0], [64.0, 0.0, 64.0], [0.0, 64.0, 64.0]].map(still);
@@ -84,9 +84,9 @@ impl Probe {
     }
 }
 
-/// The place of a sample in the five dimensions, `x` and `y` in pixels from the centre of the image.
+/// Position of a sample in the five dimensions, `x` and `y` in pixels from the centre of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct SamplePosition {
     pub x: f64,
     pub y: f64,
     pub u: f64,
@@ -94,8 +94,8 @@ pub struct Look {
     pub t: f64,
 }
 
-impl Look {
-    /// A vertex at the time and from the place on the lens of this sample, not rounded to f32: `[x, y, w]`.
+impl SamplePosition {
+    /// A vertex at the time and lens position of this sample, not rounded to f32: `[x, y, w]`.
     pub fn sheared(&self, vertex: &MovingVertex, shear: &Shear) -> [f64; 3] {
         let p: [f64; 3] = std::array::from_fn(|axis| {
             let (q, r) = (f64::from(vertex.open[axis]), f64::from(vertex.close[axis]));
@@ -106,7 +106,7 @@ impl Look {
     }
 }
 
-/// What a vertex at this depth is multiplied with to be moved by a pixel: 1 in an orthographic view.
+/// Factor of an image coordinate for a vertex at this depth: 1 in an orthographic view.
 pub fn weight(shear: &Shear, depth: f64) -> f64 {
     if shear.parallel { 1.0 } else { depth }
 }
@@ -124,8 +124,8 @@ pub fn repeated(per_pixel: u32, block: &[Sample]) -> SampleTable {
     SampleTable::programmed(per_pixel, 0, samples).unwrap()
 }
 
-/// The samples of an image in the order of [`visibility`](pipeline::frame::visibility): pixel by pixel in rows.
-pub fn looks(table: &SampleTable, viewport: Viewport) -> Vec<([u32; 2], Sample)> {
+/// Samples of an image in the order of [`visibility`](pipeline::frame::visibility): pixel by pixel in rows.
+pub fn sample_positions(table: &SampleTable, viewport: Viewport) -> Vec<([u32; 2], Sample)> {
     let pixels = (0..viewport.height()).flat_map(|y| (0..viewport.width()).map(move |x| [x, y]));
     pixels.flat_map(|[x, y]| table.pixel(x, y).iter().map(move |&sample| ([x, y], sample))).collect()
 }

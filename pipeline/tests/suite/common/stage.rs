@@ -1,11 +1,11 @@
-//! A camera, a table and an image to draw on.
+//! A camera, a sample table and an image.
 
 use glam::Vec3;
 use pipeline::frame::visibility;
 use pipeline::sampling::Sample;
 use pipeline::*;
 
-use super::{Flat, QUAD, looks, pixel_camera, spec};
+use super::{Flat, QUAD, pixel_camera, sample_positions, spec};
 
 pub const RED: Flat = Flat(Vec3::new(1.0, 0.0, 0.0));
 pub const BLUE: Flat = Flat(Vec3::new(0.0, 0.0, 1.0));
@@ -23,7 +23,7 @@ impl Stage {
         Self { viewport, table, camera: pixel_camera(viewport, NEAR) }
     }
 
-    /// With the default table.
+    /// A stage with the default table.
     pub fn sampled(width: u32, height: u32, per_pixel: u32) -> Self {
         Self::new(width, height, SampleTable::low_discrepancy(per_pixel, 1, LensShape::Disk).unwrap())
     }
@@ -35,15 +35,19 @@ impl Stage {
         render(&self.camera, draws, &settings, |_| ()).unwrap().image
     }
 
-    /// For each sample its pixel, itself, the triangle it sees and its depth.
+    /// For each sample its pixel, the sample, its visible triangle and its depth.
     pub fn see(&self, draws: &[Draw<'_>]) -> Vec<([u32; 2], Sample, u32, f32)> {
         let spec = spec(Features::ALL);
         let settings =
             Settings { spec: &spec, viewport: self.viewport, samples: &self.table, background: Vec3::ZERO };
         let seen = visibility(&self.camera, draws, &settings).unwrap();
-        let looks = looks(&self.table, self.viewport);
-        assert_eq!(seen.len(), looks.len());
-        looks.into_iter().zip(seen).map(|((px, s), (id, depth))| (px, s, id, f32::from_bits(depth))).collect()
+        let sample_positions = sample_positions(&self.table, self.viewport);
+        assert_eq!(seen.len(), sample_positions.len());
+        sample_positions
+            .into_iter()
+            .zip(seen)
+            .map(|((px, s), (id, depth))| (px, s, id, f32::from_bits(depth)))
+            .collect()
     }
 
     pub fn pixel(&self, image: &[Vec3], x: u32, y: u32) -> Vec3 {

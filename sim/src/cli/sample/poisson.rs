@@ -3,10 +3,10 @@
 use clap::{ArgGroup, Args};
 use serde::Serialize;
 use warnings::Warning;
-use workloads::points::doubt;
 use workloads::points::poisson::{
-    Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_telling, radius_for, saturation, span,
+    Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_with_progress, radius_for, saturation, span,
 };
+use workloads::points::thin_regions_warning;
 
 use super::file::Points;
 use super::{Common, Failure, usage};
@@ -93,7 +93,7 @@ fn make<const D: usize>(
         progress.note(&note);
     }
     let bar = progress.bar("points, about", points as u64);
-    pool.install(|| poisson_disk_telling(spec, &mut |points| bar.set(points as u64))).map_err(usage)
+    pool.install(|| poisson_disk_with_progress(spec, &mut |points| bar.set(points as u64))).map_err(usage)
 }
 
 /// Note if r cannot be large enough for the requested number of points.
@@ -121,12 +121,12 @@ fn sample<const D: usize>(args: &PoissonArgs, terminal: &Terminal) -> Result<(),
         seed: spec.seed,
         packing_density: found.points.len() as f64 * ball(D) * spec.radius.powi(D as i32),
         darts: found.darts,
-        voids: found.voids,
+        voids: found.uncovered,
         levels: found.levels,
-        thin_voids: found.thin_voids,
-        warnings: doubt(found.points.len(), found.thin_voids).into_iter().collect(),
+        thin_voids: found.thin_regions,
+        warnings: thin_regions_warning(found.points.len(), found.thin_regions).into_iter().collect(),
     };
-    let thin = match found.thin_voids {
+    let thin = match found.thin_regions {
         0 => "no other fits".to_owned(),
         thin => format!(
             "no other representable point fits; {thin} uncovered regions below the gap between numbers are left"

@@ -1,99 +1,101 @@
-//! A shared resource as a calendar: how much of each stretch of time is taken, whoever asks first.
+//! Calendar of a shared resource: how much of each time slot is taken.
 
 use crate::clock::Time;
 
-/// Stretches of equal length, each with room for so much work. Packets ask in the order of the stream, not in that of time;
-/// a stretch that one of them left free can be taken by another that comes later in the stream and earlier in time.
+/// Time slots of equal length, each with capacity for the same amount of work. Requests come in stream order,
+/// not in time order. A request may use capacity before that of earlier requests.
 ///
-/// Work is counted in grains of one server, so that a server alone needs no division.
+/// Work is measured in grains of one server, so a single server needs no division.
 #[derive(Clone, Debug)]
 pub(super) struct Calendar {
-    /// Binary logarithm of the length of a stretch.
+    /// Binary logarithm of the slot length in grains.
     shift: u32,
     servers: u64,
-    /// Work that fits in a stretch.
-    room: u64,
+    /// Capacity of a slot.
+    capacity: u64,
     used: Vec<u64>,
-    /// For each stretch the first one from it on that may have room.
-    free: Vec<u32>,
+    /// For each slot, a lower bound of the first slot from it on with free capacity (union-find with path
+    /// compression).
+    next_free: Vec<u32>,
 }
 
 impl Calendar {
-    /// Stretches of `length` grains or a little more, with so many servers.
+    /// A calendar with slots of at least `length` grains (rounded up to a power of two), for `servers`
+    /// servers.
     pub fn new(length: Time, servers: u32) -> Self {
         let length = length.next_power_of_two();
         let servers = u64::from(servers);
         Self {
             shift: length.trailing_zeros(),
             servers,
-            room: length * servers,
+            capacity: length * servers,
             used: Vec::new(),
-            free: Vec::new(),
+            next_free: Vec::new(),
         }
     }
 
-    /// Does `work` from `at` on and says when it begins and when it is done.
-    pub fn take(&mut self, at: Time, work: u64) -> (Time, Time) {
-        let mut stretch = self.first_free((at >> self.shift) as usize);
-        let begin = self.moment(stretch, at);
-        let mut left = work;
+    /// Reserve `work` from `at` on. Returns when it begins and ends.
+    pub fn reserve(&mut self, at: Time, work: u64) -> (Time, Time) {
+        let mut slot = self.find_free((at >> self.shift) as usize);
+        let begin = self.end_of_slot_work(slot, at);
+        let mut remaining = work;
         loop {
-            let here = left.min(self.room - self.used[stretch]);
-            self.used[stretch] += here;
-            left -= here;
-            if self.used[stretch] == self.room {
-                self.free[stretch] = stretch as u32 + 1;
+            let here = remaining.min(self.capacity - self.used[slot]);
+            self.used[slot] += here;
+            remaining -= here;
+            if self.used[slot] == self.capacity {
+                self.next_free[slot] = slot as u32 + 1;
             }
-            if left == 0 {
-                let alone = begin + self.alone(work + self.servers - 1);
-                return (begin, self.moment(stretch, at).max(alone));
+            if remaining == 0 {
+                let on_all_servers = begin + self.on_all_servers(work + self.servers - 1);
+                return (begin, self.end_of_slot_work(slot, at).max(on_all_servers));
             }
-            stretch = self.first_free(stretch + 1);
+            slot = self.find_free(slot + 1);
         }
     }
 
-    /// When the work put into a stretch so far is done, if none of it is done before `at`.
-    fn moment(&self, stretch: usize, at: Time) -> Time {
-        (((stretch as Time) << self.shift) + self.alone(self.used[stretch])).max(at)
+    /// End of the work reserved in a slot so far, if none of it ends before `at`.
+    fn end_of_slot_work(&self, slot: usize, at: Time) -> Time {
+        (((slot as Time) << self.shift) + self.on_all_servers(self.used[slot])).max(at)
     }
 
-    /// How long all servers need for `work`.
-    fn alone(&self, work: u64) -> Time {
+    /// Time of `work` on all servers.
+    fn on_all_servers(&self, work: u64) -> Time {
         if self.servers == 1 { work } else { work / self.servers }
     }
 
-    fn first_free(&mut self, from: usize) -> usize {
+    fn find_free(&mut self, from: usize) -> usize {
         self.reach(from);
         let mut at = from;
-        while self.free[at] as usize != at {
-            at = self.free[at] as usize;
+        while self.next_free[at] as usize != at {
+            at = self.next_free[at] as usize;
             self.reach(at);
         }
-        // Whoever comes this way again goes straight there.
+        // Path compression.
         let mut passed = from;
         while passed != at {
-            passed = std::mem::replace(&mut self.free[passed], at as u32) as usize;
+            passed = std::mem::replace(&mut self.next_free[passed], at as u32) as usize;
         }
         at
     }
 
-    fn reach(&mut self, stretch: usize) {
+    fn reach(&mut self, slot: usize) {
         let known = self.used.len();
-        if stretch >= known {
-            self.used.resize(stretch + 1, 0);
-            self.free.extend(known as u32..=stretch as u32);
+        if slot >= known {
+            self.used.resize(slot + 1, 0);
+            self.next_free.extend(known as u32..=slot as u32);
         }
     }
 
-    /// How many work side by side.
+    /// Number of servers.
     pub fn servers(&self) -> u64 {
         self.servers
     }
 
-    /// Every stretch in which anything was done: from, to, work done and work that fits.
-    pub fn stretches(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
+    /// Every slot with reserved work: start, end, work and capacity.
+    pub fn slots(&self) -> impl Iterator<Item = (Time, Time, u64, u64)> {
         let used = self.used.iter().zip(0..).filter(|(used, _)| **used > 0);
-        used.map(|(&used, at): (&u64, Time)| (at << self.shift, (at + 1) << self.shift, used, self.room))
+        used.map(|(&used, at): (&u64, Time)| (at << self.shift, (at + 1) << self.shift, used, self.capacity))
     }
 }
 
@@ -102,21 +104,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_fills_stretches_whoever_comes_first() {
+    fn work_fills_slots_in_any_order() {
         let mut calendar = Calendar::new(16, 1);
-        assert_eq!(calendar.take(32, 16), (32, 48));
+        assert_eq!(calendar.reserve(32, 16), (32, 48));
         // Earlier in time, later in the stream.
-        assert_eq!(calendar.take(3, 4), (3, 7));
-        assert_eq!(calendar.take(33, 2), (48, 50));
-        // 12 fit before 16 is over, as far as the calendar knows; the next stretch is free, the one after full.
-        assert_eq!(calendar.take(0, 30), (4, 52));
-        assert_eq!(calendar.stretches().map(|(_, _, used, _)| used).sum::<u64>(), 52);
+        assert_eq!(calendar.reserve(3, 4), (3, 7));
+        assert_eq!(calendar.reserve(33, 2), (48, 50));
+        // Slot 0 has capacity for 12 more, slot 1 is free, slot 2 is full.
+        assert_eq!(calendar.reserve(0, 30), (4, 52));
+        assert_eq!(calendar.slots().map(|(_, _, used, _)| used).sum::<u64>(), 52);
     }
 
     #[test]
     fn a_saturated_calendar_is_a_queue() {
         let mut calendar = Calendar::new(32, 2);
-        let ends: Vec<_> = (0..40).map(|_| calendar.take(0, 4 * 3).1).collect();
+        let ends: Vec<_> = (0..40).map(|_| calendar.reserve(0, 4 * 3).1).collect();
         assert_eq!(*ends.last().unwrap(), 40 * 4 * 3 / 2);
         assert!(ends.windows(2).all(|pair| pair[1] > pair[0]));
     }

@@ -1,40 +1,41 @@
-//! Memory chips at the level `packet`: a calendar for each bus, and for each bank the rows it was last asked for.
+//! Memory chips of the level `packet`: a calendar per bus, and the latest rows of each bank.
 
+use super::Span;
 use super::calendar::Calendar;
-use crate::address::Map;
+use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::spec::DramSpec;
 
-/// Lines in a stretch of a bus's calendar. Where it waits for a row it is idle in between: longer stretches would lend that time
-/// to lines that come too late for it.
-const STRETCH: u32 = 4;
-/// The same of a bank, which waits for nobody.
-const BANK_STRETCH: u32 = 32;
+/// Lines per slot of a bus calendar. The bus idles while a row opens; longer slots would give that idle time
+/// to lines that come later.
+const BUS_SLOT_LINES: u32 = 4;
+/// Lines per slot of a bank calendar.
+const BANK_SLOT_LINES: u32 = 32;
 
-/// Rows of a bank that are remembered.
-const ROWS: usize = 4;
+/// Latest rows remembered per bank.
+const REMEMBERED_ROWS: usize = 4;
 
-/// A row that was opened.
+/// An opened row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Open {
+struct OpenRow {
     row: u32,
-    /// When it was asked for.
+    /// Time of the request that opened it.
     since: Time,
-    /// When the last line of it so far is issued.
+    /// When its last line so far is issued.
     until: Time,
-    /// Lines of its channel that came before it was opened or are its own.
+    /// Lines of the channel before it was opened, plus its own lines.
     own: u64,
 }
 
-impl Open {
+impl OpenRow {
     const NONE: Self = Self { row: u32::MAX, since: 0, until: 0, own: 0 };
 }
 
-/// A bank: when it opened rows, and those it opened last, the latest first.
+/// A bank: calendar of its row activations, and its latest rows, the newest first.
 #[derive(Clone, Debug)]
 struct Bank {
     time: Calendar,
-    rows: [Open; ROWS],
+    rows: [OpenRow; REMEMBERED_ROWS],
 }
 
 #[derive(Clone, Debug)]
@@ -45,19 +46,32 @@ struct Channel {
     lines: u64,
 }
 
-/// When lines went over the bus.
+/// Lines of one row in a bank.
+#[derive(Clone, Copy, Debug)]
+struct RowUse {
+    row: u32,
+    /// When they arrive, and when the last one is issued.
+    seen: Time,
+    issued: Time,
+    /// Lines of the channel before them.
+    lines: u64,
+    /// Their number.
+    count: u64,
+}
+
+/// Times of a transfer over the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moved {
-    /// When the last was issued.
+    /// When the last line is issued.
     pub issued: Time,
-    /// When its data had passed.
+    /// When its data has been transferred.
     pub data: Time,
 }
 
 /// All channels.
 #[derive(Clone, Debug)]
 pub(super) struct Dram {
-    map: Map,
+    map: AddressMap,
     channels: Vec<Channel>,
     burst: Time,
     cas: Time,
@@ -74,11 +88,12 @@ impl Dram {
         let period = clocks.period(spec.clock);
         let cycles = |count: u32| period * Time::from(count);
         let burst = cycles(spec.burst_cycles.get());
-        let [bus, time] = [STRETCH, BANK_STRETCH].map(|lines| Calendar::new(burst * Time::from(lines), 1));
-        let bank = Bank { time, rows: [Open::NONE; ROWS] };
+        let [bus, time] =
+            [BUS_SLOT_LINES, BANK_SLOT_LINES].map(|lines| Calendar::new(burst * Time::from(lines), 1));
+        let bank = Bank { time, rows: [OpenRow::NONE; REMEMBERED_ROWS] };
         let channel = Channel { bus, banks: vec![bank; spec.banks.get() as usize], lines: 0 };
         Self {
-            map: Map::new(spec),
+            map: AddressMap::new(spec),
             channels: vec![channel; spec.channels.get() as usize],
             burst,
             cas: cycles(spec.cas_cycles.get()),
@@ -91,90 +106,100 @@ impl Dram {
         }
     }
 
-    /// Lines of one chunk lie side by side in one row.
-    pub fn chunk(&self, line: u32) -> u32 {
-        self.map.chunk(line)
+    /// Group of a line; all lines of a group are in the same row.
+    pub fn group(&self, line: u32) -> u32 {
+        self.map.group(line)
     }
 
-    /// How long a full queue takes.
+    /// Transfer time of a full queue.
     pub fn backlog(&self) -> Time {
         self.backlog
     }
 
-    /// From the last data to the L2.
+    /// Latency from the end of a transfer to the L2.
     pub fn latency(&self) -> Time {
         self.latency
     }
 
-    /// `count` lines of one chunk over the bus of its channel, the first seen from `seen.0` on and the last from `seen.1`.
-    pub fn transfer(&mut self, line: u32, count: u32, seen: (Time, Time)) -> Moved {
-        let place = self.map.place(line);
-        let channel = &mut self.channels[place.channel];
-        let bank = &mut channel.banks[place.bank];
+    /// Transfer `count` lines of one group over the bus of their channel. The first arrives at `seen.from`, the
+    /// last at `seen.to`.
+    pub fn transfer(&mut self, line: u32, count: u32, seen: Span) -> Moved {
+        let address = self.map.locate(line);
+        let channel = &mut self.channels[address.channel];
+        let bank = &mut channel.banks[address.bank];
         let work = self.burst * Time::from(count);
-        let opens = bank.opens(place.row, seen.0, channel.lines, self.queue);
+        let opens = bank.opens(address.row, seen.from, channel.lines, self.queue);
         let opens = opens.map(|closes| self.activate + if closes { self.precharge } else { 0 });
-        // The next row can be opened when the last line has been asked for.
+        // The next row can open once the last line is issued.
         let held = work - self.burst;
-        let closes = bank.closes_at(seen.0).min(seen.0 + self.backlog);
-        let ready = opens.map_or(seen.0, |opens| bank.time.take(closes, opens + held).0 + opens);
-        let end = channel.bus.take(ready, work).1.max(seen.1 + self.burst);
-        bank.note(place.row, (seen.0, end - self.burst), opens.is_some(), (channel.lines, u64::from(count)));
+        let closes = bank.closes_at(seen.from).min(seen.from + self.backlog);
+        let ready = opens.map_or(seen.from, |opens| bank.time.reserve(closes, opens + held).0 + opens);
+        let end = channel.bus.reserve(ready, work).1.max(seen.to + self.burst);
+        let used = RowUse {
+            row: address.row,
+            seen: seen.from,
+            issued: end - self.burst,
+            lines: channel.lines,
+            count: count.into(),
+        };
+        bank.note(used, opens.is_some());
         channel.lines += u64::from(count);
         self.end = self.end.max(end);
         Moved { issued: end - self.burst, data: end + self.cas }
     }
 
-    /// When the last transfer is over.
+    /// End of the last transfer.
     pub fn ends_at(&self) -> Time {
         self.end
     }
 
-    /// For how long the bank that is busiest with it opens and closes rows.
+    /// Row time of the busiest bank.
     pub fn rows(&self) -> Time {
         let banks = self.channels.iter().flat_map(|channel| &channel.banks);
-        let busy = |bank: &Bank| bank.time.stretches().map(|(_, _, used, _)| used).sum();
+        let busy = |bank: &Bank| bank.time.slots().map(|(_, _, used, _)| used).sum();
         banks.map(busy).max().unwrap_or(0)
     }
 
-    /// The buses of all channels.
+    /// Bus calendars of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.channels.iter().map(|channel| &channel.bus)
     }
 }
 
 impl Bank {
-    /// Whether a row has to be opened for a line that is seen at `seen`, after `lines` lines of the channel, and if so whether
-    /// another has to be closed.
+    /// Whether a line that arrives at `seen`, after `lines` lines of its channel, opens its row. `Some(true)`
+    /// if another row has to be closed first.
     ///
-    /// First ready first come (Rixner et al. 2000): where lines of its row are still to go, it goes with them, whatever else was
-    /// asked for since; but for a queue full of others, which keeps it from being seen.
+    /// First ready first come (Rixner et al. 2000): a line joins pending lines of its row, ahead of older
+    /// requests to other rows. The exception is a queue full of other lines, which hides the line from the
+    /// scheduler.
     fn opens(&self, row: u32, seen: Time, lines: u64, queue: u64) -> Option<bool> {
         let latest = self.rows[0].row;
-        let goes_along = |open: &Open| open.row == row && open.until > seen && lines - open.own < queue;
+        let goes_along = |open: &OpenRow| open.row == row && open.until > seen && lines - open.own < queue;
         (latest != row && !self.rows.iter().any(goes_along)).then_some(latest != u32::MAX)
     }
 
-    /// When the row that is open can be closed for a line that is seen at `seen`: when its own lines have gone. One that is asked
-    /// for later in time, though earlier in the stream, does not matter.
+    /// When the open row can be closed for a line that arrives at `seen`: after its own lines are issued.
+    /// Lines that arrive later in time, though earlier in the stream, are ignored.
     fn closes_at(&self, seen: Time) -> Time {
         let open = &self.rows[0];
         if open.since <= seen { open.until.max(seen) } else { seen }
     }
 
-    /// `count` lines of `row` are seen and go between two moments, after `lines` lines of the channel.
-    fn note(&mut self, row: u32, (seen, at): (Time, Time), opened: bool, (lines, count): (u64, u64)) {
+    /// Record lines of a row; `opened` says whether they opened it.
+    fn note(&mut self, used: RowUse, opened: bool) {
+        let RowUse { row, seen, issued, lines, count } = used;
         let known = self.rows.iter().position(|open| open.row == row);
         match known {
             Some(known) if !opened => {
                 let open = &mut self.rows[known];
-                open.until = open.until.max(at);
+                open.until = open.until.max(issued);
                 open.own += count;
             }
             _ => {
-                let until = known.map_or(at, |known| self.rows[known].until.max(at));
-                self.rows.copy_within(..known.unwrap_or(ROWS - 1), 1);
-                self.rows[0] = Open { row, since: seen, until, own: lines + count };
+                let until = known.map_or(issued, |known| self.rows[known].until.max(issued));
+                self.rows.copy_within(..known.unwrap_or(REMEMBERED_ROWS - 1), 1);
+                self.rows[0] = OpenRow { row, since: seen, until, own: lines + count };
             }
         }
     }
@@ -186,18 +211,25 @@ mod tests {
 
     #[test]
     fn a_line_goes_along_with_others_of_its_row_that_have_not_gone() {
-        let mut bank = Bank { time: Calendar::new(16, 1), rows: [Open::NONE; ROWS] };
+        let used = |row, [seen, issued]: [Time; 2], [lines, count]: [u64; 2]| RowUse {
+            row,
+            seen,
+            issued,
+            lines,
+            count,
+        };
+        let mut bank = Bank { time: Calendar::new(16, 1), rows: [OpenRow::NONE; REMEMBERED_ROWS] };
         assert_eq!(bank.opens(7, 0, 0, 4), Some(false));
-        bank.note(7, (0, 10), true, (0, 1));
+        bank.note(used(7, [0, 10], [0, 1]), true);
         assert_eq!((bank.opens(7, 50, 9, 4), bank.opens(8, 5, 1, 4)), (None, Some(true)));
-        bank.note(8, (5, 20), true, (1, 1));
+        bank.note(used(8, [5, 20], [1, 1]), true);
         assert_eq!((bank.opens(7, 9, 2, 4), bank.opens(7, 10, 2, 4)), (None, Some(true)));
-        bank.note(7, (9, 30), false, (2, 1));
+        bank.note(used(7, [9, 30], [2, 1]), false);
         let [latest, before, ..] = bank.rows.map(|open| (open.row, open.until));
         assert_eq!((latest, before), ((8, 20), (7, 30)));
         assert_eq!([3, 6, 25].map(|seen| bank.closes_at(seen)), [3, 20, 25]);
-        // Four lines of others have come since.
-        bank.note(8, (40, 60), false, (3, 3));
+        // Four lines of other rows came in between.
+        bank.note(used(8, [40, 60], [3, 3]), false);
         assert_eq!((bank.opens(7, 9, 5, 4), bank.opens(7, 9, 6, 4)), (None, Some(true)));
     }
 }

@@ -1,69 +1,71 @@
-//! L2 and memory at the level `packet`: calendars that runs of lines are entered into.
+//! L2 and memory of the level `packet`: runs of lines enter calendars.
 
 use activity::{LineAccess, LineKind};
 
+use super::Span;
 use super::calendar::Calendar;
 use super::dram::Dram;
-use super::ring::Ring;
+use super::queue::QueueTimes;
 use crate::clock::{Clocks, Time};
-use crate::job::CLIENTS;
+use crate::demand::CLIENTS;
 use crate::spec::MachineSpec;
 
-/// Cycles in a stretch of the calendar.
-const STRETCH: u32 = 8;
+/// Cycles per slot of the L2 calendar.
+const SLOT_CYCLES: u32 = 8;
 
-/// When some lines were asked for, taken and there.
+/// Times of a group of line requests.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fetched {
-    /// When the last was asked for.
-    pub asked: Time,
-    /// When the first was taken by the L2.
+    /// When the last line is requested.
+    pub last_request: Time,
+    /// When the L2 accepts the first line.
     pub first: Time,
-    /// When the last that is read is there; 0 where none is.
-    pub there: Time,
-    /// When everything has been moved.
+    /// When the last line read arrives; 0 if none is read.
+    pub arrived: Time,
+    /// When all transfers are done.
     pub moved: Time,
 }
 
-/// Lines side by side that go the same way.
+/// Consecutive lines with the same route.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     head: LineAccess,
     count: u32,
-    /// From the moment the first is asked for to that of the last.
+    /// Delay from the request of the first line to that of the last.
     last: Time,
 }
 
-/// A client asks for so many lines a cycle: when for the next, and how many of its cycle are gone.
+/// Requests of a client with a limited rate: the time of the next request, and the requests already made in
+/// its cycle.
 #[derive(Clone, Copy, Debug)]
-struct Asking {
+struct RequestPacer {
     at: Time,
-    gone: u32,
+    used: u32,
     lines_per_cycle: u32,
     period: Time,
 }
 
-impl Asking {
-    /// How long after the next line the last of `count` is asked for.
-    fn last(&self, count: u32) -> Time {
-        Time::from((self.gone + count - 1) / self.lines_per_cycle) * self.period
+impl RequestPacer {
+    /// Delay from the next request to the last of `count` requests.
+    fn delay_of_last(&self, count: u32) -> Time {
+        Time::from((self.used + count - 1) / self.lines_per_cycle) * self.period
     }
 
-    /// The next line is asked for at `at` or, where its cycle began before, in that.
-    fn waits(&mut self, at: Time) {
+    /// Delay the next request until `at`, unless it is later already.
+    fn delay_until(&mut self, at: Time) {
         if at > self.at {
-            (self.at, self.gone) = (at, 0);
+            (self.at, self.used) = (at, 0);
         }
     }
 
-    /// `count` lines have been asked for, the last of them at `last`.
-    fn asked(&mut self, count: u32, last: Time) {
-        self.gone = (self.gone + count) % self.lines_per_cycle;
-        self.at = if self.gone == 0 { last + self.period } else { last };
+    /// Advance past `count` requests, the last of them at `last`.
+    fn advance(&mut self, count: u32, last: Time) {
+        self.used = (self.used + count) % self.lines_per_cycle;
+        self.at = if self.used == 0 { last + self.period } else { last };
     }
 }
 
-/// The lines that memory reads or drains, and writes back, for one.
+/// The lines moved for an access: the one that memory reads or drains, and the one written back.
 fn moved(line: &LineAccess) -> (Option<u32>, Option<u32>) {
     let fetch = matches!(line.kind, LineKind::Fetch | LineKind::Drain).then_some(line.line);
     (fetch, (line.victim != LineAccess::NONE).then_some(line.victim))
@@ -74,10 +76,10 @@ fn moved(line: &LineAccess) -> (Option<u32>, Option<u32>) {
 pub(super) struct Memory {
     dram: Dram,
     l2: Calendar,
-    ports: [Ring; CLIENTS.len()],
-    /// Lines that each port's client asks for in a cycle.
+    ports: [QueueTimes; CLIENTS.len()],
+    /// Lines per cycle that the client of each port can request.
     lines_per_cycle: [u32; CLIENTS.len()],
-    /// When the last request of each port was taken: none passes another of its port.
+    /// When the last request of each port is accepted; requests of a port stay in order.
     order: [Time; CLIENTS.len()],
     period: Time,
     latency: Time,
@@ -91,8 +93,8 @@ impl Memory {
         let period = clocks.period(spec.clock);
         Self {
             dram: Dram::new(&machine.dram, clocks),
-            l2: Calendar::new(Time::from(STRETCH) * period, spec.lines_per_cycle.get()),
-            ports: std::array::from_fn(|_| Ring::new(spec.queue.get())),
+            l2: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.lines_per_cycle.get()),
+            ports: std::array::from_fn(|_| QueueTimes::new(spec.queue.get())),
             lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
             order: [0; CLIENTS.len()],
             period,
@@ -102,56 +104,63 @@ impl Memory {
         }
     }
 
-    /// A client whose cycles are of `period` asks for `lines` one after another, from `start` on.
-    pub fn ask(&mut self, port: usize, lines: &[LineAccess], start: Time, period: Time) -> Fetched {
-        let mut fetched = Fetched { asked: start, first: Time::MAX, there: 0, moved: 0 };
-        let mut asking = Asking { at: start, gone: 0, lines_per_cycle: self.lines_per_cycle[port], period };
-        let mut rest = lines;
-        while let Some(&head) = rest.first() {
-            // A run is no longer than what the port holds: its lines go the same way.
-            let longest = rest.len().min(self.queue as usize);
-            let way = self.way(&head);
-            let count = 1 + rest[1..longest].iter().take_while(|&line| self.way(line) == way).count();
+    /// Request `lines` one after another from `start` on, for a client with cycles of `period` grains.
+    pub fn request(&mut self, port: usize, lines: &[LineAccess], start: Time, period: Time) -> Fetched {
+        let mut fetched = Fetched { last_request: start, first: Time::MAX, arrived: 0, moved: 0 };
+        let mut pacer =
+            RequestPacer { at: start, used: 0, lines_per_cycle: self.lines_per_cycle[port], period };
+        let mut remaining = lines;
+        while let Some(&head) = remaining.first() {
+            // A run fits into the port's queue.
+            let max_count = remaining.len().min(self.queue as usize);
+            let route = self.route(&head);
+            let count =
+                1 + remaining[1..max_count].iter().take_while(|&line| self.route(line) == route).count();
             let count = count as u32;
-            rest = &rest[count as usize..];
-            // The port has room a cycle after the L2 took the request so many before.
-            let ring = &self.ports[port];
-            asking.waits(ring.room_at().max(ring.room_for(count).saturating_sub(asking.last(count))));
-            let run = Run { head, count, last: asking.last(count) };
-            fetched.asked = asking.at + run.last;
-            let seen = (asking.at + period).max(self.order[port]);
+            remaining = &remaining[count as usize..];
+            // The queue of the port has room one cycle after the L2 accepts an earlier request.
+            let queue = &self.ports[port];
+            pacer.delay_until(
+                queue.room_at().max(queue.room_for(count).saturating_sub(pacer.delay_of_last(count))),
+            );
+            let run = Run { head, count, last: pacer.delay_of_last(count) };
+            fetched.last_request = pacer.at + run.last;
+            let seen = (pacer.at + period).max(self.order[port]);
             let (first, last) = self.take(&run, seen, &mut fetched);
             self.order[port] = last;
             self.ports[port].note_all(run.count, first + self.period, last + self.period);
             fetched.first = fetched.first.min(first);
-            asking.asked(count, fetched.asked);
+            pacer.advance(count, fetched.last_request);
         }
         fetched
     }
 
-    /// What tells a line from another that goes elsewhere: whether it is read, and where what it moves lies.
-    fn way(&self, line: &LineAccess) -> (bool, Option<u32>, Option<u32>) {
+    /// Route of a line: whether it is read, and the memory groups of the lines it moves. Lines with equal
+    /// routes form a run.
+    fn route(&self, line: &LineAccess) -> (bool, Option<u32>, Option<u32>) {
         let (moved, victim) = moved(line);
-        let chunk = |line: u32| self.dram.chunk(line);
+        let chunk = |line: u32| self.dram.group(line);
         (matches!(line.kind, LineKind::Hit | LineKind::Fetch), moved.map(chunk), victim.map(chunk))
     }
 
-    /// A run through the L2, the first seen from `seen` on. Says when the first and the last were taken.
+    /// Pass a run through the L2; its first line arrives at `seen`. Returns when the first and the last line
+    /// are accepted.
     fn take(&mut self, run: &Run, seen: Time, fetched: &mut Fetched) -> (Time, Time) {
         let Run { head, count, last: later } = *run;
-        let (first, end) = self.l2.take(seen, u64::from(count) * self.period);
+        let (first, end) = self.l2.reserve(seen, u64::from(count) * self.period);
         let mut last = end.saturating_sub(self.period).max(first + later);
         if head.kind == LineKind::Hit {
-            fetched.there = fetched.there.max(last + self.latency);
+            fetched.arrived = fetched.arrived.max(last + self.latency);
         }
         let (fetch, victim) = moved(&head);
         for line in [fetch, victim].into_iter().flatten() {
-            let moved = self.dram.transfer(line, count, (first + self.period, last + self.period));
-            // The queue of the channel holds no more than this: the request waits in front of the L2 for the rest.
+            let seen = Span { from: first + self.period, to: last + self.period };
+            let moved = self.dram.transfer(line, count, seen);
+            // The channel's queue holds `backlog`; the rest of the run waits in front of the L2.
             last = last.max(moved.issued.saturating_sub(self.dram.backlog()));
             fetched.moved = fetched.moved.max(moved.data);
             if head.kind == LineKind::Fetch && line == head.line {
-                fetched.there = fetched.there.max(moved.data + self.dram.latency() + self.latency);
+                fetched.arrived = fetched.arrived.max(moved.data + self.dram.latency() + self.latency);
             }
         }
         fetched.moved = fetched.moved.max(last + self.period);
@@ -159,22 +168,22 @@ impl Memory {
         (first, last)
     }
 
-    /// When the last line is taken and the last transfer over.
+    /// When the last line is accepted and the last transfer is done.
     pub fn ends_at(&self) -> Time {
         self.end.max(self.dram.ends_at())
     }
 
-    /// Stretches of the L2's time.
+    /// Calendar of the L2.
     pub fn l2(&self) -> &Calendar {
         &self.l2
     }
 
-    /// For how long the bank that is busiest with it opens and closes rows.
+    /// Row time of the busiest bank.
     pub fn rows(&self) -> Time {
         self.dram.rows()
     }
 
-    /// The buses of all channels.
+    /// Bus calendars of all channels.
     pub fn buses(&self) -> impl Iterator<Item = &Calendar> {
         self.dram.buses()
     }

@@ -1,23 +1,23 @@
-//! The level `packet`: a recurrence over packets and places, with no clock ticking.
+//! Level `packet`: a recurrence over packets and stations, without a ticking clock.
 //!
-//! For packet `k` at place `p`, with `n` the next place on its way:
+//! For packet `k` at station `p`, with `n` its next station:
 //!
 //! ```text
 //! start(p, k)  = max(arrive(p, k), free(p))
 //! served(p, k) = max(start(p, k) + service(p, k), last request)
-//! leave(p, k)  = max(served(p, k), lines there, leave(p, k - 1), start(n, k - queue(n)) + 1)
+//! leave(p, k)  = max(served(p, k), last line, leave(p, k - 1), start(n, k - queue(n)) + 1)
 //! arrive(n, k) = leave(p, k) + latency(p)
 //! ```
 //!
-//! the recurrence of tandem queues with finite buffers and blocking after service (Dallery and Gershwin 1992). It is that of
-//! the level `stepped`, to the cycle, for units that share nothing. What is shared (lanes of the cores, the L2, buses and
-//! banks of memory) is a calendar.
+//! This is the recurrence of tandem queues with finite buffers and blocking after service (Dallery and
+//! Gershwin 1992). For units that share nothing it equals the level `stepped`, to the cycle. Shared resources
+//! (lanes of the cores, the L2, buses and banks of memory) are calendars.
 
 mod calendar;
 mod cores;
 mod dram;
 mod memory;
-mod ring;
+mod queue;
 mod station;
 mod tally;
 
@@ -26,29 +26,29 @@ use std::collections::VecDeque;
 use activity::{LineAccess, Packet, PacketCounts, Unit};
 
 use crate::clock::{Clocks, Time};
-use crate::job::{Job, Jobs, Place};
+use crate::demand::{DemandBuilder, ServiceDemand, Station};
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
 use crate::{Clock, Recorder, Timed};
 use calendar::Calendar;
 use cores::Cores;
 use memory::Memory;
-use station::Station;
+use station::StationState;
 use tally::Tally;
 
-/// A packet comes to a place.
+/// A packet at a station.
 #[derive(Clone, Copy, Debug)]
 struct Visit<'a> {
-    place: Place,
-    job: &'a Job,
-    /// All its lines, those of each client side by side.
+    station: Station,
+    demand: &'a ServiceDemand,
+    /// All its lines, grouped by client.
     lines: &'a [LineAccess],
-    /// When it is there, and when the place after has room for it.
+    /// When it arrives, and when the next station has room for it.
     arrive: Time,
     room: Time,
 }
 
-/// The first and the last moment of something that has several parts.
+/// First and last time of work with several parts.
 #[derive(Clone, Copy, Debug)]
 struct Span {
     from: Time,
@@ -63,34 +63,34 @@ impl Span {
     }
 }
 
-/// A clock that advances by packets.
+/// Clock that advances by packets.
 #[derive(Debug)]
 pub struct PacketClock {
     clocks: Clocks,
-    makes: Jobs,
-    stations: Vec<Station>,
-    /// Whether the clocks of some places differ.
-    mixed: bool,
+    builder: DemandBuilder,
+    stations: Vec<StationState>,
+    /// Whether the clocks of the stations differ.
+    clocks_differ: bool,
     cores: Cores,
     memory: Memory,
     tally: Tally,
     gates: Gates,
-    /// Packets of the front end that the tiles have not caught up with.
-    ahead: VecDeque<(Job, PacketCounts, Vec<LineAccess>)>,
+    /// Front-end packets not yet simulated; the tiles have not reached them.
+    ahead: VecDeque<(ServiceDemand, PacketCounts, Vec<LineAccess>)>,
     lines: Vec<LineAccess>,
     /// Packets so far.
     packets: u64,
     end: Time,
-    /// The latest moment that is timed.
-    most: Time,
+    /// Latest time that is simulated.
+    max_end: Time,
     is_too_long: bool,
 }
 
-/// Core cycles of a frame beyond which it is not timed: half a second to some seconds of hardware. Shared resources are
-/// kept as calendars of about three bytes a cycle.
+/// Longest frame in core cycles, half a second to some seconds of hardware time. Calendars of shared
+/// resources take about three bytes per cycle.
 pub const MAX_CYCLES: u64 = 1 << 30;
 
-/// When batches were set up and traversed, as far as is known.
+/// When each batch was set up and traversed, as far as known.
 #[derive(Clone, Debug, Default)]
 struct Gates {
     set_up: Vec<Time>,
@@ -98,17 +98,17 @@ struct Gates {
 }
 
 impl Gates {
-    fn opens(&self, job: &Job) -> Time {
+    fn opens(&self, demand: &ServiceDemand) -> Time {
         let at = |times: &[Time], batch: usize| times.get(batch).copied().unwrap_or(0);
-        match (job.front, job.batch as usize) {
+        match (demand.front, demand.batch as usize) {
             (true, batch) => batch.checked_sub(2).map_or(0, |before| at(&self.traversed, before)),
             (false, batch) => at(&self.set_up, batch),
         }
     }
 
-    fn note(&mut self, job: &Job, at: Time) {
-        let times = if job.front { &mut self.set_up } else { &mut self.traversed };
-        let batch = job.batch as usize;
+    fn note(&mut self, demand: &ServiceDemand, at: Time) {
+        let times = if demand.front { &mut self.set_up } else { &mut self.traversed };
+        let batch = demand.batch as usize;
         if times.len() <= batch {
             times.resize(batch + 1, 0);
         }
@@ -117,14 +117,14 @@ impl Gates {
 }
 
 impl PacketClock {
-    /// A clock at zero for packets in batches of `batch_triangles`, writing into `recorder`.
+    /// A clock at time 0 for packets in batches of `batch_triangles`, which records into `recorder`.
     pub fn new(machine: &MachineSpec, clocks: Clocks, batch_triangles: u32, recorder: Recorder) -> Self {
         let stations: Vec<_> =
-            Place::ALL.into_iter().map(|place| Station::new(place, machine, &clocks)).collect();
+            Station::ALL.into_iter().map(|station| StationState::new(station, machine, &clocks)).collect();
         Self {
             clocks,
-            makes: Jobs::new(machine, batch_triangles),
-            mixed: stations.iter().any(|station| station.period() != stations[0].period()),
+            builder: DemandBuilder::new(machine, batch_triangles),
+            clocks_differ: stations.iter().any(|station| station.period() != stations[0].period()),
             stations,
             cores: Cores::new(machine, &clocks),
             memory: Memory::new(machine, &clocks),
@@ -134,114 +134,116 @@ impl PacketClock {
             lines: Vec::new(),
             packets: 0,
             end: 0,
-            most: MAX_CYCLES * clocks.period(Clock::Core),
+            max_end: MAX_CYCLES * clocks.period(Clock::Core),
             is_too_long: false,
         }
     }
 
-    /// Whether the frame takes more than [`MAX_CYCLES`]. What comes later is not timed, and [`PacketClock::finish`] gives the
-    /// time of the part before.
+    /// Whether the frame takes more than [`MAX_CYCLES`]. Later packets are not timed, and
+    /// [`PacketClock::finish`] returns the time of the packets before.
     pub fn is_too_long(&self) -> bool {
         self.is_too_long
     }
 
-    /// Runs a stream that is written already.
+    /// Run a recorded stream.
     pub fn run(mut self, stream: &Stream) -> Timed {
-        for (job, counts) in stream.jobs.iter().zip(&stream.counts) {
-            let all: u32 = job.lines.iter().sum();
-            self.next(job, counts, &stream.lines[job.first_line..job.first_line + all as usize]);
+        for (demand, counts) in stream.demands.iter().zip(&stream.counts) {
+            let all: u32 = demand.lines.iter().sum();
+            self.next(demand, counts, &stream.lines[demand.first_line..demand.first_line + all as usize]);
         }
         self.finish()
     }
 
-    /// The next packet of the stream and the lines it asks for.
+    /// Add the next packet of the stream and the lines it requests.
     pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
         let mut sorted = std::mem::take(&mut self.lines);
         sorted.clear();
-        let job = self.makes.job(packet, lines, &mut sorted);
-        self.next(&job, &packet.counts, &sorted);
+        let demand = self.builder.build(packet, lines, &mut sorted);
+        self.next(&demand, &packet.counts, &sorted);
         self.lines = sorted;
     }
 
-    fn next(&mut self, job: &Job, counts: &PacketCounts, lines: &[LineAccess]) {
+    fn next(&mut self, demand: &ServiceDemand, counts: &PacketCounts, lines: &[LineAccess]) {
         self.packets += 1;
-        if job.front {
-            self.ahead.push_back((job.clone(), *counts, lines.to_vec()));
+        if demand.front {
+            self.ahead.push_back((demand.clone(), *counts, lines.to_vec()));
             return;
         }
         if !self.ahead.is_empty() {
-            self.catch_up(Some(job.batch));
+            self.catch_up(Some(demand.batch));
         }
-        self.walk(job, counts, lines);
+        self.walk(demand, counts, lines);
     }
 
-    /// The front end up to the batch that tiles need, and as far as it is behind them in time.
+    /// Simulate the front end up to the batch that the tiles need, and as far as it is behind the tiles in
+    /// time.
     fn catch_up(&mut self, batch: Option<u32>) {
-        while let Some((job, ..)) = self.ahead.front() {
-            let needed = batch.is_none_or(|batch| job.batch <= batch);
-            let behind = self.stations[0].free().max(self.gates.opens(job))
-                <= self.stations[Place::Traversal as usize].free();
+        while let Some((demand, ..)) = self.ahead.front() {
+            let needed = batch.is_none_or(|batch| demand.batch <= batch);
+            let behind = self.stations[0].free().max(self.gates.opens(demand))
+                <= self.stations[Station::Traversal as usize].free();
             if !(needed || behind) {
                 return;
             }
-            if let Some((job, counts, lines)) = self.ahead.pop_front() {
-                self.walk(&job, &counts, &lines);
+            if let Some((demand, counts, lines)) = self.ahead.pop_front() {
+                self.walk(&demand, &counts, &lines);
             }
         }
     }
 
-    /// A packet on its way from its first place to its last.
-    fn walk(&mut self, job: &Job, counts: &PacketCounts, lines: &[LineAccess]) {
-        let first = if job.front { Place::Command } else { Place::Traversal };
-        let mut arrive = self.gates.opens(job);
-        self.is_too_long |= self.end > self.most || arrive > self.most;
+    /// Move a packet from its first station to its last.
+    fn walk(&mut self, demand: &ServiceDemand, counts: &PacketCounts, lines: &[LineAccess]) {
+        let first = if demand.front { Station::Command } else { Station::Traversal };
+        let mut arrive = self.gates.opens(demand);
+        self.is_too_long |= self.end > self.max_end || arrive > self.max_end;
         if self.is_too_long {
             return;
         }
         let mut memory = Span::NONE;
-        for &place in &Place::ALL[first as usize..=job.last as usize] {
-            if self.mixed {
-                arrive = self.stations[place as usize].edge(arrive);
+        for &station in &Station::ALL[first as usize..=demand.last as usize] {
+            if self.clocks_differ {
+                arrive = self.stations[station as usize].edge(arrive);
             }
-            // A packet leaves when the next queue has room, which it sees a cycle later.
-            let room = if place == job.last { 0 } else { self.stations[place as usize + 1].queue.room_at() };
-            let visit = Visit { place, job, lines, arrive, room };
-            let leave = match place.unit() {
+            // A packet leaves when the next queue has room, which it sees one cycle later.
+            let room =
+                if station == demand.last { 0 } else { self.stations[station as usize + 1].queue.room_at() };
+            let visit = Visit { station, demand, lines, arrive, room };
+            let leave = match station.unit() {
                 Unit::Shader => self.cores(&visit, counts, &mut memory),
-                _ => self.station(&visit, counts, &mut memory),
+                _ => self.serve(&visit, counts, &mut memory),
             };
-            arrive = leave + self.stations[place as usize].latency;
+            arrive = leave + self.stations[station as usize].latency;
         }
         self.end = self.end.max(arrive);
-        self.gates.note(job, arrive);
+        self.gates.note(demand, arrive);
         if memory.from <= memory.to {
             self.tally.count(Unit::L2, counts, memory.from, memory.to);
             self.tally.count(Unit::Dram, counts, memory.from, memory.to);
         }
-        self.tally.through(counts);
+        self.tally.packet_done(counts);
     }
 
-    fn station(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
-        let served = self.stations[visit.place as usize].serve(visit, &mut self.memory);
+    fn serve(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
+        let served = self.stations[visit.station as usize].serve(visit, &mut self.memory);
         if let Some(fetched) = served.fetched {
             *memory = memory.with(fetched.first, fetched.moved);
         }
-        self.tally.serve(visit.place.unit(), counts, served.start, served.busy_to);
+        self.tally.serve(visit.station.unit(), counts, served.start, served.busy_to);
         served.leave
     }
 
     fn cores(&mut self, visit: &Visit<'_>, counts: &PacketCounts, memory: &mut Span) -> Time {
-        let run = self.cores.run(visit, &self.makes, &mut self.memory);
-        self.stations[visit.place as usize].queue.note(run.taken + 1);
+        let run = self.cores.run(visit, &self.builder, &mut self.memory);
+        self.stations[visit.station as usize].queue.note(run.taken + 1);
         self.tally.count(Unit::Shader, counts, run.taken, run.done);
         *memory = memory.with(run.memory.from, run.memory.to);
         if run.texture.from <= run.texture.to {
             self.tally.serve(Unit::Texture, counts, run.texture.from, run.texture.to);
         }
-        run.left
+        run.departed
     }
 
-    /// The activity of everything pushed.
+    /// Activity of all packets added.
     pub fn finish(mut self) -> Timed {
         self.catch_up(None);
         let end = self.end.max(self.memory.ends_at());
@@ -256,7 +258,7 @@ impl PacketClock {
             write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }
         let timeline = recorder.finish();
-        let rows = crate::over_busiest(clocks.ps(memory.rows()), &timeline);
+        let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
         Timed {
             timeline,
             cycles: clocks.cycles(Clock::Core, end),
@@ -268,8 +270,8 @@ impl PacketClock {
     }
 }
 
-/// The busy time of one of `servers` of a unit from its calendar: all that lies in a bin at once. What the calendar put beyond the
-/// end of the frame by its stretches is moved before it.
+/// Write the busy time of one of `servers` servers of a unit from its calendar, bin by bin. Slots may end
+/// after the frame; their work is moved before its end.
 fn write(
     recorder: &mut Recorder,
     clocks: &Clocks,
@@ -278,13 +280,13 @@ fn write(
     servers: u64,
     end_ps: u64,
 ) {
-    // Work in the bin of `at_ps` that is not written, and where that bin ends.
+    // Work of the bin at `at_ps` that is not yet written, and the end of that bin.
     let (mut work, mut at_ps, mut end) = (0, 0, 0);
     let flush = |recorder: &mut Recorder, work: u64, at_ps| {
         let busy_ps = clocks.ps_below(work / (calendar.servers() * servers));
         recorder.busy(unit, at_ps, at_ps + busy_ps, 1, 1);
     };
-    for (from, to, used, room) in calendar.stretches() {
+    for (from, to, used, room) in calendar.slots() {
         if to <= end {
             work += used;
             continue;
@@ -301,7 +303,7 @@ fn write(
     flush(recorder, work, at_ps);
 }
 
-/// `whole` times `used` over `room`, rounded down.
+/// `whole * used / room`, rounded down.
 fn part(whole: u64, used: u64, room: u64) -> u64 {
     match whole.checked_mul(used) {
         Some(product) => product / room,

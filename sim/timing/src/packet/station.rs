@@ -1,34 +1,34 @@
-//! A unit at its place at the level `packet`.
+//! State of a unit at its station, at the level `packet`.
 
 use super::Visit;
 use super::memory::{Fetched, Memory};
-use super::ring::Ring;
+use super::queue::QueueTimes;
 use crate::clock::{Clocks, Time};
-use crate::job::{Place, port};
+use crate::demand::{Station, port};
 use crate::spec::MachineSpec;
 
-/// The first edge of a clock at or after `at`. Most moments are edges already.
+/// First edge of a clock at or after `at`. Most times are edges already.
 pub(super) fn aligned(at: Time, period: Time) -> Time {
     if period == 1 { at } else { at.next_multiple_of(period) }
 }
 
-/// The state of a unit.
+/// State of a unit at a station.
 #[derive(Clone, Debug)]
-pub(super) struct Station {
+pub(super) struct StationState {
     pub latency: Time,
-    /// The queue in front: when those in it began to be served.
-    pub queue: Ring,
+    /// The input queue, by the times at which its packets began service.
+    pub queue: QueueTimes,
     period: Time,
-    /// When it can begin with the next packet, and when it can ask for the next line.
+    /// When it can serve the next packet, and when it can request the next line.
     free: Time,
-    asks: Time,
-    left: Time,
+    next_request: Time,
+    departed: Time,
     port: Option<usize>,
-    /// Those that wait behind for their lines.
-    behind: Option<Ring>,
+    /// Packets that wait for their lines after service.
+    behind: Option<QueueTimes>,
 }
 
-/// What became of a packet at a unit.
+/// Times of a packet at a unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Served {
     pub start: Time,
@@ -37,78 +37,79 @@ pub(super) struct Served {
     pub fetched: Option<Fetched>,
 }
 
-impl Station {
-    pub fn new(place: Place, machine: &MachineSpec, clocks: &Clocks) -> Self {
-        let common = machine.common(place.unit());
+impl StationState {
+    pub fn new(station: Station, machine: &MachineSpec, clocks: &Clocks) -> Self {
+        let common = machine.common(station.unit());
         let period = clocks.period(common.clock);
-        let port = port(place.unit());
+        let port = port(station.unit());
         Self {
             latency: period * Time::from(common.latency_cycles),
-            queue: Ring::new(common.queue),
+            queue: QueueTimes::new(common.queue),
             period,
             free: 0,
-            asks: 0,
-            left: 0,
+            next_request: 0,
+            departed: 0,
             port,
-            behind: port.map(|_| Ring::new(common.in_flight)),
+            behind: port.map(|_| QueueTimes::new(common.in_flight)),
         }
     }
 
-    /// When it can begin with another packet.
+    /// When it can serve another packet.
     pub fn free(&self) -> Time {
         self.free
     }
 
-    /// The first edge of its clock at or after `at`.
+    /// First edge of its clock at or after `at`.
     pub fn edge(&self, at: Time) -> Time {
         aligned(at, self.period)
     }
 
-    /// Grains of a cycle.
+    /// Grains per cycle.
     pub fn period(&self) -> Time {
         self.period
     }
 
-    /// The later of an edge of its clock and the first one at or after `at`.
+    /// The later of `edge`, an edge of its clock, and the first edge at or after `at`.
     fn later(&self, edge: Time, at: Time) -> Time {
         if at <= edge { edge } else { aligned(at, self.period) }
     }
 
-    /// A packet comes by.
+    /// Serve a packet.
     pub fn serve(&mut self, visit: &Visit<'_>, memory: &mut Memory) -> Served {
         let start = visit.arrive.max(self.free);
-        let busy_to = start + self.period * Time::from(visit.job.service[visit.place as usize]);
+        let busy_to = start + self.period * Time::from(visit.demand.service[visit.station as usize]);
         let fetched = self.fetch(visit, start, memory);
-        let asked = fetched.as_ref().map_or(busy_to, |fetched| self.later(busy_to, fetched.asked));
-        let waits = fetched.as_ref().map_or(0, |fetched| fetched.there).max(visit.room);
+        let last_request =
+            fetched.as_ref().map_or(busy_to, |fetched| self.later(busy_to, fetched.last_request));
+        let waits = fetched.as_ref().map_or(0, |fetched| fetched.arrived).max(visit.room);
         let leave = match &self.behind {
             None => {
-                self.free = self.later(asked, waits);
+                self.free = self.later(last_request, waits);
                 self.free
             }
             Some(behind) => {
-                self.free = asked.max(behind.room_at());
-                self.later(self.free.max(self.left), waits)
+                self.free = last_request.max(behind.room_at());
+                self.later(self.free.max(self.departed), waits)
             }
         };
         if let Some(behind) = &mut self.behind {
             behind.note(leave);
         }
-        self.left = leave;
+        self.departed = leave;
         self.queue.note(start + 1);
         Served { start, busy_to, leave, fetched }
     }
 
     fn fetch(&mut self, visit: &Visit<'_>, start: Time, memory: &mut Memory) -> Option<Fetched> {
         let port = self.port?;
-        if visit.job.lines[port] == 0 {
+        if visit.demand.lines[port] == 0 {
             return None;
         }
-        let range = visit.job.lines_of(port);
-        let first = visit.job.first_line;
+        let range = visit.demand.lines_of(port);
+        let first = visit.demand.first_line;
         let lines = &visit.lines[range.start - first..range.end - first];
-        let fetched = memory.ask(port, lines, start.max(self.asks), self.period);
-        self.asks = fetched.asked + self.period;
+        let fetched = memory.request(port, lines, start.max(self.next_request), self.period);
+        self.next_request = fetched.last_request + self.period;
         Some(fetched)
     }
 }

@@ -1,14 +1,15 @@
-//! Events of packets in bins of time, added up where many packets fall into one bin.
+//! Events of packets in bins of time. Consecutive packets of a bin are written together.
 
 use activity::{Counts, PacketCounts, Unit};
 
 use crate::Recorder;
 use crate::clock::{Clocks, Time};
 
-/// Where a unit is: the bin it writes into, and what it has done there.
+/// Position of a unit: its current bin, and its work in that bin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cursor {
-    /// The bin, in grains: nothing that begins before `from`, at `to` or later, or ends after `to` is surely in it.
+    /// The bin in grains, shrunk to times that are surely inside: work that begins in `from..to` and ends by
+    /// `to`.
     from: Time,
     to: Time,
     start_ps: u64,
@@ -16,16 +17,16 @@ struct Cursor {
     busy: Time,
 }
 
-/// Events over time. A packet whose work in a unit lies in the bin in which that unit is costs a comparison: its events are in
-/// the running total, and what the total has grown by is written when the unit goes on to another bin.
+/// Events over time. A packet whose work is inside the current bin of a unit costs one comparison: its events
+/// go to the running total. The growth of the total is written when the unit moves to another bin.
 #[derive(Debug)]
 pub(super) struct Tally {
     recorder: Recorder,
     clocks: Clocks,
     cursors: [Cursor; Unit::COUNT],
-    /// Events of all packets that are through.
+    /// Events of all packets so far.
     total: Counts,
-    /// Of these, those that are written, by unit.
+    /// The part of them that has been written, by unit.
     written: Counts,
 }
 
@@ -35,19 +36,19 @@ impl Tally {
         Self { recorder, clocks, cursors: Default::default(), total, written }
     }
 
-    /// `unit` did its share of `counts` evenly between two moments.
+    /// Record that `unit` did its part of `counts` evenly between two times.
     pub fn count(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
         let at = &self.cursors[unit as usize];
         if from < at.from || from >= at.to || to > at.to {
-            self.elsewhere(unit, counts, from, to);
+            self.count_outside_bin(unit, counts, from, to);
         }
     }
 
-    /// The same, and it was busy meanwhile.
+    /// Record the same, and that `unit` was busy meanwhile.
     pub fn serve(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
         let at = &mut self.cursors[unit as usize];
         if from < at.from || from >= at.to || to > at.to {
-            self.elsewhere(unit, counts, from, to);
+            self.count_outside_bin(unit, counts, from, to);
             let (from_ps, to_ps) = (self.clocks.ps(from), self.clocks.ps(to));
             self.recorder.busy(unit, from_ps, to_ps, 1, 1);
         } else {
@@ -55,25 +56,25 @@ impl Tally {
         }
     }
 
-    /// All units have done what `counts` says.
-    pub fn through(&mut self, counts: &PacketCounts) {
+    /// Record the end of a packet: all units have done their part of `counts`.
+    pub fn packet_done(&mut self, counts: &PacketCounts) {
         self.total += counts;
     }
 
     #[cold]
-    fn elsewhere(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
+    fn count_outside_bin(&mut self, unit: Unit, counts: &PacketCounts, from: Time, to: Time) {
         let (from_ps, to_ps) = (self.clocks.ps(from), self.clocks.ps(to));
         self.recorder.count(unit, counts, from_ps, to_ps);
         if from >= self.cursors[unit as usize].from {
             self.write(unit);
-            self.go_to(unit, to_ps);
+            self.move_to_bin(unit, to_ps);
         }
         for (written, &count) in self.written.of_mut(unit).iter_mut().zip(counts.of(unit)) {
             *written += u64::from(count);
         }
     }
 
-    /// Writes what `unit` has done in its bin.
+    /// Write the work of `unit` in its bin.
     fn write(&mut self, unit: Unit) {
         let Self { recorder, total, written, cursors, .. } = self;
         let cursor = &mut cursors[unit as usize];
@@ -87,15 +88,15 @@ impl Tally {
         recorder.busy(unit, cursor.start_ps, cursor.start_ps + busy_ps, 1, 1);
     }
 
-    /// `unit` goes on to the bin of `at_ps`.
-    fn go_to(&mut self, unit: Unit, at_ps: u64) {
+    /// Move `unit` to the bin of `at_ps`.
+    fn move_to_bin(&mut self, unit: Unit, at_ps: u64) {
         let bin_ps = self.recorder.bin_ps();
         let start_ps = at_ps / bin_ps * bin_ps;
         let (from, to) = (self.clocks.grain_from(start_ps), self.clocks.grain_up_to(start_ps + bin_ps));
         self.cursors[unit as usize] = Cursor { from, to, start_ps, busy: 0 };
     }
 
-    /// The recorder, with everything in it.
+    /// The recorder, with everything written.
     pub fn finish(mut self) -> Recorder {
         Unit::ALL.into_iter().for_each(|unit| self.write(unit));
         self.recorder
@@ -107,9 +108,9 @@ mod tests {
     use super::*;
     use activity::Event;
 
-    /// Packets here and there, in and out of order, into a tally and straight into a recorder.
+    /// Packets in and out of time order, through a tally and directly through a recorder.
     #[test]
-    fn bins_are_those_of_a_recorder() {
+    fn bins_equal_those_of_a_recorder() {
         for hz in [(1e9, 1e9), (925e6, 1375e6)] {
             let clocks = Clocks::new(hz.0, hz.1).unwrap();
             let bins = || Recorder::new(10_000, 16);
@@ -123,11 +124,11 @@ mod tests {
                 let from = u64::from(step) * 13 + jump * 20;
                 let to = from + u64::from(step % 50);
                 tally.count(Unit::SampleTest, &counts, from, to);
-                tally.through(&counts);
+                tally.packet_done(&counts);
                 plain.count(Unit::SampleTest, &counts, clocks.ps(from), clocks.ps(to));
             }
             let mut tally = tally.finish();
-            // The clock says when the frame ends.
+            // The clock sets the end of the frame.
             tally.lasts(100_000_000);
             plain.lasts(100_000_000);
             assert_eq!(tally.finish(), plain.finish(), "{hz:?}");

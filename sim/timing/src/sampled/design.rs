@@ -1,38 +1,39 @@
-//! Strata of units with like signatures, and the representatives drawn from each.
+//! Stratified sampling: strata of units with similar signatures, and the representatives drawn from each.
 
-/// Fewest representatives of a stratum: with one nothing is known of its spread.
-const LEAST: usize = 2;
-/// Fewest of all: two strata, so that the line through all of them leaves something over.
-const FEWEST: usize = 2 * LEAST;
+/// Fewest representatives per stratum; one would not show the variance.
+const MIN_PER_STRATUM: usize = 2;
+/// Fewest representatives in all: two strata, so the regression has residuals.
+const MIN_REPRESENTATIVES: usize = 2 * MIN_PER_STRATUM;
 
-/// Units whose signatures are neighbours.
+/// Units with neighbouring signatures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stratum {
-    /// Its units, in the order of their signatures.
+    /// Its units, sorted by signature.
     pub members: Vec<usize>,
-    /// Those of them that are to be measured, in the same order.
+    /// Its representatives, in the same order.
     pub chosen: Vec<usize>,
 }
 
-/// Which units are measured, and for which others they stand.
+/// The strata, and the stratum of every unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Design {
     strata: Vec<Stratum>,
-    /// The stratum of each unit.
+    /// Stratum of each unit.
     of: Vec<usize>,
 }
 
 impl Design {
-    /// Cuts units into as many strata of (nearly) equal size as pairs of `representatives` allow, in the order of `signature`
-    /// (ties in their own order), and draws two or three from each without replacement. `random` gives a random word for
-    /// each unit; the same words give the same design. A unit that is measured anyway, `certain`, counts as a representative and
-    /// stands for nobody but itself: it is a stratum of its own, the last.
+    /// Split units into strata of (nearly) equal size, in the order of `signature`, and draw two or three
+    /// representatives from each without replacement. Ties are in the order of the units. There are as many
+    /// strata as `representatives` has pairs. `random` returns a random word for each unit; equal words give
+    /// equal designs. The unit `certain` is measured in any case: it counts as a representative and forms the
+    /// last stratum by itself.
     ///
-    /// Equal sizes with equal draws make every unit as likely as any other, so a stratified mean is a plain one (Cochran
-    /// 1977, 5.3). Twice as many representatives hold those of the first design: strata are cut in two, and those drawn from a
-    /// whole are drawn from its parts.
+    /// Equal sizes with equal draws give every unit the same probability, so a stratified mean is a plain
+    /// mean (Cochran 1977, 5.3). Doubling `representatives` keeps those of the first design: strata are
+    /// halved, and the units drawn from a stratum are drawn from its halves.
     ///
-    /// Fewer than 4 representatives drawn are taken as 4, more than there are units as all.
+    /// At least 4 representatives are drawn, and at most all units.
     pub fn draw(
         signature: &[f64],
         certain: Option<usize>,
@@ -41,9 +42,9 @@ impl Design {
     ) -> Self {
         let mut order: Vec<usize> = (0..signature.len()).filter(|&unit| Some(unit) != certain).collect();
         let units = order.len();
-        let wanted = representatives.saturating_sub(certain.iter().len()).max(FEWEST).min(units);
+        let wanted = representatives.saturating_sub(certain.iter().len()).max(MIN_REPRESENTATIVES).min(units);
         order.sort_by(|&a, &b| signature[a].total_cmp(&signature[b]).then(a.cmp(&b)));
-        let parts = (wanted / LEAST).max(1);
+        let parts = (wanted / MIN_PER_STRATUM).max(1);
         let share = |whole: usize, part: usize| whole * part / parts;
         let mut strata: Vec<Stratum> = (0..parts)
             .map(|part| {
@@ -56,13 +57,13 @@ impl Design {
         strata.retain(|stratum| !stratum.members.is_empty());
         strata.extend(certain.map(|unit| Stratum { members: vec![unit], chosen: vec![unit] }));
         let mut of = vec![0; signature.len()];
-        for (stratum, place) in strata.iter().zip(0..) {
-            stratum.members.iter().for_each(|&unit| of[unit] = place);
+        for (stratum, at) in strata.iter().zip(0..) {
+            stratum.members.iter().for_each(|&unit| of[unit] = at);
         }
         Self { strata, of }
     }
 
-    /// The strata, that of the smallest signatures first, the one that was certain last.
+    /// All strata, in the order of their signatures; the certain unit's is the last.
     pub fn strata(&self) -> &[Stratum] {
         &self.strata
     }
@@ -72,12 +73,12 @@ impl Design {
         self.of[unit]
     }
 
-    /// How many units there are.
+    /// Number of units.
     pub fn units(&self) -> usize {
         self.of.len()
     }
 
-    /// All representatives, in the order of their numbers.
+    /// All representatives, sorted.
     pub fn chosen(&self) -> Vec<usize> {
         let mut all: Vec<usize> = self.strata.iter().flat_map(|stratum| stratum.chosen.clone()).collect();
         all.sort_unstable();
@@ -85,12 +86,12 @@ impl Design {
     }
 }
 
-/// Draws `count` of `members`: those with the smallest random words, each a function of the unit alone.
+/// Draw `count` of `members`: those with the smallest random words, which depend on the unit alone.
 fn draw(members: &[usize], count: usize, random: &impl Fn(u64) -> u64) -> Vec<usize> {
     let mut words: Vec<(u64, usize)> =
-        members.iter().zip(0..).map(|(&unit, place)| (random(unit as u64), place)).collect();
+        members.iter().zip(0..).map(|(&unit, at)| (random(unit as u64), at)).collect();
     words.sort_unstable();
-    let mut places: Vec<usize> = words[..count].iter().map(|&(_, place)| place).collect();
-    places.sort_unstable();
-    places.into_iter().map(|place| members[place]).collect()
+    let mut positions: Vec<usize> = words[..count].iter().map(|&(_, at)| at).collect();
+    positions.sort_unstable();
+    positions.into_iter().map(|at| members[at]).collect()
 }

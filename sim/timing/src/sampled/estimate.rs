@@ -1,20 +1,20 @@
-//! From the representatives to all units: the combined regression estimator and its error.
+//! Estimates for all units from the representatives: combined regression estimator and its error.
 
 use super::{Design, student_t};
 
-/// A value and the ends of the interval that holds the truth with the probability that was asked for.
+/// A value and its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// The most likely value.
+    /// Most likely value.
     pub value: f64,
-    /// The lower end.
+    /// Lower end.
     pub low: f64,
-    /// The upper end.
+    /// Upper end.
     pub high: f64,
 }
 
 impl Interval {
-    /// Whether `truth` is inside, ends included.
+    /// Whether `truth` is in the interval, ends included.
     pub fn holds(&self, truth: f64) -> bool {
         (self.low..=self.high).contains(&truth)
     }
@@ -25,47 +25,48 @@ impl Interval {
         if half == 0.0 { 0.0 } else { half / self.value.abs() }
     }
 
-    /// The same times `by`, which is not negative.
+    /// The interval times `by`, which is at least 0.
     pub fn scaled(self, by: f64) -> Self {
         Self { value: self.value * by, low: self.low * by, high: self.high * by }
     }
 }
 
-/// What one quantity of all units comes to, from its values for the representatives.
+/// Estimate of one quantity of all units from its values for the representatives.
 ///
-/// In stratum `h` unit `i` is predicted as `mean_h(y) + b (x_i - mean_h(x))`, means over its representatives, with one slope `b`
-/// for all (least squares through all representatives). The sum over units is the combined regression estimator (Cochran 1977,
-/// eq. 7.53 with a slope of the whole sample), and measured values in the place of predicted ones leave it as it is.
+/// In stratum `h` unit `i` is predicted as `mean_h(y) + b (x_i - mean_h(x))`. The means are over its
+/// representatives, and the slope `b` is the same for all strata (least squares through all representatives).
+/// The sum over units is the combined regression estimator (Cochran 1977, eq. 7.53, with a slope of the whole
+/// sample). Replacing predicted by measured values leaves the sum unchanged.
 ///
-/// Its variance is `sum over h of N_h^2 (1 - n_h / N_h) s_h^2 / n_h`, with `s_h^2` the variance of the residuals of the line within
-/// a stratum (Cochran 1977, eqs. 5.13 and 7.56), times `f / (f - r)`: the slope took `r` of the `f` degrees of freedom within strata.
-/// To that comes `(sum over h of N_h (X_h - mean_h(x)))^2 s^2 / S_xx`, what the line carries from the representatives to the units
-/// they stand for, times the variance of its slope (Royall and Cumberland 1981): draws that lie to one side know less.
-/// The interval is that of Student with the effective degrees of freedom of such a sum, spreads taken as equal (Cochran 1977,
-/// eq. 5.16; Satterthwaite 1946), less `r`, rounded down.
+/// Its variance is `sum over h of N_h^2 (1 - n_h / N_h) s_h^2 / n_h` times `f / (f - r)`. Here `s_h^2` is the
+/// variance of the residuals in a stratum (Cochran 1977, eqs. 5.13 and 7.56), and the slope takes `r` of the
+/// `f` degrees of freedom within strata. The variance of the slope adds `(sum over h of N_h (X_h -
+/// mean_h(x)))^2 s^2 / S_xx` (Royall and Cumberland 1981): unbalanced draws are less accurate. The interval
+/// uses Student's t with the effective degrees of freedom of such a sum, assuming equal variances (Cochran
+/// 1977, eq. 5.16; Satterthwaite 1946), less `r`, rounded down.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// A prediction for every unit, the representatives' own not in their place.
+    /// Prediction for every unit, also for the representatives.
     predicted: Vec<f64>,
-    /// For each stratum, what the line leaves of its representatives.
+    /// Residuals of the representatives, by stratum.
     residuals: Vec<Vec<f64>>,
-    /// The square of what the slope is multiplied by in the total, over the spread that it is known from.
+    /// Squared coefficient of the slope in the total, over the spread of the covariate.
     lever: f64,
     shape: Shape,
 }
 
-/// What the errors of all quantities share.
+/// Properties shared by all quantities of a design.
 #[derive(Clone, Debug, PartialEq)]
 struct Shape {
     /// Units and representatives of each stratum.
     sizes: Vec<[usize; 2]>,
-    /// Degrees of freedom within strata, and how many of them the slope took.
+    /// Degrees of freedom within strata, and how many of them the slope takes.
     within: f64,
     slope: f64,
 }
 
 impl Estimate {
-    /// `covariate` holds a number known for every unit; `measured` says the quantity of a representative.
+    /// Estimate from `covariate`, a known number per unit, and `measured`, the quantity of a representative.
     pub fn new(design: &Design, covariate: &[f64], measured: impl Fn(usize) -> f64) -> Self {
         let slope = Slope::new(design, covariate, &measured);
         let mut predicted = vec![0.0; design.units()];
@@ -76,7 +77,7 @@ impl Estimate {
             let mean_y = mean(stratum.chosen.iter().map(|&unit| measured(unit)));
             let at = |unit: usize| mean_y + slope.slope * (covariate[unit] - mean_x);
             stratum.members.iter().for_each(|&unit| predicted[unit] = at(unit));
-            // Where all are measured nothing is carried, whatever rounding says.
+            // If all units are measured the coefficient is 0, whatever rounding gives.
             if stratum.chosen.len() < stratum.members.len() {
                 carried += stratum.members.iter().map(|&unit| covariate[unit] - mean_x).sum::<f64>();
             }
@@ -90,30 +91,30 @@ impl Estimate {
         Self { predicted, residuals, lever, shape }
     }
 
-    /// The prediction for a unit.
+    /// Prediction for a unit.
     pub fn predicted(&self, unit: usize) -> f64 {
         self.predicted[unit]
     }
 
-    /// The sum over all units, with its interval.
+    /// Sum over all units, with its interval.
     pub fn total(&self, confidence: f64) -> Interval {
         let total = self.predicted.iter().sum();
         self.shape.interval(total, self.shape.variance(&self.residuals, self.lever), confidence)
     }
 
-    /// The sum of this quantity over that of another of the same design, with its interval: the variance is that of what is left of
-    /// `y - R x` (Cochran 1977, eq. 6.13).
+    /// Ratio of this quantity's sum to another's of the same design, with its interval. The variance is that
+    /// of the residuals of `y - R x` (Cochran 1977, eq. 6.13).
     pub fn ratio(&self, to: &Self, confidence: f64) -> Interval {
-        let [above, below]: [f64; 2] = [self, to].map(|estimate| estimate.predicted.iter().sum());
-        let ratio = above / below;
-        let left = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
-        let left: Vec<Vec<f64>> = self.residuals.iter().zip(&to.residuals).map(left).collect();
+        let [numerator, denominator]: [f64; 2] = [self, to].map(|estimate| estimate.predicted.iter().sum());
+        let ratio = numerator / denominator;
+        let residual = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
+        let residual: Vec<Vec<f64>> = self.residuals.iter().zip(&to.residuals).map(residual).collect();
         let shape = if self.shape.slope > to.shape.slope { &self.shape } else { &to.shape };
         let lever = self.lever.max(to.lever);
-        shape.interval(ratio, shape.variance(&left, lever) / (below * below), confidence)
+        shape.interval(ratio, shape.variance(&residual, lever) / (denominator * denominator), confidence)
     }
 
-    /// The interval of a single unit of a stratum, in which its own value lies with the probability `confidence`: half of its width.
+    /// Half width of the prediction interval of a single unit of a stratum.
     pub fn half_width_of_one(&self, stratum: usize, confidence: f64) -> f64 {
         let [_, chosen] = self.shape.sizes[stratum];
         let variance = self.shape.pooled(&self.residuals) * (1.0 + 1.0 / chosen as f64);
@@ -122,7 +123,7 @@ impl Estimate {
 }
 
 impl Shape {
-    /// What a stratum's variance counts for in that of the whole.
+    /// Weight of a stratum's variance in the variance of the total.
     fn weight([units, chosen]: [usize; 2]) -> f64 {
         let (all, some) = (units as f64, chosen as f64);
         all * (all - some) / some
@@ -139,15 +140,16 @@ impl Shape {
         if squares > 0.0 { (sum * sum / squares - self.slope).max(1.0) as u32 } else { 1 }
     }
 
-    /// The variance of what the line leaves, over all strata.
+    /// Pooled variance of the residuals.
     fn pooled(&self, residuals: &[Vec<f64>]) -> f64 {
-        let squares: f64 = residuals.iter().flatten().map(|left| left * left).sum();
+        let squares: f64 = residuals.iter().flatten().map(|residual| residual * residual).sum();
         if squares == 0.0 { 0.0 } else { squares / (self.within - self.slope) }
     }
 
     fn variance(&self, residuals: &[Vec<f64>], lever: f64) -> f64 {
-        let of = |(left, [units, chosen]): (&Vec<f64>, &[usize; 2])| {
-            let spread = left.iter().map(|left| left * left).sum::<f64>() / (*chosen as f64 - 1.0);
+        let of = |(residual, [units, chosen]): (&Vec<f64>, &[usize; 2])| {
+            let spread =
+                residual.iter().map(|residual| residual * residual).sum::<f64>() / (*chosen as f64 - 1.0);
             Self::weight([*units, *chosen]) * spread
         };
         let sum: f64 = residuals.iter().zip(&self.sizes).filter(|(_, [_, chosen])| *chosen > 1).map(of).sum();
@@ -161,12 +163,12 @@ impl Shape {
     }
 }
 
-/// The slope of the line through all representatives.
+/// Slope of the regression through all representatives.
 struct Slope {
     slope: f64,
-    /// The share of the covariate's spread that lies within strata: the degrees of freedom the slope takes there.
+    /// Fraction of the covariate's spread within strata: the degrees of freedom that the slope takes there.
     within: f64,
-    /// The covariate's spread over all representatives.
+    /// Spread of the covariate over all representatives.
     spread: f64,
 }
 
@@ -185,7 +187,7 @@ impl Slope {
                 within += (covariate[unit] - own_x) * (covariate[unit] - own_x);
             }
         }
-        // A signature that says nothing: equal for all.
+        // A constant covariate has no slope.
         let slope = |by: f64| if xx > 0.0 { by / xx } else { 0.0 };
         Self { slope: slope(xy), within: slope(within), spread: xx }
     }

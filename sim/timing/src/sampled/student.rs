@@ -1,12 +1,12 @@
-//! Student's distribution: how far a mean of few may be from the truth.
+//! Student's t distribution: confidence intervals of means of few values.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// The half-width, in standard errors, of the interval that holds the truth with probability `confidence` (0 to 1), where the
-/// standard error itself is known from `freedom` degrees of freedom (at least 1 is taken).
+/// Half width, in standard errors, of an interval that contains the truth with probability `confidence` (0 to
+/// 1). The standard error is estimated with `freedom` degrees of freedom, at least 1.
 ///
-/// Student (1908); the distribution for whole degrees of freedom is a finite sum (Abramowitz and Stegun 1964, 26.7.3 and
-/// 26.7.4), inverted by bisection to the last bits of an f64.
+/// Student (1908). For integer degrees of freedom the distribution is a finite sum (Abramowitz and Stegun
+/// 1964, 26.7.3 and 26.7.4), inverted here by bisection to the last bits of an f64.
 pub fn student_t(confidence: f64, freedom: u32) -> f64 {
     let inside = |angle: f64| within(angle, freedom.max(1));
     let (mut low, mut high) = (0.0, FRAC_PI_2);
@@ -17,7 +17,7 @@ pub fn student_t(confidence: f64, freedom: u32) -> f64 {
     libm::tan(low) * f64::from(freedom.max(1)).sqrt()
 }
 
-/// The probability of |t| < sqrt(n) tan(angle) for `n` degrees of freedom.
+/// Probability of |t| < sqrt(n) tan(angle) for `n` degrees of freedom.
 fn within(angle: f64, n: u32) -> f64 {
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
     let square = cosine * cosine;
@@ -59,7 +59,7 @@ mod tests {
         }
     }
 
-    /// One degree is Cauchy's distribution, two have a closed form.
+    /// One degree is the Cauchy distribution; two have a closed form.
     #[test]
     fn closed_forms() {
         for confidence in [0.5, 0.8, 0.95, 0.999] {
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn more_freedom_is_a_narrower_interval_and_none_is_taken_as_one() {
+    fn the_interval_narrows_with_freedom_and_0_counts_as_1() {
         let widths: Vec<f64> = (1..60).map(|n| student_t(0.95, n)).collect();
         assert!(widths.windows(2).all(|pair| pair[1] < pair[0]));
         assert!(widths[58] > 1.95996);

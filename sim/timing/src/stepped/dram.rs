@@ -2,21 +2,29 @@
 
 use activity::{Event, LineAccess, LineKind, Unit};
 
-use super::meter::{Meter, Rest};
+use super::meter::Meter;
 use super::waits::Waits;
-use crate::address::Map;
+use crate::address::AddressMap;
 use crate::clock::{Clocks, Time};
 use crate::spec::MachineSpec;
+use crate::stalls::Reason;
 use crate::{LINE_BYTES, Recorder};
 
-/// A line on its way.
+/// A pending line.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     seen_at: Time,
     bank: usize,
     row: u32,
-    /// Who waits for it, and how long it takes from here to there; `None` for a line that is written.
-    reader: Option<(u32, Time)>,
+    /// The waiting reader and the latency from here to it; `None` for writes.
+    reader: Option<Reader>,
+}
+
+/// A wait for a line, and the latency from memory to the reader.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reader {
+    pub wait: u32,
+    pub latency: Time,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,7 +35,7 @@ struct Bank {
 
 #[derive(Clone, Debug)]
 struct Channel {
-    /// In the order in which they came.
+    /// In order of arrival.
     entries: Vec<Entry>,
     banks: Vec<Bank>,
     bus_free_at: Time,
@@ -39,7 +47,7 @@ struct Channel {
 #[derive(Clone, Debug)]
 pub(super) struct Dram {
     channels: Vec<Channel>,
-    map: Map,
+    map: AddressMap,
     queue: usize,
     period: Time,
     burst: Time,
@@ -63,7 +71,7 @@ impl Dram {
         };
         Self {
             channels: vec![channel; spec.channels.get() as usize],
-            map: Map::new(spec),
+            map: AddressMap::new(spec),
             queue: spec.queue.get() as usize,
             period,
             burst: cycles(spec.burst_cycles.get()),
@@ -78,11 +86,11 @@ impl Dram {
         self.period
     }
 
-    /// Whether the lines that `access` moves can be queued.
+    /// Whether the lines moved by `access` fit in the queues.
     pub fn has_room(&self, access: &LineAccess, now: Time) -> bool {
         let moved = matches!(access.kind, LineKind::Fetch | LineKind::Drain).then_some(access.line);
         let victim = (access.victim != LineAccess::NONE).then_some(access.victim);
-        let channels = [moved, victim].map(|line| line.map(|line| self.map.place(line).channel));
+        let channels = [moved, victim].map(|line| line.map(|line| self.map.locate(line).channel));
         match channels {
             [Some(a), Some(b)] if a == b => self.channels[a].room(self.queue, now) >= 2,
             _ => channels
@@ -92,18 +100,19 @@ impl Dram {
         }
     }
 
-    /// Queues a line to be seen from `seen_at` on; `reader` as in [`Entry`].
-    pub fn push(&mut self, line: u32, reader: Option<(u32, Time)>, seen_at: Time) {
-        let place = self.map.place(line);
-        self.channels[place.channel].entries.push(Entry {
+    /// Add a line, visible from `seen_at` on; `reader` as in [`Entry`].
+    pub fn push(&mut self, line: u32, reader: Option<Reader>, seen_at: Time) {
+        let address = self.map.locate(line);
+        self.channels[address.channel].entries.push(Entry {
             seen_at,
-            bank: place.bank,
-            row: place.row,
+            bank: address.bank,
+            row: address.row,
             reader,
         });
     }
 
-    /// In each channel, a column command and a row command where they can be given. Says whether any was.
+    /// Issue one column command and one row command per channel, where possible. Returns whether any was
+    /// issued.
     pub fn tick(
         &mut self,
         now: Time,
@@ -121,21 +130,22 @@ impl Dram {
             acted |= self.channels[at].row(now, self.activate, self.precharge);
         }
         let busy = self.channels.iter().filter(|channel| channel.bus_free_at > now).count() as u32;
-        let asked = |channel: &Channel| channel.entries.iter().any(|entry| entry.seen_at <= now);
-        let rest = if self.channels.iter().any(asked) { Rest::Starved(Unit::Dram) } else { Rest::Idle };
-        meter.set(Unit::Dram, now, busy, rest, recorder);
+        let is_seen = |channel: &Channel| channel.entries.iter().any(|entry| entry.seen_at <= now);
+        let reason =
+            if self.channels.iter().any(is_seen) { Reason::Starved(Unit::Dram) } else { Reason::Idle };
+        meter.set(Unit::Dram, now, busy, reason, recorder);
         acted
     }
 
     fn moved(&self, entry: &Entry, now: Time, waits: &mut Waits, at_ps: u64, recorder: &mut Recorder) {
         let event = if entry.reader.is_some() { Event::DramReadBytes } else { Event::DramWriteBytes };
         recorder.event(event, u64::from(LINE_BYTES), at_ps);
-        if let Some((wait, way)) = entry.reader {
-            waits.arrives(wait, now + self.cas + self.burst + self.latency + way);
+        if let Some(Reader { wait, latency }) = entry.reader {
+            waits.arrives(wait, now + self.cas + self.burst + self.latency + latency);
         }
     }
 
-    /// When it may have something to do next, if nobody else does anything.
+    /// Earliest time of possible work if no other unit acts.
     pub fn wakes_at(&self, now: Time) -> Option<Time> {
         self.channels.iter().flat_map(|channel| channel.wakes(now)).filter(|&at| at > now).min()
     }
@@ -144,7 +154,7 @@ impl Dram {
         self.channels.iter().all(|channel| channel.entries.is_empty())
     }
 
-    /// When the last transfer so far ends.
+    /// End of the last transfer so far.
     pub fn ends_at(&self) -> Time {
         self.channels.iter().map(|channel| channel.bus_free_at).max().unwrap_or(0)
     }
@@ -156,7 +166,7 @@ impl Channel {
         queue.saturating_sub(self.entries.len() + just_freed)
     }
 
-    /// The oldest line whose row is open goes over the bus, where that is free.
+    /// Transfer the oldest line of an open row, if the bus is free.
     fn column(&mut self, now: Time, burst: Time) -> Option<Entry> {
         if self.bus_free_at > now {
             return None;
@@ -172,7 +182,8 @@ impl Channel {
         Some(self.entries.remove(at))
     }
 
-    /// The oldest line whose row is not open opens it, unless another waits for the one that is.
+    /// Open the row of the oldest line whose row is closed, unless a line waits for the open row of that
+    /// bank.
     fn row(&mut self, now: Time, activate: Time, precharge: Time) -> bool {
         let wanted = |bank: usize| {
             self.entries

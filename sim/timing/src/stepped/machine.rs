@@ -1,29 +1,29 @@
-//! Everything there is, from cycle to cycle.
+//! All units of a machine, cycle by cycle.
 
-use activity::Unit;
+use activity::{LineAccess, Unit};
 
 use super::dram::Dram;
 use super::memory::L2;
-use super::meter::{Meter, Rest};
+use super::meter::Meter;
 use super::queue::Queue;
-use super::shader::Shader;
+use super::shader::{CoreEnv, Shader};
 use super::sources::Sources;
-use super::stage::Stage;
+use super::stage::{Stage, StageEnv};
 use super::waits::Waits;
-use super::world::{At, Cores, Texels, World};
-use super::{Manner, Stalled, Stream};
+use super::{Stalled, StepOptions, Stream};
 use crate::clock::{Clocks, Time};
-use crate::job::{Jobs, Place, TEXTURE_PORT, port};
+use crate::demand::{DemandBuilder, Station, TEXTURE_PORT, port};
 use crate::spec::{Common, MachineSpec};
+use crate::stalls::Reason;
 use crate::{Recorder, Timed};
 
-/// Everything there is.
+/// All units of a machine.
 pub(super) struct Machine<'a> {
-    world: World<'a>,
-    /// In front of each place.
-    queues: [Queue<u32>; Place::COUNT],
-    /// The unit at each place; the shader cores stand at two and are below.
-    stages: [Option<Stage>; Place::COUNT],
+    shared: SharedState<'a>,
+    /// Input queue of each station.
+    queues: [Queue<u32>; Station::COUNT],
+    /// Unit of each station, except for the shader cores.
+    stages: [Option<Stage>; Station::COUNT],
     shader: Shader,
     texture: Stage,
     textures: Queue<u32>,
@@ -32,7 +32,7 @@ pub(super) struct Machine<'a> {
     dram: Dram,
     waits: Waits,
     meter: Meter,
-    /// Unit-cycles visited and skipped.
+    /// Cycles simulated, summed over units.
     visited: u64,
 }
 
@@ -40,36 +40,36 @@ impl<'a> Machine<'a> {
     pub fn new(
         machine: &MachineSpec,
         clocks: Clocks,
-        makes: &'a Jobs,
+        builder: &'a DemandBuilder,
         stream: &'a Stream,
         recorder: Recorder,
     ) -> Self {
-        let common = Place::ALL.map(|place| machine.common(place.unit()));
-        let period = |place: Place| clocks.period(common[place as usize].clock);
-        let stage = |place: Place| {
-            (place.unit() != Unit::Shader).then(|| {
-                let Common { in_flight, lines_per_cycle, .. } = common[place as usize];
-                Stage::new(period(place), in_flight, lines_per_cycle)
+        let common = Station::ALL.map(|station| machine.common(station.unit()));
+        let period = |station: Station| clocks.period(common[station as usize].clock);
+        let stage = |station: Station| {
+            (station.unit() != Unit::Shader).then(|| {
+                let Common { in_flight, lines_per_cycle, .. } = common[station as usize];
+                Stage::new(period(station), in_flight, lines_per_cycle)
             })
         };
         let mut servers = [1; Unit::COUNT];
         servers[Unit::Shader as usize] = machine.shader.cores.get() * machine.shader.lanes.get();
         servers[Unit::L2 as usize] = machine.l2.lines_per_cycle.get();
         servers[Unit::Dram as usize] = machine.dram.channels.get();
-        let world = World {
+        let shared = SharedState {
             clocks,
-            makes,
+            builder,
             stream,
-            latency: Place::ALL
-                .map(|place| period(place) * Time::from(common[place as usize].latency_cycles)),
-            sources: Sources::new(&stream.jobs),
+            latency: Station::ALL
+                .map(|station| period(station) * Time::from(common[station as usize].latency_cycles)),
+            sources: Sources::new(&stream.demands),
             recorder,
             end: 0,
         };
         Self {
-            world,
-            queues: Place::ALL.map(|place| Queue::new(common[place as usize].queue)),
-            stages: Place::ALL.map(stage),
+            shared,
+            queues: Station::ALL.map(|station| Queue::new(common[station as usize].queue)),
+            stages: Station::ALL.map(stage),
             shader: Shader::new(machine, &clocks),
             texture: Stage::new(
                 clocks.period(machine.texture.clock),
@@ -87,14 +87,14 @@ impl<'a> Machine<'a> {
         }
     }
 
-    pub fn run(mut self, manner: &Manner) -> Result<Timed, Stalled> {
+    pub fn run(mut self, options: &StepOptions) -> Result<Timed, Stalled> {
         let periods = Unit::ALL.map(|unit| self.period(unit));
         let (mut now, mut quiet_since) = (0, 0);
         let longest = periods.into_iter().max().unwrap_or(1);
         loop {
             let mut acted = false;
-            self.world.sources.settle();
-            for &unit in &manner.order {
+            self.shared.sources.begin_cycle();
+            for &unit in &options.order {
                 if now % periods[unit as usize] == 0 {
                     acted |= self.tick(unit, now);
                     self.visited += 1;
@@ -102,32 +102,32 @@ impl<'a> Machine<'a> {
             }
             if acted {
                 quiet_since = now + 1;
-                now = self.world.clocks.next_edge(now);
+                now = self.shared.clocks.next_edge(now);
                 continue;
             }
-            // Once every unit has had a cycle since anything happened, nothing will until the next moment that one waits for.
-            // A moment just gone may belong to a unit whose cycle is still to come.
+            // If all units had a cycle without action, nothing happens before the earliest time a unit waits
+            // for. A time just past may belong to a unit whose cycle is still to come.
             let quiet = now >= quiet_since + longest - 1;
             now = match self.wakes_at(now.saturating_sub(longest)) {
                 None if quiet => break,
-                Some(at) if quiet && manner.skip && at > now => self.world.clocks.edge_from(at),
-                _ => self.world.clocks.next_edge(now),
+                Some(at) if quiet && options.skip_idle && at > now => self.shared.clocks.edge_from(at),
+                _ => self.shared.clocks.next_edge(now),
             };
         }
         self.finish(now)
     }
 
     fn finish(mut self, now: Time) -> Result<Timed, Stalled> {
-        let clocks = self.world.clocks;
-        if self.world.sources.left() > 0 || !self.l2.is_empty() || !self.dram.is_empty() {
+        let clocks = self.shared.clocks;
+        if self.shared.sources.remaining() > 0 || !self.l2.is_empty() || !self.dram.is_empty() {
             return Err(Stalled {
                 cycles: clocks.cycles(crate::Clock::Core, now),
-                left: self.world.sources.left(),
+                remaining: self.shared.sources.remaining(),
             });
         }
-        let end = self.world.end.max(self.l2.ends_at()).max(self.dram.ends_at());
-        self.meter.finish(end, &mut self.world.recorder);
-        let mut recorder = self.world.recorder;
+        let end = self.shared.end.max(self.l2.ends_at()).max(self.dram.ends_at());
+        self.meter.finish(end, &mut self.shared.recorder);
+        let mut recorder = self.shared.recorder;
         recorder.lasts(clocks.ps(end));
         let timeline = recorder.finish();
         let cycles = clocks.cycles(crate::Clock::Core, end);
@@ -136,7 +136,7 @@ impl<'a> Machine<'a> {
             cycles,
             stalls: Some(self.meter.stalls),
             unit_cycles: self.visited,
-            packets: self.world.stream.jobs.len() as u64,
+            packets: self.shared.stream.demands.len() as u64,
             rows: None,
         })
     }
@@ -147,13 +147,13 @@ impl<'a> Machine<'a> {
             Unit::Texture => self.texture.period(),
             Unit::L2 => self.l2.period(),
             Unit::Dram => self.dram.period(),
-            _ => self.stages[place(unit) as usize].as_ref().map_or(1, Stage::period),
+            _ => self.stages[station_of(unit) as usize].as_ref().map_or(1, Stage::period),
         }
     }
 
-    /// One cycle of one unit. Says whether it did anything.
+    /// Simulate one cycle of one unit. Returns whether it acted.
     fn tick(&mut self, unit: Unit, now: Time) -> bool {
-        let (clocks, recorder) = (self.world.clocks, &mut self.world.recorder);
+        let (clocks, recorder) = (self.shared.clocks, &mut self.shared.recorder);
         match unit {
             Unit::Shader => self.tick_shader(now),
             Unit::Texture => self.tick_texture(now),
@@ -161,66 +161,187 @@ impl<'a> Machine<'a> {
                 self.l2.tick(now, &mut self.dram, &mut self.waits, &mut self.meter, recorder, &clocks)
             }
             Unit::Dram => self.dram.tick(now, &mut self.waits, &mut self.meter, recorder, &clocks),
-            _ => self.tick_stage(place(unit), now),
+            _ => self.tick_stage(station_of(unit), now),
         }
     }
 
-    fn tick_stage(&mut self, place: Place, now: Time) -> bool {
-        let (before, after) = self.queues.split_at_mut(place as usize + 1);
-        let input = &mut before[place as usize];
-        let fed = self.world.sources.feed(place, now, input);
-        let Some(stage) = &mut self.stages[place as usize] else { return false };
-        let port = port(place.unit()).map(|port| &mut self.l2.ports[port]);
-        let mut at = At { world: &mut self.world, next: after.first_mut(), place };
+    fn tick_stage(&mut self, station: Station, now: Time) -> bool {
+        let (before, after) = self.queues.split_at_mut(station as usize + 1);
+        let input = &mut before[station as usize];
+        let fed = self.shared.sources.feed(station, now, input);
+        let Some(stage) = &mut self.stages[station as usize] else { return false };
+        let port = port(station.unit()).map(|port| &mut self.l2.ports[port]);
+        let mut at = StationEnv { shared: &mut self.shared, next: after.first_mut(), station };
         let ticked = stage.tick(now, input, port, &mut self.waits, &mut at);
-        let rest = if stage.is_free() { self.world.sources.without(place, now) } else { ticked.rest };
-        self.meter.set(place.unit(), now, u32::from(ticked.busy), rest, &mut self.world.recorder);
+        let reason =
+            if stage.is_free() { self.shared.sources.idle_reason(station, now) } else { ticked.reason };
+        self.meter.set(station.unit(), now, u32::from(ticked.busy), reason, &mut self.shared.recorder);
         fed || ticked.acted
     }
 
     fn tick_shader(&mut self, now: Time) -> bool {
         let [_, vertex, setup, _, _, _, _, _, pixel, colour] = &mut self.queues;
-        let mut cores = Cores { world: &mut self.world, setup, colour };
-        let jobs = &cores.world.stream.jobs;
-        let (acted, busy, rest) =
-            self.shader.tick(now, jobs, [vertex, pixel], &mut self.textures, &mut cores);
-        let rest = rest.unwrap_or_else(|| self.world.sources.without(Place::Pixel, now));
-        self.meter.set(Unit::Shader, now, busy, rest, &mut self.world.recorder);
+        let mut cores = CoresEnv { shared: &mut self.shared, setup, colour };
+        let demands = &cores.shared.stream.demands;
+        let (acted, busy, reason) =
+            self.shader.tick(now, demands, [vertex, pixel], &mut self.textures, &mut cores);
+        let reason = reason.unwrap_or_else(|| self.shared.sources.idle_reason(Station::Pixel, now));
+        self.meter.set(Unit::Shader, now, busy, reason, &mut self.shared.recorder);
         acted
     }
 
     fn tick_texture(&mut self, now: Time) -> bool {
         let mut texels =
-            Texels { world: &self.world, shader: &mut self.shader, latency: self.texture_latency };
+            TextureEnv { shared: &self.shared, shader: &mut self.shader, latency: self.texture_latency };
         let port = Some(&mut self.l2.ports[TEXTURE_PORT]);
         let ticked = self.texture.tick(now, &mut self.textures, port, &mut self.waits, &mut texels);
-        let idle = self.texture.is_free() && self.world.sources.left_at(Place::Pixel) == 0;
-        let rest = match (self.texture.is_free(), idle) {
-            (_, true) => Rest::Idle,
-            (true, _) => Rest::Starved(Unit::Shader),
-            _ => ticked.rest,
+        let idle = self.texture.is_free() && self.shared.sources.remaining_at(Station::Pixel) == 0;
+        let reason = match (self.texture.is_free(), idle) {
+            (_, true) => Reason::Idle,
+            (true, _) => Reason::Starved(Unit::Shader),
+            _ => ticked.reason,
         };
-        self.meter.set(Unit::Texture, now, u32::from(ticked.busy), rest, &mut self.world.recorder);
+        self.meter.set(Unit::Texture, now, u32::from(ticked.busy), reason, &mut self.shared.recorder);
         ticked.acted
     }
 
-    /// The first moment after `now` for which any unit waits or waited.
+    /// Earliest time after `now` that a unit waits for.
     fn wakes_at(&self, now: Time) -> Option<Time> {
         let stages = self.stages.iter().zip(&self.queues);
         let stages = stages.filter_map(|(stage, input)| stage.as_ref()?.wakes_at(now, input, &self.waits));
-        let inputs = [&self.queues[Place::Vertex as usize], &self.queues[Place::Pixel as usize]];
+        let inputs = [&self.queues[Station::Vertex as usize], &self.queues[Station::Pixel as usize]];
         let others = [
             self.shader.wakes_at(now, inputs),
             self.texture.wakes_at(now, &self.textures, &self.waits),
             self.l2.wakes_at(now),
             self.dram.wakes_at(now),
-            self.world.sources.wakes_at(now),
+            self.shared.sources.wakes_at(now),
         ];
         stages.chain(others.into_iter().flatten()).min()
     }
 }
 
-/// Where a unit stands that stands at one place.
-fn place(unit: Unit) -> Place {
-    Place::ALL.into_iter().find(|place| place.unit() == unit).unwrap_or(Place::Command)
+/// Station of a unit with one station.
+fn station_of(unit: Unit) -> Station {
+    Station::ALL.into_iter().find(|station| station.unit() == unit).unwrap_or(Station::Command)
+}
+
+/// State shared by all units.
+pub(super) struct SharedState<'a> {
+    pub clocks: Clocks,
+    pub builder: &'a DemandBuilder,
+    pub stream: &'a Stream,
+    pub latency: [Time; Station::COUNT],
+    pub sources: Sources,
+    pub recorder: Recorder,
+    pub end: Time,
+}
+
+/// Environment of a unit at a station; its items are packets.
+pub(super) struct StationEnv<'w, 'a> {
+    pub shared: &'w mut SharedState<'a>,
+    pub next: Option<&'w mut Queue<u32>>,
+    pub station: Station,
+}
+
+impl StageEnv for StationEnv<'_, '_> {
+    fn work(&self, id: u32) -> (u32, std::ops::Range<usize>) {
+        let demand = &self.shared.stream.demands[id as usize];
+        let lines = port(self.station.unit()).map_or(0..0, |port| demand.lines_of(port));
+        (demand.service[self.station as usize], lines)
+    }
+
+    fn line(&self, at: usize) -> LineAccess {
+        self.shared.stream.lines[at]
+    }
+
+    fn served(&mut self, id: u32, from: Time, to: Time) {
+        self.shared.count(self.station.unit(), id, from, to);
+    }
+
+    fn leave(&mut self, id: u32, now: Time) -> Result<(), Unit> {
+        self.shared.leave(self.station, id, now, self.next.as_deref_mut())
+    }
+}
+
+impl SharedState<'_> {
+    fn count(&mut self, unit: Unit, id: u32, from: Time, to: Time) {
+        let counts = &self.stream.counts[id as usize];
+        self.recorder.count(unit, counts, self.clocks.ps(from), self.clocks.ps(to));
+    }
+
+    /// Move a packet from `station` to the next queue, or finish it.
+    fn leave(
+        &mut self,
+        station: Station,
+        id: u32,
+        now: Time,
+        next: Option<&mut Queue<u32>>,
+    ) -> Result<(), Unit> {
+        let demand = &self.stream.demands[id as usize];
+        let at = now + self.latency[station as usize];
+        if demand.last == station {
+            self.sources.done(demand, at);
+            self.end = self.end.max(at);
+            return Ok(());
+        }
+        let Some(next) = next else { return Ok(()) };
+        if next.room(now) == 0 {
+            return Err(Station::ALL[station as usize + 1].unit());
+        }
+        next.push(id, at);
+        Ok(())
+    }
+}
+
+/// Environment of the shader cores; packets go on to set-up or to colour.
+pub(super) struct CoresEnv<'w, 'a> {
+    pub shared: &'w mut SharedState<'a>,
+    pub setup: &'w mut Queue<u32>,
+    pub colour: &'w mut Queue<u32>,
+}
+
+impl CoreEnv for CoresEnv<'_, '_> {
+    fn served(&mut self, kind: usize, packet: u32, from: Time, to: Time) {
+        self.shared.count(Unit::Shader, packet, from, to);
+        if kind == 1 {
+            self.shared.count(Unit::Texture, packet, from, to);
+        }
+    }
+
+    fn leave(&mut self, kind: usize, packet: u32, now: Time) -> Result<(), Unit> {
+        let (station, next) =
+            if kind == 0 { (Station::Vertex, &mut *self.setup) } else { (Station::Pixel, &mut *self.colour) };
+        self.shared.leave(station, packet, now, Some(next))
+    }
+}
+
+/// Environment of the texture units; their items are warps.
+pub(super) struct TextureEnv<'w, 'a> {
+    pub shared: &'w SharedState<'a>,
+    pub shader: &'w mut Shader,
+    pub latency: Time,
+}
+
+impl StageEnv for TextureEnv<'_, '_> {
+    fn work(&self, id: u32) -> (u32, std::ops::Range<usize>) {
+        let warp = self.shader.warp(id);
+        let demand = &self.shared.stream.demands[warp.packet as usize];
+        let [fetches, lines] = warp.texels(demand);
+        let all = demand.lines_of(TEXTURE_PORT);
+        let part = crate::demand::share(all.len() as u32, warp.part, warp.parts);
+        let range = all.start + part.start as usize..all.start + part.end as usize;
+        (self.shared.builder.texture_cycles(fetches, lines), range)
+    }
+
+    fn line(&self, at: usize) -> LineAccess {
+        self.shared.stream.lines[at]
+    }
+
+    fn served(&mut self, _: u32, _: Time, _: Time) {}
+
+    fn leave(&mut self, id: u32, now: Time) -> Result<(), Unit> {
+        self.shader.textured(id, now + self.latency);
+        Ok(())
+    }
 }

@@ -1,35 +1,36 @@
-//! The way to memory and back: requests in front of the L2, the L2, and who waits for what.
+//! Path to memory and back: requests in front of the L2, the L2, and readers waiting for lines.
 
 use activity::{Event, LineAccess, LineKind, Unit};
 
-use super::dram::Dram;
-use super::meter::{Meter, Rest};
+use super::dram::{Dram, Reader};
+use super::meter::Meter;
 use super::queue::Queue;
 use super::waits::Waits;
 use crate::Recorder;
 use crate::clock::{Clocks, Time};
-use crate::job::CLIENTS;
+use crate::demand::CLIENTS;
 use crate::spec::MachineSpec;
+use crate::stalls::Reason;
 
-/// Nobody waits.
-pub(super) const NOBODY: u32 = u32::MAX;
+/// Stands for no wait.
+pub(super) const NO_WAIT: u32 = u32::MAX;
 
-/// A line asked for, and who waits for it.
+/// A line request, with the wait it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Request {
     pub access: LineAccess,
     pub wait: u32,
 }
 
-/// The L2 with a port for each client. What hits is known; here it takes its time.
+/// The L2, with a port for each client. Hits and misses are given; the L2 adds their time.
 #[derive(Clone, Debug)]
 pub(super) struct L2 {
     pub ports: [Queue<Request>; CLIENTS.len()],
     lines_per_cycle: u32,
     period: Time,
     latency: Time,
-    /// The port that is asked first.
-    turn: usize,
+    /// First port in round-robin order.
+    next_port: usize,
     ends_at: Time,
 }
 
@@ -42,7 +43,7 @@ impl L2 {
             lines_per_cycle: spec.lines_per_cycle.get(),
             period,
             latency: period * Time::from(spec.latency_cycles),
-            turn: 0,
+            next_port: 0,
             ends_at: 0,
         }
     }
@@ -51,7 +52,7 @@ impl L2 {
         self.period
     }
 
-    /// Takes as many requests as it can, the ports in turn. Says whether it took any.
+    /// Accept as many requests as possible, round robin over the ports. Returns whether any was accepted.
     pub fn tick(
         &mut self,
         now: Time,
@@ -62,9 +63,9 @@ impl L2 {
         clocks: &Clocks,
     ) -> bool {
         let mut taken = 0;
-        let mut stuck = false;
+        let mut blocked = false;
         while taken < self.lines_per_cycle {
-            let order = (0..CLIENTS.len()).map(|step| (self.turn + step) % CLIENTS.len());
+            let order = (0..CLIENTS.len()).map(|step| (self.next_port + step) % CLIENTS.len());
             let mut found = None;
             for port in order {
                 let Some(request) = self.ports[port].head(now) else { continue };
@@ -72,43 +73,43 @@ impl L2 {
                     found = Some((port, request));
                     break;
                 }
-                stuck = true;
+                blocked = true;
             }
             let Some((port, request)) = found else { break };
             self.ports[port].pop(now);
-            self.turn = (port + 1) % CLIENTS.len();
+            self.next_port = (port + 1) % CLIENTS.len();
             self.take(request, now, dram, waits);
             count(&request.access, clocks.ps(now), recorder);
             taken += 1;
             self.ends_at = now + self.period;
         }
-        let rest = if stuck { Rest::Blocked(Unit::Dram) } else { Rest::Idle };
-        meter.set(Unit::L2, now, taken, rest, recorder);
+        let reason = if blocked { Reason::Blocked(Unit::Dram) } else { Reason::Idle };
+        meter.set(Unit::L2, now, taken, reason, recorder);
         taken > 0
     }
 
     fn take(&mut self, Request { access, wait }: Request, now: Time, dram: &mut Dram, waits: &mut Waits) {
-        let there = now + self.period;
+        let seen_at = now + self.period;
         if access.victim != LineAccess::NONE {
-            dram.push(access.victim, None, there);
+            dram.push(access.victim, None, seen_at);
         }
         match access.kind {
             LineKind::Hit => waits.arrives(wait, now + self.latency),
             LineKind::Fetch => {
                 waits.fetches(wait, now);
-                dram.push(access.line, Some((wait, self.latency)), there);
+                dram.push(access.line, Some(Reader { wait, latency: self.latency }), seen_at);
             }
-            LineKind::Drain => dram.push(access.line, None, there),
+            LineKind::Drain => dram.push(access.line, None, seen_at),
             LineKind::Write | LineKind::Allocate => {}
         }
     }
 
-    /// When it may have something to do next, if nobody else does anything.
+    /// Earliest time of possible work if no other unit acts.
     pub fn wakes_at(&self, now: Time) -> Option<Time> {
         self.ports.iter().filter_map(Queue::head_at).filter(|&at| at > now).min()
     }
 
-    /// When it is done with the last request so far.
+    /// End of the last request so far.
     pub fn ends_at(&self) -> Time {
         self.ends_at
     }
@@ -118,7 +119,7 @@ impl L2 {
     }
 }
 
-/// The events of a line taken by the L2; memory counts its own.
+/// Record the L2 events of an accepted line; memory records its own.
 fn count(access: &LineAccess, at_ps: u64, recorder: &mut Recorder) {
     for (event, times) in l2_events(access) {
         if times > 0 {
@@ -127,7 +128,7 @@ fn count(access: &LineAccess, at_ps: u64, recorder: &mut Recorder) {
     }
 }
 
-/// The events of the L2 that a line causes.
+/// L2 events of a line.
 fn l2_events(access: &LineAccess) -> [(Event, u64); 3] {
     let reads = matches!(access.kind, LineKind::Hit | LineKind::Fetch);
     let writes = matches!(access.kind, LineKind::Write | LineKind::Allocate);

@@ -1,4 +1,4 @@
-//! What each unit does from moment to moment: busy, starved, blocked or idle.
+//! States of the units over time: busy, starved, blocked or idle.
 
 use activity::Unit;
 
@@ -6,16 +6,14 @@ use crate::Recorder;
 use crate::clock::{Clocks, Time};
 use crate::stalls::{Reason, Stalls};
 
-pub(super) use crate::stalls::Reason as Rest;
-
-/// The state of a unit: how many of its servers work, and why the others do not.
+/// State of a unit: the number of busy servers, and why the others do not work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct State {
     busy: u32,
-    rest: Reason,
+    reason: Reason,
 }
 
-/// Writes down how long each unit was in which state.
+/// Recorder of the time that each unit spends in each state.
 #[derive(Clone, Debug)]
 pub(super) struct Meter {
     clocks: Clocks,
@@ -26,13 +24,13 @@ pub(super) struct Meter {
 
 impl Meter {
     pub fn new(clocks: Clocks, servers: [u32; Unit::COUNT]) -> Self {
-        let start = (State { busy: 0, rest: Reason::Idle }, 0);
+        let start = (State { busy: 0, reason: Reason::Idle }, 0);
         Self { clocks, servers, now: [start; Unit::COUNT], stalls: Stalls::new(clocks, servers) }
     }
 
-    /// From `now` on `busy` servers of `unit` work, and the others do not because of `rest`.
-    pub fn set(&mut self, unit: Unit, now: Time, busy: u32, rest: Reason, recorder: &mut Recorder) {
-        let state = State { busy, rest };
+    /// Set the state of `unit` from `now` on: `busy` servers work, the others do not because of `reason`.
+    pub fn set(&mut self, unit: Unit, now: Time, busy: u32, reason: Reason, recorder: &mut Recorder) {
+        let state = State { busy, reason };
         let (before, since) = self.now[unit as usize];
         if before != state {
             self.write(unit, before, since, now, recorder);
@@ -40,7 +38,7 @@ impl Meter {
         }
     }
 
-    /// The end of the frame.
+    /// End the frame at `now`.
     pub fn finish(&mut self, now: Time, recorder: &mut Recorder) {
         for unit in Unit::ALL {
             let (state, since) = self.now[unit as usize];
@@ -54,7 +52,7 @@ impl Meter {
             return;
         }
         let servers = self.servers[unit as usize];
-        self.stalls.add(unit, state.busy, state.rest, from, to);
+        self.stalls.add(unit, state.busy, state.reason, from, to);
         if state.busy > 0 {
             let (start, end) = (self.clocks.ps(from), self.clocks.ps(to));
             recorder.busy(unit, start, end, u64::from(state.busy), u64::from(servers));

@@ -1,8 +1,8 @@
-//! The level `stepped`, the reference: every unit, queue and arbiter from cycle to cycle, written to be read.
+//! Level `stepped`, the reference: every unit, queue and arbiter, cycle by cycle, written for clarity.
 //!
-//! What a unit does in a cycle others see in the next, so the order in which they are visited does not matter; a test
-//! visits them in every order it likes. Cycles in which no unit does anything but wait are skipped, which changes nothing
-//! either, and a test runs both ways.
+//! Actions of a cycle become visible in the next one, so the order in which units are simulated does not
+//! matter; a test permutes it. Cycles in which all units only wait are skipped, which does not change the
+//! result; a test runs with and without skipping.
 
 mod dram;
 mod machine;
@@ -13,76 +13,74 @@ mod shader;
 mod sources;
 mod stage;
 mod waits;
-mod warp;
-mod world;
 
 use activity::{LineAccess, PacketCounts, Unit};
 
 use crate::clock::Clocks;
-use crate::job::{Job, Jobs};
+use crate::demand::{DemandBuilder, ServiceDemand};
 use crate::spec::MachineSpec;
 use crate::{Recorder, Timed};
 use machine::Machine;
 
-/// A frame that does not end: a fault of the model, never of the input.
+/// Deadlock: packets remain but no unit can act. This is an error of the model, never of the input.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("nothing moves after {cycles} cycles, but {left} packets are not done; please report it")]
+#[error("nothing moves after {cycles} cycles, but {remaining} packets are not done; please report it")]
 pub struct Stalled {
-    /// Cycles of the core clock.
+    /// Length in core cycles.
     pub cycles: u64,
     /// Packets not done.
-    pub left: usize,
+    pub remaining: usize,
 }
 
-/// What may be done in more than one way without any difference.
+/// Options of the simulation that do not change its result.
 #[derive(Clone, Debug)]
-pub struct Manner {
-    /// The units in the order in which they are visited in a cycle.
+pub struct StepOptions {
+    /// Order in which the units are simulated in a cycle.
     pub order: [Unit; Unit::COUNT],
-    /// Whether cycles in which nothing happens are skipped.
-    pub skip: bool,
+    /// Whether to skip cycles without action.
+    pub skip_idle: bool,
 }
 
-impl Default for Manner {
+impl Default for StepOptions {
     fn default() -> Self {
-        Self { order: Unit::ALL, skip: true }
+        Self { order: Unit::ALL, skip_idle: true }
     }
 }
 
-/// A frame's packets, as jobs of one machine.
+/// Packets of a frame, as service demands of one machine.
 #[derive(Clone, Debug, Default)]
 pub struct Stream {
-    pub(crate) jobs: Vec<Job>,
+    pub(crate) demands: Vec<ServiceDemand>,
     pub(crate) counts: Vec<PacketCounts>,
     pub(crate) lines: Vec<LineAccess>,
 }
 
 impl Stream {
-    /// Adds the next packet.
-    pub fn push(&mut self, makes: &mut Jobs, packet: &activity::Packet, lines: &[LineAccess]) {
-        self.jobs.push(makes.job(packet, lines, &mut self.lines));
+    /// Add the next packet.
+    pub fn push(&mut self, builder: &mut DemandBuilder, packet: &activity::Packet, lines: &[LineAccess]) {
+        self.demands.push(builder.build(packet, lines, &mut self.lines));
         self.counts.push(packet.counts);
     }
 
-    /// Adds the packet that was pushed last to `totals`.
-    pub fn add_last(&self, makes: &Jobs, totals: &mut crate::Totals) {
-        if let (Some(job), Some(counts)) = (self.jobs.last(), self.counts.last()) {
-            totals.add(makes, job, counts, &self.lines[job.first_line..]);
+    /// Add the last packet to `totals`.
+    pub fn add_last(&self, builder: &DemandBuilder, totals: &mut crate::Totals) {
+        if let (Some(demand), Some(counts)) = (self.demands.last(), self.counts.last()) {
+            totals.add(builder, demand, counts, &self.lines[demand.first_line..]);
         }
     }
 }
 
-/// Runs `stream` through `machine`, from the first cycle to the last.
+/// Simulate `stream` on `machine`.
 ///
 /// # Errors
-/// [`Stalled`] where the model has a fault.
+/// [`Stalled`] for a deadlock, an error of the model.
 pub fn run(
     machine: &MachineSpec,
     clocks: Clocks,
-    makes: &Jobs,
+    builder: &DemandBuilder,
     stream: &Stream,
     recorder: Recorder,
-    manner: &Manner,
+    options: &StepOptions,
 ) -> Result<Timed, Stalled> {
-    Machine::new(machine, clocks, makes, stream, recorder).run(manner)
+    Machine::new(machine, clocks, builder, stream, recorder).run(options)
 }

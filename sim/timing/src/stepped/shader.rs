@@ -1,59 +1,66 @@
-//! The shader cores: packets become warps, warps share the cores, latency hides behind those that are resident.
+//! Shader cores: packets are split into warps, warps share the cores, and resident warps hide latency.
 
 use std::collections::VecDeque;
 
 use activity::Unit;
 
-use super::meter::Rest;
 use super::queue::Queue;
-use super::warp::{Core, Warp, due};
 use crate::clock::{Clocks, Time};
-use crate::job::{Job, share};
+use crate::demand::{ServiceDemand, share};
 use crate::spec::MachineSpec;
+use crate::stalls::Reason;
 
 /// A packet whose warps are on the cores.
 #[derive(Clone, Copy, Debug)]
 struct Flight {
-    job: u32,
+    packet: u32,
     /// Warps not done.
-    left: u32,
+    remaining: u32,
     from: Time,
     to: Time,
 }
 
-/// One way through the cores: that of vertices or that of pixels.
+/// Packets of one kind (vertices or pixels) on the cores, in order.
 #[derive(Clone, Debug, Default)]
-struct Way {
+struct PacketFifo {
     flights: VecDeque<Flight>,
     /// Packets that have left.
-    left: u64,
-    /// The packet whose warps are being sent: how many were, of how many.
-    sending: Option<(u32, u32, u32)>,
+    retired: u64,
+    /// Packet whose warps are being sent.
+    sending: Option<Sending>,
 }
 
-/// The state of all cores.
+/// Progress of sending the warps of a packet.
+#[derive(Clone, Copy, Debug)]
+struct Sending {
+    packet: u32,
+    sent: u32,
+    warps: u32,
+}
+
+/// State of all cores.
 #[derive(Clone, Debug)]
 pub(super) struct Shader {
     cores: Vec<Core>,
-    ways: [Way; 2],
+    fifos: [PacketFifo; 2],
     warps: Vec<Warp>,
     free: Vec<u32>,
-    turn: usize,
+    next_kind: usize,
     lanes: u64,
     warp_lanes: u32,
     in_flight: usize,
     period: Time,
     alu: Time,
-    /// Warps at the texture units or on their way back.
+    /// Warps at the texture units or on their fifo back.
     fetching: usize,
 }
 
-/// What surrounds the cores.
-pub(super) trait Outside {
-    /// A packet was on the cores from `from` to `to`.
-    fn served(&mut self, kind: usize, job: u32, from: Time, to: Time);
-    /// Hands a packet on, or says who does not take it.
-    fn leave(&mut self, kind: usize, job: u32, now: Time) -> Result<(), Unit>;
+/// Interface of the cores to their surroundings.
+pub(super) trait CoreEnv {
+    /// Record that a packet was on the cores from `from` to `to`.
+    fn served(&mut self, kind: usize, packet: u32, from: Time, to: Time);
+    /// Pass a packet on. The error is the unit that has no room.
+    fn leave(&mut self, kind: usize, packet: u32, now: Time) -> Result<(), Unit>;
 }
 
 impl Shader {
@@ -70,10 +77,10 @@ impl Shader {
         };
         Self {
             cores: vec![core; spec.cores.get() as usize],
-            ways: Default::default(),
+            fifos: Default::default(),
             warps: Vec::new(),
             free: Vec::new(),
-            turn: 0,
+            next_kind: 0,
             lanes: u64::from(spec.lanes),
             warp_lanes: spec.warp_lanes.get(),
             in_flight: spec.in_flight.get() as usize,
@@ -91,15 +98,16 @@ impl Shader {
         &self.warps[id as usize]
     }
 
-    /// One cycle. Says whether anything was done, how many lanes were busy, and why the others were not.
+    /// Simulate a cycle. Returns whether the cores acted, how many lanes were busy, and why the others were
+    /// not.
     pub fn tick(
         &mut self,
         now: Time,
-        jobs: &[Job],
+        demands: &[ServiceDemand],
         inputs: [&mut Queue<u32>; 2],
         textures: &mut Queue<u32>,
-        outside: &mut impl Outside,
-    ) -> (bool, u32, Option<Rest>) {
+        env: &mut impl CoreEnv,
+    ) -> (bool, u32, Option<Reason>) {
         let mut acted = false;
         let mut busy = 0;
         for at in 0..self.cores.len() {
@@ -110,30 +118,31 @@ impl Shader {
             acted |= did;
             busy += worked;
         }
-        let mut rest = None;
+        let mut reason = None;
         for (kind, input) in inputs.into_iter().enumerate() {
             loop {
-                let retired = self.retire(kind, now, outside, &mut rest);
-                let taken = self.take(kind, now, jobs, input);
+                let retired = self.retire(kind, now, env, &mut reason);
+                let taken = self.take(kind, now, demands, input);
                 acted |= retired || taken;
                 if !(retired || taken) {
                     break;
                 }
             }
         }
-        acted |= self.send(now, jobs, textures);
-        let resident = self.ways.iter().any(|way| !way.flights.is_empty());
-        let why = if self.fetching > 0 { Rest::Starved(Unit::Texture) } else { Rest::Starved(Unit::Shader) };
-        (acted, busy, rest.or(resident.then_some(why)))
+        acted |= self.send(now, demands, textures);
+        let resident = self.fifos.iter().any(|fifo| !fifo.flights.is_empty());
+        let why =
+            if self.fetching > 0 { Reason::Starved(Unit::Texture) } else { Reason::Starved(Unit::Shader) };
+        (acted, busy, reason.or(resident.then_some(why)))
     }
 
-    /// A warp has its texels.
+    /// Record that the texels of a warp arrive at `at`.
     pub fn textured(&mut self, id: u32, at: Time) {
         let core = self.warps[id as usize].core;
         self.cores[core].textured.push_back((at, id));
     }
 
-    /// Warps of one core: those whose time has come are ready, and the ready ones fill the lanes of the cycle.
+    /// Simulate a cycle of one core: due warps become ready, and ready warps fill the lanes.
     fn run(&mut self, at: usize, now: Time) -> (bool, u32) {
         let cycle = now / self.period;
         let core = &mut self.cores[at];
@@ -150,15 +159,15 @@ impl Shader {
         while let Some(id) = due(&mut core.cooling, now) {
             acted = true;
             let warp = self.warps[id as usize];
-            if warp.left > 0 {
+            if warp.remaining > 0 {
                 core.ready.push_back(id);
                 continue;
             }
             core.slots += 1;
             self.free.push(id);
-            let way = &mut self.ways[warp.kind];
-            let flight = &mut way.flights[(warp.number - way.left) as usize];
-            flight.left -= 1;
+            let fifo = &mut self.fifos[warp.kind];
+            let flight = &mut fifo.flights[(warp.number - fifo.retired) as usize];
+            flight.remaining -= 1;
             flight.to = now;
         }
         core.lane = core.lane.max(cycle * self.lanes);
@@ -167,9 +176,9 @@ impl Shader {
             && let Some(id) = core.ready.pop_front()
         {
             let warp = &mut self.warps[id as usize];
-            // A warp without operations passes.
-            core.lane += if warp.left > 0 { u64::from(warp.threads) } else { 0 };
-            warp.left = warp.left.saturating_sub(1);
+            // A warp without operations occupies no lane.
+            core.lane += if warp.remaining > 0 { u64::from(warp.threads) } else { 0 };
+            warp.remaining = warp.remaining.saturating_sub(1);
             let last = core.lane.saturating_sub(1).max(cycle * self.lanes) / self.lanes;
             core.cooling.push_back((last * self.period + self.alu, id));
             acted = true;
@@ -181,69 +190,81 @@ impl Shader {
         &mut self,
         kind: usize,
         now: Time,
-        outside: &mut impl Outside,
-        rest: &mut Option<Rest>,
+        env: &mut impl CoreEnv,
+        reason: &mut Option<Reason>,
     ) -> bool {
-        let way = &mut self.ways[kind];
-        let Some(&flight) = way.flights.front() else { return false };
-        if flight.left > 0 {
+        let fifo = &mut self.fifos[kind];
+        let Some(&flight) = fifo.flights.front() else { return false };
+        if flight.remaining > 0 {
             return false;
         }
-        if let Err(by) = outside.leave(kind, flight.job, now) {
-            *rest = Some(Rest::Blocked(by));
+        if let Err(by) = env.leave(kind, flight.packet, now) {
+            *reason = Some(Reason::Blocked(by));
             return false;
         }
-        outside.served(kind, flight.job, flight.from, flight.to);
-        way.flights.pop_front();
-        way.left += 1;
+        env.served(kind, flight.packet, flight.from, flight.to);
+        fifo.flights.pop_front();
+        fifo.retired += 1;
         true
     }
 
-    /// The next packet, when the warps of the one before are all sent.
-    fn take(&mut self, kind: usize, now: Time, jobs: &[Job], input: &mut Queue<u32>) -> bool {
-        let way = &mut self.ways[kind];
-        if way.sending.is_some() || way.flights.len() >= self.in_flight {
+    /// Accept the next packet once all warps of the previous one are sent.
+    fn take(&mut self, kind: usize, now: Time, demands: &[ServiceDemand], input: &mut Queue<u32>) -> bool {
+        let fifo = &mut self.fifos[kind];
+        if fifo.sending.is_some() || fifo.flights.len() >= self.in_flight {
             return false;
         }
         let Some(id) = input.head(now) else { return false };
         input.pop(now);
-        let parts = jobs[id as usize].warps(self.warp_lanes);
-        way.flights.push_back(Flight { job: id, left: parts, from: now, to: now });
-        way.sending = (parts > 0).then_some((id, 0, parts));
+        let parts = demands[id as usize].warps(self.warp_lanes);
+        fifo.flights.push_back(Flight { packet: id, remaining: parts, from: now, to: now });
+        fifo.sending = (parts > 0).then_some(Sending { packet: id, sent: 0, warps: parts });
         true
     }
 
-    /// One warp a cycle, of vertices and of pixels in turn, to the core that has most room.
-    fn send(&mut self, now: Time, jobs: &[Job], textures: &mut Queue<u32>) -> bool {
-        let turns = [self.turn, 1 - self.turn];
-        let Some(kind) = turns.into_iter().find(|&kind| self.ways[kind].sending.is_some()) else {
+    /// Send one warp per cycle, alternately of vertices and pixels, to the core with most free slots.
+    fn send(&mut self, now: Time, demands: &[ServiceDemand], textures: &mut Queue<u32>) -> bool {
+        let turns = [self.next_kind, 1 - self.next_kind];
+        let Some(kind) = turns.into_iter().find(|&kind| self.fifos[kind].sending.is_some()) else {
             return false;
         };
-        let Some((job, part, parts)) = self.ways[kind].sending else { return false };
-        let most = self.cores.iter().map(|core| core.slots).max().unwrap_or(0);
-        let textured = kind == 1 && jobs[job as usize].is_textured();
-        if most == 0 || (textured && textures.room(now) == 0) {
+        let Some(Sending { packet, sent: part, warps: parts }) = self.fifos[kind].sending else {
+            return false;
+        };
+        let max_slots = self.cores.iter().map(|core| core.slots).max().unwrap_or(0);
+        let textured = kind == 1 && demands[packet as usize].is_textured();
+        if max_slots == 0 || (textured && textures.room(now) == 0) {
             return false;
         }
-        let core = self.cores.iter().position(|core| core.slots == most).unwrap_or(0);
-        let way = &mut self.ways[kind];
-        let number = way.left + way.flights.len() as u64 - 1;
-        let threads = share(jobs[job as usize].threads, part, parts).len() as u32;
-        let warp = Warp { job, part, parts, kind, number, threads, left: jobs[job as usize].ops, core };
-        way.sending = (part + 1 < parts).then_some((job, part + 1, parts));
+        let core = self.cores.iter().position(|core| core.slots == max_slots).unwrap_or(0);
+        let fifo = &mut self.fifos[kind];
+        let number = fifo.retired + fifo.flights.len() as u64 - 1;
+        let threads = share(demands[packet as usize].threads, part, parts).len() as u32;
+        let warp = Warp {
+            packet,
+            part,
+            parts,
+            kind,
+            number,
+            threads,
+            remaining: demands[packet as usize].ops,
+            core,
+        };
+        let more = part + 1 < parts;
+        fifo.sending = more.then_some(Sending { packet, sent: part + 1, warps: parts });
         self.cores[core].slots -= 1;
-        let id = self.place(warp);
+        let id = self.store(warp);
         if textured {
             textures.push(id, now + self.period);
             self.fetching += 1;
         } else {
             self.cores[core].fresh.push_back((now + self.period, id));
         }
-        self.turn = 1 - kind;
+        self.next_kind = 1 - kind;
         true
     }
 
-    fn place(&mut self, warp: Warp) -> u32 {
+    fn store(&mut self, warp: Warp) -> u32 {
         let Some(id) = self.free.pop() else {
             self.warps.push(warp);
             return self.warps.len() as u32 - 1;
@@ -252,16 +273,66 @@ impl Shader {
         id
     }
 
-    /// When it may have something to do next, if nobody else does anything.
+    /// Earliest time of possible work if no other unit acts.
     pub fn wakes_at(&self, now: Time, inputs: [&Queue<u32>; 2]) -> Option<Time> {
         let inputs = inputs.into_iter().filter_map(Queue::head_at);
         let cores = self.cores.iter().filter(|core| !core.is_empty()).flat_map(|core| {
             let queues = [&core.fresh, &core.textured, &core.cooling];
             let arrives = queues.into_iter().filter_map(|queue| queue.front()).map(|(at, _)| *at);
-            // Lanes that are taken beyond this cycle are free again, whether or not a warp is ready then.
+            // Lanes occupied beyond this cycle become free again, whether or not a warp is ready then.
             arrives
                 .chain([core.lane.div_ceil(self.lanes) * self.period, core.lane / self.lanes * self.period])
         });
         inputs.chain(cores).filter(|&at| at > now).min()
     }
+}
+
+/// Threads that execute together.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Warp {
+    pub packet: u32,
+    /// Number of the warp in its packet.
+    pub part: u32,
+    pub parts: u32,
+    /// 0 for vertices, 1 for pixels.
+    pub kind: usize,
+    /// Number of its packet among those of its kind.
+    pub number: u64,
+    pub threads: u32,
+    /// Operations not done.
+    pub remaining: u32,
+    pub core: usize,
+}
+
+impl Warp {
+    /// Its texture fetches and lines of the texture cache.
+    pub fn texels(&self, demand: &ServiceDemand) -> [u32; 2] {
+        demand.texels.map(|whole| share(whole, self.part, self.parts).len() as u32)
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Core {
+    pub slots: u32,
+    /// Next free lane, numbered over all cycles.
+    pub lane: u64,
+    pub ready: VecDeque<u32>,
+    /// Warps just sent, back from the texture units, and between two operations, each sorted by time.
+    pub fresh: VecDeque<(Time, u32)>,
+    pub textured: VecDeque<(Time, u32)>,
+    pub cooling: VecDeque<(Time, u32)>,
+}
+
+impl Core {
+    pub fn is_empty(&self) -> bool {
+        self.ready.is_empty() && self.fresh.is_empty() && self.textured.is_empty() && self.cooling.is_empty()
+    }
+}
+
+pub(super) fn due(queue: &mut VecDeque<(Time, u32)>, now: Time) -> Option<u32> {
+    let (at, id) = *queue.front()?;
+    (at <= now).then(|| {
+        queue.pop_front();
+        id
+    })
 }

@@ -1,98 +1,99 @@
-//! Where packets come from: the command stream, and the bins, which are double buffered.
+//! Sources of packets: the command stream, and the bins, which are double buffered.
 
 use activity::Unit;
 
-use super::meter::Rest;
 use super::queue::Queue;
 use crate::clock::Time;
-use crate::job::{Job, Place};
+use crate::demand::{ServiceDemand, Station};
+use crate::stalls::Reason;
 
-/// Packets of a batch that are not done, and when the last of them was.
+/// Unfinished packets of a batch, and when the last one finished.
 #[derive(Clone, Copy, Debug, Default)]
 struct Gate {
-    left: usize,
+    remaining: usize,
     at: Time,
 }
 
 impl Gate {
     fn is_open(&self, now: Time) -> bool {
-        self.left == 0 && self.at <= now
+        self.remaining == 0 && self.at <= now
     }
 }
 
-/// The packets of a frame that no unit has seen yet. Tiles wait for the set-up of their whole batch; the front end waits for
-/// the tiles of the batch before the last.
+/// Packets of a frame not yet in any queue. Tiles wait for the set-up of their whole batch. The front end
+/// waits for the tiles of the batch before the last.
 #[derive(Clone, Debug)]
 pub(super) struct Sources {
-    /// Number, batch and path of the packets of each path, in order, and the next of them.
+    /// Index and batch of the packets of each path, in order, and the next of each path.
     paths: [Vec<(u32, u32)>; 2],
     next: [usize; 2],
     set_up: Vec<Gate>,
     traversed: Vec<Gate>,
-    /// Packets that will still come to each place.
-    to_come: [usize; Place::COUNT],
-    /// Packets done in this cycle, of which others hear in the next: the first and last of their places.
-    news: Vec<(usize, usize)>,
-    left: usize,
+    /// Packets that have yet to pass each station.
+    to_come: [usize; Station::COUNT],
+    /// Packets done in this cycle, as first and last station; visible in the next cycle.
+    done_this_cycle: Vec<(usize, usize)>,
+    remaining: usize,
 }
 
 impl Sources {
-    pub fn new(jobs: &[Job]) -> Self {
-        let batches = jobs.iter().map(|job| job.batch as usize + 1).max().unwrap_or(0);
+    pub fn new(demands: &[ServiceDemand]) -> Self {
+        let batches = demands.iter().map(|demand| demand.batch as usize + 1).max().unwrap_or(0);
         let mut sources = Self {
             paths: [Vec::new(), Vec::new()],
             next: [0; 2],
             set_up: vec![Gate::default(); batches],
             traversed: vec![Gate::default(); batches],
-            to_come: [0; Place::COUNT],
-            news: Vec::new(),
-            left: jobs.len(),
+            to_come: [0; Station::COUNT],
+            done_this_cycle: Vec::new(),
+            remaining: demands.len(),
         };
-        for (job, id) in jobs.iter().zip(0..) {
-            sources.paths[usize::from(!job.front)].push((id, job.batch));
-            sources.gate(job).left += 1;
-            let first = if job.front { 0 } else { Place::Traversal as usize };
-            sources.to_come[first..=job.last as usize].iter_mut().for_each(|count| *count += 1);
+        for (demand, id) in demands.iter().zip(0..) {
+            sources.paths[usize::from(!demand.front)].push((id, demand.batch));
+            sources.gate(demand).remaining += 1;
+            let first = if demand.front { 0 } else { Station::Traversal as usize };
+            sources.to_come[first..=demand.last as usize].iter_mut().for_each(|count| *count += 1);
         }
         sources
     }
 
-    fn gate(&mut self, job: &Job) -> &mut Gate {
-        let gates = if job.front { &mut self.set_up } else { &mut self.traversed };
-        &mut gates[job.batch as usize]
+    fn gate(&mut self, demand: &ServiceDemand) -> &mut Gate {
+        let gates = if demand.front { &mut self.set_up } else { &mut self.traversed };
+        &mut gates[demand.batch as usize]
     }
 
     /// Packets not done.
-    pub fn left(&self) -> usize {
-        self.left
+    pub fn remaining(&self) -> usize {
+        self.remaining
     }
 
-    /// Packets that are not through with `place` or any place before it.
-    pub fn left_at(&self, place: Place) -> usize {
-        self.to_come[place as usize]
+    /// Packets that have yet to pass `station`.
+    pub fn remaining_at(&self, station: Station) -> usize {
+        self.to_come[station as usize]
     }
 
-    /// A packet is done at `at`.
-    pub fn done(&mut self, job: &Job, at: Time) {
-        let gate = self.gate(job);
-        gate.left -= 1;
+    /// Record that a packet is done at `at`.
+    pub fn done(&mut self, demand: &ServiceDemand, at: Time) {
+        let gate = self.gate(demand);
+        gate.remaining -= 1;
         gate.at = gate.at.max(at);
-        self.left -= 1;
-        self.news.push((if job.front { 0 } else { Place::Traversal as usize }, job.last as usize));
+        self.remaining -= 1;
+        self.done_this_cycle
+            .push((if demand.front { 0 } else { Station::Traversal as usize }, demand.last as usize));
     }
 
-    /// A new cycle begins.
-    pub fn settle(&mut self) {
-        for (first, last) in self.news.drain(..) {
+    /// Begin a cycle.
+    pub fn begin_cycle(&mut self) {
+        for (first, last) in self.done_this_cycle.drain(..) {
             self.to_come[first..=last].iter_mut().for_each(|count| *count -= 1);
         }
     }
 
-    /// Fills the queue of the first place of a path.
-    pub fn feed(&mut self, place: Place, now: Time, queue: &mut Queue<u32>) -> bool {
-        let path = match place {
-            Place::Command => 0,
-            Place::Traversal => 1,
+    /// Fill the input queue of the first station of a path.
+    pub fn feed(&mut self, station: Station, now: Time, queue: &mut Queue<u32>) -> bool {
+        let path = match station {
+            Station::Command => 0,
+            Station::Traversal => 1,
             _ => return false,
         };
         let mut fed = false;
@@ -118,30 +119,30 @@ impl Sources {
         self.waits_for(path, batch).is_none_or(|gate| gate.is_open(now))
     }
 
-    /// Why `place` has nothing to do.
-    pub fn without(&self, place: Place, now: Time) -> Rest {
+    /// Why `station` has no work.
+    pub fn idle_reason(&self, station: Station, now: Time) -> Reason {
         let gated = |path: usize| {
             let next = self.paths[path].get(self.next[path]);
             next.is_some_and(|&(_, batch)| !self.may_start(path, batch, now))
         };
-        match place {
-            Place::Pixel if self.left_at(Place::Pixel) > 0 => Rest::Starved(Unit::ShadingCache),
-            Place::Pixel if self.left_at(Place::Vertex) > 0 => Rest::Starved(Unit::Command),
-            _ if self.left_at(place) == 0 => Rest::Idle,
-            Place::Command if gated(0) => Rest::Blocked(Unit::Traversal),
-            Place::Command => Rest::Idle,
-            Place::Traversal if gated(1) => Rest::Starved(Unit::Setup),
-            Place::Traversal => Rest::Idle,
-            _ => Rest::Starved(Place::ALL[place as usize - 1].unit()),
+        match station {
+            Station::Pixel if self.remaining_at(Station::Pixel) > 0 => Reason::Starved(Unit::ShadingCache),
+            Station::Pixel if self.remaining_at(Station::Vertex) > 0 => Reason::Starved(Unit::Command),
+            _ if self.remaining_at(station) == 0 => Reason::Idle,
+            Station::Command if gated(0) => Reason::Blocked(Unit::Traversal),
+            Station::Command => Reason::Idle,
+            Station::Traversal if gated(1) => Reason::Starved(Unit::Setup),
+            Station::Traversal => Reason::Idle,
+            _ => Reason::Starved(Station::ALL[station as usize - 1].unit()),
         }
     }
 
-    /// The first moment after `now` at which a batch may go on.
+    /// Earliest time after `now` at which a batch may continue.
     pub fn wakes_at(&self, now: Time) -> Option<Time> {
         let gates = (0..2).filter_map(|path| {
             let &(_, batch) = self.paths[path].get(self.next[path])?;
             self.waits_for(path, batch)
         });
-        gates.filter(|gate| gate.left == 0).map(|gate| gate.at).filter(|&at| at > now).min()
+        gates.filter(|gate| gate.remaining == 0).map(|gate| gate.at).filter(|&at| at > now).min()
     }
 }

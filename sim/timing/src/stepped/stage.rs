@@ -1,48 +1,48 @@
-//! A unit that serves one packet after another and, where it is a client of the L2, asks for its lines meanwhile.
+//! A unit that serves packets one after another and, as a client of the L2, requests their lines meanwhile.
 
 use std::collections::VecDeque;
 use std::ops::Range;
 
 use activity::{LineAccess, LineKind, Unit};
 
-use super::memory::{NOBODY, Request};
-use super::meter::Rest;
+use super::memory::{NO_WAIT, Request};
 use super::queue::Queue;
 use super::waits::Waits;
 use crate::clock::Time;
+use crate::stalls::Reason;
 
-/// What surrounds a stage: what its items are and where they go.
-pub(super) trait Around {
-    /// Cycles that `id` takes, and its lines.
+/// Interface of a stage to its surroundings.
+pub(super) trait StageEnv {
+    /// Service cycles of `id`, and its lines.
     fn work(&self, id: u32) -> (u32, Range<usize>);
-    /// A line.
+    /// Line number `at`.
     fn line(&self, at: usize) -> LineAccess;
-    /// `id` was served from `from` to `to`.
+    /// Record that `id` was served from `from` to `to`.
     fn served(&mut self, id: u32, from: Time, to: Time);
-    /// Hands `id` on at `now`, or says who does not take it.
+    /// Pass `id` on at `now`. The error is the unit that has no room.
     fn leave(&mut self, id: u32, now: Time) -> Result<(), Unit>;
 }
 
-/// Whether a stage did anything in a cycle, and its state after.
+/// Result of a cycle: whether the stage acted, and its state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ticked {
     pub acted: bool,
     pub busy: bool,
-    pub rest: Rest,
+    pub reason: Reason,
 }
 
 #[derive(Clone, Debug)]
 struct Serving {
     id: u32,
     from: Time,
-    /// When its work is done, but for requests.
+    /// End of the service, apart from requests.
     done_at: Time,
-    /// Lines it has not asked for.
+    /// Lines not yet requested.
     lines: Range<usize>,
     wait: u32,
 }
 
-/// The state of a stage.
+/// State of a stage.
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
     period: Time,
@@ -50,13 +50,13 @@ pub(super) struct Stage {
     in_flight: usize,
     serving: Option<Serving>,
     waiting: VecDeque<(u32, u32)>,
-    /// Lines that it can ask for in a cycle, and when it last asked, for how many.
+    /// Lines it can request per cycle, and the last cycle with requests and their number.
     lines_per_cycle: u32,
-    asked: (Time, u32),
+    last_requests: (Time, u32),
 }
 
 impl Stage {
-    /// A stage that asks for lines only where `lines_per_cycle` is not 0.
+    /// A stage; it requests no lines if `lines_per_cycle` is 0.
     pub fn new(period: Time, in_flight: u32, lines_per_cycle: u32) -> Self {
         Self {
             period,
@@ -64,7 +64,7 @@ impl Stage {
             serving: None,
             waiting: VecDeque::new(),
             lines_per_cycle,
-            asked: (0, 0),
+            last_requests: (0, 0),
         }
     }
 
@@ -72,58 +72,58 @@ impl Stage {
         self.period
     }
 
-    /// One cycle: ask for lines, finish, let go, begin, until nothing more can be done.
+    /// Simulate a cycle: request lines, finish, release and begin, until nothing more is possible.
     pub fn tick(
         &mut self,
         now: Time,
         input: &mut Queue<u32>,
         port: Option<&mut Queue<Request>>,
         waits: &mut Waits,
-        around: &mut impl Around,
+        env: &mut impl StageEnv,
     ) -> Ticked {
         let (mut acted, mut blocked) = (false, None);
         let mut port = port;
         loop {
-            let asked = port.as_deref_mut().is_some_and(|port| self.ask(now, port, around));
-            let finished = self.finish(now, waits, around, &mut blocked);
-            let released = self.release(now, waits, around, &mut blocked);
-            let begun = self.begin(now, input, waits, around);
-            if !(asked || finished || released || begun) {
+            let requested = port.as_deref_mut().is_some_and(|port| self.request(now, port, env));
+            let finished = self.finish(now, waits, env, &mut blocked);
+            let released = self.release(now, waits, env, &mut blocked);
+            let begun = self.begin(now, input, waits, env);
+            if !(requested || finished || released || begun) {
                 break;
             }
             acted = true;
         }
         let busy = self.serving.as_ref().is_some_and(|serving| now < serving.done_at);
-        let asks = self.serving.as_ref().is_some_and(|serving| !serving.lines.is_empty());
-        // So many lines a cycle are its pace: asking for any is work, a port without room is not.
-        let rest = match (&self.serving, blocked) {
-            (Some(_), _) if asks => Rest::Blocked(Unit::L2),
-            (Some(_), Some(by)) => Rest::Blocked(by),
-            _ => Rest::Idle,
+        let has_requests = self.serving.as_ref().is_some_and(|serving| !serving.lines.is_empty());
+        // Requesting lines at the full rate is work; a full port is a stall.
+        let reason = match (&self.serving, blocked) {
+            (Some(_), _) if has_requests => Reason::Blocked(Unit::L2),
+            (Some(_), Some(by)) => Reason::Blocked(by),
+            _ => Reason::Idle,
         };
-        Ticked { acted, busy: busy || (asks && self.asked_at(now) > 0), rest }
+        Ticked { acted, busy: busy || (has_requests && self.requested_at(now) > 0), reason }
     }
 
-    /// Whether it serves nothing, so that it is for others to say why.
+    /// Whether it serves no packet. The caller then knows why.
     pub fn is_free(&self) -> bool {
         self.serving.is_none()
     }
 
-    /// Lines it has asked for in the cycle that begins at `now`.
-    fn asked_at(&self, now: Time) -> u32 {
-        if self.asked.0 == now { self.asked.1 } else { 0 }
+    /// Lines requested in the cycle that begins at `now`.
+    fn requested_at(&self, now: Time) -> u32 {
+        if self.last_requests.0 == now { self.last_requests.1 } else { 0 }
     }
 
-    /// One of the lines of a cycle.
-    fn ask(&mut self, now: Time, port: &mut Queue<Request>, around: &impl Around) -> bool {
-        let asked = self.asked_at(now);
+    /// Request one line.
+    fn request(&mut self, now: Time, port: &mut Queue<Request>, env: &impl StageEnv) -> bool {
+        let requested = self.requested_at(now);
         let Some(serving) = &mut self.serving else { return false };
-        if serving.lines.is_empty() || asked == self.lines_per_cycle || port.room(now) == 0 {
+        if serving.lines.is_empty() || requested == self.lines_per_cycle || port.room(now) == 0 {
             return false;
         }
         let Some(at) = serving.lines.next() else { return false };
-        port.push(Request { access: around.line(at), wait: serving.wait }, now + self.period);
-        self.asked = (now, asked + 1);
+        port.push(Request { access: env.line(at), wait: serving.wait }, now + self.period);
+        self.last_requests = (now, requested + 1);
         true
     }
 
@@ -131,7 +131,7 @@ impl Stage {
         &mut self,
         now: Time,
         waits: &Waits,
-        around: &mut impl Around,
+        env: &mut impl StageEnv,
         blocked: &mut Option<Unit>,
     ) -> bool {
         let Some(serving) = &self.serving else { return false };
@@ -140,7 +140,7 @@ impl Stage {
         }
         let (id, from, done_at, wait) = (serving.id, serving.from, serving.done_at, serving.wait);
         if self.in_flight == 0 {
-            match around.leave(id, now) {
+            match env.leave(id, now) {
                 Ok(()) => {}
                 Err(by) => {
                     *blocked = Some(by);
@@ -153,60 +153,60 @@ impl Stage {
             let head = self
                 .waiting
                 .front()
-                .filter(|(_, wait)| *wait != NOBODY && waits.ready_at(*wait).is_none_or(|at| at > now));
-            *blocked = head.map(|(_, wait)| waits.blame(*wait, now)).or(*blocked);
+                .filter(|(_, wait)| *wait != NO_WAIT && waits.ready_at(*wait).is_none_or(|at| at > now));
+            *blocked = head.map(|(_, wait)| waits.waits_for_unit(*wait, now)).or(*blocked);
             return false;
         }
-        around.served(id, from, done_at);
+        env.served(id, from, done_at);
         self.serving = None;
         true
     }
 
-    /// Those whose lines are there go on, in order.
+    /// Release waiting items whose lines have arrived, in order.
     fn release(
         &mut self,
         now: Time,
         waits: &mut Waits,
-        around: &mut impl Around,
+        env: &mut impl StageEnv,
         blocked: &mut Option<Unit>,
     ) -> bool {
         let Some(&(id, wait)) = self.waiting.front() else { return false };
-        if wait != NOBODY && waits.ready_at(wait).is_none_or(|at| at > now) {
+        if wait != NO_WAIT && waits.ready_at(wait).is_none_or(|at| at > now) {
             return false;
         }
-        if let Err(by) = around.leave(id, now) {
+        if let Err(by) = env.leave(id, now) {
             *blocked = Some(by);
             return false;
         }
-        if wait != NOBODY {
+        if wait != NO_WAIT {
             waits.close(wait);
         }
         self.waiting.pop_front();
         true
     }
 
-    fn begin(&mut self, now: Time, input: &mut Queue<u32>, waits: &mut Waits, around: &impl Around) -> bool {
+    fn begin(&mut self, now: Time, input: &mut Queue<u32>, waits: &mut Waits, env: &impl StageEnv) -> bool {
         if self.serving.is_some() {
             return false;
         }
         let Some(id) = input.head(now) else { return false };
         input.pop(now);
-        let (cycles, lines) = around.work(id);
+        let (cycles, lines) = env.work(id);
         let read = |kind| matches!(kind, LineKind::Hit | LineKind::Fetch);
-        let reads = lines.clone().filter(|&at| read(around.line(at).kind)).count() as u32;
-        let wait = if reads > 0 { waits.open(reads) } else { NOBODY };
+        let reads = lines.clone().filter(|&at| read(env.line(at).kind)).count() as u32;
+        let wait = if reads > 0 { waits.open(reads) } else { NO_WAIT };
         let done_at = now + self.period * Time::from(cycles);
         self.serving = Some(Serving { id, from: now, done_at, lines, wait });
         true
     }
 
-    /// When it may have something to do next, if nobody else does anything.
+    /// Earliest time of possible work if no other unit acts.
     pub fn wakes_at(&self, now: Time, input: &Queue<u32>, waits: &Waits) -> Option<Time> {
         let serving = self.serving.as_ref().map(|serving| serving.done_at);
         let waiting = self
             .waiting
             .front()
-            .filter(|(_, wait)| *wait != NOBODY)
+            .filter(|(_, wait)| *wait != NO_WAIT)
             .and_then(|(_, wait)| waits.ready_at(*wait));
         [serving, waiting, input.head_at()].into_iter().flatten().filter(|&at| at > now).min()
     }

@@ -1,13 +1,13 @@
-//! Who waits for which lines of memory.
+//! Pending line reads of packets and warps.
 
 use activity::Unit;
 
 use crate::clock::Time;
 
-/// Lines that packets (or warps) still lack.
+/// Pending reads, one entry per packet or warp.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Waits {
-    /// How many lines are missing, when the last one so far is there, and since when memory is asked.
+    /// Number of missing lines, arrival of the last one so far, and when memory was first accessed.
     waits: Vec<Wait>,
     free: Vec<u32>,
 }
@@ -20,7 +20,7 @@ struct Wait {
 }
 
 impl Waits {
-    /// A new wait for `missing` lines.
+    /// Open a wait for `missing` lines.
     pub fn open(&mut self, missing: u32) -> u32 {
         let wait = Wait { missing, ..Wait::default() };
         let Some(id) = self.free.pop() else {
@@ -31,31 +31,31 @@ impl Waits {
         id
     }
 
-    /// A line will be there at `at`.
+    /// Record that a line arrives at `at`.
     pub fn arrives(&mut self, id: u32, at: Time) {
         let wait = &mut self.waits[id as usize];
         wait.missing -= 1;
         wait.at = wait.at.max(at);
     }
 
-    /// A line has to come from memory.
+    /// Record that a line has to come from memory.
     pub fn fetches(&mut self, id: u32, now: Time) {
         self.waits[id as usize].fetched_at.get_or_insert(now);
     }
 
-    /// When all lines are there, where that is known.
+    /// When all lines have arrived, if known.
     pub fn ready_at(&self, id: u32) -> Option<Time> {
         let wait = self.waits[id as usize];
         (wait.missing == 0).then_some(wait.at)
     }
 
-    /// Whom to blame for the wait.
-    pub fn blame(&self, id: u32, now: Time) -> Unit {
-        let asked = self.waits[id as usize].fetched_at.is_some_and(|at| at < now);
-        if asked { Unit::Dram } else { Unit::L2 }
+    /// The unit that the reader waits for.
+    pub fn waits_for_unit(&self, id: u32, now: Time) -> Unit {
+        let fetched = self.waits[id as usize].fetched_at.is_some_and(|at| at < now);
+        if fetched { Unit::Dram } else { Unit::L2 }
     }
 
-    /// The lines were waited for.
+    /// Close a wait.
     pub fn close(&mut self, id: u32) {
         self.free.push(id);
     }

@@ -20,20 +20,20 @@ fn one_unit_takes_the_sum_and_its_latency() {
     assert_eq!(stepped(&machine, &packets).cycles, 3 + 5 + 7 + 9);
 }
 
-/// Tiles through traversal and z-cull, `a` and `b` cycles.
+/// Tiles with `a` cycles in traversal and `b` in z-cull.
 fn pair(works: &[(u32, u32)]) -> Packets {
     tiles(works.iter().map(|&(a, b)| vec![(Event::TilesVisited, a), (Event::ZCullTests, b)]))
 }
 
 #[test]
 fn two_units_overlap_and_the_slower_sets_the_pace() {
-    // A cycle of latency behind each.
+    // One cycle of latency after each unit.
     assert_eq!(cycles(&pair(&[(2, 5); 10])), 2 + 1 + 10 * 5 + 1);
     assert_eq!(cycles(&pair(&[(5, 2); 10])), 10 * 5 + 1 + 2 + 1);
 }
 
-/// Tandem queues with finite buffers and blocking after service (Dallery and Gershwin 1992): the textbook's recurrence, with
-/// a cycle for whatever passes between units, be it a packet or the news that there is room.
+/// Tandem queues with finite buffers and blocking after service (Dallery and Gershwin 1992): the textbook
+/// recurrence, plus one cycle for anything that passes between units, whether a packet or a free slot.
 fn tandem(works: &[(u32, u32)], queue: usize) -> u64 {
     let (mut free, mut second_free) = (0u64, 0u64);
     let mut starts: Vec<u64> = Vec::new();
@@ -52,8 +52,9 @@ fn a_full_queue_blocks_by_hand() {
     let mut machine = plain();
     let works: Vec<_> = [(1, 100)].into_iter().chain([(10, 1); 20]).collect();
     assert_eq!(stepped(&machine, &pair(&works)).cycles, 1 + 20 * 10 + 1 + 1 + 1);
-    // Room for one: the first starts in z-cull at 2 and leaves at 102. The second is in the queue since 11, the third done at
-    // 21 and held: the second starts at 102, that is known at 103, when the third leaves; 18 more follow ten cycles apart.
+    // A queue of one. The first packet starts in z-cull at 2 and leaves at 102. The second is in the queue
+    // since 11; the third is done at 21 and blocked. The second starts at 102, which is visible at 103, when
+    // the third leaves. 18 more follow, ten cycles apart.
     machine.z_cull.queue = size(1);
     assert_eq!(stepped(&machine, &pair(&works)).cycles, 103 + 18 * 10 + 1 + 1 + 1);
 }
@@ -64,7 +65,7 @@ proptest! {
     fn two_units_with_a_queue_of_k(works in prop::collection::vec((0u32..20, 0u32..20), 1..60), queue in 1u32..9) {
         let mut machine = plain();
         machine.z_cull.queue = size(queue);
-        // A tile that asks nothing of z-cull ends at traversal: give each one event there.
+        // A tile without events in z-cull ends at traversal, so each gets one event there.
         let works: Vec<_> = works.into_iter().map(|(a, b)| (a, b + 1)).collect();
         prop_assert_eq!(stepped(&machine, &pair(&works)).cycles, tandem(&works, queue as usize));
     }
@@ -77,13 +78,14 @@ fn pixels(threads: u32, ops: u32) -> Packet {
 
 #[test]
 fn a_lone_warp_takes_its_latency_for_every_operation() {
-    // Five units before the cores with a cycle each and no work; a cycle to reach the core; a cycle to leave.
+    // Five units before the cores, one cycle of latency each and no work; one cycle to reach the core; one to
+    // leave.
     let before = 5 + 1;
     let mut machine = plain();
     machine.shader.alu_latency_cycles = size(6);
     let one = vec![(pixels(4, 10), Vec::new())];
     assert_eq!(stepped(&machine, &one).cycles, before + 10 * 6 + 1);
-    // With lanes for one thread in a cycle an operation of four threads is issued over four cycles.
+    // With one lane an operation of four threads is issued over four cycles.
     machine.shader.lanes = size(1);
     assert_eq!(stepped(&machine, &one).cycles, before + 10 * (6 + 3) + 1);
 }
@@ -93,28 +95,30 @@ fn resident_warps_hide_latency_until_the_lanes_are_full() {
     let mut machine = plain();
     machine.shader.alu_latency_cycles = size(6);
     let run = |machine: &_, warps: u32| stepped(machine, &vec![(pixels(4 * warps, 10), Vec::new())]).cycles;
-    // Warps are sent one a cycle: w of them, up to six, take turns within the latency of one.
+    // Warps are sent one per cycle; up to six share the latency of one.
     for warps in 1..=6 {
         assert_eq!(run(&machine, warps), 6 + 10 * 6 + u64::from(warps - 1) + 1, "{warps}");
     }
-    // Eight fill the lanes: eighty operations, one a cycle, and the last one's latency.
+    // Eight warps fill the lanes: eighty operations, one per cycle, plus the latency of the last.
     assert_eq!(run(&machine, 8), 6 + 80 - 1 + 6 + 1);
-    // Two cores, half as many each; every other warp is for the other core.
+    // Two cores with half the warps each; warps alternate between the cores.
     machine.shader.cores = size(2);
     assert_eq!(run(&machine, 8), 6 + 7 + 10 * 6 + 1);
 }
 
 #[test]
 fn a_shared_resource_serves_n_clients_in_turn() {
-    // Four clients of the L2 ask for m lines each in the same cycles, it takes one a cycle: the vertices' are known to a cycle.
+    // Four clients request m lines each in the same cycles, and the L2 accepts one per cycle. The time of the
+    // vertices is known exactly.
     let lines = |unit, m: u32| (0..m).map(|n| read(unit, n, LineKind::Hit)).collect::<Vec<LineAccess>>();
     let m = 50;
     let vertices = packet(PacketKind::Vertices, &[(Event::Indices, 1)]);
     let alone = vec![(vertices, lines(Unit::Command, m))];
-    // The first request is seen at 1, the last taken at m; its line is there a cycle later and the packet done after one more.
+    // The first request is visible at 1, the last is accepted at m. Its line arrives one cycle later, and the
+    // packet is done after one more.
     assert_eq!(cycles(&alone), u64::from(m) + 1 + 1);
-    // A tile whose depth lines are asked for meanwhile: twice as many lines, and the tile, which came four cycles later,
-    // has its last line when all 2 m were taken.
+    // A tile requests depth lines meanwhile: twice as many lines. The tile starts four cycles later and has
+    // its last line when all 2 m lines are accepted.
     let mut second = packet(PacketKind::Tile, &[(Event::DepthReads, 1)]);
     second.triangle = super::common::BATCH;
     let both = vec![(vertices, lines(Unit::Command, m)), (second, lines(Unit::Depth, m))];
@@ -122,14 +126,15 @@ fn a_shared_resource_serves_n_clients_in_turn() {
 }
 
 #[test]
-fn a_client_asks_for_so_many_lines_a_cycle() {
+fn a_client_requests_a_fixed_number_of_lines_per_cycle() {
     let mut machine = plain();
     for (lines, m) in (1..6).flat_map(|lines| [1, 2, 7, 40].map(|m| (lines, m))) {
         machine.command.lines_per_cycle = size(lines);
         machine.l2.lines_per_cycle = size(lines);
-        let asks: Vec<_> = (0..m).map(|n| read(Unit::Command, n, LineKind::Hit)).collect();
-        let alone = vec![(packet(PacketKind::Vertices, &[(Event::Indices, 1)]), asks)];
-        // The first is seen at 1, the last taken in its cycle; its line is there a cycle later and the packet done after one more.
+        let requests: Vec<_> = (0..m).map(|n| read(Unit::Command, n, LineKind::Hit)).collect();
+        let alone = vec![(packet(PacketKind::Vertices, &[(Event::Indices, 1)]), requests)];
+        // The first request is visible at 1, the last is accepted in its cycle. Its line arrives one cycle
+        // later, and the packet is done after one more.
         let cycles = u64::from(m.div_ceil(lines)) + 1 + 1;
         assert_eq!(stepped(&machine, &alone).cycles, cycles, "{m} lines, {lines} a cycle");
         assert_eq!(packet_level(&machine, clocks(), &alone).cycles, cycles, "{m} lines, {lines} a cycle");
@@ -141,10 +146,10 @@ fn a_client_asks_for_so_many_lines_a_cycle() {
 }
 
 #[test]
-fn the_roofline_knows_programs_that_nobody_hides() {
+fn the_roofline_includes_unhidden_program_latency() {
     let mut machine = plain();
     machine.shader.alu_latency_cycles = size(6);
-    // A warp of ten operations alone, and sixteen of them where the cores hold one packet at a time.
+    // One warp of ten operations, and sixteen of them on cores that hold one packet at a time.
     let of = |n: usize| vec![(pixels(4, 10), Vec::new()); n];
     let bound = |machine: &_, packets: &_| bound_level(machine, clocks(), packets).cycles;
     assert!((60..=stepped(&machine, &of(1)).cycles).contains(&bound(&machine, &of(1))));
@@ -155,8 +160,8 @@ fn the_roofline_knows_programs_that_nobody_hides() {
 }
 
 #[test]
-fn the_roofline_knows_rows() {
-    // Every line of another row of one bank: opened and closed for each, tRP + tRCD + burst.
+fn the_roofline_includes_row_time() {
+    // Every line in another row of one bank: tRP + tRCD + burst for each.
     let machine = plain();
     let lines = (0..40).map(|n| read(Unit::Depth, 16 * n, LineKind::Fetch)).collect();
     let packets = vec![(tile(&[(Event::DepthReads, 1)]), lines)];
@@ -167,21 +172,22 @@ fn the_roofline_knows_rows() {
 
 #[test]
 fn rows_and_banks_by_hand() {
-    // Burst 2, CL 3, tRCD 4, tRP 5, one cycle each to the L2, to memory, in the controller, back and out.
+    // Burst 2, CL 3, tRCD 4, tRP 5; one cycle each to the L2, to memory, in the controller, back and out.
     let machine = plain();
     let run = |lines: &[u32]| {
         let lines = lines.iter().map(|&line| read(Unit::Depth, line, LineKind::Fetch)).collect();
         stepped(&machine, &vec![(tile(&[(Event::DepthReads, 1)]), lines)]).cycles
     };
-    // Depth starts at 3; the L2 sees the request at 4, memory at 5: row open at 9, data until 9 + 3 + 2, then 1 + 1 + 1.
+    // Depth starts at 3. The L2 sees the request at 4, memory at 5; the row is open at 9, data arrives until
+    // 9 + 3 + 2, then 1 + 1 + 1.
     let first = 5 + 4 + 3 + 2 + 3;
     assert_eq!(run(&[0]), first);
-    // More lines of the row: the bus is what they wait for.
+    // More lines of the row wait for the bus only.
     assert_eq!(run(&[0, 1, 2, 3]), first + 3 * 2);
-    // Another row of the same bank (8 lines a row, 2 banks): it is closed in the cycle of the first column command, as row
-    // and column commands have wires of their own, and the other opened.
+    // Another row of the same bank (8 lines a row, 2 banks). It is closed in the cycle of the first column
+    // command, as row and column commands have separate wires, and the other row opens.
     assert_eq!(run(&[0, 16]), first + 5 + 4);
-    // Another bank opens its row a cycle after the first and waits for the bus.
+    // Another bank opens its row one cycle after the first and waits for the bus.
     assert_eq!(run(&[0, 8]), first + 2);
     // First ready first come: line 1 overtakes line 16.
     assert_eq!(run(&[0, 16, 1]), run(&[0, 1, 16]));

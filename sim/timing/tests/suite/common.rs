@@ -1,10 +1,10 @@
 //! Machines and streams for tests.
 
 use activity::{Bounded, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
-use timing::stepped::{self, Manner, Stream};
+use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    ClientSpec, Clock, Clocks, DramSpec, Jobs, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec, Timed,
-    UnitSpec,
+    ClientSpec, Clock, Clocks, DemandBuilder, DramSpec, L2Spec, MachineSpec, Rates, Recorder, ShaderSpec,
+    Timed, UnitSpec,
 };
 
 pub const BATCH: u32 = 1000;
@@ -13,8 +13,8 @@ pub fn rates(text: &str) -> Rates {
     activity::spec::parse(text, "test").unwrap()
 }
 
-/// A size of a machine.
-pub fn size<const LEAST: u32, const MOST: u32>(value: u32) -> Bounded<LEAST, MOST> {
+/// A bounded size of a machine.
+pub fn size<const MIN: u32, const MAX: u32>(value: u32) -> Bounded<MIN, MAX> {
     Bounded::new(value).unwrap()
 }
 
@@ -34,7 +34,7 @@ fn client(text: &str) -> ClientSpec {
     }
 }
 
-/// Every rate is 1 in a cycle, every latency 1, every queue deep.
+/// A machine with rates and latencies of 1 and deep queues.
 pub fn plain() -> MachineSpec {
     MachineSpec {
         command: client("{\"indices\": 1}"),
@@ -98,31 +98,31 @@ pub fn recorder() -> Recorder {
     Recorder::new(100_000, 1 << 12)
 }
 
-pub fn stepped_as(machine: &MachineSpec, clocks: Clocks, packets: &Packets, manner: &Manner) -> Timed {
+pub fn stepped_as(machine: &MachineSpec, clocks: Clocks, packets: &Packets, options: &StepOptions) -> Timed {
     machine.validate().unwrap();
-    let mut makes = Jobs::new(machine, BATCH);
+    let mut builder = DemandBuilder::new(machine, BATCH);
     let mut stream = Stream::default();
-    packets.iter().for_each(|(packet, lines)| stream.push(&mut makes, packet, lines));
-    stepped::run(machine, clocks, &makes, &stream, recorder(), manner).unwrap()
+    packets.iter().for_each(|(packet, lines)| stream.push(&mut builder, packet, lines));
+    stepped::run(machine, clocks, &builder, &stream, recorder(), options).unwrap()
 }
 
 pub fn stepped(machine: &MachineSpec, packets: &Packets) -> Timed {
-    stepped_as(machine, clocks(), packets, &Manner::default())
+    stepped_as(machine, clocks(), packets, &StepOptions::default())
 }
 
-/// Tiles that cause the given events and ask for no line.
+/// Tiles with the given events and no lines.
 pub fn tiles(counts: impl IntoIterator<Item = Vec<(Event, u32)>>) -> Packets {
     counts.into_iter().map(|counts| (tile(&counts), Vec::new())).collect()
 }
 
-/// The same at the level `packet`.
+/// Timing of the packets at the level `packet`.
 pub fn packet_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
     let mut clock = timing::PacketClock::new(machine, clocks, BATCH, recorder());
     packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
     clock.finish()
 }
 
-/// The same at the level `bound`.
+/// Timing of the packets at the level `bound`.
 pub fn bound_level(machine: &MachineSpec, clocks: Clocks, packets: &Packets) -> Timed {
     let mut clock = timing::BoundClock::new(machine, clocks, BATCH, recorder());
     packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));

@@ -1,8 +1,8 @@
-//! What enters leaves, time adds up, and nothing depends on the order of visits.
+//! Conservation: all packets that enter leave, times add up, and the order of simulation does not matter.
 
 use activity::{Counts, Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use proptest::prelude::*;
-use timing::stepped::Manner;
+use timing::stepped::StepOptions;
 use timing::{Clocks, MachineSpec};
 
 use crate::common::{BATCH, Packets, plain, size, stepped_as};
@@ -17,7 +17,7 @@ fn line() -> impl Strategy<Value = (u32, LineKind, Option<u32>)> {
     (0u32..4096, kind, prop::option::weighted(0.2, 0u32..4096))
 }
 
-/// The lines of `client`, counted in `packet` as the pipeline would.
+/// Lines of `client`, counted in `packet` as in the pipeline.
 fn add_lines(packet: &mut Packet, client: Unit, lines: &[(u32, LineKind, Option<u32>)]) -> Vec<LineAccess> {
     let counts = &mut packet.counts;
     let access = |&(line, kind, victim): &(u32, LineKind, Option<u32>)| {
@@ -72,7 +72,7 @@ fn vertices_packet(
     (packet, lines)
 }
 
-/// Four batches, the front end one ahead, as the pipeline has it.
+/// Four batches with the front end one ahead, as in the pipeline.
 pub fn packets() -> impl Strategy<Value = Packets> {
     let tile = ((0u32..9, 0u32..30, 0u32..9, 0u32..5, 0u32..20), prop::collection::vec(line(), 0..12));
     let front = (1u32..20, prop::collection::vec(line(), 0..6));
@@ -93,7 +93,7 @@ pub fn packets() -> impl Strategy<Value = Packets> {
     })
 }
 
-/// Machines with anything from narrow to wide.
+/// Machines from narrow to wide.
 pub fn machine() -> impl Strategy<Value = MachineSpec> {
     let small = (1u32..6, 1u32..4, 1u32..4, 1u32..4);
     let shader = (1u32..4, 1u32..9, 1u32..9, 1u32..5, 1u32..9);
@@ -132,8 +132,8 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn everything_that_enters_leaves_and_time_adds_up(packets in packets(), machine in machine(), clocks in two_clocks()) {
-        let timed = stepped_as(&machine, clocks, &packets, &Manner::default());
+    fn every_packet_leaves_and_times_add_up(packets in packets(), machine in machine(), clocks in two_clocks()) {
+        let timed = stepped_as(&machine, clocks, &packets, &StepOptions::default());
         prop_assert_eq!(timed.timeline.total(), total(&packets));
         let stalls = timed.stalls.unwrap();
         for unit in Unit::ALL {
@@ -151,10 +151,10 @@ proptest! {
         clocks in two_clocks(),
         order in Just(Unit::ALL.to_vec()).prop_shuffle(),
     ) {
-        let plainly = stepped_as(&machine, clocks, &packets, &Manner { skip: false, ..Manner::default() });
+        let plainly = stepped_as(&machine, clocks, &packets, &StepOptions { skip_idle: false, ..StepOptions::default() });
         let order = std::array::from_fn(|at| order[at]);
         for skip in [false, true] {
-            let other = stepped_as(&machine, clocks, &packets, &Manner { order, skip });
+            let other = stepped_as(&machine, clocks, &packets, &StepOptions { order, skip_idle: skip });
             prop_assert_eq!(other.cycles, plainly.cycles);
             prop_assert_eq!(&other.timeline, &plainly.timeline);
             prop_assert_eq!(&other.stalls, &plainly.stalls);

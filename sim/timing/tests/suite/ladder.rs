@@ -1,8 +1,8 @@
-//! The cheaper levels against the reference.
+//! The cheaper levels compared with the reference.
 
 use activity::{Event, LineKind, Unit};
 use proptest::prelude::*;
-use timing::stepped::Manner;
+use timing::stepped::StepOptions;
 
 use crate::common::{
     Packets, bound_level, clocks, packet_level, plain, read, size, stepped, stepped_as, tile, tiles,
@@ -12,7 +12,7 @@ use crate::conservation::{machine, packets};
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Units that share nothing: the recurrence is the reference, to the cycle.
+    /// The recurrence equals the reference, to the cycle, for units that share nothing.
     #[test]
     fn a_chain_of_units_is_exact(
         works in prop::collection::vec(prop::array::uniform3(0u32..20), 1..60),
@@ -31,10 +31,10 @@ proptest! {
         prop_assert_eq!(found.timeline, truth.timeline);
     }
 
-    /// What happened is the same at every level, and no unit is busier than time allows.
+    /// All levels record the same events, and no unit is busy for longer than the frame.
     #[test]
     fn every_level_counts_the_same(packets in packets(), machine in machine()) {
-        let truth = stepped_as(&machine, clocks(), &packets, &Manner::default());
+        let truth = stepped_as(&machine, clocks(), &packets, &StepOptions::default());
         for found in [packet_level(&machine, clocks(), &packets), bound_level(&machine, clocks(), &packets)] {
             prop_assert_eq!(found.timeline.total(), truth.timeline.total());
             let bins = &found.timeline.bins;
@@ -50,7 +50,7 @@ fn error(machine: &timing::MachineSpec, packets: &Packets) -> f64 {
 }
 
 #[test]
-fn what_is_shared_is_close_where_it_is_the_bottleneck() {
+fn shared_bottlenecks_are_close_to_the_reference() {
     let mut machine = plain();
     machine.shader.alu_latency_cycles = size(4);
     let shaded =
@@ -63,7 +63,7 @@ fn what_is_shared_is_close_where_it_is_the_bottleneck() {
     };
     let streaming: Packets = (0..200).map(|k| lines(k, 1)).collect();
     assert!(error(&machine, &streaming).abs() < 2.0, "streaming: {}", error(&machine, &streaming));
-    // Every line another row of one of two banks.
+    // Every line in another row of one of two banks.
     let conflicts: Packets = (0..200).map(|k| lines(k, 8)).collect();
     assert!(error(&machine, &conflicts).abs() < 8.0, "conflicts: {}", error(&machine, &conflicts));
 }

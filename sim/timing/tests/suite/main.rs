@@ -1,4 +1,4 @@
-//! The ladder, level by level.
+//! Tests of the timing levels.
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 

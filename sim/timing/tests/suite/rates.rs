@@ -1,13 +1,13 @@
-//! Rates of the large GPU from outside, against those of the card it is of the class of.
+//! Rates of the large GPU, compared with those of a real card of its class.
 
 use activity::Unit;
-use timing::stepped::{self, Manner, Stream};
+use timing::stepped::{self, StepOptions, Stream};
 use timing::streams::{Packets, failures, rates};
-use timing::{Clocks, Jobs, MachineSpec, PacketClock, Recorder, Timed, Totals, bound};
+use timing::{Clocks, DemandBuilder, MachineSpec, PacketClock, Recorder, Timed, Totals, bound};
 
 const BATCH: u32 = 512;
 
-/// What a GPU file says of time.
+/// The timing part of a GPU file.
 #[derive(serde::Deserialize)]
 struct Gpu {
     core_hz: f64,
@@ -21,25 +21,25 @@ impl Gpu {
         activity::spec::load(path.as_ref()).unwrap()
     }
 
-    /// A frame at every level: `stepped`, `packet`, `bound`.
+    /// A frame at the levels `stepped`, `packet` and `bound`.
     fn run(&self, units: &MachineSpec, packets: &Packets) -> [Timed; 3] {
         let clocks = Clocks::new(self.core_hz, self.memory_hz).unwrap();
         let recorder = || Recorder::new(1_000_000, 1 << 16);
-        let mut makes = Jobs::new(units, BATCH);
+        let mut builder = DemandBuilder::new(units, BATCH);
         let (mut stream, mut totals) = (Stream::default(), Totals::new(units, &clocks));
         for (packet, lines) in packets {
-            stream.push(&mut makes, packet, lines);
-            stream.add_last(&makes, &mut totals);
+            stream.push(&mut builder, packet, lines);
+            stream.add_last(&builder, &mut totals);
         }
         [
-            stepped::run(units, clocks, &makes, &stream, recorder(), &Manner::default()).unwrap(),
+            stepped::run(units, clocks, &builder, &stream, recorder(), &StepOptions::default()).unwrap(),
             PacketClock::new(units, clocks, BATCH, recorder()).run(&stream),
             bound(units, clocks, &totals, recorder()),
         ]
     }
 }
 
-/// Found by `stepped` and `packet`: 1e9 a second, and how busy memory was by the reference.
+/// Rate at `stepped` and `packet` in 1e9 per second, and utilization of memory at `stepped`.
 fn measured(name: &str) -> ([f64; 2], f64) {
     let rate = rates().into_iter().find(|rate| rate.name.starts_with(name)).unwrap();
     let gpu = Gpu::builtin("discrete");
@@ -48,7 +48,7 @@ fn measured(name: &str) -> ([f64; 2], f64) {
     ([truth, packet].map(|timed| rate.amount / timed.timeline.duration_s() / 1e9), memory)
 }
 
-/// Units alone reach what their rates promise, but for filling the pipeline.
+/// Single units reach their nominal rates, except for pipeline fill.
 #[test]
 fn units_alone_reach_their_rates() {
     for (name, peak) in
@@ -60,7 +60,7 @@ fn units_alone_reach_their_rates() {
     }
 }
 
-/// A client that asks for enough lines a cycle reads as fast as the buses of memory carry.
+/// A client with enough requests per cycle reads at the bandwidth of the memory buses.
 #[test]
 fn one_client_fills_the_buses() {
     let (found, memory) = measured("bandwidth");
@@ -70,10 +70,11 @@ fn one_client_fills_the_buses() {
     assert!(memory > 0.98, "{memory}");
 }
 
-/// An HD 7970 fills 13.3 of its 29.6 Gpixel/s where pixels of 8 bytes are blended, because of memory, not of its colour units.
-/// So does the model, whose memory loses nothing to turns of the bus and refresh: it fills what 264 GB/s carry, 16.5.
+/// An HD 7970 reaches 13.3 of its 29.6 Gpixel/s when blending pixels of 8 bytes; memory is the bottleneck,
+/// not the colour units. The model reaches 16.5, the limit of 264 GB/s, as its memory has no bus turnaround
+/// and no refresh.
 #[test]
-fn blended_fill_is_held_up_by_memory() {
+fn blended_fill_is_limited_by_memory() {
     let (found, memory) = measured("colour fill, 8 bytes");
     for found in found {
         assert!((0.98 * 16.5..=16.5).contains(&found), "{found} of 16.5 Gpixel/s");
@@ -81,9 +82,10 @@ fn blended_fill_is_held_up_by_memory() {
     assert!(memory > 0.98, "{memory}");
 }
 
-/// No stream stalls the reference, events are the same at all levels, and where rows of memory are in dispute levels say so.
+/// No stream stalls the reference, events are the same at all levels, and conflicting memory rows give a
+/// warning.
 #[test]
-fn streams_that_break_levels_end() {
+fn challenging_streams_end() {
     for name in ["mobile", "reference", "discrete"] {
         let gpu = Gpu::builtin(name);
         for case in failures(&gpu.units, BATCH) {

@@ -1,4 +1,4 @@
-//! Frames predicted from few: closed forms, and intervals held to what they promise.
+//! Frames estimated from few: closed forms, and coverage of the intervals.
 
 use proptest::prelude::*;
 use timing::sampled::{Design, Estimate};
@@ -17,7 +17,7 @@ fn unit(seed: u64, counter: u64) -> f64 {
     (word(seed, counter) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Nearly normal: the sum of twelve.
+/// Nearly normal: the sum of twelve uniform numbers.
 fn normal(seed: u64, counter: u64) -> f64 {
     (0..12).map(|k| unit(seed, 12 * counter + k)).sum::<f64>() - 6.0
 }
@@ -31,8 +31,8 @@ fn estimate(x: &[f64], y: &[f64], count: usize, seed: u64) -> (Design, Estimate)
 /// A kind of animation: covariate and truth of frame `k` of `n`.
 type Animation = fn(u64, usize, usize) -> (f64, f64);
 
-/// A slow turn with a periodic gait; a cut from a light to a heavy scene; a signature that says nothing; one that bends; noise that
-/// grows with the frame.
+/// A slow turn with a periodic gait; a cut from a light to a heavy scene; an uninformative signature; a
+/// curved relation; noise that grows with the frame.
 const ANIMATIONS: [(&str, Animation); 5] = [
     ("gait", |seed, k, n| {
         let turn = (k as f64 / n as f64 * 6.0).sin() + 0.3 * (k as f64 * 0.7).sin();
@@ -60,10 +60,10 @@ fn animation(of: Animation, seed: u64, n: usize) -> (Vec<f64>, Vec<f64>) {
     (0..n).map(|k| of(seed, k, n)).unzip()
 }
 
-/// The promise of the issue: over at least 200 trials the truth is inside the 95 % interval in 91 to 99 % of them. Here 6000: with so
-/// many even a promise that is off by a percent shows.
+/// Coverage of the 95 % interval is 91 to 99 %, over 6000 trials. That many trials would show an error of one
+/// percent.
 #[test]
-fn intervals_hold_the_truth_as_often_as_they_say() {
+fn the_coverage_of_intervals_is_nominal() {
     let (mut inside, mut trials) = (0, 0);
     for (name, of) in ANIMATIONS {
         for count in [6, 12, 30] {
@@ -83,9 +83,9 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!((0.93..=0.98).contains(&share), "over all: {share}");
 }
 
-/// The same for the quotient of two quantities, as power is, and for single frames.
+/// Coverage for the ratio of two quantities, such as power, and for single frames.
 #[test]
-fn intervals_of_ratios_and_of_single_frames_hold() {
+fn the_coverage_of_ratios_and_single_frames_is_nominal() {
     let (mut ratios, mut singles, mut frames) = (0, 0, 0);
     let of = ANIMATIONS[0].1;
     for seed in 0..400_u64 {
@@ -108,9 +108,9 @@ fn intervals_of_ratios_and_of_single_frames_hold() {
     assert!((0.91..=0.99).contains(&singles), "single frames: {singles}");
 }
 
-/// A signature that is worth something makes the interval narrower than the mean of as many frames would.
+/// An informative signature gives a narrower interval than the mean of as many frames.
 #[test]
-fn a_good_signature_pays() {
+fn an_informative_signature_narrows_the_interval() {
     let (x, y) = animation(ANIMATIONS[0].1, 3, 300);
     let blind = vec![0.0; 300];
     let width = |x: &[f64]| {
@@ -122,23 +122,24 @@ fn a_good_signature_pays() {
 
 #[test]
 fn by_hand() {
-    // Two strata, {0, 1, 2, 3} and {4, 5, 6, 7}: all frames alike but for a step of 10 between them, and one that differs by 2.
+    // Two strata, {0, 1, 2, 3} and {4, 5, 6, 7}: all frames are equal except for a step of 10 between the
+    // strata, and one frame that differs by 2.
     let x = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
     let design = Design::draw(&x, None, 4, |unit| unit % 4);
     let chosen: Vec<_> = design.strata().iter().map(|stratum| stratum.chosen.clone()).collect();
     assert_eq!(chosen, [[0, 1], [4, 5]]);
     let y = |unit: usize| [1.0, 3.0, 9.0, 9.0, 12.0, 12.0, 9.0, 9.0][unit];
     let found = Estimate::new(&design, &x, y);
-    // Means of 2 and 12; the signature does not differ within strata, so the slope takes nothing.
+    // Means of 2 and 12; the signature is constant in each stratum, so the slope takes no degree of freedom.
     let total = found.total(0.95);
     assert!((total.value - (4.0 * 2.0 + 4.0 * 12.0)).abs() < 1e-12);
-    // Variance: 4 (4 - 2) / 2 of a spread of 2 = 8; two degrees of freedom.
+    // Variance: 4 (4 - 2) / 2 times a spread of 2 = 8; two degrees of freedom.
     assert!((total.high - total.value - 4.302_652_7 * 8.0_f64.sqrt()).abs() < 1e-6);
     assert_eq!([found.predicted(2), found.predicted(6)], [2.0, 12.0]);
 }
 
-/// Two strata of two, covariates 0, 1 and 4, 5, values 0, 2 and 4, 4: the line through all four has the slope 13/17, and its own
-/// freedom within strata is 1/17 of two.
+/// Two strata of two, covariates 0, 1 and 4, 5, values 0, 2 and 4, 4: the regression has the slope 13/17 and
+/// takes 1/17 of the two degrees of freedom within strata.
 #[test]
 fn by_hand_with_a_slope() {
     let x = [0.0, 1.0, 0.5, 4.0, 5.0, 4.5];
@@ -148,15 +149,15 @@ fn by_hand_with_a_slope() {
     let slope = 13.0 / 17.0;
     assert!((found.predicted(0) - (1.0 - 0.5 * slope)).abs() < 1e-12);
     assert!((found.predicted(2) - 1.0).abs() < 1e-12 && (found.predicted(5) - 4.0).abs() < 1e-12);
-    // Residuals of +-(1 - slope / 2) and +-slope / 2; each stratum's weight is 3 (3 - 2) / 2; of two degrees of freedom the slope took
-    // 1/17, and what is left is rounded down to one.
+    // Residuals of +-(1 - slope / 2) and +-slope / 2; each stratum's weight is 3 (3 - 2) / 2. The slope takes
+    // 1/17 of two degrees of freedom; the rest is rounded down to one.
     let squares = 2.0 * ((1.0 - 0.5 * slope) * (1.0 - 0.5 * slope) + 0.25 * slope * slope);
     let variance = 1.5 * squares * 2.0 / (2.0 - 1.0 / 17.0);
     let total = found.total(0.95);
     assert!((total.high - total.value - 12.706_204_7 * variance.sqrt()).abs() < 1e-5, "{total:?}");
 }
 
-/// What goes strictly with another quantity has no doubt in its ratio, however unsure both are.
+/// The ratio to a strictly proportional quantity is exact, however uncertain both are.
 #[test]
 fn a_fixed_ratio_is_certain() {
     let (x, time) = animation(ANIMATIONS[0].1, 3, 300);
@@ -168,7 +169,7 @@ fn a_fixed_ratio_is_certain() {
 }
 
 #[test]
-fn a_line_is_met_exactly_and_with_no_doubt() {
+fn a_linear_relation_is_estimated_exactly() {
     let x: Vec<f64> = (0..50).map(|k| f64::from(k * k)).collect();
     let y: Vec<f64> = x.iter().map(|x| 7.0 + 3.0 * x).collect();
     let total = estimate(&x, &y, 6, 1).1.total(0.95);
@@ -177,7 +178,7 @@ fn a_line_is_met_exactly_and_with_no_doubt() {
 }
 
 #[test]
-fn twice_as_many_hold_the_first_ones() {
+fn doubling_the_representatives_keeps_the_first_ones() {
     let x: Vec<f64> = (0..300).map(|k| unit(5, k)).collect();
     let chosen = |count| Design::draw(&x, Some(150), count, |unit| word(9, unit)).chosen();
     for count in [7, 13, 25, 49] {
@@ -188,9 +189,10 @@ fn twice_as_many_hold_the_first_ones() {
 }
 
 proptest! {
-    /// Measured values in the place of predictions leave the total as it is; every unit is in one stratum; all simulated is no doubt.
+    /// Replacing predictions by measured values keeps the total; every unit is in one stratum; simulating all
+    /// units gives an interval of width 0.
     #[test]
-    fn books_balance(n in 1_usize..60, count in 0_usize..70, seed in 0_u64..1000, certain in prop::bool::ANY) {
+    fn totals_and_strata_are_consistent(n in 1_usize..60, count in 0_usize..70, seed in 0_u64..1000, certain in prop::bool::ANY) {
         let x: Vec<f64> = (0..n as u64).map(|k| (unit(seed, k) * 8.0).floor()).collect();
         let y: Vec<f64> = (0..n as u64).map(|k| 10.0 + unit(seed + 1, k)).collect();
         let design = Design::draw(&x, certain.then_some(n / 2), count, |unit| word(seed, unit));

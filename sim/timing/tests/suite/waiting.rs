@@ -1,4 +1,4 @@
-//! What has to be waited for is waited for, at the reference and at `packet` alike.
+//! Packets wait for what they depend on, at the levels `stepped` and `packet` alike.
 
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::MachineSpec;
@@ -48,7 +48,7 @@ fn the_front_end_waits_for_the_tiles_of_the_batch_before_the_last() {
         let alone = cycles(&machine, &vec![front(0, 60)]);
         let all: Packets =
             begun.into_iter().chain([front(2, 60), traversed(1, 3), traversed(2, 7)]).collect();
-        // The third batch is set up when the first has been traversed, and traversed when it is set up.
+        // The third batch is set up once the first has been traversed, and then traversed.
         assert_eq!(cycles(&machine, &all), then + alone + 7 + 1, "{name}");
     }
 }
@@ -68,9 +68,9 @@ fn a_packet_waits_for_its_lines() {
     let taken = LEVELS.map(|(name, cycles)| {
         let [first, last] = [&one, &many].map(|packets| cycles(&machine, packets));
         assert!(first > 500, "{name}: {first}");
-        // All wait at once: the lines of the others come while the first is waited for.
+        // All wait at once: the lines of the others arrive while the first packet waits.
         assert!(last < first + 64 * 4, "{name}: {last}");
-        // Where only one may wait, each waits by itself.
+        // With one waiting packet at a time, each waits separately.
         let mut narrow = machine.clone();
         narrow.depth.in_flight = size(1);
         let in_turn = cycles(&narrow, &many);

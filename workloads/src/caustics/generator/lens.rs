@@ -7,20 +7,20 @@ use glam::DVec3;
 use super::super::Beam;
 use super::super::optics::{refract, transmission};
 
-/// A ball of glass at the origin in parallel light along +x, of a watt in a square metre.
+/// A glass ball at the origin, in parallel light along +x with one watt per square metre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BallLens {
     /// Radius in metres.
     pub radius_m: f64,
-    /// Refractive index over that around.
+    /// Refractive index, relative to the surroundings.
     pub index: f64,
-    /// How much of the radius is lit, 0 to 1, from the axis on.
+    /// Lit share of the radius, 0 to 1, from the axis.
     pub aperture: f64,
-    /// Rings of triangles, and parts of a ring.
+    /// Rings of triangles.
     pub rings: u32,
-    /// Parts of a ring.
+    /// Segments of a ring.
     pub segments: u32,
-    /// How far along x, from the middle of the ball, light is followed, in metres.
+    /// End of the light along x, from the centre of the ball, in metres.
     pub reach_m: f64,
 }
 
@@ -32,8 +32,8 @@ struct Ray {
 }
 
 impl BallLens {
-    /// The ray that comes in at height `h` in the half-plane at `angle` about the axis. There is no total reflection inside: it leaves at the
-    /// angle it came in.
+    /// The ray at height `h` in the half-plane at `angle` around the axis. There is no total reflection
+    /// inside: the ray leaves at its angle of incidence.
     fn ray(&self, h: f64, angle: f64) -> Option<Ray> {
         let across = DVec3::new(0.0, libm::cos(angle), libm::sin(angle));
         let normal =
@@ -46,7 +46,7 @@ impl BallLens {
         Some(Ray { from, along, enters: enters * enters })
     }
 
-    /// Two beams for each part of a ring, from the back of the ball up to the plane at `reach_m`.
+    /// Two beams per segment, from the back of the ball to the plane at `reach_m`.
     pub fn beams(&self) -> Vec<Beam> {
         let height = |ring: u32| self.aperture * self.radius_m * f64::from(ring) / f64::from(self.rings);
         let angle = |part: u32| TAU * f64::from(part) / f64::from(self.segments);
@@ -80,9 +80,10 @@ mod tests {
     const BALL: BallLens =
         BallLens { radius_m: 1.0, index: 1.5, aperture: 0.7, rings: 400, segments: 720, reach_m: 6.0 };
 
-    /// With `sin i = h / R = n sin r` the ray turns by `D = 2 (i - r)` and cuts the axis at `R sin i / sin D` from the middle.
+    /// With `sin i = h / R = n sin r` the ray is deflected by `D = 2 (i - r)` and crosses the axis at `R sin
+    /// i / sin D` from the centre.
     #[test]
-    fn rays_cut_the_axis_where_they_should() {
+    fn rays_cross_the_axis_at_the_closed_form() {
         for h in [0.01_f64, 0.2, 0.5, 0.69] {
             let (i, r) = (h.asin(), (h / 1.5).asin());
             let turned = 2.0 * (i - r);
@@ -98,7 +99,8 @@ mod tests {
         assert!((cut - 1.5).abs() < 1e-6, "{cut}");
     }
 
-    /// Neighbouring rays of a half-plane cross at `h (sin D, cos D) + h' (cos D, -sin D)`, `h' = R cos i / (2 (1 - cos i / (n cos r)))`.
+    /// Neighbouring rays of a half-plane cross at `h (sin D, cos D) + h' (cos D, -sin D)`, `h' = R cos i / (2
+    /// (1 - cos i / (n cos r)))`.
     #[test]
     fn the_caustic_of_a_ball_is_that_of_the_closed_form() {
         for ring in [60, 150, 250, 390] {
@@ -107,7 +109,7 @@ mod tests {
             let (turned, rate) = (2.0 * (i - r), i.cos() / (2.0 * (1.0 - i.cos() / (1.5 * r.cos()))));
             let known = [h * turned.sin() + rate * turned.cos(), h * turned.cos() - rate * turned.sin()];
             let beams = BALL.beams();
-            // The first part of a ring has two corners on one half-plane; both of its beams do.
+            // Both beams of the first segment of a ring have two corners on one half-plane.
             let beam = &beams[720 + (ring as usize - 1) * 1440];
             let found = beam.folds().into_iter().map(|t| {
                 let at = beam.corners(t);
@@ -121,10 +123,10 @@ mod tests {
     }
 
     #[test]
-    fn light_through_the_ball_is_what_falls_on_it_less_what_is_mirrored() {
+    fn transmitted_light_is_incident_less_reflected() {
         let sum: f64 = BALL.beams().iter().map(|beam| beam.flux_w).sum();
         let falls = std::f64::consts::PI * 0.49;
-        // Fresnel takes 4 % on each side near the axis, more far off.
+        // Fresnel reflection is 4 % per surface near the axis, and more away from it.
         assert!(sum < 0.9217 * falls && sum > 0.90 * falls, "{}", sum / falls);
     }
 }

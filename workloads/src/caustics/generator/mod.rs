@@ -1,18 +1,19 @@
-//! Where beams come from.
+//! Generators of beams.
 //!
-//! - [`Ocean`]: light refracted into water by a surface of waves; one wave alone is the sinusoidal surface with a known answer.
+//! - [`Ocean`]: light refracted into water by waves; a single wave is a sinusoidal surface with a known
+//!   solution.
 //! - [`MirrorRing`]: light reflected inside a ring, whose caustic is a nephroid or a cardioid.
 //! - [`BallLens`]: light through a ball of glass.
-//! - [`turned_beams`]: beams that turn about their way.
+//! - [`turned_beams`]: beams that twist around their axis.
 
 mod lens;
+mod mirror;
 mod ocean;
-mod ring;
 mod turned;
 
 pub use lens::BallLens;
+pub use mirror::{MirrorRing, Source};
 pub use ocean::{Ocean, Wave};
-pub use ring::{MirrorRing, Source};
 pub use turned::turned_beams;
 
 #[cfg(test)]
@@ -35,7 +36,7 @@ pub(in crate::caustics) mod tests {
             low + (high - low) * unit(mix(self.0))
         }
 
-        /// A place in a beam.
+        /// A random position in a beam.
         pub fn hit(&mut self) -> Hit {
             let (mut b, mut c) = (self.within(0.0, 1.0), self.within(0.0, 1.0));
             if b + c > 1.0 {
@@ -45,7 +46,7 @@ pub(in crate::caustics) mod tests {
         }
     }
 
-    /// A beam along z whose directions are off by up to `warp` across.
+    /// A beam along z whose directions vary by up to `warp`.
     pub fn warped(random: &mut Uniform, warp: f64) -> Beam {
         let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
         let (lean, length) = ([random.within(-0.3, 0.3), random.within(-0.3, 0.3)], random.within(1.5, 3.0));
@@ -57,7 +58,7 @@ pub(in crate::caustics) mod tests {
         Beam { open, close, flux_w: 1.0 }
     }
 
-    /// A beam that turns by about half a circle on its short way, so that its sides cross.
+    /// A short beam that twists by about 180 degrees, so that its sides cross.
     pub fn turned(random: &mut Uniform) -> Beam {
         let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
         let (sin, cos) = random.within(2.5, 3.8).sin_cos();

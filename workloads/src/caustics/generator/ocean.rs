@@ -1,4 +1,4 @@
-//! Light that a surface of waves refracts into the water.
+//! Light refracted into water by a surface with waves.
 
 use std::f64::consts::TAU;
 
@@ -11,53 +11,54 @@ use super::super::optics::{refract, transmission};
 /// A wave of the surface: `amplitude cos(number . (x, z) - rate t + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wave {
-    /// In metres.
+    /// Amplitude in metres.
     pub amplitude_m: f64,
-    /// Radians in a metre, along x and z.
+    /// Wave vector along x and z, in radians per metre.
     pub number: DVec2,
-    /// Radians in a second.
+    /// Angular frequency, in radians per second.
     pub rate: f64,
-    /// In radians.
+    /// Phase in radians.
     pub phase: f64,
 }
 
-/// A square of water, its middle at the origin and its surface at rest at height 0, over a level floor.
+/// A square of water over a horizontal floor, centred at the origin, with its mean surface at height 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ocean {
     /// Squares of two generator triangles along each side.
     pub cells: u32,
     /// Length of a side in metres.
     pub side_m: f64,
-    /// From the surface at rest to the floor, in metres.
+    /// Depth of the floor below the mean surface, in metres.
     pub depth_m: f64,
-    /// How far beams go on below the floor, as a part of their length: a receiver is to lie within them.
+    /// Extension of beams below the floor, as a share of their length, so that the receiver lies within them.
     pub overshoot: f64,
-    /// How far every other column of corners lies down its own light, as a part of its length, from 0 to below 1. The light stays what it
-    /// is, only triangles stand ever more along it, and their sides cross for longer where they fold.
+    /// Offset of every other column of corners along its light, as a share of its length, from 0 to below 1.
+    /// The light stays the same, but triangles align with it, and their sides cross over a longer part where
+    /// they fold.
     pub pleat: f64,
     /// The waves.
     pub waves: Vec<Wave>,
-    /// Where sunlight goes, downwards, of unit length.
+    /// Direction of sunlight, downwards, of unit length.
     pub sun: DVec3,
-    /// Watts in a square metre across the light.
+    /// Irradiance across the light, in watts per square metre.
     pub irradiance: f64,
     /// Refractive index of the water.
     pub index: f64,
 }
 
-/// Gravity in metres per second squared, for the pace of waves.
+/// Gravity in metres per second squared, for the wave speed.
 const GRAVITY: f64 = 9.81;
 
 impl Ocean {
-    /// Water under a low sun in waves of many lengths and directions, from the third part of `longest_m` on; `slope` is the
-    /// root mean square of their slopes.
+    /// Water under a low sun, with waves of many lengths and directions. The longest has `longest_m`, the
+    /// shortest a third of it; `slope` is the root mean square of the slopes.
     pub fn new(cells: u32, side_m: f64, depth_m: f64, [longest_m, slope]: [f64; 2], seed: u64) -> Self {
         let uniform = |n: u64| unit(mix(mix(seed ^ 0x0CEA) ^ n));
         let waves = (0..WAVES).map(|n| {
             let length_m = longest_m * libm::pow(SHORTEST, n as f64 / (WAVES - 1) as f64);
             let angle = SPREAD * (2.0 * uniform(2 * n) - 1.0);
             let number = TAU / length_m * DVec2::new(libm::cos(angle), libm::sin(angle));
-            // Each has the same share of the slope, whose mean square is half the peak's.
+            // Each wave has the same share of the slope, whose mean square is half of the peak's.
             let amplitude_m = slope * libm::sqrt(2.0 / WAVES as f64) / number.length();
             let rate = libm::sqrt(GRAVITY * number.length());
             Wave { amplitude_m, number, rate, phase: TAU * uniform(2 * n + 1) }
@@ -68,17 +69,17 @@ impl Ocean {
         Self { cells, side_m, depth_m, overshoot: 0.0, pleat: 0.0, waves, sun, irradiance, index }
     }
 
-    /// The number of generator triangles.
+    /// Number of generator triangles.
     pub fn triangles(&self) -> usize {
         2 * self.cells as usize * self.cells as usize
     }
 
-    /// The length of the shortest wave in metres, infinite without waves.
+    /// Length of the shortest wave in metres, infinite without waves.
     pub fn shortest_m(&self) -> f64 {
         TAU / self.waves.iter().map(|wave| wave.number.length()).fold(0.0, f64::max)
     }
 
-    /// A beam for each generator triangle, at a time in seconds.
+    /// One beam per generator triangle, at a time in seconds.
     pub fn beams(&self, time_s: f64) -> Vec<Beam> {
         let side = self.cells as usize + 1;
         let at = |n: usize| self.side_m * (n as f64 / f64::from(self.cells) - 0.5);
@@ -94,14 +95,14 @@ impl Ocean {
         all.map(|three| self.beam(three.map(|n| &corners[n]))).collect()
     }
 
-    /// The light that comes in through the square: that on the triangles, before any is reflected.
+    /// Flux of the light on the triangles, before reflection.
     pub fn incoming_w(&self, time_s: f64) -> f64 {
         let level = Self { pleat: 0.0, ..self.clone() };
         level.beams(time_s).iter().map(|beam| self.on(&beam.open)).sum()
     }
 
-    /// The light that enters at a place of the square, refracted at the waves themselves and not at triangles: where it starts and ends, and
-    /// watts for each square metre of the square.
+    /// Light that enters at a position of the square, refracted at the true waves instead of triangles:
+    /// start, end, and watts per square metre of the square.
     pub fn ray(&self, at: DVec2, time_s: f64) -> ([DVec3; 2], f64) {
         let (_, slope) = self.surface(at, time_s);
         let corner = self.corner(at, time_s);
@@ -109,7 +110,7 @@ impl Ocean {
         ([corner.position, corner.end], -self.irradiance * upward.dot(self.sun) * corner.enters)
     }
 
-    /// Height of the surface and its slopes along x and z.
+    /// Height of the surface, and its slopes along x and z.
     fn surface(&self, at: DVec2, time_s: f64) -> (f64, DVec2) {
         self.waves.iter().fold((0.0, DVec2::ZERO), |(height, slope), wave| {
             let angle = wave.number.dot(at) - wave.rate * time_s + wave.phase;
@@ -122,7 +123,7 @@ impl Ocean {
         let (height, slope) = self.surface(at, time_s);
         let normal = DVec3::new(-slope.x, 1.0, -slope.y).normalize();
         let position = DVec3::new(at.x, height, at.y);
-        // Into the denser medium there is always a way.
+        // Refraction into the denser medium always has a solution.
         let direction = refract(self.sun, normal, 1.0 / self.index).unwrap_or(self.sun);
         let enters = transmission(-self.sun.dot(normal), -direction.dot(normal), 1.0 / self.index);
         let length = (height + self.depth_m) / -direction.y * (1.0 + self.overshoot);
@@ -135,25 +136,27 @@ impl Ocean {
         Beam { open: corners.map(|corner| corner.start), close: corners.map(|corner| corner.end), flux_w }
     }
 
-    /// The light that falls on a triangle.
+    /// Flux of the light that hits a triangle.
     fn on(&self, [a, b, c]: &[DVec3; 3]) -> f64 {
         let area = 0.5 * (*b - *a).cross(*c - *a);
         self.irradiance * -area.dot(self.sun)
     }
 }
 
-/// How many waves an ocean has, how long the shortest is over the longest, and how far from the x axis they go, in radians.
+/// Number of waves.
 const WAVES: u64 = 12;
+/// Length of the shortest wave relative to the longest.
 const SHORTEST: f64 = 1.0 / 3.0;
+/// Largest angle of a wave from the x axis, in radians.
 const SPREAD: f64 = 1.2;
 
 struct Corner {
-    /// On the surface.
+    /// Position on the surface.
     position: DVec3,
-    /// Where the beam starts.
+    /// Start of the beam.
     start: DVec3,
     end: DVec3,
-    /// The share of light that is not reflected.
+    /// Transmitted share of light.
     enters: f64,
 }
 
@@ -168,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_comes_in_is_what_falls_on_the_square() {
+    fn incoming_flux_is_that_of_the_square() {
         let mut ocean = Ocean::new(96, 12.0, 5.0, [3.0, 0.2], 1);
         ocean.sun = DVec3::NEG_Y;
         let flat = ocean.irradiance * ocean.side_m * ocean.side_m;
@@ -181,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn pleats_keep_the_light_and_make_sides_cross() {
+    fn offset_corners_keep_the_light_and_cross_sides() {
         let flat = Ocean { overshoot: 0.25, ..Ocean::new(16, 16.0, 8.0, [4.0, 0.3], 1) };
         let crossing = |ocean: &Ocean| crate::caustics::crossing(&ocean.beams(0.3));
         let mut last = crossing(&flat);
@@ -211,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_as_steep_as_asked_for() {
+    fn slopes_are_as_requested() {
         let ocean = Ocean::new(4, 12.0, 5.0, [3.0, 0.2], 9);
         let uniform = |n: u64| unit(mix(n));
         let count = 20_000;
@@ -223,10 +226,10 @@ mod tests {
         assert!((rms - 0.2).abs() < 0.004, "{rms}");
     }
 
-    /// Sinusoidal water under light from straight above: the first cusp is under the crests, at `1 / ((1 - 1/n) A k^2)` for small
-    /// slopes.
+    /// A sinusoidal surface under vertical light. The first cusp is under the crests, at `1 / ((1 - 1/n) A
+    /// k^2)` for small slopes.
     #[test]
-    fn one_wave_focuses_where_it_should() {
+    fn one_wave_focuses_at_the_closed_form() {
         let (amplitude_m, number) = (0.002, TAU / 1.0);
         let depth = 1.0 / ((1.0 - 1.0 / 1.33) * amplitude_m * number * number);
         let wave = Wave { amplitude_m, number: DVec2::new(number, 0.0), rate: 0.0, phase: 0.0 };
@@ -239,7 +242,7 @@ mod tests {
         };
         let first = beams.iter().filter_map(focuses).fold(f64::INFINITY, f64::min);
         assert!((first / depth - 1.0).abs() < 0.002, "{first} {depth}");
-        // Under the troughs light spreads.
+        // Light diverges under the troughs.
         let trough = beams.iter().filter(|beam| beam.open.iter().all(|p| (p.x.abs() - 0.5).abs() < 0.1));
         assert!(trough.clone().count() > 100 && trough.into_iter().all(|beam| beam.folds().is_empty()));
     }

@@ -1,16 +1,17 @@
-//! Beams that turn about their way, as they do next to a focus.
+//! Twisted beams, as they occur next to a focus.
 
 use glam::DVec3;
 use pipeline::random::{mix, unit};
 
 use super::super::Beam;
 
-/// How far beams turn, in radians, and how far the corners of their ends lie up or down.
+/// Range of the twist, in radians.
 const TURN: [f64; 2] = [2.5, 3.8];
+/// Largest rise or fall of an end corner, in metres.
 const REACH_M: f64 = 0.3;
 
-/// `count` beams that begin level at height 0, within a metre of the y axis, and turn about it by half a circle or so while they go up or
-/// down by up to 0.3 m: sides cross, and a point may be passed three times.
+/// Makes `count` beams that start at height 0, within a metre of the y axis, and twist by about 180 degrees
+/// while rising or falling by up to 0.3 m. Their sides cross, and they may contain a point three times.
 pub fn turned_beams(count: u32, seed: u64) -> Vec<Beam> {
     let turned = |number: u32| {
         let uniform = |n: u64, [low, high]: [f64; 2]| {

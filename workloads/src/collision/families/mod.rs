@@ -1,45 +1,44 @@
-//! Cases whose truth is known by how they are made, from easy to hopeless: what false positives are counted over.
+//! Test cases with known ground truth, from easy to hopeless. False positives are counted over them.
 //!
-//! Two objects or many; in each family about half of the pairs that meet do collide. Gaps go down to 1e-7 of the objects' size.
+//! A case has two objects or many. In each family about half of the pairs that come near each other collide.
+//! Gaps go down to 1e-7 of the objects' size.
 
-mod draws;
-mod many;
-mod two;
-mod yardstick;
+mod basic;
+mod reference;
+mod rng;
 
 use pipeline::random::mix;
 
 use super::{Bounds, Object};
-use draws::Draws;
+use rng::Rng;
 
-pub use many::swarm_of;
-pub use two::slide;
+pub use basic::{slide, swarm_of};
 
-/// Objects that move, and which of them collide.
+/// A case: moving objects, and which of them collide.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What it is like.
+    /// Name of the family.
     pub family: &'static str,
     /// The objects.
     pub objects: Vec<Object>,
-    /// Pairs that collide, the smaller number first.
+    /// Pairs that collide, the smaller index first.
     pub collide: Vec<(usize, usize)>,
 }
 
-type Maker = fn(&mut Draws) -> Option<Case>;
+type Maker = fn(&mut Rng) -> Option<Case>;
 
 /// The families of two objects, then those of many.
 const FAMILIES: [(&str, Maker); 10] = [
-    ("tunnelling", two::tunnelling),
-    ("near miss", two::near_miss),
-    ("sliding", two::sliding),
-    ("contact at the end", two::landing),
-    ("exchanged places", two::exchange),
-    ("slivers", two::slivers),
-    ("same place, other time", two::dodge),
-    ("chain links", two::links),
-    ("flock", many::flock),
-    ("swarm", many::swarm),
+    ("tunnelling", basic::tunnelling),
+    ("near miss", basic::near_miss),
+    ("sliding", basic::sliding),
+    ("contact at the end", basic::landing),
+    ("exchanged places", basic::exchange),
+    ("slivers", basic::slivers),
+    ("same place, other time", basic::dodge),
+    ("chain links", basic::links),
+    ("flock", basic::flock),
+    ("swarm", basic::swarm),
 ];
 
 /// Names of the families.
@@ -47,30 +46,32 @@ pub fn names() -> [&'static str; FAMILIES.len()] {
     FAMILIES.map(|(name, _)| name)
 }
 
-/// `each` cases of every family, the same for the same seed.
+/// `each` cases of every family, determined by the seed.
 pub fn cases(seed: u64, each: usize) -> Vec<Case> {
     made(&FAMILIES, seed, each)
 }
 
-/// Cases like those of the yardsticks (`yardstick.rs`): so many of each kind of two objects, and of each of many.
-pub fn like_yardsticks(seed: u64, [two, many]: [usize; 2]) -> Vec<Case> {
-    let [first, second] = [(&yardstick::OF_TWO[..], two), (&yardstick::OF_MANY[..], many)];
-    [first, second].into_iter().flat_map(|(kinds, each)| made(kinds, seed, each)).collect()
+/// Cases of the kinds that the reference rates of false positives in the book were measured on: `pairs` of
+/// each kind of two objects, `groups` of each kind of many.
+pub fn reference_cases(seed: u64, pairs: usize, groups: usize) -> Vec<Case> {
+    let mut cases = made(&reference::PAIRS, seed, pairs);
+    cases.extend(made(&reference::GROUPS, seed, groups));
+    cases
 }
 
 fn made(families: &[(&'static str, Maker)], seed: u64, each: usize) -> Vec<Case> {
     let of = |(number, &(family, make)): (u64, &(&'static str, Maker))| {
-        let mut draws = Draws::new(seed ^ mix(number));
+        let mut rng = Rng::new(seed ^ mix(number));
         let mut made = Vec::new();
         while made.len() < each {
-            made.extend(make(&mut draws).map(|case| Case { family, ..case }));
+            made.extend(make(&mut rng).map(|case| Case { family, ..case }));
         }
         made
     };
     (1..).zip(families).flat_map(of).collect()
 }
 
-/// Whether the swept boxes of any two triangles touch: what is left after a broad phase of the best kind.
+/// Whether the swept boxes of any two triangles touch: the best possible broad phase.
 pub fn triangles_boxes_touch(a: &Object, b: &Object) -> bool {
     let touch = |one: &Bounds| b.boxes.iter().any(|other| one.meet(other).is_some());
     a.boxes.iter().any(touch)
@@ -85,7 +86,7 @@ mod tests {
     fn every_collision_of_every_family_is_found() {
         for zoom in [false, true] {
             let search = Search { resolution: 16, bins: 4, method: Method::FragmentBox, zoom };
-            for case in cases(7, 4).into_iter().chain(like_yardsticks(7, [6, 1])) {
+            for case in cases(7, 4).into_iter().chain(reference_cases(7, 6, 1)) {
                 let found = detect(&case.objects, &search);
                 for &(a, b) in &case.collide {
                     let answer = found.iter().find(|answer| (answer.a, answer.b) == (a, b));
@@ -107,10 +108,11 @@ mod tests {
         }
     }
 
-    /// The yardsticks were measured over cases of which 0.6 of the pairs of two and 0.1 of those of many have boxes that touch.
+    /// Of the cases with reference rates, 0.6 of the pairs of two and 0.1 of those of many have touching
+    /// boxes.
     #[test]
-    fn cases_like_those_of_the_yardsticks_are_as_near_to_each_other() {
-        let all = like_yardsticks(1, [60, 12]);
+    fn reference_cases_have_the_expected_share_of_touching_boxes() {
+        let all = reference_cases(1, 60, 12);
         for (many, expected) in [(false, 0.45..0.7), (true, 0.05..0.2)] {
             let of = || all.iter().filter(|case| (case.objects.len() > 2) == many);
             let touch: usize = of()
@@ -126,10 +128,10 @@ mod tests {
         }
     }
 
-    /// What is said to be apart is apart at many instants; what is said to collide is near to it.
+    /// Pairs declared apart are apart at many instants.
     #[test]
-    fn oracle_instants_agree_with_the_truth() {
-        for case in cases(5, 4).into_iter().chain(like_yardsticks(5, [12, 2])) {
+    fn many_instants_agree_with_the_ground_truth() {
+        for case in cases(5, 4).into_iter().chain(reference_cases(5, 12, 2)) {
             for (a, b) in
                 (0..case.objects.len()).flat_map(|a| (a + 1..case.objects.len()).map(move |b| (a, b)))
             {
@@ -139,7 +141,7 @@ mod tests {
                     all().filter(|&(i, j)| one.boxes[i].meet(&other.boxes[j]).is_some()).collect();
                 let crosses = |t: f64| {
                     near.iter().find(|&&(i, j)| {
-                        crate::collision::crossing::cross(&one.triangles[i], &other.triangles[j], t)
+                        super::super::contact_probe::cross(&one.triangles[i], &other.triangles[j], t)
                     })
                 };
                 if case.collide.contains(&(a, b)) {

@@ -54,7 +54,7 @@ pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alph
 
 /// Whether alpha would change anything: opaque texels of blended materials are drawn as they should be.
 fn transparent(described: &Described, made: &Material, vertex_alpha: f32) -> Option<Warning> {
-    let texture = made.texture.as_ref().map_or(1.0, |texture| f32::from(texture.least_alpha()) / 255.0);
+    let texture = made.texture.as_ref().map_or(1.0, |texture| f32::from(texture.min_alpha()) / 255.0);
     let least = described.pbr_metallic_roughness.base_color_factor.0[3] * texture * vertex_alpha;
     match described.alpha_mode {
         Checked::Valid(AlphaMode::Mask) => {

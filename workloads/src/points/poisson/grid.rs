@@ -1,27 +1,26 @@
-//! Points in cells so small that each holds one at most, and the two questions that are asked of them.
+//! Grid of cells that hold one point at most, with the tests whether a dart is free and a cell is covered.
 
 use std::ops::ControlFlow;
 
-use super::cells::{Cell, Cells};
-use super::exact::{FINEST_BITS, closer};
-use super::near::{MOST_HALVES, Near, square_of_difference};
+use super::cells::{Cell, Cells, MAX_HALVES, Near, square_of_difference};
 use super::{Domain, PoissonError, PoissonSpec, check_room};
 
-/// What single precision may lose of a squared distance near the radius, in squared cells: places are within 5 of a cell, so a
-/// difference is off by less than 5e-7, its square near the radius (at most 3 cells) by 3e-6, and that of four axes by 6e-6.
+/// Error bound of a squared distance near the radius in single precision, in squared cells. Positions are
+/// within 5 of a cell, so a difference is off by less than 5e-7. Its square near the radius (at most 3 cells)
+/// is off by 3e-6, and that of four axes by 6e-6.
 const MARGIN: f32 = 1e-5;
 
-/// A place that may become a point.
+/// A candidate for a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dart<const D: usize> {
-    /// The cell, as a place in the padded arrays.
+    /// Index of the cell in the padded arrays.
     pub slot: u32,
-    /// Where in the cell, in cells.
+    /// Position in the cell, in cells.
     pub place: [f32; D],
     pub point: [f64; D],
 }
 
-/// The points so far. Cells are padded by copies of those across the border (torus) or by empty ones (box).
+/// The points so far. The padding holds copies across the border (torus) or empty cells (box).
 pub(super) struct Grid<const D: usize> {
     pub radius: f64,
     pub domain: Domain,
@@ -31,8 +30,9 @@ pub(super) struct Grid<const D: usize> {
     reach2: f64,
     cells: Cells<D>,
     pub points: Vec<[f64; D]>,
-    /// Lattice points to a unit of length, a power of two, and from one to the next.
+    /// Representable coordinates per unit of length, a power of two.
     ticks: f64,
+    /// Distance of neighbouring representable coordinates.
     tick: f64,
 }
 
@@ -40,7 +40,7 @@ impl<const D: usize> Grid<D> {
     pub fn new(spec: &PoissonSpec) -> Result<Self, PoissonError> {
         let root = (D as f64).sqrt();
         let tick = 1.0 / spec.spacing.per_unit();
-        // Rounding to the lattice takes a point at most a tick out of its cell.
+        // Rounding to representable coordinates moves a point at most one tick out of its cell.
         let across = (root / (spec.radius * (1.0 - 1e-9) - 2.0 * tick * root)).ceil();
         let ratio = spec.radius * across;
         check_room(spec.radius, D, Cells::<D>::count(across, ratio))?;
@@ -56,7 +56,7 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// The place of a cell in the padded arrays.
+    /// Index of a cell in the padded arrays.
     #[inline]
     pub fn slot(&self, cell: [u64; D]) -> usize {
         self.cells.slot(cell)
@@ -68,7 +68,8 @@ impl<const D: usize> Grid<D> {
         self.cells.is_taken(slot)
     }
 
-    /// The smallest squared distance from `at` in a cell to a point, or less than `enough`, in cells.
+    /// Smallest squared distance from `at` in a cell to a point, in cells; any value below `enough` ends the
+    /// search.
     #[inline]
     fn nearest(&self, slot: usize, at: &[f32; D], enough: f32) -> f32 {
         let mut least = f32::INFINITY;
@@ -89,7 +90,7 @@ impl<const D: usize> Grid<D> {
         self.decide(least, dart)
     }
 
-    /// Whether a dart is free by its squared distance in single precision and, where that cannot tell, exactly.
+    /// Decides by the squared distance in single precision, or exactly if rounding could decide.
     #[inline]
     fn decide(&self, least: f32, dart: &Dart<D>) -> bool {
         let reach2 = self.reach2 as f32;
@@ -110,33 +111,33 @@ impl<const D: usize> Grid<D> {
         });
     }
 
-    /// Room for the points near a cell.
+    /// Allocates room for the points near a cell.
     pub fn near(&self) -> Near<D> {
         Near::new(self.cells.neighbours())
     }
 
-    /// Keeps those of the points near a cell whose disks may touch a cube in it.
+    /// Keeps the points whose disks may touch a cube in the cell.
     #[inline]
     pub fn narrow(&self, cell: &Near<D>, low: &[f64; D], side: f64, near: &mut Near<D>) {
         near.take_within(cell, &low.map(|low| low as f32), side as f32, self.reach2 as f32 + MARGIN);
     }
 
-    /// Whether a dart is free, by the points near its cell.
+    /// Whether a dart is free of the points near its cell.
     #[inline]
     pub fn is_free_among(&self, near: &Near<D>, dart: &Dart<D>) -> bool {
         self.decide(near.nearest(&dart.place), dart)
     }
 
-    /// Which halves along each axis of a cube in the cell of `near` one disk surely covers: a bit for each, by low corner and side of
-    /// a half, in cells.
+    /// Bit mask of the halves of a cube that a single disk covers with certainty. `low` and `side` are those
+    /// of a half, in cells.
     #[inline]
     pub fn covers(&self, near: &Near<D>, low: &[f64; D], side: f64) -> u32 {
         let middle = |axis: usize, upper: u32| low[axis] + (f64::from(upper) + 0.5) * side;
         let middles = std::array::from_fn(|axis| [0, 1].map(|upper| middle(axis, upper) as f32));
-        let least: [f32; MOST_HALVES] = near.of_halves(&middles, 0.5 * side as f32);
+        let least: [f32; MAX_HALVES] = near.of_halves(&middles, 0.5 * side as f32);
         let enough = self.reach2 as f32 - MARGIN;
         let mut covered = (0..1 << D).fold(0, |bits, half| bits | u32::from(least[half] < enough) << half);
-        if 0.5 * side < FINE {
+        if 0.5 * side < MAX_FINE_HALF_SIDE {
             let roughly = covered;
             for half in (0..1_u32 << D).filter(|half| roughly >> half & 1 == 0) {
                 let middle = std::array::from_fn(|axis| middle(axis, half >> axis & 1));
@@ -146,7 +147,7 @@ impl<const D: usize> Grid<D> {
         covered
     }
 
-    /// Whether one does by double precision: middle and half a side.
+    /// The same for one half, in double precision.
     fn covers_finely(&self, slot: usize, middle: &[f64; D], half: f64) -> bool {
         let enough = self.reach2 - self.across as f64 * 64.0 * f64::EPSILON;
         self.cells.any(slot, |cell, away| {
@@ -156,13 +157,13 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// Where in its cell a point is.
+    /// Position of a point in its cell.
     fn place(&self, point: &[f64; D]) -> [f64; D] {
         let across = self.across as f64;
         point.map(|x| x * across - self.cell_of(x) as f64)
     }
 
-    /// The dart at `at`, cells and parts of one along each axis, moved to the lattice.
+    /// Dart at `at` in a cell, in cells, rounded to representable coordinates.
     #[inline]
     pub fn dart(&self, cell: [u64; D], slot: usize, at: [f64; D]) -> Dart<D> {
         let across = self.across as f64;
@@ -174,7 +175,7 @@ impl<const D: usize> Grid<D> {
         Dart { slot: slot as u32, place, point }
     }
 
-    /// The dart at a point of the unit cube, moved to the lattice.
+    /// Dart at a point of the unit cube, rounded to representable coordinates.
     pub fn dart_at(&self, point: &[f64; D]) -> Dart<D> {
         let cell = point.map(|x| self.cell_of(x));
         let at = std::array::from_fn(|k| point[k] * self.across as f64 - cell[k] as f64);
@@ -185,7 +186,7 @@ impl<const D: usize> Grid<D> {
         ((x * self.across as f64) as u64).min(self.across - 1)
     }
 
-    /// Adds a point to its cell and to the copies of that across the border.
+    /// Adds a point to its cell and to the copies across the border.
     pub fn insert(&mut self, dart: &Dart<D>) {
         let index = self.points.len() as u32;
         self.points.push(dart.point);
@@ -196,7 +197,8 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// The lattice points of a cube in a cell (low corner and side in cells), with a tick more on each side.
+    /// Representable points of a cube in a cell, with one more tick on each side; low corner and side in
+    /// cells.
     pub fn lattice(&self, cell: [u64; D], low: [f64; D], side: f64) -> Vec<Dart<D>> {
         let tick = self.across as f64 / self.ticks;
         let along = (side / tick).ceil() as u64 + 2;
@@ -210,15 +212,35 @@ impl<const D: usize> Grid<D> {
         (0..count).map(|number| self.dart(cell, self.slot(cell), at(number))).collect()
     }
 
-    /// Whether a cube of this level is no wider than a few lattice points.
+    /// Whether a cube of this level is no wider than a few representable coordinates.
     pub fn is_finest(&self, level: u32) -> bool {
         let side = self.ticks / (self.across as f64 * (1_u64 << level) as f64);
         side <= 4.0 || level + 1 >= FINEST_BITS
     }
 }
 
-/// Half a side of a cube from which on double precision is worth its time, in cells.
-const FINE: f64 = 1.0 / 1024.0;
+/// Half side, in cells, below which double precision is worth its time.
+const MAX_FINE_HALF_SIDE: f64 = 1.0 / 1024.0;
+
+/// Coordinates are multiples of 2^-52, or of a coarser power of two.
+pub(super) const FINEST_BITS: u32 = 52;
+
+/// Whether two points are closer than `radius` (0 to 1/2), exactly. The squares of multiples of 2^-52 fit in
+/// 128 bits.
+pub fn closer<const D: usize>(a: &[f64; D], b: &[f64; D], radius: f64, domain: Domain) -> bool {
+    let whole = 1_u64 << FINEST_BITS;
+    let square = |k: usize| {
+        let apart = ((a[k] - b[k]).abs() * whole as f64) as u64;
+        let apart = if domain == Domain::Torus { apart.min(whole - apart) } else { apart };
+        u128::from(apart) * u128::from(apart)
+    };
+    let sum: u128 = (0..D).map(square).sum();
+    // radius = mantissa 2^exponent, and the sum is in units of 2^-104.
+    let bits = radius.to_bits();
+    let (mantissa, exponent) = ((bits & ((1 << 52) - 1)) | 1 << 52, (bits >> 52) as i32 - 1075);
+    let shift = (-(2 * exponent + 2 * FINEST_BITS as i32)).max(0) as u32;
+    sum.leading_zeros() >= shift && sum << shift < u128::from(mantissa) * u128::from(mantissa)
+}
 
 #[cfg(test)]
 mod tests {
@@ -243,9 +265,10 @@ mod tests {
         }
     }
 
-    /// Against the distance of the farthest corner in double precision, for cubes of any size whose corner is about at the radius.
+    /// Compares with the distance of the farthest corner in double precision, for cubes of any size with a
+    /// corner near the radius.
     #[test]
-    fn what_is_said_to_be_covered_is_and_what_is_not_nearly_is_not() {
+    fn coverage_is_conservative_and_tight() {
         let mut grid = grid(0.03, Domain::Box, Spacing::Double);
         let point = grid.dart_at(&[0.5031, 0.4987]);
         grid.insert(&point);
@@ -273,7 +296,7 @@ mod tests {
                     .sum();
                 let (is_said, over) = (said >> half & 1 != 0, far2 - grid.reach2);
                 assert!(!is_said || over < 1e-12, "level {level}: {over:e}");
-                let margin = if 0.5 * side < FINE { 1e-9 } else { 4.0 * f64::from(MARGIN) };
+                let margin = if 0.5 * side < MAX_FINE_HALF_SIDE { 1e-9 } else { 4.0 * f64::from(MARGIN) };
                 assert!(is_said || over > -margin, "level {level}: {over:e}");
                 covered += u32::from(is_said);
             }
@@ -282,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn no_number_of_a_cube_is_left_out() {
+    fn every_representable_point_of_a_cube_is_listed() {
         let grid = grid(0.001, Domain::Box, Spacing::Single);
         let (across, ticks, side) = (grid.across as f64, grid.ticks, 3.3 * grid.across as f64 / grid.ticks);
         let stream = Stream::new(1, 1);
@@ -299,5 +322,27 @@ mod tests {
             }
             assert!(numbers(0).count() >= 3);
         }
+    }
+
+    #[test]
+    fn the_comparison_is_exact_to_the_last_bit() {
+        let tick = 1.0 / (1_u64 << 52) as f64;
+        for radius in [0.3, 0.5, 0.001, 1.0 / 3.0, 1e-6, 0.25] {
+            let across = (radius / tick).ceil() * tick;
+            let at = |x: f64| [[0.0, 0.5], [x, 0.5]];
+            let [a, b] = at(across);
+            assert!(!closer(&a, &b, radius, Domain::Box), "{radius}");
+            let [a, b] = at(across - tick);
+            assert!(closer(&a, &b, radius, Domain::Box) == (across - tick < radius), "{radius}");
+        }
+        // A 3-4-5 triangle: a point exactly at the radius is not closer.
+        assert!(!closer(&[0.0, 0.0], &[0.1875, 0.25], 0.3125, Domain::Box));
+        assert!(closer(&[0.0, 0.0], &[0.1875, 0.25 - tick], 0.3125, Domain::Box));
+    }
+
+    #[test]
+    fn a_torus_has_no_border() {
+        assert!(closer(&[0.001, 0.5], &[0.999, 0.5], 0.01, Domain::Torus));
+        assert!(!closer(&[0.001, 0.5], &[0.999, 0.5], 0.01, Domain::Box));
     }
 }

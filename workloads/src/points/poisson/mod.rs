@@ -1,126 +1,129 @@
-//! Maximal Poisson-disk points: dart throwing over voids (thesis, Paper VI, section 5, "Accelerated Dart Throwing").
+//! Maximal Poisson disk points by dart throwing over uncovered regions (thesis, Paper VI, section 5,
+//! "Accelerated Dart Throwing").
 //!
-//! Space is cut into cells so small that each holds one point at most. Cells that are not yet known to be covered are the *voids*.
-//! Darts are thrown at voids, each as likely as its volume, and stay where they are free; then voids are halved along
-//! each axis and those that a disk covers are dropped, until none is left (the flat list of cells of one size: Ebeida, Mitchell,
-//! Patney, Davidson, Owens 2012, "A Simple Algorithm for Maximal Poisson-Disk Sampling in High Dimensions"; before it as a tree:
-//! Gamito, Maddock 2009). Voids of a level are of one size and hold all that is free, so **every dart that stays is uniform over
-//! what is free**: the points are those of plain dart throwing carried on for ever (random sequential adsorption).
+//! Space is divided into cells that can hold one point at most. Cells that may still be *uncovered* form a
+//! list. Darts are thrown at these cells with uniform density, and become points if they are free. Then each
+//! cell is halved along every axis, and cells that a disk covers are dropped, until none remains. The flat
+//! list of equal cells follows Ebeida, Mitchell, Patney, Davidson and Owens 2012, "A Simple Algorithm for
+//! Maximal Poisson-Disk Sampling in High Dimensions"; the tree before it is Gamito and Maddock 2009. The
+//! cells of a level have one size and contain all free space, so **every accepted dart is uniform over the
+//! free space**. The points are those of plain dart throwing without end (random sequential adsorption).
 //!
-//! Distances are looked at in single precision from cell to cell and, where that cannot tell, exactly, for the numbers that are
-//! handed out. Voids narrower than a few of these numbers are tried number by number; what is left of them has no number in it,
-//! and is counted ([`PoissonDisk::thin_voids`]).
+//! Distances between cells are compared in single precision. If rounding could decide, they are compared
+//! exactly, for the coordinates that are returned. Cells only a few representable coordinates wide are tested
+//! coordinate by coordinate. Those that then have uncovered space contain no representable point, and are
+//! counted ([`PoissonDisk::thin_regions`]).
 //!
-//! The paper rasterizes the voids to make candidates; that is [`super::job`]. Here a candidate is made by choosing a cell.
+//! The paper rasterizes the cells to make candidates, as [`super::job`] does. Here a candidate is made by
+//! choosing a cell.
 
 mod cells;
-mod exact;
 mod grid;
-mod near;
-mod rain;
 mod throw;
-mod voids;
+mod uncovered;
 
-pub use exact::closer;
-pub use throw::{poisson_disk, poisson_disk_drawn, poisson_disk_telling};
-pub use voids::Cube;
+pub use grid::closer;
+pub use throw::{poisson_disk, poisson_disk_drawn, poisson_disk_with_progress};
+pub use uncovered::Cube;
 
-/// What lies beyond the unit square or cube.
+/// Boundary of the unit square or cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Domain {
-    /// The other side: no border.
+    /// Periodic: opposite sides are joined.
     #[default]
     Torus,
-    /// Nothing.
+    /// Open: nothing lies beyond.
     Box,
 }
 
-/// The numbers that coordinates may be.
+/// Representable coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spacing {
-    /// Multiples of 2^-52: what `f64` tells apart everywhere in the unit interval.
+    /// Multiples of 2^-52, the largest ulp of an `f64` in the unit interval.
     #[default]
     Double,
-    /// Multiples of 2^-24: the same for `f32`.
+    /// Multiples of 2^-24, the same for `f32`.
     Single,
-    /// Multiples of 2^-n, n at most 52: coarser numbers, to see what they do.
+    /// Multiples of 2^-n, n at most 52: coarser coordinates, for experiments.
     Bits(u32),
 }
 
 impl Spacing {
-    /// Numbers to a unit of length.
+    /// Representable coordinates per unit of length.
     pub fn per_unit(self) -> f64 {
         match self {
-            Self::Double => (1_u64 << exact::FINEST_BITS) as f64,
+            Self::Double => (1_u64 << grid::FINEST_BITS) as f64,
             Self::Single => (1_u64 << 24) as f64,
-            Self::Bits(bits) => (1_u64 << bits.min(exact::FINEST_BITS)) as f64,
+            Self::Bits(bits) => (1_u64 << bits.min(grid::FINEST_BITS)) as f64,
         }
     }
 }
 
-/// What is asked for.
+/// Parameters of Poisson disk points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoissonSpec {
-    /// No two points are closer than this, and no place is farther from all of them. At most 0.5, or at least [`span`].
+    /// Minimum distance of points, and largest distance of any position from its nearest point. At most 0.5,
+    /// or at least [`span`].
     pub radius: f64,
-    /// What lies beyond the border.
+    /// Boundary of the unit square or cube.
     pub domain: Domain,
-    /// Other points by another seed.
+    /// Seed of the points.
     pub seed: u64,
-    /// The numbers that coordinates may be.
+    /// Representable coordinates.
     pub spacing: Spacing,
 }
 
-/// Why there are no points.
+/// Reason why points cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PoissonError {
-    /// The radius cannot be.
+    /// The radius is out of range.
     #[error("r is {}; it has to be {least:.1e} to 0.5, or from {one:.3} on for a single point", short(*.radius))]
     Radius {
-        /// What it is.
+        /// The given radius.
         radius: f64,
-        /// The least that coordinates can tell.
+        /// The least radius for the precision of the coordinates.
         least: f64,
-        /// From here on there is one point.
+        /// The radius from which one point covers the domain.
         one: f64,
     },
-    /// Too many points for memory and patience.
+    /// Too many points for memory and run time.
     #[error(
         "that would be about {points:.1e} points; choose a larger r, at least {least:.1e}, or fewer points, at most {most:.1e}"
     )]
     TooMany {
-        /// How many there would be.
+        /// Expected number of points.
         points: f64,
-        /// An r that would do.
+        /// A radius that works.
         least: f64,
-        /// How many points there may be about.
+        /// Largest number of points, approximately.
         most: f64,
     },
 }
 
-/// A number without a row of zeros.
+/// A number in short notation, without long runs of zeros.
 fn short(number: f64) -> String {
     let plain = number == 0.0 || !number.is_finite() || (1e-4..1e6).contains(&number.abs());
     if plain { number.to_string() } else { format!("{number:e}") }
 }
 
-/// Points that no other can be added to.
+/// Maximal Poisson disk points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoissonDisk<const D: usize> {
-    /// Points in the unit cube, in the order in which they came.
+    /// Points in the unit cube, in the order of acceptance.
     pub points: Vec<[f64; D]>,
     /// Darts thrown.
     pub darts: u64,
-    /// Voids over all levels.
-    pub voids: u64,
-    /// How often voids were halved.
+    /// Uncovered cells over all levels.
+    pub uncovered: u64,
+    /// Levels of halving.
     pub levels: u32,
-    /// Voids left without a number in them that would be free: narrower than the spacing of numbers.
-    pub thin_voids: u64,
+    /// Remaining uncovered cells without a representable point.
+    pub thin_regions: u64,
 }
 
-/// The share of space that disks of diameter r cover when no more fit (random sequential adsorption): in one dimension Renyi's
-/// constant (1958), in two and three as in `docs/guide/sampling.md`, in four from Torquato, Uche, Stillinger (2006).
+/// Share of space that disks of diameter r cover at saturation (random sequential adsorption). In one
+/// dimension it is Renyi's constant (1958), in two and three the values of `docs/guide/sampling.md`, in four
+/// that of Torquato, Uche and Stillinger (2006).
 pub fn saturation(dimensions: usize) -> f64 {
     match dimensions {
         1 => 0.7476,
@@ -141,33 +144,34 @@ pub fn ball(dimensions: usize) -> f64 {
     }
 }
 
-/// The radius at which about `count` points fill the unit cube.
+/// Radius at which about `count` points saturate the unit cube.
 pub fn radius_for(count: f64, dimensions: usize) -> f64 {
     (saturation(dimensions) / (ball(dimensions) * count)).powf(1.0 / dimensions as f64)
 }
 
-/// The distance from which on one point fills the unit cube: none is farther from it.
+/// Radius from which one point covers the unit cube.
 pub fn span(dimensions: usize, domain: Domain) -> f64 {
     let root = (dimensions as f64).sqrt();
     if domain == Domain::Torus { 0.5 * root } else { root }
 }
 
-/// Cells that memory is taken for at most, and points that are made at most: some minutes.
-const MOST_CELLS: f64 = (1_u64 << 28) as f64;
-const MOST_POINTS: f64 = (1_u64 << 25) as f64;
+/// Most cells in memory.
+const MAX_CELLS: f64 = (1_u64 << 28) as f64;
+/// Most points, which take some minutes.
+const MAX_POINTS: f64 = (1_u64 << 25) as f64;
 
-/// Refuses what would be too much.
+/// Checks the number of cells and points.
 ///
 /// # Errors
 /// [`PoissonError::TooMany`].
 pub(super) fn check_room(radius: f64, dimensions: usize, cells: f64) -> Result<(), PoissonError> {
     let volume = radius.powi(dimensions as i32);
     let points = saturation(dimensions) / (ball(dimensions) * volume);
-    let over = (cells / MOST_CELLS).max(points / MOST_POINTS);
+    let over = (cells / MAX_CELLS).max(points / MAX_POINTS);
     if over <= 1.0 {
         return Ok(());
     }
-    // Padding takes more cells the fewer there are, and what is printed has to do.
+    // Padding costs relatively more for fewer cells, and the printed value must work.
     let most = 0.8 * points / over;
     Err(PoissonError::TooMany { points, least: 1.05 * radius_for(most, dimensions), most })
 }

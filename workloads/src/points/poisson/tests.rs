@@ -7,7 +7,7 @@ fn spec(radius: f64, domain: Domain, seed: u64) -> PoissonSpec {
     PoissonSpec { radius, domain, seed, spacing: Spacing::Double }
 }
 
-/// No two closer than the radius, by all pairs and without rounding; no place farther away than the radius.
+/// Checks all pairs exactly against the radius, and the largest hole.
 fn check<const D: usize>(spec: &PoissonSpec) -> PoissonDisk<D> {
     let found = poisson_disk::<D>(spec).unwrap();
     let points = &found.points;
@@ -25,7 +25,7 @@ fn check<const D: usize>(spec: &PoissonSpec) -> PoissonDisk<D> {
 }
 
 #[test]
-fn points_are_apart_and_no_other_fits_in_one_to_four_dimensions() {
+fn points_are_maximal_in_one_to_four_dimensions() {
     for domain in [Domain::Torus, Domain::Box] {
         for seed in 0..2 {
             check::<1>(&spec(0.01, domain, seed));
@@ -37,7 +37,7 @@ fn points_are_apart_and_no_other_fits_in_one_to_four_dimensions() {
 }
 
 #[test]
-fn few_large_disks_meet_themselves_across_the_border() {
+fn large_disks_wrap_around_the_border() {
     for radius in [0.5, 0.45, 0.34, 0.3, 0.25, 0.2501] {
         for seed in 0..4 {
             for domain in [Domain::Torus, Domain::Box] {
@@ -50,8 +50,8 @@ fn few_large_disks_meet_themselves_across_the_border() {
 }
 
 #[test]
-fn as_many_fit_as_in_random_sequential_addition() {
-    // On the torus: 0.547 of the plane and 0.384 of space; the spread of 20,000 points is below 0.002.
+fn density_is_that_of_random_sequential_adsorption() {
+    // On the torus, 0.547 of the plane and 0.384 of space; the spread of 20,000 points is below 0.002.
     let density = |points: usize, radius: f64, d: usize| points as f64 * ball(d) * radius.powi(d as i32);
     let plane = poisson_disk::<2>(&spec(0.006, Domain::Torus, 3)).unwrap();
     assert!((density(plane.points.len(), 0.006, 2) - 0.547).abs() < 0.002);
@@ -62,7 +62,7 @@ fn as_many_fit_as_in_random_sequential_addition() {
 }
 
 #[test]
-fn few_points_of_a_line_are_as_many_as_the_integral_of_renyi_says() {
+fn the_mean_number_on_a_line_follows_renyi() {
     let mean = |count: u64| {
         let points = |seed| poisson_disk::<1>(&spec(0.4, Domain::Box, seed)).unwrap().points.len() as f64;
         (0..count).map(points).sum::<f64>() / count as f64
@@ -71,14 +71,14 @@ fn few_points_of_a_line_are_as_many_as_the_integral_of_renyi_says() {
     assert!((mean(4000) - expected).abs() < 0.03, "{} {expected}", mean(4000));
 }
 
-/// The mean number of points of [0, 1) at least 0.4 apart: the first one cuts the line in two (Renyi 1958).
+/// Mean number of points of [0, 1) at least 0.4 apart: the first one divides the line (Renyi 1958).
 fn expected_points() -> f64 {
-    // In an interval of length l whose ends are free, above zero: M(l) = 1 + 2/l * integral of M(y - 0.4) over y in [0, l].
+    // For an interval of length l with free ends: M(l) = 1 + 2/l * integral of M(y - 0.4) over y in [0, l].
     let step = 1e-4;
     let mut mean = vec![0.0; 10_001];
     let mut sums = vec![0.0; 10_001];
     for n in 1..=10_000_usize {
-        // The integral of M(y - 0.4) up to y = n steps is that of M up to n steps less 0.4.
+        // The integral of M(y - 0.4) up to n steps is that of M up to n steps less 0.4.
         let inner = if n > 4000 { sums[n - 4000] } else { 0.0 };
         mean[n] = 1.0 + 2.0 * inner / (n as f64 * step);
         sums[n] = sums[n - 1] + step * mean[n];
@@ -87,7 +87,7 @@ fn expected_points() -> f64 {
 }
 
 #[test]
-fn threads_change_nothing() {
+fn the_result_does_not_depend_on_threads() {
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
@@ -99,7 +99,7 @@ fn threads_change_nothing() {
 }
 
 #[test]
-fn single_precision_is_exact_for_the_numbers_written() {
+fn single_precision_points_keep_the_distance_exactly() {
     for seed in 0..4 {
         let single = PoissonSpec { spacing: Spacing::Single, ..spec(0.03, Domain::Torus, seed) };
         let found = check::<2>(&single);
@@ -111,17 +111,17 @@ fn single_precision_is_exact_for_the_numbers_written() {
 }
 
 #[test]
-fn voids_thinner_than_the_spacing_are_counted() {
+fn regions_without_a_representable_point_are_counted() {
     let thin = |spacing| {
         let spec = PoissonSpec { spacing, ..spec(0.002, Domain::Torus, 1) };
-        poisson_disk::<2>(&spec).unwrap().thin_voids
+        poisson_disk::<2>(&spec).unwrap().thin_regions
     };
     assert!(thin(Spacing::Single) > 0, "disks are some thousand numbers wide");
     assert_eq!(thin(Spacing::Double), 0);
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_radii_are_refused() {
     for radius in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.51, 1e-15] {
         let refused = poisson_disk::<2>(&spec(radius, Domain::Torus, 1)).unwrap_err();
         assert!(matches!(refused, PoissonError::Radius { .. }), "{radius}");
@@ -131,7 +131,7 @@ fn what_cannot_be_is_refused() {
 }
 
 #[test]
-fn what_is_too_much_is_refused_at_once_and_what_is_said_would_do() {
+fn too_many_points_are_refused_with_a_radius_that_works() {
     fn least<const D: usize>(radius: f64) -> f64 {
         let PoissonError::TooMany { least, most, .. } = check::<D>(radius).unwrap_err() else {
             panic!("{radius}")
@@ -143,15 +143,15 @@ fn what_is_too_much_is_refused_at_once_and_what_is_said_would_do() {
         let across = ((D as f64).sqrt() / radius).ceil();
         check_room(radius, D, (across + 6.0).powi(D as i32))
     }
-    // Cells count as well: four dimensions take 2^28 of them for fewer points than there may be.
-    assert!(check_room(0.03, 4, 1.1 * MOST_CELLS).is_err() && check_room(0.03, 4, 0.9 * MOST_CELLS).is_ok());
+    // The limit of 2^28 cells is reached before that of points in four dimensions.
+    assert!(check_room(0.03, 4, 1.1 * MAX_CELLS).is_err() && check_room(0.03, 4, 0.9 * MAX_CELLS).is_ok());
     assert!((1e-8..1e-7).contains(&least::<1>(1e-8)));
     assert!((1e-4..1e-3).contains(&least::<2>(1e-5)));
     assert!((1e-3..1e-2).contains(&least::<3>(1e-4)) && (1e-3..0.1).contains(&least::<4>(1e-3)));
 }
 
 #[test]
-fn one_point_fills_all_from_half_a_diagonal_on() {
+fn one_point_covers_all_from_half_a_diagonal() {
     for (domain, radius) in [(Domain::Torus, 0.75_f64.sqrt()), (Domain::Box, 3.0_f64.sqrt())] {
         for spacing in [Spacing::Single, Spacing::Double] {
             let spec = PoissonSpec { spacing, ..spec(radius, domain, 1) };
@@ -167,11 +167,11 @@ fn one_point_fills_all_from_half_a_diagonal_on() {
 }
 
 #[test]
-fn it_tells_of_more_and_more_points() {
-    let mut told = Vec::new();
+fn progress_reports_more_and_more_points() {
+    let mut reported = Vec::new();
     let spec = spec(0.003, Domain::Torus, 1);
-    let found = poisson_disk_telling::<2>(&spec, &mut |points| told.push(points)).unwrap();
-    assert!(told.len() > 5 && told.is_sorted() && told[told.len() / 2] > 0, "{told:?}");
+    let found = poisson_disk_with_progress::<2>(&spec, &mut |points| reported.push(points)).unwrap();
+    assert!(reported.len() > 5 && reported.is_sorted() && reported[reported.len() / 2] > 0, "{reported:?}");
     assert_eq!(found, poisson_disk::<2>(&spec).unwrap());
 }
 

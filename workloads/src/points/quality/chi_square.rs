@@ -1,32 +1,33 @@
-//! Pearson's test (1900): do counts follow what is expected?
+//! Pearson's chi-square test (1900).
 
-/// What came of it.
+/// Result of the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChiSquare {
-    /// Sum of squared differences over what is expected.
+    /// Sum of squared differences over the expectation.
     pub statistic: f64,
-    /// Degrees of freedom: cells that were used, less one.
+    /// Degrees of freedom: cells in use, less one.
     pub freedom: u64,
-    /// How likely counts that follow are to differ at least as much. Near 0 they do not follow; near 1 they follow better than
-    /// independent points would.
+    /// Probability of at least this difference if the counts follow the expectation. Near 0 they do not
+    /// follow it; near 1 they follow better than independent points would.
     pub p: f64,
 }
 
-/// A cell is used where so many points are expected.
-const LEAST_EXPECTED: f64 = 5.0;
+/// Least expected count of a cell in use.
+const MIN_EXPECTED: f64 = 5.0;
 
-/// Counts against shares, which need not add up to 1.
+/// Tests counts against expected shares, which need not add up to 1.
 pub fn chi_square(counts: &[u64], shares: &[f64]) -> ChiSquare {
     let (count, whole) = (counts.iter().sum::<u64>() as f64, shares.iter().sum::<f64>());
     let cells = counts.iter().zip(shares).map(|(&found, share)| (found as f64, share / whole * count));
-    let used: Vec<(f64, f64)> = cells.filter(|(_, expected)| *expected >= LEAST_EXPECTED).collect();
+    let used: Vec<(f64, f64)> = cells.filter(|(_, expected)| *expected >= MIN_EXPECTED).collect();
     let statistic = used.iter().map(|(found, expected)| (found - expected).powi(2) / expected).sum();
     let freedom = used.len().saturating_sub(1) as u64;
     ChiSquare { statistic, freedom, p: upper_tail(statistic, freedom) }
 }
 
-/// The probability that chi-square of `freedom` degrees is at least `statistic`: the regularized incomplete gamma function
-/// Q(freedom / 2, statistic / 2), by its series or its continued fraction (Press et al. 2007, section 6.2).
+/// Probability that chi-square of `freedom` degrees is at least `statistic`: the regularized incomplete gamma
+/// function Q(freedom / 2, statistic / 2), by its series or its continued fraction (Press et al. 2007,
+/// section 6.2).
 pub fn upper_tail(statistic: f64, freedom: u64) -> f64 {
     let (a, x) = (0.5 * freedom as f64, 0.5 * statistic);
     if a <= 0.0 || x <= 0.0 {
@@ -69,8 +70,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tails_are_those_of_tables() {
-        // Closed forms: two degrees are an exponential; the others are percentiles of printed tables.
+    fn tails_agree_with_tables() {
+        // Two degrees of freedom are an exponential; the others are percentiles of printed tables.
         for x in [0.1, 1.0, 5.0, 40.0] {
             assert!((upper_tail(x, 2) / (-0.5_f64 * x).exp() - 1.0).abs() < 1e-13);
         }
@@ -82,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_that_are_off_are_told_and_those_that_fit_too_well() {
+    fn p_is_low_for_wrong_counts_and_high_for_too_even_ones() {
         let shares = [1.0; 50];
         assert_eq!(chi_square(&[100; 50], &shares).p, 1.0);
         let far: Vec<u64> = (0..50).map(|n| 80 + 40 * (n % 2)).collect();

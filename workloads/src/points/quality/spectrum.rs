@@ -1,4 +1,5 @@
-//! The power spectrum of points: `|sum over points of exp(-2 pi i k x)|^2 / n` at whole frequencies `k` (Ulichney 1987 for its radial mean).
+//! Power spectrum of points: `|sum over points of exp(-2 pi i k x)|^2 / n` at integer frequencies `k`,
+//! averaged over directions (Ulichney 1987).
 
 use std::f64::consts::TAU;
 
@@ -7,15 +8,16 @@ use rayon::prelude::*;
 /// Power averaged over all directions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spectrum {
-    /// By frequency from 1 on: the mean over all `k` with a length that rounds to it. 1 is that of white noise.
+    /// By frequency from 1: mean over all `k` with a length that rounds to it. White noise has power 1.
     pub power: Vec<f64>,
-    /// How many points it is of.
+    /// Number of points.
     pub count: usize,
     dimensions: usize,
 }
 
 impl Spectrum {
-    /// The spectrum of points of the unit cube up to a frequency; time grows as `count x most^dimensions`.
+    /// Spectrum of points of the unit cube up to frequency `most`. The time grows as `count x
+    /// most^dimensions`.
     pub fn new<const D: usize>(points: &[[f64; D]], most: usize) -> Self {
         let waves: Vec<Vec<Waves>> = (0..D).map(|axis| waves(points, axis, most)).collect();
         let along = 2 * most + 1;
@@ -35,7 +37,7 @@ impl Spectrum {
         Self { power, count: points.len(), dimensions: D }
     }
 
-    /// The mean of spectra up to the same frequency; that of nothing is nothing.
+    /// Mean of spectra up to the same frequency; empty for no spectra.
     pub fn mean(spectra: &[Self]) -> Self {
         let Some(first) = spectra.first() else { return Self::default() };
         let mean = |k: usize| spectra.iter().map(|s| s.power[k]).sum::<f64>() / spectra.len() as f64;
@@ -79,7 +81,8 @@ fn waves<const D: usize>(points: &[[f64; D]], axis: usize, most: usize) -> Vec<W
     (0..=most).into_par_iter().map(wave).collect()
 }
 
-/// Power and weight by length of `k`, over all frequencies along the first axis; half of them, the others are the same mirrored.
+/// Power and weight by length of `k`, over half of the frequencies along the first axis; the other half is
+/// the mirror image.
 fn row(waves: &[Vec<Waves>], others: &[i64], count: usize, most: usize) -> Vec<(f64, f64)> {
     let mut product = (vec![1.0; count], vec![0.0; count]);
     for (axis, &k) in others.iter().enumerate() {
@@ -121,7 +124,7 @@ mod tests {
         let spectrum = Spectrum::new(&points, 10);
         let at = |k: usize| spectrum.power[k - 1];
         assert!((1..8).all(|k| at(k) < 1e-20), "{spectrum:?}");
-        // Of the frequencies with a length that rounds to 8, four are of the lattice, with power 64.
+        // Of the frequencies whose length rounds to 8, four belong to the lattice, with power 64.
         let near = (-8..=8_i32).flat_map(|x| (-8..=8_i32).map(move |y| f64::from(x * x + y * y).sqrt()));
         let shell = near.filter(|length| length.round() == 8.0).count();
         assert!((at(8) - 4.0 * 64.0 / shell as f64).abs() < 1e-9, "{}", at(8));

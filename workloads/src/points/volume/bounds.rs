@@ -1,4 +1,4 @@
-//! Bounds of a solid, a column in each tile, and the points in them that are inside.
+//! Bounds of a solid, one column per tile, and random points in them that are inside.
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
 use rayon::prelude::*;
@@ -8,24 +8,24 @@ use super::{Inside, Stream};
 /// The triangles that bound a solid.
 pub(super) struct Hull<'a> {
     pub triangles: &'a [MovingTriangle],
-    /// When each is there.
+    /// Time interval of each triangle.
     pub times: &'a [[f64; 2]],
-    /// Whether the third coordinate is the time of a triangle rather than its depth.
+    /// Whether the third coordinate is time instead of depth.
     pub by_time: bool,
 }
 
-/// For every tile of the image the range of the third coordinate in which the solid may be.
+/// Range of the third coordinate of a solid in every tile.
 #[derive(Clone, Debug)]
 pub struct Bounds {
     grid: Grid,
     columns: Vec<Option<[f64; 2]>>,
-    /// The triangles that touch each tile.
+    /// Triangles that touch each tile.
     pub(super) lists: Vec<Vec<u32>>,
-    /// Lengths of the columns up to each, itself included.
+    /// Cumulative lengths of the columns.
     sums: Vec<f64>,
 }
 
-/// Points inside, and what they cost.
+/// Points inside, and the number of candidates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampled {
     /// The points.
@@ -34,10 +34,10 @@ pub struct Sampled {
     pub candidates: u64,
 }
 
-/// So many candidates are tested by one worker.
+/// Candidates per parallel task.
 const CHUNK: u64 = 1 << 14;
-/// Candidates for a point before it is given up.
-const MOST_EACH: u64 = 1 << 20;
+/// Most candidates per point.
+const MAX_CANDIDATES_PER_POINT: u64 = 1 << 20;
 
 impl Bounds {
     pub(super) fn new(hull: &Hull<'_>, grid: Grid) -> Self {
@@ -60,21 +60,24 @@ impl Bounds {
         Self { grid, columns, lists, sums }
     }
 
-    /// The volume of all columns.
+    /// Volume of all columns.
     pub fn volume(&self) -> f64 {
         self.grid.tile[0] * self.grid.tile[1] * self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// The tiles that the solid may be in.
+    /// Number of tiles that the solid may touch.
     pub fn tiles(&self) -> usize {
         self.columns.iter().flatten().count()
     }
 
-    /// Even points of the solid, `count` of them. Fewer where it is so thin that random points do not find it.
+    /// `count` uniform points of the solid; fewer if it is too thin for random points to hit.
     pub fn sample(&self, solid: &dyn Inside, count: usize, seed: u64) -> Sampled {
         let stream = Stream::new(seed, 0x7015);
         let (mut points, mut candidates) = (Vec::with_capacity(count), 0);
-        while points.len() < count && candidates < MOST_EACH * count as u64 && self.volume() > 0.0 {
+        while points.len() < count
+            && candidates < MAX_CANDIDATES_PER_POINT * count as u64
+            && self.volume() > 0.0
+        {
             let chunks = rayon::current_num_threads() as u64;
             let kept: Vec<Vec<_>> = (0..chunks)
                 .into_par_iter()
@@ -82,16 +85,17 @@ impl Bounds {
                 .collect();
             candidates += chunks * CHUNK;
             let missing = count - points.len();
-            let some: Vec<_> = kept.into_iter().flatten().take(missing).collect();
-            points.extend(some.iter().map(|(_, point)| *point));
-            if let Some((last, _)) = some.last().filter(|_| points.len() == count) {
+            let taken: Vec<_> = kept.into_iter().flatten().take(missing).collect();
+            points.extend(taken.iter().map(|(_, point)| *point));
+            if let Some((last, _)) = taken.last().filter(|_| points.len() == count) {
                 candidates = last + 1;
             }
         }
         Sampled { points, candidates }
     }
 
-    /// Even points of the solid, on average `density` to a unit of volume: the number of candidates is that of the bounds.
+    /// Uniform points of the solid, `density` per unit of volume on average; the number of candidates follows
+    /// from the volume of the bounds.
     pub fn sample_density(&self, solid: &dyn Inside, density: f64, seed: u64) -> Sampled {
         let stream = Stream::new(seed, 0xDE45);
         let candidates = (density * self.volume()).round() as u64;
@@ -104,14 +108,14 @@ impl Bounds {
     }
 
     fn kept(&self, solid: &dyn Inside, stream: Stream, first: u64, count: u64) -> Vec<(u64, [f64; 3])> {
-        let look = |number: u64| {
+        let test = |number: u64| {
             let (tile, point) = self.candidate(stream, number)?;
             solid.contains(&point, tile).then_some((number, point))
         };
-        (first..first + count).filter_map(look).collect()
+        (first..first + count).filter_map(test).collect()
     }
 
-    /// A random point of the bounds and its tile.
+    /// A random point of the bounds, and its tile.
     fn candidate(&self, stream: Stream, number: u64) -> Option<(usize, [f64; 3])> {
         let unit = |k: u64| stream.unit(4 * number + k);
         let chosen = unit(0) * self.sums.last()?;

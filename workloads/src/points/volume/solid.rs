@@ -1,4 +1,4 @@
-//! What a closed surface encloses.
+//! The volume inside a closed surface.
 
 use std::collections::HashMap;
 
@@ -8,34 +8,34 @@ use pipeline::conservative::{Grid, MovingTriangle};
 use super::Inside;
 use super::bounds::{Bounds, Hull};
 
-/// The inside of a closed surface of triangles: where it winds around a point.
+/// The inside of a closed triangle surface, by winding number.
 #[derive(Clone, Debug)]
 pub struct Solid {
     triangles: Vec<[DVec3; 3]>,
     bounds: Bounds,
 }
 
-/// Why a surface encloses nothing.
+/// Reason why a surface encloses no volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SolidError {
-    /// There are edges without a partner.
+    /// Some edges have no partner.
     #[error(
         "the surface is not closed: {0} edges of triangles have no partner that runs the other way; close its holes, and let all triangles be turned outward"
     )]
     Open(usize),
-    /// There is no surface.
+    /// There are no triangles.
     #[error("the surface has no triangles; export it with its faces")]
     NoTriangles,
-    /// There are numbers that cannot be computed with.
+    /// A coordinate is not finite or too large.
     #[error("the surface has a coordinate that is not finite or beyond 1e60; mend or scale it")]
     TooFar,
-    /// There is nothing inside.
+    /// The volume is zero.
     #[error("the surface encloses no volume: it is flat, or its parts cancel out; give one that does")]
     Flat,
 }
 
 impl Solid {
-    /// The inside of the triangles, with bounds over `tiles` times `tiles` tiles. Vertices at equal places are one.
+    /// Makes a solid, with bounds over `tiles` by `tiles` tiles. Vertices at equal positions are merged.
     ///
     /// # Errors
     /// [`SolidError`].
@@ -61,12 +61,12 @@ impl Solid {
         if solid.volume().abs() > 0.0 { Ok(solid) } else { Err(SolidError::Flat) }
     }
 
-    /// What the surface encloses, by the divergence theorem; negative where triangles are turned inward.
+    /// Enclosed volume, by the divergence theorem; negative if the triangles face inwards.
     pub fn volume(&self) -> f64 {
         self.triangles.iter().map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0).sum()
     }
 
-    /// Where to look for its points.
+    /// Bounds for random points.
     pub fn bounds(&self) -> &Bounds {
         &self.bounds
     }
@@ -79,7 +79,7 @@ impl Inside for Solid {
     }
 }
 
-/// A grid a little larger than what the triangles cover.
+/// A grid slightly larger than the bounding box of the triangles.
 fn grid(triangles: &[[DVec3; 3]], tiles: u32) -> Grid {
     let all = || triangles.as_flattened().iter();
     let low = all().copied().fold(DVec3::INFINITY, DVec3::min);
@@ -92,7 +92,7 @@ fn grid(triangles: &[[DVec3; 3]], tiles: u32) -> Grid {
     Grid { origin: [x.0, y.0], tile: [x.1, y.1], columns: tiles, rows: tiles }
 }
 
-/// How a triangle is crossed on the way up from a point: 1 from within, -1 from without, 0 if it is not.
+/// Crossing of a triangle on the way up from a point: 1 from inside, -1 from outside, 0 if there is none.
 fn crossing(triangle: &[DVec3; 3], point: &[f64; 3]) -> i32 {
     let [a, b, c] = triangle;
     let weights = [side(b, c, point), side(c, a, point), side(a, b, point)];
@@ -109,8 +109,8 @@ fn crossing(triangle: &[DVec3; 3], point: &[f64; 3]) -> i32 {
     }
 }
 
-/// On which side of an edge a point is, seen from above, with the double area: always computed in one order of the two corners, so
-/// that the triangles on both sides agree.
+/// Double area and side of an edge that a point is on, seen from above. Both corners are used in one fixed
+/// order, so that the triangles on both sides of the edge agree.
 fn side(from: &DVec3, to: &DVec3, point: &[f64; 3]) -> (f64, bool) {
     let turned = (to.x, to.y, to.z) < (from.x, from.y, from.z);
     let (p, q) = if turned { (to, from) } else { (from, to) };
@@ -118,9 +118,9 @@ fn side(from: &DVec3, to: &DVec3, point: &[f64; 3]) -> (f64, bool) {
     if turned { (-area, area < 0.0) } else { (area, area >= 0.0) }
 }
 
-/// How many edges have no partner.
+/// Number of edges without a partner.
 fn open_edges(positions: &[DVec3], triangles: &[[u32; 3]]) -> usize {
-    // Zero has two signs and one place.
+    // Adding zero makes -0.0 equal to 0.0.
     let place = |vertex: u32| (positions[vertex as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
     let mut edges: HashMap<_, i64> = HashMap::new();
     for corners in triangles {

@@ -1,13 +1,13 @@
 use glam::DVec3;
 use pipeline::sampling::{HashedSamples, LensShape, Sample, SampleSource};
 
-use super::standard::place;
+use super::torus::place;
 use super::*;
 use crate::job::testing::hardware;
 use crate::points::quality::chi_square;
 use crate::points::white::counts;
 
-/// A cube from 0 to 1 as triangles.
+/// The unit cube as triangles.
 fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let corners = (0..8).map(|n| DVec3::new(f64::from(n & 1), f64::from(n >> 1 & 1), f64::from(n >> 2)));
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -47,7 +47,7 @@ fn no_sample_of_the_torus_is_missed_by_the_moving_triangles() {
 }
 
 #[test]
-fn bounds_hold_all_of_the_torus() {
+fn bounds_contain_the_torus() {
     let torus = Torus::default();
     for tiles in [1, 7, 32, 128] {
         let bounds = torus.bounds(tiles);
@@ -62,7 +62,7 @@ fn bounds_hold_all_of_the_torus() {
 }
 
 #[test]
-fn points_of_a_cube_are_even_and_inside() {
+fn points_of_a_cube_are_uniform_and_inside() {
     let (positions, triangles) = cube();
     let solid = Solid::new(&positions, &triangles, 9).unwrap();
     assert!((solid.volume() - 1.0).abs() < 1e-12);
@@ -74,7 +74,7 @@ fn points_of_a_cube_are_even_and_inside() {
 }
 
 #[test]
-fn points_of_a_tetrahedron_are_those_of_its_inequalities() {
+fn points_of_a_tetrahedron_satisfy_its_inequalities() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     let solid = Solid::new(&corners, &faces, 16).unwrap();

@@ -1,62 +1,60 @@
-//! White noise of any density: the region below the density is sampled evenly and projected (thesis, Paper VI, section 5,
-//! "Adaptive Sampling", Fig. 12).
+//! White noise of any density: uniform samples of the region below the density, projected (thesis, Paper VI,
+//! section 5, "Adaptive Sampling", Fig. 12).
 //!
-//! The region is bounded by columns over cells, each as high as the density may be there. A candidate is an even point of these
-//! columns; it stays where it is below the density. The columns are the rasterized primitives of the figure, and the test is its pixel
-//! shader.
+//! The region is bounded by columns over cells, each as high as the density's bound there. A candidate is a
+//! uniform point of the columns, and is accepted if it is below the density. The columns correspond to the
+//! rasterized primitives of the figure, and the test to its pixel shader.
 
 mod density;
-mod image;
 
-pub use density::{Density, Named};
-pub use image::{ImageDensity, ImageError};
+pub use density::{Density, ImageDensity, ImageError, Named};
 
 use rayon::prelude::*;
 
 use super::random::Stream;
 
-/// Where candidates come from.
+/// Random numbers of the candidates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Numbers {
-    /// Independent of each other.
+    /// Independent numbers.
     #[default]
     Independent,
-    /// Even by construction: a Kronecker sequence with the generalized golden ratio (Roberts 2018), moved by the seed. Points then
-    /// follow the density *too well* for white noise.
+    /// Low discrepancy: a Kronecker sequence with the generalized golden ratio (Roberts 2018), shifted by the
+    /// seed. Points then follow the density *too well* for white noise.
     LowDiscrepancy,
 }
 
-/// Points, and what they cost.
+/// Points, and the number of candidates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct White<const D: usize> {
     /// Points of the unit cube.
     pub points: Vec<[f64; D]>,
-    /// Candidates looked at.
+    /// Candidates tested.
     pub candidates: u64,
 }
 
-/// What is asked for.
+/// Parameters of white noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WhiteSpec {
-    /// How many points.
+    /// Number of points.
     pub count: usize,
-    /// Other points by another seed.
+    /// Seed of the points.
     pub seed: u64,
-    /// Columns along an axis, 1 to 4096, together at most 2^24; 1 is plain rejection.
+    /// Columns along an axis, 1 to 4096, at most 2^24 in all; 1 is plain rejection.
     pub across: u32,
-    /// Where candidates come from.
+    /// Random numbers of the candidates.
     pub numbers: Numbers,
 }
 
-/// Columns along an axis that are a good choice.
+/// A good number of columns along an axis.
 pub fn columns_for(dimensions: usize) -> u32 {
     [1024, 256, 32, 12][dimensions.clamp(1, 4) - 1]
 }
 
-/// Why there are no points.
+/// Reason why points cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WhiteError {
-    /// The density is zero everywhere, or not a number.
+    /// The density is zero everywhere, or not finite.
     #[error(
         "the density is zero or not a finite number everywhere that was looked at; there is nothing to sample"
     )]
@@ -66,12 +64,12 @@ pub enum WhiteError {
     Columns(u32),
 }
 
-/// So many candidates are looked at by one worker.
+/// Candidates per parallel task.
 const CHUNK: u64 = 1 << 14;
-/// Candidates for a point before it is given up.
-const MOST_EACH: u64 = 1 << 20;
+/// Most candidates per point.
+const MAX_CANDIDATES_PER_POINT: u64 = 1 << 20;
 
-/// Points that follow a density. The same for any number of threads.
+/// Independent points that follow a density. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`WhiteError`].
@@ -83,34 +81,34 @@ pub fn white_noise<const D: usize>(
     let sequence = Sequence::new(spec, D + 2);
     let (mut points, mut candidates) = (Vec::with_capacity(spec.count), 0);
     while points.len() < spec.count {
-        if candidates > MOST_EACH * spec.count as u64 {
+        if candidates > MAX_CANDIDATES_PER_POINT * spec.count as u64 {
             return Err(WhiteError::Nothing);
         }
         let chunks = rayon::current_num_threads() as u64;
         let firsts: Vec<u64> = (0..chunks).map(|chunk| candidates + chunk * CHUNK).collect();
-        let look = |&first: &u64| {
+        let test = |&first: &u64| {
             let kept = (first..first + CHUNK).filter_map(|n| Some((n, columns.candidate(&sequence, n)?)));
             kept.collect::<Vec<_>>()
         };
-        let found: Vec<Vec<_>> = firsts.par_iter().map(look).collect();
+        let found: Vec<Vec<_>> = firsts.par_iter().map(test).collect();
         candidates += chunks * CHUNK;
         let missing = spec.count - points.len();
-        let some: Vec<_> = found.into_iter().flatten().take(missing).collect();
-        points.extend(some.iter().map(|(_, point)| *point));
-        if let Some((last, _)) = some.last().filter(|_| points.len() == spec.count) {
+        let taken: Vec<_> = found.into_iter().flatten().take(missing).collect();
+        points.extend(taken.iter().map(|(_, point)| *point));
+        if let Some((last, _)) = taken.last().filter(|_| points.len() == spec.count) {
             candidates = last + 1;
         }
     }
     Ok(White { points, candidates })
 }
 
-/// Bounds of a density over equal cells.
+/// Upper bounds of a density over equal cells.
 struct Columns<'a, const D: usize> {
     density: &'a dyn Density<D>,
     across: u64,
-    /// Height of each.
+    /// Height of each column.
     heights: Vec<f64>,
-    /// Sum of the heights up to each, itself included.
+    /// Cumulative heights.
     sums: Vec<f64>,
 }
 
@@ -122,7 +120,7 @@ impl<'a, const D: usize> Columns<'a, D> {
         let side = 1.0 / f64::from(across);
         let height = |number: u64| {
             let low: [f64; D] = low(number, wide);
-            density.most(&low, &low.map(|low| low + side))
+            density.upper_bound(&low, &low.map(|low| low + side))
         };
         let heights: Vec<f64> = (0..count).into_par_iter().map(height).collect();
         let mut sum = 0.0;
@@ -131,7 +129,7 @@ impl<'a, const D: usize> Columns<'a, D> {
         if usable { Ok(Self { density, across: wide, heights, sums }) } else { Err(WhiteError::Nothing) }
     }
 
-    /// Candidate `number`, where it is below the density.
+    /// Candidate `number`, if it is below the density.
     fn candidate(&self, sequence: &Sequence, number: u64) -> Option<[f64; D]> {
         let whole = self.sums[self.sums.len() - 1];
         let chosen = sequence.unit(number, 0) * whole;
@@ -144,12 +142,12 @@ impl<'a, const D: usize> Columns<'a, D> {
     }
 }
 
-/// The low corner of a cell.
+/// Low corner of a cell.
 fn low<const D: usize>(number: u64, across: u64) -> [f64; D] {
     std::array::from_fn(|k| (number / across.pow(k as u32) % across) as f64 / across as f64)
 }
 
-/// The numbers of candidates.
+/// Random numbers of the candidates.
 struct Sequence {
     stream: Stream,
     numbers: Numbers,
@@ -176,7 +174,7 @@ impl Sequence {
     }
 }
 
-/// How many points are in each of `across^D` equal cells, the first axis fastest.
+/// Number of points in each of `across^D` equal cells, the first axis fastest.
 pub fn counts<const D: usize>(points: &[[f64; D]], across: u64) -> Vec<u64> {
     let mut counts = vec![0; across.pow(D as u32) as usize];
     for point in points {
@@ -186,7 +184,7 @@ pub fn counts<const D: usize>(points: &[[f64; D]], across: u64) -> Vec<u64> {
     counts
 }
 
-/// The integral of a density over each of `across^D` equal cells, by the midpoints of `fine^D` parts of each.
+/// Integral of a density over each of `across^D` equal cells, by the midpoints of `fine^D` parts of each.
 pub fn shares<const D: usize>(density: &dyn Density<D>, across: u64, fine: u64) -> Vec<f64> {
     let part = |cell: u64, number: u64| {
         let (cell, within): ([f64; D], [f64; D]) = (low(cell, across), low(number, fine));

@@ -11,7 +11,7 @@ fn fit<const D: usize>(density: &dyn Density<D>, spec: &WhiteSpec, cells: u64) -
 }
 
 #[test]
-fn bounds_hold_in_every_dimension() {
+fn bounds_are_conservative_in_every_dimension() {
     fn holds<const D: usize>() {
         let stream = Stream::new(1, D as u64);
         for (name, density) in Named::ALL {
@@ -21,7 +21,10 @@ fn bounds_hold_in_every_dimension() {
                 let side = 0.4 * at(4);
                 let high = low.map(|low| (low + side).min(1.0));
                 let point = std::array::from_fn(|k| low[k] + (high[k] - low[k]) * at(5 + k));
-                assert!(Density::<D>::at(&density, &point) <= density.most(&low, &high), "{name} {point:?}");
+                assert!(
+                    Density::<D>::at(&density, &point) <= density.upper_bound(&low, &high),
+                    "{name} {point:?}"
+                );
             }
         }
     }
@@ -47,7 +50,7 @@ fn points_follow_every_density_in_one_to_four_dimensions() {
 }
 
 #[test]
-fn another_density_is_told_apart() {
+fn another_density_is_rejected() {
     let points = white_noise::<2>(&Named::Ramp, &spec(20_000, 1)).unwrap().points;
     let wrong = chi_square(&counts(&points, 20), &shares::<2>(&Named::Constant, 20, 4));
     assert!(wrong.p < 1e-9, "{wrong:?}");
@@ -61,17 +64,17 @@ fn low_discrepancy_fits_too_well() {
 }
 
 #[test]
-fn columns_save_candidates_and_change_no_law() {
+fn columns_save_candidates() {
     let plain = white_noise::<2>(&Named::Gauss, &WhiteSpec { across: 1, ..spec(5000, 1) }).unwrap();
     let bounded = white_noise::<2>(&Named::Gauss, &WhiteSpec { across: 64, ..spec(5000, 1) }).unwrap();
-    // One candidate in 2 pi 0.15^2 stays without columns, nearly all do with them.
+    // Without columns the share of accepted candidates is 2 pi 0.15^2; with them nearly all are accepted.
     let share = 5000.0 / plain.candidates as f64;
     assert!((share - 0.1413).abs() < 0.01, "{share}");
     assert!(bounded.candidates < 6000, "{}", bounded.candidates);
 }
 
 #[test]
-fn threads_change_nothing() {
+fn the_result_does_not_depend_on_threads() {
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| white_noise::<3>(&Named::Waves, &spec(30_000, 5)).unwrap())
@@ -80,7 +83,7 @@ fn threads_change_nothing() {
 }
 
 #[test]
-fn what_has_no_density_is_refused() {
+fn invalid_densities_are_refused() {
     assert_eq!(ImageDensity::new(2, 1, vec![0.0, 0.0]), None);
     assert_eq!(ImageDensity::new(2, 2, vec![1.0]), None);
     let half = ImageDensity::new(2, 1, vec![0.0, 1.0]).unwrap();

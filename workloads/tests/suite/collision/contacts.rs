@@ -1,15 +1,13 @@
-//! Contacts made on purpose.
+//! Constructed contacts.
 
 use pipeline::random::mix;
 use workloads::collision::{Method, Object, Search, detect};
 
 use super::{Ends, SEARCHES, may_collide, random};
 
-/// Two triangles made to share a point at one time: weights, time and everything else at random, then scaled and moved. The third
-/// corner of the second is moved so that it does; rounding of that is within a few units of the largest coordinate, so that much is
-/// given to one of them.
-/// Two triangles that touch at some time, and how far rounding may have put them apart: of all sizes and places, `size` times as
-/// large as the space they are in.
+/// Two random triangles that share a point at one time, and the uncertainty of their contact. Their size is
+/// `size` of the space that they are in. The second is moved until both share a point; its rounding error is
+/// a few ulps of the largest coordinate.
 fn contact(seed: u64, size: f64) -> ([Ends; 2], f64) {
     let (scale, offset) = space(seed);
     let corner = |n: u64| [0, 1, 2].map(|axis| offset + scale * size * (random(seed, 3 * n + axis) - 0.5));
@@ -41,16 +39,17 @@ fn contact(seed: u64, size: f64) -> ([Ends; 2], f64) {
     ([a, b], 16.0 * f64::EPSILON * largest)
 }
 
-/// The size of a space, and where it is.
+/// Size and offset of a space.
 fn space(seed: u64) -> (f64, f64) {
     (10_f64.powi((mix(seed) % 13) as i32 - 6), if seed.is_multiple_of(3) { 1e6 } else { 0.0 })
 }
 
 #[test]
-fn no_contact_made_on_purpose_is_missed() {
+fn no_constructed_contact_is_missed() {
     for seed in 0..90_u64 {
-        let ([a, b], unsure) = contact(seed, 1.0);
-        let objects = [Object::from_ends(vec![a], unsure).unwrap(), Object::from_ends(vec![b], 0.0).unwrap()];
+        let ([a, b], uncertainty) = contact(seed, 1.0);
+        let objects =
+            [Object::from_ends(vec![a], uncertainty).unwrap(), Object::from_ends(vec![b], 0.0).unwrap()];
         for search in &SEARCHES {
             let found = detect(&objects, search);
             assert!(found.first().is_some_and(|f| f.verdict.may_collide()), "{seed} {search:?} {a:?} {b:?}");
@@ -58,15 +57,15 @@ fn no_contact_made_on_purpose_is_missed() {
     }
 }
 
-/// Products of such coordinates are not numbers that there are.
+/// Products of such coordinates underflow.
 #[test]
-fn contacts_of_the_smallest_numbers_are_not_missed() {
+fn contacts_of_tiny_coordinates_are_not_missed() {
     for exponent in (-1060..=-60).step_by(20) {
         let scale = 2_f64.powi(exponent / 2) * 2_f64.powi(exponent - exponent / 2);
         let at = |p: [i32; 3]| p.map(|c| f64::from(c) * scale);
         let bar = |a, b| [at(a), at(b), at(b)];
         let a: Ends = [bar([-8, 0, 0], [8, 0, 0]); 2];
-        // Edge against edge at a quarter of the time.
+        // The edges cross at a quarter of the time.
         let b: Ends = [bar([0, -8, 2], [0, 8, 2]), bar([0, -8, -6], [0, 8, -6])];
         for search in &SEARCHES {
             assert!(may_collide(a, b, search), "2^{exponent} {search:?}");
@@ -74,7 +73,8 @@ fn contacts_of_the_smallest_numbers_are_not_missed() {
     }
 }
 
-/// Small triangles on a lattice of 5x5x5, every second one of `which`; none of one comes near one of the other.
+/// Small triangles on a lattice of 5x5x5, in alternating cells by `which`. Triangles of different cells are
+/// apart.
 fn crowd(seed: u64, which: u64) -> impl Iterator<Item = Ends> {
     let (scale, offset) = space(seed);
     (0..125_u64).filter(move |n| n % 2 == which && *n != 62).map(move |n| {
@@ -93,10 +93,10 @@ fn a_contact_in_a_crowd_is_not_missed_by_boxes() {
     let search = Search { resolution: 64, bins: 16, method: Method::FragmentBox, zoom: true };
     let mut apart = 0;
     for seed in 0..120_u64 {
-        let ([a, b], unsure) = contact(seed, 0.1);
+        let ([a, b], uncertainty) = contact(seed, 0.1);
         let objects = |contact: bool| {
             let of = |which, one| crowd(seed, which).chain(contact.then_some(one)).collect();
-            [Object::from_ends(of(0, a), unsure).unwrap(), Object::from_ends(of(1, b), 0.0).unwrap()]
+            [Object::from_ends(of(0, a), uncertainty).unwrap(), Object::from_ends(of(1, b), 0.0).unwrap()]
         };
         let may = |objects: &[Object], search: &Search| {
             detect(objects, search).first().is_some_and(|found| found.verdict.may_collide())
@@ -106,7 +106,7 @@ fn a_contact_in_a_crowd_is_not_missed_by_boxes() {
         }
         apart += u32::from(!may(&objects(false), &search));
     }
-    // Where it all is a million sizes away from the origin, the spacing of numbers is not far below the lattice's.
+    // At a million sizes from the origin, an ulp is not far below the spacing of the lattice.
     assert!(apart > 80, "the crowd alone is told apart in {apart} of 120");
 }
 

@@ -1,5 +1,6 @@
-//! Contacts in exact arithmetic: corners are whole numbers times a power of two, contacts at eighths of the time in quarters of a
-//! triangle, so that two share a point to the last bit. Nothing is allowed for rounding.
+//! Contacts in exact arithmetic. Corners are integers times a power of two. Contacts lie at eighths of the
+//! time and quarters of a triangle, so both triangles share a point exactly. There is no allowance for
+//! rounding.
 
 use rayon::prelude::*;
 use workloads::collision::{Method, Object, Search};
@@ -7,16 +8,16 @@ use workloads::collision::{Method, Object, Search};
 use super::{mix, objects_may_collide};
 
 type Point = [i64; 3];
-/// Corners at both ends of the time, multiples of [`UNIT`].
+/// Corners at both times, multiples of [`UNIT`].
 type Triangle = [[Point; 3]; 2];
 
 /// Eighths of the time times quarters of a triangle.
 const UNIT: i64 = 32;
 
-/// Numbers drawn from a hash.
-struct Draws(u64);
+/// Sequence of random integers.
+struct Rng(u64);
 
-impl Draws {
+impl Rng {
     fn below(&mut self, end: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         mix(self.0) % end
@@ -34,7 +35,7 @@ impl Draws {
         [(); 3].map(|()| UNIT * self.around_zero(reach))
     }
 
-    /// Where the quarters of a triangle are that make a point: at a corner, in the middle of an edge, or anywhere.
+    /// Barycentric weights in quarters: a corner, the middle of an edge, or any point.
     fn weights(&mut self) -> [i64; 3] {
         let first = self.below(5) as i64;
         let second = self.below((5 - first) as u64) as i64;
@@ -56,73 +57,74 @@ fn middle(a: Point, b: Point) -> Point {
     [0, 1, 2].map(|axis| (a[axis] / UNIT + b[axis] / UNIT) / 2 * UNIT)
 }
 
-/// Kinds of triangles within `reach` of the origin.
-const KINDS: [fn(&mut Draws, i64) -> Triangle; 10] =
+/// Makers of triangles within `reach` of the origin.
+const KINDS: [fn(&mut Rng, i64) -> Triangle; 10] =
     [free, flat, sliver, segment, point, gliding, tunnelling, turning, still, small];
 
-fn free(draws: &mut Draws, reach: i64) -> Triangle {
-    [(); 2].map(|()| [(); 3].map(|()| draws.point(reach)))
+fn free(rng: &mut Rng, reach: i64) -> Triangle {
+    [(); 2].map(|()| [(); 3].map(|()| rng.point(reach)))
 }
 
-/// Always in one plane.
-fn flat(draws: &mut Draws, reach: i64) -> Triangle {
-    free(draws, reach).map(|end| end.map(|[x, y, _]| [x, y, 0]))
+/// A triangle that stays in one plane.
+fn flat(rng: &mut Rng, reach: i64) -> Triangle {
+    free(rng, reach).map(|end| end.map(|[x, y, _]| [x, y, 0]))
 }
 
-fn sliver(draws: &mut Draws, reach: i64) -> Triangle {
-    free(draws, reach).map(|[a, b, _]| [a, b, sum(middle(a, b), draws.point(1))])
+fn sliver(rng: &mut Rng, reach: i64) -> Triangle {
+    free(rng, reach).map(|[a, b, _]| [a, b, sum(middle(a, b), rng.point(1))])
 }
 
-fn segment(draws: &mut Draws, reach: i64) -> Triangle {
-    free(draws, reach).map(|[a, b, _]| [a, b, b])
+fn segment(rng: &mut Rng, reach: i64) -> Triangle {
+    free(rng, reach).map(|[a, b, _]| [a, b, b])
 }
 
-fn point(draws: &mut Draws, reach: i64) -> Triangle {
-    free(draws, reach).map(|[a, ..]| [a; 3])
+fn point(rng: &mut Rng, reach: i64) -> Triangle {
+    free(rng, reach).map(|[a, ..]| [a; 3])
 }
 
-/// Without turning.
-fn gliding(draws: &mut Draws, reach: i64) -> Triangle {
-    let ([open, _], way) = (free(draws, reach), draws.point(reach));
+/// A translated triangle.
+fn gliding(rng: &mut Rng, reach: i64) -> Triangle {
+    let ([open, _], way) = (free(rng, reach), rng.point(reach));
     [open, open.map(|corner| sum(corner, way))]
 }
 
-/// A thousand times as far as it is long.
-fn tunnelling(draws: &mut Draws, reach: i64) -> Triangle {
-    let ([open, _], way) = (free(draws, reach), draws.point(1024 * reach));
+/// A triangle translated by a thousand times its size.
+fn tunnelling(rng: &mut Rng, reach: i64) -> Triangle {
+    let ([open, _], way) = (free(rng, reach), rng.point(1024 * reach));
     [open, open.map(|corner| sum(corner, way))]
 }
 
-/// A sliver turned by a quarter.
-fn turning(draws: &mut Draws, reach: i64) -> Triangle {
-    let [open, _] = sliver(draws, reach);
+/// A sliver rotated by 90 degrees.
+fn turning(rng: &mut Rng, reach: i64) -> Triangle {
+    let [open, _] = sliver(rng, reach);
     [open, open.map(|[x, y, z]| [-y, x, z])]
 }
 
-fn still(draws: &mut Draws, reach: i64) -> Triangle {
-    let [open, _] = free(draws, reach);
+fn still(rng: &mut Rng, reach: i64) -> Triangle {
+    let [open, _] = free(rng, reach);
     [open; 2]
 }
 
-/// Far smaller than its way.
-fn small(draws: &mut Draws, reach: i64) -> Triangle {
-    free(draws, reach).map(|[a, ..]| [a, sum(a, draws.point(2)), sum(a, draws.point(2))])
+/// A triangle far smaller than its translation.
+fn small(rng: &mut Rng, reach: i64) -> Triangle {
+    free(rng, reach).map(|[a, ..]| [a, sum(a, rng.point(2)), sum(a, rng.point(2))])
 }
 
-/// Two triangles of one kind or of two, that exchange places, or of which one is nearly a copy of the other.
-fn pair(draws: &mut Draws, reach: i64) -> [Triangle; 2] {
-    let mut kind = || KINDS[draws.below(KINDS.len() as u64) as usize];
+/// Two triangles of the same or different kinds, which may exchange positions or be near copies.
+fn pair(rng: &mut Rng, reach: i64) -> [Triangle; 2] {
+    let mut kind = || KINDS[rng.below(KINDS.len() as u64) as usize];
     let (one, other) = (kind(), kind());
-    let first = one(draws, reach);
-    match draws.below(12) {
+    let first = one(rng, reach);
+    match rng.below(12) {
         0 => [first, [first[1], first[0]]],
         1 => [first, [first[0], first[1].map(|corner| sum(corner, [UNIT, -UNIT, 0]))]],
-        2..7 => [first, one(draws, reach)],
-        _ => [first, other(draws, reach)],
+        2..7 => [first, one(rng, reach)],
+        _ => [first, other(rng, reach)],
     }
 }
 
-/// The point of a triangle with these weights at so many eighths of the time; exact, as corners are multiples of [`UNIT`].
+/// Point of a triangle at barycentric `weights` and a time in eighths. It is exact, as corners are multiples
+/// of [`UNIT`].
 fn place(triangle: &Triangle, eighths: i64, weights: [i64; 3]) -> Point {
     let [open, close] = triangle;
     [0, 1, 2].map(|axis| {
@@ -131,33 +133,33 @@ fn place(triangle: &Triangle, eighths: i64, weights: [i64; 3]) -> Point {
     })
 }
 
-/// Moves the second so that both share a point.
-fn made_to_touch(draws: &mut Draws, [first, second]: [Triangle; 2]) -> [Triangle; 2] {
-    let eighths = [0, 8, 4, draws.below(9) as i64][draws.below(4) as usize];
-    let to = place(&first, eighths, draws.weights());
-    let from = place(&second, eighths, draws.weights());
+/// Moves the second triangle so that both share a point.
+fn made_to_touch(rng: &mut Rng, [first, second]: [Triangle; 2]) -> [Triangle; 2] {
+    let eighths = [0, 8, 4, rng.below(9) as i64][rng.below(4) as usize];
+    let to = place(&first, eighths, rng.weights());
+    let from = place(&second, eighths, rng.weights());
     let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
     [first, second.map(|end| end.map(|corner| sum(corner, way)))]
 }
 
-/// Adds triangles around to both in turn.
-fn crowd(draws: &mut Draws, objects: &mut [Vec<Triangle>; 2], reach: i64) {
-    let count = [0, 0, 0, 3, 40, 120][draws.below(6) as usize];
-    let size = if draws.one_in(2) { reach / 8 } else { reach };
+/// Adds other triangles to both objects in turn.
+fn crowd(rng: &mut Rng, objects: &mut [Vec<Triangle>; 2], reach: i64) {
+    let count = [0, 0, 0, 3, 40, 120][rng.below(6) as usize];
+    let size = if rng.one_in(2) { reach / 8 } else { reach };
     for number in 0..count {
-        let at = draws.point(4 * reach);
-        let one = free(draws, size.max(1)).map(|end| end.map(|corner| sum(corner, at)));
+        let at = rng.point(4 * reach);
+        let one = free(rng, size.max(1)).map(|end| end.map(|corner| sum(corner, at)));
         objects[number % 2].push(one);
     }
 }
 
-/// Both sheared, seen from a frame of reference that moves, far from the origin, or with other axes: all exact.
-fn pose(draws: &mut Draws, objects: &mut [Vec<Triangle>; 2], reach: i64) {
-    let shear = [draws.around_zero(2), draws.around_zero(2)].map(|by| if draws.one_in(2) { by } else { 0 });
-    let way = if draws.one_in(3) { draws.point(8 * reach) } else { [0; 3] };
-    let (near, far) = (draws.below(38), draws.one_in(2));
-    let offset = [(); 3].map(|()| if far { draws.around_zero(1 << 38) >> near } else { 0 });
-    let axes = draws.below(3) as usize;
+/// Shears, moves and permutes the axes of both objects, exactly.
+fn pose(rng: &mut Rng, objects: &mut [Vec<Triangle>; 2], reach: i64) {
+    let shear = [rng.around_zero(2), rng.around_zero(2)].map(|by| if rng.one_in(2) { by } else { 0 });
+    let way = if rng.one_in(3) { rng.point(8 * reach) } else { [0; 3] };
+    let (near, far) = (rng.below(38), rng.one_in(2));
+    let offset = [(); 3].map(|()| if far { rng.around_zero(1 << 38) >> near } else { 0 });
+    let axes = rng.below(3) as usize;
     for triangle in objects.iter_mut().flatten() {
         for (end, way) in triangle.iter_mut().zip([[0; 3], way]) {
             for corner in end {
@@ -169,18 +171,18 @@ fn pose(draws: &mut Draws, objects: &mut [Vec<Triangle>; 2], reach: i64) {
     }
 }
 
-/// Two objects that share a point and what a unit is, a power of two.
-fn case(draws: &mut Draws) -> ([Vec<Triangle>; 2], f64) {
-    let reach = [8, 100, 4096][draws.below(3) as usize];
-    let touching = pair(draws, reach);
-    let mut objects = made_to_touch(draws, touching).map(|one| vec![one]);
-    crowd(draws, &mut objects, reach);
-    pose(draws, &mut objects, reach);
-    objects.rotate_left(draws.below(2) as usize);
-    (objects, 2_f64.powi(draws.around_zero(22) as i32 - 17))
+/// Two objects that share a point, and the length of a unit, a power of two.
+fn case(rng: &mut Rng) -> ([Vec<Triangle>; 2], f64) {
+    let reach = [8, 100, 4096][rng.below(3) as usize];
+    let touching = pair(rng, reach);
+    let mut objects = made_to_touch(rng, touching).map(|one| vec![one]);
+    crowd(rng, &mut objects, reach);
+    pose(rng, &mut objects, reach);
+    objects.rotate_left(rng.below(2) as usize);
+    (objects, 2_f64.powi(rng.around_zero(22) as i32 - 17))
 }
 
-/// The objects in numbers that the search takes, the second `aside`.
+/// The objects in floating point, the second moved aside.
 fn scaled([first, second]: &[Vec<Triangle>; 2], units: [f64; 3], aside: i64) -> [Object; 2] {
     [(first, 0), (second, aside)].map(|(object, by)| {
         let ends = |triangle: &Triangle| {
@@ -190,24 +192,25 @@ fn scaled([first, second]: &[Vec<Triangle>; 2], units: [f64; 3], aside: i64) -> 
     })
 }
 
-/// A search of any kind; many triangles are drawn by edges in few tiles only, as that takes long.
-fn search(draws: &mut Draws, triangles: usize) -> Search {
-    let zoom = draws.one_in(6);
+/// A random search. Many triangles are drawn by edges in few tiles only, as that is slow.
+fn search(rng: &mut Rng, triangles: usize) -> Search {
+    let zoom = rng.one_in(6);
     let finest = if triangles > 60 && !zoom { 8 } else { 64 };
     let method =
         [Method::FragmentBox, Method::FragmentBox, Method::BoxBox, Method::BoxBox, Method::DepthOnly];
-    let resolution = 1 + draws.below(finest) as u32;
-    Search { resolution, bins: 1 + draws.below(16) as u32, method: method[draws.below(5) as usize], zoom }
+    let resolution = 1 + rng.below(finest) as u32;
+    Search { resolution, bins: 1 + rng.below(16) as u32, method: method[rng.below(5) as usize], zoom }
 }
 
-/// Each contact by some searches; how many pairs are told apart with one of them moved aside.
-fn none_is_missed(seeds: std::ops::Range<u64>, searches: usize) -> usize {
+/// Checks that several searches find each contact; counts the pairs separated after one object was moved
+/// aside.
+fn separated_when_moved(seeds: std::ops::Range<u64>, searches: usize) -> usize {
     let checked = |seed: u64| {
-        let mut draws = Draws(mix(seed));
-        let (exact, unit) = case(&mut draws);
+        let mut rng = Rng(mix(seed));
+        let (exact, unit) = case(&mut rng);
         let objects = scaled(&exact, [unit; 3], 0);
         for _ in 0..searches {
-            let search = search(&mut draws, objects[0].len() + objects[1].len());
+            let search = search(&mut rng, objects[0].len() + objects[1].len());
             assert!(objects_may_collide(&objects, &search), "{seed} is missed by {search:?}");
         }
         let closer = Search { resolution: 64, ..Search::default() };
@@ -218,24 +221,24 @@ fn none_is_missed(seeds: std::ops::Range<u64>, searches: usize) -> usize {
 
 #[test]
 fn no_exact_contact_is_missed() {
-    let apart = none_is_missed(0..200, 2);
+    let apart = separated_when_moved(0..200, 2);
     println!("moved aside, {apart} of 10 are told apart");
     assert!(apart >= 3);
 }
 
-/// What is long along one axis may be so thin along others that products of both are no numbers.
+/// Products of coordinates may underflow along some axes.
 #[test]
-fn no_exact_contact_is_missed_whatever_units_axes_have() {
+fn no_exact_contact_is_missed_with_any_units_per_axis() {
     (0..1500_u64).into_par_iter().for_each(|seed| {
-        let mut draws = Draws(mix(seed ^ 0x5EED));
-        let (exact, _) = case(&mut draws);
-        let unit = |draws: &mut Draws| {
-            let exponent = draws.below(1170) as i32 - 1070;
+        let mut rng = Rng(mix(seed ^ 0x5EED));
+        let (exact, _) = case(&mut rng);
+        let unit = |rng: &mut Rng| {
+            let exponent = rng.below(1170) as i32 - 1070;
             2_f64.powi(exponent / 2) * 2_f64.powi(exponent - exponent / 2)
         };
-        let units = [(); 3].map(|()| unit(&mut draws));
+        let units = [(); 3].map(|()| unit(&mut rng));
         let objects = scaled(&exact, units, 0);
-        let search = search(&mut draws, objects[0].len() + objects[1].len());
+        let search = search(&mut rng, objects[0].len() + objects[1].len());
         assert!(
             objects_may_collide(&objects, &search),
             "{seed} in units of {units:?} is missed by {search:?}"
@@ -243,13 +246,13 @@ fn no_exact_contact_is_missed_whatever_units_axes_have() {
     });
 }
 
-/// `cargo test -p workloads --release --test collision exact -- --ignored --nocapture`.
+/// `cargo test -p workloads --release --test suite exact -- --ignored --nocapture`.
 #[test]
 #[ignore = "minutes to an hour: 80,000 searches"]
 fn none_of_twenty_thousand_is_missed() {
     let mut apart = 0;
     for start in (0..20_000).step_by(1000) {
-        apart += none_is_missed(start..start + 1000, 4);
+        apart += separated_when_moved(start..start + 1000, 4);
         println!(
             "{} contacts, none missed; moved aside, {apart} of {} told apart",
             start + 1000,

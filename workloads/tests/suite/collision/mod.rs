@@ -1,17 +1,17 @@
-//! Collision detection: public queries, an oracle, and the ways a pair can be missed. No collision may be, ever.
+//! Collision detection: public queries, an oracle, and constructed cases. No collision may be missed.
 
 mod contacts;
 mod exact;
 mod oracle;
 mod public;
-mod yardsticks;
+mod reference_rates;
 
 use pipeline::random::{mix, unit};
 use workloads::collision::{Method, Object, Search, detect};
 
 type Ends = [[[f64; 3]; 3]; 2];
 
-/// Searches from the simplest to the closest; none may miss anything.
+/// Searches from the coarsest to the finest; none may miss a collision.
 const SEARCHES: [Search; 7] = [
     Search { resolution: 1, bins: 1, method: Method::FragmentBox, zoom: false },
     Search { resolution: 8, bins: 1, method: Method::BoxBox, zoom: false },
@@ -30,7 +30,7 @@ fn objects_may_collide(objects: &[Object; 2], search: &Search) -> bool {
     detect(objects, search).first().is_some_and(|answer| answer.verdict.may_collide())
 }
 
-/// A corner in a hash's unit cube.
+/// A coordinate in the unit cube, from a hash.
 fn random(seed: u64, n: u64) -> f64 {
     unit(mix(seed.wrapping_mul(1000) + n))
 }

@@ -1,13 +1,13 @@
-//! What is told apart and what is not, and an oracle of many instants.
+//! Pairs that are separated or kept, and an oracle of many instants.
 
 use proptest::prelude::*;
 use workloads::collision::{Method, Search};
 
 use super::{Ends, SEARCHES, may_collide, random};
 
-/// The toaster that dodges the ball (Fig. 6): paths that cross in space, not in time.
+/// Paths that cross in space, but at different times (thesis, Paper VI, Fig. 6).
 #[test]
-fn paths_that_cross_at_different_times_are_told_apart_by_time_alone() {
+fn paths_that_cross_at_different_times_are_separated_by_time_alone() {
     let square = |x: f64, y: f64| [[x, y, 0.0], [x + 0.2, y, 0.1], [x, y + 0.2, 0.2]];
     let a = [square(-2.0, 0.0), square(2.0, 0.0)];
     let b = [square(0.0, -1.0), square(0.0, 3.0)];
@@ -16,9 +16,9 @@ fn paths_that_cross_at_different_times_are_told_apart_by_time_alone() {
     assert!(may_collide(a, b, &Search { method: Method::DepthOnly, ..plain }));
 }
 
-/// A tip that comes near a face, stops short of it by a gap and turns aside.
+/// A tip that approaches a face, stops at a gap and turns aside.
 #[test]
-fn near_misses_are_told_apart_by_looking_closer() {
+fn near_misses_are_separated_by_refinement() {
     for gap in [1e-3, 1e-5, 1e-7] {
         let face = [[[-1.0, -1.0, -0.4], [1.0, -1.0, 0.2], [0.0, 1.0, 0.3]]; 2];
         let foot = -0.4 * 0.25 + 0.2 * 0.25 + 0.3 * 0.5;
@@ -29,10 +29,10 @@ fn near_misses_are_told_apart_by_looking_closer() {
     }
 }
 
-/// Where the method fails: tilted planes that slide along each other closer than a tile is wide. No looking closer helps, as they are near
-/// everywhere.
+/// Limitation: tilted planes that slide along each other at less than a tile's width. Refinement does not
+/// help, as they are near everywhere.
 #[test]
-fn sliding_planes_nearer_than_a_tile_are_not_told_apart() {
+fn sliding_planes_nearer_than_a_tile_are_not_separated() {
     let a: Ends = [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.3], [0.0, 1.0, 0.6]]; 2];
     let apart = |gap: f64| {
         let slid = |by: f64| a[0].map(|[x, y, z]| [x + by, y, z + 0.3 * by + gap]);
@@ -43,9 +43,9 @@ fn sliding_planes_nearer_than_a_tile_are_not_told_apart() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
-    /// Points of one triangle found in the other by dense looking.
+    /// Crossings found at many instants are reported by every search.
     #[test]
-    fn what_crosses_at_a_looked_at_instant_is_reported(seed in 0_u64..1 << 40) {
+    fn crossings_at_any_tested_instant_are_reported(seed in 0_u64..1 << 40) {
         let corner = |n: u64| [0, 1, 2].map(|axis| random(seed, 3 * n + axis));
         let a: Ends = [[corner(0), corner(1), corner(2)], [corner(3), corner(4), corner(5)]];
         let b: Ends = [[corner(6), corner(7), corner(8)], [corner(9), corner(10), corner(11)]];

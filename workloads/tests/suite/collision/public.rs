@@ -25,7 +25,7 @@ fn files_below(folder: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-/// The rows of a query file: a point and whether the truth of its query is a collision.
+/// The rows of a query file: a point, and whether the query is a collision.
 fn rows(path: &Path) -> Vec<([f64; 3], bool)> {
     let file = BufReader::new(GzDecoder::new(std::fs::File::open(path).unwrap()));
     let row = |line: String| {
@@ -53,7 +53,7 @@ fn no_public_query_is_missed() {
                 [[from, to].map(|p| [p[0], p[1], p[1]]), [from, to].map(|p| [p[2], p[3], p[3]])]
             };
             for (search, reported) in SEARCHES.iter().zip(&mut reported) {
-                // Each query by the plainest, and by another one in turn.
+                // Each query is searched by the coarsest search, and by another one in turn.
                 if *search != SEARCHES[0] && *search != SEARCHES[number % SEARCHES.len()] {
                     continue;
                 }
@@ -64,11 +64,12 @@ fn no_public_query_is_missed() {
             if query[0].1 { collide += 1 } else { apart += 1 }
         }
     }
-    println!("{collide} collide, {apart} do not; reported in vain by search: {reported:?}");
+    println!("{collide} collide, {apart} do not; false positives by search: {reported:?}");
     assert!(collide > 0 && apart > 0 && reported[6] < reported[0]);
 }
 
-/// The pairs of `shared/ccd/README.md` that truly collide: how many there are, and how many of all pairs.
+/// Pairs that truly collide in the public scenes (the `README.md` beside them): their number, and that of all
+/// pairs.
 #[test]
 #[cfg_attr(not(collision_data), ignore = "no folder ccd beside QUINTILE_SCENES")]
 fn public_scenes_keep_every_pair_that_collides() {

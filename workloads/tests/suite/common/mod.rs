@@ -1,4 +1,4 @@
-//! Small files made for tests.
+//! Helpers that make small files for tests.
 
 pub mod meshes;
 
@@ -24,7 +24,7 @@ pub fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
     file
 }
 
-/// A glTF being put together: numbers go to one buffer, each list with an accessor of its own.
+/// A glTF under construction: numbers go to one buffer, each list with its own accessor.
 pub struct Builder {
     pub json: Value,
     pub binary: Vec<u8>,
@@ -39,7 +39,7 @@ impl Builder {
         Self { json, binary: Vec::new() }
     }
 
-    /// Adds bytes as an accessor and gives its index.
+    /// Adds bytes as an accessor and returns its index.
     pub fn accessor(&mut self, bytes: &[u8], count: usize, kind: &str, component: u32) -> usize {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
         let view = self.list("bufferViews").len();
@@ -106,7 +106,7 @@ impl Builder {
     }
 }
 
-/// A file in a folder that goes away with the test.
+/// A temporary folder of files.
 pub struct Files(tempfile::TempDir);
 
 impl Files {
@@ -131,20 +131,20 @@ pub fn real_scenes() -> PathBuf {
     std::env::var_os("QUINTILE_SCENES").map(PathBuf::from).expect("the folder of real scenes")
 }
 
-/// The message of an error that has to be a failure, not a mistake of usage.
+/// The message of an error, which must be a failure (not a mistake of usage).
 pub fn failure(error: LoadError) -> String {
     assert!(!error.is_usage(), "{error}");
     error.to_string()
 }
 
-/// That `text` holds every part.
+/// Checks that `text` contains every part.
 pub fn expect(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "`{part}` is not in: {text}");
     }
 }
 
-/// Hardware for tests: everything switched on, caches as those of the reference GPU.
+/// Hardware for tests: all features on, caches of the reference GPU.
 pub fn spec() -> pipeline::PipelineSpec {
     let lines = pipeline::CacheSpec::lru(256, 4);
     pipeline::PipelineSpec {
@@ -166,12 +166,12 @@ pub fn spec() -> pipeline::PipelineSpec {
     }
 }
 
-/// An image to the bit.
+/// The bits of an image.
 pub fn bits(image: &[glam::Vec3]) -> Vec<[u32; 3]> {
     image.iter().map(|pixel| pixel.to_array().map(f32::to_bits)).collect()
 }
 
-/// White, whoever looks.
+/// A white shader, independent of the viewer.
 pub struct White;
 
 impl pipeline::Shader for White {

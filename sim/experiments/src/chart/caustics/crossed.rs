@@ -3,7 +3,9 @@
 use glam::DVec3;
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
-use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, Squares, crossing, doubts, draw, error};
+use workloads::caustics::{
+    Beam, Eye, Floor, Light, Method, Picture, Squares, accuracy_warnings, crossing, draw, error,
+};
 
 use super::Effort;
 use super::view::{SQUARE_PX, above, from_the_side, water};
@@ -105,7 +107,7 @@ impl Bench {
             executions: pictures.each_ref().map(Picture::total_runs),
             useful: pictures.each_ref().map(Picture::useful_share),
             difference: pictures.iter().map(|other| ours.farthest(other)).fold(0.0, f64::max),
-            warned: doubts(&surface, &beams).iter().any(|doubt| doubt.code == "caustics-crossed"),
+            warned: accuracy_warnings(&surface, &beams).iter().any(|doubt| doubt.code == "caustics-crossed"),
         }
     }
 

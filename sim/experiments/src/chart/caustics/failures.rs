@@ -1,6 +1,6 @@
 //! Where beams fail: too few triangles, and sides that cross.
 
-use workloads::caustics::{CROSSED, Method};
+use workloads::caustics::{MAX_CROSSED_SHARE, Method};
 
 use super::{CausticsChart, Coarse, Crossed};
 use output::plot::{ChartPanel, Scale, Series};
@@ -36,7 +36,7 @@ fn by_cells(chart: &CausticsChart, of: fn(&Crossed) -> f64) -> impl Iterator<Ite
 fn over_crossing(title: &str, up: &str, curves: Vec<Series>) -> ChartPanel {
     ChartPanel::new(title, [CROSSING, up], curves)
         .on(Scale::Even, Scale::Even)
-        .failing(Some(100.0 * CROSSED..f64::INFINITY), "caustics-crossed")
+        .failing(Some(100.0 * MAX_CROSSED_SHARE..f64::INFINITY), "caustics-crossed")
 }
 
 fn error(chart: &CausticsChart) -> ChartPanel {

@@ -4,7 +4,9 @@ use cpu_time::ThreadTime;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean as Water;
-use workloads::caustics::{Floor, Light, Method, Picture, SQUARES, Squares, crossing, doubts, draw, error};
+use workloads::caustics::{
+    Floor, Light, MIN_SQUARES_PER_WAVE, Method, Picture, Squares, accuracy_warnings, crossing, draw, error,
+};
 
 use super::view::{DEPTH_M, SIDE_M, SLOPE, SQUARE_PX, above, aside, aside_of, water};
 use super::{CausticsChart, Coarse, Effort, Row, crossed};
@@ -119,7 +121,7 @@ fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, Study
         let beams = surface.beams(0.0);
         let found = draw(&beams, &eye, Method::Moving, Some(Light::Floor(floor))).light;
         bar.inc();
-        let warned = !doubts(&surface, &beams).is_empty();
+        let warned = !accuracy_warnings(&surface, &beams).is_empty();
         let error = error(&squares.of_image(&found), &known);
         Coarse { cells, slope, crossing: crossing(&beams), error, noise, warned }
     };
@@ -128,5 +130,5 @@ fn by_cells(effort: &Effort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, Study
 
 /// So many squares along a side, and a run does not warn of a surface that is too coarse.
 fn resolved_cells() -> f64 {
-    SQUARES * SIDE_M / water(1, SLOPE).shortest_m()
+    MIN_SQUARES_PER_WAVE * SIDE_M / water(1, SLOPE).shortest_m()
 }

@@ -4,7 +4,7 @@
 mod measure;
 
 use serde::Serialize;
-use workloads::collision::families::{Case, cases, like_yardsticks};
+use workloads::collision::families::{Case, cases, reference_cases};
 use workloads::collision::{Method, Search};
 
 use crate::study::table::{Sheet, Table, fixed, millis, plain};
@@ -191,7 +191,11 @@ impl Study for CollisionChart {
     fn measure(effort: Effort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let sets = [
             (Set::Families, all_cases(&effort), ways(&effort)),
-            (Set::LikeYardsticks, like_yardsticks(1, effort.yardsticks), yardstick_ways(&effort)),
+            (
+                Set::LikeYardsticks,
+                reference_cases(1, effort.yardsticks[0], effort.yardsticks[1]),
+                yardstick_ways(&effort),
+            ),
         ];
         let bar = progress.bar("ways", sets.iter().map(|(_, _, ways)| ways.len() as u64).sum());
         let mut rows = Vec::new();

@@ -6,7 +6,9 @@ use pipeline::geometry::Projection;
 use pipeline::memory::CacheError;
 use pipeline::{LensShape, SampleTable, Settings, Viewport};
 use rayon::prelude::*;
-use workloads::occlusion::{Answer, Pyramid, Queries, Samples, Seen, Yard, YardSpec, depths};
+use workloads::occlusion::{
+    Answer, Pyramid, Queries, SampledAnswer, Samples, WallScene, WallSceneSpec, depths,
+};
 use workloads::visibility::Unshaded;
 
 use super::{Effort, Kind, OcclusionChart, Row};
@@ -33,10 +35,10 @@ pub(super) const GAPS: f32 = 0.02;
 
 impl Kind {
     /// A yard of this kind with so many boxes, its walls whole.
-    pub(crate) fn spec(self, boxes: u32, seed: u64) -> YardSpec {
+    pub(crate) fn spec(self, boxes: u32, seed: u64) -> WallSceneSpec {
         let motion = if self == Self::Defocus { 0.0 } else { MOTION };
         let lens = if self == Self::Motion { 0.0 } else { LENS };
-        YardSpec { walls: WALLS, slats: 1, gaps: 0.0, boxes, motion, lens, seed }
+        WallSceneSpec { walls: WALLS, slats: 1, gaps: 0.0, boxes, motion, lens, seed }
     }
 
     fn boxes(self) -> &'static [[u32; 3]] {
@@ -59,12 +61,12 @@ impl Kind {
 
 /// A yard whose walls are drawn and whose boxes were asked for by samples.
 pub(crate) struct Drawn {
-    yard: Yard,
+    yard: WallScene,
     viewport: Viewport,
     table: SampleTable,
     depths: Vec<f32>,
     /// What sampled queries found, by box.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<SampledAnswer>,
 }
 
 fn refused(error: CacheError) -> StudyError {
@@ -76,8 +78,8 @@ impl Drawn {
     ///
     /// # Errors
     /// When there is no such yard or image.
-    pub fn new(size: [u32; 2], yard: &YardSpec, samples: u32) -> Result<Self, StudyError> {
-        let yard = yard.yard().ok_or_else(|| StudyError::Pipeline("a yard".to_owned()))?;
+    pub fn new(size: [u32; 2], yard: &WallSceneSpec, samples: u32) -> Result<Self, StudyError> {
+        let yard = yard.wall_scene().ok_or_else(|| StudyError::Pipeline("a yard".to_owned()))?;
         let gpu = GpuSpec::load("reference")?;
         let viewport = Viewport::new(size[0], size[1])
             .ok_or_else(|| StudyError::Pipeline("an image without area".to_owned()))?;
@@ -199,7 +201,7 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionCh
 fn drawn(effort: &Effort, kind: Kind, slats: u32, samples: u32, bar: &Bar) -> Result<Vec<Drawn>, StudyError> {
     let gaps = if slats > 1 { GAPS } else { 0.0 };
     let drawn = |seed| {
-        let yard = YardSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
+        let yard = WallSceneSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
         Drawn::new(effort.size, &yard, samples)
     };
     let yards = (0..effort.yards).map(drawn).collect();

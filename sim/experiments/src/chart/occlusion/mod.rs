@@ -3,7 +3,7 @@
 mod measure;
 
 use serde::Serialize;
-use workloads::occlusion::HALF_COVERED;
+use workloads::occlusion::MAX_HALF_COVERED_SHARE;
 
 use crate::study::table::{Sheet, Table, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -253,7 +253,7 @@ impl OcclusionChart {
     /// The number of slats from which on a run with the smaller tiles warns.
     fn warned(&self) -> Option<f64> {
         let small = Some(measure::FAILING_TILES[0]);
-        let warned = |row: &&Row| row.tile_px == small && row.half_covered > HALF_COVERED;
+        let warned = |row: &&Row| row.tile_px == small && row.half_covered > MAX_HALF_COVERED_SHARE;
         self.failing.iter().find(warned).map(|row| f64::from(row.slats))
     }
 }

@@ -38,7 +38,7 @@ pub(super) fn coarse(effort: &Effort) -> Result<Vec<Coarse>, PoissonError> {
             bits,
             radius_in_numbers: COARSE_RADIUS * spacing.per_unit(),
             points: found.points.len(),
-            thin_voids: found.thin_voids,
+            thin_voids: found.thin_regions,
             beyond: (hole.radius / COARSE_RADIUS - 1.0).max(0.0),
         })
     });

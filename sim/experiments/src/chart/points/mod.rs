@@ -6,7 +6,7 @@ mod failures;
 mod measure;
 
 use serde::Serialize;
-use workloads::points::THIN;
+use workloads::points::MAX_THIN_PER_POINT;
 
 use crate::study::table::{Sheet, Table, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -187,7 +187,7 @@ impl PointsChart {
     fn failures(&self) -> Vec<ChartPanel> {
         let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
             let curve = Series::curve("voids, 2D", self.coarse.iter().map(|c| (c.radius_in_numbers, of(c))));
-            let warned = |c: &&Coarse| c.thin_voids as f64 > THIN * c.points as f64;
+            let warned = |c: &&Coarse| c.thin_voids as f64 > MAX_THIN_PER_POINT * c.points as f64;
             let last = self.coarse.iter().rfind(warned);
             ChartPanel::new(title, ["r in spacings of numbers", up], vec![curve])
                 .on(Scale::Doublings, Scale::Decades)

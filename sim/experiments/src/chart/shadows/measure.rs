@@ -8,7 +8,9 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, PipelineSpec, SampleSpec, SampleTable, Settings, Viewport};
 use serde::Serialize;
 use workloads::accumulation::SharedSamples;
-use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap, Shadows, World, see, stage};
+use workloads::soft_shadows::{
+    AreaLight, LightSpec, Method, Renderer, ShadowMap, Shadows, View, World, depth_pass, stage,
+};
 use workloads::{Frame, Overrides, Scene};
 
 use super::Effort;
@@ -101,8 +103,8 @@ impl Stage {
         let [width, height] = self.effort.size;
         let viewport = Viewport::new(width, height)
             .ok_or_else(|| StudyError::Pipeline("an image of no size".to_owned()))?;
-        let seen_by = (&self.frame.camera, &draws[..]);
-        let world = World::new(seen_by, viewport, &self.light, &albedos, self.scene.background());
+        let view = View { camera: &self.frame.camera, draws: &draws };
+        let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         run(&Bench { stage: self, draws: &draws, world, viewport })
     }
 }
@@ -143,9 +145,9 @@ impl Bench<'_> {
 
     fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), StudyError> {
         let started = Instant::now();
-        let subject = (&self.stage.light, self.draws);
-        let map =
-            ShadowMap::new(subject, self.stage.effort.map_px, set, (method, self.spec()), &mut |_, _| ())?;
+        let renderer = Renderer { method, spec: self.spec() };
+        let Stage { light, effort, .. } = self.stage;
+        let map = ShadowMap::new(light, self.draws, effort.map_px, set, renderer, &mut |_, _| ())?;
         let host_s = started.elapsed().as_secs_f64();
         let passes = if method == Method::OnePass { 1 } else { set.samples().len() as u32 };
         let cost = cost(&map.counts, passes, host_s);
@@ -173,9 +175,9 @@ impl Bench<'_> {
     }
 
     fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
-        let subject = (&self.stage.frame.camera, self.draws);
-        let how = (Method::OnePass, self.spec());
-        Ok(see(subject, self.viewport, set, how, &mut |_, _| ())?.samples)
+        let view = View { camera: &self.stage.frame.camera, draws: self.draws };
+        let renderer = Renderer { method: Method::OnePass, spec: self.spec() };
+        Ok(depth_pass(&view, self.viewport, set, renderer, &mut |_, _| ())?.samples)
     }
 
     /// Wrong shadows over the bias.

@@ -4,8 +4,8 @@ use activity::{Event, Timeline, Unit};
 use cpu_time::ThreadTime;
 use power_model::{EnergyTable, FramePower, Platform, PowerModel};
 use serde::Serialize;
-use timing::stepped::{self, Manner, Stream};
-use timing::{Clocks, Jobs, PacketClock, Recorder, Timed, Totals, bound};
+use timing::stepped::{self, StepOptions, Stream};
+use timing::{Clocks, DemandBuilder, PacketClock, Recorder, Timed, Totals, bound};
 
 use super::Reference;
 use super::subjects::Packets;
@@ -130,7 +130,7 @@ pub(super) fn rows(
 /// A frame's packets as what the units of one machine owe, written once for all levels.
 pub(super) struct Written {
     clocks: Clocks,
-    makes: Jobs,
+    builder: DemandBuilder,
     stream: Stream,
     totals: Totals,
     host_s: f64,
@@ -140,24 +140,26 @@ impl Written {
     pub fn new(gpu: &GpuSpec, packets: &Packets) -> Result<Self, RunError> {
         let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
         let started = ThreadTime::now();
-        let mut makes = Jobs::new(&gpu.units, gpu.pipeline.batch_triangles);
+        let mut builder = DemandBuilder::new(&gpu.units, gpu.pipeline.batch_triangles);
         let (mut stream, mut totals) = (Stream::default(), Totals::new(&gpu.units, &clocks));
         packets.each(|packet, lines| {
-            stream.push(&mut makes, packet, lines);
-            stream.add_last(&makes, &mut totals);
+            stream.push(&mut builder, packet, lines);
+            stream.add_last(&builder, &mut totals);
         });
-        Ok(Self { clocks, makes, stream, totals, host_s: started.elapsed().as_secs_f64() })
+        Ok(Self { clocks, builder, stream, totals, host_s: started.elapsed().as_secs_f64() })
     }
 }
 
 /// The frame at a level, and the host's seconds for it: timing alone, as the stream is written.
 pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(Timed, f64), RunError> {
-    let Written { clocks, makes, stream, totals, .. } = written;
+    let Written { clocks, builder, stream, totals, .. } = written;
     let started = ThreadTime::now();
     let recorder = Recorder::new(BIN_PS, MOST_BINS);
     let timed = match level {
-        Level::Stepped => stepped::run(&gpu.units, *clocks, makes, stream, recorder, &Manner::default())
-            .map_err(TimingError::from)?,
+        Level::Stepped => {
+            stepped::run(&gpu.units, *clocks, builder, stream, recorder, &StepOptions::default())
+                .map_err(TimingError::from)?
+        }
         Level::Packet => {
             PacketClock::new(&gpu.units, *clocks, gpu.pipeline.batch_triangles, recorder).run(stream)
         }

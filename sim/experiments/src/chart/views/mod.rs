@@ -7,7 +7,7 @@ mod measure;
 
 use pipeline::Replacement;
 use serde::Serialize;
-use workloads::multiview::{Layout, MOST_DEG, MOST_RUNS};
+use workloads::multiview::{Layout, MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG};
 
 use crate::study::table::{Sheet, Table, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -229,9 +229,9 @@ impl ViewsChart {
             "RMSE against cameras of their own",
         ];
         // Close to the angle from which on a run warns, angles grow with the line.
-        let off = |angle: &&Angle| (angle.degrees / MOST_DEG).ln().abs();
+        let off = |angle: &&Angle| (angle.degrees / MAX_VIEW_ANGLE_DEG).ln().abs();
         let nearest = self.angles.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-        let warned = nearest.map(|angle| angle.baseline * MOST_DEG / angle.degrees..f64::INFINITY);
+        let warned = nearest.map(|angle| angle.baseline * MAX_VIEW_ANGLE_DEG / angle.degrees..f64::INFINITY);
         let panel = ChartPanel::new("error of the outer views", axes, curves);
         panel.failing(warned, "a run warns: view-dependent-shading")
     }
@@ -255,7 +255,8 @@ impl Case {
     fn too_small(&self) -> Option<f64> {
         let rows = || self.rows.iter().filter(|cached| cached.policy == POLICIES[0].0);
         let least = rows().map(|cached| cached.invocations_per_pixel).reduce(f64::min)?;
-        let small = rows().filter(|cached| cached.invocations_per_pixel > MOST_RUNS * least);
+        let small =
+            rows().filter(|cached| cached.invocations_per_pixel > MAX_RUNS_OVER_INFINITE_CACHE * least);
         small.map(|cached| f64::from(cached.entries)).reduce(f64::max)
     }
 }

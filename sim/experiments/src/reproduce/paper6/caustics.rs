@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use workloads::caustics::generator::{Ocean, turned_beams};
-use workloads::caustics::{Eye, Floor, Found, Method, receivers};
+use workloads::caustics::{Coverage, Eye, Floor, Method, receivers};
 
 use super::super::band::Cases;
 use super::super::figure::line;
@@ -113,7 +113,8 @@ const OVERSHOOT: f64 = 0.25;
 pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_7);
     let (row, form) = (with.settings, with.form);
-    let (mut tried, mut all) = (Cases::new("pairs of a pixel and a beam that are missed"), Found::default());
+    let (mut tried, mut all) =
+        (Cases::new("pairs of a pixel and a beam that are missed"), Coverage::default());
     for &pleat in row.pleat.all(form) {
         let mut at = Vec::new();
         for &slope in row.slope.all(form) {
@@ -156,7 +157,7 @@ fn eye(place: [DVec3; 3], half_height: f64, size: &Size) -> Result<Eye, RunError
 }
 
 /// Water with waves of a slope, its triangles pleated along the light.
-fn in_ocean(row: &Lost, form: Form, [slope, pleat]: [f64; 2]) -> Result<Found, RunError> {
+fn in_ocean(row: &Lost, form: Form, [slope, pleat]: [f64; 2]) -> Result<Coverage, RunError> {
     let middle = DVec3::new(0.6, -0.5 * DEPTH_M, 0.3);
     let from = middle + 80.0 * DVec3::new(0.3, 0.35, 1.0).normalize();
     let eye = eye([from, middle, DVec3::Y], 6.5, row.size_px.get(form))?;
@@ -167,7 +168,7 @@ fn in_ocean(row: &Lost, form: Form, [slope, pleat]: [f64; 2]) -> Result<Found, R
 }
 
 /// Beams that turn about themselves, cut by a floor and seen from above.
-fn turned(row: &Lost, form: Form, height_m: f64) -> Result<Found, RunError> {
+fn turned(row: &Lost, form: Form, height_m: f64) -> Result<Coverage, RunError> {
     let eye = eye([10.0 * DVec3::Y, DVec3::ZERO, DVec3::NEG_Z], 1.2, row.turned_px.get(form))?;
     let beams = turned_beams(*row.turned_beams.get(form), *row.seed.get(form));
     Ok(receivers(&beams, &eye, Method::Moving, &Floor { height_m }))

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 use workloads::collision::families::{Case, cases};
-use workloads::collision::{Drawn, Method, Object, PlainPasses, Search, candidates, detect};
+use workloads::collision::{Method, Object, PlainPasses, PlainResult, Search, candidates, detect};
 use workloads::shapes;
 
 use super::super::band::Cases;
@@ -26,7 +26,7 @@ const fn name(method: Method) -> &'static str {
 }
 
 /// What passes have drawn, as the rows print it.
-fn ran(drawn: &Drawn) -> Vec<Number> {
+fn ran(drawn: &PlainResult) -> Vec<Number> {
     numbers([
         ("passes", drawn.passes as f64),
         ("draws", drawn.draws as f64),
@@ -36,7 +36,7 @@ fn ran(drawn: &Drawn) -> Vec<Number> {
 }
 
 /// How many of these pairs, all of which collide, the passes clear, and what they drew.
-fn cleared(pairs: &[Pair], method: Method, resolution: u32) -> (u64, Drawn) {
+fn cleared(pairs: &[Pair], method: Method, resolution: u32) -> (u64, PlainResult) {
     let one = |passes: &mut PlainPasses, [a, b]: &Pair| {
         let drawn = passes.pair(a, b);
         (u64::from(!drawn.may_collide()), drawn)
@@ -57,7 +57,7 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         Some(folder) => super::public::load(folder, row.public_scenes.get(form))?,
         None => Public::default(),
     };
-    let (mut tried, mut drawn, mut missed) = (Cases::new("pairs missed"), Drawn::default(), 0);
+    let (mut tried, mut drawn, mut missed) = (Cases::new("pairs missed"), PlainResult::default(), 0);
     for &method in row.methods.get(form) {
         let mut at = Vec::new();
         for &resolution in row.resolution_px.all(form) {
@@ -146,12 +146,12 @@ struct Looked<'a> {
 }
 
 impl Looked<'_> {
-    fn drawn(&self, method: Method, resolution: u32) -> Drawn {
+    fn drawn(&self, method: Method, resolution: u32) -> PlainResult {
         PlainPasses::new(method, resolution).pair(&self.objects[0], &self.objects[1])
     }
 
     /// Whether boxes of time and depth and boxes of depth alone say what they have to.
-    fn is_told_apart(&self, ours: &Drawn, depth: &Drawn) -> bool {
+    fn is_told_apart(&self, ours: &PlainResult, depth: &PlainResult) -> bool {
         depth.may_collide() && ours.may_collide() == self.case.collide
     }
 }
@@ -162,7 +162,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let refused = || RunError::setting("VI-2: a coordinate is beyond 1e60 or not a number");
     let (mut tried, mut drawn, mut said) =
-        (Cases::new("pixels left of a pair"), Drawn::default(), Vec::new());
+        (Cases::new("pixels left of a pair"), PlainResult::default(), Vec::new());
     for case in row.objects.get(form).iter().filter(|case| row.cases.all(form).contains(&case.name)) {
         let objects = [object(&case.first).ok_or_else(refused)?, object(&case.second).ok_or_else(refused)?];
         let looked = Looked { case, objects };
@@ -174,7 +174,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
                 let (ours, depth) =
                     (looked.drawn(method, resolution), looked.drawn(Method::DepthOnly, resolution));
                 drawn = drawn.and(&ours).and(&depth);
-                let fewest = ours.left.into_iter().min().unwrap_or(0);
+                let fewest = ours.overlaps.into_iter().min().unwrap_or(0);
                 at.push((resolution, fewest as f64, looked.is_told_apart(&ours, &depth)));
                 if resolution == *row.resolution_px.get(form) && method == row.methods.get(form)[0] {
                     said.push(told(case, &ours, &depth, resolution));
@@ -189,10 +189,10 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// What the passes say of a case.
-fn told(case: &TwoObjects, ours: &Drawn, depth: &Drawn, resolution: u32) -> String {
-    let kept = |drawn: &Drawn| if drawn.may_collide() { "keep" } else { "clear" };
+fn told(case: &TwoObjects, ours: &PlainResult, depth: &PlainResult, resolution: u32) -> String {
+    let kept = |drawn: &PlainResult| if drawn.may_collide() { "keep" } else { "clear" };
     let along =
-        ["x", "y", "z"].into_iter().zip(ours.left).filter(|(_, left)| *left == 0).map(|(axis, _)| axis);
+        ["x", "y", "z"].into_iter().zip(ours.overlaps).filter(|(_, left)| *left == 0).map(|(axis, _)| axis);
     let along: Vec<&str> = along.collect();
     let where_ =
         if along.is_empty() { String::new() } else { format!(" (apart along {})", along.join(" and ")) };
@@ -214,7 +214,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let all = cases(*row.seed.get(form), *row.cases_of_each_family.get(form));
     let mut resolutions = row.resolution_px.all(form).to_vec();
     resolutions.sort_unstable();
-    let mut drawn = Drawn::default();
+    let mut drawn = PlainResult::default();
     let mut kept = |method| -> Vec<Vec<usize>> {
         let at = |&resolution: &u32| {
             let each: Vec<_> = all.par_iter().map(|case| kept_in_vain(case, method, resolution)).collect();
@@ -253,9 +253,9 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// Pairs of a case that do not collide and are kept, and what was drawn for that.
-fn kept_in_vain(case: &Case, method: Method, resolution: u32) -> (usize, Drawn) {
+fn kept_in_vain(case: &Case, method: Method, resolution: u32) -> (usize, PlainResult) {
     let mut passes = PlainPasses::new(method, resolution);
-    let (mut kept, mut all) = (0, Drawn::default());
+    let (mut kept, mut all) = (0, PlainResult::default());
     for (a, b) in candidates(&case.objects) {
         if !case.collide.contains(&(a, b)) {
             let drawn = passes.pair(&case.objects[a], &case.objects[b]);

@@ -1,6 +1,6 @@
 //! Rows VI-4 and VI-5: occlusion queries by intervals.
 
-use workloads::occlusion::{Answer, Seen, YardSpec};
+use workloads::occlusion::{Answer, SampledAnswer, WallSceneSpec};
 
 use super::super::Done;
 use super::super::band::{Cases, short};
@@ -16,7 +16,7 @@ use run::RunError;
 fn drawn(
     kind: Kind,
     yards: u64,
-    change: impl Fn(YardSpec) -> YardSpec,
+    change: impl Fn(WallSceneSpec) -> WallSceneSpec,
     size: (u32, u32),
     samples: u32,
     asked: u32,
@@ -61,7 +61,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let (size, asked) = (*row.size_px.get(form), *row.asked.get(form));
     let mut total = Share::default();
     let mut measure = |motion: f32, tile_px: u32| -> Result<Vec<(f64, f64)>, RunError> {
-        let change = |spec| YardSpec { motion, ..spec };
+        let change = |spec| WallSceneSpec { motion, ..spec };
         let yards = drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), asked)?;
         let at = |&boxes: &u32| {
             let share = Share::of(&yards, [1, 1, boxes], tile_px);
@@ -154,7 +154,7 @@ impl Costs {
         costs
     }
 
-    fn add(&mut self, seen: &Seen, answer: &Answer, made: f64) {
+    fn add(&mut self, seen: &SampledAnswer, answer: &Answer, made: f64) {
         let sampled = [seen.tests(), seen.bytes(), seen.madds].map(|count| count as f64);
         let interval =
             [answer.tests() as f64 + made, answer.bytes() as f64 + 4.0 * made, answer.madds as f64];

@@ -108,7 +108,7 @@ impl Public {
         })?;
         let answers = detect(&objects, &Search::default());
         let kept = answers.iter().filter(|answer| answer.verdict.may_collide());
-        let seen: Vec<_> = kept.clone().filter(|answer| answer.verdict.is_seen()).collect();
+        let seen: Vec<_> = kept.clone().filter(|answer| answer.verdict.is_contact()).collect();
         self.scenes += 1;
         self.known += scene.collide;
         self.seen += seen.len().min(scene.collide);

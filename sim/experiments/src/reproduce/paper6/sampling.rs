@@ -134,7 +134,7 @@ impl Checked {
             hole: largest_hole(points, torus).radius / radius,
             free: free_share(points, radius, torus, places),
             density: points.len() as f64 * ball(D) * radius.powi(D as i32),
-            thin_voids: found.thin_voids,
+            thin_voids: found.thin_regions,
         }
     }
 
@@ -155,7 +155,8 @@ fn thrown(row: &Darts, form: Form) -> Result<(job::Rasterized, PoissonDisk<3>), 
     let options =
         job::Options { radius: *row.radius_2d.get(form), rounds: *row.rounds.get(form), periodic: true };
     let size = [*row.side_px.get(form), *row.samples.get(form)];
-    let flat = rasterized(options, size, *row.seed.get(form), &GpuSpec::load("reference")?.pipeline)?;
+    let flat =
+        rasterized(options, size[0], size[1], *row.seed.get(form), &GpuSpec::load("reference")?.pipeline)?;
     let radius = *row.radius_3d.get(form);
     let spec =
         PoissonSpec { radius, domain: Domain::Torus, seed: *row.seed.get(form), spacing: Spacing::Double };

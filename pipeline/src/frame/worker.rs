@@ -1,0 +1,494 @@
+//! Worker: rasterizes the triangles of one bin, through tile tests, sample tests and the shading grid.
+
+use super::bin::Bin;
+use super::bin::{BinLog, SamplesHere, TestsHere, TileWork, Work};
+use super::pass::Pass;
+use super::surface::{Grid, own_pixel};
+use super::test_selection::TestSelector;
+use super::tile_tests::{Remaining, Subject, TestContext, TestTile};
+use super::vertices::Ready;
+use super::{Settings, Shading};
+use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
+use crate::geometry::Shear;
+use crate::memory::depths_fit;
+use crate::sample_test::{Hits, Target, test_screened};
+use crate::sampling::TileSamples;
+use crate::setup::{PixelRect, Triangle};
+use crate::shading::QuadSet;
+use crate::traversal::{Box5, Screen, TileRect};
+use crate::{sample_test, traversal};
+
+/// Memory reused by a worker.
+#[derive(Default)]
+pub(super) struct Scratch {
+    /// Samples of the bin's tiles, filled on first use.
+    samples: Vec<TileSamples>,
+    filled: Vec<bool>,
+    /// The same samples through a pinhole, for triangles drawn in focus.
+    sharp: Vec<TileSamples>,
+    sharpened: Vec<bool>,
+    hits: Hits,
+    quads: QuadSet,
+}
+
+/// A worker with its results so far.
+pub(super) struct Worker<'a, 'p> {
+    pass: &'a Pass<'p>,
+    bin: &'a mut Bin,
+    scratch: &'a mut Scratch,
+    log: BinLog,
+    /// Tile tests since the last packet.
+    tests: TileWork,
+    /// Division of lens and time for depth culling.
+    grid: BoxGrid,
+    /// Depth bounds of the current triangle.
+    bounder: Option<(u32, Bounder)>,
+}
+
+impl<'a, 'p> Worker<'a, 'p> {
+    pub fn new(pass: &'a Pass<'p>, bin: &'a mut Bin, scratch: &'a mut Scratch) -> Self {
+        let Scratch { samples, filled, sharp, sharpened, .. } = scratch;
+        for (tiles, flags) in [(samples, filled), (sharp, sharpened)] {
+            tiles.resize_with(bin.tiles.len(), TileSamples::default);
+            flags.clear();
+            flags.resize(bin.tiles.len(), false);
+        }
+        let grid = pass.depth_grid();
+        Self { pass, bin, scratch, log: BinLog::default(), tests: TileWork::default(), grid, bounder: None }
+    }
+
+    /// Rasterize the `listed` triangles of a batch.
+    pub fn rasterize(mut self, batch: &[Ready], listed: &[u32]) -> BinLog {
+        for &index in listed {
+            self.triangle(&batch[index as usize]);
+        }
+        self.finish()
+    }
+
+    /// Rasterize one triangle in the tiles of the bin.
+    fn triangle(&mut self, ready: &Ready) {
+        let (side, coarse) = (self.pass.settings.spec.tile_px, self.pass.settings.spec.coarse_tile_px);
+        let subject = self.subject(ready);
+        let [x0, y0] = self.bin.origin;
+        let here = ready.pixels.intersection(&PixelRect { x0, y0, x1: x0 + coarse, y1: y0 + coarse });
+        let tiles = here.tiles(side);
+        self.tests.coarse_visited += 1;
+        let count = (tiles.x1 - tiles.x0) * (tiles.y1 - tiles.y0);
+        let coarse_tile = TestTile {
+            rect: TileRect::new(self.pass.settings.viewport, self.bin.origin, coarse),
+            tiles: Some(count),
+            samples: count * self.samples_of_a_tile(),
+        };
+        let Some(remaining) = subject.test(&coarse_tile, &Remaining::all(ready.within), &mut self.context())
+        else {
+            return;
+        };
+        for row in tiles.y0..tiles.y1 {
+            for column in tiles.x0..tiles.x1 {
+                let before = (self.tests, self.log.work.len());
+                self.tests.visited += 1;
+                self.fine(&subject, &remaining, [column * side, row * side]);
+                if self.pass.heat {
+                    self.note_tests(before, [column * side, row * side]);
+                }
+            }
+        }
+    }
+
+    fn samples_of_a_tile(&self) -> u32 {
+        self.pass.settings.spec.tile_px.pow(2) * self.pass.settings.samples.per_pixel()
+    }
+
+    fn context(&mut self) -> TestContext<'_> {
+        let features = &self.pass.settings.spec.features;
+        TestContext { features, work: &mut self.tests, selector: &mut self.bin.selector }
+    }
+
+    fn subject<'r>(&self, ready: &'r Ready) -> Subject<'r>
+    where
+        'a: 'r,
+    {
+        let shear = &self.pass.projection.shear;
+        Subject { triangle: &ready.triangle, lines: ready.lines.as_ref(), shear }
+    }
+
+    /// Record tile tests by tile, for heat maps. They are in the packet made since, or wait for the next one.
+    fn note_tests(&mut self, (before, packets): (TileWork, usize), origin: [u32; 2]) {
+        let index = self.tile_index(origin);
+        let after = self.log.work[packets..].last().map_or(self.tests, |work| work.tests);
+        self.log.tests.resize(self.bin.tiles.len(), TestsHere::default());
+        self.log.tests[index].add(&before, &after);
+    }
+
+    /// Rasterize one triangle in one tile, and record the cost of tiles without hits for `auto`.
+    fn fine(&mut self, subject: &Subject<'_>, remaining: &Remaining, origin: [u32; 2]) {
+        if !self.pass.settings.spec.features.auto {
+            return self.tile(subject, remaining, origin);
+        }
+        let before = (self.tests.tile_madds(), self.log.work.len());
+        self.tile(subject, remaining, origin);
+        let packet = self.log.work[before.1..].last();
+        let madds = packet.map_or(self.tests.tile_madds(), |work| {
+            work.tests.tile_madds() + work.screen_madds + work.sample_madds
+        });
+        self.bin
+            .selector
+            .record_tile(madds.saturating_sub(before.0), packet.is_none_or(|work| work.hit == 0));
+    }
+
+    /// Rasterize one triangle in one tile.
+    fn tile(&mut self, subject: &Subject<'_>, remaining: &Remaining, origin: [u32; 2]) {
+        let rect = TileRect::new(self.pass.settings.viewport, origin, self.pass.settings.spec.tile_px);
+        let tile = TestTile { rect, tiles: None, samples: self.samples_of_a_tile() };
+        let Some(mut remaining) = subject.test(&tile, remaining, &mut self.context()) else { return };
+        let index = self.tile_index(origin);
+        self.fill(index, origin, remaining.within.lens);
+        if let Some((within, in_front)) =
+            self.visible_part(subject.triangle, &tile.rect, &remaining.within, index)
+        {
+            if within != remaining.within {
+                let Some(narrowed) = remaining.narrowed(within) else { return };
+                remaining = narrowed;
+            }
+            let tested = self.samples(subject, &tile, &mut remaining, index);
+            if self.scratch.hits.screened + self.scratch.hits.tested > 0 {
+                if !self.pass.is_depth_only() {
+                    self.request_quads(subject.triangle, index, origin);
+                }
+                let small = self.small_pixels(subject.triangle, index, origin);
+                self.record(subject.triangle.id, (tested, small), in_front, origin);
+            }
+        }
+    }
+
+    /// Test the samples of a tile in each piece of the remaining time. Returns the dimensions of the tests.
+    fn samples(
+        &mut self,
+        subject: &Subject<'_>,
+        tile: &TestTile,
+        remaining: &mut Remaining,
+        index: usize,
+    ) -> [bool; 2] {
+        let screened = subject.wants_screen(tile, remaining, &mut self.context());
+        remaining.screened = screened;
+        let Scratch { samples, sharp, hits, .. } = &mut *self.scratch;
+        let drawn_sharp = self.pass.lens && !remaining.within.lens;
+        let samples = if drawn_sharp { &sharp[index] } else { &samples[index] };
+        let grid = self.grid;
+        let stored = self.bin.tiles[index].get_or_insert_with(|| DepthTile::cleared(grid, samples));
+        if self.pass.heat {
+            hits.by_pixel.get_or_insert_default();
+        }
+        hits.clear();
+        let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
+        let (times, near) = (remaining.times, self.pass.projection.near);
+        let (triangle, within) = unclipped(subject.triangle, remaining.within);
+        let mut savings = ScreenSavings::default();
+        for piece in times.pieces() {
+            let within = Box5 { t: piece.t, ..within };
+            let screen = screened.then(|| subject.screen(&tile.rect, remaining, piece, &mut self.tests));
+            let features = &self.pass.settings.spec.features;
+            let mut context =
+                TestContext { features, work: &mut self.tests, selector: &mut self.bin.selector };
+            let screen = screen.filter(|screen| subject.pays(screen, within.lens, &mut context));
+            let before = [hits.screened, hits.tested];
+            test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
+            if features.auto {
+                let counts = [hits.screened - before[0], hits.tested - before[1]];
+                savings.add(counts, screen.as_ref(), &mut self.bin.selector);
+            }
+        }
+        if self.pass.settings.spec.features.auto {
+            savings.record(hits, [triangle.moving, within.lens], remaining, &mut self.bin.selector);
+        }
+        if !hits.written.is_empty() {
+            let lowered = stored.record_writes(&hits.written);
+            self.tests.z_min_updates += if self.pass.settings.spec.depth.z_min { lowered } else { 0 };
+        }
+        [triangle.moving, within.lens]
+    }
+
+    /// Index in the bin of the tile at `origin`.
+    fn tile_index(&self, origin: [u32; 2]) -> usize {
+        let side = self.pass.settings.spec.tile_px;
+        let [column, row] = [0, 1].map(|axis| (origin[axis] - self.bin.origin[axis]) / side);
+        (row * Bin::tiles_across(self.pass) + column) as usize
+    }
+
+    fn fill(&mut self, index: usize, origin: [u32; 2], lens: bool) {
+        let (settings, shear) = (self.pass.settings, &self.pass.projection.shear);
+        let Scratch { samples, filled, sharp, sharpened, .. } = &mut *self.scratch;
+        let fill = |tile: &mut TileSamples, shear: &Shear, filled: &mut bool| {
+            if !std::mem::replace(filled, true) {
+                tile.fill(settings.samples, settings.viewport, shear, origin, settings.spec.tile_px);
+            }
+        };
+        fill(&mut samples[index], shear, &mut filled[index]);
+        if self.pass.lens && !lens {
+            fill(&mut sharp[index], &shear.sharp(), &mut sharpened[index]);
+        }
+    }
+
+    fn request_quads(&mut self, triangle: &Triangle, index: usize, origin: [u32; 2]) {
+        let Settings { spec, viewport, samples: source, .. } = *self.pass.settings;
+        let (samples, side) = (&self.scratch.samples[index], spec.tile_px);
+        let per_pixel = source.per_pixel();
+        let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
+        for slot in self.scratch.hits.written.iter().map(|&slot| slot as usize) {
+            match spec.shading {
+                Shading::Cached => self.scratch.quads.request(grid.cell(samples, slot, origin, side), 0),
+                Shading::PerSample => {
+                    let index =
+                        samples.in_image(slot, origin, side, viewport, per_pixel) % per_pixel as usize;
+                    self.scratch.quads.request(own_pixel(samples, slot, origin, side), index as u16);
+                }
+            }
+        }
+        let first = self.log.quads.len();
+        self.scratch.quads.drain_into(&mut self.log.quads);
+        if spec.shading == Shading::PerSample {
+            // Samples are shaded pixel by pixel rather than in the order of time.
+            self.log.quads[first..]
+                .sort_unstable_by_key(|access| (access.quad[1], access.quad[0], access.sample));
+        }
+    }
+
+    fn record(
+        &mut self,
+        triangle: u32,
+        ([moving, lens], small_pixels): ([bool; 2], [u64; 2]),
+        in_front: bool,
+        origin: [u32; 2],
+    ) {
+        let index = self.tile_index(origin);
+        let hits = &self.scratch.hits;
+        if let Some(edge_madds) = hits.by_pixel.as_deref().filter(|_| self.pass.heat) {
+            let madds = [traversal::screen_madds(moving, lens), sample_test::madds(moving, lens)];
+            self.log.samples.resize(self.bin.tiles.len(), None);
+            self.log.samples[index].get_or_insert_with(SamplesHere::new).add(edge_madds, madds);
+        }
+        self.log.work.push(Work {
+            triangle,
+            tile: Bin::tile_number(self.pass, origin),
+            tests: std::mem::take(&mut self.tests),
+            screened: hits.screened,
+            screen_madds: hits.screened * traversal::screen_madds(moving, lens),
+            tested: hits.tested,
+            hit: hits.hit,
+            unread: if in_front { hits.hit } else { 0 },
+            written: hits.written.len() as u32,
+            sample_madds: hits.tested * sample_test::madds(moving, lens),
+            read_pixels: hits.read_pixels,
+            written_pixels: hits.written_pixels,
+            small_pixels,
+            quads_end: self.log.quads.len() as u32,
+        });
+    }
+
+    /// Tile tests without a packet of their own go into a last packet.
+    fn finish(mut self) -> BinLog {
+        if !self.tests.is_empty() {
+            let tile = Bin::tile_number(self.pass, self.bin.origin);
+            let quads_end = self.log.quads.len() as u32;
+            self.log.work.push(Work {
+                triangle: u32::MAX,
+                tile,
+                tests: self.tests,
+                quads_end,
+                ..Work::default()
+            });
+        }
+        self.log
+    }
+}
+
+/// Triangle and box for the sample test. It reads the time of samples only for moving triangles, and their
+/// lens position only with a lens, so a clip plane forces that dimension.
+fn unclipped(triangle: &Triangle, within: Box5) -> (Triangle, Box5) {
+    let whole = Box5::whole(true);
+    let clipped_t = within.t[0] > whole.t[0] || within.t[1] < whole.t[1];
+    let clipped_lens = [within.u, within.v].iter().any(|[lo, hi]| *lo > -1.0 || *hi < 1.0);
+    let triangle = Triangle { moving: triangle.moving || clipped_t, ..*triangle };
+    (triangle, Box5 { lens: within.lens || clipped_lens, ..within })
+}
+
+/// State of the samples of one pixel.
+#[derive(Clone, Copy)]
+struct Pixel {
+    min: f32,
+    max: f32,
+    /// Cell that shades all samples so far; `None` if they differ.
+    cell: Option<[i32; 2]>,
+    seen: bool,
+}
+
+impl Pixel {
+    const NONE: Self = Self { min: f32::INFINITY, max: 0.0, cell: None, seen: false };
+
+    fn add(&mut self, depth: f32, cell: Option<[i32; 2]>) {
+        self.min = self.min.min(depth);
+        self.max = self.max.max(depth);
+        self.cell = if self.seen { self.cell.filter(|_| self.cell == cell) } else { cell };
+        self.seen = true;
+    }
+}
+
+impl Worker<'_, '_> {
+    /// Pixels written by `triangle` whose depths and whose colours now compress to half.
+    fn small_pixels(&self, triangle: &Triangle, index: usize, origin: [u32; 2]) -> [u64; 2] {
+        let Settings { spec, samples: source, .. } = *self.pass.settings;
+        let (compression, written) = (spec.memory.compression, self.scratch.hits.written_pixels);
+        let Some(stored) = self.bin.tiles[index].as_ref().filter(|_| compression.is_on() && written != 0)
+        else {
+            return [0; 2];
+        };
+        let samples = &self.scratch.samples[index];
+        let grid = Grid::new(self.pass, &triangle.corners, triangle.moving);
+        let colours = compression.colour && spec.shading == Shading::Cached;
+        let mut pixels = [Pixel::NONE; 64];
+        for slot in 0..samples.len {
+            let pixel = samples.pixel[slot] as usize;
+            if written & 1 << pixel != 0 {
+                let own = colours && stored.triangle[slot] == triangle.id;
+                let cell = own.then(|| grid.cell(samples, slot, origin, spec.tile_px));
+                pixels[pixel].add(stored.depth[slot], cell);
+            }
+        }
+        let count = source.per_pixel();
+        let fit = |pixel: &Pixel| {
+            let depth = compression.depth && pixel.seen && depths_fit(pixel.min, pixel.max, count);
+            [depth, count > 1 && pixel.cell.is_some()]
+        };
+        pixels.iter().enumerate().fold([0; 2], |[depth, colour], (at, pixel)| {
+            let [small, same] = fit(pixel);
+            [depth | u64::from(small) << at, colour | u64::from(same) << at]
+        })
+    }
+}
+
+/// Savings of screens in a tile, for the test selector.
+#[derive(Default)]
+struct ScreenSavings {
+    /// Samples considered.
+    samples: u32,
+    screened: u32,
+    taken: u32,
+}
+
+impl ScreenSavings {
+    /// Add a piece of the time: the numbers of samples screened and tested.
+    pub fn add(
+        &mut self,
+        [screened, tested]: [u32; 2],
+        screen: Option<&Screen>,
+        selector: &mut TestSelector,
+    ) {
+        let Some(screen) = screen else {
+            self.samples += tested;
+            return;
+        };
+        self.samples += screened;
+        self.screened += screened;
+        self.taken += screened - tested;
+        if screened > 0 {
+            let share = f64::from(screened - tested) / f64::from(screened);
+            selector.record_screen(screen.gain(), share, f64::from(screened));
+        }
+    }
+
+    /// Record the cost in these dimensions and the savings of all pieces.
+    pub fn record(
+        &self,
+        hits: &Hits,
+        [moving, lens]: [bool; 2],
+        remaining: &Remaining,
+        selector: &mut TestSelector,
+    ) {
+        let (test_madds, cost) = (sample_test::madds(moving, lens), traversal::screen_madds(moving, lens));
+        if remaining.screened {
+            let saved = f64::from(self.taken * test_madds) - f64::from(self.screened * cost);
+            let share = saved / f64::from((self.samples * test_madds).max(1));
+            selector.record_set_up(share, f64::from(self.samples));
+        }
+        let madds = hits.screened * cost + hits.tested * test_madds;
+        let on_hits = hits.hit * test_madds + hits.hit.min(hits.screened) * cost;
+        let misses = [self.samples - hits.hit, madds.saturating_sub(on_hits)];
+        selector.record_samples(remaining.facing, misses, [self.samples, madds]);
+    }
+}
+
+impl Worker<'_, '_> {
+    /// Part of lens and time that stored depths leave visible in the tile, and whether no stored depth has to
+    /// be read for it. `None` if the triangle is hidden.
+    fn visible_part(
+        &mut self,
+        triangle: &Triangle,
+        rect: &TileRect,
+        within: &Box5,
+        index: usize,
+    ) -> Option<(Box5, bool)> {
+        let (features, depth) = (&self.pass.settings.spec.features, &self.pass.settings.spec.depth);
+        if !features.z_max && !depth.z_min {
+            return Some((*within, false));
+        }
+        if !self.wants_depth(triangle, within, index) {
+            return Some((*within, false));
+        }
+        self.prepare(triangle);
+        let mut visible = Visible::unknown(within);
+        if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[index]) {
+            self.tests.z_updates += if features.z_max { tile.update_farthest() } else { 0 };
+            visible = tile.boxes.compare(within, |part| bounder.over(rect, part));
+        }
+        self.tests.z_tests += visible.compared;
+        self.tests.interval_madds +=
+            visible.compared * interval_madds(depth.bound, triangle.moving, within.lens);
+        if features.auto {
+            self.record_depth(triangle, within, &visible);
+        }
+        if !features.z_max {
+            return Some((*within, visible.in_front && visible.behind == 0));
+        }
+        self.tests.boxes_culled += visible.behind;
+        self.tests.z_culled += u32::from(visible.within.is_none());
+        // The sample test considers a still triangle at all times.
+        let time = |part: Box5| Box5 { t: if triangle.moving { part.t } else { within.t }, ..part };
+        let front = depth.z_min && visible.in_front && (triangle.moving || visible.behind == 0);
+        visible.within.map(|part| (time(part), front))
+    }
+
+    /// Whether stored depths are expected to save more than their test costs.
+    fn wants_depth(&mut self, triangle: &Triangle, within: &Box5, index: usize) -> bool {
+        let (features, depth) = (&self.pass.settings.spec.features, &self.pass.settings.spec.depth);
+        if !features.auto || depth.z_min {
+            return true;
+        }
+        if self.bin.tiles[index].is_none() {
+            return false;
+        }
+        let samples = f64::from(self.samples_of_a_tile()) * Remaining::all(*within).volume(triangle.moving);
+        let selector = &mut self.bin.selector;
+        let known = self.bounder.as_ref().is_some_and(|(id, _)| *id == triangle.id);
+        let set_up = if known { 0 } else { set_up_madds(depth.bound, triangle.moving) };
+        let cost = interval_madds(depth.bound, triangle.moving, within.lens) + set_up;
+        let test_madds = f64::from(sample_test::madds(triangle.moving, within.lens));
+        let workload = samples * selector.sample_madds(test_madds);
+        selector.wants_depth(f64::from(cost), workload)
+    }
+
+    fn record_depth(&mut self, triangle: &Triangle, within: &Box5, visible: &Visible) {
+        let before = Remaining::all(*within).volume(triangle.moving);
+        let part = visible.within.map_or(0.0, |part| Remaining::all(part).volume(triangle.moving) / before);
+        let share = if part.is_finite() { 1.0 - part } else { 0.0 };
+        self.bin.selector.record_depth(share, f64::from(self.samples_of_a_tile()) * before);
+    }
+
+    /// Prepare the depth bounds of the triangle, once per bin.
+    fn prepare(&mut self, triangle: &Triangle) {
+        if self.bounder.as_ref().is_none_or(|(id, _)| *id != triangle.id) {
+            let bound = self.pass.settings.spec.depth.bound;
+            self.tests.interval_madds += set_up_madds(bound, triangle.moving);
+            self.bounder = Some((triangle.id, Bounder::new(triangle, &self.pass.projection.shear, bound)));
+        }
+    }
+}

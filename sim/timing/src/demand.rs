@@ -1,0 +1,249 @@
+//! Service demand of packets: the cycles a packet needs at each station of one machine. All levels read the
+//! same demands.
+
+use std::ops::Range;
+
+use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind, Unit};
+
+use crate::MachineSpec;
+
+/// A station on the path of a packet. The shader cores are two stations, one for vertices and one for pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+#[allow(missing_docs, reason = "the units of the block diagram")]
+pub enum Station {
+    Command,
+    Vertex,
+    Setup,
+    Traversal,
+    ZCull,
+    SampleTest,
+    Depth,
+    ShadingCache,
+    Pixel,
+    Colour,
+}
+
+impl Station {
+    /// All stations, in stream order.
+    pub const ALL: [Self; 10] = [
+        Self::Command,
+        Self::Vertex,
+        Self::Setup,
+        Self::Traversal,
+        Self::ZCull,
+        Self::SampleTest,
+        Self::Depth,
+        Self::ShadingCache,
+        Self::Pixel,
+        Self::Colour,
+    ];
+    /// Number of stations.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// Unit at the station.
+    pub const fn unit(self) -> Unit {
+        match self {
+            Self::Command => Unit::Command,
+            Self::Vertex | Self::Pixel => Unit::Shader,
+            Self::Setup => Unit::Setup,
+            Self::Traversal => Unit::Traversal,
+            Self::ZCull => Unit::ZCull,
+            Self::SampleTest => Unit::SampleTest,
+            Self::Depth => Unit::Depth,
+            Self::ShadingCache => Unit::ShadingCache,
+            Self::Colour => Unit::Colour,
+        }
+    }
+}
+
+/// Clients of the L2, in the order of its ports.
+pub const CLIENTS: [Unit; 4] = [Unit::Command, Unit::Depth, Unit::Texture, Unit::Colour];
+
+/// Port of the texture units.
+pub const TEXTURE_PORT: usize = 2;
+
+/// Port of a client of the L2; `None` for other units.
+pub fn port(unit: Unit) -> Option<usize> {
+    CLIENTS.iter().position(|&client| client == unit)
+}
+
+/// Service demand of one packet.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ServiceDemand {
+    /// Whether the packet takes the front end (command to set-up) or the tile path (traversal to colour).
+    pub front: bool,
+    /// Batch number.
+    pub batch: u32,
+    /// Last station with work.
+    pub last: Station,
+    /// Cycles of service at each station; 0 at the shader cores.
+    pub service: [u32; Station::COUNT],
+    /// Shader threads.
+    pub threads: u32,
+    /// Operations per thread.
+    pub ops: u32,
+    /// Bilinear fetches of all threads, and texture cache lines they read.
+    pub texels: [u32; 2],
+    /// Index of the first line in the store.
+    pub first_line: usize,
+    /// Lines requested by each client, in the order of [`CLIENTS`].
+    pub lines: [u32; 4],
+}
+
+impl ServiceDemand {
+    /// Index range of one client's lines in the store.
+    pub fn lines_of(&self, port: usize) -> Range<usize> {
+        let before: u32 = self.lines[..port].iter().sum();
+        let first = self.first_line + before as usize;
+        first..first + self.lines[port] as usize
+    }
+
+    /// Whether the threads use the texture units.
+    pub fn is_textured(&self) -> bool {
+        self.texels != [0; 2] || self.lines[TEXTURE_PORT] > 0
+    }
+
+    /// Number of warps of at most `lanes` threads.
+    pub fn warps(&self, lanes: u32) -> u32 {
+        self.threads.div_ceil(lanes)
+    }
+}
+
+/// Range of `whole` that belongs to part number `part` of `parts`; the ranges cover `whole` exactly.
+pub fn share(whole: u32, part: u32, parts: u32) -> Range<u32> {
+    let up_to = |part: u32| (u64::from(whole) * u64::from(part) / u64::from(parts.max(1))) as u32;
+    up_to(part)..up_to(part + 1)
+}
+
+/// Builder of service demands from packets.
+#[derive(Clone, Debug)]
+pub struct DemandBuilder {
+    /// Cycles per event, by station.
+    costs: [Vec<(Event, f64)>; Station::COUNT],
+    texel_cycles: [f64; 2],
+    batch_triangles: u32,
+    batch: u32,
+}
+
+impl DemandBuilder {
+    /// A builder for packets in batches of `batch_triangles` on `machine`.
+    pub fn new(machine: &MachineSpec, batch_triangles: u32) -> Self {
+        let costs = Station::ALL.map(|station| {
+            let rates = machine.common(station.unit()).rates;
+            rates.iter().flat_map(|rates| rates.iter()).map(|(event, rate)| (event, rate.recip())).collect()
+        });
+        let cycles = |event| {
+            machine.texture.rates.iter().find(|(e, _)| *e == event).map_or(0.0, |(_, rate)| rate.recip())
+        };
+        Self {
+            costs,
+            texel_cycles: [Event::TextureFetches, Event::TextureLines].map(cycles),
+            batch_triangles: batch_triangles.max(1),
+            batch: 0,
+        }
+    }
+
+    /// Demand of the next packet of the stream. `lines` are appended to `store`, sorted by client.
+    pub fn build(
+        &mut self,
+        packet: &Packet,
+        lines: &[LineAccess],
+        store: &mut Vec<LineAccess>,
+    ) -> ServiceDemand {
+        let counts = &packet.counts;
+        let front = matches!(packet.kind, PacketKind::Draw | PacketKind::Vertices);
+        let batch = self.batch_of(packet, front);
+        let stations = if front { Station::Command as usize..3 } else { 3..Station::COUNT };
+        let mut demand = ServiceDemand {
+            front,
+            batch,
+            last: if front { Station::Command } else { Station::Traversal },
+            service: [0; Station::COUNT],
+            threads: counts[if front { Event::VertexInvocations } else { Event::PixelInvocations }],
+            ops: 0,
+            texels: [counts[Event::TextureFetches], counts[Event::TextureLines]],
+            first_line: store.len(),
+            lines: [0; 4],
+        };
+        demand.ops = counts[Event::ShaderOps].div_ceil(demand.threads.max(1));
+        if !lines.is_empty() {
+            demand.lines = sorted(lines, store);
+        }
+        for station in &Station::ALL[stations] {
+            let used = counts.uses(station.unit())
+                || port(station.unit()).is_some_and(|port| demand.lines[port] > 0);
+            if used {
+                demand.last = *station;
+                demand.service[*station as usize] = self.cycles(*station, counts);
+            }
+        }
+        demand
+    }
+
+    /// Cycles of the texture units for `fetches` and `lines`.
+    pub fn texture_cycles(&self, fetches: u32, lines: u32) -> u32 {
+        let [fetch, line] = self.texel_cycles;
+        whole((f64::from(fetches) * fetch).max(f64::from(lines) * line))
+    }
+
+    /// Cycles of service at `station` for `counts`, without line requests. The parts of a unit work in
+    /// parallel, so the slowest one counts.
+    fn cycles(&self, station: Station, counts: &PacketCounts) -> u32 {
+        let parts =
+            self.costs[station as usize].iter().map(|&(event, cycles)| f64::from(counts[event]) * cycles);
+        whole(parts.fold(0.0, f64::max))
+    }
+
+    fn batch_of(&mut self, packet: &Packet, front: bool) -> u32 {
+        let own = packet.triangle / self.batch_triangles;
+        match packet.kind {
+            PacketKind::Tile if packet.triangle != u32::MAX => self.batch = own,
+            _ => {}
+        }
+        if front { own } else { self.batch }
+    }
+}
+
+/// Append `lines` to `store`, grouped by client in the order of the ports. Returns the number per client.
+fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; 4] {
+    CLIENTS.map(|client| {
+        let before = store.len();
+        store.extend(lines.iter().filter(|access| access.client == client));
+        (store.len() - before) as u32
+    })
+}
+
+/// Round up, except for excess within rounding error.
+fn whole(cycles: f64) -> u32 {
+    let cycles = (cycles - 1e-6).max(0.0);
+    // `f64::ceil` is a function call on x86-64 without SSE4.1.
+    let below = cycles as u32;
+    below.saturating_add(u32::from(f64::from(below) < cycles))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_add_up() {
+        for (whole, parts) in [(0, 1), (7, 3), (100, 7), (3, 5)] {
+            assert_eq!((0..parts).map(|part| share(whole, part, parts).len() as u32).sum::<u32>(), whole);
+        }
+    }
+
+    #[test]
+    fn the_texture_port_belongs_to_the_texture_units() {
+        assert_eq!(port(Unit::Texture), Some(TEXTURE_PORT));
+    }
+
+    #[test]
+    fn cycles_round_up_except_for_rounding_errors() {
+        assert_eq!(
+            [0.0, 0.2, 1.0, 3.0 * (1.0 / 3.0), 49.0 * (1.0 / 49.0), 2.1].map(whole),
+            [0, 1, 1, 1, 1, 3]
+        );
+        assert_eq!([4.2e9, 1e10, 1e300].map(whole), [4_200_000_000, u32::MAX, u32::MAX]);
+    }
+}

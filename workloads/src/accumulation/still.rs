@@ -1,0 +1,178 @@
+//! Still renderings: shared samples, pinholes and snapshots of moving geometry.
+
+use glam::{Affine3A, Vec2, Vec3};
+use pipeline::geometry::Projection;
+use pipeline::sampling::{Pattern, Sample, SampleSource, SampleSpec, TableError};
+use pipeline::setup::Corner;
+use pipeline::{Camera, CameraError, Draw, DrawError, Geometry, SampleTable, Viewport};
+
+/// Samples that all pixels share.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SharedSamples(Vec<Sample>);
+
+impl SharedSamples {
+    /// Takes 1 to 256 samples in range; `None` otherwise.
+    pub fn new(samples: Vec<Sample>) -> Option<Self> {
+        let fits = (1..=SampleTable::MAX_PER_PIXEL as usize).contains(&samples.len());
+        (fits && samples.iter().all(Sample::is_in_range)).then_some(Self(samples))
+    }
+
+    /// A fixed set of `count` samples of lens and time: those of the first pixel of a table. Patterns that
+    /// differ between pixels are accepted.
+    ///
+    /// # Errors
+    /// [`TableError`] if the table cannot be made.
+    pub fn from_spec(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, TableError> {
+        Ok(Self(SampleTable::new(spec, count, seed)?.pixel(0, 0).to_vec()))
+    }
+
+    /// The first `count` samples of a scrambled Sobol sequence.
+    ///
+    /// # Errors
+    /// [`TableError`] unless `count` is 1 to 256.
+    pub fn interleaved(spec: &SampleSpec, count: u32, seed: u64) -> Result<Self, TableError> {
+        let pattern = Pattern::Interleaved { points: count.max(1) };
+        Self::from_spec(&SampleSpec { pattern, ..spec.clone() }, count, seed)
+    }
+
+    /// The samples.
+    pub fn samples(&self) -> &[Sample] {
+        &self.0
+    }
+
+    /// The same samples at the pixel centre.
+    #[must_use]
+    pub fn centred(&self) -> Self {
+        Self(self.0.iter().map(|sample| Sample { x: 0.5, y: 0.5, ..*sample }).collect())
+    }
+
+    /// One sample at the lens centre and time 0.
+    pub fn still(&self, index: usize) -> Self {
+        let Sample { x, y, .. } = self.0[index];
+        Self(vec![Sample { x, y, ..Sample::default() }])
+    }
+}
+
+impl SampleSource for SharedSamples {
+    fn per_pixel(&self) -> u32 {
+        self.0.len() as u32
+    }
+
+    fn pixel_into(&self, _px: u32, _py: u32, into: &mut [Sample]) {
+        into.copy_from_slice(&self.0);
+    }
+}
+
+/// The pinhole at lens position `(u, v)` of `camera`, with the image shifted so that points in focus stay in
+/// place. A lens of radius `R` focused at `F` shifts a point at depth `w` by `u R (1 / F - 1 / w)` in the
+/// image at depth 1. Moving the camera by `u R` and its image by `u R / F` does the same (Haeberli and Akeley
+/// 1990). A camera without a lens, or an orthographic one, is returned unchanged.
+///
+/// # Errors
+/// [`CameraError`] if the lens is so large that the position is not finite.
+pub fn pinhole(camera: &Camera, [u, v]: [f32; 2]) -> Result<Camera, CameraError> {
+    let Some(lens) = camera.lens().filter(|_| !camera.is_orthographic()) else { return Ok(*camera) };
+    let by = Vec2::new(u, v) * lens.radius();
+    let moved = |pose: Affine3A| Affine3A::from_translation(Vec3::new(-by.x, -by.y, 0.0)) * pose;
+    // The image is twice the tangent high, and its y points down.
+    let shift = by * Vec2::new(1.0, -1.0) / (2.0 * camera.half_height() * lens.focus());
+    let still = camera.with_lens(None).moving(moved(camera.open()), moved(camera.close()))?;
+    still.with_shift(camera.shift() + shift)
+}
+
+/// Still meshes on the image plane of a pinhole, and their camera.
+///
+/// Vertices are projected and moved to their position at time `t` and lens position `(u, v)`, each with the
+/// single rounding of the sample test of a 5D pass. So without a lens, or with its focus at infinity, the
+/// snapshot equals the sample `(u, v, t)` of that pass bit for bit. (A lens with a finite focus shifts a
+/// sample by its depth, which rounds in another order.)
+pub struct Snapshot<'a> {
+    meshes: Vec<Vec<Vec3>>,
+    draws: Vec<Draw<'a>>,
+    /// A pinhole without projection: the meshes are already on its image plane.
+    pub camera: Camera,
+}
+
+/// Reason why a snapshot cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the variants are the sources, documented there")]
+pub enum SnapshotError {
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+}
+
+impl<'a> Snapshot<'a> {
+    /// Snapshot of `draws` in `camera`, for an image of the size of `viewport`, at the time and lens position
+    /// of `at`.
+    ///
+    /// # Errors
+    /// [`SnapshotError`] if no camera exists for the viewport.
+    pub fn new(
+        camera: &Camera,
+        draws: &[Draw<'a>],
+        viewport: Viewport,
+        at: &Sample,
+    ) -> Result<Self, SnapshotError> {
+        let projection = Projection::new(camera, viewport);
+        let base = [at.u * projection.shear.s[0], at.v * projection.shear.s[1]];
+        let place = |(open, close): (&Vec3, &Vec3)| {
+            let [x, y, w] = Corner::new(&projection.vertex(*open, *close)).at(at.t);
+            // In the image y points down, in world space up.
+            Vec3::new(x - base[0], -(y - base[1]), w)
+        };
+        let mesh = |draw: &Draw<'a>| {
+            draw.geometry.open().iter().zip(draw.geometry.close()).map(place).collect::<Vec<_>>()
+        };
+        // One scene unit at depth 1 is a pixel.
+        let camera = Camera::new(Affine3A::IDENTITY, 0.5 * viewport.height() as f32, camera.near())?;
+        Ok(Self { meshes: draws.iter().map(mesh).collect(), draws: draws.to_vec(), camera })
+    }
+
+    /// The still draws, with the order, triangles, shaders and culling of the original ones.
+    ///
+    /// # Errors
+    /// [`SnapshotError`] if a vertex is not finite.
+    pub fn draws(&self) -> Result<Vec<Draw<'_>>, SnapshotError> {
+        let pairs = self.meshes.iter().zip(&self.draws);
+        let still = pairs.map(|(mesh, draw)| {
+            Ok(Draw { geometry: Geometry::new(mesh, mesh, draw.geometry.triangles())?, ..*draw })
+        });
+        still.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pipeline::geometry::Projection;
+    use pipeline::{Lens, Viewport};
+
+    use super::*;
+
+    /// Compares with the lens formula, at depths before, in and behind the focus.
+    #[test]
+    fn a_pinhole_sees_the_same_as_its_lens_position() {
+        let lens = Lens::new(0.3, 4.0).unwrap();
+        let camera = Camera::new(Affine3A::from_rotation_y(0.2), 0.7, 0.1).unwrap();
+        let camera = camera.with_shift(Vec2::new(0.1, -0.05)).unwrap().with_lens(Some(lens));
+        let viewport = Viewport::new(640, 480).unwrap();
+        let wide = Projection::new(&camera, viewport);
+        for [u, v] in [[0.0, 0.0], [1.0, 0.0], [-0.4, 0.9]] {
+            let one = Projection::new(&pinhole(&camera, [u, v]).unwrap(), viewport);
+            for point in [Vec3::new(0.2, -0.3, 2.0), Vec3::new(-1.0, 0.4, 4.0), Vec3::new(2.0, 1.0, 19.0)] {
+                let [x, y, w] = wide.vertex(point, point).open.map(f64::from);
+                let place = [(x, 0, u), (y, 1, v)].map(|(at, axis, place)| {
+                    at / w
+                        + f64::from(place)
+                            * (f64::from(wide.shear.a[axis]) - f64::from(wide.shear.s[axis]) / w)
+                });
+                let [px, py, pw] = one.vertex(point, point).open.map(f64::from);
+                let error_px = (place[0] - px / pw).abs().max((place[1] - py / pw).abs());
+                assert!(error_px < 2e-4, "{error_px} px at {u} {v} {point}");
+            }
+        }
+        let bare = camera.with_lens(None);
+        assert_eq!(pinhole(&bare, [1.0, 1.0]).unwrap(), bare);
+    }
+}
