@@ -1,4 +1,4 @@
-//! The command `quintile`: arguments, progress, exit codes. What it does is in the crates it calls: [`run`], [`experiments`],
-//! [`traces`], [`output`].
+//! The command `quintile`: arguments, progress, exit codes. The work is done by the crates [`run`],
+//! [`experiments`], [`traces`], [`output`].
 
 pub mod cli;

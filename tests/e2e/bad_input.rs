@@ -1,5 +1,5 @@
-//! Bad input: one clear message that names file, place and mend; exit code 2 for what was asked wrongly, 1 for what
-//! failed; no panic.
+//! Bad input: one message with file, place and remedy. Exit code 2 for usage errors, 1 for failures; no
+//! panic.
 
 use std::fs;
 
@@ -48,7 +48,7 @@ fn flags() {
 }
 
 #[test]
-fn flags_that_a_workload_has_no_use_for() {
+fn flags_without_effect_on_a_workload_are_refused() {
     let mut refusals = Refusals::default();
     let cases: [(&[&str], &[&str]); 7] = [
         (&["occlusion", "--lens", "0.3"], &["--lens", "`occlusion`", "--set lens="]),
@@ -65,7 +65,7 @@ fn flags_that_a_workload_has_no_use_for() {
 }
 
 #[test]
-fn files_that_hold_nothing_that_could_collide() {
+fn files_without_triangles_are_refused_by_ccd() {
     let mut refusals = Refusals::default();
     let inputs = Inputs::new();
     let empty = inputs.put("empty.mts", mts(&[]));
@@ -77,7 +77,7 @@ fn files_that_hold_nothing_that_could_collide() {
 }
 
 #[test]
-fn a_frame_rate_that_cannot_be() {
+fn invalid_frame_rates() {
     let mut refusals = Refusals::default();
     for rate in ["-60", "0", "NaN", "1e9", "1e-9"] {
         refusals.call(&["tiny", "--rate", rate], 2, &["rate"]);
@@ -85,7 +85,7 @@ fn a_frame_rate_that_cannot_be() {
 }
 
 #[test]
-fn names_of_nothing() {
+fn unknown_names() {
     let mut refusals = Refusals::default();
     refusals.call(&["tinny"], 2, &["tinny", "did you mean `tiny`?"]);
     refusals.call(&["samplng"], 2, &["samplng", "did you mean `sampling`?", "workloads: caustics, ccd, "]);
@@ -100,7 +100,7 @@ fn names_of_nothing() {
 }
 
 #[test]
-fn files_that_are_not_there() {
+fn missing_files() {
     let mut refusals = Refusals::default();
     for scene in ["gone.glb", "gone.gltf", "gone.ron", "gone.ply", "gone.ply.gz", "gone.obj"] {
         refusals.call(&[scene], 1, &[scene, "No such file"]);
@@ -118,7 +118,7 @@ fn files_that_are_not_there() {
 
 #[cfg(unix)]
 #[test]
-fn names_that_are_no_text() {
+fn names_that_are_not_unicode() {
     let mut refusals = Refusals::default();
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
@@ -128,7 +128,7 @@ fn names_that_are_no_text() {
 }
 
 #[test]
-fn a_glb_cut_anywhere() {
+fn truncated_glb_files() {
     let mut refusals = Refusals::default();
     let whole = Glb::square().bytes();
     for length in [4, 11, 12, 19, 40, whole.len() / 2, whole.len() - 60, whole.len() - 1] {
@@ -139,7 +139,7 @@ fn a_glb_cut_anywhere() {
 
 #[test]
 #[cfg_attr(not(real_scenes), ignore = "QUINTILE_SCENES is not set")]
-fn a_real_glb_cut_at_a_third() {
+fn a_truncated_real_glb_file() {
     let bytes = fs::read(real_scene("Fox.glb")).expect("the fox is there");
     Refusals::default().file("fox.glb", &bytes[..bytes.len() / 3], 1, &["truncated", "get the file again"]);
 }
@@ -164,7 +164,7 @@ fn indices_out_of_range() {
     refusals.file("a.ply", ply("3", "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), 1, &["triangle 0", "vertex 9"]);
 }
 
-/// An ASCII PLY of so many vertices and one face.
+/// ASCII PLY file with one face and this number of vertices.
 fn ply(vertices: &str, body: &str) -> String {
     format!(
         "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
@@ -173,7 +173,7 @@ fn ply(vertices: &str, body: &str) -> String {
 }
 
 #[test]
-fn vertices_that_are_no_numbers() {
+fn vertices_that_are_not_finite() {
     let mut refusals = Refusals::default();
     for (bad, word) in [(f32::NAN, "NaN"), (f32::INFINITY, "infinite")] {
         let corners = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, bad, 0.0], [0.0, 1.0, 0.0]];
@@ -189,7 +189,7 @@ fn vertices_that_are_no_numbers() {
 }
 
 #[test]
-fn geometry_files_that_are_something_else() {
+fn geometry_files_of_another_format() {
     let mut refusals = Refusals::default();
     for name in ["a.glb", "a.gltf", "a.ply", "a.obj", "a.ply.gz", "a.obj.gz"] {
         refusals.file(name, b"\x89PNG\r\n\x1a\n\0\0\xff\xfe no geometry", 1, &[]);
@@ -203,7 +203,7 @@ fn geometry_files_that_are_something_else() {
 }
 
 #[test]
-fn scenes_with_nothing_in_them() {
+fn empty_scenes() {
     let mut refusals = Refusals::default();
     refusals.file("a.ron", "(objects: [])", 2, &["objects", "add a `file` or a `shape`"]);
     refusals.file("a.obj", "v 0 0 0\n", 1, &[]);
@@ -213,7 +213,7 @@ fn scenes_with_nothing_in_them() {
 }
 
 #[test]
-fn scene_files_with_mistakes() {
+fn invalid_scene_files() {
     let mut refusals = Refusals::default();
     let sphere = "objects: [(shape: Sphere(radius: 1))]";
     let cases = [
@@ -236,7 +236,7 @@ fn scene_files_with_mistakes() {
 }
 
 #[test]
-fn gpu_and_platform_files_with_mistakes() {
+fn invalid_gpu_and_platform_files() {
     let mut refusals = Refusals::default();
     let source =
         |path: &str| fs::read_to_string(crate::support::root().join(path)).expect("a file of the repository");

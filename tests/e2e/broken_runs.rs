@@ -1,11 +1,11 @@
-//! Failure modes: however a run dies, nothing it leaves looks like a whole result, and the results of the run before stay whole.
+//! Failed runs leave no partial results, and the results of the previous run stay complete.
 
 use std::fs;
 use std::path::Path;
 
 use crate::support::{Inputs, Refusals, quintile};
 
-/// The tests may run as root, whom no permission stops: a file stands where the folder should be.
+/// A file has the name of the folder, because permissions do not stop tests that run as root.
 #[test]
 fn results_that_cannot_be_written() {
     let mut refusals = Refusals::default();
@@ -18,9 +18,9 @@ fn results_that_cannot_be_written() {
     assert_eq!(fs::read_to_string(&file).ok().as_deref(), Some("not a folder"));
 }
 
-/// What no run can write over is found before any work, and the results of the run before stay as they are.
+/// Files that cannot be overwritten are reported before the work, and the previous results stay unchanged.
 #[test]
-fn what_stands_in_the_way_leaves_old_results_alone() {
+fn unwritable_files_leave_previous_results_unchanged() {
     let mut refusals = Refusals::default();
     for (name, is_folder) in [
         ("images", false),
@@ -44,7 +44,7 @@ fn what_stands_in_the_way_leaves_old_results_alone() {
     }
 }
 
-/// Puts something into the place of `path` that no run can write over.
+/// Replaces `path` with something that a run cannot overwrite.
 fn block(path: &Path, with_folder: bool) {
     if path.is_dir() {
         fs::remove_dir_all(path).expect("results can be removed");
@@ -58,9 +58,9 @@ fn block(path: &Path, with_folder: bool) {
     }
 }
 
-/// A mistake that is noticed before anything is written leaves the results of the run before whole.
+/// A usage error leaves the results of the previous run complete.
 #[test]
-fn a_mistake_in_the_call_leaves_old_results_alone() {
+fn a_usage_error_leaves_previous_results_unchanged() {
     let mut refusals = Refusals::default();
     let results = quintile().run("tiny", &[]);
     let out = results.folder().display().to_string();
@@ -70,11 +70,11 @@ fn a_mistake_in_the_call_leaves_old_results_alone() {
     assert!(before == results.files());
 }
 
-/// Runs that no machine holds in memory are refused at once instead of ending in an abort. The limits are those of a
-/// small machine: 4 GB and 20 s.
+/// Runs that exceed memory are refused at once, without an abort. The limits are those of a small machine: 4
+/// GB and 20 s.
 #[cfg(target_os = "linux")]
 #[test]
-fn runs_beyond_all_memory() {
+fn runs_that_exceed_memory() {
     let mut refusals = Refusals::default();
     let inputs = Inputs::new();
     let still =

@@ -1,4 +1,4 @@
-//! Cameras: chosen, described, placed inside, printed and given back.
+//! Cameras: chosen, described, placed inside, printed and reused.
 
 use crate::support::{Glb, Inputs, Refusals, Results, quintile};
 use serde_json::{Value, json};
@@ -16,7 +16,7 @@ fn images(scene: &str, args: &[&str]) -> [Vec<u8>; 2] {
     [0, 1].map(|frame| results.bytes(&format!("images/frame_000{frame}.png")))
 }
 
-/// What `quintile info` says of the scene that such a run sees.
+/// Output of `quintile info` for the scene of such a run.
 fn info(scene: &str, args: &[&str]) -> Value {
     let ended = quintile().call([&["info", scene, "--json"], &SMALL[..], args].concat());
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
@@ -61,7 +61,7 @@ fn two_cameras() -> Glb {
 }
 
 #[test]
-fn a_camera_that_is_printed_and_given_back_makes_the_same_bytes() {
+fn a_printed_camera_gives_the_same_bytes_when_reused() {
     let inputs = Inputs::new();
     let moving = |camera: &str| {
         format!(
@@ -103,7 +103,7 @@ fn a_camera_in_a_file_or_typed_with_parentheses_is_the_same() {
     assert!(expected == images("tiny", &["--camera", &format!("({fields})")]));
     assert!(expected == images("tiny", &["--camera", &file]));
     assert!(expected != images("tiny", &[]));
-    // The image and the samples may stand in the file, and the command line comes after it.
+    // The file may set image and samples; the command line overrides them.
     let whole = inputs.put("whole.ron", format!("(width: 48, height: 32, samples: 2, {fields})"));
     let results = quintile().run("tiny", &["--frames", "0..2", "--camera", &whole]);
     assert!(expected[0] == results.bytes("images/frame_0000.png"));
@@ -132,7 +132,7 @@ fn the_camera_of_a_scene_file_is_its_number_0() {
 }
 
 #[test]
-fn lens_and_focus_of_a_camera_are_used_and_the_command_line_comes_after() {
+fn the_command_line_overrides_lens_and_focus_of_a_camera() {
     let camera = "position: (0, 1.5, 5), target: (0, 1.5, 0)";
     let lens = format!("{camera}, lens_radius: 0.2");
     let found = info("tiny", &["--camera", &lens]);
@@ -141,7 +141,7 @@ fn lens_and_focus_of_a_camera_are_used_and_the_command_line_comes_after() {
     let pinhole = images("tiny", &["--camera", &lens, "--lens", "0"]);
     assert!(pinhole == images("tiny", &["--camera", &format!("{camera}, lens_radius: 0, focus: 3")]));
     assert!(pinhole != images("tiny", &["--camera", &lens]));
-    // The focus depth of the scene's own camera means nothing to another one.
+    // The focus depth of the scene's own camera does not apply to another one.
     let inputs = Inputs::new();
     let scene = inputs.put(
         "focused.ron",
@@ -192,7 +192,7 @@ fn workloads_with_a_scene_take_a_camera_and_others_refuse_it() {
 }
 
 #[test]
-fn mistakes_in_a_camera_name_their_place() {
+fn errors_in_a_camera_name_their_place() {
     let mut refusals = Refusals::default();
     for (camera, says) in [
         ("positon: (0, 0, 3)", "--camera:1:1: unknown field `positon`, did you mean `position`?"),

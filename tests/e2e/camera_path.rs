@@ -54,7 +54,7 @@ fn limits(results: &Results) -> String {
 }
 
 #[test]
-fn thirty_six_frames_of_a_path_are_thirty_six_pictures() {
+fn frames_of_a_camera_path_have_distinct_images() {
     let inputs = Inputs::new();
     let glb = inputs.put("node.glb", camera_node().bytes());
     let small = ["--size", "64x36", "--samples", "2"];
@@ -77,7 +77,7 @@ fn thirty_six_frames_of_a_path_are_thirty_six_pictures() {
 }
 
 #[test]
-fn a_choice_and_its_check_see_every_frame_of_a_path() {
+fn choice_and_verification_cover_every_frame_of_a_path() {
     let inputs = Inputs::new();
     let path = scene(&inputs, "path.ron", PATH, "");
     let chosen = quintile().run(&path, &["--accuracy", "50%", "--frames", "0..12", "--verify"]);
@@ -113,7 +113,7 @@ fn a_still_camera_over_a_still_scene_is_simulated_once() {
 
 /// A clip that starts over exactly with a frame: its frames are simulated once, at each level.
 #[test]
-fn frames_that_come_again_are_simulated_once() {
+fn repeated_frames_are_simulated_once() {
     let inputs = Inputs::new();
     let mut glb = camera_node();
     let times = glb.floats(&[0.0, 0.5], 1);
@@ -137,9 +137,9 @@ fn row(results: &Results, frame: u32) -> Value {
     rows.find(|row| row["frame"] == frame).cloned().unwrap_or_default()
 }
 
-/// Light, focus and a fitted camera are placed for the scene, not for the frames asked for.
+/// Light, focus and a fitted camera are placed for the whole scene, not for the selected frames.
 #[test]
-fn a_frame_alone_is_that_of_the_whole_path() {
+fn a_single_frame_equals_that_of_the_whole_path() {
     let inputs = Inputs::new();
     let glb = inputs.put("node.glb", camera_node().bytes());
     let fitted = format!(
@@ -186,9 +186,9 @@ fn workloads_follow_the_camera_of_their_scene() {
     }
 }
 
-/// Frames of `occlusion` are the same shutter interval again and again; those of `caustics` and `sampling` never are.
+/// All frames of `occlusion` are equal; those of `caustics` and `sampling` all differ.
 #[test]
-fn workloads_without_a_scene_repeat_what_is_equal() {
+fn workloads_without_a_scene_repeat_equal_frames() {
     for (name, args, differ) in [
         ("occlusion", &["--size", "48x28", "--set", "objects=4"][..], 1),
         ("caustics", &["--size", "48x28", "--set", "cells=8"], 3),

@@ -31,7 +31,7 @@ fn pairs_come_as_csv_and_json_the_same_for_any_threads() {
 }
 
 #[test]
-fn what_cannot_be_is_told() {
+fn invalid_arguments_are_refused() {
     let inputs = Inputs::new();
     let (good, cut) = (inputs.put("good.mts", falling()), inputs.put("cut.mts", &falling()[..100]));
     let alone = inputs.put("alone.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
@@ -59,7 +59,7 @@ fn mts_at(number: f64) -> Vec<u8> {
 }
 
 #[test]
-fn what_cannot_be_answered_keeps_no_other_from_it() {
+fn a_broken_case_does_not_stop_the_others() {
     let inputs = Inputs::new();
     let (first, last) = (inputs.put("first.mts", falling()), inputs.put("last.mts", falling()));
     let (csv, gone) = (inputs.path("pairs.csv"), inputs.path("gone.mts"));
@@ -99,7 +99,7 @@ fn cases_of_one_name_are_refused() {
 }
 
 #[test]
-fn ends_that_do_not_go_together_are_refused() {
+fn meshes_of_different_topology_are_refused() {
     let inputs = Inputs::new();
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     let whole = inputs.put("whole.obj", format!("{corners}f 1 2 3\n"));
@@ -122,9 +122,9 @@ fn ends_that_do_not_go_together_are_refused() {
     }
 }
 
-/// Copies of one triangle: every two of them touch all over, and no image tells them apart.
+/// Copies of one triangle: every pair touches everywhere, and no image separates them.
 #[test]
-fn coincident_triangles_are_told_at_once() {
+fn coincident_triangles_are_reported_at_once() {
     let inputs = Inputs::new();
     let copies = 200;
     let corners = "v 0 0 0\nv 1 0 0.1\nv 0.1 1 0\n".repeat(copies);

@@ -1,4 +1,4 @@
-//! `quintile run` and `quintile list` as they are called.
+//! `quintile run` and `quintile list`.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ fn tiny(args: &[&str]) -> Results {
 }
 
 #[test]
-fn every_promised_file_is_there_and_not_empty() {
+fn every_documented_file_exists_and_is_not_empty() {
     let results = tiny(&[]);
     for name in FILES {
         assert!(!results.bytes(name).is_empty(), "{name} is empty");
@@ -44,7 +44,7 @@ fn is_temporary(path: &std::path::Path) -> bool {
 }
 
 #[test]
-fn images_have_the_size_asked_for_and_a_picture_in_them() {
+fn images_have_the_requested_size_and_are_not_empty() {
     let results = tiny(&["--size", "50x30", "--frames", "1..3", "--exr"]);
     for number in 1..3 {
         let picture = results.image(number);
@@ -96,7 +96,7 @@ fn frames_csv_has_its_columns_and_a_row_for_each_found_frame() {
 }
 
 #[test]
-fn the_summary_says_what_was_run() {
+fn the_summary_describes_the_run() {
     let summary = tiny(&["--samples", "3", "--seed", "7", "--rate", "30"]).summary();
     let settings = &summary["settings"];
     assert_eq!(summary["scene"], "tiny");
@@ -110,10 +110,10 @@ fn the_summary_says_what_was_run() {
     assert!(pinhole["counts"]["sample_madds"].as_u64() < summary["counts"]["sample_madds"].as_u64());
 }
 
-/// Anything a browser would fetch: only what starts with `data:` or `#` needs nothing, and links beside the page are
-/// followed on a click alone.
+/// References that a browser would fetch. Those with `data:` or `#` need no network, and links are followed
+/// only on a click.
 #[test]
-fn the_report_needs_no_network_and_nothing_beside_it() {
+fn the_report_needs_no_network_and_no_other_files() {
     let results = tiny(&[]);
     let report = results.text("report.html");
     for tag in
@@ -136,7 +136,7 @@ fn the_report_needs_no_network_and_nothing_beside_it() {
 }
 
 #[test]
-fn links_of_the_report_lead_to_files_that_are_there() {
+fn links_of_the_report_lead_to_existing_files() {
     let results = tiny(&[]);
     let report = results.text("report.html");
     let mut links = 0;
@@ -166,7 +166,7 @@ fn json_alone_goes_to_standard_output() {
 }
 
 #[test]
-fn a_pipe_sees_results_and_no_progress() {
+fn a_pipe_gets_results_and_no_progress() {
     let Results { ended, .. } = &tiny(&[]);
     assert_eq!(ended.stderr.lines().count(), 1, "{}", ended.stderr);
     assert!(ended.stderr.starts_with("note: expected time: about "), "{}", ended.stderr);
@@ -197,7 +197,7 @@ fn list_names_everything_in_text_and_in_json() {
 }
 
 #[test]
-fn help_shows_how_it_is_called() {
+fn help_shows_usage() {
     let help = quintile().call(["--help"]);
     assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));
     assert!(help.stdout.contains("run") && help.stdout.contains("list"));

@@ -26,7 +26,7 @@ fn texture(x: u32, y: u32) -> [u8; 3] {
 }
 
 #[test]
-fn runs_differ_in_what_was_changed_and_in_what_follows() {
+fn a_changed_setting_and_its_effects_are_listed() {
     let small = ["--frames", "0..2"];
     let one = quintile().run("tiny", &small);
     let other = quintile().run("tiny", &[&small[..], &["--samples", "8"]].concat());
@@ -49,7 +49,7 @@ fn runs_differ_in_what_was_changed_and_in_what_follows() {
     let [first, second] = [text.find("settings that differ"), text.find("samples_tested")];
     assert!(first.is_some() && first < second, "{text}");
     assert!(text.contains("+") && !text.contains("not the same work"), "{text}");
-    // A run beside itself, by its folder and by its summary.
+    // A run compared with itself, by its folder and by its summary.
     let (text, found) = compared(&[&a, &one.path("summary.json").display().to_string()]);
     assert_eq!(found["settings"], json!([]));
     assert!(text.contains("settings: no difference") && text.contains("numbers are equal"), "{text}");
@@ -58,7 +58,7 @@ fn runs_differ_in_what_was_changed_and_in_what_follows() {
 }
 
 #[test]
-fn runs_of_different_scenes_say_so() {
+fn runs_of_different_scenes_give_a_warning() {
     let one = quintile().run("tiny", &["--frames", "0..1"]);
     let other = quintile().run("tiny", &["--frames", "0..2", "--size", "32x24"]);
     let mut summary = other.summary();
@@ -141,7 +141,7 @@ fn folders_of_images_are_compared_by_name() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused() {
+fn results_of_different_kinds_are_refused() {
     let inputs = Inputs::new();
     let a = png(&inputs, "a.png", [40, 30], texture);
     let wide = png(&inputs, "wide.png", [41, 30], texture);

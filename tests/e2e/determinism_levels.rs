@@ -1,5 +1,5 @@
-//! Same input, same bytes at every level of timing: for any number of threads, whatever else is written, whatever a joule costs.
-//! And counters that do not depend on the level at all.
+//! Determinism: equal bytes at every timing level, for any number of threads and any set of outputs. Counters do
+//! not depend on timing level or energy table.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -42,7 +42,7 @@ fn any_number_of_threads_gives_the_same_bytes_at_every_level() {
     }
 }
 
-/// A probe times nothing that its choice depends on, where no budget is given.
+/// Without a budget, the choice of a probe does not depend on measured times.
 #[test]
 fn a_choice_by_accuracy_does_not_depend_on_threads() {
     let choose = |threads: &str| {
@@ -52,9 +52,9 @@ fn a_choice_by_accuracy_does_not_depend_on_threads() {
     assert_same(&choose("1"), &choose("16").files(), "--accuracy with 16 threads");
 }
 
-/// More files change nothing in the others, but for what is asked for and the report and the manifest, which list them.
+/// Additional files change no other file, except for those that list them: request, report and manifest.
 #[test]
-fn any_subset_of_outputs_leaves_the_others_as_they_are() {
+fn additional_outputs_leave_the_others_unchanged() {
     for level in LEVELS {
         let files = |results: &Results| {
             let mut files = without_host(results.files());
@@ -75,9 +75,9 @@ fn any_subset_of_outputs_leaves_the_others_as_they_are() {
     }
 }
 
-/// Watts are made from time, never the other way round: other joules leave cycles, counters and images alone.
+/// Power follows from time: another energy table changes neither cycles nor counters nor images.
 #[test]
-fn power_does_not_change_what_is_timed() {
+fn energy_tables_do_not_change_timing() {
     for level in ["stepped", "packet", "bound"] {
         let [low, high] = ["low", "high"].map(|bound| run(level, &["--bound", bound]));
         let of = |results: &Results| {
@@ -94,7 +94,7 @@ fn power_does_not_change_what_is_timed() {
     }
 }
 
-/// What happens is decided before it is timed.
+/// Events do not depend on timing.
 #[test]
 fn counters_and_their_hash_agree_at_all_levels() {
     let [stepped, packet, bound, sampled] = LEVELS.map(|level| run(level, &[]));
@@ -108,7 +108,8 @@ fn counters_and_their_hash_agree_at_all_levels() {
     let whole: Vec<_> = frames(&packet).iter().map(hash).collect();
     assert!(whole.iter().all(Option::is_some));
     assert_ne!(whole[0], whole[6], "frames that differ have equal hashes");
-    // Frames that `sampled` simulated are those of `packet`, to the last counter and cycle; the others have none.
+    // Simulated frames of `sampled` equal those of `packet` in all counters and cycles; predicted ones have
+    // no counters.
     let pairs = frames(&sampled);
     let known: Vec<_> =
         pairs.iter().zip(frames(&packet)).filter(|(row, _)| row["predicted"] == false).collect();
@@ -120,7 +121,7 @@ fn counters_and_their_hash_agree_at_all_levels() {
     assert!(pairs.iter().all(|row| hash(row).is_some() == (row["predicted"] == false)));
 }
 
-/// A test that cannot fail is none: another seed gives other samples, and so other counters.
+/// Control: another seed gives other samples, and so other counters.
 #[test]
 fn another_seed_has_another_hash() {
     let [one, other] =

@@ -1,4 +1,4 @@
-//! Same input, same bytes: run twice, and with any number of threads.
+//! Determinism: equal bytes when run twice, and with any number of threads.
 
 use crate::support::{Results, quintile, without_host};
 
@@ -52,7 +52,7 @@ fn a_real_animated_scene() {
     same_for_any_number_of_threads(&fox, &["--size", "128x96", "--frames", "0..4", "--lens", "4"]);
 }
 
-/// A test that cannot fail is none: another seed has to give other samples and other noise.
+/// Control: another seed gives other samples and other noise.
 #[test]
 fn another_seed_gives_another_run() {
     let run = |seed: &str| quintile().run("tiny", &["--seed", seed]);

@@ -1,4 +1,4 @@
-//! `--dry-run` and the expected time: what is said before a run, and that it changes nothing.
+//! `--dry-run` and the expected time: their output, and that they change no results.
 
 use crate::support::{Inputs, number, quintile};
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn dry(args: &[&str]) -> Value {
 }
 
 #[test]
-fn it_says_what_would_be_run_and_writes_nothing() {
+fn a_dry_run_describes_the_run_and_writes_nothing() {
     let inputs = Inputs::new();
     let out = inputs.path("out");
     let args = [
@@ -54,7 +54,7 @@ fn it_says_what_would_be_run_and_writes_nothing() {
 }
 
 #[test]
-fn it_counts_the_frames_that_differ() {
+fn distinct_frames_are_counted() {
     let inputs = Inputs::new();
     let still = "(settings: (width: 48, height: 32, samples: 2, frames: (0, 30)), camera: (position: (0, 0, 5), target: (0, 0, 0)), \
                  objects: [(shape: Sphere(radius: 1, segments: 12))])";
@@ -70,7 +70,7 @@ fn it_counts_the_frames_that_differ() {
 }
 
 #[test]
-fn it_shows_a_choice_and_warnings_beforehand() {
+fn choice_and_warnings_are_shown_before_the_run() {
     let chosen = dry(&[&["default", "--frames", "0..2", "--accuracy", "50%"], &SMALL[..]].concat());
     assert!(chosen["chosen"].as_str().is_some_and(|line| line.contains("expected error")), "{chosen}");
     let warned = dry(&[&["default", "--frames", "0..2", "--gpu", "discrete"], &SMALL[..]].concat());
@@ -80,7 +80,7 @@ fn it_shows_a_choice_and_warnings_beforehand() {
 }
 
 #[test]
-fn mistakes_are_found_without_running() {
+fn errors_are_found_without_running() {
     let ended = quintile().call(["run", "tiny", "--gpu", "referense", "--dry-run"]);
     assert_eq!(ended.code, Some(2));
     assert!(ended.stderr.contains("did you mean `reference`?"), "{}", ended.stderr);

@@ -1,4 +1,4 @@
-//! Books that balance, from the files alone: the rule is written out again here, not called.
+//! Energy sums of a run, recomputed from its files with an independent implementation.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -8,8 +8,8 @@ use activity::{Event, Unit};
 use power_model::{Bound, EnergyTable, Part, Platform};
 use serde_json::Value;
 
-/// The runs whose books are looked at: a tiny one, one whose frames are found, and one without V-sync. Every test looks at
-/// the same, run once.
+/// Runs under test: a tiny one, one whose frames are found, and one without V-sync. Each is run once for all
+/// tests.
 static RUNS: LazyLock<[Results; 3]> = LazyLock::new(|| {
     let folder = |name| Path::new(env!("CARGO_TARGET_TMPDIR")).join("energies").join(name);
     let default = ["--size", "320x180", "--frames", "0..6"];
@@ -91,7 +91,8 @@ fn joules_by_part_summed_in_their_order_are_the_energy_exactly() {
     }
 }
 
-/// Joules of a unit are its counts times the table's rows, whatever the clock did; idle is the platform's floor.
+/// A unit's energy is its counts times the rows of the table, independent of timing; idle energy is the
+/// platform's.
 #[test]
 fn joules_by_part_follow_from_counts_and_times() {
     let table = EnergyTable::builtin("28nm").expect("a built-in table").joules(Bound::Nominal);
@@ -135,7 +136,7 @@ fn a_trace_without_noise_is_the_curve_within_the_quantization() {
 
 /// The recorded trace is noisy; over a run the noise averages out.
 #[test]
-fn the_recording_holds_the_energy_that_was_spent() {
+fn the_recording_has_the_energy_of_the_curve() {
     for results in RUNS.iter() {
         let summary = results.summary();
         let first = number(&summary, "/frames/0/start_s");

@@ -1,4 +1,4 @@
-//! Scene files as other programs write them: materials, colours, formats, coordinates, and what is reported as left out.
+//! Scene files of other programs: materials, colours, formats, coordinates, and reports of ignored features.
 
 use std::fs;
 
@@ -102,7 +102,7 @@ fn vertex_colours_are_drawn() {
     ];
     let images = files.map(|path| {
         let image = run(&path, &[]).image(0);
-        // Most of a gradient is neither.
+        // Most pixels of a gradient are neither red nor blue.
         assert_red_then_blue(&image, 24, &path);
         image
     });
@@ -114,7 +114,7 @@ fn counts(results: &Results) -> Value {
 }
 
 #[test]
-fn vertex_colours_cost_what_they_take_and_white_ones_nothing() {
+fn vertex_colours_are_counted_unless_white() {
     let inputs = Inputs::new();
     let with = |name: &str, color: Option<[f32; 4]>| {
         let mut glb = Glb::square();
@@ -136,7 +136,7 @@ fn vertex_colours_cost_what_they_take_and_white_ones_nothing() {
     assert_eq!(of(&grey, "vertex_bytes"), of(&plain, "vertex_bytes") + 12.0 * fetched);
 }
 
-/// A square with everything that is left out of the picture, on three primitives and three nodes.
+/// A square with all ignored features, on three primitives and three nodes.
 fn demanding() -> Glb {
     let mut glb = Glb::square();
     glb.texture_coordinates();
@@ -163,7 +163,7 @@ const PIXEL: &str =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNoAAAAggCBd81ytgAAAABJRU5ErkJggg==";
 
 #[test]
-fn what_is_left_out_is_one_line_a_kind_with_a_count() {
+fn ignored_features_give_one_line_per_kind_with_a_count() {
     let inputs = Inputs::new();
     let results = run(&inputs.put("a.glb", demanding().bytes()), &[]);
     let kinds = [
@@ -194,7 +194,7 @@ fn what_is_left_out_is_one_line_a_kind_with_a_count() {
 }
 
 #[test]
-fn what_changes_nothing_is_not_reported() {
+fn features_without_effect_are_not_reported() {
     let mut glb = demanding();
     let map = json!({"index": 0});
     let strengthless = json!({"index": 0, "strength": 0});
@@ -261,7 +261,7 @@ fn off_and_stl_files_are_drawn() {
 }
 
 #[test]
-fn other_formats_are_named_with_the_way_out() {
+fn other_formats_are_refused_with_a_remedy() {
     let inputs = Inputs::new();
     let mut refusals = Refusals::default();
     for (name, what) in [
@@ -329,8 +329,12 @@ fn a_patch_far_from_the_origin_draws_the_same_picture_as_at_it() {
     glb("far.glb", UTM);
     assert_eq!(image("near.glb"), image("far.glb"));
     let results = run(&inputs.path("far.obj"), &[]);
-    let told = results.ended.stderr.lines().filter(|line| line.contains("coordinates-recentred")).count();
-    assert!(told == 1 && results.ended.stderr.contains("(500000, 0, 4000000)"), "{}", results.ended.stderr);
+    let reported = results.ended.stderr.lines().filter(|line| line.contains("coordinates-recentred")).count();
+    assert!(
+        reported == 1 && results.ended.stderr.contains("(500000, 0, 4000000)"),
+        "{}",
+        results.ended.stderr
+    );
     assert!(
         !run(&inputs.path("near.obj"), &[]).warning_codes().iter().any(|code| code.contains("coordinates"))
     );
@@ -356,7 +360,7 @@ fn a_file_whose_numbers_are_too_coarse_for_its_shape_is_reported() {
 }
 
 #[test]
-fn a_byte_order_mark_is_no_part_of_a_file() {
+fn a_byte_order_mark_is_skipped() {
     let inputs = Inputs::new();
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 5 5 5\nf 1 2 3 4\n";
     let off = "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";

@@ -1,4 +1,4 @@
-//! `quintile info`: what is in a scene, for people and for programs.
+//! `quintile info`: description of a scene as text and as JSON.
 
 use crate::support::{Glb, Inputs, Refusals, mts, quintile};
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ fn info(args: &[&str]) -> (String, Value) {
     (text.stdout, serde_json::from_str(&json.stdout).expect("JSON"))
 }
 
-/// A square that turns in one clip and slides in another, half of it hidden by what is not drawn.
+/// A square that turns in one clip and slides in another, with features that are not drawn.
 fn animated() -> Glb {
     let mut glb = Glb::square();
     let times = glb.floats(&[0.0, 0.5, 1.25], 1);
@@ -109,7 +109,7 @@ fn meshes_samples_and_workloads_are_described_too() {
 }
 
 #[test]
-fn what_cannot_be_read_is_refused() {
+fn unreadable_files_are_refused() {
     let mut refusals = Refusals::default();
     let inputs = Inputs::new();
     for (scene, code, says) in [

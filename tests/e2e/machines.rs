@@ -22,7 +22,7 @@ fn a_gpu_brings_its_platform_and_its_table() {
         let results = quintile().run("tiny", &["--gpu", gpu]);
         assert_eq!(machine(&results), [gpu, platform, "28nm"]);
         assert!(!mismatch(&results), "{gpu}");
-        // Said explicitly it is the same, to the last number.
+        // Naming them explicitly gives the same numbers.
         let explicit = quintile().run("tiny", &["--gpu", gpu, "--platform", platform, "--energy", "28nm"]);
         let (one, other) = (results.summary(), explicit.summary());
         for key in ["truth", "measured", "energy_by_part_j", "counts", "frames", "warnings"] {
@@ -51,14 +51,14 @@ fn copy(inputs: &Inputs, file: &str, name: &str, change: impl Fn(String) -> Stri
 }
 
 #[test]
-fn files_of_ones_own_name_each_other() {
+fn user_files_of_gpu_and_platform_name_each_other() {
     let inputs = Inputs::new();
     let platform = copy(&inputs, "power-model/platforms/reference.ron", "board", |text| text);
     let own = "power: (platform: \"board.ron\", energy: \"28nm\")";
     let gpu = copy(&inputs, "sim/run/gpus/reference.ron", "chip", |text| {
         text.replacen("power: (platform: \"reference\", energy: \"28nm\")", own, 1)
     });
-    // The platform's file is looked for beside the GPU's.
+    // The platform's file is relative to the folder of the GPU's.
     let together = quintile().run("tiny", &["--gpu", &gpu]);
     assert_eq!(machine(&together), ["chip", "board", "28nm"]);
     assert!(!mismatch(&together));
@@ -75,7 +75,7 @@ fn files_of_ones_own_name_each_other() {
 #[test]
 fn list_shows_the_pairs() {
     let text = quintile().call(["list"]).stdout;
-    for line in ["[platform iphone_4s, energy table 28nm]", "[no platform belongs to it]"] {
+    for line in ["[platform iphone_4s, energy table 28nm]", "[no platform of its own]"] {
         assert!(text.contains(line), "{text}");
     }
     let listing: Value = serde_json::from_str(&quintile().call(["list", "--json"]).stdout).expect("JSON");

@@ -1,4 +1,4 @@
-//! The command as users have it, from arguments to files; a promise in each file.
+//! End-to-end tests of the command, from arguments to files; one subject per file.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod bad_input;

@@ -1,4 +1,4 @@
-//! Messages of every command: one style, in the colours and to the extent asked for.
+//! Messages of every command: one style, with colours and verbosity as configured.
 
 use crate::support::{Ended, Inputs, quintile};
 
@@ -21,7 +21,7 @@ fn warnings_are_on_standard_error_and_quiet_removes_them() {
 }
 
 #[test]
-fn errors_are_printed_however_quiet() {
+fn errors_are_printed_with_quiet() {
     let normal = quintile().call(["run", "no_such_scene"]);
     let quiet = quintile().call(["--quiet", "run", "no_such_scene"]);
     assert_eq!((normal.code, quiet.code), (Some(2), Some(2)));
@@ -30,7 +30,7 @@ fn errors_are_printed_however_quiet() {
 }
 
 #[test]
-fn errors_of_the_parser_and_of_the_program_look_alike() {
+fn errors_of_parser_and_program_have_one_style() {
     let calls: [&[&str]; 3] = [
         &["run", "no_such_scene"],
         &["run", "tiny", "--no-such-option"],

@@ -1,4 +1,4 @@
-//! A run of one frame: nothing else is there to be found.
+//! A run of one frame: no other start may be found.
 
 use crate::support::quintile;
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! Files for results: refused before any work, left alone where there is nothing to say.
+//! Output files: refused before the work, unchanged without results.
 
 use std::fs::read_to_string;
 
@@ -12,7 +12,7 @@ fn crossing() -> Vec<u8> {
 }
 
 #[test]
-fn a_folder_that_is_not_there_is_told_before_the_work() {
+fn a_missing_folder_is_reported_before_the_work() {
     let inputs = Inputs::new();
     let case = inputs.put("cross.mts", crossing());
     let cut = inputs.put("cut.mts", &crossing()[..60]);
@@ -21,9 +21,9 @@ fn a_folder_that_is_not_there_is_told_before_the_work() {
     let [hits, plot] = ["no/a.hit", "no/a.svg"].map(|name| inputs.path(name));
     let calls: [&[&str]; 7] = [
         &["ccd", &case, "--csv", &csv],
-        // What is wrong with a file is found out later.
+        // Errors in the contents of a file are found later.
         &["ccd", &cut, "--csv", &csv],
-        // As is what would take minutes.
+        // Long work starts later.
         &["sample", "poisson", "--dim", "4", "--count", "1000000", "-o", &points],
         &["sample", "volume", "--count", "100000000", "-o", &points],
         &["samples", "--out", &samples],
@@ -34,7 +34,8 @@ fn a_folder_that_is_not_there_is_told_before_the_work() {
         let ended = quintile().call(call);
         assert_eq!(ended.code, Some(2), "{call:?}: {}", ended.stderr);
         let folder = inputs.path("no");
-        for says in [&format!("there is no folder {folder};"), "make it, or name a file in one that is there"]
+        for says in
+            [&format!("there is no folder {folder};"), "create it, or name a file in an existing folder"]
         {
             assert!(ended.stderr.contains(says), "{call:?}: {}", ended.stderr);
         }
@@ -43,7 +44,7 @@ fn a_folder_that_is_not_there_is_told_before_the_work() {
 }
 
 #[test]
-fn an_old_file_stays_where_nothing_is_known() {
+fn an_old_file_stays_without_new_results() {
     let inputs = Inputs::new();
     let (cut, whole) = (inputs.put("cut.mts", &crossing()[..60]), inputs.put("cross.mts", crossing()));
     let csv = inputs.put("pairs.csv", "old");
@@ -60,7 +61,7 @@ fn an_old_file_stays_where_nothing_is_known() {
 }
 
 #[test]
-fn rows_are_printed_where_asked_for() {
+fn rows_go_to_standard_output_on_request() {
     let inputs = Inputs::new();
     let case = inputs.put("cross.mts", crossing());
     for printed in ["-", "/dev/stdout"] {

@@ -1,11 +1,11 @@
-//! The README has the two commands and a picture, and links in it and in the book lead somewhere.
+//! README and book: the two commands, a picture, and links that resolve.
 
 use std::fs;
 use std::path::Path;
 
 use crate::support::root;
 
-/// What `.ci/run` calls and what the README tells a newcomer to call.
+/// Commands that both `.ci/run` and the README contain.
 const COMMANDS: [&str; 2] = ["cargo run --release -- run", "cargo test --workspace --release"];
 
 fn text(path: &Path) -> String {
@@ -44,7 +44,7 @@ fn assert_links_resolve(file: &Path) {
 }
 
 #[test]
-fn both_commands_are_there_as_ci_runs_them() {
+fn both_commands_are_as_in_ci() {
     let readme = text(&root().join("README.md"));
     let ci = text(&root().join(".ci/run"));
     for command in COMMANDS {
@@ -68,7 +68,7 @@ fn there_is_a_picture_and_it_decodes() {
 }
 
 #[test]
-fn links_lead_somewhere() {
+fn links_resolve() {
     assert_links_resolve(&root().join("README.md"));
     let book = root().join("docs");
     assert_links_resolve(&book.join("SUMMARY.md"));

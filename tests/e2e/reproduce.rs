@@ -1,4 +1,4 @@
-//! `quintile reproduce` as a user meets it: fields, files, exit codes, and the same bytes for any number of threads.
+//! `quintile reproduce`: fields, files, exit codes, and the same bytes for any number of threads.
 
 use std::fs;
 use std::io::Write;
@@ -115,7 +115,7 @@ fn rows_are_whole(json: &Value, (ids, number): (&[&str], u32), folder: &Path) {
     }
 }
 
-/// A row prints how much was run, and that is something.
+/// A row reports how much was run; the amount is not zero.
 fn ran_something(row: &Value) {
     let ran = row["ran"].as_array().expect("a list");
     let counts = ran.iter().map(|number| number["value"].as_f64().unwrap_or(0.0));
@@ -145,7 +145,7 @@ fn verdict_follows_from_band(row: &Value) {
     }
 }
 
-/// Whether a condition is met is no opinion either.
+/// The verdict of a condition follows from the number.
 fn condition_is_about_the_number(id: &str, number: f64, case: &Value) {
     let holds = case["holds"] == true;
     let exactly = match id {
@@ -191,7 +191,7 @@ fn paper_three_is_whole_and_the_same_for_any_number_of_threads() {
     verdicts_follow_from_numbers(json);
 }
 
-/// A verdict is no opinion.
+/// Verdicts follow from the numbers.
 fn verdicts_follow_from_numbers(json: &Value) {
     let sums = row(json, "III-2");
     let whole = number(sums, "whole_J");
@@ -263,7 +263,7 @@ fn planted_a_plate_on_the_bar_is_not_cleared() {
     }
 }
 
-/// The same number against another report, and with another tolerance.
+/// The same number compared with another reported number, and with another tolerance.
 #[test]
 fn planted_numbers_of_the_paper_flip_the_verdict_of_views() {
     let small = (
@@ -425,7 +425,7 @@ fn paper_two_waits_for_its_passes_and_says_so() {
 }
 
 #[test]
-fn what_makes_no_sense_is_told_before_any_work() {
+fn invalid_arguments_are_refused_before_the_work() {
     let unknown = quintile().call(["reproduce", "VII"]);
     assert_eq!(unknown.code, Some(2));
     assert!(unknown.stderr.contains("VII") && unknown.stderr.contains("II, III"), "{}", unknown.stderr);

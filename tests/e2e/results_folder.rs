@@ -1,4 +1,4 @@
-//! The folder of results: earlier results stay whole until new ones are, and files of the user stay.
+//! Folder of results: earlier results stay complete until new ones are, and files of the user stay.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,21 +6,21 @@ use std::path::{Path, PathBuf};
 
 use crate::support::{Inputs, Results, Running, quintile};
 
-/// Frames that take much longer than a test looks at them.
+/// Frames that take longer than the test runs.
 const LONG: [&str; 8] = ["run", "default", "--timing", "stepped", "--size", "640x360", "--frames", "0..36"];
 
 fn run(out: &str) -> Results {
     quintile().run_in(Path::new(out), "tiny", &[])
 }
 
-/// A long run into `out` that has drawn at least one frame.
+/// A long run into `out` that has rendered at least one frame.
 fn long_run(out: &str) -> Running {
     let images = Path::new(out).join(".quintile/new/images");
     let begun = || fs::read_dir(&images).is_ok_and(|mut images| images.next().is_some());
     quintile().spawn(LONG.iter().chain(&["--out", out])).once(begun)
 }
 
-/// What is in `out` but for the folder in which new results are made.
+/// Contents of `out` without the folder of new results.
 fn visible(results: &Results) -> BTreeMap<PathBuf, Vec<u8>> {
     results.files().into_iter().filter(|(name, _)| !name.starts_with(".quintile")).collect()
 }
@@ -50,7 +50,7 @@ fn a_run_that_is_killed_leaves_the_results_of_the_run_before() {
     let ended = long_run(&inputs.path("out")).signal("KILL").end();
     assert_eq!(ended.code, None);
     assert!(before == visible(&results));
-    // What it left behind neither blocks the next run nor stays.
+    // Its files do not block the next run, which removes them.
     run(&inputs.path("out"));
     assert!(before == results.files());
 }
@@ -133,7 +133,7 @@ fn files_of_the_user_in_the_way_are_refused_before_any_work() {
     }
 }
 
-/// Results that were changed by hand are not overwritten unasked, and every file of a run is listed with its hash.
+/// Modified results are not overwritten without `--force`, and every file of a run is listed with its hash.
 #[test]
 fn changed_results_are_the_users() {
     let inputs = Inputs::new();
@@ -178,7 +178,7 @@ fn links_and_the_current_directory_may_be_the_folder() {
     assert!(here.join("summary.json").exists());
 }
 
-/// A limit on the size of files stands for a full disk: writing ends with an error in the middle of a file.
+/// A limit on file size simulates a full disk: writing fails in the middle of a file.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_leaves_the_results_of_the_run_before() {
@@ -220,7 +220,7 @@ fn a_read_only_folder_is_refused_before_any_work() {
     }
 }
 
-/// Every command that writes a folder keeps to the same rules, and none takes the results of another for its own.
+/// Every command that writes a folder follows the same rules, and none overwrites the results of another.
 #[test]
 fn commands_that_share_a_folder() {
     let inputs = Inputs::new();
@@ -243,7 +243,7 @@ fn commands_that_share_a_folder() {
     assert_eq!(quintile().call(stress).code, Some(0));
 }
 
-/// A list of results that names files elsewhere, as somebody else's may, is no list of results.
+/// A manifest that names files outside of the folder is invalid.
 #[test]
 fn names_in_a_list_of_results_stay_in_the_folder() {
     let inputs = Inputs::new();
@@ -280,7 +280,7 @@ fn new_results_are_not_made_behind_a_link() {
 }
 
 #[test]
-fn a_dry_run_finds_what_is_in_the_way() {
+fn a_dry_run_reports_files_in_the_way() {
     let inputs = Inputs::new();
     let out = inputs.path("out");
     fs::create_dir(&out).expect("a folder");

@@ -1,4 +1,4 @@
-//! Sample tables as they are asked for: by name, described, in a file; and heat maps, as they are written.
+//! Sample tables by name, by description and in a file; and heat maps.
 
 use std::fs;
 use std::path::Path;
@@ -89,7 +89,7 @@ fn heat_maps_add_up_to_the_counters() {
             assert!(image::open(file("png")).unwrap().width() >= 760);
         }
         let counted = summary["counts"][event].as_u64().unwrap();
-        // The image leaves the caches at the end, nowhere in particular.
+        // The caches are written back at the end, at no position in the image.
         let all_placed = event != "dram_write_bytes";
         assert!(
             if all_placed { placed == counted } else { placed < counted },
@@ -102,7 +102,7 @@ fn heat_maps_add_up_to_the_counters() {
 }
 
 #[test]
-fn counters_without_a_place_are_refused() {
+fn counters_without_a_position_are_refused() {
     for (counter, message) in [("draws", "before it is known where"), ("samples_testd", "`samples_tested`")] {
         let ended = quintile().call(["run", "tiny", "--heat", counter]);
         assert_eq!(ended.code, Some(2));

@@ -1,4 +1,4 @@
-//! `--timing sampled`, `--accuracy`, `--budget` and `--verify` as a user meets them.
+//! `--timing sampled`, `--accuracy`, `--budget` and `--verify`.
 
 use crate::support::{Inputs, Results, number, quintile};
 use serde_json::Value;
@@ -14,7 +14,7 @@ fn rows(results: &Results) -> Vec<Value> {
 }
 
 #[test]
-fn predicted_frames_are_marked_wherever_they_stand() {
+fn predicted_frames_are_marked_in_every_file() {
     let results = run(&["--timing", "sampled", "--frames", "0..30"]);
     let (summary, rows) = (results.summary(), rows(&results));
     let simulated = summary["sampled"]["simulated_frames"].as_array().cloned().expect("a list");
@@ -50,7 +50,7 @@ fn predicted_frames_are_marked_wherever_they_stand() {
     assert!(results.ended.stdout.contains("predicted: from 6 frames"), "{}", results.ended.stdout);
 }
 
-/// Where all is simulated, nothing is predicted and no column is added.
+/// Other levels predict no frames and add no columns.
 #[test]
 fn other_levels_predict_nothing() {
     let results = run(&["--frames", "0..4"]);
@@ -59,7 +59,7 @@ fn other_levels_predict_nothing() {
     assert!(results.text("frames.csv").lines().next().is_some_and(|header| header.ends_with("outlier")));
 }
 
-/// The totals of a run from a few of its frames, against all of them.
+/// Totals of a sampled run, compared with those of all frames.
 #[test]
 fn totals_are_near_the_truth_and_sums_agree() {
     let [sampled, whole] =
@@ -88,9 +88,9 @@ fn a_still_scene_and_a_short_one_need_no_prediction() {
     assert_eq!(number(&short.summary(), "/sampled/cycles_per_frame/relative_half_width"), 0.0);
 }
 
-/// The promise of `--accuracy`: the actual error is within what was asked for, whether or not frames are predicted.
+/// The actual error is within the requested accuracy, with and without predicted frames.
 #[test]
-fn the_accuracy_asked_for_is_kept() {
+fn the_requested_accuracy_is_met() {
     for (frames, accuracy) in [("0..3", "2%"), ("0..3", "30%"), ("0..36", "3%")] {
         let results = run(&["--frames", frames, "--accuracy", accuracy, "--verify"]);
         let summary = results.summary();
@@ -106,9 +106,9 @@ fn the_accuracy_asked_for_is_kept() {
     }
 }
 
-/// The reference is right by definition, and has to be chosen where nothing else is good enough.
+/// The reference has no error, and is chosen if no other level is accurate enough.
 #[test]
-fn what_cannot_be_had_cheaper_is_stepped() {
+fn an_accuracy_beyond_other_levels_gives_stepped() {
     let results = run(&["--frames", "0..2", "--accuracy", "0.0001%", "--verify"]);
     assert_eq!(results.summary()["choice"]["level"], "stepped");
     assert_eq!(number(&results.summary(), "/verified/error"), 0.0);
@@ -116,7 +116,7 @@ fn what_cannot_be_had_cheaper_is_stepped() {
 }
 
 #[test]
-fn a_budget_takes_what_fits() {
+fn a_budget_limits_level_and_frames() {
     let ample = run(&["--frames", "0..2", "--budget", "10h"]).summary();
     assert_eq!(ample["choice"]["level"], "stepped");
     assert!(number(&ample, "/choice/expected_host_s") < 36e3);
@@ -126,7 +126,7 @@ fn a_budget_takes_what_fits() {
 }
 
 #[test]
-fn what_makes_no_sense_is_told() {
+fn invalid_combinations_are_refused() {
     let cases = [
         (["--accuracy", "2"], "write it as 2%"),
         (["--accuracy", "0%"], "more than 0%"),

@@ -1,4 +1,4 @@
-//! `quintile trace` as a user calls it: files of recorders, each subcommand, and what it says to wrong input.
+//! `quintile trace`: files of recorders, each subcommand, and errors for bad input.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ fn quintile(folder: &Path, args: &[&str]) -> Output {
     Command::new(binary).current_dir(folder).arg("trace").args(args).output().unwrap()
 }
 
-/// What a call that has to succeed prints with `--json`.
+/// Output of a successful call with `--json`.
 fn json(folder: &Path, args: &[&str]) -> Value {
     let output = quintile(folder, &[args, &["--json"]].concat());
     assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -77,7 +77,7 @@ fn converted_files_hold_the_same_and_streaming_finds_the_same() {
 }
 
 #[test]
-fn repairs_are_made_on_request_alone_and_told() {
+fn repairs_are_made_only_on_request_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let rows = "time_s,voltage_V,current_A\n0,5,1\n0.001,5,nan\n0.003,5,3\n0.002,5,2\n0.006,5,6\n0.007,5,7\n";
     fs::write(folder.path().join("bad.csv"), rows).unwrap();
@@ -302,7 +302,7 @@ fn a_trace_without_energy_has_no_relative_error() {
     assert!(json(folder.path(), &["sample", "off.csv", "--out", "again.csv"])["relative_error"].is_null());
 }
 
-/// The output of a call that has to fail as one that was asked wrongly, in one line.
+/// Output of a call that fails with a usage error in one line.
 fn refused(folder: &Path, args: &[&str], says: &str) {
     let output = quintile(folder, args);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -311,7 +311,7 @@ fn refused(folder: &Path, args: &[&str], says: &str) {
 }
 
 #[test]
-fn numbers_that_are_none_and_flags_that_would_do_nothing_are_refused() {
+fn invalid_numbers_and_flags_without_effect_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
     let cases: [(&[&str], &str); 19] = [
@@ -427,7 +427,7 @@ fn stamps_that_are_equal_or_not_named_are_refused() {
 }
 
 #[test]
-fn a_plot_tells_gaps_and_mends_them_on_request() {
+fn a_plot_reports_gaps_and_fills_them_on_request() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path());
     let text = fs::read_to_string(folder.path().join("t.csv")).unwrap();
@@ -446,7 +446,7 @@ fn a_plot_tells_gaps_and_mends_them_on_request() {
 }
 
 #[test]
-fn what_is_no_setting_is_refused_and_deviations_are_drawn() {
+fn invalid_settings_are_refused_and_deviations_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let table = |name: &str, rows: &str| {
         fs::write(folder.path().join(name), format!("time_ms,energy_mJ,sd\n{rows}")).unwrap();

@@ -1,9 +1,10 @@
-//! What `quintile trace` keeps from being lost or mistaken: inputs, descriptions, units, the end of a recording.
+//! `quintile trace` protects inputs and descriptions, and checks units and the end of a recording.
 
 use crate::support::{Inputs, quintile};
 use serde_json::Value;
 
-/// Frames of 10 ms at 5 kHz from 0.1 s on: 4 ms at 20 W, then 2 W. After the last there is rest for as long as seven.
+/// Frames of 10 ms at 5 kHz from 0.1 s on: 4 ms at 20 W, then 2 W. The last is followed by an idle gap as
+/// long as seven frames.
 fn recording() -> String {
     let row = |i: u32| {
         let busy = (500..2000).contains(&i) && (i - 500) % 50 < 20;
@@ -19,7 +20,7 @@ fn read(path: &str) -> Vec<u8> {
 }
 
 #[test]
-fn what_is_read_is_not_written_over() {
+fn inputs_are_not_overwritten() {
     let inputs = Inputs::new();
     let trace = inputs.put("t.csv", recording());
     let (marks, stamps) = (inputs.put("marks.txt", "0.2\n"), inputs.put("stamps.txt", "1\n2\n3\n4\n"));
@@ -73,7 +74,7 @@ fn conversions_beside_each_other_keep_their_descriptions() {
     }
 }
 
-/// Drawing makes the plot and nothing else, unless asked to.
+/// Drawing writes only the plot, unless --keep-pyramid is given.
 #[test]
 fn plots_leave_nothing_beside_the_trace() {
     let inputs = Inputs::new();
@@ -121,23 +122,23 @@ fn an_idle_recording_that_is_too_short_is_refused_by_instant() {
     let trace = inputs.put("t.csv", recording());
     let rows: String = (0..500).map(|i| format!("{},2\n", f64::from(i) / 5000.0)).collect();
     let idle = inputs.put("idle.csv", "time_s,power_W\n".to_owned() + &rows);
-    let stretch =
+    let segment =
         ["trace", "energy", &trace, "--from", "0.1", "--to", "0.2", "--idle-trace", &idle, "--idle-by"];
-    let ended = quintile().call(stretch.into_iter().chain(["instant"]));
+    let ended = quintile().call(segment.into_iter().chain(["instant"]));
     assert_eq!(ended.code, Some(2), "{}", ended.stderr);
     assert!(ended.stderr.contains("the idle recording lasts 0.1 s, the trace 0.47 s"), "{}", ended.stderr);
-    assert_eq!(quintile().call(stretch.into_iter().chain(["mean"])).code, Some(0));
+    assert_eq!(quintile().call(segment.into_iter().chain(["mean"])).code, Some(0));
 }
 
 #[test]
-fn pareto_reads_units_or_says_that_it_cannot() {
+fn pareto_reads_units_or_refuses_them() {
     let inputs = Inputs::new();
     let table = inputs.put("table.csv", "Time [ms],energy_kWh,power_W\n10,1,3\n");
     let asked = |time: &str, energy: &str| {
         quintile().call(["trace", "pareto", &table, "--time", time, "--energy", energy, "--json"])
     };
-    let told: Value = serde_json::from_str(&asked("Time [ms]", "energy_kWh").stdout).unwrap_or_default();
-    let text = told.to_string();
+    let printed: Value = serde_json::from_str(&asked("Time [ms]", "energy_kWh").stdout).unwrap_or_default();
+    let text = printed.to_string();
     assert!(text.contains("0.01") && text.contains("3600000"), "{text}");
     for (time, energy) in [("power_W", "energy_kWh"), ("energy_kWh", "Time [ms]"), ("Time [ms]", "power_W")] {
         assert_eq!(asked(time, energy).code, Some(2), "{time} {energy}");
@@ -238,7 +239,7 @@ fn a_dash_is_standard_input_and_standard_output() {
 }
 
 #[test]
-fn what_is_wrong_with_a_pipe_is_said_of_standard_input() {
+fn errors_of_a_pipe_name_standard_input() {
     let refused = |args: &[&str], input: &[u8], says: &str| {
         let ended = piped(args, input);
         let message = String::from_utf8_lossy(&ended.stderr).into_owned();
@@ -269,7 +270,7 @@ fn frames_of(samples: &[u32]) -> String {
     "time_s,power_W\n".to_owned() + &(0..end).map(row).collect::<String>()
 }
 
-/// What a command warns of, on standard error.
+/// Warnings of a command, on standard error.
 fn warned(args: &[&str], code: &str) -> String {
     let ended = quintile().call(args);
     assert_eq!(ended.code, Some(0), "{args:?}: {}", ended.stderr);

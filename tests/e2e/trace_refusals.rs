@@ -1,4 +1,4 @@
-//! What `quintile trace` refuses, what it warns of, and the exit codes of files that hold no trace.
+//! Errors and warnings of `quintile trace`, and exit codes for files without a trace.
 
 use crate::support::{Inputs, quintile};
 
@@ -46,7 +46,7 @@ fn bad_values_are_refused_with_the_option_they_are_of() {
 }
 
 #[test]
-fn what_holds_no_trace_fails_alike_in_every_format_and_command() {
+fn files_without_a_trace_fail_alike_in_every_format_and_command() {
     let inputs = Inputs::new();
     let trace = recording(&inputs);
     let folder = inputs.path("folder.parquet");
@@ -93,19 +93,19 @@ fn plots_show_samples_where_they_are_few_and_a_damaged_pyramid_is_made_anew() {
     let mut bytes = std::fs::read(&kept).unwrap_or_default();
     bytes[3000] ^= 0x40;
     inputs.put("t.csv.pyramid", bytes);
-    let (told, again) = plot(&[]);
-    assert!(told.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made, "{}", told.stderr);
+    let (ended, again) = plot(&[]);
+    assert!(ended.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made, "{}", ended.stderr);
     assert_eq!((plot(&[]).0.stderr, plot(&[]).1 == made), (String::new(), true));
     let whole = std::fs::read(&kept).unwrap_or_default();
     let mut head = whole.clone();
     head[20] ^= 1;
     for damaged in [head, whole[..40].to_vec(), whole[..whole.len() - 1].to_vec()] {
         inputs.put("t.csv.pyramid", damaged);
-        let (told, again) = plot(&[]);
+        let (ended, again) = plot(&[]);
         assert!(
-            told.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made,
+            ended.stderr.contains("t.csv.pyramid: damaged; made anew") && again == made,
             "{}",
-            told.stderr
+            ended.stderr
         );
     }
 }
@@ -128,35 +128,36 @@ fn a_lost_end_is_in_the_file_and_filled_on_request() {
 }
 
 #[test]
-fn a_rail_that_is_the_sum_of_others_is_told_unless_rails_are_chosen() {
+fn a_rail_that_is_the_sum_of_others_is_reported_unless_rails_are_chosen() {
     let inputs = Inputs::new();
     let row = |i: u32| format!("{},{},{},{}\n", f64::from(i) / 1000.0, i % 7, i % 11, i % 7 + i % 11);
     let rows: String = (0..200).map(row).collect();
     let trace = inputs.put("rails.csv", format!("time_s,cpu_power_W,gpu_power_W,board_power_W\n{rows}"));
     let out = inputs.path("o.csv");
-    let told = quintile().call(["trace", "convert", &trace, &out]).stderr;
+    let stderr = quintile().call(["trace", "convert", &trace, &out]).stderr;
     assert!(
-        told.contains("warning: [rail-counted-twice] board is, to rounding, the sum of cpu, gpu"),
-        "{told}"
+        stderr.contains("warning: [rail-counted-twice] board is, to rounding, the sum of cpu, gpu"),
+        "{stderr}"
     );
-    assert!(told.contains("give --rail board, or --rail cpu --rail gpu"), "{told}");
+    assert!(stderr.contains("give --rail board, or --rail cpu --rail gpu"), "{stderr}");
     let chosen = quintile().call(["trace", "convert", &trace, &out, "--rail", "cpu", "--rail", "gpu"]).stderr;
     assert!(!chosen.contains("warning"), "{chosen}");
 }
 
 #[test]
-fn anchors_of_another_clock_or_beyond_the_stamps_are_told() {
+fn anchors_of_another_clock_or_beyond_the_stamps_give_a_warning() {
     let inputs = Inputs::new();
     let (trace, stamps) = (recording(&inputs), inputs.put("stamps.txt", "1.01\n1.02\n1.03\n1.04\n"));
-    let told = |first: &str, second: &str| {
+    let warnings = |first: &str, second: &str| {
         let args = ["trace", "align", &trace, &stamps, "--anchor", first, "--anchor", second];
         let ended = quintile().call(args);
         assert_eq!(ended.code, Some(0), "{}", ended.stderr);
         ended.stderr
     };
-    assert_eq!(told("1.01=0.02", "1.04=0.05"), "");
-    assert!(told("1.01=0.02", "1.04=0.06").contains("warning: [anchors-off] by the anchors, a second"));
+    assert_eq!(warnings("1.01=0.02", "1.04=0.05"), "");
+    assert!(warnings("1.01=0.02", "1.04=0.06").contains("warning: [anchors-off] by the anchors, a second"));
     assert!(
-        told("1.01=0.02", "1.09=0.1").contains("warning: [anchors-off] stamp 1.09 s of an anchor is beyond")
+        warnings("1.01=0.02", "1.09=0.1")
+            .contains("warning: [anchors-off] stamp 1.09 s of an anchor is beyond")
     );
 }

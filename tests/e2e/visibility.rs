@@ -16,7 +16,7 @@ fn scene() -> Vec<u8> {
 }
 
 #[test]
-fn half_the_samples_see_a_triangle_over_half_the_image() {
+fn a_triangle_over_half_the_image_covers_half_the_samples() {
     let folder = tempfile::tempdir().unwrap();
     let (file, hits) = (folder.path().join("half.m5d"), folder.path().join("half.hit"));
     std::fs::write(&file, scene()).unwrap();
@@ -51,7 +51,7 @@ fn moving_scene() -> Vec<u8> {
 }
 
 #[test]
-fn no_way_of_looking_changes_what_is_seen() {
+fn tile_tests_do_not_change_the_result() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("moving.m5d");
     std::fs::write(&file, moving_scene()).unwrap();
@@ -87,11 +87,11 @@ fn no_way_of_looking_changes_what_is_seen() {
 fn a_tile_test_that_is_none_is_refused() {
     let ended = quintile().call(["visibility", "a.m5d", "--tests", "edges,hiz"].map(OsStr::new));
     assert_eq!(ended.code, Some(2));
-    assert!(ended.stderr.contains("`hiz` is no tile test"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("unknown tile test `hiz`"), "{}", ended.stderr);
 }
 
 #[test]
-fn a_cut_file_is_refused() {
+fn a_truncated_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("cut.m5d");
     std::fs::write(&file, &scene()[..100]).unwrap();

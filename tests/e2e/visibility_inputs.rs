@@ -1,4 +1,4 @@
-//! `quintile visibility`: whatever file a moving mesh comes in, the same samples see the same triangles.
+//! `quintile visibility`: all file formats of a moving mesh give the same visible triangles.
 
 use crate::support::{Ended, Inputs, quintile};
 
@@ -132,7 +132,7 @@ fn the_same_mesh_in_any_file_gives_the_same_bytes() {
 }
 
 #[test]
-fn the_camera_that_was_fitted_is_told_and_can_be_given_back() {
+fn the_fitted_camera_is_printed_and_can_be_reused() {
     let inputs = Inputs::new();
     let files = [inputs.put("a.mts", mts(&soup(), 8))];
     let ended = visibility(&files, &["--json"]);
@@ -152,13 +152,13 @@ fn the_camera_that_was_fitted_is_told_and_can_be_given_back() {
     assert_eq!(printed.code, Some(0), "{}", printed.stderr);
     let camera = inputs.put("c.ron", printed.stdout);
     assert!(hits(&inputs, &files, &[]) == hits(&inputs, &files, &["--camera", &camera]));
-    let told = visibility(&files, &["--camera", &camera, "--json"]);
-    assert!(!told.stdout.contains("fov_deg"), "only a fitted camera is told: {}", told.stdout);
+    let seen = visibility(&files, &["--camera", &camera, "--json"]);
+    assert!(!seen.stdout.contains("fov_deg"), "only a fitted camera is printed: {}", seen.stdout);
 }
 
-/// The engine takes no orthographic camera; what is modelled instead sees the same whatever is tested, and says so.
+/// Orthographic cameras are modelled with a warning; the result does not depend on the tile tests.
 #[test]
-fn an_orthographic_camera_is_modelled_and_told() {
+fn an_orthographic_camera_is_modelled_with_a_warning() {
     let inputs = Inputs::new();
     let files = [inputs.put("a.mts", mts(&soup(), 8))];
     for lens in ["", "lens_radius: 0.25, focus: 6, "] {
@@ -183,11 +183,11 @@ fn an_orthographic_camera_is_modelled_and_told() {
     }
 }
 
-/// Files, flags, exit code, and what the message has to say.
+/// Files, flags, exit code, and parts of the message.
 type Case<'a> = (&'a [&'a String], &'a [&'a str], i32, &'a [&'a str]);
 
 #[test]
-fn wrong_inputs_are_told_from_failures() {
+fn usage_errors_and_failures_have_their_exit_codes() {
     let inputs = Inputs::new();
     let soup = soup();
     let [start, end] = [0, 1].map(|i| inputs.put(&format!("{i}.ply"), ply(&soup, i)));
@@ -221,7 +221,7 @@ fn wrong_inputs_are_told_from_failures() {
         (&[&start, &end], &["--camera", &typo], 2, &["typo.ron:2:", "`widht`, did you mean `width`?"]),
         (&[&start, &whole], &[], 2, &["a.mts holds both ends", "give it alone"]),
         (&[&strange], &[], 2, &["a.glb: ", "known here: .m5d, .mts"]),
-        (&[&carried], &["--print-camera"], 2, &["a.m5d carries its camera", "leave it out"]),
+        (&[&carried], &["--print-camera"], 2, &["a.m5d has a camera of its own", "leave it out"]),
         (&[&start, &end, &end], &[], 2, &["no more were expected"]),
         (&[], &[], 2, &["<FILE>"]),
         (&[&whole], &["--print-camera", "--camera", &typo], 2, &["--print-camera", "--camera"]),

@@ -1,5 +1,5 @@
-//! Every coded warning that a run can be brought to give is given: in `summary.json`, on the terminal and in the report.
-//! The list of all codes keeps this complete.
+//! Every warning code that a run can produce, in `summary.json`, on the terminal and in the report. The list
+//! of all codes is checked for completeness.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -8,13 +8,13 @@ use crate::support::{Glb, Inputs, Results, number, quintile, root};
 use serde_json::json;
 use warnings::Code;
 
-/// Why a warning of a workload is not brought about here.
+/// Reason for a warning of a workload without a test here.
 const TESTED: &str = "tests of the workload bring it about, each in a run of its own";
 
-/// Why a warning of `quintile trace` is not brought about here.
+/// Reason for a warning of `quintile trace` without a test here.
 const COMMAND: &str = "a run does not give it; tests of `quintile trace` bring it about";
 
-/// Codes that no test here brings about, and why.
+/// Codes without a test here, with the reason.
 const NOT_PROVOKED: [(&str, &str); 21] = [
     ("ambiguous-alignment", COMMAND),
     ("anchors-off", COMMAND),
@@ -51,7 +51,7 @@ const NOT_PROVOKED: [(&str, &str); 21] = [
     ),
     (
         "start-error",
-        "it takes a start that counts as found and is off by more than half of its frame, which no test makes up so far",
+        "it takes a start that counts as found and is off by more than half of its frame; a unit test in `run` makes one up",
     ),
     ("unsure-frames", "it takes a trace in which frames go astray; tests in `traces` have some"),
     (
@@ -60,7 +60,7 @@ const NOT_PROVOKED: [(&str, &str); 21] = [
     ),
 ];
 
-/// Codes brought about by the tests below, and `orthographic-view`, which is the matter of `visibility_inputs`.
+/// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
 const PROVOKED: [&str; 53] = [
     "accuracy-missed",
     "alpha-ignored",
@@ -138,7 +138,7 @@ fn assert_warns(results: &Results, code: &str) {
     assert!(report.contains(escaped(word).as_str()), "`{word}` of {code} is not in the report");
 }
 
-/// Text as the report has it.
+/// Text as escaped in the report.
 fn escaped(text: &str) -> String {
     let pairs =
         [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;"), ('\'', "&#x27;"), ('/', "&#x2f;")];
@@ -163,7 +163,7 @@ const SPHERE: &str = "(shape: Sphere(radius: 1, segments: 12))";
 fn frames_too_short_for_the_recorder() {
     let results = quintile().run("tiny", &["--trace-rate", "50000"]);
     assert_warns(&results, "short-frame");
-    // One message says it all, and nothing that was not measured looks as if it had been.
+    // One message is enough, and no value is reported as measured.
     assert_eq!(results.warning_codes(), ["short-frame"]);
     let summary = results.summary();
     assert!(summary["measured"].is_null() && summary["truth"].is_object());
@@ -197,16 +197,16 @@ fn the_recorder_follows_short_frames() {
     assert_eq!((number(&larger, "/recorder/rate_hz"), &larger["recorder"]["raised"]), (50e3, &json!(false)));
 }
 
-/// The page of the book on warnings says what some commands warn of. They do.
+/// The book's page on warnings lists commands with their warnings; each is checked.
 #[test]
-fn the_page_says_what_a_fresh_checkout_warns_of() {
+fn warnings_of_the_page_are_as_listed() {
     let page = fs::read_to_string(root().join("docs/warnings.md")).expect("the book's chapter on warnings");
     let section = page.split("## In a fresh checkout").nth(1).unwrap_or_default();
     let promises: Vec<(&str, &str)> = section.lines().filter_map(promise).collect();
     assert!(promises.len() >= 5, "{section}");
     for (command, promised) in promises {
         let args: Vec<&str> = command.split_whitespace().skip(2).collect();
-        // The whole default run takes too long for a test, so a part of it stands for it.
+        // The whole default run takes too long for a test; part of it is used.
         let (scene, args) = match args.split_first() {
             Some((scene, args)) => (*scene, args.to_vec()),
             None => ("default", vec!["--frames", "17..19", "--timing", "bound"]),
@@ -216,7 +216,7 @@ fn the_page_says_what_a_fresh_checkout_warns_of() {
     }
 }
 
-/// The command of a line, and the code that it warns of; no code where it warns of nothing.
+/// Command of a line and its warning code; `None` without a warning.
 fn promise(line: &str) -> Option<(&str, &str)> {
     let (command, rest) = line.strip_prefix("- `")?.split_once("` warns of ")?;
     let code = if rest.starts_with("nothing") { "" } else { rest.strip_prefix('`')?.split('`').next()? };
@@ -231,7 +231,7 @@ fn a_gpu_on_a_platform_of_another() {
 }
 
 #[test]
-fn a_platform_that_rests_at_more_than_it_works() {
+fn a_platform_with_idle_power_above_busy_power() {
     let inputs = Inputs::new();
     let path = root().join("power-model/platforms/reference.ron");
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -254,14 +254,14 @@ fn packets_that_the_recorder_lost_are_gaps_in_its_file() {
     let trace = results.path("trace.parquet");
     let refused = traces::io::read(&trace, &traces::io::ReadOptions::default()).unwrap_err();
     assert!(matches!(refused, traces::io::ReadError::Uneven { .. }), "{refused}");
-    let mended = traces::io::ReadOptions { repair: true, ..Default::default() };
-    assert!(!traces::io::read(&trace, &mended).unwrap().repairs.is_empty());
+    let repairing = traces::io::ReadOptions { repair: true, ..Default::default() };
+    assert!(!traces::io::read(&trace, &repairing).unwrap().repairs.is_empty());
     let ended = quintile().call(["run", "tiny", "--packet-loss", "1"]);
     assert!(ended.code == Some(2) && ended.stderr.contains("--packet-loss"), "{}", ended.stderr);
 }
 
 #[test]
-fn an_accuracy_that_no_time_is_left_for() {
+fn an_accuracy_beyond_the_budget() {
     let args = ["--size", "96x54", "--frames", "0..2", "--accuracy", "0.0001%", "--budget", "0.001ms"];
     let results = quintile().run("default", &args);
     assert_warns(&results, "budget-missed");
@@ -275,7 +275,7 @@ fn frames_that_are_not_found() {
     assert_warns(&results, "few-samples");
 }
 
-/// A torus that is there for some frames and far away for the others; `keys` say when.
+/// A torus that is in view in some frames only, according to `keys`.
 fn flashing(frames: u32, keys: &str) -> String {
     format!(
         "(settings: (width: 320, height: 180, samples: 16, frames: (0, {frames}), shutter: 0), \
@@ -286,7 +286,7 @@ fn flashing(frames: u32, keys: &str) -> String {
 }
 
 #[test]
-fn a_marked_frame_like_no_other() {
+fn a_marked_frame_without_similar_frames() {
     let once = "(time_s: 0, position: (0, 0, 99)), (time_s: 0.0666, position: (0, 0, 0)), \
                 (time_s: 0.0832, position: (0, 0, 99)), (time_s: 9, position: (0, 0, 99))";
     let inputs = Inputs::new();
@@ -301,9 +301,9 @@ fn starts_of_frames_no_longer_than_a_sample() {
     assert_warns(&results, "irregular-spacing");
 }
 
-/// Whether chance makes starts and noise look alike depends on the frames' length: one of these has to be such a case.
+/// Whether noise resembles a start depends on the frames' length: at least one of these lengths has to.
 #[test]
-fn starts_that_drown_in_noise() {
+fn starts_below_the_noise_floor() {
     let runs = [("0..1", "100"), ("0..3", "200"), ("0..12", "200"), ("0..3", "300"), ("0..20", "500")];
     let run = |(frames, rate)| quintile().run("tiny", &["--frames", frames, "--trace-rate", rate]);
     let found =
@@ -337,13 +337,13 @@ fn a_triangle_without_area() {
 }
 
 #[test]
-fn a_camera_that_sees_nothing() {
+fn an_empty_image() {
     let away = format!("(camera: (position: (0, 0, 5), target: (0, 0, 9)), objects: [{SPHERE}])");
     assert_warns(&run_file("away.ron", away, &[]), "empty-frame");
 }
 
 #[test]
-fn images_that_are_not_there() {
+fn missing_images() {
     let object = "(shape: Plane(size: 2), material: (texture: Image(file: \"gone.png\")))";
     assert_warns(&run_file("a.ron", format!("(objects: [{object}])"), &[]), "missing-image");
     let mut glb = Glb::square();
@@ -355,7 +355,7 @@ fn images_that_are_not_there() {
 }
 
 #[test]
-fn materials_that_are_not_drawn_as_they_ask() {
+fn unsupported_material_features() {
     let mut glb = Glb::square();
     let see_through = json!({"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 1});
     let map = json!({"index": 0});
@@ -430,7 +430,7 @@ const PIXEL: &str =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNoAAAAggCBd81ytgAAAABJRU5ErkJggg==";
 
 #[test]
-fn parts_of_a_gltf_scene_that_are_left_out() {
+fn ignored_parts_of_a_gltf_scene() {
     let mut glb = Glb::square();
     let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
     glb.json["meshes"][0]["primitives"] = json!([glb.json["meshes"][0]["primitives"][0], points]);
@@ -462,7 +462,7 @@ fn a_camera_inside_a_room() {
 }
 
 #[test]
-fn a_lens_for_a_camera_placed_by_itself() {
+fn a_lens_for_an_automatically_placed_camera() {
     let focus = format!("(settings: (lens_radius: 0.1, focus: 3), objects: [{SPHERE}])");
     assert_warns(&run_file("a.ron", focus, &[]), "focus-of-fitted-camera");
     let wide = format!("(objects: [{SPHERE}])");
@@ -471,12 +471,12 @@ fn a_lens_for_a_camera_placed_by_itself() {
     assert_warns(&run_file("a.ron", leaves, &[]), "leaves-fitted-view");
 }
 
-/// A code, a scene that provokes it with its flags, and one that does not with its flags.
+/// A code, a scene with flags that gives the warning, and one that does not.
 type Regime<'a> = (&'a str, String, &'a [&'a str], String, &'a [&'a str]);
 
-/// Scenes in the regimes of the failure catalogue, and next to each a harmless one of the same kind that is not warned of.
+/// Scenes in the regimes of the failure catalogue, each with a similar scene that gives no warning.
 #[test]
-fn regimes_in_which_tile_tests_pay_little() {
+fn regimes_in_which_tile_tests_are_ineffective() {
     let camera = "camera: (position: (0, 0, 5), target: (0, 0, 0))";
     let scene = |camera: &str, object: &str| format!("({camera}, objects: [{object}])");
     let floor = |y: &str| format!("(shape: Plane(size: 100), position: (0, {y}, 0))");
@@ -518,7 +518,7 @@ fn regimes_in_which_tile_tests_pay_little() {
 
 /// The reference GPU with memory that opens a row for every line, slowly.
 #[test]
-fn rows_of_memory_that_decide() {
+fn memory_rows_as_the_bottleneck() {
     let inputs = Inputs::new();
     let path = root().join("sim/run/gpus/reference.ron");
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -558,7 +558,7 @@ fn a_mark_at_the_edge_of_the_recording() {
     assert_warns(&quintile().run("default", &args), "window-cut");
 }
 
-/// Every code is in one of the two lists here, and in the section of the book that it names, with its meaning.
+/// Every code is in one of the two lists here, and in the chapter of the book that it names.
 #[test]
 fn every_code_is_accounted_for() {
     let listed = PROVOKED.into_iter().chain(NOT_PROVOKED.map(|(code, _)| code));
@@ -575,7 +575,7 @@ fn every_code_is_accounted_for() {
 }
 
 #[test]
-fn beams_whose_sides_cross() {
+fn light_volumes_with_crossing_sides() {
     let set = ["cells=24", "slope=0.3", "depth_m=10", "pleat=0.6"].map(|option| ["--set", option]);
     let args = [&["--size", "64x36"][..], set.as_flattened()].concat();
     let results = quintile().run("caustics", &args);
@@ -585,12 +585,12 @@ fn beams_whose_sides_cross() {
 
 /// No run samples points in single precision: the warning is that of `quintile sample`.
 #[test]
-fn points_on_numbers_that_are_too_coarse() {
+fn points_limited_by_precision() {
     let warnings = |single: &[&str]| {
         let args = [&["sample", "poisson", "--dim", "1", "--r", "1e-5", "--json"], single].concat();
         let ended = quintile().call(&args);
-        let told: serde_json::Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
-        told["warnings"].clone()
+        let printed: serde_json::Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
+        printed["warnings"].clone()
     };
     assert_eq!(warnings(&["--single"])[0]["code"], "points-thin-voids");
     assert_eq!(warnings(&[]), json!([]));

@@ -1,23 +1,23 @@
-//! The letters of the plots: a subset of DejaVu Sans inside the command, so that no system font is needed.
+//! Font of the plots: an embedded subset of DejaVu Sans, so that no system font is needed.
 
-/// The letters of Latin-1 and Latin Extended-A and the few signs plots use, regular. See `assets/README.md`.
+/// Regular font with Latin-1, Latin Extended-A and the symbols of plots. See `assets/README.md`.
 pub const REGULAR: &[u8] = include_bytes!("../assets/DejaVuSans-subset.ttf");
 
-/// The same, bold.
+/// Bold font with the same characters.
 pub const BOLD: &[u8] = include_bytes!("../assets/DejaVuSans-Bold-subset.ttf");
 
-/// The family named in SVG: DejaVu where the reader has it, else something of about the same width.
+/// Font family in SVG: DejaVu if installed, otherwise fonts of similar width.
 pub const FAMILY: &str = "DejaVu Sans, Verdana, Segoe UI, Helvetica, Arial, sans-serif";
 
-/// The characters beyond the Latin letters that the subset has.
+/// Characters of the subset beyond the Latin letters.
 const SYMBOLS: &str = "–—…→←−≤≥≈ΩσμΔ∞";
 
-/// Whether the subset has `letter`: ASCII, Latin-1, Latin Extended-A and [`SYMBOLS`].
+/// Whether the subset has `letter`.
 fn has(letter: char) -> bool {
     matches!(letter, ' '..='~' | '\u{a0}'..='\u{17f}') || SYMBOLS.contains(letter)
 }
 
-/// `text` with every character that the subset lacks replaced by `?`, so that pictures show a sign and not a box.
+/// Replaces every character that the subset lacks with `?`.
 pub fn drawable(text: &str) -> String {
     text.chars().map(|c| if has(c) { c } else { '?' }).collect()
 }
@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_subset_has_every_letter_it_says() {
+    fn the_subset_has_all_declared_letters() {
         for font in [REGULAR, BOLD].map(|bytes| FontRef::try_from_slice(bytes).unwrap()) {
             let named = |letter: char| font.glyph_id(letter).0 != 0;
             let lacking: String =

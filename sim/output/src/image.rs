@@ -1,4 +1,4 @@
-//! Frames as files: PNG in 8-bit sRGB, EXR in linear f32, and small copies for the report.
+//! Images as files: PNG in 8-bit sRGB, EXR in linear f32, and thumbnails for the report.
 
 use std::io::Cursor;
 
@@ -8,7 +8,7 @@ use pipeline::texture::linear_to_srgb8;
 
 use super::dir::{OutDir, OutputError};
 
-/// Why an image could not be made.
+/// Error of an image.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// Width or height is 0.
@@ -19,14 +19,14 @@ pub enum ImageError {
         /// Height in pixels.
         height: u32,
     },
-    /// The number of pixels given is not width times height.
+    /// The number of pixels is not width times height.
     #[error("an image of {width}x{height} pixels was given {given} pixels")]
     Length {
         /// Width in pixels.
         width: u32,
         /// Height in pixels.
         height: u32,
-        /// Pixels given.
+        /// Number of pixels given.
         given: usize,
     },
     /// The encoder failed.
@@ -34,7 +34,7 @@ pub enum ImageError {
     Encode(#[from] image::ImageError),
 }
 
-/// A picture in linear RGB, rows from the top, `width * height` pixels.
+/// Image in linear RGB: `width * height` pixels, rows from the top.
 #[derive(Clone, Copy, Debug)]
 pub struct LinearImage<'a> {
     width: u32,
@@ -43,7 +43,7 @@ pub struct LinearImage<'a> {
 }
 
 impl<'a> LinearImage<'a> {
-    /// The picture of `width` x `height` `pixels`.
+    /// Image of `width` x `height` `pixels`.
     ///
     /// # Errors
     /// [`ImageError::NoArea`] for a zero side, [`ImageError::Length`] when `pixels` has another length.
@@ -57,7 +57,7 @@ impl<'a> LinearImage<'a> {
         Ok(Self { width, height, pixels })
     }
 
-    /// The bytes of a PNG file, 8-bit sRGB.
+    /// Encodes a PNG file, 8-bit sRGB.
     ///
     /// # Errors
     /// [`ImageError::Encode`] when the encoder fails.
@@ -66,7 +66,7 @@ impl<'a> LinearImage<'a> {
         encode_png(self.width, self.height, &bytes)
     }
 
-    /// The bytes of an EXR file, linear f32.
+    /// Encodes an EXR file, linear f32.
     ///
     /// # Errors
     /// [`ImageError::Encode`] when the encoder fails.
@@ -79,8 +79,8 @@ impl<'a> LinearImage<'a> {
         Ok(bytes.into_inner())
     }
 
-    /// The bytes of a PNG at most `max_width` pixels wide: each pixel the mean, in linear light, of those it covers.
-    /// Never larger than the picture itself.
+    /// Encodes a PNG at most `max_width` pixels wide, never larger than the image. Each pixel is the mean, in
+    /// linear light, of the pixels it covers.
     ///
     /// # Errors
     /// [`ImageError::Encode`] when the encoder fails.
@@ -125,13 +125,14 @@ impl<'a> LinearImage<'a> {
     }
 }
 
-/// The pixels `[from, to)` of a side of `full` that pixel `index` of a side of `small` stands for, at least one.
+/// Pixels `[from, to)` of a side of `full` pixels that pixel `index` of a side of `small` pixels covers; at
+/// least one.
 fn span(index: u32, small: u32, full: u32) -> (usize, usize) {
     let edge = |i: u32| (u64::from(i) * u64::from(full) / u64::from(small)) as usize;
     (edge(index), edge(index + 1).max(edge(index) + 1))
 }
 
-/// The bytes of a PNG file from 8-bit RGB `bytes`, rows from the top.
+/// Encodes a PNG file from 8-bit RGB `bytes`, rows from the top.
 ///
 /// # Errors
 /// [`ImageError::Encode`] when the encoder fails.

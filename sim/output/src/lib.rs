@@ -1,16 +1,16 @@
-//! What a run leaves behind: files in one folder, and lines on the terminal.
+//! Output: files in a folder of results, and lines on the terminal.
 //!
-//! - [`dir`]: the folder; results appear in it when all of them are whole.
+//! - [`dir`]: the folder of results; results appear together when all are complete.
 //! - [`image`]: frames as PNG and EXR, thumbnails.
-//! - [`plot`]: the plots, each drawn once into SVG and PNG with the letters of [`font`].
+//! - [`plot`]: the plots as SVG and PNG, with the embedded [`font`].
 //! - [`perfetto`]: a timeline that the Perfetto viewer opens, written with [`protobuf`].
-//! - [`report`]: one HTML page that shows it all and needs no network.
+//! - [`report`]: one HTML page that works without network.
 //! - [`table`]: numbers with SI prefixes and aligned tables.
-//! - [`progress`]: bars on a terminal, silence in a pipe.
+//! - [`progress`]: progress bars, only on a terminal.
 //! - [`terminal`]: errors, warnings and notes on standard error.
 //!
-//! Every part takes plain input structs of its own, so it knows nothing of the run that fills them. What is written
-//! depends on these inputs alone, byte for byte.
+//! Every part has input structs of its own and does not depend on the crate `run`. The bytes written depend
+//! only on these inputs.
 
 pub mod dir;
 pub mod font;

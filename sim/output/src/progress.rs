@@ -1,4 +1,4 @@
-//! Progress bars: on a terminal, and nowhere else; and the messages printed above them.
+//! Progress bars on a terminal, and messages printed above them.
 
 use std::io::{IsTerminal, stderr};
 
@@ -7,7 +7,7 @@ use warnings::Warning;
 
 use super::terminal::{Terminal, Verbosity};
 
-/// The bars of a run, drawn to standard error, and messages between them. They may be used from any thread.
+/// Progress bars and messages on standard error; usable from any thread.
 #[derive(Clone, Debug)]
 pub struct Progress {
     bars: MultiProgress,
@@ -15,25 +15,26 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Bars without colours on standard error; with `quiet` no bars and no messages.
+    /// Bars without colours on standard error; `quiet` hides bars and messages.
     pub fn new(quiet: bool) -> Self {
         let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
         Self::on(&Terminal::new(verbosity, clap::ColorChoice::Never), quiet)
     }
 
-    /// Bars on standard error; none where the terminal is quiet, where `hidden`, or where standard error is no terminal.
+    /// Bars on standard error. They are hidden if the terminal is quiet, if `hidden`, or if standard error is
+    /// not a terminal.
     pub fn on(terminal: &Terminal, hidden: bool) -> Self {
         let silent = hidden || terminal.verbosity() == Verbosity::Quiet || !stderr().is_terminal();
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         Self { bars: MultiProgress::with_draw_target(target), terminal: terminal.clone() }
     }
 
-    /// Whether nothing will be drawn.
+    /// Whether bars are hidden.
     pub fn is_silent(&self) -> bool {
         self.bars.is_hidden()
     }
 
-    /// A new bar below the others, for `length` steps of the work called `label`.
+    /// Adds a bar below the others, for `length` steps of the work `label`.
     pub fn bar(&self, label: &str, length: u64) -> Bar {
         let bar = self.bars.add(ProgressBar::new(length));
         if let Ok(style) =
@@ -45,40 +46,40 @@ impl Progress {
         Bar { bar }
     }
 
-    /// Prints a note above the bars, unless the terminal is quiet; also where no bars are drawn.
+    /// Prints a note above the bars, also if bars are hidden; not on a quiet terminal.
     pub fn note(&self, message: &str) {
         self.bars.suspend(|| self.terminal.note(message));
     }
 
-    /// Prints a warning above the bars, unless the terminal is quiet; also where no bars are drawn.
+    /// Prints a warning above the bars, also if bars are hidden; not on a quiet terminal.
     pub fn warn(&self, warning: &Warning) {
         self.bars.suspend(|| self.terminal.warn(warning));
     }
 
-    /// Prints a detail above the bars where details are wanted.
+    /// Prints a detail above the bars, under `--verbose`.
     pub fn detail(&self, message: &str) {
         self.bars.suspend(|| self.terminal.detail(message));
     }
 }
 
-/// One bar; it stays on the screen, where it got to, when dropped.
+/// A progress bar. It stays on the screen when dropped.
 #[derive(Debug)]
 pub struct Bar {
     bar: ProgressBar,
 }
 
 impl Bar {
-    /// One step done.
+    /// Adds one finished step.
     pub fn inc(&self) {
         self.bar.inc(1);
     }
 
-    /// So many steps done.
+    /// Sets the number of finished steps.
     pub fn set(&self, position: u64) {
         self.bar.set_position(position);
     }
 
-    /// Steps done so far.
+    /// Number of finished steps.
     pub fn position(&self) -> u64 {
         self.bar.position()
     }
@@ -95,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quiet_means_silent() {
+    fn quiet_hides_bars() {
         let progress = Progress::new(true);
         assert!(progress.is_silent() && Progress::on(&Terminal::default(), true).is_silent());
         progress.note("unseen");

@@ -1,7 +1,7 @@
-//! Writing of protocol buffers, as far as a Perfetto trace wants it.
+//! Encoder of protocol buffers, limited to the types of a Perfetto trace.
 //!
-//! The wire format is that of <https://protobuf.dev/programming-guides/encoding/>: a field is its number and wire type
-//! as a varint, then a varint, eight bytes, or a length and that many bytes.
+//! The wire format is that of <https://protobuf.dev/programming-guides/encoding/>: a field is its number and
+//! wire type as a varint, then a varint, eight bytes, or a length and that many bytes.
 
 /// Wire type of varints.
 const VARINT: u64 = 0;
@@ -10,7 +10,7 @@ const FIXED64: u64 = 1;
 /// Wire type of a length and that many bytes.
 const BYTES: u64 = 2;
 
-/// A message under construction; fields appear in the order in which they are put.
+/// Builder of a message; fields are encoded in the order of the calls.
 #[derive(Clone, Debug, Default)]
 pub struct Message {
     bytes: Vec<u8>,
@@ -52,7 +52,7 @@ impl Message {
         self
     }
 
-    /// What has been put so far, encoded.
+    /// The encoded message.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }

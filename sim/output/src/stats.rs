@@ -1,18 +1,18 @@
-//! Mean and standard deviation, as plots and report show them.
+//! Mean and standard deviation, for plots and report.
 
 use serde::Serialize;
 
-/// A mean with its standard deviation, in the unit of what was averaged.
+/// Mean and standard deviation, in the unit of the values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MeanSd {
-    /// The arithmetic mean.
+    /// Arithmetic mean.
     pub mean: f64,
-    /// The sample standard deviation (divided by n - 1); 0 for a single value.
+    /// Sample standard deviation (divided by n - 1); 0 for a single value.
     pub sd: f64,
 }
 
 impl MeanSd {
-    /// Of the finite ones among `values`; `None` where there are none.
+    /// Statistics of the finite `values`; `None` without any.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let values: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         if values.is_empty() {
@@ -24,7 +24,7 @@ impl MeanSd {
         Some(Self { mean, sd })
     }
 
-    /// Both multiplied by a positive `factor`, for example into another unit.
+    /// Scales both by a positive `factor`, for example to convert units.
     pub fn scaled(self, factor: f64) -> Self {
         Self { mean: self.mean * factor, sd: self.sd * factor }
     }

@@ -1,10 +1,10 @@
-//! Numbers for people: SI prefixes, and aligned tables for the terminal.
+//! Numbers as text with SI prefixes, and aligned tables for the terminal.
 
 use std::fmt;
 
 use super::MeanSd;
 
-/// Prefixes from small to large, each with its power of ten.
+/// SI prefixes in ascending order: sign and power of ten.
 const PREFIXES: [(&str, i32); 11] = [
     ("f", -15),
     ("p", -12),
@@ -19,10 +19,10 @@ const PREFIXES: [(&str, i32); 11] = [
     ("P", 15),
 ];
 
-/// A prefix and what to multiply a value in the plain unit by to express it with the prefix.
+/// SI prefix with its factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prefix {
-    /// The sign, for example `m`; empty for the plain unit.
+    /// Sign, for example `m`; empty for the plain unit.
     pub sign: &'static str,
     /// 1000 for `m`.
     pub factor: f64,
@@ -32,7 +32,7 @@ impl Prefix {
     /// No prefix.
     pub const NONE: Self = Self { sign: "", factor: 1.0 };
 
-    /// The prefix with which `magnitude` reads as a number in [1, 1000), as far as prefixes go.
+    /// Prefix that brings `magnitude` into [1, 1000), within the range of prefixes.
     pub fn of(magnitude: f64) -> Self {
         let magnitude = magnitude.abs();
         if magnitude == 0.0 || !magnitude.is_finite() {
@@ -112,17 +112,17 @@ pub fn digits(value: f64) -> String {
     plain(value, 4)
 }
 
-/// A count as it is, any other number without a unit to four digits.
+/// An integer in full, any other number without a unit to four digits.
 pub fn count_or_digits(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value}") } else { digits(value) }
 }
 
-/// A number without a unit to three digits; whole and in groups of three where it is large.
+/// A number without a unit to three digits; large numbers as integers in groups of three.
 pub fn number(value: f64) -> String {
     if (9999.5..1e18).contains(&value) { grouped(libm::round(value) as u64) } else { plain(value, 3) }
 }
 
-/// A number without a unit to so many significant digits.
+/// A number without a unit to `digits` significant digits.
 fn plain(value: f64, digits: usize) -> String {
     if value == 0.0 || (1e-3..1e9).contains(&value.abs()) {
         return format!("{value:.*}", plain_decimals(value, digits));
@@ -130,7 +130,7 @@ fn plain(value: f64, digits: usize) -> String {
     format!("{value:.*e}", digits - 1)
 }
 
-/// How many decimals a number without a prefix has at so many significant digits.
+/// Number of decimals of `value` at `digits` significant digits.
 fn plain_decimals(value: f64, digits: usize) -> usize {
     let power = if value == 0.0 { digits as i32 - 1 } else { libm::floor(libm::log10(value.abs())) as i32 };
     (digits as i32 - 1 - power).clamp(0, 12) as usize
@@ -144,20 +144,20 @@ pub fn grouped(value: u64) -> String {
     groups.join(" ")
 }
 
-/// A number of things: `1 frame`, `2 frames`.
+/// Count with its noun: `1 frame`, `2 frames`.
 pub fn counted(count: usize, thing: &str) -> String {
     let ending = if count == 1 { "" } else { "s" };
     format!("{count} {thing}{ending}")
 }
 
-/// Rows of text under a header, aligned for a terminal: the first column to the left, the others to the right.
+/// Text table for a terminal: the first column is left-aligned, the others right-aligned.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table with these columns and no rows.
+    /// Empty table with these columns.
     pub fn new<'a>(header: impl IntoIterator<Item = &'a str>) -> Self {
         Self { rows: vec![header.into_iter().map(str::to_owned).collect()] }
     }
@@ -194,7 +194,7 @@ impl fmt::Display for Table {
     }
 }
 
-/// Words as one would type them into a shell.
+/// Quotes words for a shell and joins them.
 pub fn shell_line<'a>(words: impl IntoIterator<Item = &'a String>) -> String {
     let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./,:=%+@".contains(letter);
     let quoted = |word: &String| match word.is_empty() || !word.chars().all(plain) {
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!(si_digits(1234.56, "Hz", 4), "1.235 kHz");
     }
 
-    /// A report had "69.4 µ draws per pixel" and a table "52.9 m".
+    /// A prefix without a unit, as in `69.4 µ`, would be meaningless.
     #[test]
     fn numbers_without_a_unit_have_no_prefix() {
         assert_eq!(
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_values_have_a_text_too() {
+    fn zero_and_infinite_values_have_a_text() {
         assert_eq!(si(0.0, "J"), "0.00 J");
         assert_eq!(si(f64::NAN, "J"), "n/a");
         assert_eq!(si(f64::INFINITY, "J"), "n/a");
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_lends_its_prefix_to_its_deviation() {
+    fn mean_and_deviation_share_a_prefix() {
         assert_eq!(si_mean_sd(MeanSd { mean: 0.012_34, sd: 0.000_4 }, "J"), "12.34 ± 0.40 mJ");
         assert_eq!(si_mean_sd(MeanSd { mean: f64::NAN, sd: 0.0 }, "J"), "n/a");
     }

@@ -1,18 +1,24 @@
-//! What a run would do, for `--dry-run`.
+//! `--dry-run`: what a run would do, and the time and memory that it is expected to take.
 
-use serde::Serialize;
-use warnings::Warning;
-
-use super::{Expected, PacingChoice, Prepared, RunError, pairing};
-use crate::Sampling;
+use cpu_time::ProcessTime;
 use output::table::{grouped, si};
+use pipeline::frame::render_with_heat;
+use pipeline::{Draw, Settings, Viewport};
+use serde::Serialize;
+use timing::{FrameClock, Level, Recorder};
+use warnings::Warning;
+use workloads::{Frame, FrameMesh, Scene};
 
-/// A run before it starts.
+use crate::plan::BYTES_PER_SAMPLE;
+use crate::regime::Regime;
+use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, Work, frame, gpu};
+
+/// Description of a run before it starts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DryRun {
     /// Name of the scene or of the workload.
     pub scene: String,
-    /// Triangles of the scene; not known of a workload.
+    /// Triangles of the scene; `None` for a workload.
     pub triangles: Option<usize>,
     /// Width and height of the image.
     pub size: [u32; 2],
@@ -20,7 +26,7 @@ pub struct DryRun {
     pub samples: u32,
     /// The sample table.
     pub table: String,
-    /// Frames a second of the scene's time.
+    /// Frames per second of the scene's time.
     pub frame_rate_hz: f64,
     /// Open time of the shutter as a share of the frame period.
     pub shutter: f64,
@@ -28,9 +34,9 @@ pub struct DryRun {
     pub lens_radius: f32,
     /// First frame, and one after the last.
     pub frames: [u32; 2],
-    /// Frames that differ.
+    /// Number of distinct frames.
     pub distinct_frames: usize,
-    /// Frames that are simulated, at least; the others repeat these or are predicted.
+    /// Lower limit of the number of simulated frames; the others are repeated or predicted.
     pub simulated_frames: usize,
     /// Name of the GPU.
     pub gpu: String,
@@ -38,25 +44,25 @@ pub struct DryRun {
     pub platform: String,
     /// Name of the energy table.
     pub energy_table: String,
-    /// The level of timing.
+    /// Timing level.
     pub timing: &'static str,
-    /// When the next frame starts.
+    /// Pacing of frames.
     pub pacing: &'static str,
-    /// Samples a second of the recorder, where that was asked for.
+    /// Samples per second of the recorder, if given.
     pub trace_rate_hz: Option<f64>,
-    /// What was chosen for `--accuracy` or `--budget`.
+    /// Choice for `--accuracy` or `--budget`.
     pub chosen: Option<String>,
-    /// Time and memory; not known of a workload.
+    /// Expected time and memory; `None` for a workload.
     pub expected: Option<Expected>,
-    /// Warnings that are known before the run.
+    /// Warnings found before the run.
     pub warnings: Vec<Warning>,
 }
 
 impl DryRun {
-    /// Of a run that is ready.
+    /// Describes a prepared run.
     ///
     /// # Errors
-    /// When the expected time cannot be found.
+    /// If the expected time cannot be measured.
     pub fn new(prepared: &Prepared) -> Result<Self, RunError> {
         let (plan, settings) = (&prepared.plan, prepared.plan.work.settings());
         let distinct = prepared.distinct.numbers().len();
@@ -65,10 +71,10 @@ impl DryRun {
             sampling => sampling.first(prepared.distinct.groups().len()).min(distinct),
         };
         let mut warnings = plan.work.warnings().to_vec();
-        warnings.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+        warnings.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
         Ok(Self {
             scene: plan.work.name().to_owned(),
-            triangles: plan.work.scene("").ok().map(workloads::Scene::triangle_count),
+            triangles: plan.work.scene("").ok().map(Scene::triangle_count),
             size: [settings.width, settings.height],
             samples: settings.samples,
             table: settings.table.clone(),
@@ -82,18 +88,15 @@ impl DryRun {
             platform: plan.platform.name.clone(),
             energy_table: plan.table.name().to_owned(),
             timing: plan.options.timing.name(),
-            pacing: match plan.options.pacing {
-                PacingChoice::Vsync => "vsync",
-                PacingChoice::Free => "free",
-            },
+            pacing: plan.options.pacing.name(),
             trace_rate_hz: plan.options.trace_rate_hz,
-            chosen: prepared.choice.as_ref().map(super::Choice::line),
+            chosen: prepared.choice.as_ref().map(Choice::line),
             expected: prepared.expected()?,
             warnings,
         })
     }
 
-    /// What would be run, a row for each subject.
+    /// Description as rows of name and value.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let triangles =
             self.triangles.map_or(String::new(), |count| format!(", {} triangles", grouped(count as u64)));
@@ -131,5 +134,152 @@ impl DryRun {
         rows.extend(self.chosen.clone().map(|line| ("chosen", line)));
         rows.push(("expected", expected));
         rows
+    }
+}
+
+/// Expected time and memory of a run on this host. Results do not depend on them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Expected {
+    /// Wall-clock seconds to the last file; accurate to a factor of two on an otherwise idle host.
+    pub host_s: f64,
+    /// Memory in bytes.
+    pub memory_bytes: u64,
+}
+
+/// Samples of the smaller of two probe images; the larger one has four times as many.
+const PROBE_SAMPLES: f64 = 30e3;
+/// Largest number of triangles of a probe image, chosen at equal steps.
+const MAX_PROBE_TRIANGLES: usize = 20_000;
+/// Time to write plots, report and other files, in seconds.
+const FILES_S: f64 = 0.3;
+/// Time to record, analyse and write one trace sample, in seconds. `command.md` has the measurement.
+const TRACE_SAMPLE_S: f64 = 0.9e-6;
+/// Memory of one trace sample in bytes.
+const TRACE_SAMPLE_BYTES: f64 = 70.0;
+/// Time of a preview over the time of a frame.
+const PREVIEW_TIME_RATIO: f64 = 0.05;
+/// Memory of the program with a small scene, in bytes.
+const PROGRAM_BYTES: u64 = 30_000_000;
+/// Memory of one triangle of the scene in bytes.
+const TRIANGLE_BYTES: u64 = 150;
+
+impl Expected {
+    /// Expected time and memory of `plan` on the threads of the current pool; `None` for a workload, which cannot be
+    /// reduced.
+    ///
+    /// # Errors
+    /// If a frame cannot be rendered or timed.
+    pub(super) fn new(plan: &Plan, distinct: &Distinct) -> Result<Option<Self>, RunError> {
+        let Work::Scene(scene) = &plan.work else { return Ok(None) };
+        let (all, differ) = (distinct.groups().len(), distinct.numbers().len());
+        let (whole, previews) = match plan.options.sampling {
+            Sampling::Every => (differ, 0.0),
+            sampling => (sampling.first(all).min(differ), PREVIEW_TIME_RATIO * differ as f64),
+        };
+        let probe = Probe::new(plan, scene, distinct.numbers()[differ / 2])?;
+        let mut frames_s = probe.frame_s(plan.options.timing)? * (whole as f64 + previews);
+        if plan.options.verify {
+            frames_s += probe.frame_s(Level::Stepped)? * differ as f64;
+        }
+        let threads = rayon::current_num_threads();
+        let trace_samples = plan.size().trace_samples();
+        let samples = plan.pixels() * u64::from(plan.samples.per_pixel());
+        let memory_bytes = PROGRAM_BYTES
+            + TRIANGLE_BYTES * scene.triangle_count() as u64
+            + BYTES_PER_SAMPLE * samples * threads.min(differ) as u64
+            + (TRACE_SAMPLE_BYTES * trace_samples) as u64;
+        let host_s = FILES_S + TRACE_SAMPLE_S * trace_samples + frames_s / threads as f64;
+        Ok(Some(Self { host_s, memory_bytes }))
+    }
+
+    /// Time and memory as text.
+    pub fn line(&self) -> String {
+        format!("about {}, {:.0} MB of memory", duration(self.host_s), self.memory_bytes as f64 / 1e6)
+    }
+}
+
+/// Duration as text, to two digits.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 1.0 => "a second".to_owned(),
+        s if s < 100.0 => format!("{s:.0} s"),
+        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
+}
+
+/// A frame with part of its triangles, to be rendered at reduced sizes.
+struct Probe<'a> {
+    plan: &'a Plan,
+    scene: &'a Scene,
+    frame: Frame,
+    /// Triangles of the frame per rendered triangle.
+    triangle_ratio: f64,
+    /// CPU seconds for making the frame.
+    made_s: f64,
+}
+
+impl<'a> Probe<'a> {
+    fn new(plan: &'a Plan, scene: &'a Scene, number: u32) -> Result<Self, RunError> {
+        let started = ProcessTime::now();
+        let mut frame = scene.frame(number)?;
+        let made_s = started.elapsed().as_secs_f64();
+        let step = frame.triangle_count().div_ceil(MAX_PROBE_TRIANGLES).max(1);
+        let all = frame.triangle_count();
+        frame.meshes.iter_mut().for_each(|mesh| thin_out(mesh, step));
+        let triangle_ratio = all as f64 / frame.triangle_count().max(1) as f64;
+        Ok(Self { plan, scene, frame, triangle_ratio, made_s })
+    }
+
+    /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes.
+    fn frame_s(&self, level: Level) -> Result<f64, RunError> {
+        let samples = self.plan.pixels() as f64 * f64::from(self.plan.samples.per_pixel());
+        let by = (samples / PROBE_SAMPLES).sqrt().max(1.0);
+        let [small, large] = [self.drawn(by, level)?, self.drawn((0.5 * by).max(1.0), level)?];
+        let a_and_b = |[(x0, y0), (x1, y1)]: [(f64, f64); 2]| {
+            let b = if x1 > x0 { ((y1 - y0) / (x1 - x0)).clamp(0.0, y1 / x1) } else { y1 / x1 };
+            (y1 - b * x1, b)
+        };
+        let (a, b) = a_and_b([small, large]);
+        Ok(self.made_s + self.triangle_ratio * (a + b * self.plan.pixels() as f64))
+    }
+
+    /// Pixels and CPU seconds of the frame, rendered `by` times smaller along each axis.
+    fn drawn(&self, by: f64, level: Level) -> Result<(f64, f64), RunError> {
+        let plan = self.plan;
+        let side = |side: u32| ((f64::from(side) / by).ceil() as u32).max(1);
+        let viewport = Viewport::new(side(plan.viewport.width()), side(plan.viewport.height()))
+            .ok_or_else(|| RunError::Setting("size of the probe".to_owned()))?;
+        let started = ProcessTime::now();
+        let draws: Vec<Draw<'_>> = self.frame.draws(self.scene)?;
+        let background = self.scene.background();
+        let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
+        let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
+        let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
+        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+        render_with_heat(&self.frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;
+        clock.finish()?;
+        Regime::of(&self.frame.camera, &draws, viewport, plan.samples.per_pixel());
+        Ok((viewport.pixels() as f64, started.elapsed().as_secs_f64()))
+    }
+}
+
+/// Keeps one in `step` triangles.
+fn thin_out(mesh: &mut FrameMesh, step: usize) {
+    if step > 1 {
+        mesh.triangles = mesh.triangles.iter().copied().step_by(step).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_have_two_digits_and_a_unit() {
+        assert_eq!(
+            [0.4, 12.4, 99.0, 150.0, 5900.0, 7200.0].map(duration),
+            ["a second", "12 s", "99 s", "2 min", "98 min", "2 h"]
+        );
     }
 }

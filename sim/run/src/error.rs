@@ -1,4 +1,4 @@
-//! Each way a run can die.
+//! Errors of a run.
 
 use crate::gpu::GpuError;
 use output::OutputError;
@@ -6,7 +6,7 @@ use output::image::ImageError;
 use output::plot::PlotError;
 use timing::TimingError;
 
-/// Why a run did not finish.
+/// Error of a run.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the variants are the sources, documented there")]
 pub enum RunError {
@@ -50,18 +50,18 @@ pub enum RunError {
     Input { path: String, source: std::io::Error },
     #[error(transparent)]
     Spec(#[from] activity::spec::SpecError),
-    /// Two settings that cannot be together, or one that cannot be.
+    /// A setting is invalid, or two settings conflict.
     #[error("{0}")]
     Setting(String),
 }
 
 impl RunError {
-    /// That something was refused for the reason it gives.
+    /// Invalid setting, with the message of `why`.
     pub fn setting(why: impl std::fmt::Display) -> Self {
         Self::Setting(why.to_string())
     }
 
-    /// Whether the mistake is the caller's (exit code 2) rather than a failure (exit code 1).
+    /// Whether this is a usage error (exit code 2) rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Scene(error) => error.is_usage(),
@@ -85,7 +85,7 @@ impl RunError {
     }
 }
 
-/// Whether a file could not be read at all, wherever in the chain of causes that stands.
+/// Whether the chain of causes contains an input or output error: the file could not be read.
 fn is_unreadable(error: &(dyn std::error::Error + 'static)) -> bool {
     let mut cause = Some(error);
     while let Some(error) = cause {

@@ -1,113 +1,116 @@
-//! One frame through pipeline, clock and watts.
+//! Simulation of one frame: pipeline, timing model and power model.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use activity::{Timeline, Unit};
+use activity::{Event, LineAccess, Packet, Timeline, Unit};
 use glam::Vec3;
-use pipeline::frame::HeatMap;
-use rayon::prelude::*;
-use timing::Recorder;
-
-use super::heat::{self, HeatPicture};
-use super::{Distinct, Observed, Origin, Plan, RunError, RunFrame, draw};
 use output::OutDir;
 use output::image::LinearImage;
 use output::progress::Progress;
-use timing::{AccuracyWarning, FrameClock};
+use pipeline::Settings;
+use pipeline::frame::{HeatMap, render_with_heat};
+use rayon::prelude::*;
+use timing::{AccuracyWarning, FrameClock, Recorder};
+use workloads::job::Drawn;
+use workloads::{Frame, Scene};
 
-/// Bins of a frame's timeline are a microsecond long, twenty to a sample of a 50 kHz recorder.
+use crate::heat::{self, HeatPicture};
+use crate::regime::Regime;
+use crate::{Distinct, Observed, Origin, Plan, RunError, RunFrame, Work};
+
+/// Length of a timeline bin in picoseconds: one microsecond, a twentieth of a sample at 50 kHz.
 pub const BIN_PS: u64 = 1_000_000;
-/// Most bins of all frames that are kept, about 200 bytes each; where there would be more they are made longer.
-const MOST_BINS: usize = 8_000_000;
-/// Fewest bins of a frame, however many frames there are.
-pub(super) const FEWEST_BINS: usize = 1024;
+/// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
+const MAX_TOTAL_BINS: usize = 8_000_000;
+/// Lower limit of the bins of a frame, for any number of frames.
+pub(super) const MIN_FRAME_BINS: usize = 1024;
 
-/// The most bins of a frame where `frames` are kept.
-pub(super) fn bins_of_each(frames: usize) -> usize {
-    (MOST_BINS / frames.max(1)).max(FEWEST_BINS)
+/// Largest number of bins of one frame, in a run of `frames`.
+pub(super) fn max_bins_per_frame(frames: usize) -> usize {
+    (MAX_TOTAL_BINS / frames.max(1)).max(MIN_FRAME_BINS)
 }
 
-/// Simulates the frames called `numbers` and writes nothing.
+/// Simulates the frames `numbers` without writing files.
 ///
 /// # Errors
-/// When a frame cannot be made or timed.
+/// If a frame cannot be rendered or timed.
 pub fn frames_of(plan: &Plan, numbers: &[u32], progress: &Progress) -> Result<Vec<RunFrame>, RunError> {
-    let most_bins = bins_of_each(numbers.len());
+    let max_bins = max_bins_per_frame(numbers.len());
     let bar = progress.bar("frames", numbers.len() as u64);
     let simulate = |&number: &u32| {
-        let (frame, ..) = simulate_frame(plan, number, most_bins)?;
+        let (frame, ..) = simulate_frame(plan, number, max_bins)?;
         bar.inc();
         Ok(frame)
     };
     numbers.par_iter().map(simulate).collect()
 }
 
-/// What a panic carries through the threads, so that it is known which frame it happened in.
+/// Payload of a panic in a worker thread, with the frame that was simulated.
 pub struct CrashedFrame {
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
-    /// What the panic itself carried.
+    /// Payload of the original panic.
     pub panic: Box<dyn Any + Send>,
 }
 
-/// Lets tests of builds with assertions see a crash; elsewhere it is nothing.
-fn panic_where_asked(number: u32) {
+/// Panics in the frame that `QUINTILE_PANIC_IN_FRAME` names: a test hook of debug builds.
+fn panic_if_requested(number: u32) {
     if cfg!(debug_assertions)
-        && std::env::var("QUINTILE_PANIC_IN_FRAME").is_ok_and(|asked| asked == number.to_string())
+        && std::env::var("QUINTILE_PANIC_IN_FRAME").is_ok_and(|frame| frame == number.to_string())
     {
         panic!("a test asked for it");
     }
 }
 
-/// Where frames are simulated.
-pub(super) struct Stage<'a> {
+/// Simulates frames of a plan and writes their images.
+pub(super) struct FrameSimulator<'a> {
     pub plan: &'a Plan,
     pub distinct: &'a Distinct,
-    /// Where images and heat maps go; nowhere without it.
+    /// Folder of images and heat maps; `None` writes no files.
     pub dir: Option<&'a OutDir>,
-    /// Bins of a frame at most.
-    pub most_bins: usize,
+    /// Largest number of timeline bins of a frame.
+    pub max_bins: usize,
 }
 
-/// A frame simulated whole.
-pub(super) struct Whole {
+/// Result of simulating one frame.
+pub(super) struct SimulatedFrame {
     pub frame: RunFrame,
-    /// Its linear image, where it is wanted.
+    /// Linear image, if it is kept for the report.
     pub picture: Option<Vec<Vec3>>,
     pub heat: Vec<HeatPicture>,
 }
 
-impl Stage<'_> {
-    /// Simulates the frames of group `group` once and writes the image of each.
-    pub fn whole(&self, group: usize, picture: bool) -> Result<Whole, RunError> {
+impl FrameSimulator<'_> {
+    /// Simulates group `group` once and writes the image of each of its frames.
+    pub fn simulate(&self, group: usize, keep_picture: bool) -> Result<SimulatedFrame, RunError> {
         let (plan, dir, number) = (self.plan, self.dir, self.distinct.numbers()[group]);
         let simulate = || {
-            panic_where_asked(number);
-            simulate_frame(plan, number, self.most_bins)
+            panic_if_requested(number);
+            simulate_frame(plan, number, self.max_bins)
         };
         let simulated = catch_unwind(AssertUnwindSafe(simulate))
             .unwrap_or_else(|panic| resume_unwind(Box::new(CrashedFrame { frame: number, panic })));
         let (frame, image, maps) = simulated?;
         let mut heat = Vec::new();
         if let Some(dir) = dir {
-            let write = |map| heat::write(plan, dir, number, (map, &image));
+            let write = |map| heat::write(plan, dir, number, map, &image);
             heat = maps.iter().map(write).collect::<Result<_, _>>()?;
             self.distinct.members(group).try_for_each(|number| write_image(plan, dir, number, &image))?;
         }
-        Ok(Whole { frame, picture: picture.then_some(image), heat })
+        Ok(SimulatedFrame { frame, picture: keep_picture.then_some(image), heat })
     }
 }
 
 fn simulate_frame(
     plan: &Plan,
     number: u32,
-    most_bins: usize,
+    max_bins: usize,
 ) -> Result<(RunFrame, Vec<Vec3>, Vec<HeatMap>), RunError> {
     let mut clock =
-        FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, most_bins));
-    let draw::Drawing { drawn, regime, heat } =
-        draw::draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
+        FrameClock::new(plan.options.timing, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
+    let Rendered { drawn, regime, heat } =
+        draw(plan, number, &plan.options.heat, |packet, lines| clock.push(packet, lines))?;
     let timed = clock.finish()?;
     let accuracy = AccuracyWarning::all(plan.options.timing, &timed);
     let timeline = timed.timeline;
@@ -138,7 +141,7 @@ fn busy_shares(timeline: &Timeline) -> Vec<[f32; Unit::COUNT]> {
     timeline.bins.iter().map(|bin| bin.busy_ps.map(share)).collect()
 }
 
-/// The name of a frame's image without its ending.
+/// Path of the image of frame `number`, without extension.
 pub(super) fn image_name(number: u32) -> String {
     format!("images/frame_{number:04}")
 }
@@ -151,4 +154,54 @@ fn write_image(plan: &Plan, dir: &OutDir, number: u32, image: &[Vec3]) -> Result
         linear.write_exr(dir, &format!("{}.exr", image_name(number)))?;
     }
     Ok(())
+}
+
+/// Result of rendering a frame.
+struct Rendered {
+    drawn: Drawn,
+    regime: Regime,
+    heat: Vec<HeatMap>,
+}
+
+/// Renders frame `number`, with heat maps of `events`; `emit` receives the packets.
+fn draw(
+    plan: &Plan,
+    number: u32,
+    events: &[Event],
+    mut emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<Rendered, RunError> {
+    match &plan.work {
+        Work::Scene(scene) => draw_scene(plan, scene, &scene.frame(number)?, events, emit),
+        Work::Job { job, .. } => {
+            let drawn = job.frame(number, &plan.gpu.pipeline, &mut emit)?;
+            Ok(Rendered { drawn, regime: Regime::default(), heat: Vec::new() })
+        }
+    }
+}
+
+/// Renders `frame`. The frame number must have no influence: frames with equal fingerprints are rendered
+/// once.
+fn draw_scene(
+    plan: &Plan,
+    scene: &Scene,
+    frame: &Frame,
+    events: &[Event],
+    emit: impl FnMut(&Packet, &[LineAccess]),
+) -> Result<Rendered, RunError> {
+    let draws = frame.draws(scene)?;
+    let viewport = plan.viewport;
+    let background = scene.background();
+    let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
+    let (rendered, heat) =
+        render_with_heat(&frame.camera, &draws, &settings, events, emit).map_err(RunError::setting)?;
+    let drawn = Drawn {
+        image: rendered.image,
+        counts: rendered.counts,
+        triangles: frame.triangle_count(),
+        moving: frame.is_moving(),
+        lens: frame.camera.lens().is_some(),
+        ..Drawn::default()
+    };
+    let regime = Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
+    Ok(Rendered { drawn, regime, heat })
 }

@@ -1,27 +1,31 @@
-//! The GPU file.
+//! GPU file, and the check that platform and energy table belong to the GPU.
 
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use activity::spec;
 use pipeline::PipelineSpec;
+use power_model::{EnergyTable, Platform};
 use serde::Deserialize;
 use timing::{Clocks, Machine, MachineSpec, TimingError};
+use warnings::{Code, Warning};
 
-/// A GPU. `docs/gpu.md` documents every field.
+use crate::RunOptions;
+
+/// Specification of a GPU. `docs/gpu.md` documents every field.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GpuSpec {
-    /// What it is called.
+    /// Name of the GPU.
     pub name: String,
-    /// What it stands for, in a sentence.
+    /// Description, one sentence.
     pub doc: String,
-    /// The platform and the energy table that its watts are modelled with; nothing where none belongs to it.
+    /// Platform and energy table of its power model, if it has its own.
     #[serde(default)]
     pub power: Option<PowerFiles>,
-    /// Clock of everything but memory, in hertz.
+    /// Core clock in hertz: all units except memory.
     pub core_hz: f64,
-    /// Clock of memory, in hertz.
+    /// Memory clock in hertz.
     pub memory_hz: f64,
     /// Sizes of the pipeline.
     pub pipeline: PipelineSpec,
@@ -29,7 +33,7 @@ pub struct GpuSpec {
     pub units: MachineSpec,
 }
 
-/// A platform and an energy table, each a name or a file whose name ends in `.ron`.
+/// Platform and energy table: names, or files that end in `.ron`.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PowerFiles {
@@ -40,7 +44,7 @@ pub struct PowerFiles {
 }
 
 impl PowerFiles {
-    /// Takes names of files as relative to the folder of `file`.
+    /// Resolves file names relative to the folder of `file`.
     fn beside(&mut self, file: &Path) {
         for name in [&mut self.platform, &mut self.energy] {
             if name.ends_with(".ron") {
@@ -51,40 +55,40 @@ impl PowerFiles {
 }
 
 impl Default for PowerFiles {
-    /// Those of the reference, which also serve a GPU to which none belong.
+    /// Platform and table of the reference GPU, also used for a GPU without its own.
     fn default() -> Self {
         Self { platform: "reference".to_owned(), energy: "28nm".to_owned() }
     }
 }
 
-/// Why a GPU cannot be used.
+/// Error of a GPU file.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
     /// The file cannot be read or parsed.
     #[error(transparent)]
     Spec(#[from] spec::SpecError),
-    /// A value cannot be.
+    /// A value is invalid.
     #[error("{place}: {message}")]
     Value {
-        /// The file as it was named, with line and column where the value stands in it.
+        /// File name as given, with line and column of the value if it is in the file.
         place: String,
-        /// Which value, what is wrong with it and what would do.
+        /// The value, what is wrong with it, and valid values.
         message: String,
     },
     /// No GPU has this name.
     #[error("no GPU called `{name}`; {suggestion}; or name a .ron file")]
     Unknown {
-        /// What was asked for.
+        /// Name as given.
         name: String,
-        /// The nearest name, or all of them.
+        /// The most similar name, or all names.
         suggestion: String,
     },
 }
 
-/// Clocks of a GPU: from a model on an FPGA to ten times what is built.
+/// Valid clocks in hertz: from a prototype on an FPGA to ten times those of products.
 const CLOCKS_HZ: RangeInclusive<f64> = 1e6..=1e11;
 
-/// The GPUs that come with the program: name and file.
+/// Built-in GPUs: name and RON text.
 const BUILTIN: [(&str, &str); 4] = [
     ("reference", include_str!("../gpus/reference.ron")),
     ("mobile", include_str!("../gpus/mobile.ron")),
@@ -93,15 +97,15 @@ const BUILTIN: [(&str, &str); 4] = [
 ];
 
 impl GpuSpec {
-    /// Names of the GPUs that come with the program.
+    /// Names of the built-in GPUs.
     pub fn names() -> impl Iterator<Item = &'static str> {
         BUILTIN.iter().map(|(name, _)| *name)
     }
 
-    /// The GPU called `name`, or in the file of that name when it ends in `.ron`.
+    /// Loads the built-in GPU `name`, or the file `name` if it ends in `.ron`.
     ///
     /// # Errors
-    /// When there is none, or its file has a mistake.
+    /// If no GPU has this name, or its file is invalid.
     pub fn load(name: impl AsRef<Path>) -> Result<Self, GpuError> {
         let path = name.as_ref();
         let name = &*path.to_string_lossy();
@@ -120,10 +124,10 @@ impl GpuSpec {
         Ok(gpu)
     }
 
-    /// A GPU from RON text; `file` stands for the file in messages.
+    /// Parses and validates RON text; messages name `file`.
     ///
     /// # Errors
-    /// When the text has a mistake.
+    /// If the text is invalid.
     pub fn parse(text: &str, file: &str) -> Result<Self, GpuError> {
         let spec: Self = spec::parse(text, file)?;
         match spec.validate() {
@@ -136,21 +140,21 @@ impl GpuSpec {
         }
     }
 
-    /// What its time depends on.
+    /// Parameters of the timing model.
     ///
     /// # Errors
-    /// When the GPU was not validated.
+    /// If the clocks have no common cycle; a loaded GPU is validated.
     pub fn machine(&self) -> Result<Machine<'_>, TimingError> {
         let clocks = self.clocks().ok_or_else(|| TimingError::Clocks(self.name.clone()))?;
         Ok(Machine { units: &self.units, clocks, batch_triangles: self.pipeline.batch_triangles })
     }
 
-    /// Both clocks in one time.
+    /// Core and memory clock with a common cycle; `None` if there is none.
     pub fn clocks(&self) -> Option<Clocks> {
         Clocks::new(self.core_hz, self.memory_hz)
     }
 
-    /// Checks what the types of single fields do not; on failure the field and what is wrong with it.
+    /// Checks relations between fields. Error: name of the field and message.
     fn validate(&self) -> Result<(), (String, String)> {
         for (field, value) in [("core_hz", self.core_hz), ("memory_hz", self.memory_hz)] {
             if !CLOCKS_HZ.contains(&value) {
@@ -173,6 +177,39 @@ impl GpuSpec {
     }
 }
 
+/// Checks that platform and energy table belong to the GPU. The power values of a platform hold for the size
+/// and clock of one GPU and are not scaled; others give a warning.
+pub(super) fn check_pairing(
+    options: &RunOptions,
+    gpu: &GpuSpec,
+    platform: &Platform,
+    table: &EnergyTable,
+) -> Option<Warning> {
+    let in_use = format!("platform `{}` and energy table `{}`", platform.name, table.name());
+    let message = match &gpu.power {
+        None => format!(
+            "no platform belongs to GPU `{}`, so its watts come from {in_use}, which were made for another machine: compare its \
+             cycles and counts, not its watts; or write a platform for it and name that as `power` in the GPU file",
+            gpu.name
+        ),
+        Some(own) if belongs(own, options, platform, table) => return None,
+        Some(own) => format!(
+            "GPU `{}` belongs to platform `{}` and energy table `{}`, and its watts come from {in_use}: they are those of another \
+             machine; leave --platform and --energy out, or choose the GPU that belongs to them (`quintile list`)",
+            gpu.name, own.platform, own.energy
+        ),
+    };
+    Some(Warning::new(Code::PlatformMismatch, message))
+}
+
+/// Whether the GPU file names this platform and table, by name or by the path in the options.
+fn belongs(own: &PowerFiles, options: &RunOptions, platform: &Platform, table: &EnergyTable) -> bool {
+    let is = |own: &str, given: &Option<PathBuf>, name: &str| {
+        own == name || given.as_ref().is_none_or(|given| given == Path::new(own))
+    };
+    is(&own.platform, &options.platform, &platform.name) && is(&own.energy, &options.energy, table.name())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_name_their_place() {
+    fn errors_name_line_and_column() {
         let text = message(&REFERENCE.replace("tile_px: 8", "tile_pz: 8"));
         assert!(text.starts_with("gpu.ron:") && text.contains("did you mean `tile_px`?"), "{text}");
         let text = message(&REFERENCE.replace("\"samples_resolved\"", "\"samples_resolve\""));
@@ -205,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_beyond_any_hardware_are_refused_with_their_line() {
+    fn sizes_out_of_range_are_refused_with_their_line() {
         let text =
             message(&REFERENCE.replace("queue: 8, lines_per_cycle", "queue: 4294967295, lines_per_cycle"));
         assert!(

@@ -1,4 +1,4 @@
-//! Heat maps: where in a frame a counter counted, as files.
+//! Heat maps: counts of an event over the image, as files.
 
 use activity::Event;
 use glam::{Vec3, vec3};
@@ -11,27 +11,29 @@ use output::image::LinearImage;
 use output::plot::{HeatMapPlot, HeatTile, Picture, Shading};
 use output::table::grouped;
 
-/// A heat map of the report.
+/// Heat map of the report.
 pub struct HeatPicture {
-    /// The counter.
+    /// Counter of the map.
     pub event: Event,
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
-    /// The bytes of a PNG file.
+    /// Contents of a PNG file.
     pub png: Vec<u8>,
 }
 
-/// The name of the files of a heat map without their endings.
+/// Path of the files of a heat map, without extension.
 pub(super) fn heat_name(event: Event, frame: u32) -> String {
     format!("heat/{}_{frame:04}", event.name())
 }
 
-/// Writes picture, values of the pixels and counts of the tiles; returns the picture. `image` is that of the frame, for its outlines.
+/// Writes a heat map as PNG, as EXR (values of pixels) and as CSV (counts of tiles). The brightness of
+/// `image`, the frame's image, shades the PNG. Returns the PNG.
 pub(super) fn write(
     plan: &Plan,
     dir: &OutDir,
     frame: u32,
-    (map, image): (&HeatMap, &[Vec3]),
+    map: &HeatMap,
+    image: &[Vec3],
 ) -> Result<HeatPicture, RunError> {
     let name = heat_name(map.event, frame);
     let png = picture(plan, frame, map, &brightness(image)).png()?;
@@ -43,7 +45,7 @@ pub(super) fn write(
     Ok(HeatPicture { event: map.event, frame, png })
 }
 
-/// Brightness of each pixel as displayed.
+/// Displayed brightness of each pixel, 0 to 1.
 fn brightness(image: &[Vec3]) -> Vec<f32> {
     let luminance = |pixel: &Vec3| pixel.dot(vec3(0.2126, 0.7152, 0.0722)).clamp(0.0, 1.0);
     image.iter().map(|pixel| libm::powf(luminance(pixel), 1.0 / 2.2)).collect()
@@ -70,18 +72,18 @@ fn picture(plan: &Plan, frame: u32, map: &HeatMap, brightness: &[f32]) -> Pictur
         shading: Shading::Clipped,
         brightness,
     };
-    plot.picture(&plan.options.look)
+    plot.picture(&plan.options.plot_style)
 }
 
-/// The most blocks that are drawn; larger pictures would show no more of them.
-const MOST_BLOCKS: usize = 1 << 19;
+/// Largest number of blocks in a picture.
+const MAX_BLOCKS: usize = 1 << 19;
 
-/// The side of the blocks of pixels that are drawn as one.
+/// Side in pixels of the blocks that are drawn as one.
 fn block_px(map: &HeatMap) -> u32 {
-    (1..).find(|side| map.samples.len() / (side * side) as usize <= MOST_BLOCKS).unwrap_or(1)
+    (1..).find(|side| map.samples.len() / (side * side) as usize <= MAX_BLOCKS).unwrap_or(1)
 }
 
-/// Blocks of `side` pixels, cut to the image, each with the mean of its pixels.
+/// Blocks of `side` pixels, clipped to the image, each with the mean of its pixels.
 fn blocks(plan: &Plan, map: &HeatMap, side: u32) -> Vec<HeatTile> {
     let [width, height] = [plan.viewport.width(), plan.viewport.height()];
     let across = width.div_ceil(side);
@@ -98,7 +100,7 @@ fn blocks(plan: &Plan, map: &HeatMap, side: u32) -> Vec<HeatTile> {
     (0..across * height.div_ceil(side)).map(block).collect()
 }
 
-/// The fine tiles, each with its own events and its share of those of the coarse tile it is in.
+/// Fine tiles, each with its own events and its share of the events of its coarse tile.
 fn tiles(plan: &Plan, map: &HeatMap) -> Vec<HeatTile> {
     let side = plan.gpu.pipeline.coarse_tile_px;
     let across = plan.viewport.width().div_ceil(side);
@@ -110,7 +112,7 @@ fn tiles(plan: &Plan, map: &HeatMap) -> Vec<HeatTile> {
     map.tiles.iter().map(tile).collect()
 }
 
-/// Every tile with its count, fine ones first; coarse ones where something is counted for them as a whole.
+/// Writes the count of each fine tile, then of each coarse tile that has events of its own.
 fn table(map: &HeatMap, out: &mut dyn std::io::Write) -> Result<(), BoxError> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(["x_px", "y_px", "width_px", "height_px", "count"])?;

@@ -1,42 +1,29 @@
-//! A run: scene, pipeline, clock, watts, trace, frames, files.
+//! A run: from a scene and a GPU to frames in joules, a power trace and a folder of results.
 //!
 //! ```text
-//! RunOptions -> Plan -> open -> prepare: Distinct -> choose -> Prepared -> run: simulate -> measure -> Outcome -> write
+//! RunOptions -> Plan -> open -> prepare -> Prepared -> run: simulate -> measure -> Outcome -> write
 //! ```
 
-mod again;
-mod checks;
 mod choice;
 pub mod compare;
-mod distinct;
-mod draw;
 mod dry_run;
 mod error;
-mod expected;
-mod facts;
 mod frame;
-mod frame_rows;
 mod gpu;
 mod heat;
-mod limits;
 mod measure;
-mod modelled;
 mod one_frame;
 mod options;
-mod pairing;
 mod pictures;
 mod plan;
 mod provenance;
-mod recorder;
 mod regime;
 mod report;
 mod sampled;
-mod sampling;
 mod simulate;
 mod simulated;
 mod stalls;
 mod summary;
-mod timeline;
 pub mod visibility;
 mod warn;
 mod work;
@@ -45,46 +32,38 @@ mod write;
 use output::progress::Progress;
 use output::{Destination, OutDir};
 
-pub use again::again;
-pub use checks::Checks;
 pub use choice::{Choice, Dimensions, ProbeSummary, Verified, cheapest_level};
-pub use distinct::Distinct;
-pub use dry_run::DryRun;
+pub use dry_run::{DryRun, Expected};
 pub use error::RunError;
-pub use expected::Expected;
 pub use frame::{BIN_PS, CrashedFrame, frames_of};
-pub use frame_rows::FrameRow;
 pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use heat::HeatPicture;
-pub use limits::fits_memory;
-pub use measure::Measurement;
-pub use modelled::Modelled;
+pub use measure::{Checks, Measurement, Resolution};
 pub use one_frame::MachineTexts;
-pub use options::{PacingChoice, RunOptions, Wish};
-pub use plan::Plan;
-pub use provenance::{Host, Input, Provenance};
-pub use recorder::Resolution;
+pub use options::{Method, PacingChoice, Requested, RunOptions, Sampling};
+pub use plan::{Plan, fits_memory};
+pub use provenance::{Host, Input, Provenance, again};
 pub use regime::Regime;
-pub use sampled::{Forecast, Glimpse, Preview, Scout, Signatures, taken};
-pub use sampling::{Method, Sampling};
-pub use simulated::{Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated, Taken};
+pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
+pub use simulated::{FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated};
 pub use stalls::StallShares;
-pub use summary::{Detection, Figures, Summary};
-pub use work::Work;
+pub use summary::{Detection, Figures, FrameRow, Summary};
+pub use work::{Distinct, Work};
 
-/// Everything a run found out.
+/// Results of a run.
 pub struct Outcome {
-    /// What was asked for.
+    /// Options and loaded inputs.
     pub plan: Plan,
-    /// What the simulator knows.
+    /// Frames as simulated: the ground truth.
     pub simulated: Simulated,
-    /// What the trace says.
+    /// Frames as measured in the power trace.
     pub measurement: Measurement,
-    /// The numbers of `summary.json`.
+    /// Contents of `summary.json`.
     pub summary: Summary,
 }
 
-/// A run with everything loaded, checked and chosen, of which nothing is simulated and nothing written yet.
+/// A run that is ready to start: inputs loaded, options checked, level and frames chosen. Nothing is
+/// simulated or written yet.
 pub struct Prepared {
     plan: Plan,
     provenance: Provenance,
@@ -92,29 +71,30 @@ pub struct Prepared {
     choice: Option<Choice>,
 }
 
-/// Prepares a run: finds the frames that differ, and makes the choices that were left to the program, or those `made` by the run
-/// that is repeated. The program was built from `revision`.
+/// Prepares a run: finds the distinct frames and applies the choice of `--accuracy` and `--budget`. The
+/// choice is `recorded` when a run is repeated, otherwise a probe makes it. `revision` is the git revision of
+/// the program.
 ///
 /// # Errors
-/// [`RunError`]; [`RunError::is_usage`] tells the caller's mistakes from failures.
+/// [`RunError`]; [`RunError::is_usage`] separates usage errors from failures.
 pub fn prepare(
     mut plan: Plan,
-    made: Option<Choice>,
+    recorded: Option<Choice>,
     revision: Option<&str>,
     progress: &Progress,
 ) -> Result<Prepared, RunError> {
-    say_camera(&plan, progress);
+    report_camera(&plan, progress);
     let provenance = Provenance::new(&plan, revision)?;
     let distinct = Distinct::new(&plan.work)?;
-    let choice = choice::choose(&mut plan, made, &distinct, progress)?;
+    let choice = choice::choose(&mut plan, recorded, &distinct, progress)?;
     Ok(Prepared { plan, provenance, distinct, choice })
 }
 
 impl Prepared {
-    /// What the run is expected to take, found by drawing a frame small; nothing for a workload.
+    /// Expected time and memory, from one frame at a reduced size; `None` for a workload.
     ///
     /// # Errors
-    /// When that frame cannot be drawn.
+    /// If that frame cannot be rendered.
     pub fn expected(&self) -> Result<Option<Expected>, RunError> {
         Expected::new(&self.plan, &self.distinct)
     }
@@ -122,19 +102,19 @@ impl Prepared {
     /// Simulates, measures and writes the results into `dir`.
     ///
     /// # Errors
-    /// As [`prepare`]. Earlier results in `dir` are then as they were.
+    /// As [`prepare`]. Earlier results in `dir` then stay unchanged.
     pub fn run(self, mut dir: OutDir, progress: &Progress) -> Result<Outcome, RunError> {
         let Self { plan, provenance, distinct, mut choice } = self;
         let simulated = simulate::simulate(&plan, &distinct, &dir, progress)?;
         if let Some(choice) = &mut choice {
-            choice.settle(&simulated);
+            choice.add_prediction_error(&simulated);
         }
         let verified =
             plan.options.verify.then(|| choice::verify(&plan, &simulated, progress)).transpose()?;
         let measurement = measure::measure(&plan, &simulated)?;
         let summary =
             Summary { choice, verified, ..Summary::new(&plan, provenance, &simulated, &measurement) }
-                .warned();
+                .with_choice_warnings();
         let outcome = Outcome { plan, simulated, measurement, summary };
         write::write(&outcome, &dir, progress)?;
         dir.publish()?;
@@ -145,12 +125,12 @@ impl Prepared {
 /// Locks the folder `out` for the results of `plan`.
 ///
 /// # Errors
-/// As [`Destination::open`]: before any work, where results cannot go there.
+/// As [`Destination::open`], if results cannot be written there.
 pub fn open(plan: &Plan, out: &Destination) -> Result<OutDir, RunError> {
     Ok(out.open([write::claim(plan)])?)
 }
 
-/// Runs the whole line and writes its results into `out`.
+/// Plans, prepares and executes a run; writes its results into `out`.
 ///
 /// # Errors
 /// As [`open`], [`prepare`] and [`Prepared::run`].
@@ -160,25 +140,15 @@ pub fn run(options: RunOptions, out: &Destination, progress: &Progress) -> Resul
     prepare(plan, None, None, progress)?.run(dir, progress)
 }
 
-/// Says in detail which camera sees the scene, before minutes of work are spent on it.
-fn say_camera(plan: &Plan, progress: &Progress) {
+/// Prints the camera of a scene under `--verbose`, before the simulation starts.
+fn report_camera(plan: &Plan, progress: &Progress) {
     let Work::Scene(scene) = &plan.work else { return };
     if let Ok(camera) = scene.camera_used() {
         progress.detail(&format!("camera, {}: --camera '{}'", camera.source, camera.ron));
     }
 }
 
-/// Simulates and measures as [`run`] does, and writes nothing.
-///
-/// # Errors
-/// As [`run`].
-pub fn unwritten(plan: &Plan, progress: &Progress) -> Result<(Simulated, Measurement), RunError> {
-    let simulated = simulate::unwritten(plan, progress)?;
-    let measurement = measure::measure(plan, &simulated)?;
-    Ok((simulated, measurement))
-}
-
-/// The figures that every run draws into `plots/`, and what they show.
+/// Figures that every run writes into `plots/`: name and description.
 pub const FIGURES: [(&str, &str); 4] = [
     ("power_run", "power over the run with found and true frame starts"),
     ("frame_power", "power over one frame, stacked by part"),

@@ -1,51 +1,53 @@
-//! From watts over time to a trace, and back to joules per frame as an analyst would.
+//! Measurement of a run: the power curve is recorded as a trace, and frames and energies are found in the trace.
 
-use power_model::{FramePower, PARTS, Run, pace};
-use traces::device::{Device, Sampled};
+use output::table::si;
+use power_model::{FramePower, PARTS, PacedFrame, Run, pace};
+use serde::Serialize;
+use traces::device::{Device, DeviceSpec, RATES_HZ, Sampled};
 use traces::energy::{FrameEnergy, PowerIntegral, TrueFrame};
 use traces::frames::{Found, Marks, default_window, find, marked_only};
 use traces::score::{self, Score, TOLERANCE_S};
 use traces::{Mark, MarkKind, Metadata, Trace};
 
-use super::checks::Checks;
-use super::limits::trace_fits;
-use super::recorder::{Resolution, device_spec};
-use super::{Plan, RunError, Simulated};
+use crate::options::DEFAULT_RATE_HZ;
+use crate::plan::trace_fits;
+use crate::{Plan, RunError, Simulated};
 
-/// The trace of a run and what was found in it.
+/// Trace of a run, and the frames found in it.
 pub struct Measurement {
-    /// The frames in their places: the truth.
+    /// Paced frames and their power curve: the ground truth.
     pub run: Run,
     /// The trace as recorded.
     pub trace: Trace,
-    /// Samples beyond the range of the recorder, currents and voltages.
+    /// Number of clipped samples, currents and voltages.
     pub clipped: usize,
     /// The recorder.
     pub device: Device,
-    /// How finely it records the frames.
+    /// Sampling rate relative to the frames.
     pub resolution: Resolution,
-    /// The one marked frame and the end of the run.
+    /// Mark of one frame, and end of the run.
     pub marks: Marks,
-    /// Frame starts found.
+    /// Found frame starts.
     pub found: Found,
-    /// The energy of every found frame.
+    /// Energy of each found frame.
     pub frames: Vec<FrameEnergy>,
-    /// The true frames, as the analysis would describe them.
+    /// True frames, in the form of the analysis.
     pub truth: Vec<TrueFrame>,
-    /// Found against true starts.
+    /// Found starts compared with true starts.
     pub score: Score,
-    /// Sums that have to agree.
+    /// Consistency checks.
     pub checks: Checks,
 }
 
 impl Measurement {
-    /// Whether no frame of several was found but the one that was marked, so that nothing is measured by frame.
+    /// Whether only the marked frame was found although there are more. Energies of frames are then not
+    /// measured.
     pub fn is_mark_alone(&self) -> bool {
         self.truth.len() > 1 && self.found.starts.len() == 1
     }
 
-    /// For each frame of the run, the one found in the trace at its place, if any; none where only the marked frame was
-    /// found, because that one then reaches from the mark to the end mark.
+    /// Matches each frame of the run with the frame found at its time. If only the marked frame was found, it
+    /// reaches to the end mark and matches none.
     pub fn by_true_frame(&self) -> Vec<Option<&FrameEnergy>> {
         if self.is_mark_alone() {
             return vec![None; self.truth.len()];
@@ -57,19 +59,19 @@ impl Measurement {
     }
 }
 
-/// Paces the frames, records them, finds them again and integrates them.
+/// Places frames in time, records the power curve, finds the frames in the trace and integrates their energy.
 pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement, RunError> {
     let powers: Vec<&FramePower> = simulated.in_order().map(|frame| &frame.power).collect();
     let run = pace(&powers, &plan.platform, plan.pacing)?;
     let resolution = Resolution::new(plan.options.trace_rate_hz, &run);
-    // Frames may last longer than their share of the display's ticks.
+    // Frames may take longer than one tick of the display.
     trace_fits(run.curve.end_s(), resolution.rate_hz)?;
     let device = Device::new(device_spec(plan, resolution.rate_hz, &powers))?;
     let Sampled { mut trace, clipped_currents, clipped_voltages } =
         device.sample(&run.curve, 0.0, run.curve.end_s())?;
     let marks = marks(&run, &trace);
     trace.metadata = metadata(plan, &device, &marks);
-    // A run of one frame has no other to be found, and any that is would be false.
+    // In a run of one frame, every further start would be a false positive.
     let search = if run.frames.len() == 1 { marked_only } else { find };
     let found = search(&trace, &marks)?;
     let integral = PowerIntegral::new(&trace);
@@ -82,8 +84,8 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     Ok(Measurement { run, clipped, device, resolution, marks, found, frames, truth, score, checks, trace })
 }
 
-/// The middle frame is marked, as an analyst would pick one from the steady part. The last frame ends at the end of the run,
-/// or of the trace where a recording without a tail ends with a part of a sample.
+/// Marks the middle frame, which is past the warm-up. The end mark is the end of the run, or the end of the
+/// trace if that is earlier by part of a sample.
 fn marks(run: &Run, trace: &Trace) -> Marks {
     let middle = &run.frames[run.frames.len() / 2];
     let shortest = run.frames.iter().map(|frame| frame.end_s - frame.start_s).fold(f64::INFINITY, f64::min);
@@ -106,8 +108,172 @@ fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {
     }
 }
 
-/// The mean power of each part over the frames of a run, from start to end, idle included.
+/// Mean power of each part in watts, from the first start to the last end, idle time included.
 pub(super) fn mean_parts_w(run: &Run) -> [f64; PARTS] {
     let length_s = run.end_s - run.start_s;
     run.energy().by_part_j.map(|joules| joules / length_s)
+}
+
+/// Rates in Hz for automatic choice, lowest first. Short frames need a higher rate.
+const CHOSEN_RATES_HZ: [f64; 5] = [DEFAULT_RATE_HZ, 100e3, 200e3, 500e3, 1e6];
+/// Smallest busy time of a frame in samples. Shorter work may fall between two samples and be missed.
+pub(crate) const MIN_BUSY_SAMPLES: f64 = 2.0;
+/// Smallest length of a frame in samples. The error of a start is about one sample, or two percent of such a
+/// frame.
+const MIN_FRAME_SAMPLES: f64 = 50.0;
+/// Largest number of trace samples for automatic choice of a higher rate.
+const MAX_CHOSEN_SAMPLES: f64 = 5e6;
+
+/// Sampling rate of the recorder relative to the frames.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Resolution {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Whether the rate was raised above the default because frames are short.
+    pub raised: bool,
+    /// Busy time of the shortest frame in seconds.
+    pub shortest_busy_s: f64,
+}
+
+impl Resolution {
+    /// Resolution of the frames of `run` at `given_hz`, or at the lowest rate that resolves them.
+    pub(super) fn new(given_hz: Option<f64>, run: &Run) -> Self {
+        let shortest = |of: fn(&PacedFrame) -> f64| run.frames.iter().map(of).fold(f64::INFINITY, f64::min);
+        let shortest_busy_s = shortest(|frame| frame.busy_end_s - frame.start_s);
+        let shortest_frame_s = shortest(|frame| frame.end_s - frame.start_s);
+        let rate_hz =
+            given_hz.unwrap_or_else(|| chosen_hz(shortest_busy_s, shortest_frame_s, run.curve.end_s()));
+        Self { rate_hz, raised: given_hz.is_none() && rate_hz > DEFAULT_RATE_HZ, shortest_busy_s }
+    }
+
+    /// Number of samples in the busy time of the shortest frame.
+    pub fn samples_in_shortest(&self) -> f64 {
+        self.shortest_busy_s * self.rate_hz
+    }
+
+    /// Message about a raised rate; `None` for the default or a given rate.
+    pub fn raised_line(&self) -> Option<String> {
+        self.raised.then(|| {
+            format!(
+                "recorder: {}, raised from {} because the shortest frame is busy for {} only; --trace-rate sets it",
+                si(self.rate_hz, "Hz"),
+                si(DEFAULT_RATE_HZ, "Hz"),
+                si(self.shortest_busy_s, "s")
+            )
+        })
+    }
+
+    /// Lowest rate of the series 1, 2, 5, 10... Hz that resolves the shortest frame; `None` above the range
+    /// of recorders.
+    pub(super) fn needed_hz(&self) -> Option<f64> {
+        let needed_hz = MIN_BUSY_SAMPLES / self.shortest_busy_s;
+        let series =
+            (0..8).flat_map(|decade| [1.0, 2.0, 5.0].map(|step| step * libm::pow(10.0, f64::from(decade))));
+        series.into_iter().find(|rate_hz| *rate_hz >= needed_hz).filter(|rate_hz| RATES_HZ.contains(rate_hz))
+    }
+}
+
+/// Lowest rate that resolves the shortest frame, limited by [`MAX_CHOSEN_SAMPLES`].
+fn chosen_hz(shortest_busy_s: f64, shortest_frame_s: f64, trace_s: f64) -> f64 {
+    let resolves = |rate_hz: f64| {
+        rate_hz * shortest_busy_s >= MIN_BUSY_SAMPLES && rate_hz * shortest_frame_s >= MIN_FRAME_SAMPLES
+    };
+    let mut chosen_hz = DEFAULT_RATE_HZ;
+    for rate_hz in CHOSEN_RATES_HZ {
+        if resolves(chosen_hz) || rate_hz * trace_s > MAX_CHOSEN_SAMPLES {
+            break;
+        }
+        chosen_hz = rate_hz;
+    }
+    chosen_hz
+}
+
+/// Recorder on the platform's rail, with a range that fits the peak power.
+fn device_spec(plan: &Plan, rate_hz: f64, powers: &[&FramePower]) -> DeviceSpec {
+    let peak_w = powers.iter().map(|power| power.peak_w()).fold(plan.platform.idle_w.value(), f64::max);
+    let spec = DeviceSpec {
+        rate_hz,
+        packet_samples: plan.options.packet_samples,
+        packet_loss: plan.options.packet_loss,
+        seed: plan.options.seed,
+        ..DeviceSpec::fitting(plan.platform.rail.voltage_v.value(), peak_w)
+    };
+    spec.named_by_rate_and_bits()
+}
+
+/// Consistency checks of a run: sums that have to agree.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Checks {
+    /// |sum of frame energies / integral from the first found start to the end mark - 1|.
+    pub frames_against_integral_relative: f64,
+    /// |sum of true frame energies / integral of the noise-free curve over the frames - 1|.
+    pub parts_against_curve_relative: f64,
+    /// Integral of a trace without noise minus that of the curve, over the recording, in joules.
+    pub noise_free_trace_minus_curve_j: f64,
+    /// Largest such difference that quantization can cause, in joules.
+    pub quantization_bound_j: f64,
+}
+
+impl Checks {
+    pub(super) fn new(
+        run: &Run,
+        device: &Device,
+        integral: &PowerIntegral<'_>,
+        found: &Found,
+        frames: &[FrameEnergy],
+    ) -> Result<Self, RunError> {
+        let sum: f64 = frames.iter().map(|frame| frame.energy_j).sum();
+        let first = found.starts.first().map_or(found.end_s, |start| start.time_s);
+        let quiet = device.noise_free();
+        let sampled = quiet.sample(&run.curve, 0.0, run.curve.end_s())?;
+        let trace_j = PowerIntegral::new(&sampled.trace).total_j();
+        let curve_j = run.curve.energy_j(sampled.trace.start_s(), sampled.trace.end_s());
+        Ok(Self {
+            frames_against_integral_relative: relative(sum, integral.energy_j(first, found.end_s)),
+            parts_against_curve_relative: relative(
+                run.energy().total_j(),
+                run.curve.energy_j(run.start_s, run.end_s),
+            ),
+            noise_free_trace_minus_curve_j: trace_j - curve_j,
+            quantization_bound_j: quiet.quantization_energy_bound_j(&sampled).unwrap_or(f64::INFINITY),
+        })
+    }
+}
+
+fn relative(a: f64, b: f64) -> f64 {
+    if a == b { 0.0 } else { (a / b - 1.0).abs() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_frames_are_recorded_faster() {
+        let vsync = |busy_s| chosen_hz(busy_s, 1.0 / 60.0, 1.0);
+        assert_eq!([1e-3, 40e-6, 39e-6, 14e-6, 2e-6, 1e-9].map(vsync), [50e3, 50e3, 100e3, 200e3, 1e6, 1e6]);
+    }
+
+    #[test]
+    fn frames_without_idle_time_need_fifty_samples() {
+        assert_eq!(
+            [2e-3, 1e-3, 0.9e-3, 0.3e-3].map(|frame_s| chosen_hz(frame_s, frame_s, 1.0)),
+            [50e3, 50e3, 100e3, 200e3]
+        );
+    }
+
+    #[test]
+    fn a_long_trace_keeps_its_rate() {
+        assert_eq!(
+            [1.0, 24.0, 26.0, 60.0].map(|trace_s| chosen_hz(14e-6, 1.0 / 60.0, trace_s)),
+            [200e3, 200e3, 100e3, 50e3]
+        );
+    }
+
+    #[test]
+    fn a_needed_rate_is_within_the_range_of_recorders() {
+        let needed =
+            |shortest_busy_s| Resolution { rate_hz: 50e3, raised: false, shortest_busy_s }.needed_hz();
+        assert_eq!([14e-6, 1.9e-6, 0.2e-6, 0.1e-6].map(needed), [Some(200e3), Some(2e6), Some(10e6), None]);
+    }
 }

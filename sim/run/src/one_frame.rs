@@ -1,14 +1,13 @@
-//! One small frame on a machine whose files are at hand as text: for tests and fuzz targets of these files.
+//! One small frame on a machine given as text, for tests and fuzz targets of its files.
 
+use output::progress::Progress;
 use power_model::{EnergyTable, Platform};
+use timing::Level;
 use workloads::Overrides;
 
-use super::{Plan, RunError, RunOptions, unwritten};
-use crate::gpu::GpuSpec;
-use output::progress::Progress;
-use timing::Level;
+use crate::{GpuSpec, Plan, RunError, RunOptions, measure, simulate};
 
-/// The files of a machine as RON text; those that are absent are the reference's.
+/// Files of a machine as RON text; `None` for those of the reference.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MachineTexts<'a> {
     /// The GPU file.
@@ -20,12 +19,12 @@ pub struct MachineTexts<'a> {
 }
 
 impl MachineTexts<'_> {
-    /// Draws one frame of the scene `tiny` at 16x12 pixels, times it at `level`, records it and finds it again; nothing is
-    /// written. The energy of the frame in the recording, J. Messages name the files `gpu.ron`, `platform.ron` and
-    /// `table.ron`.
+    /// Simulates one frame of the scene `tiny` at 16x12 pixels at `level`, records it and finds it in the
+    /// trace. Returns its energy in the trace in joules and writes no files. Messages name the files
+    /// `gpu.ron`, `platform.ron` and `table.ron`.
     ///
     /// # Errors
-    /// What is wrong with a file, or with the files together.
+    /// If a file is invalid, or the files do not match.
     pub fn one_frame(&self, level: Level) -> Result<f64, RunError> {
         let gpu =
             self.gpu.map_or_else(|| GpuSpec::load("reference"), |text| GpuSpec::parse(text, "gpu.ron"))?;
@@ -39,7 +38,8 @@ impl MachineTexts<'_> {
             Overrides { size: Some((16, 12)), samples: Some(1), frames: Some(0..1), ..Overrides::default() };
         let options = RunOptions { scene: "tiny".into(), overrides, timing: level, ..RunOptions::default() };
         let plan = Plan::resolve(options)?.on(gpu, platform, table)?;
-        let (_, measurement) = unwritten(&plan, &Progress::new(true))?;
+        let simulated = simulate::without_files(&plan, &Progress::new(true))?;
+        let measurement = measure::measure(&plan, &simulated)?;
         Ok(measurement.frames.iter().map(|frame| frame.energy_j).sum())
     }
 }

@@ -1,49 +1,57 @@
-//! What was asked for.
+//! Options of a run.
 
 use std::path::{Path, PathBuf};
 
 use activity::Event;
+use output::plot::Look;
 use power_model::Bound;
 use serde::{Deserialize, Serialize, Serializer};
+use timing::Level;
 use workloads::Overrides;
 use workloads::job::OptionSource;
 
-use crate::Sampling;
-use output::plot::Look;
-use timing::Level;
-
-/// The rate of the recorder that the methodology of per-frame energy is described with.
-pub(super) const DEFAULT_RATE_HZ: f64 = 50e3;
+/// Default rate of the recorder in Hz. The method of per-frame energy is described at this rate.
+pub(crate) const DEFAULT_RATE_HZ: f64 = 50e3;
 
 /// When the next frame starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum PacingChoice {
-    /// On the next tick of a display that runs at the scene's frame rate.
+    /// On the next tick of the display
     #[default]
     Vsync,
-    /// As soon as the one before is done.
+    /// As soon as the previous frame is done
     Free,
 }
 
-/// What the caller wants of a run, instead of a level of timing.
+impl PacingChoice {
+    /// Name in results and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Vsync => "vsync",
+            Self::Free => "free",
+        }
+    }
+}
+
+/// Requested accuracy and time budget; they replace a timing level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Wish {
-    /// The largest relative error of cycles and energy of the run, against every frame at the reference.
+pub struct Requested {
+    /// Largest relative error of the run's cycles and energy, compared with every frame at level `stepped`.
     pub accuracy: Option<f64>,
-    /// The longest that simulating may take, in seconds by the clock.
+    /// Time budget of the simulation in seconds of wall-clock time.
     pub budget_s: Option<f64>,
 }
 
-impl Wish {
-    /// Whether anything was asked for.
+impl Requested {
+    /// Whether an accuracy or a budget is given.
     pub fn is_any(&self) -> bool {
         self.accuracy.is_some() || self.budget_s.is_some()
     }
 }
 
-/// A run as asked for: all that its results depend on but the content of files.
+/// Options of a run. Results depend on these and on the contents of the files they name.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunOptions {
@@ -57,41 +65,43 @@ pub struct RunOptions {
     /// A built-in GPU or a RON file.
     #[serde(serialize_with = "as_text")]
     pub gpu: PathBuf,
-    /// A built-in platform or a RON file; without it the one that belongs to the GPU.
+    /// A built-in platform or a RON file; `None` for the platform of the GPU.
     #[serde(serialize_with = "as_text_if_any")]
     pub platform: Option<PathBuf>,
-    /// A built-in energy table or a RON file; without it the one that belongs to the GPU.
+    /// A built-in energy table or a RON file; `None` for the table of the GPU.
     #[serde(serialize_with = "as_text_if_any")]
     pub energy: Option<PathBuf>,
-    /// Which of the table's values is used.
+    /// Column of the energy table.
     pub bound: Bound,
-    /// How time is modelled.
+    /// Timing level of the simulated frames.
     pub timing: Level,
-    /// How many frames are simulated.
+    /// Which frames are simulated.
     pub sampling: Sampling,
-    /// What is wanted instead: then level and frames are chosen.
-    pub wish: Wish,
-    /// Whether the run is held against every frame at the reference.
+    /// Requested accuracy and budget: if given, a probe chooses `timing` and `sampling`.
+    pub requested: Requested,
+    /// Whether every frame is simulated again at level `stepped`, to report the actual error.
     pub verify: bool,
     /// When the next frame starts.
     pub pacing: PacingChoice,
-    /// Samples per second of the recorder; without it 50 kHz, or more where frames are short ([`Resolution`](super::Resolution)).
+    /// Samples per second of the recorder; `None` for 50 kHz, or more if frames are short
+    /// ([`Resolution`](crate::Resolution)).
     pub trace_rate_hz: Option<f64>,
-    /// Samples of the recorder that travel together and are lost together.
+    /// Samples in one packet of the recorder. A packet is lost as a whole.
     pub packet_samples: u32,
-    /// Share of these packets that are lost, 0 to below 1.
+    /// Share of packets that are lost, in [0, 1).
     pub packet_loss: f64,
-    /// Seed of samples, noise and losses.
+    /// Seed of samples, noise and packet losses.
     pub seed: u64,
-    /// Whether images are written as EXR, too.
+    /// Whether images are also written as EXR.
     pub exr: bool,
-    /// Counters whose heat maps are wanted.
+    /// Counters of the heat maps.
     pub heat: Vec<Event>,
-    /// How pictures look.
-    pub look: Look,
+    /// Width, title and font size of plots.
+    pub plot_style: Look,
 }
 
-/// JSON holds Unicode alone: other bytes of a path are replaced, so that a run does not fail when it writes its summary.
+/// Serializes a path as text. Bytes that are not Unicode are replaced, so that writing the summary cannot
+/// fail.
 fn as_text<S: Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(&path.to_string_lossy())
 }
@@ -112,7 +122,7 @@ impl Default for RunOptions {
             bound: Bound::Nominal,
             timing: Level::default(),
             sampling: Sampling::default(),
-            wish: Wish::default(),
+            requested: Requested::default(),
             verify: false,
             pacing: PacingChoice::default(),
             trace_rate_hz: None,
@@ -121,7 +131,112 @@ impl Default for RunOptions {
             seed: 1,
             exr: false,
             heat: Vec::new(),
-            look: Look::default(),
+            plot_style: Look::default(),
         }
+    }
+}
+
+/// Value of `--timing`: a timing level for every frame, or sampled simulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Method {
+    /// Every unit from cycle to cycle: the reference, slow
+    Stepped,
+    /// A recurrence over packets
+    #[default]
+    Packet,
+    /// The busiest unit of each batch, fill and drain
+    Bound,
+    /// One frame in fifty at `packet`, the others predicted from a preview, with intervals
+    Sampled,
+}
+
+impl Method {
+    /// Timing level of the simulated frames.
+    pub const fn level(self) -> Level {
+        match self {
+            Self::Stepped => Level::Stepped,
+            Self::Packet | Self::Sampled => Level::Packet,
+            Self::Bound => Level::Bound,
+        }
+    }
+
+    /// Which frames are simulated.
+    pub const fn sampling(self) -> Sampling {
+        match self {
+            Self::Sampled => Sampling::Some,
+            _ => Sampling::Every,
+        }
+    }
+}
+
+/// Which frames of a run are simulated; the others are predicted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// All distinct frames.
+    #[default]
+    Every,
+    /// One frame in fifty, at least six.
+    Some,
+    /// This number of frames.
+    Count(usize),
+    /// Frames are added until the relative half-widths of all 95 % intervals are at most `target`.
+    Until {
+        /// Largest relative half-width of an interval.
+        target: f64,
+        /// Largest number of simulated frames.
+        max_frames: usize,
+    },
+}
+
+impl Sampling {
+    /// Frames of the run per simulated frame.
+    const FRAMES_PER_SIMULATED: usize = 50;
+    /// Smallest number of simulated frames: the pilot frame, and two strata of two or three.
+    pub const MIN_FRAMES: usize = 6;
+    /// Number of frames in the first round of [`Self::Until`]: the pilot frame, and three strata of two.
+    pub const FIRST_FRAMES: usize = 7;
+
+    /// Number of frames to simulate first, of a run of `frames`.
+    pub fn first(self, frames: usize) -> usize {
+        match self {
+            Self::Every => frames,
+            Self::Some => frames.div_ceil(Self::FRAMES_PER_SIMULATED).max(Self::MIN_FRAMES),
+            Self::Count(count) => count,
+            Self::Until { max_frames, .. } => Self::FIRST_FRAMES.min(max_frames),
+        }
+    }
+
+    /// Number of frames of the next round, if `done` of `frames` gave intervals of `relative` half-width;
+    /// `None` when finished.
+    pub fn next(self, done: usize, frames: usize, relative: f64) -> Option<usize> {
+        let Self::Until { target, max_frames } = self else { return None };
+        // A NaN does not meet the target.
+        let enough = relative <= target || done >= frames.min(max_frames);
+        let next = if 4 * done > frames { frames } else { 2 * done - 1 };
+        (!enough).then(|| next.min(max_frames))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_in_fifty_and_six_at_least() {
+        assert_eq!([36, 300, 301, 1000].map(|n| Sampling::Some.first(n)), [6, 6, 7, 20]);
+    }
+
+    #[test]
+    fn frames_double_until_the_target_is_met() {
+        let until = Sampling::Until { target: 0.01, max_frames: 300 };
+        assert_eq!(until.next(7, 300, 0.02), Some(13));
+        assert_eq!(until.next(7, 300, f64::NAN), Some(13));
+        assert_eq!(until.next(13, 300, 0.01), None);
+        assert_eq!(until.next(96, 300, 0.02), Some(300));
+        assert_eq!(until.next(300, 300, f64::NAN), None);
+        let capped = Sampling::Until { target: 0.01, max_frames: 20 };
+        assert_eq!([7, 13, 20].map(|done| capped.next(done, 300, 0.5)), [Some(13), Some(20), None]);
+        assert_eq!(Sampling::Some.next(6, 300, 1.0), None);
     }
 }

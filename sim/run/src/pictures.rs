@@ -1,4 +1,4 @@
-//! The plots of a run.
+//! Plots of a run.
 
 use activity::Unit;
 use power_model::Part;
@@ -9,14 +9,14 @@ use output::plot::{
     FrameEnergy, FrameEnergyPoint, FramePower, Picture, PowerPart, PowerRun, UnitBusy, UnitLane,
 };
 
-/// A plot with the name of its files and what it shows.
+/// A plot with its file name and caption.
 pub(super) struct Plot {
     pub stem: &'static str,
     pub caption: String,
     pub picture: Picture,
 }
 
-/// Every plot of a run.
+/// All plots of a run.
 pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
     let subject = format!("{} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
     let shown = shown_frame(outcome);
@@ -47,7 +47,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
             picture: frame_energy(outcome, &subject),
         },
     ];
-    plots.extend(stalls::picture(shown.1, &subject, &outcome.plan.options.look).map(|picture| Plot {
+    plots.extend(stalls::picture(shown.1, &subject, &outcome.plan.options.plot_style).map(|picture| Plot {
         stem: "plots/stalls",
         caption: format!("Frame {}: what each unit waited for, and which held it up.", shown.1.index),
         picture,
@@ -55,7 +55,7 @@ pub(super) fn plots(outcome: &Outcome) -> Vec<Plot> {
     plots
 }
 
-/// The frame shown in detail, the marked one or the one next to it that was simulated: its place in the run and what is known of it.
+/// Frame shown in detail: the simulated frame nearest to the marked one, and its index in the run.
 fn shown_frame(outcome: &Outcome) -> (usize, &RunFrame) {
     let middle = outcome.simulated.frames.len() / 2;
     let known = outcome.simulated.in_order().enumerate().filter(|(_, frame)| frame.observed().is_some());
@@ -79,10 +79,10 @@ fn power_run(outcome: &Outcome, subject: &str) -> Picture {
         true_starts_s: &truth,
         mark_s: Some((mark - window.pre_s, mark + window.post_s)),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }
 
-/// Parts that drew power, in the order in which every picture shows them: what is always there first.
+/// Parts that consumed energy, in the order of all plots: overhead first, then units.
 pub(super) fn parts_in_use(outcome: &Outcome) -> Vec<Part> {
     let energy = outcome.measurement.run.energy();
     let (units, overhead): (Vec<Part>, Vec<Part>) = Part::ALL
@@ -111,7 +111,7 @@ fn frame_power(outcome: &Outcome, subject: &str, (place, frame): (usize, &RunFra
         samples: &samples,
         frame_j: outcome.summary.frames.get(place).map(|row| row.energy_j),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }
 
 fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
@@ -126,7 +126,7 @@ fn unit_busy(outcome: &Outcome, subject: &str, frame: &RunFrame) -> Picture {
         bin_s: frame.power.bin_s(),
         units: Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(lane).collect(),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }
 
 fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
@@ -146,5 +146,5 @@ fn frame_energy(outcome: &Outcome, subject: &str) -> Picture {
         measured_j: MeanSd::of(outcome.measurement.frames.iter().map(|frame| frame.energy_j)),
         pixels: outcome.plan.pixels(),
     }
-    .picture(&outcome.plan.options.look)
+    .picture(&outcome.plan.options.plot_style)
 }

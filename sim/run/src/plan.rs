@@ -1,4 +1,4 @@
-//! What a run is made of, loaded and checked.
+//! Plan of a run: its inputs, loaded and checked, and the limits of its size.
 
 use std::path::{Path, PathBuf};
 
@@ -9,41 +9,39 @@ use power_model::{EnergyTable, Pacing, Platform, PowerModel};
 use traces::device::RATES_HZ;
 use workloads::{Overrides, SampleChoice};
 
-use super::limits::Size;
-use super::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions};
-use super::{RunError, Work};
-use crate::Sampling;
 use crate::gpu::GpuSpec;
+use crate::options::{DEFAULT_RATE_HZ, PacingChoice, RunOptions, Sampling};
+use crate::{RunError, Work};
 
-/// A run with everything loaded and checked.
+/// Plan of a run: options, and all inputs loaded and checked.
 pub struct Plan {
-    /// What was asked for.
+    /// The options.
     pub options: RunOptions,
-    /// The scene or the job with its settings changed as asked.
+    /// The scene or workload, with the changes of the options applied.
     pub work: Work,
     /// Size of the image.
     pub viewport: Viewport,
-    /// Where and when each pixel looks.
+    /// Sample table.
     pub samples: Box<dyn SampleSource>,
     /// The hardware.
     pub gpu: GpuSpec,
-    /// What surrounds it.
+    /// The platform.
     pub platform: Platform,
-    /// Joules per event.
+    /// Energy table, in joules per event.
     pub table: EnergyTable,
-    /// Table and platform joined.
+    /// Power model of table and platform.
     pub model: PowerModel,
     /// When the next frame starts.
     pub pacing: Pacing,
-    /// The files that all this was read from, by name.
+    /// Input files, sorted by name.
     pub files: Vec<PathBuf>,
 }
 
 impl Plan {
-    /// Loads and checks everything that `options` names.
+    /// Loads and checks all inputs that `options` names.
     ///
     /// # Errors
-    /// The first thing that is missing, broken or makes no sense.
+    /// The first input that is missing or invalid.
     pub fn resolve(options: RunOptions) -> Result<Self, RunError> {
         let (plan, files) = inputs::record(|| Self::load(options));
         Ok(Self { files, ..plan? })
@@ -91,7 +89,7 @@ impl Plan {
     /// The same plan on another GPU, platform and energy table.
     ///
     /// # Errors
-    /// When platform and table do not go together, or what is recorded would be too large.
+    /// If platform and table do not match, or the recording would be too large.
     pub fn on(self, gpu: GpuSpec, platform: Platform, table: EnergyTable) -> Result<Self, RunError> {
         let model = PowerModel::at(&table, &platform, self.options.bound)?;
         let plan = Self { gpu, platform, table, model, ..self };
@@ -109,7 +107,7 @@ impl Plan {
     }
 }
 
-/// What decides how large a run is.
+/// Size of a run, from the parts of a plan.
 fn size_of(
     work: &Work,
     viewport: Viewport,
@@ -128,8 +126,8 @@ fn size_of(
     }
 }
 
-/// What is drawn with its settings changed as asked, and its sample table. A table in a file decides how many samples there
-/// are, unless the caller asked for another number.
+/// Scene or workload with the changes of the options applied, and its sample table. A table in a file sets
+/// the samples per pixel, unless the options do.
 fn work(options: &RunOptions) -> Result<(Work, SampleChoice), RunError> {
     let work = Work::find(&options.scene, &options.overrides, &options.options, options.seed)?;
     let table = SampleChoice::load(&work.settings().table)?;
@@ -151,5 +149,113 @@ fn file_or_name<T, E>(
     match name.extension().is_some_and(|ending| ending == "ron") {
         true => load(name),
         false => builtin(&name.to_string_lossy()),
+    }
+}
+
+/// Largest memory for the samples of one image, in bytes.
+const MAX_SAMPLE_BYTES: u64 = 8 << 30;
+/// Memory of one sample in bytes: depth, triangle, log entry and resolved colour.
+pub(super) const BYTES_PER_SAMPLE: u64 = 16;
+/// Largest number of trace samples: about 2.5 GB of CSV and 0.4 GB of Parquet.
+const MAX_TRACE_SAMPLES: f64 = 5e7;
+/// Largest number of frames of a run.
+const MAX_FRAMES: u32 = 100_000;
+
+/// Checks that an image of `pixels` with `samples` each fits into memory. `what` begins the message.
+///
+/// # Errors
+/// [`RunError::Setting`] with the memory that the image would need.
+pub fn fits_memory(what: &str, pixels: u64, samples: u32, bytes_per_sample: u64) -> Result<(), RunError> {
+    let bytes = pixels * u64::from(samples) * bytes_per_sample;
+    let (needed, limit) = (bytes >> 30, MAX_SAMPLE_BYTES >> 30);
+    let message = || {
+        format!(
+            "{what}: {pixels} pixels of {samples} samples take {needed} GiB, more than {limit} GiB; ask for fewer"
+        )
+    };
+    if bytes > MAX_SAMPLE_BYTES { Err(RunError::Setting(message())) } else { Ok(()) }
+}
+
+/// Quantities that determine memory and disk space of a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    pub pixels: u64,
+    pub samples: u32,
+    pub frames: u32,
+    pub pacing: Pacing,
+    pub trace_rate_hz: f64,
+    pub idle_s: f64,
+}
+
+impl Size {
+    /// Checks memory, number of frames and length of the trace.
+    pub fn check(&self) -> Result<(), RunError> {
+        let refuse = |message| Err(RunError::Setting(message));
+        fits_memory("size and samples", self.pixels, self.samples, BYTES_PER_SAMPLE)?;
+        if self.frames > MAX_FRAMES {
+            return refuse(format!(
+                "frames: {} in one run; at most {MAX_FRAMES}, ask for fewer",
+                self.frames
+            ));
+        }
+        trace_fits(self.recorded_s(), self.trace_rate_hz)
+    }
+
+    /// Length of the recording in seconds. Frames without V-sync are not counted: their length is unknown
+    /// yet.
+    fn recorded_s(&self) -> f64 {
+        let frames_s = match self.pacing {
+            Pacing::Vsync { rate } => f64::from(self.frames) / rate.value(),
+            Pacing::FreeRunning => 0.0,
+        };
+        frames_s + self.idle_s
+    }
+
+    /// Number of samples of the trace.
+    pub fn trace_samples(&self) -> f64 {
+        self.recorded_s() * self.trace_rate_hz
+    }
+}
+
+/// Checks that a recording of `length_s` stays below [`MAX_TRACE_SAMPLES`].
+pub(super) fn trace_fits(length_s: f64, rate_hz: f64) -> Result<(), RunError> {
+    let samples = length_s * rate_hz;
+    if samples <= MAX_TRACE_SAMPLES {
+        return Ok(());
+    }
+    Err(RunError::Setting(format!(
+        "the trace: {length_s:.0} s at {rate_hz} samples a second are {samples:.1e} samples, more than {MAX_TRACE_SAMPLES:.0e}; ask \
+         for fewer frames, a lower --trace-rate, a higher --rate, or less lead_in_s and tail_s in the platform file"
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size() -> Size {
+        let pacing = Pacing::vsync(60.0).unwrap();
+        Size { pixels: 921_600, samples: 8, frames: 36, pacing, trace_rate_hz: 50e3, idle_s: 0.5 }
+    }
+
+    fn message(size: Size) -> String {
+        size.check().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn ordinary_runs_fit() {
+        assert!(size().check().is_ok());
+        assert!(Size { pixels: 3840 * 2160, samples: 64, frames: 3000, ..size() }.check().is_ok());
+    }
+
+    #[test]
+    fn errors_of_size_name_the_setting_to_change() {
+        assert!(message(Size { pixels: 1 << 28, samples: 256, ..size() }).contains("ask for fewer"));
+        assert!(message(Size { frames: 10_000_000, ..size() }).contains("at most 100000"));
+        assert!(message(Size { trace_rate_hz: 1e7, frames: 6000, ..size() }).contains("--trace-rate"));
+        let idle = Size { trace_rate_hz: 1e7, idle_s: 120.0, pacing: Pacing::FreeRunning, ..size() };
+        assert!(
+            message(idle).contains("120 s at 10000000 samples a second are 1.2e9 samples, more than 5e7")
+        );
     }
 }

@@ -1,32 +1,38 @@
-//! What a run was made from and where: for repeating it.
+//! Provenance of a run (options, input files, program, host), and repeating a run by it.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
 
+use output::dir::sha256_of;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use workloads::scene::CameraUsed;
 
-use super::{Plan, RunError, Work};
-use output::dir::sha256_of;
+use crate::{Choice, Plan, RunError, RunOptions, Work};
 
-/// A file that a run was made from.
+/// Schema version of `summary.json`, described by `docs/summary.schema.json`. A version may gain keys.
+/// Removing a key or changing its meaning or unit needs a new version.
+pub const SCHEMA: u32 = 2;
+
+/// Input file of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// Its path as it was opened.
+    /// Path as it was opened.
     pub path: String,
-    /// Its size; without it there was no such file.
+    /// Size in bytes; `None` for a missing file.
     pub bytes: Option<u64>,
-    /// The SHA-256 of its content, hexadecimal.
+    /// SHA-256 of the contents, hexadecimal.
     pub sha256: Option<String>,
 }
 
 impl Input {
-    /// The file at `path` as it is now. One that is missing or a folder has neither size nor hash.
+    /// Reads the file at `path`. A missing file and a folder have neither size nor hash.
     ///
     /// # Errors
-    /// When it is there and cannot be read.
+    /// If the file exists and cannot be read.
     pub fn now(path: &Path) -> Result<Self, RunError> {
         let name = path.display().to_string();
         let absent = |path| Self { path, bytes: None, sha256: None };
@@ -38,41 +44,43 @@ impl Input {
         }
     }
 
-    /// The files of `plan`.
+    /// Input files of `plan`.
     pub(super) fn of_plan(plan: &Plan) -> Result<Vec<Self>, RunError> {
         plan.files.iter().map(|path| Self::now(path)).collect()
     }
 }
 
-/// The program, the call and the machine. No result depends on them but the time a run takes, and with it what `--budget` chooses.
+/// Program, command line and host of a run. Results do not depend on them, except for the choice of
+/// `--budget`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Host {
-    /// The words of the command line.
+    /// Command line, one word per entry.
     pub command: Vec<String>,
-    /// The current directory, which relative paths begin at.
+    /// Current directory, the base of relative paths.
     pub directory: String,
-    /// The git revision of the program, with `+changes` where its sources differed from it; only in release builds within a clone.
+    /// Git revision of the program, with `+changes` if the sources were modified; only in release builds from
+    /// a clone.
     pub revision: Option<String>,
     /// Worker threads.
     pub threads: usize,
-    /// Threads that the processor runs at once.
+    /// Hardware threads of the processor.
     pub cores: usize,
-    /// The model of the processor, where the system says.
+    /// Processor model, if known.
     pub cpu: Option<String>,
-    /// The operating system, with its version where it is known.
+    /// Operating system, with its version if known.
     pub system: String,
-    /// The kind of processor.
+    /// Processor architecture.
     pub architecture: String,
 }
 
 impl Host {
-    /// This process on this machine; its program was built from `revision`.
+    /// Describes this process; `revision` is the git revision of the program.
     pub fn now(revision: Option<&str>) -> Self {
         let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
         let version = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
         Self {
-            // How the program was found is no part of the call.
+            // The path of the program is not recorded.
             command: ["quintile".to_owned()].into_iter().chain(words.skip(1)).collect(),
             directory: std::env::current_dir().unwrap_or_default().display().to_string(),
             revision: revision.map(str::to_owned),
@@ -91,16 +99,16 @@ fn cpu() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// What is recorded of a run before it begins.
+/// Provenance of a run, recorded before it starts.
 #[derive(Clone, Debug)]
 pub struct Provenance {
-    /// What was asked for.
-    pub request: super::RunOptions,
-    /// The files it was made from, by name.
+    /// The options.
+    pub request: RunOptions,
+    /// The input files, sorted by name.
     pub inputs: Vec<Input>,
-    /// The camera of a scene; workloads have cameras of their own.
+    /// Camera of a scene; `None` for workloads.
     pub camera: Option<CameraUsed>,
-    /// The machine.
+    /// The host.
     pub host: Host,
 }
 
@@ -115,12 +123,93 @@ impl Provenance {
     }
 }
 
+/// Parts of a summary that are needed to repeat a run.
+#[derive(Deserialize)]
+struct Recorded {
+    version: String,
+    request: RunOptions,
+    inputs: Vec<Input>,
+    choice: Option<Choice>,
+    host: Host,
+}
+
+/// Schema version of a summary; all other keys are skipped.
+#[derive(Deserialize)]
+struct Schema {
+    schema: u32,
+    #[serde(flatten)]
+    _other: BTreeMap<String, IgnoredAny>,
+}
+
+/// Reads the options of a run from its summary at `path`, and its choice if `--accuracy` or `--budget` was
+/// given.
+///
+/// # Errors
+/// If the file is not a summary of this schema. Without `force` also if the program (of `revision`) or an
+/// input changed.
+pub fn again(
+    path: &Path,
+    force: bool,
+    revision: Option<&str>,
+) -> Result<(RunOptions, Option<Choice>), RunError> {
+    let name = path.display();
+    let text = fs::read(path).map_err(|source| RunError::Input { path: name.to_string(), source })?;
+    let refuse = |message: String| RunError::Setting(format!("{name}: {message}"));
+    let summary: Schema = serde_json::from_slice(&text).map_err(|_| {
+        refuse("it is not the summary of a run; give the summary.json that `quintile run` wrote".to_owned())
+    })?;
+    if summary.schema != SCHEMA {
+        let message = format!(
+            "its schema is {}, this version reads {SCHEMA}; repeat the run with the version that wrote it, or by its `request`",
+            summary.schema
+        );
+        return Err(refuse(message));
+    }
+    let recorded: Recorded = serde_json::from_slice(&text)
+        .map_err(|error| refuse(format!("it is damaged: {error}; get the file again")))?;
+    if !force {
+        recorded.check(revision).map_err(refuse)?;
+    }
+    Ok((recorded.request, recorded.choice))
+}
+
+impl Recorded {
+    /// Checks that version, revision and inputs are those of the recorded run.
+    fn check(&self, revision: Option<&str>) -> Result<(), String> {
+        let of = |version: &str, revision: Option<&str>| {
+            revision.map_or(version.to_owned(), |revision| format!("{version} ({revision})"))
+        };
+        let (then, now) =
+            (of(&self.version, self.host.revision.as_deref()), of(env!("CARGO_PKG_VERSION"), revision));
+        if then != now {
+            return Err(format!(
+                "Quintile {then} made this run, and this is {now}: results may differ; take that version, or repeat it with --force"
+            ));
+        }
+        self.inputs.iter().try_for_each(|then| self.check_input(then))
+    }
+
+    fn check_input(&self, then: &Input) -> Result<(), String> {
+        let now = Input::now(Path::new(&then.path)).map_err(|error| error.to_string())?;
+        let changed = match (&then.sha256, &now.sha256) {
+            (then, now) if then == now => return Ok(()),
+            (Some(_), None) => format!("is missing; the run was made in {}", self.host.directory),
+            (None, Some(_)) => "was missing when the run was made".to_owned(),
+            _ => "was changed after the run was made".to_owned(),
+        };
+        Err(format!(
+            "its input {} {changed}: put that file as it was, or repeat the run with --force",
+            then.path
+        ))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_file_is_an_input_too() {
+    fn a_missing_file_has_neither_size_nor_hash() {
         let missing = Input::now(Path::new("/nowhere/a.png")).unwrap();
         assert_eq!((missing.bytes, missing.sha256), (None, None));
     }

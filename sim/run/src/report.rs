@@ -1,25 +1,27 @@
-//! The report of a run.
+//! Contents of the report of a run.
 
 use activity::{Event, Unit};
 use glam::Vec3;
-use power_model::Part;
-
-use super::frame::image_name;
-use super::heat::heat_name;
-use super::pictures::{Plot, parts_in_use};
-use super::{Outcome, RunError, facts};
 use output::image::LinearImage;
 use output::plot::part_colour;
 use output::report::{
-    CounterRow, FrameNumbers, FrameRow, PartRow, Report, ReportImage, ReportPlot, UnitRow, WarningRow,
+    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, Report, ReportImage, ReportPlot, UnitRow,
+    WarningRow,
 };
+use output::table::{count_or_digits, grouped, shell_line, si};
+use power_model::{Bound, Part};
 
-/// Fills the report.
+use crate::frame::image_name;
+use crate::heat::heat_name;
+use crate::pictures::{Plot, parts_in_use};
+use crate::{Host, Input, Outcome, RunError};
+
+/// Collects the contents of the report.
 pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<'a>, RunError> {
     let plan = &outcome.plan;
     Ok(Report {
         title: format!("{} on {}", plan.work.name(), plan.gpu.name).into(),
-        facts: facts::facts(outcome),
+        facts: facts(outcome),
         warnings: warnings(outcome),
         headline: outcome.summary.headline(),
         images: images(outcome)?.into_iter().chain(heat(outcome)).collect(),
@@ -29,10 +31,10 @@ pub(super) fn report<'a>(outcome: &'a Outcome, plots: &[Plot]) -> Result<Report<
         pixels: plan.pixels(),
         units: units(outcome),
         counters: counters(outcome),
-        settings: facts::settings(outcome),
-        inputs: facts::inputs(outcome),
-        files: facts::files(outcome),
-        host: facts::host(outcome),
+        settings: settings(outcome),
+        inputs: inputs(outcome),
+        files: files(outcome),
+        host: host(outcome),
     })
 }
 
@@ -48,7 +50,7 @@ fn warnings(outcome: &Outcome) -> Vec<WarningRow> {
 fn images(outcome: &Outcome) -> Result<Vec<ReportImage>, RunError> {
     let viewport = outcome.plan.viewport;
     let mut pictures: Vec<_> = outcome.simulated.pictures.iter().collect();
-    // The middle one first, large; the others in order as thumbnails.
+    // The middle image comes first and large; the others follow in order as thumbnails.
     let middle = pictures.len() / 2;
     pictures[..=middle].rotate_right(1);
     let shown = outcome.plan.work.shows();
@@ -108,12 +110,12 @@ fn frames(outcome: &Outcome) -> Vec<FrameRow> {
             power_w: m.power_w(),
         }),
         truth: Some(FrameNumbers { time_s: row.duration_s, energy_j: row.energy_j, power_w: row.power_w }),
-        flags: remarks(row.predicted, measured.map_or("missed".to_owned(), |m| m.flags.to_string())),
+        flags: frame_flags(row.predicted, measured.map_or("missed".to_owned(), |m| m.flags.to_string())),
     })
     .collect()
 }
 
-fn remarks(predicted: bool, flags: String) -> String {
+fn frame_flags(predicted: bool, flags: String) -> String {
     match (predicted, flags.is_empty()) {
         (false, _) => flags,
         (true, true) => "predicted".to_owned(),
@@ -130,7 +132,7 @@ fn units(outcome: &Outcome) -> Vec<UnitRow> {
             doc: unit.doc().to_owned(),
             busy: share,
             modelled: share.is_some(),
-            note: if share.is_some() { "" } else { "nothing in the scene asks for it" }.to_owned(),
+            note: if share.is_some() { "" } else { "not used by the scene" }.to_owned(),
         }
     };
     Unit::ALL.into_iter().map(row).collect()
@@ -152,4 +154,151 @@ fn counters(outcome: &Outcome) -> Vec<CounterRow> {
         }
     };
     Event::ALL.into_iter().map(row).collect()
+}
+
+/// Facts below the heading: scene, hardware, model, limits.
+fn facts(outcome: &Outcome) -> Vec<FactRow> {
+    let (plan, summary) = (&outcome.plan, &outcome.summary);
+    let mut facts = vec![
+        FactRow::new("scene", plan.work.name()),
+        FactRow::new("triangles", grouped(summary.settings.triangles as u64)),
+        FactRow::new("GPU", format!("{}: {}", plan.gpu.name, plan.gpu.doc)),
+        FactRow::new("platform", format!("{}: {}", plan.platform.name, plan.platform.doc)),
+        FactRow::new("energy table", format!("{}, {}", plan.table.name(), bound(plan.options.bound))),
+        FactRow::new("modelled", summary.modelled.line()),
+        FactRow::new("limits", summary.modelled.limits.join("; ")),
+        FactRow::new("counts hash", summary.counts_hash.clone()),
+        FactRow::new("Quintile", summary.version),
+    ];
+    let found = |(&name, value): (&&'static str, &f64)| FactRow::new(name, count_or_digits(*value));
+    facts.extend(summary.facts.iter().map(found));
+    facts.extend(summary.accuracy_rows().into_iter().map(|(name, value)| FactRow::new(name, value)));
+    facts
+}
+
+fn bound(bound: Bound) -> &'static str {
+    match bound {
+        Bound::Low => "low values",
+        Bound::Nominal => "nominal values",
+        Bound::High => "high values",
+    }
+}
+
+/// Settings in use.
+fn settings(outcome: &Outcome) -> Vec<FactRow> {
+    let settings = &outcome.summary.settings;
+    let device = outcome.measurement.device.spec();
+    let mut rows = vec![
+        FactRow::new("size", format!("{}x{} pixels", settings.width, settings.height)),
+        FactRow::new("samples per pixel", settings.samples.to_string()),
+        FactRow::new("sample table", settings.table.clone()),
+        FactRow::new("frames", frame_range(outcome)),
+        FactRow::new("frame rate", si(settings.frame_rate_hz, "Hz")),
+        FactRow::new("shutter", format!("{} of the frame period", settings.shutter)),
+    ];
+    rows.extend(settings.clip.as_ref().map(|clip| FactRow::new("animation clip", clip.clone())));
+    rows.extend(camera(outcome));
+    rows.extend([
+        FactRow::new("pacing", settings.pacing),
+        FactRow::new(
+            "recorder",
+            format!(
+                "{}: {}, {} bits, ±{} A, ±{} V",
+                device.name,
+                si(device.rate_hz, "Hz"),
+                device.bits,
+                device.current_range_a[1],
+                device.voltage_range_v[1]
+            ),
+        ),
+        FactRow::new("seed", settings.seed.to_string()),
+    ]);
+    rows
+}
+
+/// Camera of the first frame; for a workload only the lens.
+fn camera(outcome: &Outcome) -> Vec<FactRow> {
+    let lens = |radius: f32| match radius > 0.0 {
+        true => format!("radius {radius} scene units"),
+        false => "none: a pinhole".to_owned(),
+    };
+    let Some(camera) = &outcome.summary.camera else {
+        return vec![FactRow::new("lens", lens(outcome.summary.settings.lens_radius))];
+    };
+    let vector = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z})");
+    let view = match (camera.fov_deg, camera.view_height) {
+        (Some(degrees), _) => format!("{degrees:.3} degrees high"),
+        (None, height) => format!("{} scene units high, orthographic", height.unwrap_or_default()),
+    };
+    let note = |row: FactRow, note: &str| FactRow { note: note.to_owned(), ..row };
+    let given = outcome.plan.work.settings().focus.is_some();
+    vec![
+        note(
+            FactRow::new("camera position", vector(camera.position)),
+            if camera.moves { "when the first frame begins" } else { "" },
+        ),
+        FactRow::new("camera looks along", vector(camera.direction)),
+        FactRow::new("camera's up", vector(camera.up)),
+        note(FactRow::new("camera", camera.source.to_string()), &format!("--camera '{}'", camera.ron)),
+        FactRow::new("view", view),
+        FactRow::new("lens", lens(camera.lens_radius)),
+        note(
+            FactRow::new("focus", format!("depth {} scene units", camera.focus)),
+            if given { "" } else { "found automatically" },
+        ),
+    ]
+}
+
+/// Input files.
+fn inputs(outcome: &Outcome) -> Vec<FactRow> {
+    let row = |input: &Input| FactRow {
+        name: input.path.clone(),
+        value: input.sha256.clone().unwrap_or_else(|| "missing".to_owned()),
+        note: input.bytes.map_or(String::new(), |bytes| format!("{} bytes", grouped(bytes))),
+    };
+    outcome.summary.inputs.iter().map(row).collect()
+}
+
+/// Program, command line and host.
+fn host(outcome: &Outcome) -> Vec<FactRow> {
+    let Host { command, directory, revision, threads, cores, cpu, system, architecture } =
+        &outcome.summary.host;
+    let unknown = || "unknown".to_owned();
+    vec![
+        FactRow::new("command", shell_line(command)),
+        FactRow::new("directory", directory.clone()),
+        FactRow::new("git revision", revision.clone().unwrap_or_else(unknown)),
+        FactRow::new("worker threads", threads.to_string()),
+        FactRow::new("processor", cpu.clone().unwrap_or_else(unknown)),
+        FactRow::new("cores", cores.to_string()),
+        FactRow::new("system", format!("{system}, {architecture}")),
+    ]
+}
+
+fn frame_range(outcome: &Outcome) -> String {
+    let frames = &outcome.plan.work.settings().frames;
+    format!("{} ({}..{})", frames.end - frames.start, frames.start, frames.end)
+}
+
+/// Files beside the report, with descriptions.
+fn files(outcome: &Outcome) -> Vec<FileLink> {
+    let heat = [(
+        "heat/",
+        "where in each frame counters counted: pictures, values of the pixels, counts of the tiles",
+    )];
+    let heat = heat.into_iter().filter(|_| !outcome.simulated.heat.is_empty());
+    [
+        ("summary.json", "every number of this page, for scripts"),
+        ("frames.csv", "energy of each found frame, with the truth beside it"),
+        ("trace.parquet", "the recorded trace: time, voltage, current"),
+        ("trace.csv", "the same as text"),
+        ("timeline.perfetto-trace", "units and power over time, for ui.perfetto.dev"),
+        ("images/", "every frame that was simulated"),
+        ("plots/", "the plots as SVG and PNG"),
+        ("manifest.json", "these files with their sizes and hashes"),
+    ]
+    .into_iter()
+    .chain(heat)
+    .map(|(path, what)| FileLink { path: path.to_owned(), what: what.to_owned() })
+    .collect()
 }

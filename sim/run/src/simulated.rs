@@ -1,66 +1,66 @@
-//! What the simulator knows of the frames of a run.
+//! Results of the simulator: the frames of a run, and which dimensions and units were modelled.
 
 use activity::{Counts, Unit};
 use glam::Vec3;
 use power_model::FramePower;
 use serde::Serialize;
-use timing::Stalls;
 use timing::sampled::Interval;
+use timing::{AccuracyWarning, Stalls};
 use warnings::Warning;
 use workloads::job::Fact;
 
-use super::heat::HeatPicture;
-use super::regime::Regime;
-use timing::AccuracyWarning;
+use crate::Plan;
+use crate::heat::HeatPicture;
+use crate::regime::Regime;
 
-/// A frame of a run with its power over time, simulated or predicted.
+/// Frame of a run with its power over time, simulated or predicted.
 pub struct RunFrame {
-    /// Its number in the scene.
+    /// Frame number in the scene.
     pub index: u32,
-    /// Triangles drawn.
+    /// Number of triangles.
     pub triangles: usize,
     /// Whether anything moves while its shutter is open.
     pub moving: bool,
     /// Whether the camera has a lens.
     pub lens: bool,
-    /// Watts over time and joules by part.
+    /// Power over time in watts, and energy by part in joules.
     pub power: FramePower,
-    /// For how long each unit was busy, in picoseconds.
+    /// Busy time of each unit in picoseconds.
     pub busy_ps: [u64; Unit::COUNT],
-    /// The busy share of each unit in each bin of [`FramePower::bin_s`].
+    /// Busy share of each unit in each bin of [`FramePower::bin_s`].
     pub busy: Vec<[f32; Unit::COUNT]>,
     /// Cycles of the core clock.
     pub cycles: u64,
-    /// How it came about, with what is known of such frames alone.
+    /// Simulated or predicted, with the data of that variant.
     pub origin: Origin,
 }
 
-/// How a frame of a run came about.
+/// Origin of the numbers of a frame.
 pub enum Origin {
-    /// It was simulated whole.
+    /// The frame was simulated.
     Simulated(Observed),
-    /// It was predicted from others: half the widths of the intervals of its cycles and its energy.
-    Predicted(Taken),
+    /// The frame was predicted from others: half-widths of the intervals of cycles and energy.
+    Predicted(FrameCost),
 }
 
-/// What is known of a frame that was simulated, and of no other.
+/// Data that only a simulated frame has.
 pub struct Observed {
-    /// How often each event happened.
+    /// Event counts.
     pub counts: Counts,
-    /// Results of a workload.
+    /// Results of a workload, by name.
     pub facts: Vec<Fact>,
     /// Warnings of a workload.
     pub warnings: Vec<Warning>,
-    /// Triangles that tile tests are weak for.
+    /// Numbers of triangles for which tile tests are ineffective.
     pub regime: Regime,
-    /// Why units did not work, where the timing level records it.
+    /// Stall reasons, if the timing level records them.
     pub stalls: Option<Stalls>,
-    /// Why the timing level may be inaccurate.
+    /// Accuracy warnings of the timing level.
     pub accuracy: Vec<AccuracyWarning>,
 }
 
 impl RunFrame {
-    /// What is known of it, if it was simulated.
+    /// Data of a simulated frame; `None` for a predicted frame.
     pub fn observed(&self) -> Option<&Observed> {
         match &self.origin {
             Origin::Simulated(observed) => Some(observed),
@@ -68,8 +68,13 @@ impl RunFrame {
         }
     }
 
-    /// Half the widths of its intervals, if it was predicted.
-    pub fn half_widths(&self) -> Option<Taken> {
+    /// Cycles and energy of the frame.
+    pub fn cost(&self) -> FrameCost {
+        FrameCost { cycles: self.cycles as f64, energy_j: self.power.energy().total_j() }
+    }
+
+    /// Half-widths of the intervals of a predicted frame; `None` for a simulated frame.
+    pub fn half_widths(&self) -> Option<FrameCost> {
         match self.origin {
             Origin::Simulated(_) => None,
             Origin::Predicted(half) => Some(half),
@@ -77,37 +82,37 @@ impl RunFrame {
     }
 }
 
-/// All frames of a run.
+/// Frames of a run.
 pub struct Simulated {
-    /// Frames that differ.
+    /// Distinct frames.
     pub distinct: Vec<RunFrame>,
-    /// For each frame of the run, its place in `distinct`: frames with the same input share one.
+    /// Index into `distinct` of each frame of the run; frames with equal input share one entry.
     pub frames: Vec<usize>,
-    /// Pictures for the report: frame number and the linear image.
+    /// Images for the report: frame number and linear pixels.
     pub pictures: Vec<(u32, Vec<Vec3>)>,
-    /// The heat maps of the frame in the middle.
+    /// Heat maps of one frame, for the report.
     pub heat: Vec<HeatPicture>,
-    /// Which frames were predicted, and with which confidence.
+    /// Simulated frames and confidence intervals of a sampled run.
     pub sampled: Option<SampledSummary>,
 }
 
 impl Simulated {
-    /// The frames of the run in order.
+    /// Frames of the run in order.
     pub fn in_order(&self) -> impl Iterator<Item = &RunFrame> {
         self.frames.iter().map(|&place| &self.distinct[place])
     }
 
-    /// The simulated frames among those that differ.
+    /// Simulated frames among the distinct frames.
     pub fn observed(&self) -> impl Iterator<Item = (&RunFrame, &Observed)> {
         self.distinct.iter().filter_map(|frame| Some((frame, frame.observed()?)))
     }
 
-    /// What is known of the simulated frames of the run, in order.
+    /// Data of the simulated frames of the run, in order.
     pub fn known(&self) -> impl Iterator<Item = &Observed> {
         self.in_order().filter_map(RunFrame::observed)
     }
 
-    /// The counts of the frames of the run that were simulated.
+    /// Event counts, summed over the simulated frames of the run.
     pub fn total(&self) -> Counts {
         self.known().fold(Counts::default(), |mut sum, frame| {
             sum += &frame.counts;
@@ -116,25 +121,25 @@ impl Simulated {
     }
 }
 
-/// What a simulated frame took.
+/// Cycles and energy of a frame, or their errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Taken {
+pub struct FrameCost {
     /// Cycles of the core clock.
     pub cycles: f64,
     /// Joules while busy.
     pub energy_j: f64,
 }
 
-/// A quantity of the whole run with its interval.
+/// Quantity of the run with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantity {
-    /// The most likely value.
+    /// Estimate.
     pub value: f64,
-    /// The lower end of the 95 % interval.
+    /// Lower end of the 95 % interval.
     pub low: f64,
-    /// The upper end.
+    /// Upper end of the 95 % interval.
     pub high: f64,
-    /// Half the width over the value.
+    /// Half-width over the estimate.
     pub relative_half_width: f64,
 }
 
@@ -146,35 +151,35 @@ impl From<Interval> for Quantity {
 }
 
 impl Quantity {
-    /// Whether `truth` is inside.
+    /// Whether the interval contains `truth`.
     pub fn holds(&self, truth: f64) -> bool {
         (self.low..=self.high).contains(&truth)
     }
 }
 
-/// Which frames were simulated, and how sure the rest is.
+/// Simulated frames and confidence intervals of a sampled run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampledSummary {
-    /// Frames that were simulated whole; all others are predicted.
+    /// Simulated frames; all others are predicted.
     pub simulated_frames: Vec<u32>,
-    /// Frames of the run for one that was simulated.
+    /// Frames of the run per simulated frame.
     pub frames_per_simulated: f64,
-    /// Groups of frames of like previews, that of the frame all are scaled by among them.
+    /// Number of strata: groups of frames with similar previews, including that of the pilot frame.
     pub strata: usize,
-    /// Width and height of the preview in pixels, and samples in each of them.
+    /// Width and height of the preview in pixels, and samples per pixel.
     pub preview: [u32; 3],
-    /// The probability with which an interval holds the truth.
+    /// Confidence level of the intervals.
     pub confidence: f64,
-    /// Mean cycles of a frame.
+    /// Mean cycles per frame.
     pub cycles_per_frame: Quantity,
-    /// Mean joules of a frame while the GPU works on it, idle after it not counted.
+    /// Mean energy per frame in joules while the GPU is busy, without idle time.
     pub busy_energy_per_frame_j: Quantity,
-    /// Mean watts while the GPU works.
+    /// Mean power in watts while the GPU is busy.
     pub busy_power_w: Quantity,
 }
 
 impl SampledSummary {
-    /// The quantities with their names and units.
+    /// The three quantities with names and units.
     pub fn quantities(&self) -> [(&'static str, &'static str, Quantity); 3] {
         [
             ("cycles per frame", "", self.cycles_per_frame),
@@ -200,8 +205,89 @@ impl SampledSummary {
         )
     }
 
-    /// Half of the widest interval, over its value.
+    /// Relative half-width of the widest interval.
     pub fn worst(&self) -> f64 {
         self.quantities().iter().map(|(_, _, quantity)| quantity.relative_half_width).fold(0.0, f64::max)
+    }
+}
+
+/// Dimensions and units that a run modelled.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Modelled {
+    /// Number of dimensions: 2 for the screen, 1 for motion while the shutter is open, 2 for a lens.
+    pub dimensions: u32,
+    /// Whether time is a dimension.
+    pub motion: bool,
+    /// Whether the lens is a dimension.
+    pub lens: bool,
+    /// Number of simulated frames; equal frames are simulated once.
+    pub distinct_frames: usize,
+    /// Number of predicted distinct frames.
+    pub predicted_frames: usize,
+    /// Units with at least one event.
+    pub units: Vec<&'static str>,
+    /// Units without events.
+    pub units_not_modelled: Vec<&'static str>,
+    /// Timing level.
+    pub timing: &'static str,
+    /// Limitations of the model and of this run.
+    pub limits: Vec<&'static str>,
+}
+
+impl Modelled {
+    pub(super) fn new(plan: &Plan, simulated: &Simulated) -> Self {
+        let total = simulated.total();
+        let motion = simulated.distinct.iter().any(|frame| frame.moving);
+        let lens = simulated.distinct.iter().any(|frame| frame.lens);
+        let (used, unused): (Vec<Unit>, Vec<Unit>) =
+            Unit::ALL.into_iter().partition(|&unit| total.uses(unit));
+        let predicted = simulated.distinct.iter().filter(|frame| frame.half_widths().is_some()).count();
+        let mut limits = vec![
+            "one opaque pass; no blending",
+            "one voltage and clock state; no governor, no temperature change",
+            "caches are walked in the order of the stream, whenever it is timed",
+        ];
+        if simulated.distinct.len() < simulated.frames.len() {
+            limits.push(match simulated.distinct.len() {
+                1 => "nothing changes from frame to frame: one frame was simulated and repeated",
+                _ => "some frames equal an earlier one: these were not simulated again",
+            });
+        }
+        if predicted > 0 {
+            limits.push(
+                "counters, heat and images are of the frames that were simulated; the others are predicted",
+            );
+        }
+        Self {
+            dimensions: 2 + u32::from(motion) + 2 * u32::from(lens),
+            motion,
+            lens,
+            distinct_frames: simulated.distinct.len() - predicted,
+            predicted_frames: predicted,
+            units: used.into_iter().map(Unit::name).collect(),
+            units_not_modelled: unused.into_iter().map(Unit::name).collect(),
+            timing: plan.options.timing.name(),
+            limits,
+        }
+    }
+
+    /// A line for the terminal.
+    pub fn line(&self) -> String {
+        let dimensions = match (self.motion, self.lens) {
+            (true, true) => "5D (screen, lens, time)",
+            (true, false) => "3D (screen, time; pinhole: no lens)",
+            (false, true) => "4D (screen, lens; nothing moves: no time)",
+            (false, false) => "2D (screen; pinhole and nothing moves)",
+        };
+        let unused = if self.units_not_modelled.is_empty() {
+            String::new()
+        } else {
+            format!("; not needed and not modelled: {}", self.units_not_modelled.join(", "))
+        };
+        let predicted = match self.predicted_frames {
+            0 => String::new(),
+            count => format!(", {} frames simulated and {count} predicted", self.distinct_frames),
+        };
+        format!("{dimensions}, timing level {}{predicted}{unused}", self.timing)
     }
 }

@@ -1,4 +1,4 @@
-//! Why units did not work, where the level of timing knows.
+//! Stalls of units over a run, for summary, plot and timeline.
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use super::{RunFrame, Simulated};
 use output::perfetto::CounterTrack;
 use output::plot::{Look, Picture, StallLane, StallLanes};
 
-/// Columns of the picture at most.
-const COLUMNS: usize = 128;
+/// Largest number of columns of the plot.
+const MAX_COLUMNS: usize = 128;
 
-/// Shares of a unit's time over the frames of a run; with those by unit they add up to 1.
+/// Shares of a unit's time over the frames of a run; all of them add up to 1.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StallShares {
-    /// Working.
+    /// Serving work.
     pub busy: f64,
-    /// With nothing left to do, or nobody asking.
+    /// No work left, or no request.
     pub idle: f64,
-    /// Waiting for a unit to hand something over, by that unit.
+    /// Waiting for input from a unit, by that unit.
     pub starved: BTreeMap<&'static str, f64>,
-    /// Waiting for a unit to take something or to answer, by that unit.
+    /// Waiting for a unit to accept output or to reply, by that unit.
     pub blocked: BTreeMap<&'static str, f64>,
 }
 
-/// The shares of every unit in use over all frames that differ; empty where the level of timing does not know.
+/// Shares of every unit in use over all distinct frames; empty if the timing level records no stalls.
 pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShares> {
     let used = simulated.total();
     let of = |unit: Unit| {
@@ -47,7 +47,7 @@ pub(super) fn shares(simulated: &Simulated) -> BTreeMap<&'static str, StallShare
     Unit::ALL.into_iter().filter(|&unit| used.uses(unit)).map(|unit| (unit.name(), of(unit))).collect()
 }
 
-/// Busy, starved and blocked shares of `unit` in each interval.
+/// Busy, starved and blocked share of `unit` in each interval.
 fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
     stalls.intervals().iter().map(move |interval| {
         let time = &interval[unit as usize];
@@ -56,11 +56,11 @@ fn lane(stalls: &Stalls, unit: Unit) -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// What the units waited for in a frame.
+/// Plot of the stalls in a frame; `None` if they are not recorded.
 pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Picture> {
     let observed = frame.observed()?;
     let stalls = observed.stalls.as_ref()?;
-    let group = stalls.intervals().len().div_ceil(COLUMNS).max(1);
+    let group = stalls.intervals().len().div_ceil(MAX_COLUMNS).max(1);
     let bottlenecks = stalls.bottlenecks();
     let of = |unit: Unit| {
         let shares: Vec<[f64; 3]> = lane(stalls, unit).collect();
@@ -78,7 +78,7 @@ pub(super) fn picture(frame: &RunFrame, subject: &str, look: &Look) -> Option<Pi
     Some(StallLanes { subject, frame: u64::from(frame.index), interval_s, units }.picture(look))
 }
 
-/// Names of the tracks, by unit.
+/// Names of the tracks, in the order of units.
 const TRACKS: [[&str; 2]; Unit::COUNT] = [
     ["command starved", "command blocked"],
     ["shader starved", "shader blocked"],
@@ -94,8 +94,8 @@ const TRACKS: [[&str; 2]; Unit::COUNT] = [
     ["dram starved", "dram blocked"],
 ];
 
-/// Tracks of the viewer: for each unit the share of its time that it is starved and that it is blocked. `starts` are those of
-/// the frames of the run, in ns.
+/// Tracks for the Perfetto viewer: starved and blocked share of each unit. `starts` are the starts of frames
+/// in ns.
 pub(super) fn tracks(simulated: &Simulated, starts: &[u64]) -> Vec<CounterTrack<'static>> {
     let mut tracks = Vec::new();
     for (unit, names) in Unit::ALL.into_iter().zip(TRACKS) {

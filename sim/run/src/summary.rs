@@ -1,30 +1,29 @@
-//! The numbers of `summary.json`: the same bytes for the same input, whatever the machine did meanwhile.
+//! `summary.json`: the numbers of a run. Equal inputs give equal bytes on every machine, except for `host`.
 
 use std::collections::BTreeMap;
 
-use activity::{Counts, Unit};
+use activity::{Counts, Event, Unit};
+use output::MeanSd;
+use output::report::Headline;
 use power_model::Energy;
 use serde::Serialize;
 use traces::energy::{FrameEnergy, Spread, Summary as FrameSummary};
 use warnings::Warning;
 use workloads::scene::CameraUsed;
 
-use super::checks::Checks;
-use super::frame_rows::{FrameRow, hash, rows};
-use super::measure::mean_parts_w;
-use super::modelled::Modelled;
-use super::stalls::{self, StallShares};
-use super::{
-    Choice, Host, Input, Measurement, Plan, Provenance, Resolution, RunOptions, SampledSummary, Simulated,
-    Verified, warn,
+use crate::frame::image_name;
+use crate::measure::{Checks, mean_parts_w};
+use crate::provenance::SCHEMA;
+use crate::stalls::{self, StallShares};
+use crate::{
+    Choice, Host, Input, Measurement, Modelled, Plan, Provenance, Resolution, RunOptions, SampledSummary,
+    Simulated, Verified, warn,
 };
-use output::MeanSd;
-use output::report::Headline;
 
-/// A run in numbers.
+/// Contents of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Version of the form of this file.
+    /// Schema version.
     pub schema: u32,
     /// Version of the program.
     pub version: &'static str,
@@ -34,63 +33,59 @@ pub struct Summary {
     pub gpu: String,
     /// Name of the platform.
     pub platform: String,
-    /// Name of the energy table, and which of its values were used.
+    /// Name and column of the energy table.
     pub energy_table: [String; 2],
-    /// What was asked for: all that the results depend on but the content of `inputs`.
+    /// Options of the run. Results depend on these and on the contents of `inputs`.
     pub request: RunOptions,
-    /// The files that the run was made from, by name.
+    /// Input files, sorted by name.
     pub inputs: Vec<Input>,
     /// Settings in use.
     pub settings: SettingsSummary,
-    /// The camera of the first frame; workloads have cameras of their own.
+    /// Camera of the first frame; `None` for workloads.
     pub camera: Option<CameraUsed>,
-    /// What was modelled and what not.
+    /// Dimensions and units that were modelled.
     pub modelled: Modelled,
-    /// Regimes in which the methods are known to be bad.
+    /// Warnings.
     pub warnings: Vec<Warning>,
-    /// Frames as measured in the trace; nothing where no frame was found but the marked one.
+    /// Frames as measured in the trace; `None` if only the marked frame was found.
     pub measured: Option<Figures>,
-    /// Frames as the simulator knows them.
+    /// Frames as simulated: the ground truth.
     pub truth: Option<Figures>,
-    /// How finely the frames were recorded.
+    /// Sampling rate relative to the frames.
     pub recorder: Resolution,
-    /// Found against true frame starts.
+    /// Found frame starts compared with true ones.
     pub detection: Detection,
-    /// Sums that have to agree.
+    /// Consistency checks.
     pub checks: Checks,
-    /// Joules of the run by part, start of the first frame to end of the last.
+    /// Energy by part in joules, from the first frame's start to the last frame's end.
     pub energy_by_part_j: Energy,
-    /// Mean watts of the run by part.
+    /// Mean power by part in watts.
     pub power_by_part_w: BTreeMap<&'static str, f64>,
-    /// Share of the run's frame time for which each unit in use was busy.
+    /// Busy time of each unit in use, as a share of the frames' busy time.
     pub unit_busy: BTreeMap<&'static str, f64>,
-    /// What each unit did and waited for, in shares of its time; where the level of timing knows.
+    /// Busy, idle and stalled shares of each unit's time, if the timing level records stalls.
     pub stalls: BTreeMap<&'static str, StallShares>,
-    /// Samples hit over samples tested.
+    /// Sample test efficiency: samples hit over samples tested.
     pub sample_test_efficiency: Option<f64>,
-    /// What a workload found out, its mean over frames.
+    /// Results of a workload by name, means over frames.
     pub facts: BTreeMap<&'static str, f64>,
-    /// How often each event happened in the frames that were simulated.
+    /// Event counts of the simulated frames.
     pub counts: Counts,
-    /// A hash of the counts of every frame that was simulated: equal runs have equal hashes.
+    /// Hash of the event counts of all simulated frames. Equal runs have equal hashes.
     pub counts_hash: String,
-    /// What was chosen for the accuracy or the time that was asked for.
+    /// Choice for the requested accuracy or time budget.
     pub choice: Option<Choice>,
-    /// Actual errors, where they were asked for.
+    /// Actual errors, with `--verify`.
     pub verified: Option<Verified>,
-    /// Which frames were simulated and how sure the others are, where not all were.
+    /// Simulated frames and confidence intervals of a sampled run.
     pub sampled: Option<SampledSummary>,
-    /// Every frame of the run.
+    /// All frames of the run.
     pub frames: Vec<FrameRow>,
-    /// The program, the call and the machine. Everything else is the same on every machine.
+    /// Program, command line and host. All other keys are equal on every machine.
     pub host: Host,
 }
 
-/// The version of the form of `summary.json`, described by `docs/summary.schema.json`. Within a version keys may be added; one that
-/// goes, or changes its meaning or unit, makes the next version.
-pub const SCHEMA: u32 = 1;
-
-/// Settings as they came to be.
+/// Settings in use.
 #[derive(Clone, Debug, Serialize)]
 #[allow(missing_docs, reason = "the names say it, documented at their sources")]
 pub struct SettingsSummary {
@@ -111,12 +106,12 @@ pub struct SettingsSummary {
     pub triangles: usize,
 }
 
-/// A table of frames in a few numbers.
+/// Statistics over frames.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Figures {
-    /// How many frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Seconds from start to start.
+    /// Seconds from start to start of the next.
     pub duration_s: Spread,
     /// Joules.
     pub energy_j: Spread,
@@ -124,7 +119,7 @@ pub struct Figures {
     pub energy_per_pixel_j: Spread,
     /// Watts.
     pub power_w: Spread,
-    /// Joules of all frames.
+    /// Energy of all frames in joules.
     pub total_j: f64,
 }
 
@@ -146,7 +141,7 @@ fn scaled(spread: Spread, by: f64) -> Spread {
     Spread { mean: spread.mean * by, deviation: spread.deviation * by, median: spread.median * by }
 }
 
-/// How the frame finder did.
+/// Precision and errors of the found frame starts.
 #[derive(Clone, Debug, Serialize)]
 #[allow(missing_docs, reason = "the terms of information retrieval")]
 pub struct Detection {
@@ -162,7 +157,7 @@ pub struct Detection {
 }
 
 impl Summary {
-    /// The quantities that people compare, measured beside true, mean and standard deviation over frames in SI units.
+    /// Time, energy and power per frame, measured and true: mean and standard deviation in SI units.
     pub fn headline(&self) -> Vec<Headline> {
         let row = |label: &str, unit: &str, pick: fn(&Figures) -> Spread| {
             let number = |figures: &Option<Figures>| {
@@ -179,8 +174,8 @@ impl Summary {
         ]
     }
 
-    /// What was chosen, what was predicted and how wrong it was, in words; nothing where nothing of that was asked for.
-    pub fn judgement(&self) -> Vec<(&'static str, String)> {
+    /// Choice, confidence intervals and actual errors as text rows; empty for a plain run.
+    pub fn accuracy_rows(&self) -> Vec<(&'static str, String)> {
         let mut rows: Vec<(&'static str, String)> = Vec::new();
         rows.extend(self.choice.as_ref().map(|choice| ("chosen", choice.line())));
         rows.extend(self.sampled.as_ref().map(|sampled| ("predicted", sampled.line())));
@@ -188,9 +183,9 @@ impl Summary {
         rows
     }
 
-    /// With a warning where what was asked for is not met.
-    pub(super) fn warned(mut self) -> Self {
-        self.warnings.extend(self.choice.iter().flat_map(warn::missed));
+    /// Adds the warnings about a missed accuracy or budget.
+    pub(super) fn with_choice_warnings(mut self) -> Self {
+        self.warnings.extend(self.choice.iter().flat_map(warn::missed_requests));
         self.warnings = Warning::fold(self.warnings);
         self
     }
@@ -247,7 +242,7 @@ impl Summary {
     }
 }
 
-/// The mean over frames of each fact that frames know.
+/// Mean over frames of each result of a workload.
 fn facts(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     let mut sums: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
     for fact in simulated.known().flat_map(|frame| &frame.facts) {
@@ -258,7 +253,7 @@ fn facts(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     sums.into_iter().map(|(name, [sum, count])| (name, sum / count)).collect()
 }
 
-/// The true frames in the form of measured ones, for the same statistics.
+/// True frames in the form of measured frames, for the same statistics.
 fn true_frames(measurement: &Measurement) -> Vec<FrameEnergy> {
     let frame = |f: &power_model::PacedFrame| FrameEnergy {
         start_s: f.start_s,
@@ -284,10 +279,7 @@ fn settings(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Se
         frames: scene.frames.end - scene.frames.start,
         lens_radius: scene.lens_radius,
         focus: scene.focus,
-        pacing: match plan.options.pacing {
-            super::PacingChoice::Vsync => "vsync",
-            super::PacingChoice::Free => "free",
-        },
+        pacing: plan.options.pacing.name(),
         trace_rate_hz: measurement.resolution.rate_hz,
         seed: plan.options.seed,
         triangles: simulated.distinct.first().map_or(0, |frame| frame.triangles),
@@ -309,7 +301,7 @@ fn detection(measurement: &Measurement) -> Detection {
     }
 }
 
-/// Busy time over the time of the frames, idle between them not counted.
+/// Busy time of each unit over the busy time of the frames.
 fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
     let total = simulated.total();
     let time: f64 = simulated.in_order().map(|frame| frame.power.duration_s()).sum();
@@ -318,4 +310,87 @@ fn unit_busy(simulated: &Simulated) -> BTreeMap<&'static str, f64> {
         ps as f64 * 1e-12 / time
     };
     Unit::ALL.into_iter().filter(|&unit| total.uses(unit)).map(|unit| (unit.name(), busy(unit))).collect()
+}
+
+/// Frame of a run, in `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameRow {
+    /// Frame number in the scene.
+    pub frame: u32,
+    /// Image file; `None` for a predicted frame.
+    pub image: Option<String>,
+    /// Whether the frame was predicted.
+    pub predicted: bool,
+    /// Hash of its event counts, equal at every timing level; `None` for a predicted frame.
+    pub counts_hash: Option<String>,
+    /// True start in seconds from the start of the recording.
+    pub start_s: f64,
+    /// Busy time in cycles of the core clock.
+    pub cycles: u64,
+    /// Busy time in seconds.
+    pub busy_s: f64,
+    /// Time to the start of the next frame, in seconds.
+    pub duration_s: f64,
+    /// True energy in joules.
+    pub energy_j: f64,
+    /// True energy per pixel in joules.
+    pub energy_per_pixel_j: f64,
+    /// True mean power in watts.
+    pub power_w: f64,
+    /// True energy by part in joules. Summed in this order they give the frame's energy exactly.
+    pub energy_by_part_j: Energy,
+    /// Ends of the interval of the cycles, for a predicted frame.
+    pub cycles_interval: Option<[f64; 2]>,
+    /// Ends of the interval of the energy in joules, for a predicted frame.
+    pub energy_interval_j: Option<[f64; 2]>,
+    /// Energy measured in the trace in joules; `None` if the frame was not found.
+    pub measured_energy_j: Option<f64>,
+    /// Error of the found start in seconds; `None` if the frame was not found.
+    pub start_error_s: Option<f64>,
+}
+
+/// Hash of counts, continued from `seed`.
+fn hash(seed: u64, counts: &Counts) -> u64 {
+    Event::ALL.iter().fold(seed, |hash: u64, &event| {
+        pipeline::random::mix(hash.rotate_left(1) ^ counts[event].wrapping_add(event as u64))
+    })
+}
+
+/// Interval of half-width `half` around a value, not below 0.
+fn around(value: f64, half: Option<f64>) -> Option<[f64; 2]> {
+    half.map(|half| [(value - half).max(0.0), value + half])
+}
+
+/// All frames of the run.
+fn rows(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<FrameRow> {
+    let first = plan.work.settings().frames.start;
+    measurement
+        .run
+        .frames
+        .iter()
+        .zip(measurement.by_true_frame())
+        .zip(simulated.in_order())
+        .zip(first..)
+        .map(|(((paced, measured), known), frame)| {
+            let (energy_j, duration_s) = (paced.energy.total_j(), paced.end_s - paced.start_s);
+            FrameRow {
+                frame,
+                image: known.observed().map(|_| format!("{}.png", image_name(frame))),
+                predicted: known.half_widths().is_some(),
+                counts_hash: known.observed().map(|observed| format!("{:016x}", hash(0, &observed.counts))),
+                start_s: paced.start_s,
+                cycles: known.cycles,
+                busy_s: paced.busy_end_s - paced.start_s,
+                duration_s,
+                energy_j,
+                energy_per_pixel_j: energy_j / plan.pixels() as f64,
+                cycles_interval: around(known.cycles as f64, known.half_widths().map(|half| half.cycles)),
+                energy_interval_j: around(energy_j, known.half_widths().map(|half| half.energy_j)),
+                energy_by_part_j: paced.energy,
+                power_w: energy_j / duration_s,
+                measured_energy_j: measured.map(|m| m.energy_j),
+                start_error_s: measured.map(|m| m.start_s - paced.start_s),
+            }
+        })
+        .collect()
 }

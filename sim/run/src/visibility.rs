@@ -1,10 +1,10 @@
-//! What every sample of a scene sees, and how long it takes to find out.
+//! Visible triangle of every sample of a scene, and the rate of finding them.
 
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use pipeline::sampling::SampleSource;
-use pipeline::visibility::{SampleLayout, VisibleTriangle, Visibility, resolve};
+use pipeline::visibility::{SampleLayout, Visibility, VisibleTriangle, resolve};
 use pipeline::{Cull, Draw, Features, Geometry, PipelineSpec, Settings, frame};
 use serde::Serialize;
 use warnings::{Code, Warning};
@@ -13,48 +13,48 @@ use workloads::visibility::{Unshaded, VisibilityScene};
 use crate::Regime;
 use crate::gpu::GpuSpec;
 
-/// How fast, in samples of the image per second.
+/// Rates in samples of the image per second.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Rates {
-    /// By the CPU time of a thread in set-up, binning, tests and depth: the median of all runs.
+    /// By CPU time per thread in set-up, binning, tests and depth: median of all runs.
     pub samples_per_s: f64,
     /// The same of the fastest run.
     pub best_samples_per_s: f64,
-    /// By the clock, with samples made and sorted before and results put in the order of the image after the median run.
+    /// By wall-clock time of the median run, including preparation of samples and reordering of results.
     pub end_to_end_samples_per_s: f64,
-    /// How often it was rasterized.
+    /// Number of runs.
     pub runs: u16,
-    /// On how many threads.
+    /// Number of threads.
     pub threads: usize,
 }
 
-/// What was found.
+/// Visible triangles and rates.
 pub struct Found {
-    /// By sample, in the order `(y width + x) per_pixel + index`.
+    /// Triangle and depth of each sample, in the order `(y width + x) per_pixel + index`.
     pub seen: Vec<VisibleTriangle>,
-    /// How fast.
+    /// Rates.
     pub rates: Rates,
 }
 
-/// Seconds of one run: CPU time of all threads, and the clock.
-struct Run {
+/// Time of one run: CPU seconds of all threads, and wall-clock seconds.
+struct RunTime {
     cpu_s: f64,
     wall_s: f64,
 }
 
-/// Finds what the samples of `source` see of `scene`, `runs` times: with tile tests as the modelled hardware does it, or
-/// without as fast as it goes; the engine that goes fastest takes no orthographic camera, so that is modelled with all tests. Uses
-/// the threads of the pool it is called in.
+/// Computes the visible triangle and depth of every sample of `source`, `runs` times, on the threads of the
+/// current pool. `tests` selects the modelled hardware with these tile tests; `None` selects the fast engine.
+/// The fast engine does not support orthographic cameras; for these all tile tests are modelled.
 ///
 /// # Errors
-/// When the mesh cannot be drawn, in words.
+/// If the mesh cannot be rendered, as text.
 pub fn find(
     scene: &VisibilityScene,
     source: &dyn SampleSource,
     tests: Option<Features>,
     runs: u16,
 ) -> Result<Found, String> {
-    // One array twice is a still mesh.
+    // The same array at both ends is a still mesh.
     let close = if scene.open == scene.close { &scene.open } else { &scene.close };
     let geometry = Geometry::new(&scene.open, close, &scene.triangles).map_err(|error| error.to_string())?;
     let fast = if tests.is_none() { fastest(scene, source, &geometry, runs) } else { None };
@@ -64,7 +64,7 @@ pub fn find(
     }
 }
 
-/// What a user should know of what is seen: nothing at all, or lengths that f32 cannot multiply.
+/// Warnings about an empty image or coordinates out of range.
 pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
     let Ok(geometry) = Geometry::new(&scene.open, &scene.close, &scene.triangles) else { return Vec::new() };
     let draws = [Draw { geometry, shader: &Unshaded, cull: Cull::None }];
@@ -95,7 +95,7 @@ pub fn warnings(scene: &VisibilityScene) -> Vec<Warning> {
     found.into_iter().flatten().collect()
 }
 
-/// `None` where the camera is one the engine does not take.
+/// Runs the fast engine; `None` if it does not support the camera.
 fn fastest(
     scene: &VisibilityScene,
     source: &dyn SampleSource,
@@ -135,22 +135,22 @@ fn modelled(
     Ok(Found { seen: seen.into_iter().map(|(id, depth)| (id, f32::from_bits(depth))).collect(), rates })
 }
 
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Run) {
+fn timed<T>(work: impl FnOnce() -> T) -> (T, RunTime) {
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
     let result = work();
-    (result, Run { cpu_s: cpu.elapsed().as_secs_f64(), wall_s: wall.elapsed().as_secs_f64() })
+    (result, RunTime { cpu_s: cpu.elapsed().as_secs_f64(), wall_s: wall.elapsed().as_secs_f64() })
 }
 
-/// Rates of runs over so many samples; `apart_s` seconds went by before and after them.
-fn rates(samples: usize, mut runs: Vec<Run>, apart_s: f64) -> Rates {
+/// Rates of runs over `samples`. `outside_s` are the seconds before and after the runs.
+fn rates(samples: usize, mut runs: Vec<RunTime>, outside_s: f64) -> Rates {
     let (samples, threads) = (samples as f64, rayon::current_num_threads());
     runs.sort_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
-    let rate = |run: &Run| samples * threads as f64 / run.cpu_s.max(f64::MIN_POSITIVE);
+    let rate = |run: &RunTime| samples * threads as f64 / run.cpu_s.max(f64::MIN_POSITIVE);
     let median = &runs[runs.len() / 2];
     Rates {
         samples_per_s: rate(median),
         best_samples_per_s: rate(&runs[0]),
-        end_to_end_samples_per_s: samples / (apart_s + median.wall_s),
+        end_to_end_samples_per_s: samples / (outside_s + median.wall_s),
         runs: runs.len() as u16,
         threads,
     }
@@ -161,8 +161,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rates_are_those_of_a_thread_and_of_the_median_run() {
-        let runs = [(3.0, 2.0), (1.0, 0.5), (2.0, 1.0)].map(|(cpu_s, wall_s)| Run { cpu_s, wall_s });
+    fn rates_are_per_thread_and_of_the_median_run() {
+        let runs = [(3.0, 2.0), (1.0, 0.5), (2.0, 1.0)].map(|(cpu_s, wall_s)| RunTime { cpu_s, wall_s });
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
         let rates = pool.install(|| rates(100, runs.into(), 3.0));
         assert_eq!((rates.samples_per_s, rates.best_samples_per_s), (100.0, 200.0));

@@ -1,16 +1,18 @@
-//! The files of a run.
+//! Files of a run.
 
+use activity::Unit;
+use output::dir::{Claim, OutDir, SUMMARY};
+use output::perfetto::{self, CounterTrack, FrameSpan, MAX_SLICES, Timeline, UnitTrack, slices_of_bins};
+use output::progress::Progress;
+use power_model::Part;
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable};
 use traces::score::{TOLERANCE_S, truth_beside};
 
-use super::frame::image_name;
-use super::heat::heat_name;
-use super::{FIGURES, FrameRow, Outcome, Plan, RunError, pictures, report, timeline};
-use output::dir::{Claim, OutDir, SUMMARY};
-use output::perfetto;
-use output::progress::Progress;
+use crate::frame::image_name;
+use crate::heat::heat_name;
+use crate::{FIGURES, FrameRow, Outcome, Plan, RunError, pictures, report, stalls};
 
-/// The files that a run may write.
+/// Files that a run may write.
 pub(super) fn claim(plan: &Plan) -> Claim {
     let ends: &[&str] = if plan.options.exr { &["png", "exr"] } else { &["png"] };
     let frames = || plan.work.settings().frames.clone();
@@ -26,7 +28,7 @@ pub(super) fn claim(plan: &Plan) -> Claim {
         .files(["timeline.perfetto-trace", "report.html", SUMMARY])
 }
 
-/// Writes everything but the images, which are there already.
+/// Writes all files except images, which the simulation has written.
 pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Result<(), RunError> {
     let bar = progress.bar("files", 4);
     let trace = &outcome.measurement.trace;
@@ -36,7 +38,7 @@ pub(super) fn write(outcome: &Outcome, dir: &OutDir, progress: &Progress) -> Res
     bar.inc();
     write_frames(outcome, dir)?;
     let process = format!("quintile {} on {}", outcome.plan.work.name(), outcome.plan.gpu.name);
-    let timeline = timeline::timeline(outcome, &process);
+    let timeline = timeline(outcome, &process);
     dir.write_file("timeline.perfetto-trace", |out| Ok(perfetto::write(&timeline, out)?))?;
     bar.inc();
     let plots = pictures::plots(outcome);
@@ -59,7 +61,7 @@ fn write_frames(outcome: &Outcome, dir: &OutDir) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Of a run with predicted frames: which ones these are, and the ends of the intervals of their energies.
+/// Columns of a sampled run: whether a frame is predicted, and the ends of its energy interval.
 fn predictions(outcome: &Outcome) -> Vec<ExtraColumn> {
     if outcome.simulated.sampled.is_none() {
         return Vec::new();
@@ -83,4 +85,79 @@ fn predictions(outcome: &Outcome) -> Vec<ExtraColumn> {
         column("predicted_energy_low_J", &|row| end(row, 0)),
         column("predicted_energy_high_J", &|row| end(row, 1)),
     ]
+}
+
+const NS: f64 = 1e9;
+
+/// Timeline for the Perfetto viewer: frames, units in use, total power and power by part.
+fn timeline<'a>(outcome: &'a Outcome, process: &'a str) -> Timeline<'a> {
+    let total = outcome.simulated.total();
+    let units = Unit::ALL
+        .into_iter()
+        .filter(|&unit| total.uses(unit))
+        .map(|unit| unit_track(outcome, unit))
+        .collect();
+    let energy = outcome.measurement.run.energy();
+    let parts = Part::ALL.into_iter().filter(|part| energy[*part] > 0.0);
+    let starts: Vec<u64> = outcome.measurement.run.frames.iter().map(|paced| ns(paced.start_s)).collect();
+    let power = std::iter::once(total_power(outcome)).chain(parts.map(|part| part_power(outcome, part)));
+    let counters = power.chain(stalls::tracks(&outcome.simulated, &starts)).collect();
+    Timeline { process, frames: frames(outcome), units, counters }
+}
+
+fn ns(time_s: f64) -> u64 {
+    (time_s * NS).round() as u64
+}
+
+fn frames(outcome: &Outcome) -> Vec<FrameSpan> {
+    let rows = outcome.measurement.run.frames.iter().zip(&outcome.summary.frames);
+    rows.map(|(paced, row)| FrameSpan {
+        frame: u64::from(row.frame),
+        start_ns: ns(paced.start_s),
+        busy_end_ns: ns(paced.busy_end_s),
+        end_ns: ns(paced.end_s),
+        numbers: vec![
+            ("energy_mJ", row.energy_j * 1e3),
+            ("energy_nJ_per_pixel", row.energy_per_pixel_j * 1e9),
+            ("power_W", row.power_w),
+        ],
+    })
+    .collect()
+}
+
+fn unit_track(outcome: &Outcome, unit: Unit) -> UnitTrack<'static> {
+    let limit = (MAX_SLICES / outcome.simulated.frames.len().max(1)).max(1);
+    let slices = outcome
+        .measurement
+        .run
+        .frames
+        .iter()
+        .zip(outcome.simulated.in_order())
+        .flat_map(|(paced, frame)| {
+            let busy: Vec<f64> = frame.busy.iter().map(|shares| f64::from(shares[unit as usize])).collect();
+            slices_of_bins(ns(paced.start_s), frame.power.bin_s() * NS, &busy, limit)
+        })
+        .collect();
+    UnitTrack { name: unit.name(), doc: unit.doc(), slices }
+}
+
+fn total_power(outcome: &Outcome) -> CounterTrack<'static> {
+    let curve = &outcome.measurement.run.curve;
+    let points = curve.edges_s().iter().zip(curve.watts()).map(|(&edge, &watts)| (ns(edge), watts)).collect();
+    CounterTrack { name: "power, total", unit: "W", points }
+}
+
+fn part_power(outcome: &Outcome, part: Part) -> CounterTrack<'static> {
+    let idle_w = outcome.plan.platform.idle_w.value();
+    let between = if part == Part::Idle { idle_w } else { 0.0 };
+    let mut points = vec![(0, between)];
+    for (paced, frame) in outcome.measurement.run.frames.iter().zip(outcome.simulated.in_order()) {
+        let mut at = paced.start_s;
+        for (length_s, watts) in frame.power.bins() {
+            points.push((ns(at), watts[part.index()]));
+            at += length_s;
+        }
+        points.push((ns(paced.busy_end_s), between));
+    }
+    CounterTrack { name: part.name(), unit: "W", points }
 }

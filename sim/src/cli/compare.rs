@@ -57,7 +57,7 @@ fn runs_text(runs: &RunComparison, all: bool) -> String {
     text + &changes_text(&runs.values, all)
 }
 
-/// The numbers that differ, or all.
+/// Table of the numbers that differ, or of all.
 fn changes_text(changes: &[Change], all: bool) -> String {
     let differ = changes.iter().filter(|change| all || !change.is_equal());
     let mut table = Table::new(["", "A", "B", "B - A", "B / A"]);

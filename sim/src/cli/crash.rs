@@ -1,4 +1,4 @@
-//! What is reported of a crash: where it happened, and how to run that frame again.
+//! Report of a crash: its place, and the command that repeats the frame.
 
 use std::any::Any;
 use std::backtrace::{Backtrace, BacktraceStatus};
@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use output::table::shell_line;
 use run::CrashedFrame;
 
-/// The panics of this process, in all its threads.
+/// Panics in all threads of this process.
 #[derive(Clone, Default)]
 pub(super) struct Crashes {
-    seen: Arc<Mutex<Vec<Crash>>>,
+    recorded: Arc<Mutex<Vec<Crash>>>,
 }
 
 #[derive(Clone)]
@@ -18,15 +18,15 @@ struct Crash {
     /// File and line.
     place: String,
     message: String,
-    /// Where the variable `RUST_BACKTRACE` asks for it.
+    /// Present if the variable `RUST_BACKTRACE` is set.
     backtrace: Option<String>,
 }
 
 impl Crashes {
-    /// Takes note of panics from now on; nothing is printed before the [report](Self::report).
-    pub fn watch() -> Self {
+    /// Installs a panic hook that records panics; [`Self::report`] prints them.
+    pub fn record() -> Self {
         let crashes = Self::default();
-        let seen = crashes.seen.clone();
+        let recorded = crashes.recorded.clone();
         std::panic::set_hook(Box::new(move |info| {
             let place = info.location().map(|at| format!("{}:{}", at.file(), at.line()));
             let backtrace = Backtrace::capture();
@@ -36,18 +36,18 @@ impl Crashes {
                 message: message(info.payload()),
                 backtrace: is_captured.then(|| backtrace.to_string()),
             };
-            seen.lock().unwrap_or_else(PoisonError::into_inner).push(crash);
+            recorded.lock().unwrap_or_else(PoisonError::into_inner).push(crash);
         }));
         crashes
     }
 
-    /// What to print of the panic with this payload, in a call with these arguments.
+    /// Message about the panic with this payload, in a call with these arguments.
     pub fn report(&self, payload: &(dyn Any + Send), arguments: &[String]) -> String {
         let frame = payload.downcast_ref::<CrashedFrame>();
         let message = message(frame.map_or(payload, |crashed| &*crashed.panic));
-        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        // Threads may crash at once: that of the frame whose panic came through.
-        let crash = seen.iter().find(|crash| crash.message == message).or(seen.first());
+        let recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
+        // Several threads may panic; take the one whose payload arrived.
+        let crash = recorded.iter().find(|crash| crash.message == message).or(recorded.first());
         let place = crash.map_or("an unknown place", |crash| &crash.place);
         let (within, again) = match frame {
             Some(CrashedFrame { frame, .. }) => (format!(" in frame {frame}"), alone(arguments, *frame)),
@@ -71,9 +71,9 @@ fn message(payload: &(dyn Any + Send)) -> String {
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no message").to_owned()
 }
 
-/// The arguments for one frame of a run, with another folder for its results; those of other commands as they are.
+/// Arguments that run one frame, with its own folder of results; arguments of other commands are unchanged.
 fn alone(arguments: &[String], frame: u32) -> Vec<String> {
-    // Options of every command may come before its name.
+    // Global options may stand before the subcommand.
     if !arguments.iter().any(|word| word == "run") {
         return arguments.to_vec();
     }
@@ -115,7 +115,7 @@ mod tests {
             message: message.to_owned(),
             backtrace: None,
         };
-        crashes.seen.lock().unwrap().extend([crash("a.rs:1", "other"), crash("b.rs:2", "broken")]);
+        crashes.recorded.lock().unwrap().extend([crash("a.rs:1", "other"), crash("b.rs:2", "broken")]);
         let payload = CrashedFrame { frame: 3, panic: Box::new("broken") };
         let report = crashes.report(&payload, &words("run tiny --seed 2"));
         for says in [

@@ -35,7 +35,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// What the name of a file ends in, without `.gz`, in lower case.
+/// Extension of a file name in lower case, without `.gz`.
 fn ending(name: &str) -> Option<String> {
     let name = name.to_ascii_lowercase();
     let bare = name.strip_suffix(".gz").unwrap_or(&name);
@@ -71,7 +71,7 @@ struct MeshFile<'a> {
     lens_radius: f32,
     focus: Option<f32>,
     near: f32,
-    /// The camera, where the file does not carry one.
+    /// Fitted camera, if the file has none.
     camera: Option<String>,
     warnings: &'a [warnings::Warning],
 }
@@ -144,7 +144,7 @@ fn counted(count: usize, what: &str) -> String {
     if count == 1 { format!("1 {what}") } else { format!("{} {what}s", grouped(count as u64)) }
 }
 
-/// A point or a size, each coordinate to a few digits.
+/// Point or size as text, each coordinate to four digits.
 fn point(values: [f64; 3]) -> String {
     format!("({})", values.map(digits).join(", "))
 }
@@ -249,16 +249,20 @@ fn cameras(info: &SceneInfo) -> String {
     section("cameras (--camera)", &table)
 }
 
-/// Rows of a table for people; `--json` has all.
-const ROWS: usize = 20;
+/// Largest number of rows of a table; `--json` has all.
+const MAX_ROWS: usize = 20;
 
 fn more(count: usize, section: String) -> String {
-    if count > ROWS { format!("{section}  and {} more: --json names them\n", count - ROWS) } else { section }
+    if count > MAX_ROWS {
+        format!("{section}  and {} more: --json names them\n", count - MAX_ROWS)
+    } else {
+        section
+    }
 }
 
 fn meshes(info: &SceneInfo) -> String {
     let mut table = Table::new(["mesh", "triangles", "vertices", "material"]);
-    for mesh in info.meshes.iter().take(ROWS) {
+    for mesh in info.meshes.iter().take(MAX_ROWS) {
         let material = info.materials.get(mesh.material).map_or("-", |material| material.name.as_str());
         let [triangles, vertices] = [mesh.triangles, mesh.vertices].map(|count| grouped(count as u64));
         table.row([mesh.name.clone(), triangles, vertices, material.to_owned()]);
@@ -268,7 +272,7 @@ fn meshes(info: &SceneInfo) -> String {
 
 fn materials(info: &SceneInfo) -> String {
     let mut table = Table::new(["material", "color", "texture", "sides", "light"]);
-    for material in info.materials.iter().take(ROWS) {
+    for material in info.materials.iter().take(MAX_ROWS) {
         let texture = material.texture.and_then(|texture| info.textures.get(texture));
         table.row([
             material.name.clone(),

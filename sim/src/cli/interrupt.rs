@@ -1,4 +1,4 @@
-//! What an interrupt (Ctrl-C) does.
+//! Handling of interrupts (Ctrl-C).
 
 use std::io::{IsTerminal, Write, stderr};
 
@@ -6,22 +6,23 @@ use traces::io::unfinished;
 
 use output::terminal::Terminal;
 
-/// The exit code of a process that an interrupt ended, as shells have it: 128 and the number of the signal.
-const CODE: i32 = 130;
+/// Exit code after an interrupt, as in shells: 128 plus the number of the signal.
+const EXIT_CODE: i32 = 130;
 
-/// From now on an interrupt removes unfinished files, says so and ends the process. So do a request to terminate and a hang-up.
+/// Installs a handler for interrupt, termination and hang-up. It removes unfinished files, prints a message
+/// and ends the process.
 pub(super) fn handle(terminal: Terminal) {
     let end = move || {
-        // Nothing is made any more while this is held.
+        // No file is created while this guard is held.
         let _held = unfinished::remove_all();
         if stderr().is_terminal() {
-            // Off the line of a progress bar.
+            // Leave the line of the progress bar.
             let _ = writeln!(stderr());
         }
         terminal.error("interrupted: unfinished results were removed, earlier ones are as they were");
-        std::process::exit(CODE);
+        std::process::exit(EXIT_CODE);
     };
-    // Whoever started the program with signals ignored or handled (nohup) wants them so. What a process then leaves behind, the next
-    // one with the same folder removes.
+    // Signals that are already ignored or handled (nohup) stay so. The next process with the same folder then
+    // removes unfinished files.
     let _ = ctrlc::try_set_handler(end);
 }

@@ -8,7 +8,7 @@ use super::terminal::{print, print_json};
 use experiments::catalog::{ALL, CHARTS};
 use run::GpuSpec;
 
-/// Everything that can be named, each with a line that says what it is.
+/// Names of all built-in things, each with a description.
 #[derive(Serialize)]
 struct Listing {
     scenes: Vec<Entry>,
@@ -27,7 +27,7 @@ struct Entry {
     what: String,
 }
 
-/// A GPU with the platform and the energy table that belong to it, if any do.
+/// A GPU with its platform and energy table, if it has its own.
 #[derive(Serialize)]
 struct Gpu {
     #[serde(flatten)]
@@ -44,12 +44,12 @@ impl Gpu {
         Self { entry: Entry::new(name, doc), platform, energy_table }
     }
 
-    /// The entry with what belongs to it in words.
+    /// The entry with its platform and energy table as text.
     fn line(&self) -> Entry {
         let Entry { name, what } = &self.entry;
         let own = match (&self.platform, &self.energy_table) {
             (Some(platform), Some(table)) => format!("platform {platform}, energy table {table}"),
-            _ => "no platform belongs to it".to_owned(),
+            _ => "no platform of its own".to_owned(),
         };
         Entry::new(name, format!("{what} [{own}]"))
     }

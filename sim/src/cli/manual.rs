@@ -1,4 +1,4 @@
-//! `quintile completions` and `quintile man`, by the generators of the parser of the command line.
+//! `quintile completions` and `quintile man`, generated from the declarations of arguments.
 
 use std::io;
 use std::path::Path;
@@ -30,9 +30,9 @@ pub(super) fn man(args: &ManArgs) -> Result<(), Failure> {
     print(&format!("{}: {pages} manual pages", folder.display()))
 }
 
-/// Writes the page of `command` and of every command below it; how many.
+/// Writes the pages of `command` and its subcommands; returns their number.
 fn write_pages(command: &clap::Command, folder: &Path) -> Result<usize, Failure> {
-    // The built name of a command below another one is that of both, with a hyphen between.
+    // The built name of a subcommand contains that of its parent, separated by a hyphen.
     let name = command.get_display_name().unwrap_or_else(|| command.get_name());
     let path = folder.join(format!("{name}.1"));
     let bytes = page(command).map_err(|error| failed(&path.display().to_string(), &error))?;

@@ -1,4 +1,4 @@
-//! The command `quintile`: what was typed, what it means, what is printed.
+//! Subcommands of `quintile`: arguments in, results and messages out.
 
 mod args;
 mod ccd;
@@ -33,13 +33,12 @@ use output::terminal::Terminal;
 
 pub use args::{Cli, Command};
 
-/// Runs the command line of this process and says how it ended: 0 for success, 2 for a mistake of the caller, 1 for a
-/// failure.
+/// Executes the command line of this process. Exit code: 0 for success, 2 for a usage error, 1 for a failure.
 pub fn main() -> ExitCode {
     let cli = parse(std::env::args_os().collect()).unwrap_or_else(|error| error.exit());
     let terminal = cli.messages.terminal();
     interrupt::handle(terminal.clone());
-    let crashes = Crashes::watch();
+    let crashes = Crashes::record();
     match std::panic::catch_unwind(AssertUnwindSafe(|| dispatch(&cli, &terminal))) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(failure)) => {
@@ -55,12 +54,12 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The command line, in the colours it asks for also where it is wrong.
+/// Parses the command line. Errors of the parser follow `--color`, too.
 fn parse(args: Vec<OsString>) -> Result<Cli, clap::Error> {
     let mut command = Cli::command().color(args::color_of(&args));
     let matches = command.try_get_matches_from_mut(args)?;
     let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
-    // Options of every command may be written at two levels, each of which the parser checks by itself.
+    // Global options may stand before and after the subcommand; the parser checks conflicts only within each.
     if cli.messages.quiet && cli.messages.verbose {
         let message = "the argument '--quiet' cannot be used with '--verbose'";
         return Err(command.error(ErrorKind::ArgumentConflict, message));
@@ -68,7 +67,7 @@ fn parse(args: Vec<OsString>) -> Result<Cli, clap::Error> {
     Ok(cli)
 }
 
-/// A message and an exit code.
+/// Error message with an exit code.
 struct Failure {
     message: String,
     code: u8,
@@ -86,9 +85,9 @@ impl From<workloads::LoadError> for Failure {
     }
 }
 
-/// Worker threads as asked for, all cores where nothing was.
-fn threads(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(asked.unwrap_or(0))).build();
+/// Pool of worker threads; one per core without a number.
+fn threads(number: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(number.unwrap_or(0))).build();
     pool.map_err(|error| Failure { message: format!("starting worker threads: {error}"), code: 1 })
 }
 

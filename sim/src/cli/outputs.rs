@@ -1,10 +1,10 @@
-//! Files for results, looked at before any work is done for them.
+//! Checks of output files before the work starts.
 
 use std::path::{Path, PathBuf};
 
 use super::Failure;
 
-/// Refuses a file that results could not be written to, or that is one of its own inputs.
+/// Checks that an output file can be written and is not one of the inputs.
 pub(super) fn may_hold_results<'a>(
     (flag, out): (&str, Option<&Path>),
     inputs: impl IntoIterator<Item = &'a Path>,
@@ -12,7 +12,7 @@ pub(super) fn may_hold_results<'a>(
     let Some(out) = out else { return Ok(()) };
     if out.is_dir() || out.file_name().is_none() {
         let message =
-            format!("{flag}: {:?} is no name of a file; name one in a folder that is there", out.as_os_str());
+            format!("{flag}: {:?} is not a file name; name a file in an existing folder", out.as_os_str());
         return Err(Failure { message, code: 2 });
     }
     not_an_input((flag, out), inputs)?;
@@ -22,7 +22,7 @@ pub(super) fn may_hold_results<'a>(
     };
     if !folder.is_dir() {
         let message = format!(
-            "{flag}: {}: there is no folder {}; make it, or name a file in one that is there",
+            "{flag}: {}: there is no folder {}; create it, or name a file in an existing folder",
             out.display(),
             folder.display()
         );
@@ -50,24 +50,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_written_is_refused_and_nothing_is_left_behind() {
+    fn unwritable_outputs_are_refused_and_nothing_is_left_behind() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         ["old.csv", "in.csv"].iter().for_each(|name| std::fs::write(at(name), "old").unwrap());
-        let told = |name: &str| {
-            let held = may_hold_results(("--out", Some(&at(name))), [at("in.csv").as_path()]);
-            held.err().map(|failure| (failure.code, failure.message))
+        let refused = |name: &str| {
+            let checked = may_hold_results(("--out", Some(&at(name))), [at("in.csv").as_path()]);
+            checked.err().map(|failure| (failure.code, failure.message))
         };
-        assert_eq!([told("new.csv"), told("old.csv")], [None, None]);
+        assert_eq!([refused("new.csv"), refused("old.csv")], [None, None]);
         for (name, expected, says) in [
             ("no/new.csv", 2, "there is no folder"),
             ("old.csv/new.csv", 2, "there is no folder"),
             ("in.csv", 2, "is what is read"),
-            ("", 2, "name one"),
-            (".", 2, "name one"),
-            ("..", 2, "name one"),
+            ("", 2, "is not a file name"),
+            (".", 2, "is not a file name"),
+            ("..", 2, "is not a file name"),
         ] {
-            let (code, message) = told(name).unwrap();
+            let (code, message) = refused(name).unwrap();
             assert!(code == expected && message.contains(says), "{message}");
         }
         assert!(

@@ -1,4 +1,4 @@
-//! Values of flags that have a form of their own. Errors say which form.
+//! Parsers of flag values. Errors describe the expected form.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use pipeline::Features;
 use super::quantity::length_of_time;
 use experiments::stress::methods::SWITCHES;
 
-/// Frames from the first to one past the last, at least one.
+/// Range of frames, the end not included; at least one frame.
 pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {
     let wrong = || format!("`{text}` is not a range of frames; write it as 0..36");
     let (start, end) = text.split_once("..").ok_or_else(wrong)?;
@@ -23,7 +23,7 @@ pub(super) fn frames(text: &str) -> Result<Range<u32>, String> {
     }
 }
 
-/// Tile tests by the names they have in a GPU's file.
+/// Set of tile tests, by their names in GPU files.
 pub(super) fn tests(text: &str) -> Result<Features, String> {
     match text {
         "all" => return Ok(Features::ALL),
@@ -35,21 +35,21 @@ pub(super) fn tests(text: &str) -> Result<Features, String> {
     for name in text.split(',').map(|name| name.trim().replace('-', "_")) {
         let switch = SWITCHES.iter().find(|switch| switch.name == name).ok_or_else(|| {
             let names = SWITCHES.map(|switch| switch.name).join(", ");
-            format!("`{name}` is no tile test; there are {names}, or all, none, auto")
+            format!("unknown tile test `{name}`; there are {names}, or all, none, auto")
         })?;
         (switch.on)(&mut features);
     }
     Ok(features)
 }
 
-/// A name and a value with `=` between.
+/// Name and value, separated by `=`.
 pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     let (name, value) =
         text.split_once('=').ok_or_else(|| format!("`{text}` has no value; write it as name=value"))?;
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// A share in percent, more than none and at most all, as a fraction.
+/// Share in percent, above 0 % and at most 100 %, as a fraction.
 pub(super) fn percent(text: &str) -> Result<f64, String> {
     let number =
         text.trim_end().strip_suffix('%').ok_or_else(|| format!("`{text}` has no %; write it as 2%"))?;
@@ -60,7 +60,7 @@ pub(super) fn percent(text: &str) -> Result<f64, String> {
     Err(format!("`{text}` cannot be met; it has to be more than 0% and at most 100%, for example 2%"))
 }
 
-/// A length of time in seconds. Its unit is required: a bare number may be meant in minutes.
+/// Duration in seconds. The unit is required, because a bare number is ambiguous.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     let wrong = || format!("`{text}` is not a time; write it as 30s, 500ms, 2min or 1h");
     if text.trim().ends_with(|last: char| last.is_ascii_digit() || last == '.') {
@@ -79,58 +79,58 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("`{text}` is not a size; write it as 1280x720, each side 1 to 16384 pixels");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let side = |part: &str| {
-        let pixels = part.trim().parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
+        let pixels = part.trim().parse().ok().filter(|side| (1..=MAX_SIDE_PX).contains(side));
         pixels.ok_or_else(wrong)
     };
     Ok((side(width)?, side(height)?))
 }
 
-/// The most pixels along a side of an image.
-const MAX_SIDE: u32 = 16_384;
+/// Largest side of an image in pixels.
+const MAX_SIDE_PX: u32 = 16_384;
 
-/// Samples in a pixel.
+/// Samples per pixel.
 pub(super) fn per_pixel(text: &str) -> Result<u32, String> {
     let samples = text.trim().parse().ok().filter(|samples| (1..=256).contains(samples));
     samples.ok_or_else(|| format!("`{text}` is not a number of samples; it has to be 1 to 256"))
 }
 
-/// The radius of a lens in scene units.
+/// Radius of a lens in scene units.
 pub(super) fn lens(text: &str) -> Result<f32, String> {
     number(text, "a radius of the lens in scene units; it has to be a finite number of at least 0", |r| {
         r >= 0.0
     })
 }
 
-/// A depth in scene units.
+/// Depth in scene units.
 pub(super) fn depth(text: &str) -> Result<f32, String> {
     number(text, "a depth in scene units; it has to be a finite number above zero", |depth| depth > 0.0)
 }
 
-/// A fraction of the frame period.
+/// Share of the frame period.
 pub(super) fn shutter(text: &str) -> Result<f64, String> {
     number(text, "a fraction of the frame period; it has to be 0 to 1", |open| (0.0..=1.0).contains(&open))
 }
 
-/// A share of at least 0 and below 1.
+/// Share in [0, 1).
 pub(super) fn share_below_one(text: &str) -> Result<f64, String> {
     number(text, "a share; it has to be at least 0 and below 1, for example 0.01", |share| {
         (0.0..1.0).contains(&share)
     })
 }
 
-/// What a device multiplies by.
+/// Gain of a device.
 pub(super) fn gain(text: &str) -> Result<f64, String> {
     number(text, "a gain; it has to be a finite number above zero, for example 1.01", |gain| gain > 0.0)
 }
 
-/// A finite number that fits; `due` says what is asked for.
+/// Finite number for which `fits` holds; `expected` describes it in errors.
 fn number<T: FromStr + Into<f64> + Copy>(
     text: &str,
-    due: &str,
+    expected: &str,
     fits: impl Fn(f64) -> bool,
 ) -> Result<T, String> {
     let value = text.trim().parse::<T>().ok().filter(|&value| value.into().is_finite() && fits(value.into()));
-    value.ok_or_else(|| format!("`{text}` is not {due}"))
+    value.ok_or_else(|| format!("`{text}` is not {expected}"))
 }
 
 #[cfg(test)]
@@ -144,13 +144,13 @@ mod tests {
         assert!(
             tests("edges,hiz")
                 .unwrap_err()
-                .contains("`hiz` is no tile test; there are lens_lines, side_planes")
+                .contains("unknown tile test `hiz`; there are lens_lines, side_planes")
         );
         assert!(tests("").is_err());
     }
 
     #[test]
-    fn shares_and_times() {
+    fn shares_and_durations() {
         assert_eq!([percent("2%"), percent("0.5 %"), percent("100%")], [Ok(0.02), Ok(0.005), Ok(1.0)]);
         assert!(percent("2").unwrap_err().contains("write it as 2%"));
         for wrong in ["0%", "-1%", "101%", "NaN%", "%", "two%"] {
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_a_scene_say_what_would_fit() {
+    fn errors_of_numbers_name_the_valid_range() {
         assert_eq!([lens("0"), lens("2.5"), depth("1e3")], [Ok(0.0), Ok(2.5), Ok(1e3)]);
         assert_eq!([shutter("0"), shutter("1"), share_below_one("0.5")], [Ok(0.0), Ok(1.0), Ok(0.5)]);
         assert_eq!([per_pixel("1"), per_pixel("256")], [Ok(1), Ok(256)]);

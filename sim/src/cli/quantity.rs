@@ -1,14 +1,14 @@
 //! Values of options that are physical quantities: a number, and a unit that may be left out.
 
-/// A kind of quantity: its units, and the one that a bare number is in.
+/// Kind of quantity, with its units and the unit of a bare number.
 struct Quantity {
-    /// What it is, with its article, for messages.
+    /// Name with article, for messages.
     what: &'static str,
     /// The unit of a bare number.
     bare: &'static str,
-    /// Every unit and what one of it is in SI.
+    /// Units, each with its value in SI.
     units: &'static [(&'static str, f64)],
-    /// Values as they may be written.
+    /// Examples for messages.
     examples: &'static str,
 }
 
@@ -63,7 +63,7 @@ const RESISTANCE: Quantity = Quantity {
 };
 
 impl Quantity {
-    /// The value of `text` in SI, finite.
+    /// Parses a finite value; the result is in SI.
     fn parse(&self, text: &str) -> Result<f64, String> {
         let text = text.trim();
         let with_unit = |(unit, si): &(&str, f64)| {
@@ -76,11 +76,12 @@ impl Quantity {
         value.filter(|value| value.is_finite()).ok_or_else(|| self.wrong(text, ""))
     }
 
-    /// The same where `fits` holds; `range` says what has to hold.
+    /// Parses a value for which `fits` holds; `range` describes it in errors.
     fn parse_in(&self, text: &str, range: &str, fits: impl Fn(f64) -> bool) -> Result<f64, String> {
         self.parse(text).and_then(|value| if fits(value) { Ok(value) } else { Err(self.wrong(text, range)) })
     }
 
+    /// Message about a value that is not of this quantity.
     fn wrong(&self, text: &str, range: &str) -> String {
         let Self { what, bare, examples, .. } = self;
         format!(
@@ -94,17 +95,17 @@ pub(super) fn rate(text: &str) -> Result<f64, String> {
     RATE.parse_in(text, " above 0", |hertz| hertz > 0.0)
 }
 
-/// A moment, s.
+/// Point in time, s.
 pub(super) fn time(text: &str) -> Result<f64, String> {
     TIME.parse(text)
 }
 
-/// A length of time above 0, s.
+/// Duration above 0, s.
 pub(super) fn length_of_time(text: &str) -> Result<f64, String> {
     TIME.parse_in(text, " above 0", |seconds| seconds > 0.0)
 }
 
-/// A length of time of at least 0, s, where a bare number is milliseconds.
+/// Duration of at least 0, s; a bare number is in milliseconds.
 pub(super) fn milliseconds(text: &str) -> Result<f64, String> {
     SHORT_TIME.parse_in(text, " of at least 0", |seconds| seconds >= 0.0)
 }
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_refused_with_an_example() {
+    fn errors_give_an_example() {
         for (message, says) in [
             (
                 rate("0"),

@@ -40,16 +40,16 @@ pub struct ReproduceArgs {
     /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is run
     #[arg(long, value_name = "DIR")]
     pub collision_data: Option<PathBuf>,
-    /// Folder for the results; made where it is missing
+    /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
     pub out: PathBuf,
     /// Overwrite files in DIR that Quintile did not write
     #[arg(long)]
     pub force: bool,
-    /// Worker threads; all cores without it. The results do not depend on it
+    /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Print the JSON to standard output and nothing else
+    /// Print only the JSON to standard output
     #[arg(long)]
     pub json: bool,
 }

@@ -2,20 +2,17 @@
 
 use std::time::Instant;
 
-use power_model::Bound;
 use serde::Serialize;
 use workloads::job::OptionSource;
 
 use super::Failure;
-use super::args::{BoundArg, PacingArg, RunArgs};
+use super::args::RunArgs;
 use super::terminal::{print, print_json};
 use output::progress::Progress;
 use output::table::{Table, count_or_digits, counted, si, si_mean_sd};
 use output::terminal::{Terminal, Verbosity};
 use output::{Destination, MeanSd};
-use run::{
-    DryRun, Outcome, PacingChoice, Plan, Prepared, RunError, RunOptions, Summary, Wish, again, open, prepare,
-};
+use run::{DryRun, Outcome, Plan, Prepared, Requested, RunError, RunOptions, Summary, again, open, prepare};
 
 /// The git revision of this program.
 const REVISION: Option<&str> = option_env!("QUINTILE_REVISION");
@@ -25,13 +22,13 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
     let pool = super::threads(args.threads)?;
-    let (options, made) = match &args.again {
+    let (options, recorded) = match &args.again {
         Some(summary) => again(summary, args.force, REVISION)?,
         None => (options(args), None),
     };
     let plan = Plan::resolve(options)?;
     let dir = open(&plan, &out)?;
-    let prepared = pool.install(|| prepare(plan, made, REVISION, &progress))?;
+    let prepared = pool.install(|| prepare(plan, recorded, REVISION, &progress))?;
     if args.dry_run {
         return dry_run(args, &pool.install(|| DryRun::new(&prepared))?, terminal);
     }
@@ -47,7 +44,7 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     print(&format!("{}took {:.1} s", text(args, &outcome), started.elapsed().as_secs_f64()))
 }
 
-/// Says how long the run will take, where that can be known.
+/// Prints the expected time of a run of a scene.
 fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunError> {
     if let Some(expected) = prepared.expected()? {
         progress.note(&format!("expected time: {}", expected.line()));
@@ -55,7 +52,7 @@ fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunErro
     Ok(())
 }
 
-/// Prints what would be run and where results would go.
+/// Prints a description of the run and the folder of results.
 fn dry_run(args: &RunArgs, dry_run: &DryRun, terminal: &Terminal) -> Result<(), Failure> {
     if args.json {
         return print_json(dry_run, true);
@@ -74,30 +71,23 @@ fn options(args: &RunArgs) -> RunOptions {
         gpu: args.gpu.clone(),
         platform: args.platform.clone(),
         energy: args.energy.clone(),
-        bound: match args.bound {
-            BoundArg::Low => Bound::Low,
-            BoundArg::Nominal => Bound::Nominal,
-            BoundArg::High => Bound::High,
-        },
+        bound: args.bound,
         timing: args.timing.level(),
         sampling: args.timing.sampling(),
-        wish: Wish { accuracy: args.accuracy, budget_s: args.budget },
+        requested: Requested { accuracy: args.accuracy, budget_s: args.budget },
         verify: args.verify,
-        pacing: match args.pacing {
-            PacingArg::Vsync => PacingChoice::Vsync,
-            PacingArg::Free => PacingChoice::Free,
-        },
+        pacing: args.pacing,
         trace_rate_hz: args.trace_rate,
         packet_samples: args.packet_samples,
         packet_loss: args.packet_loss,
         seed: args.seed,
         exr: args.exr,
         heat: args.heat.clone(),
-        look: args.look.look(),
+        plot_style: args.look.look(),
     }
 }
 
-/// The summary with the folder it was written to.
+/// Summary with the folder it was written to.
 #[derive(Serialize)]
 struct Printed<'a> {
     out: String,
@@ -105,7 +95,7 @@ struct Printed<'a> {
     summary: &'a Summary,
 }
 
-/// What a run says on a terminal.
+/// Text of a finished run for the terminal.
 fn text(args: &RunArgs, outcome: &Outcome) -> String {
     let (summary, settings) = (&outcome.summary, &outcome.summary.settings);
     let mut lines = vec![
@@ -120,7 +110,7 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
             counted(settings.triangles, "triangle")
         ),
         format!("modelled: {}", summary.modelled.line()),
-        judged(summary),
+        accuracy_lines(summary),
         figures(outcome).to_string(),
         found(summary),
     ];
@@ -134,9 +124,9 @@ fn text(args: &RunArgs, outcome: &Outcome) -> String {
     lines.join("\n")
 }
 
-/// What was chosen, predicted and verified; a line each.
-fn judged(summary: &Summary) -> String {
-    let lines = summary.judgement().into_iter().map(|(name, value)| format!("{name}: {value}\n"));
+/// One line each for the choice, the predicted intervals and the actual errors.
+fn accuracy_lines(summary: &Summary) -> String {
+    let lines = summary.accuracy_rows().into_iter().map(|(name, value)| format!("{name}: {value}\n"));
     lines.collect()
 }
 
@@ -154,7 +144,7 @@ fn found(summary: &Summary) -> String {
     )
 }
 
-/// Measured beside true, a row for each quantity.
+/// Table of measured and true values, one row per quantity.
 fn figures(outcome: &Outcome) -> Table {
     let mut table = Table::new(["", "measured in the trace", "simulator's truth"]);
     for row in outcome.summary.headline() {

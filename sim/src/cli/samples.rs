@@ -13,7 +13,7 @@ use super::Failure;
 use super::args::SamplesArgs;
 use super::terminal::{print, print_json};
 
-/// What was written.
+/// Description of the written file.
 #[derive(Serialize)]
 struct Written {
     table: String,

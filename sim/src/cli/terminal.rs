@@ -1,4 +1,4 @@
-//! Printing results without panics: a reader that closed the pipe is no error, a full disk is a failure.
+//! Printing of results. A closed pipe is not an error; a full disk is.
 
 use std::io::{self, ErrorKind, Write};
 

@@ -18,7 +18,7 @@ use output::terminal::Terminal;
 use run::fits_memory;
 use run::visibility::{Rates, find};
 
-/// What was found.
+/// Result for `--json`.
 #[derive(Serialize)]
 struct Found {
     triangles: usize,
@@ -27,7 +27,7 @@ struct Found {
     samples_per_pixel: u32,
     samples: usize,
     hits: usize,
-    /// The camera, where it was fitted.
+    /// Camera, if it was fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<CameraSpec>,
     warnings: Vec<Warning>,
@@ -64,18 +64,19 @@ pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Fail
     ))
 }
 
-/// The camera as a file to change and to give back.
+/// Prints the fitted camera as RON, for `--camera`.
 fn print_camera(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<(), Failure> {
-    let carried =
-        || format!("--print-camera: {} carries its camera, so none was fitted; leave it out", named(args));
+    let carried = || {
+        format!("--print-camera: {} has a camera of its own, so none was fitted; leave it out", named(args))
+    };
     let camera = scene.fitted.as_ref().ok_or_else(|| Failure { message: carried(), code: 2 })?;
     print(&camera.to_ron())
 }
 
-/// Bytes that a sample takes on its way.
+/// Memory of one sample in bytes.
 const BYTES_PER_SAMPLE: u64 = 48;
 
-/// The mesh in messages.
+/// Name of the mesh in messages.
 fn named(args: &VisibilityArgs) -> String {
     args.files.first().map_or_else(String::new, |file| file.display().to_string())
 }
@@ -105,14 +106,19 @@ fn see(args: &VisibilityArgs, scene: VisibilityScene) -> Result<Found, Failure> 
     })
 }
 
-/// The warning that rates are not those of the engine.
+/// Warning that the fast engine does not support the camera.
 fn slow_view() -> Warning {
-    let message = "the engine that is fast takes no orthographic camera, so all tile tests were modelled: the samples see what they \
-                   would, but the rates are those of the model";
+    let message = "the fast engine does not support orthographic cameras, so all tile tests were modelled: the result is the same, but \
+                   the rates are those of the model";
     Warning::new(Code::OrthographicView, message)
 }
 
-fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[VisibleTriangle]) -> Result<(), Failure> {
+fn write(
+    out: &Path,
+    scene: &VisibilityScene,
+    per_pixel: u32,
+    seen: &[VisibleTriangle],
+) -> Result<(), Failure> {
     let (triangles, depths): (Vec<u32>, Vec<f32>) = seen.iter().copied().unzip();
     let written = traces::io::atomic::write_file(out, |file: &mut BufWriter<File>| {
         write_hits(scene.viewport, per_pixel, &triangles, &depths, file)?;
@@ -121,7 +127,7 @@ fn write(out: &Path, scene: &VisibilityScene, per_pixel: u32, seen: &[VisibleTri
     written.map_err(|error| Failure { message: error.to_string(), code: 1 })
 }
 
-/// The samples asked for: those the scene's seed hashes to, the built-in table, or a file.
+/// Sample source of `--samples`: hashed from the scene's seed, the built-in table, or a file.
 fn samples(args: &VisibilityArgs, scene: &VisibilityScene) -> Result<Box<dyn SampleSource>, Failure> {
     let range = || Failure {
         message: format!("{}: {} samples per pixel; it has to be 1 to 256", named(args), scene.per_pixel),

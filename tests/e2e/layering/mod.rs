@@ -1,4 +1,4 @@
-//! The arrows between the crates and between the modules of each, and the rules every crate keeps.
+//! Layering: allowed dependencies between crates and between modules, and rules of every crate.
 
 mod modules;
 
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::support::{Inputs, root};
 use cargo_metadata::{Metadata, MetadataCommand};
 
-/// Which crates of the house each may use, in builds and in tests.
+/// Workspace crates that each crate may use, in builds and in tests.
 const ARROWS: [(&str, &[&str]); 12] = [
     ("warnings", &[]),
     ("activity", &[]),
@@ -48,7 +48,7 @@ fn workspace() -> Metadata {
     command.manifest_path(root().join("Cargo.toml")).no_deps().exec().expect("cargo metadata answers")
 }
 
-/// What each crate of the house uses of the house.
+/// Workspace crates that each crate uses.
 fn arrows() -> BTreeMap<String, BTreeSet<String>> {
     let metadata = workspace();
     let packages = metadata.workspace_packages();
@@ -61,7 +61,7 @@ fn arrows() -> BTreeMap<String, BTreeSet<String>> {
 }
 
 #[test]
-fn no_crate_uses_another_against_the_arrows() {
+fn crates_use_only_allowed_crates() {
     let arrows = arrows();
     for (name, allowed) in ARROWS {
         let allowed: BTreeSet<String> = allowed.iter().map(|name| (*name).to_owned()).collect();
@@ -74,7 +74,7 @@ fn no_crate_uses_another_against_the_arrows() {
 }
 
 #[test]
-fn the_arrows_that_the_design_draws_are_there() {
+fn documented_dependencies_exist() {
     let arrows = arrows();
     let drawn = [
         ("workloads", "pipeline"),
@@ -90,7 +90,7 @@ fn the_arrows_that_the_design_draws_are_there() {
 }
 
 #[test]
-fn no_modules_use_each_other_in_a_circle() {
+fn modules_have_no_circular_dependencies() {
     let mut circles = Vec::new();
     for package in workspace().workspace_packages() {
         let found = modules::circles(&package.manifest_path.as_std_path().with_file_name("src"));
@@ -100,7 +100,7 @@ fn no_modules_use_each_other_in_a_circle() {
 }
 
 #[test]
-fn a_circle_of_modules_is_seen_through_imports_paths_and_parents() {
+fn circles_are_found_through_imports_paths_and_parents() {
     let crate_of = |files: &[(&str, &str)]| {
         let inputs = Inputs::new();
         for (name, text) in files {

@@ -1,7 +1,7 @@
-//! Which module of a crate uses which other, from its sources.
+//! Dependencies between the modules of a crate, from its sources.
 //!
-//! Modules of one folder must not use each other in a circle. What a module takes from a re-export of its parent counts as
-//! taken from where it is defined. Tests are left out: they may look at anything.
+//! Modules of one folder must not use each other in a circle. An item used through a re-export of the parent
+//! counts as used from its definition. Test modules are skipped.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,22 +13,22 @@ use syn::{Attribute, Item, ItemMod, ItemUse, UseTree};
 /// The path of a module from the root of its crate.
 type Module = Vec<String>;
 
-/// What is said in the file of a module.
+/// Contents of a module's file.
 #[derive(Default)]
 struct Content {
-    /// Items that are defined in it.
+    /// Items defined in the module.
     items: BTreeSet<String>,
-    /// Names that it imports, with the paths they stand for.
+    /// Imported names, with their paths.
     imports: BTreeMap<String, Vec<String>>,
-    /// Paths whose content it imports whole.
+    /// Paths of glob imports.
     globs: Vec<Vec<String>>,
-    /// Every path in it.
+    /// All paths in the module.
     paths: Vec<Vec<String>>,
     /// Modules declared in it that have files of their own.
     children: Vec<String>,
 }
 
-/// The circles of a crate: for each folder the modules in it that use one another.
+/// Circular dependencies of a crate: for each folder, the modules that use one another.
 pub fn circles(sources: &Path) -> Vec<String> {
     let mut modules = BTreeMap::new();
     read(&sources.join("lib.rs"), sources, Vec::new(), &mut modules);
@@ -42,11 +42,11 @@ pub fn circles(sources: &Path) -> Vec<String> {
             }
         }
     }
-    let told = |(folder, uses): (&Module, &BTreeMap<String, BTreeSet<String>>)| {
+    let circle_of = |(folder, uses): (&Module, &BTreeMap<String, BTreeSet<String>>)| {
         let circle: Vec<&str> = uses.keys().filter(|from| reaches(uses, from)).map(String::as_str).collect();
         (!circle.is_empty()).then(|| format!("{}::{{{}}}", folder.join("::"), circle.join(", ")))
     };
-    arrows.iter().filter_map(told).collect()
+    arrows.iter().filter_map(circle_of).collect()
 }
 
 /// Whether arrows lead from `start` back to it.
@@ -81,7 +81,7 @@ fn read(file: &Path, folder: &Path, module: Module, modules: &mut BTreeMap<Modul
     modules.insert(module, content);
 }
 
-/// The module that defines what `path` in `module` names; nothing for other crates.
+/// Module that defines what `path` in `module` names; `None` for other crates.
 fn resolve(
     modules: &BTreeMap<Module, Content>,
     module: &[String],

@@ -1,4 +1,4 @@
-//! Running the command as a script would: no terminal, output into pipes.
+//! Calls of the command as by a script: no terminal, output into pipes.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ pub struct Quintile {
     program: PathBuf,
 }
 
-/// How a call ended.
+/// Result of a finished call.
 #[derive(Clone, Debug)]
 pub struct Ended {
     /// The exit code; `None` when a signal ended it.
@@ -26,7 +26,7 @@ pub struct Ended {
     pub stderr: String,
 }
 
-/// A call that is not done.
+/// A running call.
 #[derive(Debug)]
 pub struct Running {
     child: Child,
@@ -117,7 +117,7 @@ impl Quintile {
         Results::new(folder, Some(temporary), ended)
     }
 
-    /// The same into a `folder` that stays, for results that several tests look at.
+    /// The same into a `folder` that stays, for results that several tests share.
     ///
     /// # Panics
     /// If it fails.

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-/// A `.glb` in the making: a mesh of one primitive, its numbers in one buffer.
+/// Builder of a `.glb` file: a mesh of one primitive, with one buffer.
 #[derive(Clone, Debug)]
 pub struct Glb {
     /// The JSON chunk.
@@ -33,7 +33,7 @@ impl Glb {
         glb
     }
 
-    /// Adds floats as an accessor of vectors of `width` numbers (1 to 4) and gives its number.
+    /// Adds floats as an accessor of vectors of `width` components (1 to 4); returns its index.
     pub fn floats(&mut self, numbers: &[f32], width: usize) -> usize {
         let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][width - 1];
         let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
@@ -45,7 +45,7 @@ impl Glb {
         &mut self.json["meshes"][0]["primitives"][0]
     }
 
-    /// Puts the first material, `described` in glTF, on the square.
+    /// Adds a material, `described` in glTF, to the square.
     pub fn material(&mut self, described: Value) {
         self.json["materials"] = json!([described]);
         self.primitive()["material"] = json!(0);
@@ -92,7 +92,7 @@ impl Glb {
     }
 }
 
-/// Appends to a JSON list and gives the place.
+/// Appends to a JSON list and returns the index.
 fn push(list: &mut Value, item: Value) -> usize {
     let Some(list) = list.as_array_mut() else { return 0 };
     list.push(item);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// A folder of input files that goes away with the test.
+/// Temporary folder of input files.
 #[derive(Debug)]
 pub struct Inputs {
     folder: TempDir,
@@ -26,7 +26,7 @@ impl Inputs {
         Self { folder: TempDir::new().expect("a temporary folder can be made") }
     }
 
-    /// Writes a file and gives its path.
+    /// Writes a file and returns its path.
     ///
     /// # Panics
     /// If it cannot be written.
@@ -36,7 +36,7 @@ impl Inputs {
         path
     }
 
-    /// The path of `name` in the folder, whether or not it is there.
+    /// Path of `name` in the folder, existing or not.
     pub fn path(&self, name: &str) -> String {
         self.folder.path().join(name).display().to_string()
     }

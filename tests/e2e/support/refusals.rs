@@ -1,11 +1,11 @@
-//! Refusals: what every one of them has to look like.
+//! Checks of error messages.
 
 use std::fs;
 
 use super::{Ended, Inputs, quintile};
 
-/// What a mend begins with: a message has to say what to do, not only what is wrong.
-const MENDS: [&str; 36] = [
+/// Beginnings of remedies: a message has to state what to do.
+const REMEDIES: [&str; 40] = [
     "--help",
     "0 to 1",
     "; up to ",
@@ -16,13 +16,16 @@ const MENDS: [&str; 36] = [
     "at least",
     "built in:",
     "check ",
+    "choose ",
     "convert it",
+    "create it",
     "did you mean",
     "due",
     "end of RON",
     "Expected ",
     "export it",
     "finite",
+    "fix ",
     "from ",
     "get it again",
     "get the file again",
@@ -34,6 +37,7 @@ const MENDS: [&str; 36] = [
     "leave it out",
     "mend ",
     "move one",
+    "name a file",
     "name another",
     "needs",
     "put ",
@@ -44,14 +48,14 @@ const MENDS: [&str; 36] = [
     "write it as",
 ];
 
-/// What is wrong with the refusals seen, all of them, so that one bad message does not hide the next. Complains when dropped.
+/// Collects the problems of all checked messages and panics with the list when dropped.
 #[derive(Default)]
 pub struct Refusals {
     complaints: Vec<String>,
 }
 
 impl Refusals {
-    /// Holds `ended` against what is due: it failed with `code` and one message that has every part of `says` and a mend.
+    /// Checks that a call failed with `code` and one message that contains every part of `says` and a remedy.
     pub fn check(&mut self, ended: &Ended, code: i32, says: &[&str]) {
         let Ended { stdout, stderr, .. } = ended;
         let mut complain = |holds: bool, what: &str| {
@@ -69,13 +73,13 @@ impl Refusals {
         }
         let messages = stderr.lines().filter(|line| line.starts_with("error: ")).count();
         complain(messages == 1, "one message is due");
-        // The parser of the command line adds how the command is used.
+        // The parser of the command line adds usage lines.
         let of_parser = stderr.contains("For more information, try '--help'");
         complain(of_parser || stderr.lines().count() == 1, "one line is due");
-        complain(MENDS.iter().any(|mend| stderr.contains(mend)), "it does not say how to mend it");
+        complain(REMEDIES.iter().any(|remedy| stderr.contains(remedy)), "it names no remedy");
     }
 
-    /// Runs `quintile run ARGS` into a fresh folder; refused there, it leaves nothing.
+    /// Checks `quintile run ARGS` with a new folder, which has to stay empty.
     pub fn call(&mut self, args: &[&str], code: i32, says: &[&str]) {
         let inputs = Inputs::new();
         let out = inputs.path("out");
@@ -86,7 +90,7 @@ impl Refusals {
         }
     }
 
-    /// The same with a scene file of these bytes; its name has to be in the message.
+    /// Checks a run of a scene file with these bytes; the message has to name the file.
     pub fn file(&mut self, name: &str, bytes: impl AsRef<[u8]>, code: i32, says: &[&str]) {
         let inputs = Inputs::new();
         let scene = inputs.put(name, bytes);

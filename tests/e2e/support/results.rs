@@ -15,9 +15,9 @@ use super::Ended;
 #[derive(Debug)]
 pub struct Results {
     folder: PathBuf,
-    /// Keeps the folder until this goes away.
+    /// Keeps the temporary folder.
     _temporary: Option<TempDir>,
-    /// What the command printed.
+    /// Output of the command.
     pub ended: Ended,
 }
 
@@ -37,7 +37,7 @@ impl Results {
         Self { folder, _temporary: temporary, ended }
     }
 
-    /// What is in a folder, and the call that put it there.
+    /// Results in a folder, with the call that wrote them.
     pub fn in_folder(folder: &Path, ended: Ended) -> Self {
         Self::new(folder.to_owned(), None, ended)
     }
@@ -133,11 +133,11 @@ impl Results {
     }
 }
 
-/// `files` without what is about the machine and the call: `host` in the summary and in the report, and with it the hashes of these two.
-/// Everything else is the same for the same run on every machine.
+/// `files` without provenance of the host: `host` in summary and report, and the hashes of these two files.
+/// Everything else is equal on every machine.
 ///
 /// # Panics
-/// If there is none of it to be left out.
+/// If the host is missing.
 #[must_use]
 pub fn without_host(mut files: BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut edit = |name: &str, change: fn(&mut Value)| {

@@ -13,7 +13,7 @@ pub struct Schema {
     root: Value,
 }
 
-/// Words that say nothing of what is allowed.
+/// Keywords without constraints.
 const NOTES: [&str; 5] = ["$schema", "$defs", "title", "description", "required"];
 
 impl Schema {
@@ -27,14 +27,15 @@ impl Schema {
         Self { root: serde_json::from_slice(&text).unwrap_or_else(|error| panic!("{name}: {error}")) }
     }
 
-    /// What in `value` the schema does not allow: a line each, beginning with the place.
+    /// Violations of the schema in `value`, one line each, beginning with the path.
     pub fn faults(&self, value: &Value) -> Vec<String> {
         let mut faults = Vec::new();
         self.check(&self.root, value, "", &mut faults);
         faults
     }
 
-    /// Objects of the schema that do not say all they could: that allow keys they do not describe, or need not have all they do.
+    /// Objects of the schema that are not strict: additional keys are allowed, or described keys are
+    /// optional.
     pub fn gaps(&self) -> Vec<String> {
         let mut gaps = Vec::new();
         gaps_of(&self.root, "", &mut gaps);

@@ -1,4 +1,4 @@
-//! The files that a command may write, known before it works.
+//! Claim: the files that a command may write, declared before its work.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::manifest::{MANIFEST, Manifest, Owner};
 use super::{OutputError, manifest};
 
-/// The files that a command may write into a folder, by names relative to it. A name may have one `*`.
+/// Files that a command may write into a folder, by relative names. A name may contain one `*`.
 #[derive(Clone, Debug)]
 pub struct Claim {
     by: String,
@@ -15,19 +15,19 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// A claim of the command `by`, for example `chart timing`.
+    /// Empty claim of the command `by`, for example `chart timing`.
     pub fn new(by: impl Into<String>) -> Self {
         Self { by: by.into(), names: BTreeSet::new() }
     }
 
-    /// With these files.
+    /// Adds these files.
     #[must_use]
     pub fn files<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
         self.names.extend(names.into_iter().map(Into::into));
         self
     }
 
-    /// With these plots, each as `STEM.svg` and `STEM.png`.
+    /// Adds these plots, each as `STEM.svg` and `STEM.png`.
     #[must_use]
     pub fn plots<S: AsRef<str>>(self, stems: impl IntoIterator<Item = S>) -> Self {
         let both = |stem: S| ["svg", "png"].map(|end| format!("{}.{end}", stem.as_ref()));
@@ -48,12 +48,12 @@ impl Claim {
         self.names.iter().map(String::as_str).filter(|name| name.contains('*'))
     }
 
-    /// The folders of the files, relative; the empty path stands for the folder of results itself.
+    /// Folders of the files, relative; the empty path is the folder of results itself.
     pub(super) fn folders(&self) -> BTreeSet<PathBuf> {
         self.names.iter().filter_map(|name| Path::new(name).parent()).map(Path::to_owned).collect()
     }
 
-    /// Refuses files in the folder `root` that would be overwritten and are not older results of this command.
+    /// Checks that files in `root` that would be overwritten are older results of this command.
     pub(super) fn check(&self, root: &Path, listed: &Manifest, force: bool) -> Result<(), OutputError> {
         for folder in self.folders() {
             let at = root.join(&folder);
@@ -75,7 +75,7 @@ impl Claim {
     }
 }
 
-/// Whether `name` is `pattern` with anything for its `*`.
+/// Whether `name` matches `pattern`; `*` matches any text.
 fn matches(pattern: &str, name: &str) -> bool {
     pattern.split_once('*').is_some_and(|(start, end)| {
         name.len() >= start.len() + end.len() && name.starts_with(start) && name.ends_with(end)
@@ -83,7 +83,7 @@ fn matches(pattern: &str, name: &str) -> bool {
 }
 
 impl Owner {
-    /// Refuses a file that is not an older result, unless it may be overwritten.
+    /// Checks that a file is an older result or may be overwritten.
     pub(super) fn must_be_ours(self, path: &Path, force: bool) -> Result<Self, OutputError> {
         let (why, forcible) = match &self {
             Self::Nobody | Self::Ours => return Ok(self),

@@ -1,4 +1,4 @@
-//! The list of results in a folder: what of it Quintile may replace.
+//! Manifest: list of the results in a folder, which Quintile may replace.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -10,43 +10,43 @@ use sha2::{Digest, Sha256};
 
 use super::OutputError;
 
-/// The name of the list in a folder of results.
+/// File name of the manifest.
 pub const MANIFEST: &str = "manifest.json";
 /// Below the folder of results.
 pub(super) const WORK_FOLDER: &str = ".quintile";
 
-/// The version of the list's form.
+/// Schema version of the manifest.
 const SCHEMA: u32 = 1;
 
-/// The results in a folder.
+/// List of the results in a folder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     schema: u32,
-    /// Each file by its name relative to the folder, with `/` between folders.
+    /// Files by relative name, with `/` between folders.
     pub files: BTreeMap<String, Entry>,
 }
 
-/// A file as it was written.
+/// Entry of a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// The command that wrote it, for example `run`.
+    /// Command that wrote the file, for example `run`.
     pub by: String,
-    /// Its size.
+    /// Size in bytes.
     pub bytes: u64,
-    /// The SHA-256 of its content, hexadecimal.
+    /// SHA-256 of the contents, hexadecimal.
     pub sha256: String,
 }
 
-/// Whose the file at a name is.
+/// Owner of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Owner {
-    /// There is none.
+    /// The file does not exist.
     Nobody,
-    /// The command that asks wrote it, and nobody changed it.
+    /// An unchanged result of the same command.
     Ours,
-    /// Somebody else's; how that is known.
+    /// A file of the user or of another command, with the reason.
     User(String),
     /// It is a folder.
     Folder,
@@ -59,8 +59,8 @@ impl Default for Manifest {
 }
 
 impl Manifest {
-    /// The list in the folder `root`, an empty one where there is none. One that cannot be read is the user's: it is overwritten only
-    /// with `force`.
+    /// Reads the manifest in the folder `root`; a missing one is empty. An unreadable one counts as a file of
+    /// the user and is overwritten only with `force`.
     pub(super) fn of_folder(root: &Path, force: bool) -> Result<Self, OutputError> {
         let path = root.join(MANIFEST);
         match Self::read(&path) {
@@ -87,7 +87,8 @@ impl Manifest {
         known.ok_or_else(|| in_the_way("it is not a list of results that this version of Quintile wrote"))
     }
 
-    /// Whether this version wrote it: all names are of files in the folder, and none is the list itself or in `.quintile`.
+    /// Whether the manifest is valid: schema version of this program, and names within the folder, except
+    /// itself and `.quintile`.
     fn is_known(&self) -> bool {
         let inside = |name: &String| {
             let path = Path::new(name);
@@ -98,7 +99,7 @@ impl Manifest {
         self.schema == SCHEMA && self.files.keys().all(inside)
     }
 
-    /// Whose the file `name` in `root` is, asked by the command `by`.
+    /// Owner of the file `name` in `root`, from the view of command `by`.
     pub(super) fn owner(&self, root: &Path, name: &str, by: &str) -> Result<Owner, OutputError> {
         let path = root.join(name);
         let unreadable = |source| OutputError::Read { path: path.clone(), source };
@@ -123,17 +124,17 @@ impl Manifest {
 
 const CHANGED: &str = "this file was changed after Quintile wrote it";
 
-/// The SHA-256 of a file's content, hexadecimal.
+/// SHA-256 of the contents of a file, hexadecimal.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// If the file cannot be read.
 pub fn sha256_of(path: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     io::copy(&mut File::open(path)?, &mut Hashing(&mut hash))?;
     Ok(hex(hash))
 }
 
-/// The same of a text.
+/// SHA-256 of a text, hexadecimal.
 pub fn sha256_of_text(text: &str) -> String {
     hex(Sha256::new_with_prefix(text))
 }

@@ -1,12 +1,13 @@
-//! The folder of results: written aside, and moved into place when whole.
+//! Folder of results: files are written aside and moved into place when all are complete.
 //!
 //! ```text
 //! Destination --open--> OutDir --write--> .quintile/new --publish--> the folder, manifest.json
 //! ```
 //!
-//! While a command works, its files are in `.quintile/new` below the folder: on the same file system, also where the folder is a
-//! mount point, a link or the current directory. Until they are published, earlier results stay as they are. Files that no
-//! [manifest](Manifest) lists, or that changed since it was written, belong to the user: they are neither removed nor overwritten.
+//! New files are in `.quintile/new` below the folder, so that they are on the same file system. This holds
+//! for mount points, links and the current directory, too. Earlier results stay unchanged until new ones are
+//! published. Files that no [manifest](Manifest) lists, or that changed since, belong to the user: they are
+//! neither removed nor overwritten.
 
 mod claim;
 mod error;
@@ -30,45 +31,45 @@ pub use manifest::{Entry, MANIFEST, Manifest, sha256_of, sha256_of_text};
 use swap::Swap;
 use work::Work;
 
-/// Anything that a writer of a file can fail with.
+/// Error of a file's writer.
 pub type BoxError = Box<dyn Error + Send + Sync>;
 
-/// The last file of a run; where it is, the run is whole.
+/// Last file of a run. If it exists, the run is complete.
 pub const SUMMARY: &str = "summary.json";
 
-/// A folder for results, as named by the caller.
+/// Destination of results, as given by the caller.
 #[derive(Clone, Debug)]
 pub struct Destination {
-    /// The folder; made where it is missing.
+    /// The folder; created if missing.
     pub folder: PathBuf,
     /// Whether files that Quintile did not write may be overwritten.
     pub force: bool,
 }
 
 impl Destination {
-    /// A folder in which only results of Quintile are overwritten.
+    /// Destination in which only results of Quintile are overwritten.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), force: false }
     }
 
-    /// Locks the folder for the files that `claims` list.
+    /// Creates and locks the folder for the files of `claims`.
     ///
     /// # Errors
-    /// Before any work: [`OutputError::Folder`] when the folder cannot be made or written, [`OutputError::Busy`] when another
-    /// process writes into it, [`OutputError::InTheWay`] for a file of the user where a result has to go.
+    /// [`OutputError::Folder`] if the folder cannot be created or written, [`OutputError::Busy`] if another
+    /// process writes into it, [`OutputError::InTheWay`] for a file of the user with the name of a result.
     pub fn open(&self, claims: impl IntoIterator<Item = Claim>) -> Result<OutDir, OutputError> {
         OutDir::open(self, claims.into_iter().collect())
     }
 }
 
-/// The folder that a command writes into, locked. Dropped without [`Self::publish`], it leaves no trace.
+/// A locked folder of results. Dropping it without [`Self::publish`] removes the new files.
 #[derive(Debug)]
 pub struct OutDir {
     destination: Destination,
     claims: Vec<Claim>,
-    /// What the folder held when it was opened or last published.
+    /// Results in the folder when it was opened or last published.
     listed: Manifest,
-    /// Files written since.
+    /// Files written since then.
     written: Mutex<BTreeMap<String, Entry>>,
     work: Work,
 }
@@ -87,16 +88,17 @@ impl OutDir {
         Ok(Self { destination, claims, listed, written, work })
     }
 
-    /// The folder as it was named.
+    /// Folder as given.
     pub fn path(&self) -> &Path {
         &self.destination.folder
     }
 
-    /// Writes the file `relative` (folders in between are made) through `write`. It appears in the folder when it is
-    /// [published](Self::publish).
+    /// Writes the file `relative` through `write` and creates its folders. It appears in the folder of
+    /// results when [published](Self::publish).
     ///
     /// # Errors
-    /// [`OutputError::Write`] with the file and the cause, [`OutputError::Unclaimed`] for a file that no claim lists.
+    /// [`OutputError::Write`] with the file and the cause, [`OutputError::Unclaimed`] for a file that no
+    /// claim lists.
     pub fn write_file(
         &self,
         relative: &str,
@@ -105,7 +107,7 @@ impl OutDir {
         let by = self.producer(relative)?;
         let staged = self.work.new_file(relative);
         let failed = |source| OutputError::Write { path: self.path().join(relative), source };
-        // The handler of signals removes the folder: not between these two.
+        // The signal handler removes the folder; it must not run between these two.
         let created = unfinished::uninterrupted(|| {
             staged.parent().map_or(Ok(()), fs::create_dir_all)?;
             File::create(&staged)
@@ -118,7 +120,7 @@ impl OutDir {
         Ok(())
     }
 
-    /// Writes `value` as a JSON file for people to read, a line end after it.
+    /// Writes `value` as an indented JSON file with a final line end.
     ///
     /// # Errors
     /// As [`Self::write_file`].
@@ -129,22 +131,22 @@ impl OutDir {
         })
     }
 
-    /// Moves what was written into place, and removes what the same commands wrote before and did not write again. Returns the names
-    /// of the files, in order.
+    /// Moves the new files into place and removes older results of the same commands. Returns the sorted
+    /// names of the new files.
     ///
     /// # Errors
-    /// [`OutputError::InTheWay`] and [`OutputError::Publish`]: the folder is as it was before, and the new results stay in
-    /// `.quintile/new`, from where the next command with this folder moves them.
+    /// [`OutputError::InTheWay`] and [`OutputError::Publish`]. The folder is then unchanged, and the new
+    /// results stay in `.quintile/new`. The next command with this folder moves them into place.
     pub fn publish(&mut self) -> Result<Vec<String>, OutputError> {
         let written = std::mem::take(self.written.get_mut().unwrap_or_else(PoisonError::into_inner));
         let names = written.keys().cloned().collect();
         let swap = Swap::new(self.path(), &self.work, self.listed.clone(), written);
-        // A signal waits until old and new are not mixed.
+        // Signals wait while old and new results are mixed.
         self.listed = unfinished::uninterrupted(|| swap.run(self.destination.force))?;
         Ok(names)
     }
 
-    /// Who writes `relative`.
+    /// Command that claims `relative`.
     fn producer(&self, relative: &str) -> Result<&str, OutputError> {
         let plain = Path::new(relative).components().all(|part| matches!(part, Component::Normal(_)));
         let claim = self.claims.iter().find(|claim| plain && claim.covers(relative));
@@ -153,10 +155,10 @@ impl OutDir {
 }
 
 impl OutDir {
-    /// Lets `make` write into `folder`, and publishes.
+    /// Opens `folder`, lets `make` write into it, and publishes.
     ///
     /// # Errors
-    /// When the folder cannot be opened, or the results cannot be moved into it.
+    /// If the folder cannot be opened or the results cannot be moved into it.
     pub fn with<T>(folder: &Path, claim: Claim, make: impl FnOnce(&Self) -> T) -> Result<T, OutputError> {
         let mut dir = Destination::new(folder).open([claim])?;
         let made = make(&dir);
@@ -165,7 +167,7 @@ impl OutDir {
     }
 }
 
-/// A file being written, with the number and the hash of its bytes.
+/// Writer of a file that counts and hashes its bytes.
 struct Counted {
     out: BufWriter<File>,
     hash: Sha256,

@@ -1,4 +1,4 @@
-//! Moving new results into place and older ones out of it.
+//! Replacement of older results with new ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,10 +9,11 @@ use super::manifest::{Entry, MANIFEST, Manifest, Owner};
 use super::work::Work;
 use super::{OutputError, SUMMARY};
 
-/// Old and new results of a folder.
+/// Older and new results of a folder.
 ///
-/// All steps are renames within one file system. One that fails undoes those before it. A process that is killed between them leaves
-/// the list of the new files in `.quintile`; the next one [recovers](Self::recover) by doing the rest.
+/// All steps are renames within one file system. If one fails, the earlier ones are undone. If the process is
+/// killed between them, the manifest of the new files stays in `.quintile`, and the next process
+/// [finishes](Self::recover) the renames.
 pub(super) struct Swap<'a> {
     root: &'a Path,
     work: &'a Work,
@@ -21,7 +22,7 @@ pub(super) struct Swap<'a> {
 }
 
 impl<'a> Swap<'a> {
-    /// Of the folder `root`, which holds `old`, for the new files `written`.
+    /// Replacement of `old` with `written` in the folder `root`.
     pub fn new(root: &'a Path, work: &'a Work, old: Manifest, written: BTreeMap<String, Entry>) -> Self {
         let by: BTreeSet<&str> = written.values().map(|entry| entry.by.as_str()).collect();
         let mut new = old.clone();
@@ -30,7 +31,7 @@ impl<'a> Swap<'a> {
         Self { root, work, old, new }
     }
 
-    /// Finishes what a killed process had begun; without whole results in `work`, clears it.
+    /// Finishes the replacement of a killed process. Without complete results in `work`, clears it.
     pub fn recover(root: &'a Path, work: &'a Work, force: bool) -> Result<(), OutputError> {
         if work.manifest().exists() {
             let (old, new) = (Manifest::of_folder(root, force)?, Manifest::read(&work.manifest())?);
@@ -40,13 +41,13 @@ impl<'a> Swap<'a> {
         Ok(())
     }
 
-    /// Replaces the old results by the new ones and returns the list of what is then in the folder.
+    /// Replaces the older results and returns the new manifest.
     pub fn run(self, force: bool) -> Result<Manifest, OutputError> {
         let list = self.work.manifest();
         let failed = |source: io::Error| OutputError::Write { path: list.clone(), source: source.into() };
         let mut text = serde_json::to_string_pretty(&self.new).map_err(|error| failed(error.into()))?;
         text.push('\n');
-        // Under its own name it says that everything is there.
+        // Under its final name the manifest marks the new files as complete.
         let unfinished = list.with_extension("unfinished");
         fs::write(&unfinished, text).and_then(|()| fs::rename(&unfinished, &list)).map_err(failed)?;
         self.replace(force)?;
@@ -59,14 +60,14 @@ impl<'a> Swap<'a> {
         steps.extend(self.moves());
         for (done, (from, to)) in steps.iter().enumerate() {
             if let Err(source) = rename(from, to) {
-                // The first failure is the one to report.
+                // Report the first failure.
                 steps[..done].iter().rev().for_each(|(from, to)| drop(rename(to, from)));
                 let path = if to.starts_with(self.work.path()) { from } else { to };
                 let (path, kept) = (path.clone(), self.work.new_files());
                 return Err(OutputError::Publish { path, kept, source });
             }
         }
-        // Folders that only held older results; others are not empty and stay.
+        // Remove folders that held only older results; others are not empty and stay.
         for folder in steps.iter().filter_map(|(from, _)| from.parent()).filter(|folder| *folder != self.root)
         {
             let _ = fs::remove_dir(folder);
@@ -74,7 +75,8 @@ impl<'a> Swap<'a> {
         Ok(())
     }
 
-    /// Renames that take older results out of the way: `summary.json` first, so that a folder that holds both does not look whole.
+    /// Renames that move older results away: `summary.json` first, so that a mixed folder does not count as
+    /// complete.
     fn aside(&self, force: bool) -> Result<Vec<(PathBuf, PathBuf)>, OutputError> {
         let mut names: Vec<&String> = Vec::new();
         for (name, entry) in &self.new.files {
@@ -99,7 +101,7 @@ impl<'a> Swap<'a> {
         Ok(steps)
     }
 
-    /// Renames that put new results into place: `summary.json` last, and then the list.
+    /// Renames that put new results into place: `summary.json` next to last, then the manifest.
     fn moves(&self) -> Vec<(PathBuf, PathBuf)> {
         let mut names: Vec<&String> =
             self.new.files.keys().filter(|name| self.work.new_file(name).exists()).collect();
@@ -111,7 +113,7 @@ impl<'a> Swap<'a> {
     }
 }
 
-/// How late a file appears: those whose presence says that others are there come later.
+/// Order of renames: files that mark results as complete come last.
 fn rank(name: &str) -> u8 {
     if name == SUMMARY { 2 } else { u8::from(name.ends_with(".json")) }
 }

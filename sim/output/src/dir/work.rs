@@ -1,4 +1,4 @@
-//! The locked folder in which results are made.
+//! Locked folder of unfinished results.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -10,17 +10,17 @@ use traces::io::unfinished::Unfinished;
 use super::OutputError;
 use super::manifest::{MANIFEST, WORK_FOLDER};
 
-/// The folder `.quintile` below a folder of results, with a lock on it that ends with the process.
+/// Folder `.quintile` below a folder of results, with a lock that ends with the process.
 #[derive(Debug)]
 pub(super) struct Work {
     path: PathBuf,
-    /// Removes the folder; before the lock goes.
+    /// Removes the folder before the lock.
     _unfinished: Unfinished,
     _lock: File,
 }
 
 impl Work {
-    /// Makes and locks the folder below `root`, which is made where it is missing.
+    /// Creates and locks the folder below `root`; creates `root` if missing.
     pub fn lock(root: &Path) -> Result<Self, OutputError> {
         let made = missing(root);
         let path = root.join(WORK_FOLDER);
@@ -29,7 +29,7 @@ impl Work {
             return Err(OutputError::InTheWay { path, why, forcible: false });
         }
         let lock = locked(root, &path).inspect_err(|_| {
-            // Only folders without content go; a folder that another process uses has its lock.
+            // Removes only empty folders; a folder in use contains its lock.
             let _ = fs::remove_dir(&path);
             remove_empty(&made);
         })?;
@@ -43,37 +43,37 @@ impl Work {
         Ok(Self { path, _unfinished: unfinished, _lock: lock })
     }
 
-    /// The folder itself.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where the new file `relative` is made.
+    /// Path of the new file `relative`.
     pub fn new_file(&self, relative: &str) -> PathBuf {
         self.new_files().join(relative)
     }
 
-    /// Where new files are made.
+    /// Folder of new files.
     pub fn new_files(&self) -> PathBuf {
         self.path.join("new")
     }
 
-    /// Where older files go until new ones are in their place.
+    /// Folder of older files during a replacement.
     pub fn old_file(&self, relative: &str) -> PathBuf {
         self.path.join("old").join(relative)
     }
 
-    /// The list that says that the new files are whole.
+    /// Manifest of complete new files.
     pub fn manifest(&self) -> PathBuf {
         self.path.join(MANIFEST)
     }
 
-    /// Removes what is not needed any more.
+    /// Removes unneeded files.
     pub fn clear(&self) {
         clear(&self.path);
     }
 
-    /// Finds out whether files can be moved into those of `folders` that are in `root`: before long work, not after it.
+    /// Checks before the work that files can be moved into the existing `folders` of `root`.
     pub fn try_folders(&self, root: &Path, folders: BTreeSet<PathBuf>) -> Result<(), OutputError> {
         let probe = self.path.join("probe");
         for folder in folders.iter().map(|folder| root.join(folder)).filter(|folder| folder.is_dir()) {
@@ -81,7 +81,7 @@ impl Work {
             let tried = File::create(&probe).and_then(|_| fs::rename(&probe, &moved));
             let tried = tried.and_then(|()| fs::remove_file(&moved));
             if let Err(source) = tried {
-                // Whichever of the two is there.
+                // Only one of the two exists.
                 [probe, moved].iter().for_each(|file| drop(fs::remove_file(file)));
                 return Err(OutputError::Folder { path: folder, source });
             }
@@ -90,7 +90,7 @@ impl Work {
     }
 }
 
-/// The folders that have to be made for `folder` to be there, the innermost first.
+/// Missing folders on the path of `folder`, the innermost first.
 fn missing(folder: &Path) -> Vec<PathBuf> {
     let above = folder.ancestors().filter(|folder| !folder.as_os_str().is_empty());
     above.take_while(|folder| folder.symlink_metadata().is_err()).map(Path::to_owned).collect()
@@ -100,10 +100,10 @@ fn remove_empty(folders: &[PathBuf]) {
     folders.iter().for_each(|folder| drop(fs::remove_dir(folder)));
 }
 
-/// Makes `work` and locks it.
+/// Creates and locks `work`.
 fn locked(root: &Path, work: &Path) -> Result<File, OutputError> {
     let failed = |source| OutputError::Folder { path: root.to_owned(), source };
-    // A process that ends removes its lock, and between opening and locking that may happen: try again.
+    // An ending process may remove the lock between opening and locking: try again.
     for _ in 0..100 {
         fs::create_dir_all(work).map_err(failed)?;
         let mut file = match open(&work.join("lock")) {
@@ -112,7 +112,7 @@ fn locked(root: &Path, work: &Path) -> Result<File, OutputError> {
         };
         match file.try_lock() {
             Ok(()) => {}
-            // A file system without locks.
+            // This file system has no locks.
             Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
             Err(TryLockError::Error(error)) => return Err(failed(error)),
             Err(TryLockError::WouldBlock) => return Err(busy(root, &mut file)),
@@ -135,8 +135,8 @@ fn busy(root: &Path, lock: &mut File) -> OutputError {
     OutputError::Busy { path: root.to_owned(), process }
 }
 
-/// Writes the number of this process into the lock and reads it back by its name: whoever had the lock before may have removed the
-/// file between opening and locking, and then another process may lock another file.
+/// Writes the number of this process into the lock and reads it back by name. The former owner may have
+/// removed the file between opening and locking; then another process may lock another file.
 fn is_still_there(lock: &mut File, path: &Path) -> io::Result<bool> {
     let number = std::process::id().to_string();
     lock.set_len(0)?;
@@ -144,15 +144,15 @@ fn is_still_there(lock: &mut File, path: &Path) -> io::Result<bool> {
     Ok(fs::read_to_string(path).is_ok_and(|found| found == number))
 }
 
-/// Removes all but whole results, and the lock last: from then on the folder may be another's.
+/// Removes all but complete results, and the lock last: another process may then use the folder.
 fn abandon(work: &Path) {
     clear(work);
-    // What cannot be removed is left to the next process that locks the folder.
+    // The next process that locks the folder removes the rest.
     let _ = fs::remove_file(work.join("lock"));
     let _ = fs::remove_dir(work);
 }
 
-/// Removes new and old files. Whole results, which the list says these are, wait for the next command.
+/// Removes new and old files. Complete results, marked by the manifest, are kept for the next command.
 fn clear(work: &Path) {
     if work.join(MANIFEST).exists() {
         return;

@@ -1,23 +1,24 @@
-//! Keeping tracks short enough for a viewer without losing what one looks for.
+//! Decimation of tracks for the viewer; extremes are kept.
 
-/// The most points a counter track is written with.
+/// Largest number of points of a counter track.
 pub const MAX_POINTS: usize = 20_000;
 
-/// The most slices [`slices_of_bins`] returns.
+/// Largest number of slices of a unit's track.
 pub const MAX_SLICES: usize = 10_000;
 
-/// A stretch of time in which a unit was busy.
+/// Interval in which a unit was busy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BusySlice {
-    /// When it starts, in ns from the start of the run.
+    /// Start in ns from the start of the run.
     pub start_ns: u64,
-    /// When it ends, after `start_ns`.
+    /// End in ns, after `start_ns`.
     pub end_ns: u64,
-    /// The fraction of it for which the unit was serving work, 0 to 1.
+    /// Busy share of the interval, 0 to 1.
     pub utilisation: f64,
 }
 
-/// At most `limit` (at least 4) of `points`, in order, as [`Thinner`] keeps them. Points that are not finite are left out.
+/// Reduces `points` to at most `limit` (at least 4), in order, as [`Thinner`] does. Points that are not
+/// finite are dropped.
 pub fn decimate(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
     let finite: Vec<(u64, f64)> = points.iter().copied().filter(|(_, value)| value.is_finite()).collect();
     let mut thinner = Thinner::new(finite.len() as u64, limit);
@@ -25,12 +26,12 @@ pub fn decimate(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
     thinner.kept().into_iter().map(|(index, _)| finite[index as usize]).collect()
 }
 
-/// Keeps at most `limit` (at least 4) of many values that are seen once: all of them where they are few enough, else the
-/// lowest and the highest of each of `limit / 2 - 1` stretches of equal length, beside the first and the last of all.
+/// Reduces a stream of values to at most `limit` (at least 4). Few values are all kept. Otherwise the first
+/// and the last are kept, and the lowest and the highest of each of `limit / 2 - 1` equal segments.
 #[derive(Clone, Debug)]
 pub struct Thinner {
     count: u64,
-    /// Values in a stretch; 1 keeps all.
+    /// Values in a segment; 1 keeps all.
     length: u64,
     seen: u64,
     low: (u64, f64),
@@ -39,14 +40,14 @@ pub struct Thinner {
 }
 
 impl Thinner {
-    /// For `count` finite values.
+    /// Thinner for `count` finite values.
     pub fn new(count: u64, limit: usize) -> Self {
         let limit = limit.max(4) as u64;
         let length = if count <= limit { 1 } else { count.div_ceil(limit / 2 - 1) };
         Self { count, length, seen: 0, low: (0, 0.0), high: (0, 0.0), kept: Vec::new() }
     }
 
-    /// The next value.
+    /// Adds a value.
     pub fn push(&mut self, value: f64) {
         let point = (self.seen, value);
         let fresh = self.seen.is_multiple_of(self.length);
@@ -66,7 +67,7 @@ impl Thinner {
         }
     }
 
-    /// The values kept, each with its number from 0, in order.
+    /// Kept values in order, each with its index.
     pub fn kept(mut self) -> Vec<(u64, f64)> {
         self.kept.sort_unstable_by_key(|(index, _)| *index);
         self.kept.dedup_by_key(|(index, _)| *index);
@@ -74,10 +75,10 @@ impl Thinner {
     }
 }
 
-/// The slices of a unit whose busy fraction in bin `i`, the time from `start_ns + i bin_ns` to the next, is `busy[i]`.
+/// Slices of a unit with busy share `busy[i]` in bin `i`, which starts at `start_ns + i bin_ns`.
 ///
-/// Idle bins make no slice; neighbouring bins in the same tenth of utilisation are one. Where that leaves more than
-/// `limit` slices (at least 1), bins are taken two by two, four by four and so on until it does not.
+/// Idle bins give no slice. Neighbouring bins in the same tenth of utilisation are merged. If more than
+/// `limit` slices (at least 1) remain, groups of two, four, ... bins are merged first.
 pub fn slices_of_bins(start_ns: u64, bin_ns: f64, busy: &[f64], limit: usize) -> Vec<BusySlice> {
     let mut group = 1;
     loop {
@@ -89,7 +90,7 @@ pub fn slices_of_bins(start_ns: u64, bin_ns: f64, busy: &[f64], limit: usize) ->
     }
 }
 
-/// The tenth, 1 to 10, that a utilisation above 0 lies in.
+/// Tenth, 1 to 10, of a utilisation above 0.
 pub(super) fn tenth(utilisation: f64) -> u32 {
     libm::ceil(utilisation * 10.0).clamp(1.0, 10.0) as u32
 }
@@ -136,7 +137,7 @@ mod tests {
         assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
     }
 
-    /// The rule as it was written first, for points that are all at hand.
+    /// Reference implementation on a list of all points.
     fn of_all(points: &[(u64, f64)], limit: usize) -> Vec<(u64, f64)> {
         if points.len() <= limit.max(4) {
             return points.to_vec();
@@ -155,9 +156,9 @@ mod tests {
     }
 
     #[test]
-    fn oracle_values_seen_once_are_thinned_as_if_all_were_at_hand() {
+    fn oracle_a_stream_is_thinned_like_a_list() {
         for count in [0_u64, 1, 4, 5, 6, 7, 99, 100, 101, 1000, 1001, 4097] {
-            // Few levels, so that lowest and highest are tied.
+            // Few distinct values give ties of lowest and highest.
             let points: Vec<(u64, f64)> = (0..count).map(|i| (i * 3, (i * 7919 % 13) as f64)).collect();
             for limit in [0, 4, 7, 20, 100, 1000] {
                 assert_eq!(decimate(&points, limit), of_all(&points, limit), "{count} {limit}");
@@ -166,14 +167,14 @@ mod tests {
     }
 
     #[test]
-    fn few_points_are_left_alone() {
+    fn few_points_are_unchanged() {
         let points = [(0, 1.0), (5, 2.0)];
         assert_eq!(decimate(&points, 20), points);
         assert!(decimate(&[], 20).is_empty());
     }
 
     #[test]
-    fn neighbours_alike_are_one_slice_and_idle_bins_none() {
+    fn equal_neighbours_are_merged_and_idle_bins_give_no_slice() {
         let busy = [0.0, 0.51, 0.59, 0.0, 1.0, f64::NAN];
         let slices = slices_of_bins(1000, 100.0, &busy, 10);
         let expected = [(1100, 1300, 0.55), (1400, 1500, 1.0)];

@@ -1,11 +1,12 @@
 //! A timeline for the Perfetto viewer (<https://ui.perfetto.dev>).
 //!
-//! One process; below it a track of frames, a track per unit with slices of busy time, and counter tracks of power.
-//! Field numbers are those of Perfetto v59's `trace_packet.proto`, `track_descriptor.proto`, `track_event.proto`,
-//! `counter_descriptor.proto`, `process_descriptor.proto` and `debug_annotation.proto` (Apache-2.0, google/perfetto).
+//! One process; below it a track of frames, a track per unit with slices of busy time, and counter tracks of
+//! power. Field numbers are those of Perfetto v59's `trace_packet.proto`, `track_descriptor.proto`,
+//! `track_event.proto`, `counter_descriptor.proto`, `process_descriptor.proto` and `debug_annotation.proto`
+//! (Apache-2.0, google/perfetto).
 //!
-//! The viewer is for looking, so tracks are bounded: a counter track keeps at most [`MAX_POINTS`] points, the lowest
-//! and the highest of each stretch among them; a unit's track at most [`MAX_SLICES`] slices.
+//! Tracks are bounded for the viewer: a counter track has at most [`MAX_POINTS`] points, including the lowest
+//! and the highest of each segment; a unit's track has at most [`MAX_SLICES`] slices.
 
 use std::io::{self, Write};
 
@@ -15,16 +16,16 @@ mod decimate;
 
 pub use decimate::{BusySlice, MAX_POINTS, MAX_SLICES, Thinner, decimate, slices_of_bins};
 
-/// What the timeline shows. Times are in ns from the start of the run.
+/// Contents of a timeline. Times are in ns from the start of the run.
 #[derive(Clone, Debug, Default)]
 pub struct Timeline<'a> {
-    /// The name of the process, for example `quintile default on hd7970`.
+    /// Name of the process, for example `quintile default on hd7970`.
     pub process: &'a str,
-    /// The frames in order.
+    /// Frames in order.
     pub frames: Vec<FrameSpan>,
-    /// The units in the order in which they are to be shown.
+    /// Units in the order of display.
     pub units: Vec<UnitTrack<'a>>,
-    /// The counters in the order in which they are to be shown.
+    /// Counters in the order of display.
     pub counters: Vec<CounterTrack<'a>>,
 }
 
@@ -33,28 +34,28 @@ pub struct Timeline<'a> {
 pub struct FrameSpan {
     /// The number of the frame.
     pub frame: u64,
-    /// When it starts.
+    /// Start.
     pub start_ns: u64,
-    /// When its work is done, not before `start_ns`.
+    /// End of its work, not before `start_ns`.
     pub busy_end_ns: u64,
-    /// When the next one starts, not before `busy_end_ns`.
+    /// Start of the next frame, not before `busy_end_ns`.
     pub end_ns: u64,
     /// Numbers shown with the frame, each with a name that carries its unit, for example `energy_mJ`.
     pub numbers: Vec<(&'static str, f64)>,
 }
 
-/// A unit's busy time.
+/// Track of a unit's busy time.
 #[derive(Clone, Debug, Default)]
 pub struct UnitTrack<'a> {
     /// The unit.
     pub name: &'a str,
-    /// One sentence on what it does.
+    /// Description, one sentence.
     pub doc: &'a str,
-    /// Its slices in order, without overlap; [`slices_of_bins`] makes them.
+    /// Slices in order, without overlap; see [`slices_of_bins`].
     pub slices: Vec<BusySlice>,
 }
 
-/// A quantity over time; each value holds from its time on.
+/// Track of a quantity over time; each value holds until the next.
 #[derive(Clone, Debug, Default)]
 pub struct CounterTrack<'a> {
     /// The quantity, for example `power, total`.
@@ -73,15 +74,15 @@ enum EventType {
     Counter = 4,
 }
 
-/// Every packet belongs to one writer; any number but 0.
+/// Number of the writer of all packets; not 0.
 const SEQUENCE_ID: u64 = 1;
 /// `SequenceFlags.SEQ_INCREMENTAL_STATE_CLEARED` of `trace_packet.proto`.
 const INCREMENTAL_STATE_CLEARED: u64 = 1;
 /// `ChildTracksOrdering.EXPLICIT` of `track_descriptor.proto`: by `sibling_order_rank`.
 const EXPLICIT_ORDER: u64 = 3;
-/// No process of the model has a number; the viewer wants one.
+/// Process number that the viewer requires.
 const PROCESS_ID: u64 = 1;
-/// The tracks' numbers need only differ; these are the same in every run.
+/// Identifiers of tracks: distinct, and the same in every run.
 const PROCESS_UUID: u64 = 0x5175_696e_7469_6c00;
 const FRAMES_UUID: u64 = PROCESS_UUID + 1;
 const UNITS_UUID: u64 = PROCESS_UUID + 0x1_0000;

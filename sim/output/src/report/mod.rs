@@ -1,4 +1,4 @@
-//! One page that shows a whole run, opens from disk and asks the network for nothing.
+//! Report: one HTML page about a run that opens from disk and needs no network.
 
 use std::borrow::Cow;
 
@@ -15,26 +15,26 @@ mod rows;
 
 pub use rows::{CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, UnitRow, WarningRow};
 
-/// The page before it is filled.
+/// Template of the page.
 const TEMPLATE: &str = include_str!("../../assets/report.html");
-/// The end of the name makes every value escaped for HTML.
+/// The extension `.html` enables escaping of every value.
 const TEMPLATE_NAME: &str = "report.html";
 
-/// Why the report could not be made.
+/// Error of filling the template.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot fill the report: {0}")]
 pub struct ReportError(#[from] minijinja::Error);
 
-/// What the report says. All text may be anything; it is escaped.
+/// Contents of the report. All text is escaped.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report<'a> {
-    /// The heading, for example `default on hd7970`.
+    /// Heading, for example `default on hd7970`.
     pub title: Cow<'a, str>,
     /// Scene, GPU, platform, level of timing, command line, version: shown below the heading in this order.
     pub facts: Vec<FactRow>,
-    /// Remarks that go before everything else.
+    /// Warnings, shown first.
     pub warnings: Vec<WarningRow>,
-    /// The numbers of the run: time, energy, energy per pixel and power of a frame.
+    /// Time, energy, energy per pixel and power of a frame.
     pub headline: Vec<Headline>,
     /// Rendered frames: the first is shown large, the others small.
     pub images: Vec<ReportImage>,
@@ -50,67 +50,67 @@ pub struct Report<'a> {
     pub units: Vec<UnitRow>,
     /// One row per counter.
     pub counters: Vec<CounterRow>,
-    /// Every setting that the results depend on.
+    /// Settings in use.
     pub settings: Vec<FactRow>,
-    /// The files that the run was made from: path, hash, size.
+    /// Input files: path, hash, size.
     pub inputs: Vec<FactRow>,
     /// The files beside the report.
     pub files: Vec<FileLink>,
-    /// The program, the call and the machine: in a section of their own, as results do not depend on them.
+    /// Program, command line and host, in a section of their own: results do not depend on them.
     pub host: Vec<FactRow>,
 }
 
-/// A number of the run, per frame, measured and true.
+/// Quantity per frame, measured and true.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Headline {
-    /// What it is, for example `energy per frame`.
+    /// Name, for example `energy per frame`.
     pub label: String,
-    /// Its plain unit, for example `J`; the prefix is chosen.
+    /// Unit without prefix, for example `J`.
     pub unit: String,
-    /// By the analysis of the trace, in the unit.
+    /// Measured in the trace, in the unit.
     pub measured: Option<MeanSd>,
-    /// By the simulator, in the unit.
+    /// Ground truth of the simulator, in the unit.
     pub truth: Option<MeanSd>,
 }
 
-/// A rendered frame within the page.
+/// Image embedded in the page.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ReportImage {
-    /// Below the picture, for example `frame 12`.
+    /// Caption, for example `frame 12`.
     pub caption: String,
-    /// The bytes of a PNG file; see [`super::image::LinearImage::thumbnail_png`].
+    /// Contents of a PNG file; see [`super::image::LinearImage::thumbnail_png`].
     #[serde(serialize_with = "base64")]
     pub png: Vec<u8>,
-    /// The file in full size, relative to the report.
+    /// File in full size, relative to the report.
     pub link: Option<String>,
 }
 
-/// A plot within the page.
+/// Plot embedded in the page.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ReportPlot {
-    /// What it shows and how to read it, in a sentence.
+    /// Caption, one sentence.
     pub caption: String,
-    /// The text of an SVG file made by [`super::plot::Picture::svg`]; it is put into the page as it is.
+    /// The text of an SVG file made by [`super::plot::Picture::svg`]; it is embedded unchanged.
     pub svg: String,
     /// Path without extension of the `.svg` and `.png` files, relative to the report.
     pub stem: Option<String>,
 }
 
-/// A part with what follows from the others.
+/// Part with its share of the energy.
 #[derive(Serialize)]
 struct PartView<'a> {
     #[serde(flatten)]
     part: &'a PartRow,
     share: f64,
-    /// Share of the energy while frames are drawn; `None` for what is drawn between them.
+    /// Share of the energy without idle time; `None` for idle energy.
     busy_share: Option<f64>,
 }
 
 impl Report<'_> {
-    /// The page.
+    /// Fills the template.
     ///
     /// # Errors
-    /// [`ReportError`] when the template cannot be filled.
+    /// [`ReportError`] if the template cannot be filled.
     pub fn html(&self) -> Result<String, ReportError> {
         let mut environment = Environment::new();
         environment.set_trim_blocks(true);
@@ -137,7 +137,7 @@ impl Report<'_> {
         dir.write_file(relative, |out| Ok(out.write_all(self.html()?.as_bytes())?)).map(drop)
     }
 
-    /// The parts with their shares of all energy, and of that without what is drawn between frames.
+    /// Parts with their shares of all energy, and of the energy without idle time.
     fn part_views(&self) -> Vec<PartView<'_>> {
         let sum = |parts: &mut dyn Iterator<Item = &PartRow>| parts.map(|part| part.energy_j).sum::<f64>();
         let total = sum(&mut self.parts.iter());

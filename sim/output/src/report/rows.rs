@@ -1,33 +1,33 @@
-//! The rows of the report's tables.
+//! Rows of the report's tables.
 
 use serde::Serialize;
 
-/// A name and a value, for example of a setting.
+/// Name and value, for example of a setting.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FactRow {
-    /// What it is.
+    /// Name.
     pub name: String,
-    /// What it says, with its unit.
+    /// Value with its unit.
     pub value: String,
-    /// Where it comes from or what it means; may be empty.
+    /// Note; may be empty.
     pub note: String,
 }
 
 impl FactRow {
-    /// A fact without a note.
+    /// Row without a note.
     pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
         Self { name: name.into(), value: value.into(), note: String::new() }
     }
 }
 
-/// A coded remark.
+/// Warning.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WarningRow {
-    /// A stable code in kebab case.
+    /// Warning code.
     pub code: String,
-    /// What happened, where, and what it means for the results.
+    /// Message.
     pub message: String,
-    /// The things it concerns, where it names several.
+    /// Affected things, if there are several.
     pub details: Vec<String>,
 }
 
@@ -36,81 +36,81 @@ pub struct WarningRow {
 pub struct PartRow {
     /// A unit, `constant`, `leakage`, `clock tree`.
     pub name: String,
-    /// What it is, in a sentence.
+    /// Description, one sentence.
     pub doc: String,
-    /// Its colour, the same as in the plots, as CSS writes it.
+    /// Colour in CSS notation, the same as in plots.
     pub colour: String,
-    /// Whether it is drawn between frames rather than by them.
+    /// Whether this is idle energy between frames.
     pub idle: bool,
-    /// Its energy in joules.
+    /// Energy in joules.
     pub energy_j: f64,
 }
 
 /// Time, energy and mean power of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FrameNumbers {
-    /// From its start to the start of the next, in seconds.
+    /// Time to the start of the next frame, in seconds.
     pub time_s: f64,
-    /// Over that time, in joules.
+    /// Energy over that time, in joules.
     pub energy_j: f64,
-    /// Energy over time, in watts.
+    /// Mean power in watts.
     pub power_w: f64,
 }
 
-/// A frame.
+/// Row of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FrameRow {
     /// Its number.
     pub frame: u64,
-    /// When it starts, in seconds.
+    /// Start in seconds.
     pub start_s: f64,
-    /// For how long the GPU worked on it, in seconds, where known.
+    /// Busy time in seconds, if known.
     pub busy_s: Option<f64>,
-    /// By the analysis of the trace; `None` where it found no such frame.
+    /// Measured in the trace; `None` if the frame was not found.
     pub measured: Option<FrameNumbers>,
-    /// By the simulator; `None` for a recording.
+    /// Ground truth of the simulator; `None` for a recording.
     pub truth: Option<FrameNumbers>,
-    /// Remarks, for example `warm-up`; may be empty.
+    /// Flags, for example `warm-up`; may be empty.
     pub flags: String,
 }
 
-/// A unit of the block diagram.
+/// Row of a unit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct UnitRow {
     /// Its name.
     pub name: String,
-    /// What it does, in a sentence.
+    /// Description, one sentence.
     pub doc: String,
-    /// The fraction of the frames' busy time in which it was serving work, 0 to 1; `None` where it was not timed.
+    /// Share of the frames' busy time in which the unit was busy, 0 to 1; `None` if it was not timed.
     pub busy: Option<f64>,
     /// Whether the run modelled it.
     pub modelled: bool,
-    /// How it was modelled, or why not; may be empty.
+    /// Note on the model; may be empty.
     pub note: String,
 }
 
-/// A counter.
+/// Row of a counter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CounterRow {
-    /// The unit that counts.
+    /// Unit of the counter.
     pub unit: String,
-    /// The name used in files.
+    /// Name in files.
     pub name: String,
-    /// What one of it is.
+    /// Description of one event.
     pub doc: String,
-    /// The sum over the run.
+    /// Sum over the run.
     pub total: u64,
-    /// The mean per frame.
+    /// Mean per frame.
     pub per_frame: f64,
-    /// The mean per pixel of a frame.
+    /// Mean per pixel of a frame.
     pub per_pixel: f64,
 }
 
 /// A file beside the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FileLink {
-    /// Relative to the report, with `/` between folders.
+    /// Path relative to the report, with `/` between folders.
     pub path: String,
-    /// What is in it.
+    /// Description of the contents.
     pub what: String,
 }

@@ -1,21 +1,21 @@
-//! From what the probe found to a choice.
+//! Decision from the results of the probe.
 
-use crate::Sampling;
 use timing::Level;
 
-use super::Wish;
+use crate::{Requested, Sampling};
 
-/// What the probe found, over its frames.
+/// Results of the probe over its frames.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Findings {
-    /// Of each level in the order of [`Level::ALL`]: the worst error.
+    /// Largest error of each level, in the order of [`Level::ALL`].
     errors: [f64; 3],
-    /// Seconds of the host for the clock, by level, and for the pipeline.
+    /// Host seconds of the timing model, by level.
     timing_s: [f64; 3],
+    /// Host seconds of the pipeline.
     pipeline_s: f64,
-    /// The worst error of leaving out dimensions that hardly show, where that changes anything.
+    /// Largest error of omitting small motion and blur; `None` if that changes nothing.
     pub dimensions_error: Option<f64>,
-    /// Multiply-adds with all dimensions and without these.
+    /// Multiply-adds with all dimensions, and without small motion and blur.
     madds: [u64; 2],
 }
 
@@ -37,12 +37,12 @@ impl Findings {
         self.pipeline_s *= by;
     }
 
-    /// The worst error of a level.
+    /// Largest error of a level.
     pub fn error(&self, level: Level) -> f64 {
         self.errors[level as usize]
     }
 
-    /// The share of multiply-adds that goes with dimensions that hardly show.
+    /// Share of multiply-adds that omitting small motion and blur saves.
     pub fn saved(&self) -> f64 {
         let [all, fewer] = self.madds;
         if all == 0 { 0.0 } else { 1.0 - fewer as f64 / all as f64 }
@@ -53,32 +53,32 @@ impl Findings {
     }
 }
 
-/// What to do.
+/// Level, frames and dimensions of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Decision {
     pub level: Level,
     pub sampling: Sampling,
     pub fewer_dimensions: bool,
-    /// Expected error of level and dimensions; that of predicting frames is known later.
+    /// Expected error of level and dimensions, without that of predicting frames.
     pub error: f64,
-    /// Expected seconds of the host.
+    /// Expected host seconds.
     pub host_s: f64,
 }
 
-/// Fewer frames than these are not worth predicting.
-const FRAMES_WORTH_IT: usize = 20;
-/// Leaving out dimensions has to save this share of the work.
-const SAVED_WORTH_IT: f64 = 0.1;
-/// Previews of a run take about as long as this share of its frames.
-const PREVIEWS: f64 = 0.05;
+/// Smallest number of distinct frames for prediction.
+const MIN_FRAMES_TO_PREDICT: usize = 20;
+/// Smallest share of work that omitting dimensions has to save.
+const MIN_SAVED_SHARE: f64 = 0.1;
+/// Time of a preview over the time of a frame.
+const PREVIEW_TIME_RATIO: f64 = 0.05;
 
-/// Chooses for a run of `frames` that differ.
-pub(super) fn decide(wish: &Wish, findings: &Findings, frames: usize) -> Decision {
-    let decision = match wish.accuracy {
+/// Decides for a run of `frames` distinct frames.
+pub(super) fn decide(requested: &Requested, findings: &Findings, frames: usize) -> Decision {
+    let decision = match requested.accuracy {
         Some(accuracy) => by_accuracy(accuracy, findings, frames),
         None => every(Level::Stepped, findings, frames),
     };
-    match wish.budget_s {
+    match requested.budget_s {
         Some(budget_s) if decision.host_s > budget_s || decision.sampling != Sampling::Every => {
             by_budget(budget_s, decision, findings, frames)
         }
@@ -86,18 +86,18 @@ pub(super) fn decide(wish: &Wish, findings: &Findings, frames: usize) -> Decisio
     }
 }
 
-/// The cheapest level whose error is within `limit`; the reference is its own.
+/// Cheapest level whose error is within `limit`; the reference if none is.
 pub fn cheapest_level(error: impl Fn(Level) -> f64, limit: f64) -> Level {
     Level::ALL.into_iter().rev().find(|&level| error(level) <= limit).unwrap_or(Level::Stepped)
 }
 
-/// The cheapest level whose error leaves half of the accuracy to predicting frames; all of it where there are too few.
-/// What dimensions cost comes off first.
+/// Takes the cheapest level that needs at most half of the accuracy; prediction of frames gets the rest. With
+/// few frames the level may need all of it. The error of omitted dimensions is subtracted first.
 fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
-    let worth_it = findings.saved() >= SAVED_WORTH_IT;
-    let lost = findings.dimensions_error.filter(|lost| worth_it && *lost <= 0.25 * accuracy);
+    let saves_enough = findings.saved() >= MIN_SAVED_SHARE;
+    let lost = findings.dimensions_error.filter(|lost| saves_enough && *lost <= 0.25 * accuracy);
     let left = accuracy - lost.unwrap_or(0.0);
-    let predicts = frames >= FRAMES_WORTH_IT;
+    let predicts = frames >= MIN_FRAMES_TO_PREDICT;
     let limit = if predicts { 0.5 * left } else { left };
     let level = cheapest_level(|level| findings.error(level), limit);
     let target = left - findings.error(level);
@@ -105,38 +105,42 @@ fn by_accuracy(accuracy: f64, findings: &Findings, frames: usize) -> Decision {
     decision.fewer_dimensions = lost.is_some();
     decision.error += lost.unwrap_or(0.0);
     if predicts {
-        decision.sampling = Sampling::Until { target, most: frames };
-        decision.host_s = some_s(level, Sampling::BEGIN, findings, frames);
+        decision.sampling = Sampling::Until { target, max_frames: frames };
+        decision.host_s = some_s(level, Sampling::FIRST_FRAMES, findings, frames);
     }
     decision
 }
 
-/// The most exact that fits: what was chosen, if need be with fewer frames; else every frame, then some, at cheaper levels.
-fn by_budget(budget_s: f64, wanted: Decision, findings: &Findings, frames: usize) -> Decision {
+/// Takes the most accurate option within the budget: `preferred`, perhaps with fewer frames; then every frame
+/// at cheaper levels; then some frames.
+fn by_budget(budget_s: f64, preferred: Decision, findings: &Findings, frames: usize) -> Decision {
     let fits = |level: Level| {
-        let spare_s = budget_s - PREVIEWS * frames as f64 * findings.frame_s(level);
+        let spare_s = budget_s - PREVIEW_TIME_RATIO * frames as f64 * findings.frame_s(level);
         (spare_s / findings.frame_s(level).max(f64::MIN_POSITIVE)).floor().clamp(0.0, frames as f64) as usize
     };
-    if let Sampling::Until { target, .. } = wanted.sampling
-        && fits(wanted.level) >= Sampling::BEGIN
+    if let Sampling::Until { target, .. } = preferred.sampling
+        && fits(preferred.level) >= Sampling::FIRST_FRAMES
     {
-        return Decision { sampling: Sampling::Until { target, most: fits(wanted.level) }, ..wanted };
+        return Decision {
+            sampling: Sampling::Until { target, max_frames: fits(preferred.level) },
+            ..preferred
+        };
     }
     let keep = |decision: Decision| Decision {
-        fewer_dimensions: wanted.fewer_dimensions,
-        error: decision.error + wanted.error - findings.error(wanted.level),
+        fewer_dimensions: preferred.fewer_dimensions,
+        error: decision.error + preferred.error - findings.error(preferred.level),
         ..decision
     };
     let exact = [Level::Stepped, Level::Packet].map(|level| every(level, findings, frames));
     if let Some(decision) = exact.into_iter().find(|decision| decision.host_s <= budget_s) {
         return keep(decision);
     }
-    let level = if fits(Level::Packet) >= Sampling::LEAST { Level::Packet } else { Level::Bound };
+    let level = if fits(Level::Packet) >= Sampling::MIN_FRAMES { Level::Packet } else { Level::Bound };
     let whole = every(level, findings, frames);
-    if frames < FRAMES_WORTH_IT || whole.host_s <= budget_s {
+    if frames < MIN_FRAMES_TO_PREDICT || whole.host_s <= budget_s {
         return keep(every(Level::Bound, findings, frames));
     }
-    let count = fits(level).max(Sampling::LEAST);
+    let count = fits(level).max(Sampling::MIN_FRAMES);
     let host_s = some_s(level, count, findings, frames);
     keep(Decision { sampling: Sampling::Count(count), host_s, ..whole })
 }
@@ -153,14 +157,14 @@ fn every(level: Level, findings: &Findings, frames: usize) -> Decision {
 }
 
 fn some_s(level: Level, count: usize, findings: &Findings, frames: usize) -> f64 {
-    findings.frame_s(level) * (count as f64 + PREVIEWS * frames as f64)
+    findings.frame_s(level) * (count as f64 + PREVIEW_TIME_RATIO * frames as f64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Errors of 0, 0.5 and 10 %; a frame takes 1.1, 0.2 and 0.11 s.
+    /// Errors of 0, 0.5 and 10 %, and 1.1, 0.2 and 0.11 s per frame.
     fn findings() -> Findings {
         let mut findings = Findings::default();
         for (level, error, timing_s) in
@@ -171,59 +175,59 @@ mod tests {
         findings
     }
 
-    fn wish(accuracy: f64, budget_s: f64) -> Wish {
+    fn requested(accuracy: f64, budget_s: f64) -> Requested {
         let given = |value: f64| (value > 0.0).then_some(value);
-        Wish { accuracy: given(accuracy), budget_s: given(budget_s) }
+        Requested { accuracy: given(accuracy), budget_s: given(budget_s) }
     }
 
     #[test]
-    fn the_cheapest_level_that_is_good_enough() {
-        let level = |accuracy, frames| decide(&wish(accuracy, 0.0), &findings(), frames).level;
+    fn the_cheapest_level_within_the_accuracy() {
+        let level = |accuracy, frames| decide(&requested(accuracy, 0.0), &findings(), frames).level;
         assert_eq!(
             [0.001, 0.005, 0.09, 0.1].map(|a| level(a, 1)),
             [Level::Stepped, Level::Packet, Level::Packet, Level::Bound]
         );
-        // Where frames are predicted, half is left to that.
+        // Predicted frames get half of the accuracy.
         assert_eq!([0.009, 0.01, 0.2].map(|a| level(a, 300)), [Level::Stepped, Level::Packet, Level::Bound]);
     }
 
     #[test]
     fn frames_are_predicted_to_what_the_level_leaves() {
-        let decision = decide(&wish(0.02, 0.0), &findings(), 300);
-        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, most: 300 });
-        assert_eq!(decide(&wish(0.02, 0.0), &findings(), 19).sampling, Sampling::Every);
+        let decision = decide(&requested(0.02, 0.0), &findings(), 300);
+        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, max_frames: 300 });
+        assert_eq!(decide(&requested(0.02, 0.0), &findings(), 19).sampling, Sampling::Every);
     }
 
     #[test]
-    fn the_most_exact_that_fits_the_budget() {
+    fn the_most_accurate_option_within_the_budget() {
         let of = |budget_s| {
-            let decision = decide(&wish(0.0, budget_s), &findings(), 100);
+            let decision = decide(&requested(0.0, budget_s), &findings(), 100);
             (decision.level, decision.sampling)
         };
         assert_eq!(of(120.0), (Level::Stepped, Sampling::Every));
         assert_eq!(of(30.0), (Level::Packet, Sampling::Every));
         assert_eq!(of(11.05), (Level::Packet, Sampling::Count(50)));
-        // Not even six frames at `packet`.
+        // Less than six frames fit at `packet`.
         assert_eq!(of(1.6), (Level::Bound, Sampling::Count(9)));
-        assert_eq!(of(0.1), (Level::Bound, Sampling::Count(Sampling::LEAST)));
+        assert_eq!(of(0.1), (Level::Bound, Sampling::Count(Sampling::MIN_FRAMES)));
     }
 
     #[test]
-    fn both_take_as_many_frames_as_fit() {
-        let decision = decide(&wish(0.02, 5.05), &findings(), 100);
-        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, most: 20 });
+    fn accuracy_and_budget_limit_the_frames() {
+        let decision = decide(&requested(0.02, 5.05), &findings(), 100);
+        assert_eq!(decision.sampling, Sampling::Until { target: 0.015, max_frames: 20 });
     }
 
     #[test]
-    fn dimensions_are_left_out_where_that_saves_work_and_costs_little() {
+    fn dimensions_are_omitted_if_the_error_is_small_and_work_is_saved() {
         let with = |error, madds| {
             let mut findings = findings();
             findings.add_dimensions(error, madds);
-            decide(&wish(0.02, 0.0), &findings, 1).fewer_dimensions
+            decide(&requested(0.02, 0.0), &findings, 1).fewer_dimensions
         };
         assert!(with(0.004, [100, 50]));
         assert!(!with(0.006, [100, 50]), "it costs too much of the accuracy");
         assert!(!with(0.001, [100, 95]), "it saves too little");
-        assert!(!decide(&wish(0.02, 0.0), &findings(), 1).fewer_dimensions);
+        assert!(!decide(&requested(0.02, 0.0), &findings(), 1).fewer_dimensions);
     }
 }

@@ -1,59 +1,60 @@
-//! A few frames at a reduced size, at every level.
+//! Probe: a few frames at a reduced size, simulated at every timing level.
 
 use std::time::Instant;
 
 use activity::{Counts, Event};
 use cpu_time::ThreadTime;
+use output::progress::Progress;
 use pipeline::frame::render_with_heat;
 use pipeline::{PipelineSpec, Settings, Viewport};
-use timing::Recorder;
+use timing::{FrameClock, Level, Recorder};
 
-use super::super::{Distinct, Plan, RunError, Taken, frame};
 use super::decide::Findings;
-use super::{ProbeSummary, fewer};
-use output::progress::Progress;
-use timing::{FrameClock, Level};
+use super::{ProbeSummary, with_blur_thresholds};
+use crate::{Distinct, FrameCost, Plan, RunError, frame};
 
-/// Frames that are looked at: the middles of as many equal parts of the run.
-const FRAMES: usize = 3;
-/// The image is as many times smaller along each axis as leaves it so wide, and at most [`SMALLEST`] times.
-const WIDTH_PX: u32 = 320;
-const SMALLEST: u32 = 4;
+/// Largest number of probed frames: the middles of as many equal parts of the run.
+const MAX_FRAMES: usize = 3;
+/// Width in pixels that images are reduced to, at most by a factor of [`MAX_REDUCTION`].
+const TARGET_WIDTH_PX: u32 = 320;
+/// Largest factor of the reduction along each axis.
+const MAX_REDUCTION: u32 = 4;
 
-/// What was looked at, and what was found.
+/// A finished probe: frames, image size and results.
 pub(super) struct Probe {
     numbers: Vec<u32>,
     viewport: Viewport,
     pub findings: Findings,
 }
 
-/// A frame at one level.
-struct Seen {
-    taken: Taken,
+/// Result of one frame at one level.
+struct ProbedFrame {
+    cost: FrameCost,
     counts: Counts,
-    /// Seconds of the host: of the thread in the clock alone, and by the clock on the wall in the pipeline around it.
+    /// CPU seconds of the timing model.
     timing_s: f64,
+    /// Wall-clock seconds of the pipeline.
     pipeline_s: f64,
 }
 
 impl Probe {
-    /// Simulates some of the frames that differ.
+    /// Simulates some of the distinct frames.
     pub fn new(plan: &Plan, distinct: &Distinct, progress: &Progress) -> Result<Self, RunError> {
         let differ = distinct.numbers();
-        let some = FRAMES.min(differ.len());
+        let some = MAX_FRAMES.min(differ.len());
         let numbers: Vec<u32> =
             (0..some).map(|part| differ[(2 * part + 1) * differ.len() / (2 * some)]).collect();
-        let by = (plan.viewport.width() / WIDTH_PX).clamp(1, SMALLEST);
+        let by = (plan.viewport.width() / TARGET_WIDTH_PX).clamp(1, MAX_REDUCTION);
         let [width, height] = [plan.viewport.width(), plan.viewport.height()].map(|side| side.div_ceil(by));
         let viewport = Viewport::new(width, height)
             .ok_or_else(|| RunError::Setting(format!("size of the probe: {width}x{height}")))?;
         let bar = progress.bar("probe", numbers.len() as u64);
         let mut findings = Findings::default();
         for &number in &numbers {
-            look(plan, number, viewport, by, &mut findings)?;
+            probe_frame(plan, number, viewport, by, &mut findings)?;
             bar.inc();
         }
-        // Host times are for all frames of the probe; a frame of the run has more pixels.
+        // Host times are sums over the probe's frames, at a reduced size.
         let scale = plan.pixels() as f64 / viewport.pixels() as f64 / some as f64;
         findings.scale_times(scale);
         Ok(Self { numbers, viewport, findings })
@@ -71,8 +72,8 @@ impl Probe {
     }
 }
 
-/// One frame at every level, and once more without dimensions that hardly show.
-fn look(
+/// Simulates a frame at every level, and once more without small motion and blur.
+fn probe_frame(
     plan: &Plan,
     number: u32,
     viewport: Viewport,
@@ -80,45 +81,48 @@ fn look(
     findings: &mut Findings,
 ) -> Result<(), RunError> {
     let spec = &plan.gpu.pipeline;
-    let truth = see(plan, number, viewport, spec, Level::Stepped)?;
+    let truth = simulate_frame(plan, number, viewport, spec, Level::Stepped)?;
     for level in Level::ALL {
-        let seen =
-            if level == Level::Stepped { None } else { Some(see(plan, number, viewport, spec, level)?) };
-        let seen = seen.as_ref().unwrap_or(&truth);
-        findings.add(level, apart(&seen.taken, &truth.taken), seen.timing_s, seen.pipeline_s);
+        let probed = if level == Level::Stepped {
+            None
+        } else {
+            Some(simulate_frame(plan, number, viewport, spec, level)?)
+        };
+        let probed = probed.as_ref().unwrap_or(&truth);
+        findings.add(level, relative_error(&probed.cost, &truth.cost), probed.timing_s, probed.pipeline_s);
     }
-    let thresholds = PipelineSpec { features: fewer(spec.features, by as f32), ..*spec };
+    let thresholds = PipelineSpec { features: with_blur_thresholds(spec.features, by as f32), ..*spec };
     let (exact, reduced) = (
-        see(plan, number, viewport, spec, Level::Packet)?,
-        see(plan, number, viewport, &thresholds, Level::Packet)?,
+        simulate_frame(plan, number, viewport, spec, Level::Packet)?,
+        simulate_frame(plan, number, viewport, &thresholds, Level::Packet)?,
     );
     if exact.counts != reduced.counts {
         findings.add_dimensions(
-            apart(&reduced.taken, &exact.taken),
-            [&exact, &reduced].map(|seen| madds(&seen.counts)),
+            relative_error(&reduced.cost, &exact.cost),
+            [&exact, &reduced].map(|probed| madds(&probed.counts)),
         );
     }
     Ok(())
 }
 
-fn see(
+fn simulate_frame(
     plan: &Plan,
     number: u32,
     viewport: Viewport,
     spec: &PipelineSpec,
     level: Level,
-) -> Result<Seen, RunError> {
+) -> Result<ProbedFrame, RunError> {
     let started = Instant::now();
     let scene = plan.work.scene("--accuracy or --budget")?;
     let frame = scene.frame(number)?;
     let draws = frame.draws(scene)?;
     let settings = Settings { spec, viewport, samples: &*plan.samples, background: scene.background() };
     let mut clock =
-        FrameClock::new(level, plan.gpu.machine()?, Recorder::new(frame::BIN_PS, frame::FEWEST_BINS));
+        FrameClock::new(level, plan.gpu.machine()?, Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS));
     let mut packets = Vec::new();
     let mut lines = Vec::new();
-    let emit = |packet: &activity::Packet, asked: &[activity::LineAccess]| {
-        lines.extend_from_slice(asked);
+    let emit = |packet: &activity::Packet, new_lines: &[activity::LineAccess]| {
+        lines.extend_from_slice(new_lines);
         packets.push((*packet, lines.len()));
     };
     let rendered = render_with_heat(&frame.camera, &draws, &settings, &[], emit);
@@ -134,12 +138,12 @@ fn see(
     let timing_s = started.elapsed().as_secs_f64();
     let power = plan.model.frame(&timed.timeline);
     let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
-    let taken = Taken { cycles: timed.cycles as f64, energy_j: power.energy().total_j() };
-    Ok(Seen { taken, counts: rendered.counts, timing_s, pipeline_s })
+    let cost = FrameCost { cycles: timed.cycles as f64, energy_j: power.energy().total_j() };
+    Ok(ProbedFrame { cost, counts: rendered.counts, timing_s, pipeline_s })
 }
 
-/// The larger of the relative errors of cycles and energy.
-pub(super) fn apart(found: &Taken, truth: &Taken) -> f64 {
+/// Larger of the relative errors of cycles and energy.
+pub(super) fn relative_error(found: &FrameCost, truth: &FrameCost) -> f64 {
     let relative = |found: f64, truth: f64| if found == truth { 0.0 } else { (found / truth - 1.0).abs() };
     relative(found.cycles, truth.cycles).max(relative(found.energy_j, truth.energy_j))
 }

@@ -1,7 +1,7 @@
-//! Two images, or the images of two folders.
+//! Comparison of two images, or of the images of two folders.
 //!
-//! PNG pairs are compared as they are shown: in sRGB values from 0 to 1. Pairs of EXR files, and an EXR with a PNG, are compared
-//! in linear light, without limits. The structural similarity is that of both as they are shown.
+//! Two PNG files are compared in sRGB values from 0 to 1. EXR files, and an EXR with a PNG, are compared in
+//! linear light, without clamping. Structural similarity always compares the displayed values.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -16,13 +16,13 @@ use serde::Serialize;
 use super::CompareError;
 use output::image::{LinearImage, encode_png};
 
-/// Largest side of an image in pixels.
+/// Largest side of an image, in pixels.
 const MAX_SIDE_PX: u32 = 32_768;
 
-/// Most bytes that a decoder may take.
+/// Largest memory of a decoder, in bytes.
 const MAX_DECODED_BYTES: u64 = 4 << 30;
 
-/// Two images of one size.
+/// Comparison of two images of equal size.
 #[derive(Clone, Debug, Serialize)]
 pub struct ImageComparison {
     /// The files.
@@ -31,13 +31,14 @@ pub struct ImageComparison {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Whether values are linear light, as EXR has them, rather than sRGB from 0 to 1, as PNG has them.
+    /// Whether values are linear light (EXR) rather than sRGB from 0 to 1 (PNG).
     pub linear: bool,
     /// Mean squared error over pixels and channels.
     pub mse: f64,
-    /// Peak signal to noise ratio for a peak of 1, in dB; none for equal images.
+    /// Peak signal-to-noise ratio for a peak of 1, in dB; `None` for equal images.
     pub psnr_db: Option<f64>,
-    /// Structural similarity (Wang and others 2004) of luma, 1 for equal images; none for images too small for its window.
+    /// Structural similarity of luma (Wang et al. 2004), 1 for equal images; `None` for images smaller than
+    /// its window.
     pub ssim: Option<f64>,
     /// Mean absolute difference.
     pub mean_difference: f64,
@@ -45,46 +46,46 @@ pub struct ImageComparison {
     pub largest_difference: f64,
     /// Pixels that differ.
     pub pixels_that_differ: u64,
-    /// Pixels left out because a channel is not finite.
+    /// Pixels skipped because a channel is not finite.
     pub pixels_not_finite: u64,
-    /// The factor by which the difference image is brighter than the difference, where one was written as PNG.
+    /// Brightness factor of the difference image, if written as PNG.
     pub scale: Option<f64>,
 }
 
-/// The images of two folders.
+/// Comparison of the images of two folders.
 #[derive(Clone, Debug, Serialize)]
 pub struct FolderComparison {
     /// The folders.
     pub files: [String; 2],
-    /// Images that are in both, by name.
+    /// Images in both folders, by name.
     pub images: Vec<Named>,
-    /// Images that are only in A.
+    /// Images only in A.
     pub only_in_a: Vec<String>,
-    /// Images that are only in B.
+    /// Images only in B.
     pub only_in_b: Vec<String>,
-    /// Mean of the mean squared errors.
+    /// Mean of the images' mean squared errors.
     pub mse: Option<f64>,
-    /// How many are equal.
+    /// Number of equal pairs.
     pub equal: usize,
 }
 
-/// Two images of one name.
+/// Comparison of two images of equal name.
 #[derive(Clone, Debug, Serialize)]
 pub struct Named {
     /// The name.
     pub name: String,
-    /// What is between them.
+    /// The comparison.
     #[serde(flatten)]
     pub comparison: ImageComparison,
 }
 
-/// An image in memory.
+/// A decoded image.
 struct Picture {
     width: u32,
     height: u32,
     /// Linear light.
     linear: Vec<[f32; 3]>,
-    /// As it is shown.
+    /// Displayed sRGB values.
     shown: Vec<[u8; 3]>,
     is_linear: bool,
 }
@@ -126,7 +127,7 @@ impl Picture {
     }
 }
 
-/// Compares two images and writes their difference into `out`.
+/// Compares two images and writes their difference to `out`.
 pub(super) fn compare(a: &Path, b: &Path, out: Option<&Path>) -> Result<ImageComparison, CompareError> {
     let pictures = [Picture::read(a)?, Picture::read(b)?];
     let mut comparison = between([a, b], &pictures)?;
@@ -183,7 +184,7 @@ fn between(files: [&Path; 2], pictures: &[Picture; 2]) -> Result<ImageComparison
     })
 }
 
-/// B minus A for each pixel; none where it is not finite.
+/// B minus A of each pixel; `None` if not finite.
 fn differences(pictures: &[Picture; 2], linear: bool) -> impl Iterator<Item = Option<[f64; 3]>> + '_ {
     let [a, b] = pictures;
     (0..a.shown.len()).map(move |pixel| {
@@ -203,7 +204,7 @@ fn similarity([a, b]: &[Picture; 2]) -> Option<f64> {
     ssim(&a.luma()?, &b.luma()?, &SsimOptions::default()).ok().map(|outcome| outcome.score)
 }
 
-/// Writes the difference image; gives the factor by which it was made brighter.
+/// Writes the difference image; returns its brightness factor.
 fn write_difference(out: &Path, pictures: &[Picture; 2], linear: bool) -> Result<Option<f64>, CompareError> {
     let failed = |message: String| CompareError::Write { path: out.display().to_string(), message };
     let [width, height] = [pictures[0].width, pictures[0].height];

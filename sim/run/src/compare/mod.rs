@@ -1,4 +1,4 @@
-//! Two results beside each other: runs, tables of frames, images, folders of images.
+//! Comparison of two results: runs, tables of frames, images, or folders of images.
 
 mod images;
 mod numbers;
@@ -13,7 +13,7 @@ pub use numbers::{Change, TableComparison};
 pub use runs::shown;
 pub use runs::{RunComparison, Setting};
 
-/// Why two things were not compared.
+/// Error of a comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// A file is missing or cannot be read.
@@ -21,21 +21,21 @@ pub enum CompareError {
     Read {
         /// The file.
         path: String,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// A file is not what its name says.
+    /// The contents of a file are not of its format.
     #[error("{path}: {message}")]
     Broken {
         /// The file.
         path: String,
-        /// What is wrong and what to do.
+        /// What is wrong, and what to do.
         message: String,
     },
-    /// The two cannot be compared, or not in the way that was asked for.
+    /// The two cannot be compared, or an option does not apply.
     #[error("{0}")]
     Usage(String),
-    /// The difference image could not be made or written.
+    /// The difference image cannot be made or written.
     #[error("{path}: cannot write it: {message}")]
     Write {
         /// The file.
@@ -46,7 +46,7 @@ pub enum CompareError {
 }
 
 impl CompareError {
-    /// Whether the mistake is the caller's (exit code 2) rather than a broken file (exit code 1).
+    /// Whether this is a usage error (exit code 2) rather than a broken file (exit code 1).
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::Usage(_))
     }
@@ -61,7 +61,7 @@ impl CompareError {
     }
 }
 
-/// What was compared.
+/// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Comparison {
@@ -75,7 +75,7 @@ pub enum Comparison {
     Folders(FolderComparison),
 }
 
-/// What a path leads to.
+/// Kind of result at a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Run,
@@ -102,7 +102,7 @@ impl Kind {
         }
     }
 
-    fn what(self) -> &'static str {
+    fn description(self) -> &'static str {
         match self {
             Self::Run => "a run",
             Self::Frames => "a table of frames",
@@ -112,14 +112,14 @@ impl Kind {
     }
 }
 
-/// Compares what `a` and `b` lead to. A difference image goes to `out`.
+/// Compares the results at `a` and `b`. A difference image is written to `out`.
 ///
 /// # Errors
-/// [`CompareError`]; differences are none.
+/// [`CompareError`]. A difference is not an error.
 pub fn compare(a: &Path, b: &Path, out: Option<&Path>) -> Result<Comparison, CompareError> {
     let kinds = [Kind::of(a)?, Kind::of(b)?];
     if kinds[0] != kinds[1] {
-        let [one, other] = kinds.map(Kind::what);
+        let [one, other] = kinds.map(Kind::description);
         return Err(CompareError::Usage(format!(
             "{} is {one} and {} {other}: give two of a kind",
             a.display(),
@@ -129,7 +129,7 @@ pub fn compare(a: &Path, b: &Path, out: Option<&Path>) -> Result<Comparison, Com
     if out.is_some() && kinds[0] != Kind::Image {
         let message = format!(
             "--out is for the difference of two images, and these are not: leave it out ({})",
-            kinds[0].what()
+            kinds[0].description()
         );
         return Err(CompareError::Usage(message));
     }

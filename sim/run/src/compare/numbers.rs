@@ -1,4 +1,4 @@
-//! Numbers beside numbers.
+//! Comparison of numbers, and of the means of two tables of frames.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,22 +7,22 @@ use serde::Serialize;
 
 use super::CompareError;
 
-/// A number of A and of B.
+/// Value of a quantity in A and in B.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// What it belongs to.
+    /// Group of the quantity.
     pub group: String,
     /// Its name.
     pub name: String,
     /// Its unit; empty for counts and shares.
     pub unit: String,
-    /// Its value in A, where A has one.
+    /// Value in A, if present.
     pub a: Option<f64>,
-    /// Its value in B, where B has one.
+    /// Value in B, if present.
     pub b: Option<f64>,
     /// B minus A.
     pub difference: Option<f64>,
-    /// B over A; none over zero.
+    /// B over A; `None` if A is zero.
     pub ratio: Option<f64>,
 }
 
@@ -41,18 +41,18 @@ impl Change {
         }
     }
 
-    /// Whether both have it and it is the same.
+    /// Whether both values are equal or both are missing.
     pub fn is_equal(&self) -> bool {
         self.a == self.b
     }
 }
 
-/// Two tables of frames.
+/// Comparison of two tables of frames.
 #[derive(Clone, Debug, Serialize)]
 pub struct TableComparison {
     /// The files.
     pub files: [String; 2],
-    /// Frames of each, and mean and standard deviation of what the table says of them.
+    /// Number of frames, and mean and standard deviation of each column.
     pub values: Vec<Change>,
 }
 
@@ -66,7 +66,7 @@ const COLUMNS: [(&str, &str); 6] = [
     ("true_energy_J", "J"),
 ];
 
-/// Compares two files as `quintile run` and `quintile trace frames` write them.
+/// Compares two tables written by `quintile run` or `quintile trace frames`.
 pub(super) fn compare_tables(a: &Path, b: &Path) -> Result<TableComparison, CompareError> {
     let [one, other] = [read(a)?, read(b)?];
     let frames = [&one, &other].map(|table| table.values().map(Vec::len).max().map(|count| count as f64));
@@ -94,7 +94,7 @@ fn deviation(numbers: &[f64]) -> f64 {
     (sum / (numbers.len().max(2) - 1) as f64).sqrt()
 }
 
-/// The known columns; empty cells are left out.
+/// Reads the known columns; empty cells are skipped.
 fn read(path: &Path) -> Result<BTreeMap<&'static str, Vec<f64>>, CompareError> {
     let broken = |message: String| CompareError::broken(path, message);
     let file = std::fs::File::open(path).map_err(CompareError::unreadable(path))?;

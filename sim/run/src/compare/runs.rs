@@ -1,4 +1,4 @@
-//! Two runs by their `summary.json`.
+//! Comparison of two runs by their `summary.json`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,34 +8,34 @@ use serde_json::Value;
 use super::CompareError;
 use super::numbers::Change;
 
-/// The file of a run that is compared.
+/// File of a run that is compared.
 pub(super) const SUMMARY: &str = "summary.json";
 
-/// Two runs.
+/// Comparison of two runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunComparison {
     /// The summaries.
     pub files: [String; 2],
-    /// Why a difference may not be due to what is listed as different.
+    /// Reasons why the two runs may not be comparable.
     pub warnings: Vec<String>,
-    /// What the runs were made from and differs.
+    /// Settings and inputs that differ.
     pub settings: Vec<Setting>,
-    /// Every number of the two, in the order of the file.
+    /// All numbers of both runs, in the order of the file.
     pub values: Vec<Change>,
 }
 
-/// Something that runs are made from.
+/// A setting or input of both runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setting {
-    /// Its place in the file.
+    /// Path of the key in the file.
     pub name: String,
-    /// Its value in A; null where A has none.
+    /// Value in A; null if missing.
     pub a: Value,
-    /// Its value in B.
+    /// Value in B; null if missing.
     pub b: Value,
 }
 
-/// Keys that say what a run was made from. What only says how it was called is left out.
+/// Keys of settings and inputs. The command line is not compared.
 const SETTINGS: [&str; 10] = [
     "schema",
     "version",
@@ -49,10 +49,10 @@ const SETTINGS: [&str; 10] = [
     "modelled",
 ];
 
-/// Keys below these that follow from the others.
+/// Keys within [`SETTINGS`] that are results.
 const RESULTS: [&str; 4] = ["modelled.units", "modelled.units_not_modelled", "modelled.limits", "camera.ron"];
 
-/// Keys of numbers, each with the name of its group and its unit where the names below do not end in one.
+/// Keys of numbers: key, name of the group, and unit if the key's name does not end in one.
 const GROUPS: [(&str, &str, &str); 12] = [
     ("truth", "frames (truth)", ""),
     ("measured", "frames (measured)", ""),
@@ -68,10 +68,10 @@ const GROUPS: [(&str, &str, &str); 12] = [
     ("verified", "actual errors", ""),
 ];
 
-/// Numbers of frames whose means are compared.
+/// Keys of `frames` whose means are compared.
 const OF_FRAMES: [&str; 3] = ["cycles", "busy_ms", "busy_s"];
 
-/// Compares the runs in the folders, or with the summaries, `a` and `b`.
+/// Compares two runs, each given as a folder or as a summary file.
 pub(super) fn compare(a: &Path, b: &Path) -> Result<RunComparison, CompareError> {
     let paths = [a, b].map(|path| if path.is_dir() { path.join(SUMMARY) } else { path.to_owned() });
     let runs = [read(&paths[0])?, read(&paths[1])?];
@@ -131,7 +131,7 @@ fn warnings(runs: &[Value; 2]) -> Vec<String> {
     warnings
 }
 
-/// A value for people: text without quotes, `-` for none.
+/// A JSON value as text: strings without quotes, `-` for null.
 pub fn shown(value: &Value) -> String {
     match value {
         Value::Null => "-".to_owned(),
@@ -165,7 +165,7 @@ fn values(runs: &[Value; 2]) -> Vec<Change> {
     values
 }
 
-/// The mean over frames of what each of them has under `name`.
+/// Mean over frames of the number `name`.
 fn of_frames(runs: &[Value; 2], name: &str) -> Option<Change> {
     let mean = |run: &Value| {
         let numbers: Option<Vec<f64>> =
@@ -178,7 +178,7 @@ fn of_frames(runs: &[Value; 2], name: &str) -> Option<Change> {
     known.then(|| Change::new("mean of a frame", name, unit_of(name), means))
 }
 
-/// The unit that a name ends in, or a part of it that holds mean and deviation.
+/// Unit from the ending of a name, or of a part of its path.
 fn unit_of(name: &str) -> &'static str {
     let units = [
         ("_nj_per_pixel", "nJ"),
@@ -194,7 +194,7 @@ fn unit_of(name: &str) -> &'static str {
     name.split('.').find_map(of_part).unwrap_or("")
 }
 
-/// Every value below two others that is neither a list nor an object, by its place; lists are compared whole.
+/// Pairs of values below two others, by path. Lists count as one value.
 fn leaves<'a>(name: &str, pair: [&'a Value; 2]) -> Vec<(String, [&'a Value; 2])> {
     let objects = pair.map(Value::as_object);
     if objects.iter().all(Option::is_none) {
@@ -213,7 +213,7 @@ mod tests {
 
     fn run(scene: &str, samples: u32, energy: f64) -> Value {
         json!({
-            "schema": 1, "scene": scene, "gpu": "g", "settings": {"width": 4, "height": 4, "samples": samples},
+            "schema": 2, "scene": scene, "gpu": "g", "settings": {"width": 4, "height": 4, "samples": samples},
             "truth": {"frames": 2, "energy_j": {"mean": energy, "deviation": 0.0}},
             "counts": {"samples_tested": 100 * samples}, "unit_busy": {"setup": 0.5},
             "frames": [{"cycles": 10, "busy_s": 1.0}, {"cycles": 30, "busy_s": 1.0}],
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_that_differ_come_by_their_place_and_numbers_with_their_units() {
+    fn settings_have_paths_and_numbers_have_units() {
         let runs = [run("a", 4, 2.0), run("a", 8, 3.0)];
         let differ = settings(&runs);
         assert_eq!(differ, [Setting { name: "settings.samples".to_owned(), a: json!(4), b: json!(8) }]);
@@ -235,15 +235,15 @@ mod tests {
     }
 
     #[test]
-    fn runs_that_do_not_compare_say_so() {
+    fn runs_that_are_not_comparable_give_warnings() {
         let mut other = run("b", 4, 2.0);
         other["settings"]["width"] = json!(8);
         other["frames"] = json!([{"cycles": 1}]);
         other["modelled"]["timing"] = json!("stepped");
-        other["schema"] = json!(2);
+        other["schema"] = json!(3);
         let found = warnings(&[run("a", 4, 2.0), other]).join("\n");
         for says in [
-            "different schemas (1, 2)",
+            "different schemas (2, 3)",
             "scenes differ (a, b)",
             "sizes",
             "2 and 1 frames",

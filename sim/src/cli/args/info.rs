@@ -10,8 +10,8 @@ use super::SceneArgs;
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  quintile info Fox.glb\n  quintile info building.obj --camera inside --json\n\n\
-    The flags change what sees the scene, as they do for `quintile run`. The camera is printed as RON: give it back with\n\
-    --camera, changed or not. Unchanged, it makes the same bytes."
+    The flags change the view, as for `quintile run`. The camera is printed as RON: pass it to\n\
+    --camera, changed or not. Unchanged, it gives the same bytes."
 )]
 pub struct InfoArgs {
     /// A built-in scene or a workload (see `quintile list`), a scene file as for `quintile run`, or an .m5d, .mts or .smp file

@@ -1,17 +1,18 @@
-//! Flags of commands that draw.
+//! Flags for the style of pictures.
 
 use clap::Args;
 
 use output::plot::{COLUMN_MM, Look};
 
-/// How pictures are to look. Without these each has its own width, and letters for a screen.
+/// Style of pictures. The default is a width of their own and letters for a screen.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Pictures")]
 pub struct LookArgs {
     /// Width of pictures in millimetres, 30 to 400, or `column` for 85 mm; letters are then 8 points high
     #[arg(long, value_name = "MM|column", allow_negative_numbers = true, value_parser = width)]
     pub width: Option<f64>,
-    /// Title of pictures in place of their own; an empty one leaves title and subtitle out, for papers with captions
+    /// Title of pictures in place of their own; an empty one omits title and subtitle, for papers with
+    /// captions
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
     /// Size of ordinary letters of pictures in points, 4 to 32
@@ -20,7 +21,7 @@ pub struct LookArgs {
 }
 
 impl LookArgs {
-    /// The same for pictures.
+    /// The flags as a style.
     pub fn look(&self) -> Look {
         Look { width_mm: self.width, font_pt: self.font_size, title: self.title.clone() }
     }

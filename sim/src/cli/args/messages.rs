@@ -13,7 +13,7 @@ pub struct MessageArgs {
     /// Print results and errors only: no warnings, notes or progress bars
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// Print the details of warnings and what is done
+    /// Print details of warnings and of the work
     #[arg(short, long, global = true)]
     pub verbose: bool,
     /// Colours of messages; `auto` shows them on a terminal unless NO_COLOR is set
@@ -33,7 +33,7 @@ impl MessageArgs {
     }
 }
 
-/// The value of `--color` among `args`, for errors of the parser itself, which come before there are parsed options.
+/// Value of `--color` among `args`, for errors of the parser itself.
 pub(in crate::cli) fn color_of(args: &[OsString]) -> ColorChoice {
     let words = args.iter().map(|arg| arg.to_str().unwrap_or_default()).take_while(|arg| *arg != "--");
     let words: Vec<&str> = words.collect();
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parser_knows_the_color_before_it_parses() {
+    fn color_is_found_before_parsing() {
         let color = |args: &[&str]| color_of(&args.iter().map(OsString::from).collect::<Vec<_>>());
         assert_eq!(color(&["quintile", "run", "--color", "never"]), ColorChoice::Never);
         assert_eq!(color(&["quintile", "--color=always", "run"]), ColorChoice::Always);

@@ -1,4 +1,4 @@
-//! What can be typed. One declaration per flag makes all of its docs.
+//! Declarations of all arguments; help texts and manual pages are made from them.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub use info::InfoArgs;
 pub use look::LookArgs;
 pub use messages::MessageArgs;
 pub(super) use messages::color_of;
-pub use run::{BoundArg, PacingArg, RunArgs};
+pub use run::RunArgs;
 pub use samples::SamplesArgs;
 pub use scene::SceneArgs;
 pub use trace::TraceArgs;
@@ -31,36 +31,37 @@ pub use visibility::VisibilityArgs;
 #[derive(Debug, Parser)]
 #[command(name = "quintile", version, arg_required_else_help = true, max_term_width = 100)]
 pub struct Cli {
-    /// What to do.
+    /// The subcommand.
     #[command(subcommand)]
     pub command: Command,
-    /// How much is printed.
+    /// Amount and colours of messages.
     #[command(flatten)]
     pub messages: MessageArgs,
 }
 
-/// What to do.
+/// The subcommand.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene, time it, turn it into watts, record a trace and find the energy of every frame in it
     Run(Box<RunArgs>),
-    /// Say what is in a scene, which camera sees it, and what is ignored
+    /// Describe a scene: contents, camera in use, ignored features
     Info(InfoArgs),
     /// Compare two runs, two images or two folders of images
     Compare(CompareArgs),
-    /// Find the triangle each sample sees and its depth, to be held against another program sample by sample
+    /// Compute the visible triangle and depth of every sample, for comparison with another renderer
     Visibility(VisibilityArgs),
     /// Find the pairs of moving objects that may collide
     Ccd(super::ccd::CcdArgs),
-    /// Make points: apart from each other, after a density, or evenly in a volume
+    /// Generate points: Poisson disk, following a density, or uniform in a volume
     Sample(super::sample::SampleArgs),
-    /// Write a sample table into a file
+    /// Write a sample table to a file
     Samples(SamplesArgs),
-    /// Try each tile test on families of triangles from harmless to hopeless: samples lost, efficiency, width of intervals, cost
+    /// Try each tile test on families of triangles from easy to hard: samples lost, efficiency, width of
+    /// intervals, cost
     Stress(StressArgs),
     /// Measure and draw a chart of the book
     Chart(ChartArgs),
-    /// Compute what a paper reports and hold it against that, row by row
+    /// Compute what a paper reports and compare it with the paper, row by row
     Reproduce(super::reproduce::ReproduceArgs),
     /// Analyse a power trace, recorded or synthetic: frames, energies, alignment, formats, plots, Pareto frontiers
     Trace(TraceArgs),
@@ -68,7 +69,7 @@ pub enum Command {
     Completions(CompletionsArgs),
     /// Print the manual page, or write one for each command into a folder
     Man(ManArgs),
-    /// Name the scenes, GPUs, platforms, energy tables, workloads and figures that come with the program
+    /// List the built-in scenes, GPUs, platforms, energy tables, workloads and figures
     List(ListArgs),
 }
 
@@ -111,7 +112,7 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn the_declarations_make_sense() {
+    fn the_declarations_are_consistent() {
         Cli::command().debug_assert();
     }
 }

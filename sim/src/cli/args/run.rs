@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use activity::{Event, spec::suggestion};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use pipeline::frame::HeatMap;
+use power_model::Bound;
 
 use super::{LookArgs, SceneArgs};
 use crate::cli::parse::{duration, percent, setting, share_below_one};
 use crate::cli::quantity::rate;
-use run::Method;
+use run::{Method, PacingChoice};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -17,7 +19,7 @@ use run::Method;
     after_help = "Example:\n  quintile run Fox.glb --clip Run --frames 0..60 --lens 2 --samples 16 --out fox\n  \
     quintile run Fox.glb --frames 0..300 --accuracy 2% --verify --out fox\n  \
     quintile run ccd --set resolution=64 --set bins=8 --out ccd\n\n\
-    A workload's options with their defaults are in its chapter of the book; `--set` names them when one is misspelled. It takes no\n\
+    The chapter of a workload lists its options and defaults; `--set` lists them when one is misspelled. It takes no\n\
     --accuracy, --budget, --timing sampled or --heat, which need a scene, and refuses flags of scenes that would change nothing.\n\n\
     Results are in DIR: images/, report.html, summary.json, frames.csv, trace.parquet, trace.csv, plots/ and\n\
     timeline.perfetto-trace (open it at ui.perfetto.dev). They appear together when all are whole; results of an earlier run\n\
@@ -27,20 +29,21 @@ pub struct RunArgs {
     /// A built-in scene or a workload (see `quintile list`), or a .ron, .gltf, .glb, .obj, .ply, .off or .stl file
     #[arg(default_value = "default", value_name = "SCENE|WORKLOAD|FILE")]
     pub scene: PathBuf,
-    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads and --json go with it. Refused
-    /// where the version of the program or an input is another, unless with --force
+    /// Repeat the run that wrote this summary.json, to the same bytes; only --out, --force, --threads and
+    /// --json can be added. Refused if the program version or an input differs, unless with --force
     #[arg(long, value_name = "SUMMARY", conflicts_with_all = SETTINGS)]
     pub again: Option<PathBuf>,
     /// Options of a workload in a .ron file
     #[arg(long, value_name = "FILE.ron")]
     pub options: Option<PathBuf>,
-    /// An option of a workload; may be given several times, and comes after --options
+    /// An option of a workload; may be given several times, and overrides --options
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     pub set: Vec<(String, String)>,
-    /// Folder for the results; made where it is missing
+    /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
-    /// Overwrite files in DIR that Quintile did not write; with --again, repeat it although the program or an input is another
+    /// Overwrite files in DIR that Quintile did not write; with --again, repeat although the program or an
+    /// input differs
     #[arg(long)]
     pub force: bool,
     /// Changes to the scene
@@ -56,59 +59,59 @@ pub struct RunArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub energy: Option<PathBuf>,
     /// Which values of the energy table to use
-    #[arg(long, value_enum, default_value_t)]
-    pub bound: BoundArg,
-    /// How time is modelled; `quintile chart timing` says how well
+    #[arg(long, value_name = "BOUND", default_value = "nominal", value_parser = bound())]
+    pub bound: Bound,
+    /// Timing level; `quintile chart timing` shows its accuracy
     #[arg(long, value_enum, default_value_t)]
     pub timing: Method,
     /// Let a probe choose level, frames and dimensions so that the error of cycles and energy is at most this, for example 2%;
     /// for scenes, not for workloads
     #[arg(long, value_name = "P%", value_parser = percent, conflicts_with = "timing", allow_hyphen_values = true)]
     pub accuracy: Option<f64>,
-    /// Let a probe choose the most exact that takes no longer than this, for example 30s, 500ms or 2min; for scenes, not for
-    /// workloads
+    /// Let a probe choose the most accurate options that take no longer than this, for example 30s, 500ms or
+    /// 2min; for scenes, not for workloads
     #[arg(long, value_name = "T", value_parser = duration, conflicts_with = "timing", allow_hyphen_values = true)]
     pub budget: Option<f64>,
-    /// Simulate every frame at the reference as well, and say how wrong the run was
+    /// Simulate every frame at the reference as well, and report the actual error
     #[arg(long)]
     pub verify: bool,
     /// When the next frame starts
     #[arg(long, value_enum, default_value_t)]
-    pub pacing: PacingArg,
+    pub pacing: PacingChoice,
     /// Samples per second of the recorder, 1 to 10 million: a number in Hz, or with its unit, such as 50kHz or 1MHz [default: 50kHz,
     /// or up to 1MHz where frames are shorter than two samples or, without idle time between them, than fifty]
     #[arg(long, value_name = "HZ", allow_hyphen_values = true, value_parser = rate)]
     pub trace_rate: Option<f64>,
-    /// Samples of the recorder that travel together, and are lost together
+    /// Samples in one packet of the recorder; a packet is lost as a whole
     #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=i64::from(traces::device::MAX_PACKET_SAMPLES)))]
     pub packet_samples: u32,
-    /// Share of these packets that are lost, 0 to below 1: gaps in trace.parquet
+    /// Share of packets that are lost, 0 to below 1: gaps in trace.parquet
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, allow_hyphen_values = true, value_parser = share_below_one)]
     pub packet_loss: f64,
-    /// Seed of samples, noise and losses
+    /// Seed of samples, noise and packet losses
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
-    /// Write every frame as EXR, too (linear light)
+    /// Also write every frame as EXR (linear light)
     #[arg(long)]
     pub exr: bool,
-    /// Write where in each frame a counter counted, as a picture, an EXR and a CSV in heat/; may be given several times
+    /// Write heat maps of a counter, as PNG, EXR and CSV in heat/; may be given several times
     #[arg(long, value_name = "COUNTER", value_parser = counter)]
     pub heat: Vec<Event>,
-    /// Worker threads; all cores without it. The results do not depend on it
+    /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Print what would be run, with the expected time, and stop before anything is simulated or written
+    /// Print what the run would do, with the expected time, and stop before anything is simulated or written
     #[arg(long)]
     pub dry_run: bool,
-    /// Print summary.json to standard output and nothing else
+    /// Print only summary.json to standard output
     #[arg(long)]
     pub json: bool,
-    /// How pictures look.
+    /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
 }
 
-/// What `--again` takes from the summary.
+/// Arguments that `--again` takes from the summary.
 const SETTINGS: [&str; 31] = [
     "scene",
     "options",
@@ -143,28 +146,21 @@ const SETTINGS: [&str; 31] = [
     "font_size",
 ];
 
-/// Which values of the energy table to use.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub enum BoundArg {
-    /// The lowest that sources support
-    Low,
-    /// The most likely
-    #[default]
-    Nominal,
-    /// The highest that sources support
-    High,
+/// Parser of `--bound`: the name of a column of the energy table.
+fn bound() -> impl TypedValueParser<Value = Bound> {
+    let names = [
+        PossibleValue::new("low").help("The lowest that sources support"),
+        PossibleValue::new("nominal").help("The most likely"),
+        PossibleValue::new("high").help("The highest that sources support"),
+    ];
+    PossibleValuesParser::new(names).map(|name| match name.as_str() {
+        "low" => Bound::Low,
+        "high" => Bound::High,
+        _ => Bound::Nominal,
+    })
 }
 
-/// When the next frame starts.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub enum PacingArg {
-    /// On the next tick of the display
-    #[default]
-    Vsync,
-    /// As soon as the one before is done
-    Free,
-}
-
+/// Parser of `--heat`: a counter that has a position in the image.
 fn counter(text: &str) -> Result<Event, String> {
     let placed = || Event::ALL.into_iter().filter(|&event| HeatMap::is_of(event));
     match Event::from_name(text) {
@@ -174,7 +170,7 @@ fn counter(text: &str) -> Result<Event, String> {
         }
         None => {
             let known: Vec<&str> = placed().map(Event::name).collect();
-            Err(format!("no counter is called `{text}`; {}", suggestion(text, &known)))
+            Err(format!("unknown counter `{text}`; {}", suggestion(text, &known)))
         }
     }
 }

@@ -17,19 +17,19 @@ pub struct SamplesArgs {
     /// A built-in sample table (see `quintile list`) or a description of one in a .ron file
     #[arg(value_name = "TABLE", default_value = "owen")]
     pub table: String,
-    /// Samples in a pixel, 1 to 256
+    /// Samples per pixel, 1 to 256
     #[arg(long, value_name = "N", default_value_t = 16, allow_hyphen_values = true, value_parser = per_pixel)]
     pub samples: u32,
-    /// Pixels to write; an image that is larger repeats them
+    /// Pixels to write; a larger image repeats them
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "64x64")]
     pub size: (u32, u32),
     /// Seed of the samples
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
-    /// The file
+    /// Output file
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Print what was written as one line of JSON
+    /// Print a description of the file as one line of JSON
     #[arg(long)]
     pub json: bool,
 }

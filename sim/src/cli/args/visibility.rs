@@ -17,18 +17,18 @@ pub struct VisibilityArgs {
     /// A moving mesh: an .m5d or .mts file, a .ply, .obj, .off or .stl file, or two of equal topology as the ends of the shutter
     #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
     pub files: Vec<PathBuf>,
-    /// A .ron file, or a description such as 'position: (1, 2, 3), target: (0, 0, 0)'; without it an .m5d is seen by its own
-    /// camera, other files by one that is fitted to them
+    /// A .ron file, or a description such as 'position: (1, 2, 3), target: (0, 0, 0)'; without it an .m5d
+    /// file uses its own camera, other files a fitted one
     #[arg(long, value_name = "CAMERA", allow_hyphen_values = true)]
     pub camera: Option<String>,
-    /// Print the camera that was fitted as RON, and do no more
+    /// Print the fitted camera as RON, and stop
     #[arg(long, conflicts_with_all = ["camera", "json", "out"])]
     pub print_camera: bool,
-    /// `hash` (of the seed of the camera), `table` (the built-in one) or a sample table in a file
+    /// `hash` (of the camera's seed), `table` (the built-in table) or a sample table in a file
     #[arg(long, value_name = "SAMPLES", default_value = "hash")]
     pub samples: String,
-    /// Rasterize as the modelled hardware does, with these tile tests: `all`, `none`, `auto`, or names with commas between.
-    /// Without it the fastest way is taken; what is seen is the same
+    /// Rasterize as the modelled hardware, with these tile tests: `all`, `none`, `auto`, or names separated
+    /// by commas. Without it the fastest engine is used; the result is the same
     #[arg(long, value_name = "LIST", value_parser = tests)]
     pub tests: Option<Features>,
     /// Rasterize N times and report the median
@@ -37,10 +37,10 @@ pub struct VisibilityArgs {
     /// File for the triangle and depth of every sample
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Worker threads; all cores without it. The results do not depend on it
+    /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Print what was found as one line of JSON
+    /// Print the result as one line of JSON
     #[arg(long)]
     pub json: bool,
 }

@@ -22,8 +22,8 @@ use rows::Rows;
 #[command(after_help = "Examples:\n  quintile ccd armadillo-rollers.mts.gz --json\n  \
     quintile ccd cases/*.mts --resolution 128 --csv pairs.csv\n  quintile ccd start.ply end.ply\n\n\
     Every vertex moves on a straight line from time 0 to time 1. A pair that is not reported does not collide; one that is may.\n\
-    A file that is broken or has coordinates beyond 1e60 does not keep the others from being answered: it is told, the exit code is 1, and\n\
-    its case has no row in the CSV and an `error` in the JSON. A case without a row is one that nothing is known of.")]
+    A file that is broken or has coordinates beyond 1e60 does not stop the others. It is reported, its case has no row in\n\
+    the CSV and an `error` in the JSON, and the exit code is 1.")]
 pub struct CcdArgs {
     /// .mts files (gzipped or not), a case each, or .ply, .obj or .off files two by two: a mesh at time 0 and at time 1
     #[arg(value_name = "FILE", required = true)]
@@ -34,24 +34,24 @@ pub struct CcdArgs {
     /// Bins of time in a pixel
     #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub bins: u32,
-    /// What is compared in a pixel
+    /// Comparison in each pixel
     #[arg(long, value_enum, default_value_t)]
     pub method: MethodArg,
-    /// Look once at the resolution asked for, and not closer at what is left
+    /// Render once at the given resolution, without zooming into the remaining pairs
     #[arg(long)]
     pub no_zoom: bool,
     /// File for every pair of every case: case_id,a,b,may_collide; `-` prints that and nothing else
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
-    /// Worker threads; all cores without it. The results do not depend on it
+    /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Print what was found as one line of JSON
+    /// Print the result as one line of JSON
     #[arg(long)]
     pub json: bool,
 }
 
-/// What is compared in a pixel.
+/// Comparison in each pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
     /// Each fragment of one object with the box of the other
@@ -74,25 +74,25 @@ impl CcdArgs {
     }
 }
 
-/// Pixels across times bins from which on a pair that is looked at once takes minutes.
-const SLOW: u32 = 128 * 64;
+/// Product of pixels across and bins above which a pair without zoom takes minutes.
+const MAX_FAST_PIXEL_BINS: u32 = 128 * 64;
 
-/// A pair that may collide.
+/// Pair of objects that may collide.
 #[derive(Serialize)]
 struct Pair {
     a: usize,
     b: usize,
     /// First and last time of possible contact.
     time: [f64; 2],
-    /// Where it may be: least and greatest x, y, z.
+    /// Bounds of the possible contact: smallest and largest x, y, z.
     space: [[f64; 2]; 3],
-    /// Pixels that are left, in the last image looked at; none where the pair was kept before any image was whole.
+    /// Remaining pixels of the last image; `None` if the pair was kept before an image was complete.
     pixels: Option<u64>,
-    /// Whether two triangles were seen to cross or to share a corner.
+    /// Whether two triangles cross or share a corner.
     seen: bool,
 }
 
-/// What is known of a case.
+/// Result of a case.
 #[derive(Serialize)]
 struct Found {
     case_id: String,
@@ -103,14 +103,14 @@ struct Found {
     may_collide: Vec<Pair>,
 }
 
-/// A case that nothing is known of.
+/// Case without a result.
 #[derive(Serialize)]
 struct Unknown {
     case_id: String,
     error: String,
 }
 
-/// What is known of a case, or why nothing is.
+/// Result of a case, or its error.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Outcome {
@@ -135,7 +135,7 @@ impl Outcome {
     }
 }
 
-/// The objects of a case, or why there are none.
+/// Objects of a case.
 fn objects(files: &CaseFiles) -> Result<Vec<Object>, String> {
     let case = files.load().map_err(|error| error.to_string())?;
     let object = |(number, mesh)| {
@@ -172,13 +172,13 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
     let cases = CaseFiles::of(&args.files)?;
     let pool = super::threads(args.threads)?;
     let progress = Progress::on(terminal, args.json);
-    if !search.zoom && search.resolution * search.bins > SLOW {
+    if !search.zoom && search.resolution * search.bins > MAX_FAST_PIXEL_BINS {
         progress.note(
-            "looking once at so many pixels and bins takes minutes for a pair; without --no-zoom it is seconds",
+            "without zoom, this number of pixels and bins takes minutes per pair; leave --no-zoom out for seconds",
         );
     }
     let outcomes = pool.install(|| answered(&cases, &search, &progress));
-    // Where nothing is known of any case, there is nothing to say, and what an older file says stays.
+    // Without any result nothing is written, and an older file stays.
     let known = outcomes.is_empty() || outcomes.iter().any(|outcome| outcome.found().is_some());
     if known {
         rows.write(&outcomes)?;
@@ -192,7 +192,7 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
     unanswered
 }
 
-/// Every case, in order; the pairs of all are shared out among the threads.
+/// Results of all cases, in order. The threads share the pairs of all cases.
 fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Outcome> {
     let all: Vec<_> = cases.par_iter().map(objects).collect();
     let known: Vec<&[Object]> = all.iter().map(|case| case.as_deref().unwrap_or_default()).collect();
@@ -203,7 +203,7 @@ fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<Ou
     outcomes.map(|((case, objects), answers)| Outcome::new(case, objects, &answers)).collect()
 }
 
-/// Fails where nothing is known of a case, and names each.
+/// Fails if a case has no result; the message names each.
 fn unanswered(outcomes: &[Outcome], terminal: &Terminal) -> Result<(), Failure> {
     let errors = outcomes.iter().filter_map(|outcome| match outcome {
         Outcome::Found(_) => None,
@@ -215,7 +215,7 @@ fn unanswered(outcomes: &[Outcome], terminal: &Terminal) -> Result<(), Failure> 
         ([error], 1) => error.clone(),
         (several, all) => {
             several.iter().for_each(|error| terminal.error(error));
-            format!("{} of {all} cases have no answer: mend their files or leave them out", several.len())
+            format!("{} of {all} cases have no answer: fix their files or leave them out", several.len())
         }
     };
     Err(Failure { message, code: 1 })

@@ -1,4 +1,4 @@
-//! The answer to every pair, as CSV.
+//! CSV with a row for every pair.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -7,20 +7,20 @@ use super::{CcdArgs, Found, Outcome};
 use crate::cli::terminal::print;
 use crate::cli::{Failure, outputs};
 
-/// Where the rows go.
+/// Destination of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rows<'a> {
     Unasked,
-    /// Onto standard output.
+    /// Standard output.
     Printed,
     File(&'a Path),
 }
 
-/// What stands for standard output.
+/// Names of standard output.
 const PRINTED: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
 impl<'a> Rows<'a> {
-    /// As asked for. Refuses before any work what could not be written after it.
+    /// Destination of `--csv`, checked before the work.
     pub fn of(args: &'a CcdArgs) -> Result<Self, Failure> {
         let Some(path) = args.csv.as_deref() else { return Ok(Self::Unasked) };
         if !PRINTED.iter().any(|printed| path == Path::new(printed)) {
@@ -37,7 +37,7 @@ impl<'a> Rows<'a> {
         Ok(Self::Printed)
     }
 
-    /// Writes the rows of all cases that something is known of.
+    /// Writes the rows of all cases with a result.
     pub fn write(self, outcomes: &[Outcome]) -> Result<(), Failure> {
         let failed = |message: String| Failure { message, code: 1 };
         match self {
@@ -60,7 +60,7 @@ fn all(outcomes: &[Outcome], out: impl Write) -> csv::Result<()> {
     Ok(csv.flush()?)
 }
 
-/// A line for each pair of objects.
+/// Writes a line for each pair of objects.
 fn lines(case: &Found, csv: &mut csv::Writer<impl Write>) -> csv::Result<()> {
     let mut left = case.may_collide.iter().map(|pair| (pair.a, pair.b)).peekable();
     for (a, b) in (0..case.objects).flat_map(|a| (a + 1..case.objects).map(move |b| (a, b))) {

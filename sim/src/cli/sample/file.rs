@@ -1,4 +1,4 @@
-//! Points in files.
+//! Files of points.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -13,11 +13,11 @@ use super::{Failure, usage};
 /// Points of any dimension.
 pub(super) struct Points {
     pub dimensions: usize,
-    /// Coordinate after coordinate, point after point.
+    /// Coordinates of all points, point by point.
     pub coordinates: Vec<f64>,
 }
 
-/// Kinds of files.
+/// File formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Csv,
@@ -26,14 +26,17 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// By the ending of a name.
+    /// Format by the extension of a file name.
     pub fn of(path: &Path) -> Result<Self, Failure> {
         let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
         match ending.as_deref() {
             Some("csv") => Ok(Self::Csv),
             Some("npy") => Ok(Self::Npy),
             Some("bin") => Ok(Self::Bin),
-            _ => Err(usage(format!("--out: {}: let the name end in .csv, .npy or .bin", path.display()))),
+            _ => Err(usage(format!(
+                "--out: {}: the file name has to end in .csv, .npy or .bin",
+                path.display()
+            ))),
         }
     }
 }
@@ -63,7 +66,7 @@ impl Points {
         .map_err(|error| Failure { message: error.to_string(), code: 1 })
     }
 
-    /// All of the CSV.
+    /// The CSV as one text.
     pub fn csv(&self, single: bool) -> String {
         let mut all = String::new();
         let pushed: Result<(), Infallible> = self.csv_into(single, |text| {
@@ -74,7 +77,7 @@ impl Points {
         all
     }
 
-    /// CSV with as many digits as it takes to read the same numbers back, in parts that workers write side by side.
+    /// CSV with enough digits to read back the same numbers, in parts that threads format in parallel.
     fn csv_into<E>(&self, single: bool, mut each: impl FnMut(&str) -> Result<(), E>) -> Result<(), E> {
         each(&["x", "y", "z", "w"][..self.dimensions].join(","))?;
         each("\n")?;
@@ -100,11 +103,11 @@ impl Points {
         Ok(())
     }
 
-    /// The header of version 1.0 of the format of NumPy.
+    /// Header of the NumPy format, version 1.0.
     fn npy_header(&self, single: bool) -> Vec<u8> {
         let (kind, shape) = (if single { "<f4" } else { "<f8" }, (self.len(), self.dimensions));
         let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape:?}, }}");
-        // All of the header is a multiple of 64 bytes, ends in a newline, and begins with ten bytes of its own.
+        // The header with its ten bytes of prefix is a multiple of 64 bytes and ends in a newline.
         let padded = (10 + text.len() + 1).next_multiple_of(64) - 11;
         let mut header = b"\x93NUMPY\x01\x00".to_vec();
         header.extend(((padded + 1) as u16).to_le_bytes());
@@ -113,11 +116,12 @@ impl Points {
     }
 }
 
-/// Points that a worker writes at a time, and so many of these together.
+/// Points per part of the CSV.
 const PART: usize = 4096;
+/// Parts formatted in parallel.
 const PARTS: usize = 64;
 
-/// A line for each point.
+/// One line per point.
 fn lines(coordinates: &[f64], dimensions: usize, single: bool) -> String {
     let mut text = String::with_capacity(20 * coordinates.len());
     for point in coordinates.chunks(dimensions) {
@@ -136,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_follow_each_other() {
+    fn parts_are_in_order() {
         let all: Vec<[f64; 2]> = (0..PART * PARTS + 5).map(|n| [n as f64, 0.25 * n as f64]).collect();
         let points = Points::new(&all);
         let text = points.csv(false);

@@ -24,26 +24,26 @@ use output::terminal::Terminal;
     Files by their ending: .csv (with a line x,y,... first), .npy, or .bin (coordinates point by point, little-endian, f64 or, with\n\
     --single, f32). Without -o the points are printed as CSV.")]
 pub struct SampleArgs {
-    /// What kind of points
+    /// Distribution of the points
     #[command(subcommand)]
     pub kind: Kind,
 }
 
-/// Kinds of points.
+/// Distributions of points.
 #[derive(Debug, Subcommand)]
 pub enum Kind {
-    /// Points of the unit square, cube, ... that keep their distance, to which none can be added
+    /// Poisson disk points of the unit square, cube, ...: a minimum distance, and no room for another point
     Poisson(poisson::PoissonArgs),
     /// Independent points of the unit square, cube, ... that follow a density
     White(white::WhiteArgs),
-    /// Even points of a torus or of what a closed surface encloses
+    /// Uniform points in a torus or in a closed surface
     Volume(volume::VolumeArgs),
 }
 
-/// What every kind of points has.
+/// Arguments of all distributions.
 #[derive(Debug, Args)]
 pub struct Common {
-    /// Other points by another seed
+    /// Seed of the points
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
     /// File for the points: .csv, .npy or .bin
@@ -52,15 +52,15 @@ pub struct Common {
     /// Coordinates in single precision
     #[arg(long)]
     pub single: bool,
-    /// Worker threads; all cores without it. The points do not depend on it
+    /// Worker threads [default: all cores]; the points do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Print what was made as one line of JSON instead of the points
+    /// Print a description as one line of JSON instead of the points
     #[arg(long)]
     pub json: bool,
 }
 
-/// What was made, for those who do not want the points themselves.
+/// Description of the points for `--json`.
 #[derive(Serialize)]
 struct Made<T: Serialize> {
     points: usize,
@@ -71,7 +71,7 @@ struct Made<T: Serialize> {
 }
 
 impl Common {
-    /// Writes and prints what was asked for.
+    /// Writes the file and prints the result.
     fn deliver(&self, points: &Points, facts: impl Serialize, line: &str) -> Result<(), Failure> {
         let pool = super::threads(self.threads)?;
         if let Some(path) = &self.out {
@@ -92,7 +92,8 @@ impl Common {
         ))
     }
 
-    /// Refuses a file whose ending says nothing, that cannot be written or that is the `input`, before any work.
+    /// Checks before the work that the output file has a known extension, can be written and is not the
+    /// `input`.
     fn check(&self, input: Option<&Path>) -> Result<(), Failure> {
         let out = self.out.as_deref();
         out.map(file::Format::of).transpose()?;

@@ -20,33 +20,34 @@ pub struct PoissonArgs {
     /// Dimensions, 1 to 4
     #[arg(long, value_name = "D", default_value_t = 2, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=4))]
     pub dim: u8,
-    /// Least distance, up to 0.5
+    /// Minimum distance, up to 0.5
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub r: Option<f64>,
-    /// About how many points: chooses r by how many fit on average; 1 is exact, and no other number is below what r = 0.5 gives
+    /// Approximate number of points: sets r from the mean number that fits; 1 is exact, others give at least
+    /// the points of r = 0.5
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub count: Option<u32>,
-    /// A box with borders instead of a torus, whose opposite sides meet
+    /// A box with borders instead of a periodic domain
     #[arg(long = "box")]
     pub boxed: bool,
     #[command(flatten)]
     pub common: Common,
 }
 
-/// What is to be said of the points.
+/// Facts about the points.
 #[derive(Serialize)]
 struct Facts {
     r: f64,
     periodic: bool,
     seed: u64,
-    /// Share of the domain that balls of diameter r cover.
+    /// Packing density: share of the domain covered by balls of diameter r.
     packing_density: f64,
     darts: u64,
     voids: u64,
     levels: u32,
-    /// Voids narrower than the spacing of numbers that are left.
+    /// Uncovered regions left, narrower than the gap between representable numbers.
     thin_voids: u64,
-    /// Regimes in which points are known to be bad.
+    /// Warnings about the points.
     warnings: Vec<Warning>,
 }
 
@@ -60,25 +61,25 @@ pub(super) fn run(args: &PoissonArgs, terminal: &Terminal) -> Result<(), Failure
     }
 }
 
-/// The radius at which there are about so many points, as far as it can be had.
+/// Distance r that gives about `count` points, at most 0.5.
 fn radius(count: u32, dimensions: usize, domain: Domain) -> f64 {
     if count == 1 { span(dimensions, domain) } else { radius_for(f64::from(count), dimensions).min(0.5) }
 }
 
-/// Points made in a second by the number of dimensions, about (two cores, 22 November 2026): the order of what to expect.
-const POINTS_A_SECOND: [f64; 4] = [2.5e6, 6e5, 1.1e5, 1.1e4];
-/// What takes less is not worth a word.
-const LONG_S: f64 = 20.0;
+/// Points per second by number of dimensions, on two cores; an order of magnitude.
+const POINTS_PER_S: [f64; 4] = [2.5e6, 6e5, 1.1e5, 1.1e4];
+/// Smallest expected time in seconds for a note.
+const MIN_NOTE_S: f64 = 20.0;
 
-/// What to say beforehand of many points.
+/// Note about the expected time, for many points.
 fn long(points: f64, dimensions: usize) -> Option<String> {
-    let seconds = points / POINTS_A_SECOND[dimensions - 1];
+    let seconds = points / POINTS_PER_S[dimensions - 1];
     let time = if seconds < 120.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) };
-    let told = format!("about {points:.1e} points in {dimensions} dimensions take of the order of {time}");
-    (LONG_S..f64::INFINITY).contains(&seconds).then_some(told)
+    let note = format!("about {points:.1e} points in {dimensions} dimensions take of the order of {time}");
+    (MIN_NOTE_S..f64::INFINITY).contains(&seconds).then_some(note)
 }
 
-/// Makes the points, with a bar on a terminal and a note where they take long.
+/// Generates the points, with a progress bar, and a note if they take long.
 fn make<const D: usize>(
     spec: &PoissonSpec,
     args: &PoissonArgs,
@@ -95,11 +96,11 @@ fn make<const D: usize>(
     pool.install(|| poisson_disk_with_progress(spec, &mut |points| bar.set(points as u64))).map_err(usage)
 }
 
-/// What to say where a number of points was asked for that r does not reach.
+/// Note if r cannot be large enough for the requested number of points.
 fn shortfall(args: &PoissonArgs, made: usize) -> String {
     match args.count {
         Some(count @ 2..) if radius_for(f64::from(count), args.dim.into()) > 0.5 => {
-            format!(" ({count} asked for; r is at most 0.5, which gave {made})")
+            format!(" ({count} requested; r is at most 0.5, which gave {made})")
         }
         _ => String::new(),
     }
@@ -127,7 +128,9 @@ fn sample<const D: usize>(args: &PoissonArgs, terminal: &Terminal) -> Result<(),
     };
     let thin = match found.thin_regions {
         0 => "no other fits".to_owned(),
-        thin => format!("no other number fits; {thin} voids thinner than the spacing of numbers are left"),
+        thin => format!(
+            "no other representable point fits; {thin} uncovered regions below the gap between numbers are left"
+        ),
     };
     let short = shortfall(args, found.points.len());
     if !args.common.json {
@@ -157,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn one_of_both_is_asked_for_and_not_both() {
+    fn either_r_or_count_is_required() {
         let message = parsed(&[]).unwrap_err();
         assert!(message.contains("--r <R>") && message.contains("--count <N>"), "{message}");
         assert!(parsed(&["--r", "0.1", "--count", "4"]).is_err());
@@ -165,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_told_with_its_limits() {
+    fn invalid_values_are_refused_with_their_limits() {
         let message = parsed(&["--r", "0.1", "--seed", "-1"]).err().unwrap_or_default();
         assert!(message.contains("-1") && message.contains("from 0 to 18446744073709551615"), "{message}");
         for (r, said) in
@@ -180,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_takes_long_is_told_beforehand() {
+    fn a_long_time_gives_a_note() {
         assert_eq!((long(1e5, 2), long(1e5, 4), long(f64::INFINITY, 4)), (None, None, None));
         let [short, much] = [long(1e6, 4), long(1e7, 4)].map(Option::unwrap_or_default);
         assert!(
@@ -189,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn one_point_is_one_and_what_cannot_be_few_is_said() {
+    fn one_point_is_exact_and_too_few_give_a_note() {
         let said = |count: &str| {
             let args = parsed(&["--count", count]).unwrap();
             let spec = PoissonSpec {
@@ -207,7 +210,7 @@ mod tests {
         };
         assert_eq!(said("1"), (1, String::new()));
         let (made, line) = said("2");
-        assert!(made > 1 && line.contains(&format!("2 asked for; r is at most 0.5, which gave {made}")));
+        assert!(made > 1 && line.contains(&format!("2 requested; r is at most 0.5, which gave {made}")));
         let (made, line) = said("1000");
         assert!((900..1100).contains(&made) && line.is_empty());
     }

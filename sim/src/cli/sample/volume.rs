@@ -19,7 +19,7 @@ pub struct VolumeArgs {
     /// A closed surface, .ply, .obj, .off or .stl; without it a torus about the middle of the unit cube
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
-    /// From the axis of the torus to the middle of its tube
+    /// Major radius of the torus, from its axis to the middle of its tube
     #[arg(
         long,
         value_name = "R",
@@ -37,13 +37,13 @@ pub struct VolumeArgs {
         conflicts_with = "mesh"
     )]
     pub tube: f64,
-    /// How many points; 10000 where neither this nor a density is given
+    /// Number of points [default: 10000 without a density]
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "density", value_parser = clap::value_parser!(u32).range(1..))]
     pub count: Option<u32>,
-    /// How many points to a unit of volume on average
+    /// Mean number of points per unit of volume
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     pub density: Option<f64>,
-    /// Tiles across, in each of which the volume is bounded
+    /// Tiles along an axis; the volume is bounded in each
     #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=2048))]
     pub tiles: u32,
     #[command(flatten)]
@@ -51,19 +51,19 @@ pub struct VolumeArgs {
 }
 
 impl VolumeArgs {
-    /// How many points are asked for where no density is.
+    /// Number of points without a density.
     fn points(&self) -> u32 {
         self.count.unwrap_or(10_000)
     }
 }
 
-/// What is to be said of the points.
+/// Facts about the points.
 #[derive(Serialize)]
 struct Facts {
     seed: u64,
-    /// What is enclosed, by its closed form or the divergence theorem.
+    /// Exact volume, from a closed form or the divergence theorem.
     volume: f64,
-    /// The same by counting: share of the candidates times the volume of the bounds.
+    /// Volume by counting: share of accepted candidates times the volume of the bounds.
     volume_by_count: f64,
     bounds_volume: f64,
     candidates: u64,
@@ -94,19 +94,19 @@ pub(super) fn run(args: &VolumeArgs) -> Result<(), Failure> {
     })
 }
 
-/// Candidates that are tested at most: some minutes.
-const MOST_CANDIDATES: f64 = 1e10;
+/// Largest number of candidates: some minutes of work.
+const MAX_CANDIDATES: f64 = 1e10;
 
-/// Refuses a torus that fills so little of its bounds that its points would take too long to find.
+/// Checks that a torus fills enough of its bounds for [`MAX_CANDIDATES`].
 fn thick_enough(args: &VolumeArgs, share: f64) -> Result<(), Failure> {
     let count = args.points();
     let candidates = f64::from(count) / share;
-    if candidates <= MOST_CANDIDATES {
+    if candidates <= MAX_CANDIDATES {
         return Ok(());
     }
     Err(usage(format!(
-        "--tube {:?}: {count} points in it take about {candidates:.0e} candidates, more than {MOST_CANDIDATES:.0e}; \
-         make the tube wider or ask for fewer points",
+        "--tube {:?}: {count} points in it take about {candidates:.0e} candidates, more than {MAX_CANDIDATES:.0e}; \
+         make the tube wider or choose fewer points",
         args.tube
     )))
 }
@@ -115,10 +115,10 @@ fn sample(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -
     let seed = args.common.seed;
     let count = args.points() as usize;
     let Sampled { points, candidates } = match args.density {
-        Some(density) if !(density > 0.0 && density * bounds.volume() < MOST_CANDIDATES) => {
+        Some(density) if !(density > 0.0 && density * bounds.volume() < MAX_CANDIDATES) => {
             return Err(usage(format!(
-                "--density {density:?}: it has to be above 0 and below {:.1e}: {MOST_CANDIDATES:.0e} candidates in the bounds",
-                MOST_CANDIDATES / bounds.volume()
+                "--density {density:?}: it has to be above 0 and below {:.1e}: {MAX_CANDIDATES:.0e} candidates in the bounds",
+                MAX_CANDIDATES / bounds.volume()
             )));
         }
         Some(density) => bounds.sample_density(solid, density, seed),
@@ -145,8 +145,8 @@ mod tests {
     fn a_mesh_has_no_ring_and_no_tube() {
         for flag in ["--ring", "--tube"] {
             let typed = ["quintile", "sample", "volume", "--mesh", "a.ply", flag, "0.2"];
-            let told = Cli::try_parse_from(typed).map(|_| ()).unwrap_err();
-            assert!(told.exit_code() == 2 && told.to_string().contains(flag), "{told}");
+            let error = Cli::try_parse_from(typed).map(|_| ()).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains(flag), "{error}");
         }
         assert!(Cli::try_parse_from(["quintile", "sample", "volume", "--mesh", "a.ply"]).is_ok());
     }
@@ -163,10 +163,10 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_cannot_be_are_told_in_a_line() {
+    fn invalid_numbers_are_refused_in_one_line() {
         for (typed, says) in [
             (["--tube", "1e-300"], "--tube 1e-300: 10000 points in it take about"),
-            (["--tube", "1e-9"], "make the tube wider or ask for fewer points"),
+            (["--tube", "1e-9"], "make the tube wider or choose fewer points"),
             (["--tube", "nan"], "--tube NaN: the tube has to be above 0"),
             (["--ring", "1e300"], "--ring 1e300, --tube 0.15: the tube has to be"),
             (["--ring", "inf"], "both together at most 0.5"),

@@ -16,19 +16,19 @@ pub struct WhiteArgs {
     /// Dimensions, 1 to 4
     #[arg(long, value_name = "D", default_value_t = 2, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=4))]
     pub dim: u8,
-    /// How many points
+    /// Number of points
     #[arg(long, value_name = "N", default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub count: u32,
     /// The density: constant, ramp, gauss or waves
     #[arg(long, value_name = "NAME", default_value = "gauss", value_parser = density, conflicts_with = "image")]
     pub density: Named,
-    /// A PNG or JPEG as the density of two dimensions: bright is dense
+    /// A PNG or JPEG image as a density in two dimensions: bright is dense
     #[arg(long, value_name = "FILE")]
     pub image: Option<PathBuf>,
-    /// Cells along an axis over each of which the density is bounded; 1 is plain rejection
+    /// Cells along an axis; the density is bounded in each. 1 is plain rejection
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub columns: Option<u32>,
-    /// Candidates of a low-discrepancy sequence: they follow the density better than independent ones would
+    /// Take candidates from a low-discrepancy sequence: they follow the density better than independent ones
     #[arg(long)]
     pub low_discrepancy: bool,
     #[command(flatten)]
@@ -37,10 +37,10 @@ pub struct WhiteArgs {
 
 fn density(name: &str) -> Result<Named, String> {
     let known = Named::ALL.map(|(name, _)| name);
-    Named::by_name(name).ok_or_else(|| format!("no density is called `{name}`; {}", suggestion(name, &known)))
+    Named::by_name(name).ok_or_else(|| format!("unknown density `{name}`; {}", suggestion(name, &known)))
 }
 
-/// What is to be said of the points.
+/// Facts about the points.
 #[derive(Serialize)]
 struct Facts {
     seed: u64,

@@ -9,7 +9,7 @@ use super::{Cost, Effort, QUANTITIES, Trial};
 use output::progress::Progress;
 use run::Sampling;
 use run::{
-    Distinct, Forecast, Plan, Quantity, RunError, RunFrame, RunOptions, Scout, Signatures, frames_of, taken,
+    Distinct, Forecast, Plan, Previews, Quantity, RunError, RunFrame, RunOptions, Signatures, frames_of,
 };
 
 /// What it cost, and every trial.
@@ -21,19 +21,19 @@ pub(super) fn animation(
     let plan = plan(scene, effort)?;
     let numbers: Vec<u32> = plan.work.settings().frames.clone().collect();
     let started = ProcessTime::now();
-    let scout = Scout::look(&plan, &numbers, progress)?;
+    let previews = Previews::new(&plan, &numbers, progress)?;
     let previews_s = started.elapsed().as_secs_f64();
     let started = ProcessTime::now();
     let frames = frames_of(&plan, &numbers, progress)?;
     let all_s = started.elapsed().as_secs_f64();
-    let signatures = Signatures::new(&scout.glimpses, scout.pilot, &frames[scout.pilot], &plan.model);
+    let signatures = Signatures::new(&previews.frames, previews.pilot, &frames[previews.pilot], &plan.model);
     let name = Path::new(scene).file_name().map_or(scene.into(), |file| file.to_string_lossy());
     let truth = truth(&frames, plan.gpu.core_hz);
     let (mut trials, mut simulated) = (Vec::new(), 0);
     for seed in 1..=effort.seeds {
-        let design = scout.design(&signatures, Sampling::Some.first(numbers.len()), seed);
+        let design = previews.design(&signatures, Sampling::Some.first(numbers.len()), seed);
         simulated = design.chosen().len();
-        let forecast = Forecast::new(design, &signatures, |place| taken(&frames[place]));
+        let forecast = Forecast::new(design, &signatures, |place| frames[place].cost());
         let found = [
             forecast.cycles_per_frame(),
             forecast.energy_per_frame_j(),
@@ -83,8 +83,8 @@ fn plan(scene: &str, effort: Effort) -> Result<Plan, RunError> {
 /// What all frames come to: cycles a frame, joules a frame while busy, watts while busy.
 fn truth(frames: &[RunFrame], core_hz: f64) -> [f64; 3] {
     let count = frames.len() as f64;
-    let cycles: f64 = frames.iter().map(|frame| taken(frame).cycles).sum();
-    let energy_j: f64 = frames.iter().map(|frame| taken(frame).energy_j).sum();
+    let cycles: f64 = frames.iter().map(|frame| frame.cost().cycles).sum();
+    let energy_j: f64 = frames.iter().map(|frame| frame.cost().energy_j).sum();
     [cycles / count, energy_j / count, energy_j / cycles * core_hz]
 }
 

@@ -9,7 +9,7 @@ use workloads::Overrides;
 use output::progress::Progress;
 use run::GpuSpec;
 use run::Sampling;
-use run::{Distinct, Forecast, Plan, RunError, RunFrame, RunOptions, Scout, Signatures, frames_of, taken};
+use run::{Distinct, Forecast, Plan, Previews, RunError, RunFrame, RunOptions, Signatures, frames_of};
 use timing::Level;
 
 /// The name of the level that simulates few frames and predicts the others.
@@ -66,7 +66,7 @@ struct Simulated {
 
 impl Simulated {
     fn cycles(&self) -> f64 {
-        self.frames.iter().map(|frame| taken(frame).cycles).sum()
+        self.frames.iter().map(|frame| frame.cost().cycles).sum()
     }
 }
 
@@ -135,14 +135,15 @@ fn sampled(
     progress: &Progress,
 ) -> Result<Vec<(u64, usize, f64, f64)>, RunError> {
     let started = ProcessTime::now();
-    let scout = Scout::look(&all.plan, numbers, progress)?;
+    let previews = Previews::new(&all.plan, numbers, progress)?;
     let previews_s = started.elapsed().as_secs_f64();
-    let signatures = Signatures::new(&scout.glimpses, scout.pilot, &all.frames[scout.pilot], &all.plan.model);
+    let signatures =
+        Signatures::new(&previews.frames, previews.pilot, &all.frames[previews.pilot], &all.plan.model);
     let count = numbers.len();
     let choice = |seed| {
-        let design = scout.design(&signatures, Sampling::Some.first(count), seed);
+        let design = previews.design(&signatures, Sampling::Some.first(count), seed);
         let simulated = design.chosen().len();
-        let forecast = Forecast::new(design, &signatures, |place| taken(&all.frames[place]));
+        let forecast = Forecast::new(design, &signatures, |place| all.frames[place].cost());
         let host_s = previews_s + all.host_s * simulated as f64 / count as f64;
         (seed, simulated, forecast.cycles_per_frame().value * count as f64, host_s)
     };

@@ -156,8 +156,10 @@ pub(super) fn timed(level: Level, gpu: &GpuSpec, written: &Written) -> Result<(T
     let started = ThreadTime::now();
     let recorder = Recorder::new(BIN_PS, MOST_BINS);
     let timed = match level {
-        Level::Stepped => stepped::run(&gpu.units, *clocks, builder, stream, recorder, &StepOptions::default())
-            .map_err(TimingError::from)?,
+        Level::Stepped => {
+            stepped::run(&gpu.units, *clocks, builder, stream, recorder, &StepOptions::default())
+                .map_err(TimingError::from)?
+        }
         Level::Packet => {
             PacketClock::new(&gpu.units, *clocks, gpu.pipeline.batch_triangles, recorder).run(stream)
         }

@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace align` and `quintile trace convert`.
+//! Arguments of `quintile trace align` and `quintile trace convert`.
 
 use std::path::PathBuf;
 
@@ -52,7 +52,7 @@ pub struct ConvertArgs {
     /// The file to write, however it was given.
     #[arg(skip)]
     pub out: PathBuf,
-    /// Print what was read, mended and written as JSON
+    /// Print what was read, repaired and written as JSON
     #[arg(long)]
     pub json: bool,
     /// Format of standard output, where OUT is `-` (default: csv)

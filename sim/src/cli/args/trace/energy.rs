@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace energy`.
+//! Arguments of `quintile trace energy`.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use super::parse::{pass, stretch};
 use super::{FindArgs, InputArgs};
 use crate::cli::quantity::{power, size_of_power, time};
 
-/// What is asked of frames, not of a stretch.
+/// Arguments about frames; they do not apply to a segment.
 const OF_FRAMES: [&str; 11] = [
     "mark",
     "mark_file",
@@ -47,10 +47,10 @@ pub struct EnergyArgs {
     /// Idle power to subtract, in W
     #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_hyphen_values = true, value_parser = size_of_power)]
     pub idle_w: Option<f64>,
-    /// A recording without rendering to take off
+    /// A recording without rendering, to subtract
     #[arg(long, value_name = "TRACE")]
     pub idle_trace: Option<PathBuf>,
-    /// How the recording is taken off
+    /// How the recording is subtracted
     #[arg(long, value_enum, default_value_t, requires = "idle_trace")]
     pub idle_by: IdleBy,
     /// A pass within every frame: its name, and when it begins after the start of the frame, in milliseconds or with its unit
@@ -73,7 +73,7 @@ pub struct EnergyArgs {
     pub json: bool,
 }
 
-/// How a recording of idling is taken off.
+/// How an idle recording is subtracted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum IdleBy {
     /// Its mean power, at all times
@@ -86,9 +86,9 @@ pub enum IdleBy {
 /// Frames to leave out at the beginning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Discard {
-    /// So many.
+    /// This number of frames.
     Count(usize),
-    /// Those before the mean settles.
+    /// Frames before the mean is stable.
     Auto,
 }
 

@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace`.
+//! Arguments of `quintile trace`.
 
 mod convert;
 mod energy;
@@ -28,12 +28,12 @@ use crate::cli::quantity::{positive_voltage, rate, time};
     after_help = "Example:\n  quintile trace frames meter.csv --mark 2.513 --out frames.csv\n  quintile trace plot meter.csv --from 2 --to 3 --out curve.svg"
 )]
 pub struct TraceArgs {
-    /// What to do with it.
+    /// The subcommand.
     #[command(subcommand)]
     pub command: TraceCommand,
 }
 
-/// What to do with a trace.
+/// Subcommands of `trace`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum TraceCommand {
     /// Find every frame that begins like a marked one, and its energy from start to start
@@ -167,7 +167,7 @@ pub struct FramesArgs {
     /// Also give inverse units, with what is wrong about averaging them
     #[arg(long)]
     pub inverse: bool,
-    /// Worker threads; all cores without it. The results do not depend on it
+    /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print everything as JSON and nothing else

@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace pareto`.
+//! Arguments of `quintile trace pareto`.
 
 use std::path::PathBuf;
 
@@ -52,7 +52,7 @@ pub struct ParetoArgs {
     /// Whether the result goes to standard output.
     #[arg(skip)]
     pub piped: bool,
-    /// How pictures look.
+    /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
 }

@@ -1,8 +1,8 @@
-//! Values that are more than a number or a name.
+//! Parsers of values with two parts.
 
 use crate::cli::quantity::{milliseconds, time};
 
-/// Two values with `between` between them, in the form of an example.
+/// Two values separated by `between`; `form` describes them in errors.
 fn two(
     text: &str,
     between: &str,

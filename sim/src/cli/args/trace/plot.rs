@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace plot`.
+//! Arguments of `quintile trace plot`.
 
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ pub struct PlotArgs {
     /// Whether the result goes to standard output.
     #[arg(skip)]
     pub piped: bool,
-    /// How pictures look.
+    /// Style of pictures.
     #[command(flatten)]
     pub look: LookArgs,
 }

@@ -1,4 +1,4 @@
-//! What can be typed after `quintile trace sample`.
+//! Arguments of `quintile trace sample`.
 
 use std::path::PathBuf;
 
@@ -68,7 +68,7 @@ pub struct SampleArgs {
     /// Time constant of a low-pass on the power, in seconds or with its unit (default: none)
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = length_of_time)]
     pub low_pass: Option<f64>,
-    /// Samples that travel together, and are lost together (default: 512)
+    /// Samples in one packet; a packet is lost as a whole (default: 512)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PACKET_SAMPLES)))]
     pub packet_samples: Option<u32>,
     /// Share of packets that are lost, 0 to below 1: gaps in the file (default: 0)

@@ -1,23 +1,21 @@
-//! Regimes in which the methods of a run are known to be bad.
+//! Warnings of a run.
 
 use std::collections::BTreeMap;
 
 use activity::{Counts, Event};
+use output::table::si;
 use power_model::PacedFrame;
+use timing::AccuracyWarning;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
 
-use crate::recorder::MIN_BUSY_SAMPLES;
-mod regime;
+use crate::measure::MIN_BUSY_SAMPLES;
+use crate::{Choice, Measurement, Observed, Plan, Regime, RunFrame, Simulated, gpu};
 
-use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, pairing};
-use output::table::si;
-use timing::AccuracyWarning;
-
-/// Every warning of a run, sorted and each once.
+/// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
     let mut all = plan.work.warnings().to_vec();
-    all.extend(pairing::check(&plan.options, &plan.gpu, &plan.platform, &plan.table));
+    all.extend(gpu::check_pairing(&plan.options, &plan.gpu, &plan.platform, &plan.table));
     all.extend(of_frames(
         simulated
             .distinct
@@ -26,26 +24,26 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
     ));
     all.extend(measurement.run.warnings.iter().cloned());
     let short = short_frames(measurement);
-    // A run of one frame has no other that could resemble it, and frames too short to be seen resemble nothing.
+    // In a run of one frame, or of frames that are too short, finding only the mark is expected.
     let unseen = short.is_some() && measurement.is_mark_alone();
     let explained = simulated.frames.len() == 1 || unseen;
     let of_trace = measurement.found.warnings.iter().filter(|w| !(explained && w.code == "only-mark"));
     all.extend(of_trace.cloned());
     all.extend(accuracy(plan, simulated));
     all.extend(degenerate(simulated));
-    all.extend(nothing_seen(simulated));
+    all.extend(empty_frames(simulated));
     all.extend(start_errors(measurement).filter(|_| short.is_none()));
     all.extend(short);
     all.extend(detection(measurement).filter(|_| !unseen));
     all.extend(idle_above_busy(plan, simulated));
     all.extend(clipped(measurement));
     all.extend(lost(measurement));
-    all.extend(unsure(simulated));
-    all.extend(regime::gather(simulated));
+    all.extend(wide_intervals(simulated));
+    all.extend(of_regimes(simulated));
     Warning::fold(all)
 }
 
-/// The warnings of single frames: of each code the message of the first frame that has it, with the number of frames where they
+/// Merges warnings of frames by code: the message of the first frame, with the number of frames if messages
 /// differ.
 fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) -> Vec<Warning> {
     let of = frames.len();
@@ -66,7 +64,7 @@ fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) ->
     by_code.into_values().map(joined).collect()
 }
 
-/// Accuracy warnings of the timing level: of each code, the frame with the largest extent.
+/// Accuracy warnings of the timing level: for each code, the frame with the largest extent.
 fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
     let mut worst: Vec<(u32, AccuracyWarning)> = Vec::new();
     let all =
@@ -100,7 +98,7 @@ fn degenerate(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
+fn empty_frames(simulated: &Simulated) -> Option<Warning> {
     let empty = simulated.known().filter(|frame| frame.counts[Event::SamplesHit] == 0).count();
     (empty > 0).then(|| {
         Warning::new(
@@ -110,8 +108,8 @@ fn nothing_seen(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-/// A choice that is not as good, or not as fast, as was asked for.
-pub(crate) fn missed(choice: &Choice) -> Vec<Warning> {
+/// Warnings about a choice that misses the requested accuracy or the time budget.
+pub(crate) fn missed_requests(choice: &Choice) -> Vec<Warning> {
     let late = choice.budget_s.zip(choice.expected_host_s).filter(|(budget, expected)| expected > budget);
     let late = late.map(|(budget_s, expected_s)| {
         let message = format!(
@@ -134,13 +132,13 @@ pub(crate) fn missed(choice: &Choice) -> Vec<Warning> {
     late.into_iter().chain(inexact).collect()
 }
 
-/// Intervals wider than this share of their value either way are worth a word.
-const WIDE_PERCENT: f64 = 5.0;
+/// Relative half-width in percent above which an interval gives a warning.
+const MAX_HALF_WIDTH_PERCENT: f64 = 5.0;
 
-fn unsure(simulated: &Simulated) -> Option<Warning> {
+fn wide_intervals(simulated: &Simulated) -> Option<Warning> {
     let sampled = simulated.sampled.as_ref()?;
     let worst = sampled.worst() * 100.0;
-    (worst > WIDE_PERCENT).then(|| {
+    (worst > MAX_HALF_WIDTH_PERCENT).then(|| {
         Warning::new(
             Code::PredictionUnsure,
             format!(
@@ -153,7 +151,7 @@ fn unsure(simulated: &Simulated) -> Option<Warning> {
     })
 }
 
-/// Frames whose work the recorder may miss between two samples, with the remedy and what came of it.
+/// Warning about frames that are busy for less than two samples.
 fn short_frames(measurement: &Measurement) -> Option<Warning> {
     let resolution = &measurement.resolution;
     let frames = &measurement.run.frames;
@@ -197,28 +195,31 @@ fn detection(measurement: &Measurement) -> Option<Warning> {
     })
 }
 
-/// Starts that count as found and yet are so far off that energy moves from frame to frame.
+/// Warning about found starts that are off by more than half of the frame's busy time.
 fn start_errors(measurement: &Measurement) -> Option<Warning> {
     let found = measurement.by_true_frame();
-    let off = measurement.run.frames.iter().zip(found).filter_map(|(frame, found)| {
-        let (error_s, busy_s) = ((found?.start_s - frame.start_s).abs(), frame.busy_end_s - frame.start_s);
-        (error_s > 0.5 * busy_s).then_some((error_s, busy_s))
+    let frames = measurement.run.frames.iter().zip(found).filter_map(|(frame, found)| {
+        Some(((found?.start_s - frame.start_s).abs(), frame.busy_end_s - frame.start_s))
     });
-    let off: Vec<(f64, f64)> = off.collect();
+    starts_off(frames, measurement.truth.len())
+}
+
+/// Of the error of each start that was found and the busy time of its frame, both in seconds.
+fn starts_off(frames: impl Iterator<Item = (f64, f64)>, truth: usize) -> Option<Warning> {
+    let off: Vec<(f64, f64)> = frames.filter(|(error_s, busy_s)| *error_s > 0.5 * busy_s).collect();
     let (error_s, busy_s) = off.iter().copied().max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
     let message = format!(
-        "{} of {} frame starts were found more than half of their frame's busy time off, the worst by {} where the frame is busy \
-         for {}: part of its energy counts to its neighbour; raise --trace-rate, draw larger images, or find frames with a \
+        "{} of {truth} frame starts were found more than half of their frame's busy time off, the worst by {} where the frame is \
+         busy for {}: part of its energy counts to its neighbour; raise --trace-rate, draw larger images, or find frames with a \
          shorter --window of `quintile trace frames`",
         off.len(),
-        measurement.truth.len(),
         si(error_s, "s"),
         si(busy_s, "s")
     );
     Some(Warning::new(Code::StartError, message))
 }
 
-/// A platform that draws more between frames than while the GPU works.
+/// Warning about a platform whose idle power is above the power of a frame.
 fn idle_above_busy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
     let idle_w = plan.platform.idle_w.value();
     let busy_w = |frame: &RunFrame| frame.power.energy().total_j() / frame.power.duration_s();
@@ -248,13 +249,149 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
     measurement.trace.losses().map(|losses| Warning::new(Code::PacketsLost, losses))
 }
 
+/// Smallest share of triangles in view for a warning about tiny triangles.
+const TINY_SHARE: f64 = 0.5;
+/// The same for slivers and blur.
+const SLIVER_OR_BLURRED_SHARE: f64 = 0.25;
+/// The same for triangles behind the camera and fast motion.
+const BEHIND_OR_FAST_SHARE: f64 = 0.1;
+
+/// Warnings about triangles for which tile tests are ineffective, each for the worst frame. Results stay
+/// correct.
+fn of_regimes(simulated: &Simulated) -> Vec<Warning> {
+    [
+        behind(simulated),
+        tiny(simulated),
+        slivers(simulated),
+        fast(simulated),
+        blurred(simulated),
+        extreme(simulated),
+        coarse(simulated),
+        cut(simulated),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// Frame with the most triangles of a regime, counted by `of`, if they are at least `share` of those in view.
+/// The text is, for example, `12 of 40 triangles in view (frame 3)`.
+fn worst_frame(simulated: &Simulated, share: f64, of: fn(&Regime) -> u64) -> Option<String> {
+    let (frame, observed) = simulated.observed().max_by_key(|(_, observed)| of(&observed.regime))?;
+    let (count, all) = (of(&observed.regime), observed.regime.in_view);
+    (count > 0 && count as f64 >= share * all as f64)
+        .then(|| format!("{count} of {all} triangles in view (frame {})", frame.index))
+}
+
+fn behind(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, BEHIND_OR_FAST_SHARE, |regime| regime.behind)?;
+    Some(Warning::new(
+        Code::BehindCamera,
+        format!(
+            "{which} reach behind the camera: nothing bounds their image, so they are tested all over it; move the camera, \
+             or cut large triangles into smaller ones"
+        ),
+    ))
+}
+
+fn tiny(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, TINY_SHARE, |regime| regime.tiny)?;
+    Some(Warning::new(
+        Code::SubSampleTriangles,
+        format!(
+            "{which} are smaller than the spacing of samples: most are hit by none, and tile tests cannot help; use a \
+             coarser mesh, a larger image or more samples"
+        ),
+    ))
+}
+
+fn slivers(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, SLIVER_OR_BLURRED_SHARE, |regime| regime.slivers)?;
+    Some(Warning::new(
+        Code::SliverTriangles,
+        format!(
+            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; mend the mesh \
+             where it was made"
+        ),
+    ))
+}
+
+fn fast(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, BEHIND_OR_FAST_SHARE, |regime| regime.fast)?;
+    Some(Warning::new(
+        Code::FastMotion,
+        format!(
+            "{which} move by more than an image while the shutter is open: few samples see them, the image is noisy, and \
+             a straight way may be far from the true one; use a shorter shutter, a higher frame rate or more samples"
+        ),
+    ))
+}
+
+fn blurred(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, SLIVER_OR_BLURRED_SHARE, |regime| regime.blurred)?;
+    Some(Warning::new(
+        Code::BlurBeyondImage,
+        format!(
+            "{which} are out of focus by more than an image: the lens is too large for this scene; use a smaller --lens \
+             or another --focus"
+        ),
+    ))
+}
+
+fn extreme(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, 0.0, |regime| regime.extreme)?;
+    Some(Warning::new(
+        Code::CoordinatesOutOfRange,
+        format!(
+            "{which} have coordinates whose products leave the range of 32-bit numbers: they may not be seen, or at wrong \
+             depths; scale the scene to ordinary lengths"
+        ),
+    ))
+}
+
+fn coarse(simulated: &Simulated) -> Option<Warning> {
+    let which = worst_frame(simulated, 0.0, |regime| regime.coarse)?;
+    Some(Warning::new(
+        Code::CoordinatesCoarse,
+        format!(
+            "{which} have coordinates so large that 32-bit numbers move them by more than a quarter of a pixel: they are drawn \
+             out of place; move what the camera sees to the origin, without what is far from it"
+        ),
+    ))
+}
+
+fn cut(simulated: &Simulated) -> Option<Warning> {
+    let (frame, worst) = simulated.observed().max_by_key(|(_, observed)| observed.regime.cut)?;
+    let (count, frames) =
+        (worst.regime.cut, simulated.observed().filter(|(_, observed)| observed.regime.cut > 0).count());
+    (count > 0).then(|| {
+        let message = format!(
+            "the near plane cuts {count} triangles in front of the camera away, or parts of them (frame {}; some in {frames} of {} \
+             frames): give the camera a smaller `near`, or move it",
+            frame.index,
+            simulated.distinct.len()
+        );
+        Warning::new(Code::NearPlaneCuts, message)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::GpuSpec;
-    use crate::{Quantity, SampledSummary};
+    use crate::{GpuSpec, Quantity, SampledSummary};
     use timing::streams::failures;
     use timing::{FrameClock, Level, Recorder};
+
+    #[test]
+    fn starts_off_by_more_than_half_of_their_frame_are_warned_about() {
+        let warning =
+            starts_off([(1e-6, 140e-6), (200e-6, 140e-6), (80e-6, 140e-6)].into_iter(), 36).unwrap();
+        assert_eq!(warning.code, Code::StartError);
+        let message = "2 of 36 frame starts were found more than half of their frame's busy time off, the worst by 200 µs \
+                       where the frame is busy for 140 µs";
+        assert!(warning.message.starts_with(message), "{warning}");
+        assert_eq!(starts_off([(69e-6, 140e-6)].into_iter(), 36), None);
+    }
 
     #[test]
     fn a_warning_of_many_frames_is_one_line() {
@@ -273,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_intervals_are_told_and_narrow_ones_are_not() {
+    fn only_wide_intervals_give_a_warning() {
         let of = |percent: f64| {
             let relative_half_width = percent / 100.0;
             let quantity =
@@ -289,14 +426,20 @@ mod tests {
                 busy_power_w: quantity(0.01),
             };
             let (distinct, pictures, heat) = (Vec::new(), Vec::new(), Vec::new());
-            unsure(&Simulated { distinct, frames: vec![0; 36], pictures, heat, sampled: Some(sampled) })
+            wide_intervals(&Simulated {
+                distinct,
+                frames: vec![0; 36],
+                pictures,
+                heat,
+                sampled: Some(sampled),
+            })
         };
-        assert_eq!(of(WIDE_PERCENT), None);
+        assert_eq!(of(MAX_HALF_WIDTH_PERCENT), None);
         let message = of(7.25).map(|warning| warning.to_string()).unwrap_or_default();
         assert!(message.contains("3 of 36 frames") && message.contains("7.2 %"), "{message}");
     }
 
-    /// The codes of every stream that breaks a level, where there are any.
+    /// Warning codes of the failure streams at a level.
     fn codes(level: Level) -> Vec<(String, Code)> {
         let mut found = Vec::new();
         for name in ["mobile", "reference", "discrete"] {
@@ -317,7 +460,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_that_break_a_level_are_warned_about_and_others_are_not() {
+    fn only_failure_streams_give_accuracy_warnings() {
         let rows = ["discrete", "mobile", "reference"]
             .map(|gpu| (format!("row after row on {gpu}"), Code::MemoryRows));
         assert_eq!(codes(Level::Packet), rows);
