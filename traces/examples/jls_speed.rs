@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (samples, path): (u64, _) = (samples.parse()?, Path::new(path));
     let noise: Vec<f32> =
         (0..PIECE as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 12) as f32 * 1e-6).collect();
-    let tell = |what: &str, clock: Instant| {
+    let report = |what: &str, clock: Instant| {
         println!("{what} {:.2}", samples as f64 / 1e6 / clock.elapsed().as_secs_f64());
     };
     let clock = Instant::now();
@@ -30,14 +30,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         file.finish()
     })?;
-    tell("write", clock);
+    report("write", clock);
     println!("bytes_per_sample {:.3}", std::fs::metadata(path)?.len() as f64 / samples as f64);
     if !rest.is_empty() {
         return Ok(());
     }
     let clock = Instant::now();
     let trace = read(path, &ReadOptions::default())?.trace;
-    tell("read", clock);
+    report("read", clock);
     std::fs::remove_file(path)?;
     assert_eq!(trace.samples() as u64, samples);
     Ok(())

@@ -22,31 +22,31 @@ fn main() -> Result<(), Box<dyn Error>> {
     let clock = Instant::now();
     let trace = device.sample(&curve, 0.0, curve.end_s())?.trace;
     let millions = trace.samples() as f64 / 1e6;
-    let tell = |what: &str, clock: Instant| {
+    let report = |what: &str, clock: Instant| {
         println!("{what:<10} {:8.2} million samples/s", millions / clock.elapsed().as_secs_f64());
     };
-    tell("sample", clock);
+    report("sample", clock);
 
     let power: Vec<f64> = trace.powers_w().collect();
     let clock = Instant::now();
     let distances = profile::summed_squared_difference(&power, &power[8000..8250]);
-    tell("profile", clock);
+    report("profile", clock);
     std::hint::black_box(distances);
 
     let clock = Instant::now();
     let found = find(&trace, &Marks::one(5.0 / 30.0, default_window(1.0 / 30.0, 50e3), trace.end_s()))?;
     let energies = PowerIntegral::new(&trace).frames(&found);
-    tell("find", clock);
+    report("find", clock);
     println!("{} of {frames} frames", energies.len());
 
     let path = std::env::temp_dir().join(format!("traces-speed-{}.parquet", std::process::id()));
     let clock = Instant::now();
     io::parquet::save(&trace, &path)?;
-    tell("write", clock);
+    report("write", clock);
     println!("{:.2} bytes a sample", std::fs::metadata(&path)?.len() as f64 / 1e6 / millions);
     let clock = Instant::now();
     let read = io::read_parquet(&path);
-    tell("read", clock);
+    report("read", clock);
     std::fs::remove_file(&path)?;
     assert!(read? == trace);
     Ok(())

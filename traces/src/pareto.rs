@@ -141,7 +141,7 @@ pub enum ParetoError {
         path: PathBuf,
     },
     /// A row that is not a setting.
-    #[error("{path}: row {row}: {reason}: mend or drop the row", path = path.display())]
+    #[error("{path}: row {row}: {reason}: fix or drop the row", path = path.display())]
     Row {
         /// The file.
         path: PathBuf,

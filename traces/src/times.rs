@@ -142,11 +142,11 @@ impl Column {
                      with a decimal point",
                     fields.len()
                 ),
-                columns => format!("has {} fields, the first line {columns}: mend it", fields.len()),
+                columns => format!("has {} fields, the first line {columns}: fix it", fields.len()),
             });
         }
         let number = fields[self.index].parse::<f64>().ok().filter(|time| time.is_finite());
-        number.map(|time| time * self.scale).ok_or_else(|| "holds no time; mend it".to_owned())
+        number.map(|time| time * self.scale).ok_or_else(|| "holds no time; fix it".to_owned())
     }
 }
 

@@ -36,7 +36,7 @@ pub enum TraceError {
         time_s: f64,
     },
     /// A sample is not a finite number.
-    #[error("row {row}: {channel} is {value}, not a finite number; cut the stretch out or mend it")]
+    #[error("row {row}: {channel} is {value}, not a finite number; cut it out or fix it")]
     NotFinite {
         /// Sample, from 1.
         row: usize,

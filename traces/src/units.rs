@@ -177,13 +177,13 @@ pub fn scale(column: &str, of: Quantity) -> Result<Option<f64>, UnitError> {
         name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let other = |word: &&&str| OTHER_WORDS.iter().any(|other| other.eq_ignore_ascii_case(word));
     if let Some(word) = words.iter().find(other) {
-        return Err(UnitError(format!("column `{column}`: `{word}` tells that it holds no {}", of.name())));
+        return Err(UnitError(format!("column `{column}`: `{word}` says that it holds no {}", of.name())));
     }
     let units: Vec<_> = words.iter().filter_map(|word| table_unit(word)).collect();
     match units.iter().rfind(|(quantity, _)| *quantity == of) {
         Some((_, scale)) => Ok(Some(*scale)),
         None if !units.is_empty() => {
-            Err(UnitError(format!("column `{column}`: its unit tells that it holds no {}", of.name())))
+            Err(UnitError(format!("column `{column}`: its unit says that it holds no {}", of.name())))
         }
         None => words.iter().find(|word| may_be_unit(word)).map_or(Ok(None), |word| {
             Err(UnitError(format!(
@@ -204,7 +204,7 @@ pub fn scale_with(column: &str, unit: Option<&str>, of: Quantity) -> Result<Opti
         Some(stated) if named.is_none_or(|named| named == stated) => Ok(Some(stated)),
         _ => Err(UnitError(format!(
             "column `{column}` has the unit {text} in its metadata, which is none of {} that is known, or contradicts its name: \
-             mend it",
+             fix it",
             of.name()
         ))),
     }

@@ -1,4 +1,4 @@
-//! Fingerprints, which tell whether two frames have the same content.
+//! Fingerprints: equal when two frames have the same content.
 
 use std::io::{self, BufWriter, Write};
 

@@ -124,14 +124,14 @@ fn simulate_frame(
         busy_ps: timeline.busy_ps(),
         busy: busy_shares(&timeline),
         cycles: timed.cycles,
-        origin: Origin::Simulated(Observed {
+        origin: Origin::Simulated(Box::new(Observed {
             counts: drawn.counts,
             facts: drawn.facts,
             warnings: drawn.warnings,
             regime,
             stalls: timed.stalls,
             accuracy,
-        }),
+        })),
     };
     Ok((simulated, drawn.image, heat))
 }

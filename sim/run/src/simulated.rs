@@ -38,7 +38,7 @@ pub struct RunFrame {
 /// Origin of the numbers of a frame.
 pub enum Origin {
     /// The frame was simulated.
-    Simulated(Observed),
+    Simulated(Box<Observed>),
     /// The frame was predicted from others: half-widths of the intervals of cycles and energy.
     Predicted(FrameCost),
 }

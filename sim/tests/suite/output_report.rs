@@ -1,4 +1,4 @@
-//! The report: whole without a network, harmless whatever it is told, complete whatever is missing.
+//! The report: whole without a network, harmless for any text in it, complete without what is missing.
 
 use output::report::{
     CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, Report, ReportImage,
@@ -93,7 +93,7 @@ fn nothing_is_asked_of_the_network() {
     for word in ["<link", "@import", "url(", "src=\"/", "src=\"./", "fetch(", "XMLHttpRequest", "<iframe"] {
         assert!(!page.contains(word), "{word}");
     }
-    assert!(page.contains("default-src 'none'"), "and the browser is told so");
+    assert!(page.contains("default-src 'none'"), "and the page says so to the browser");
 }
 
 #[test]

@@ -35,7 +35,7 @@ const REMEDIES: [&str; 40] = [
     "have to",
     "known here",
     "leave it out",
-    "mend ",
+    "fix ",
     "move one",
     "name a file",
     "name another",

@@ -1,4 +1,4 @@
-//! Traces of any format, told apart by their first bytes, with what is wrong mended.
+//! Traces of any format, by their first bytes, with repairs.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -82,7 +82,7 @@ fn errors(relative: &[f64]) -> Errors {
     Errors { mean, median: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::NAN) }
 }
 
-/// Frames one of whose ends is wrong, how many of them say so, and how many say so in vain. The last one ends at the end mark, wherever
+/// Frames one of whose ends is wrong, how many of them say so, and how many of the right ones say so. The last one ends at the end mark, wherever
 /// that is.
 fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
@@ -94,7 +94,7 @@ fn wrong(case: &Case, frames: &[FrameEnergy]) -> (usize, usize, usize) {
     let mut counts = (0, 0, 0);
     for (pair, frame) in partner.windows(2).zip(frames) {
         let right = matches!(pair, [Some(a), Some(b)] if *b == a + 1);
-        let reported = usize::from(frame.flags.doubted());
+        let reported = usize::from(frame.flags.has_low_confidence());
         if right {
             counts.2 += reported;
         } else {

@@ -150,7 +150,7 @@ impl<W: Write + Seek> ChunkWriter<W> {
 }
 
 /// How to repair a recording that was not closed.
-const REPAIR: &str = "the Joulescope UI or pyjls mends a copy of it by opening it";
+const REPAIR: &str = "the Joulescope UI or pyjls repairs a copy of it by opening it";
 
 /// The header of a chunk.
 #[derive(Clone, Copy, Debug)]

@@ -107,7 +107,7 @@ impl Flag {
     ];
 
     /// Flags of frames whose ends may be misplaced.
-    pub const DOUBTS: [Self; 7] =
+    pub const LOW_CONFIDENCE: [Self; 7] =
         [Self::Long, Self::Short, Self::Unsure, Self::Merged, Self::Split, Self::Odd, Self::Coarse];
 
     /// The word in the `flags` column.
@@ -145,9 +145,9 @@ impl Flags {
         self.0 & flag.bit() != 0
     }
 
-    /// Whether any of [`Flag::DOUBTS`] is set.
-    pub fn doubted(self) -> bool {
-        Flag::DOUBTS.iter().any(|flag| self.contains(*flag))
+    /// Whether any of [`Flag::LOW_CONFIDENCE`] is set.
+    pub fn has_low_confidence(self) -> bool {
+        Flag::LOW_CONFIDENCE.iter().any(|flag| self.contains(*flag))
     }
 }
 

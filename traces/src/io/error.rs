@@ -45,7 +45,7 @@ pub enum ReadError {
         reason: String,
     },
     /// A row is damaged or cut off.
-    #[error("{path}: row {row}: {reason}: the file is cut off or damaged; mend or drop the row", path = path.display())]
+    #[error("{path}: row {row}: {reason}: the file is cut off or damaged; fix or drop the row", path = path.display())]
     Row {
         /// The file.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum ReadError {
         reason: String,
     },
     /// A unit beside a column's name that does not go with it.
-    #[error("{path}: column {column} has the unit {unit} in its metadata, which contradicts that it holds {of}, or the unit in its name: mend one of them", path = path.display())]
+    #[error("{path}: column {column} has the unit {unit} in its metadata, which contradicts that it holds {of}, or the unit in its name: fix one of them", path = path.display())]
     Unit {
         /// The file.
         path: PathBuf,
@@ -175,7 +175,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// A value is missing, not a number, or not finite.
-    #[error("{path}: row {row}: {column} is {value}, not a finite number: mend it or cut the stretch out", path = path.display())]
+    #[error("{path}: row {row}: {column} is {value}, not a finite number: fix it or cut it out", path = path.display())]
     Value {
         /// The file.
         path: PathBuf,
@@ -241,7 +241,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The JSON description cannot be used.
-    #[error("{path}: the JSON description: {reason}: mend or leave out the description", path = path.display())]
+    #[error("{path}: the JSON description: {reason}: fix or leave out the description", path = path.display())]
     Description {
         /// The file.
         path: PathBuf,

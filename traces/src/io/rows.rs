@@ -319,7 +319,7 @@ fn check_overrides(
         && (requested_hz / stated_hz - 1.0).abs() > MAX_RATE_DEVIATION
     {
         let reason = format!(
-            "a rate of {requested_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or mend \
+            "a rate of {requested_hz} Hz was asked for, but it or its description says {stated_hz} Hz: leave --rate out, or fix \
              rate_hz there"
         );
         return Err(conflict(path, reason));
@@ -329,7 +329,7 @@ fn check_overrides(
         && (requested_s - stated_s).abs() * rate_hz > MAX_OFFSET_PERIODS
     {
         let reason = format!(
-            "a start at {requested_s} s was asked for, but it or its description says {stated_s} s: leave --start out, or mend \
+            "a start at {requested_s} s was asked for, but it or its description says {stated_s} s: leave --start out, or fix \
              start_s there"
         );
         return Err(conflict(path, reason));

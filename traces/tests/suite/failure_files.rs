@@ -1,4 +1,4 @@
-//! Every way a file can be wrong gives one error that names the file, the place and the mend, and no panic.
+//! Every way a file can be wrong gives one error that names the file, the place and the remedy, and no panic.
 
 use ::parquet::basic::{Repetition, Type as Physical};
 use ::parquet::data_type::{DoubleType, FloatType, Int64Type};

@@ -163,7 +163,7 @@ fn a_recording_that_was_not_closed_says_what_mends_it() {
     refused(
         &foreign("pyjls_unclosed.jls"),
         &ReadOptions::default(),
-        &["not a whole JLS file", "byte 6152: the recording was not closed", "pyjls mends a copy"],
+        &["not a whole JLS file", "byte 6152: the recording was not closed", "pyjls repairs a copy"],
     );
 }
 
@@ -198,11 +198,11 @@ fn a_recording_that_was_cut_and_repaired_gives_what_all_its_signals_have() {
 
 #[test]
 fn signals_that_begin_and_end_apart_are_cut_on_request_but_not_where_rates_differ() {
-    let mend = |voltage: &str| ReadOptions { repair: true, ..named(voltage, "current") };
+    let repaired = |voltage: &str| ReadOptions { repair: true, ..named(voltage, "current") };
     let path = foreign("pyjls_rates.jls");
-    refused(&path, &mend("voltage"), &["at 500 Hz"]);
+    refused(&path, &repaired("voltage"), &["at 500 Hz"]);
     let values = |voltage| {
-        let loaded = read(&path, &mend(voltage)).unwrap();
+        let loaded = read(&path, &repaired(voltage)).unwrap();
         assert!(
             loaded.repairs[0].message.contains("399 samples from number"),
             "{}",

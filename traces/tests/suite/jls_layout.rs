@@ -24,7 +24,7 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
 }
 
-/// All chunks of a file in order; what each says of the one before is held against that.
+/// All chunks of a file in order; what each says of the one before is compared with that.
 fn chunks(bytes: &[u8]) -> Vec<Chunk<'_>> {
     let (mut list, mut at, mut before) = (Vec::new(), 32, 0);
     while at < bytes.len() {

@@ -149,10 +149,10 @@ fn codes(found: &Found) -> Vec<&'static str> {
 
 #[test]
 fn a_frame_like_no_other_is_reported_alone_with_a_warning() {
-    let mut dice = crate::common::Dice(5);
+    let mut rng = crate::common::Rng(5);
     let mut builder = CurveBuilder::new(0.0).unwrap();
     for _ in 0..2000 {
-        builder.push(0.1e-3 + 1e-3 * dice.roll(), 1.0 + 10.0 * dice.roll()).unwrap();
+        builder.push(0.1e-3 + 1e-3 * rng.next(), 1.0 + 10.0 * rng.next()).unwrap();
     }
     let case = Case {
         truth: vec![TrueFrame { start_s: 0.5, energy_j: 1.0 }],

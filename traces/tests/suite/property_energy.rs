@@ -54,11 +54,10 @@ proptest! {
 #[test]
 fn the_quantization_bound_is_no_more_than_a_hundred_times_the_typical_error() {
     // Half a second: errors of 500 samples at 1 kHz average out, so the bound is about sqrt(3 n) times too wide.
-    let mut dice = crate::common::Dice(17);
+    let mut rng = crate::common::Rng(17);
     let (mut errors_j, mut bounds_j) = (0.0, 0.0);
     for _ in 0..50 {
-        let segments: Vec<(f64, f64)> =
-            (0..1000).map(|_| (1e-3 * dice.roll(), 100.0 * dice.roll())).collect();
+        let segments: Vec<(f64, f64)> = (0..1000).map(|_| (1e-3 * rng.next(), 100.0 * rng.next())).collect();
         let curve = curve_from(&segments);
         let device = Device::new(DeviceSpec { rate_hz: 1e3, ..DeviceSpec::default() }).unwrap().noise_free();
         let sampled = device.sample(&curve, 0.0, curve.end_s()).unwrap();

@@ -25,7 +25,7 @@ use soup::{Looks, Soup};
 /// The endings of scene files, for messages.
 pub(crate) const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
 
-/// File formats, told by the end of the name.
+/// File formats, by the end of the name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Gltf,

@@ -116,7 +116,7 @@ struct Words<'a> {
 
 impl Words<'_> {
     fn broken(&self, what: &str) -> LoadError {
-        Source { path: self.path }.broken(format!("line {}", self.line), format!("{what}; mend the file"))
+        Source { path: self.path }.broken(format!("line {}", self.line), format!("{what}; fix the file"))
     }
 
     /// The words of the next line that has any; comments begin with `#`.

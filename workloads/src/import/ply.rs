@@ -15,7 +15,7 @@ use super::{ignored, reader};
 use crate::error::{LoadError, Source};
 
 /// What to do about a header that cannot be used.
-const MEND: &str = "export it again as a PLY file of vertices and faces";
+const REMEDY: &str = "export it again as a PLY file of vertices and faces";
 
 /// Most elements of one kind: a header that asks for more is broken.
 const MOST: usize = 100_000_000;
@@ -129,7 +129,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let mut input = Reader::new(reader::open(path)?);
     let header = Parser::<Skipped>::new().read_header(&mut input);
     let header = header.map_err(|error| {
-        source.broken("header", format!("not a PLY file: {}; {MEND}", in_one_line(&error)))
+        source.broken("header", format!("not a PLY file: {}; {REMEDY}", in_one_line(&error)))
     })?;
     check(&header).map_err(|message| source.broken("header", message))?;
     let mut soup = Soup { warnings: left_out(&header, path), ..Soup::default() };
@@ -171,7 +171,7 @@ fn not_finite(source: Source<'_>, element: &ElementDef, error: &ParseError) -> O
     let names = element.properties.values().map(|property| &property.name);
     let mut named = names.zip(line.split_whitespace());
     let (name, bad) = named.find(|(_, word)| word.parse().is_ok_and(|value: f64| !value.is_finite()))?;
-    let message = format!("the coordinate `{name}` is `{bad}`, which is not finite; mend the file");
+    let message = format!("the coordinate `{name}` is `{bad}`, which is not finite; fix the file");
     Some(source.broken(format!("line {number}"), message))
 }
 
@@ -220,22 +220,22 @@ fn left_out(header: &Header, path: &Path) -> Vec<Warning> {
 
 fn check(header: &Header) -> Result<(), String> {
     let element = |name: &str| {
-        let missing = || format!("it has no element `{name}`: the file holds no triangles; {MEND}");
+        let missing = || format!("it has no element `{name}`: the file holds no triangles; {REMEDY}");
         header.elements.get(name).ok_or_else(missing)
     };
     let vertex = element("vertex")?;
     if let Some(missing) = ["x", "y", "z"].iter().find(|name| !vertex.properties.contains_key(**name)) {
-        return Err(format!("its vertices have no property `{missing}`; {MEND}"));
+        return Err(format!("its vertices have no property `{missing}`; {REMEDY}"));
     }
     if !element("face")?.properties.values().any(|property| is_corners(&property.name)) {
-        return Err(format!("its faces have no property `vertex_indices`; {MEND}"));
+        return Err(format!("its faces have no property `vertex_indices`; {REMEDY}"));
     }
     for element in header.elements.values() {
         if element.count > MOST {
             return Err(format!("{} {} elements; up to {MOST} are taken", element.count, element.name));
         }
         if element.properties.values().next().is_none() && element.count > 0 {
-            return Err(format!("element `{}` has no properties; {MEND}", element.name));
+            return Err(format!("element `{}` has no properties; {REMEDY}", element.name));
         }
     }
     Ok(())

@@ -90,7 +90,7 @@ impl Soup {
     pub fn into_mesh(self, path: &Path, origin: DVec3) -> Result<Mesh, LoadError> {
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let source = Source { path };
-        let broken = |message: String| source.broken("geometry", format!("{message}; mend the file"));
+        let broken = |message: String| source.broken("geometry", format!("{message}; fix the file"));
         let finite = self.normals.iter().chain(&self.colors).all(|v| v.is_finite());
         if !finite || self.uvs.iter().any(|uv| !uv.is_finite()) {
             return Err(broken("a normal, colour or texture coordinate is NaN or infinite".to_owned()));

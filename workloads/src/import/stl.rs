@@ -21,9 +21,8 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     let source = Source { path };
     let mut welded = Welded::default();
     if is_ascii(&bytes) {
-        ascii(&bytes, &mut welded).map_err(|(line, what)| {
-            source.broken(format!("line {line}"), format!("{what}; mend the file"))
-        })?;
+        ascii(&bytes, &mut welded)
+            .map_err(|(line, what)| source.broken(format!("line {line}"), format!("{what}; fix the file")))?;
     } else {
         binary(&bytes, &mut welded).map_err(|(place, what)| source.broken(place, what))?;
     }
@@ -76,7 +75,7 @@ fn binary(bytes: &[u8], welded: &mut Welded) -> Result<(), (String, String)> {
         let corner = |index: usize| DVec3::from_array([0, 1, 2].map(|axis| coordinate(3 * index + axis)));
         let corners = [0, 1, 2].map(corner);
         if !corners.iter().all(|corner| corner.is_finite()) {
-            let what = "a coordinate that is NaN or infinite; mend the file".to_owned();
+            let what = "a coordinate that is NaN or infinite; fix the file".to_owned();
             return Err((format!("triangle {number}"), what));
         }
         welded.triangle(corners);

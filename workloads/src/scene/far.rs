@@ -6,7 +6,7 @@ use warnings::{Code, Warning};
 /// Distance from the origin, in sizes of the scene, beyond which positions are kept relative to the scene's middle.
 const FAR: f64 = 100.0;
 
-/// Positions that f32 can tell apart along the longest side of a mesh; with fewer its shape suffers visibly.
+/// Distinct f32 positions along the longest side of a mesh; with fewer its shape suffers visibly.
 const MIN_STEPS: f64 = 4096.0;
 
 /// The box around some points.
@@ -63,7 +63,7 @@ impl Bounds {
         }
     }
 
-    /// How many positions f32 tells apart along the longest side, where these are too few for the shape.
+    /// Distinct f32 positions along the longest side, if these are too few for the shape.
     fn too_few_steps(&self) -> Option<f64> {
         let [size, distance] = self.size_and_distance()?;
         let steps = size / (distance * f64::from(f32::EPSILON));
@@ -81,7 +81,7 @@ impl Bounds {
     }
 }
 
-/// Tells the user which point positions are relative to.
+/// Reports which point positions are relative to.
 pub(super) fn recentred(origin: DVec3) -> Warning {
     let message = format!(
         "the scene is more than {FAR} times its size away from its origin, so positions are computed relative to ({}, {}, {}), \

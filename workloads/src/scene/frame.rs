@@ -14,7 +14,7 @@ use super::near::NearSpace;
 /// A scene between the opening and the closing of one frame's shutter: everything that changes from frame to frame.
 ///
 /// It does not know its number or its time, so two frames of a scene with the same content draw the same picture with the same
-/// work; their [`Fingerprint`](crate::Fingerprint)s tell.
+/// work; their [`Fingerprint`](crate::Fingerprint)s show it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Frame {
     /// The camera, its motion and its lens.
@@ -52,7 +52,7 @@ pub struct FrameMesh {
 pub enum FrameError {
     /// A vertex leaves the range of numbers.
     #[error(
-        "frame {frame}: mesh `{mesh}`: the position of vertex {vertex} is not finite, because a transform or an animation overflows: mend its scale or its keys"
+        "frame {frame}: mesh `{mesh}`: the position of vertex {vertex} is not finite, because a transform or an animation overflows: fix its scale or its keys"
     )]
     NotFinite {
         /// The frame.

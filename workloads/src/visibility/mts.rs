@@ -109,7 +109,7 @@ fn read_object(
                     return Ok(position);
                 }
                 let message = format!(
-                    "vertex {vertex} at time {when} is {position}, which is not finite; mend the file"
+                    "vertex {vertex} at time {when} is {position}, which is not finite; fix the file"
                 );
                 Err(bytes.wrong_in(format!("object {object}"), message))
             })
@@ -132,7 +132,7 @@ fn corners(
         None => Ok(corners),
         Some(vertex) => {
             let message = format!(
-                "triangle {triangle} uses vertex {vertex}, but there are only {vertices}; mend the file"
+                "triangle {triangle} uses vertex {vertex}, but there are only {vertices}; fix the file"
             );
             Err(bytes.wrong_in(format!("object {object}"), message))
         }
@@ -218,9 +218,9 @@ mod tests {
         let (first, second) = (32, 32 + 156);
         let mut nan = good.clone();
         nan[second + 72 + 24..second + 72 + 32].copy_from_slice(&f64::NAN.to_le_bytes());
-        assert_message(&nan, &["object 1: vertex 1 at time 1 is [NaN, 1, 0]", "mend"]);
+        assert_message(&nan, &["object 1: vertex 1 at time 1 is [NaN, 1, 0]", "fix"]);
         let mut index = good;
         index[first + 144 + 8..first + 144 + 12].copy_from_slice(&3_u32.to_le_bytes());
-        assert_message(&index, &["object 0: triangle 0 uses vertex 3, but there are only 3", "mend"]);
+        assert_message(&index, &["object 0: triangle 0 uses vertex 3, but there are only 3", "fix"]);
     }
 }

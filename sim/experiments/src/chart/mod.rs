@@ -1,7 +1,7 @@
 //! Charts of the book, one module for each; each is a [`Study`](crate::study::Study).
 //!
 //! - [`caustics`]: shader executions of caustics, by how beams are bounded.
-//! - [`collision`]: pairs kept in vain by collision detection.
+//! - [`collision`]: false positives of collision detection.
 //! - [`frames`]: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //! - [`glossy`]: glossy reflection and refraction against brute force and accumulation.
 //! - [`growth`]: time of the visibility engine over triangles, samples and blur.

@@ -1,4 +1,4 @@
-//! How wide the boxes of tile tests are, held against the true ones.
+//! How wide the boxes of tile tests are, compared with the true ones.
 
 use pipeline::geometry::Projection;
 use pipeline::random::mix;

@@ -3,7 +3,7 @@
 //! On the homogeneous image plane a vertex is `p(s) = p_0 + s (p_1 - p_0)`. The triangle begins or ceases to touch a rectangle
 //! only where a vertex crosses a side (`x(s) - X w(s)`, linear), a corner of the rectangle crosses an edge (`p_i x p_j`
 //! seen from the corner, quadratic) or, where it reaches to the near plane, where the cut does (linear, quadratic). Between two
-//! such instants nothing changes, so one look in the middle tells (the idea of Gribel et al. 2010 for a point, here for a tile).
+//! such instants nothing changes, so one test in the middle decides (the idea of Gribel et al. 2010 for a point, here for a tile).
 
 use glam::{DVec2, DVec3};
 use pipeline::traversal::TileRect;

@@ -83,7 +83,7 @@ type Make = fn(&Path, &ReadOptions) -> Result<Pyramid, ReadError>;
 /// What is shown, and its columns: from the pyramid beside the file, or from the samples where these are few.
 fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<((f64, f64), Vec<Column>), Failure> {
     if args.input.repair {
-        // What is mended is told, so it is mended anew each time.
+        // Repairs are listed, so they are made anew each time.
         let trace = args.input.load(terminal)?.0;
         let shown = span(args, trace.start_s(), trace.end_s())?;
         let columns = Pyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
@@ -95,15 +95,15 @@ fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<((f64, f64), Vec<Colu
         true => (Pyramid::of_file(path, &options)?, Pyramid::anew),
         false => (Pyramid::look(path, &options)?, Pyramid::build),
     };
-    let told = || terminal.note(&format!("{}: damaged; made anew", pyramid_path(path).display()));
+    let note = || terminal.note(&format!("{}: damaged; made anew", pyramid_path(path).display()));
     if pyramid.was_damaged() {
-        told();
+        note();
     }
     let shown = span(args, pyramid.start_s(), pyramid.end_s())?;
     if let Some(columns) = pyramid.columns_of_file((path, &options), shown, COLUMNS)? {
         return Ok((shown, columns));
     }
-    told();
+    note();
     let columns = make(path, &options)?.columns_of_file((path, &options), shown, COLUMNS)?;
     Ok((shown, columns.unwrap_or_default()))
 }

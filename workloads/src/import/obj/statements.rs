@@ -103,7 +103,7 @@ fn without_comment(line: &str) -> &str {
 }
 
 pub(super) fn broken(path: &Path, line: usize, what: &str) -> LoadError {
-    Source { path }.broken(format!("line {line}"), format!("{what}; mend the file"))
+    Source { path }.broken(format!("line {line}"), format!("{what}; fix the file"))
 }
 
 #[derive(Default)]
@@ -344,7 +344,7 @@ mod tests {
         ];
         for (text, expected) in cases {
             let error = read(text).unwrap_err();
-            assert!(error.contains(expected) && error.contains("mend the file"), "{text:?}: {error}");
+            assert!(error.contains(expected) && error.contains("fix the file"), "{text:?}: {error}");
         }
     }
 }

@@ -15,7 +15,7 @@ use spec::{LightSpec, SceneSpec, SettingsSpec};
 
 /// Reads the scene at `path`.
 pub(super) fn import(path: &Path) -> Result<Parts, LoadError> {
-    // A folder is told from a file that is no text: what to do about it is not the same.
+    // A folder and a file that is not text have different remedies.
     if path.is_dir() {
         return Err(Source { path }.unreadable(std::io::ErrorKind::IsADirectory.into()));
     }

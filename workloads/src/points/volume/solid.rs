@@ -27,7 +27,7 @@ pub enum SolidError {
     #[error("the surface has no triangles; export it with its faces")]
     NoTriangles,
     /// A coordinate is not finite or too large.
-    #[error("the surface has a coordinate that is not finite or beyond 1e60; mend or scale it")]
+    #[error("the surface has a coordinate that is not finite or beyond 1e60; fix or scale it")]
     TooFar,
     /// The volume is zero.
     #[error("the surface encloses no volume: it is flat, or its parts cancel out; give one that does")]

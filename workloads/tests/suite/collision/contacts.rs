@@ -107,7 +107,7 @@ fn a_contact_in_a_crowd_is_not_missed_by_boxes() {
         apart += u32::from(!may(&objects(false), &search));
     }
     // At a million sizes from the origin, an ulp is not far below the spacing of the lattice.
-    assert!(apart > 80, "the crowd alone is told apart in {apart} of 120");
+    assert!(apart > 80, "the crowd alone is separated in {apart} of 120");
 }
 
 #[test]

@@ -222,7 +222,7 @@ fn separated_when_moved(seeds: std::ops::Range<u64>, searches: usize) -> usize {
 #[test]
 fn no_exact_contact_is_missed() {
     let apart = separated_when_moved(0..200, 2);
-    println!("moved aside, {apart} of 10 are told apart");
+    println!("moved aside, {apart} of 10 are separated");
     assert!(apart >= 3);
 }
 
@@ -254,7 +254,7 @@ fn none_of_twenty_thousand_is_missed() {
     for start in (0..20_000).step_by(1000) {
         apart += separated_when_moved(start..start + 1000, 4);
         println!(
-            "{} contacts, none missed; moved aside, {apart} of {} told apart",
+            "{} contacts, none missed; moved aside, {apart} of {} separated",
             start + 1000,
             start / 20 + 50
         );

@@ -107,7 +107,9 @@ impl Bench {
             executions: pictures.each_ref().map(Picture::total_runs),
             useful: pictures.each_ref().map(Picture::useful_share),
             difference: pictures.iter().map(|other| ours.farthest(other)).fold(0.0, f64::max),
-            warned: accuracy_warnings(&surface, &beams).iter().any(|doubt| doubt.code == "caustics-crossed"),
+            warned: accuracy_warnings(&surface, &beams)
+                .iter()
+                .any(|warning| warning.code == "caustics-crossed"),
         }
     }
 

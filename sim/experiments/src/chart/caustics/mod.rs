@@ -36,7 +36,7 @@ pub struct Effort {
     pub pleated_cells: &'static [u32],
     /// Their pleats.
     pub pleats: &'static [f64],
-    /// Photons across and down that surfaces are held against.
+    /// Photons across and down that surfaces are compared with.
     pub rays: u32,
     /// Pixels along a side of the floor they light.
     pub floor_px: u32,

@@ -1,5 +1,5 @@
-//! `quintile chart collision`: pairs kept in vain by collision detection, over resolution, bins of time and cost, and where none of
-//! its methods tells pairs apart.
+//! `quintile chart collision`: false positives of collision detection, over resolution, bins of time and cost, and where all of its
+//! methods fail.
 
 mod measure;
 
@@ -33,7 +33,7 @@ pub struct Effort {
     pub yardstick_bins: &'static [u32],
 }
 
-/// A way to tell pairs apart.
+/// A method of collision detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// By the boxes that whole objects sweep.
@@ -92,7 +92,7 @@ pub struct Row {
     pub way: String,
     /// Pixels across; 0 where there is no image.
     pub resolution: u32,
-    /// Pairs of two objects kept in vain, as a share of those that do not collide.
+    /// False positive rate over pairs of two objects: pairs kept, as a share of those that do not collide.
     pub two: f64,
     /// The same of pairs among many.
     pub many: f64,
@@ -109,7 +109,7 @@ pub struct Slide {
     pub resolution: u32,
     /// The gap in parts of the plates' length.
     pub gap: f64,
-    /// The share of ways to lie in which they are kept in vain.
+    /// False positive rate over orientations.
     pub kept: f64,
 }
 
@@ -164,7 +164,8 @@ fn ways(effort: &Effort) -> Vec<Way> {
 
 impl Study for CollisionChart {
     const NAME: &'static str = "collision";
-    const ABOUT: &'static str = "Pairs kept in vain by collision detection, over resolution, bins of time and cost, and where it fails";
+    const ABOUT: &'static str =
+        "False positives of collision detection, over resolution, bins of time and cost, and where it fails";
     const PICTURES: &'static [&'static str] = &["collision", "collision_failures"];
     const FILES: &'static [&'static str] = &["collision.csv", "collision.json"];
 
@@ -211,10 +212,10 @@ impl Study for CollisionChart {
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
-        let title = "Pairs kept in vain by collision detection";
+        let title = "False positives of collision detection";
         to.chart("collision", [title, &subject(&self.pairs)], self.panels())?;
         let title = "Where collision detection fails: grazing contact";
-        let subject = "plates of 72 triangles that slide along each other without touching, any way round, looked at closer: in how many ways to lie they are kept in vain. \
+        let subject = "plates of 72 triangles that slide along each other without touching, any way round, looked at closer: the false positive rate over orientations. \
              Marked: nine in ten and more at every resolution, where a run warns (collision-near-everywhere)";
         to.chart("collision_failures", [title, subject], vec![self.failures()])
     }
@@ -236,7 +237,7 @@ impl Study for CollisionChart {
         let slides = Table::of(&self.slides)
             .shown("plates that slide: gap", |slide| slide.gap, |gap| format!("{gap:e}"))
             .shown("px", |slide| slide.resolution, plain)
-            .shown("kept in vain", |slide| slide.kept, fixed(2));
+            .shown("false positive rate", |slide| slide.kept, fixed(2));
         let rows = Table::of(&self.rows)
             .data("cases", |row| row.cases.name())
             .data("way", |row| row.way.as_str())
@@ -252,11 +253,11 @@ impl Study for CollisionChart {
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         let both = |row: &Row| {
             let level = if row.resolution == 0 { String::new() } else { format!("{} px", row.resolution) };
-            [("two objects", row.two), ("many objects", row.many)].map(|(kind, vain)| {
-                let vain = Metric::new("share of pairs kept in vain", "", vain).beside(0.0);
+            [("two objects", row.two), ("many objects", row.many)].map(|(kind, rate)| {
+                let rate = Metric::new("false positive rate", "", rate).beside(0.0);
                 let cost = Metric::new("CPU time of a pair", "s", row.pair_s);
                 let subject = format!("pairs that may collide ({kind})");
-                TradeoffPoint::new(subject, [&row.way, &level], [vain, cost])
+                TradeoffPoint::new(subject, [&row.way, &level], [rate, cost])
             })
         };
         self.rows.iter().filter(|row| row.cases == Set::Families).flat_map(both).collect()
@@ -299,7 +300,7 @@ impl CollisionChart {
             names.iter().map(of).collect()
         };
         let panel = |title: &str, across: &str, scale, point: &dyn Fn(&Row) -> (f64, f64)| {
-            ChartPanel::new(title, [across, "share kept in vain"], curves(point)).on(scale, Scale::Even)
+            ChartPanel::new(title, [across, "false positive rate"], curves(point)).on(scale, Scale::Even)
         };
         let pixels = |row: &Row| f64::from(row.resolution);
         vec![
@@ -317,7 +318,7 @@ impl CollisionChart {
             Series::curve(format!("{resolution} px"), of.map(|slide| (slide.gap, slide.kept)))
         };
         let curves = self.effort.resolutions.iter().map(curve).collect();
-        ChartPanel::new("share kept in vain", ["gap (lengths of a plate)", "share of ways to lie"], curves)
+        ChartPanel::new("false positive rate", ["gap (lengths of a plate)", "share of ways to lie"], curves)
             .on(Scale::Decades, Scale::Even)
             .failing(self.failing_gap().map(|gap| 0.0..gap), "fails")
     }

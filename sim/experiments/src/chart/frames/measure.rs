@@ -99,11 +99,11 @@ fn flagged(frames: &[FrameEnergy], scene: &Scene) -> Outcome {
     let mut outcome = Outcome::default();
     for (two, frame) in partner.windows(2).zip(frames) {
         let right = matches!(two, [Some(a), Some(b)] if *b == a + 1);
-        let told = usize::from(frame.flags.doubted());
+        let flagged = usize::from(frame.flags.has_low_confidence());
         if right {
-            (outcome.right, outcome.right_flagged) = (outcome.right + 1, outcome.right_flagged + told);
+            (outcome.right, outcome.right_flagged) = (outcome.right + 1, outcome.right_flagged + flagged);
         } else {
-            (outcome.wrong, outcome.wrong_flagged) = (outcome.wrong + 1, outcome.wrong_flagged + told);
+            (outcome.wrong, outcome.wrong_flagged) = (outcome.wrong + 1, outcome.wrong_flagged + flagged);
         }
     }
     outcome

@@ -1,7 +1,7 @@
 //! `quintile chart frames`: how well frame starts are found, by method, over rate, noise, resolution and host time.
 //!
 //! Scenes are those of [`traces::synth`], whose frames are known. Each is recorded, frames are marked as by hand (0.1 ms off at most),
-//! and the outcome is held against the truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
+//! and the outcome is compared with the ground truth: F1 of starts within 0.5 ms, and the energy error of frames whose two ends were found.
 
 mod measure;
 
@@ -357,8 +357,8 @@ impl FramesChart {
         let f1 = self.mean(axis, value, way, |o| Some(o.f1)).unwrap_or(0.0);
         let failed = self.at(axis, value, way).filter(|row| row.fails).count();
         let mark = if f1 < FAILS_BELOW { "*" } else { "" };
-        let told = if failed == 0 { String::new() } else { format!(" ({failed})") };
-        format!("{f1:.3}{mark}{told}")
+        let failures = if failed == 0 { String::new() } else { format!(" ({failed})") };
+        format!("{f1:.3}{mark}{failures}")
     }
 
     /// F1 of every scene at the usual rate; a star where a method fails.

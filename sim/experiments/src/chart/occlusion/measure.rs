@@ -34,7 +34,7 @@ const LENS: f32 = 0.15;
 pub(super) const GAPS: f32 = 0.02;
 
 impl Kind {
-    /// A yard of this kind with so many boxes, its walls whole.
+    /// A scene of this kind with so many boxes, its walls whole.
     pub(crate) fn spec(self, boxes: u32, seed: u64) -> WallSceneSpec {
         let motion = if self == Self::Defocus { 0.0 } else { MOTION };
         let lens = if self == Self::Motion { 0.0 } else { LENS };
@@ -59,9 +59,9 @@ impl Kind {
     }
 }
 
-/// A yard whose walls are drawn and whose boxes were asked for by samples.
+/// A scene whose walls are drawn and whose boxes were tested by samples.
 pub(crate) struct Drawn {
-    yard: WallScene,
+    scene: WallScene,
     viewport: Viewport,
     table: SampleTable,
     depths: Vec<f32>,
@@ -74,23 +74,23 @@ fn refused(error: CacheError) -> StudyError {
 }
 
 impl Drawn {
-    /// Draws the walls of a yard into an image of `size` with `samples` in a pixel, and asks for every box by samples.
+    /// Draws the walls of a scene into an image of `size` with `samples` in a pixel, and tests every box by samples.
     ///
     /// # Errors
-    /// When there is no such yard or image.
-    pub fn new(size: [u32; 2], yard: &WallSceneSpec, samples: u32) -> Result<Self, StudyError> {
-        let yard = yard.wall_scene().ok_or_else(|| StudyError::Pipeline("a yard".to_owned()))?;
+    /// When no such scene or image exists.
+    pub fn new(size: [u32; 2], scene: &WallSceneSpec, samples: u32) -> Result<Self, StudyError> {
+        let scene = scene.wall_scene().ok_or_else(|| StudyError::Pipeline("a wall scene".to_owned()))?;
         let gpu = GpuSpec::load("reference")?;
         let viewport = Viewport::new(size[0], size[1])
             .ok_or_else(|| StudyError::Pipeline("an image without area".to_owned()))?;
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
         let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
-        let walls = yard.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?;
-        let depths = depths(&yard.camera, &[walls], &settings).map_err(refused)?;
-        let queries = Samples { camera: &yard.camera, settings: &settings, depths: &depths };
-        let seen = yard.boxes.par_iter().map(|object| queries.ask(object));
+        let walls = scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?;
+        let depths = depths(&scene.camera, &[walls], &settings).map_err(refused)?;
+        let queries = Samples { camera: &scene.camera, settings: &settings, depths: &depths };
+        let seen = scene.boxes.par_iter().map(|object| queries.ask(object));
         let seen = seen.collect::<Result<_, _>>().map_err(refused)?;
-        Ok(Self { yard, viewport, table, depths, seen })
+        Ok(Self { scene, viewport, table, depths, seen })
     }
 
     /// Samples whose depths are stored.
@@ -100,27 +100,28 @@ impl Drawn {
 
     /// By intervals, with so many boxes of lens and time and tiles of this side.
     pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> (Vec<Answer>, f64) {
-        let grid = BoxGrid::new(boxes, self.yard.camera.lens().is_some()).unwrap_or_default();
+        let grid = BoxGrid::new(boxes, self.scene.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
-        let projection = Projection::new(&self.yard.camera, self.viewport);
+        let projection = Projection::new(&self.scene.camera, self.viewport);
         let queries = Queries::new(&pyramid, &projection);
-        let answers = self.yard.boxes.iter().map(|object| queries.ask(object)).collect();
+        let answers = self.scene.boxes.iter().map(|object| queries.ask(object)).collect();
         (answers, pyramid.half_covered())
     }
 }
 
 /// What one way of asking costs, `[tests, bytes, madds]`, and whether it finds an object hidden.
-type Told = (bool, [u64; 3]);
+type Answered = (bool, [u64; 3]);
 
-/// A row from what is told of every object, and whether it is truly hidden.
-fn row(like: Row, told: &[(Told, bool)]) -> Row {
+/// A row from the answers for all objects, and whether it is truly hidden.
+fn row(like: Row, answers: &[(Answered, bool)]) -> Row {
     let count = |of: &dyn Fn(bool, bool) -> bool| {
-        told.iter().filter(|((says, _), truly)| of(*says, *truly)).count() as u64
+        answers.iter().filter(|((says, _), truly)| of(*says, *truly)).count() as u64
     };
-    let mean =
-        |of: usize| told.iter().map(|((_, cost), _)| cost[of]).sum::<u64>() as f64 / told.len().max(1) as f64;
+    let mean = |of: usize| {
+        answers.iter().map(|((_, cost), _)| cost[of]).sum::<u64>() as f64 / answers.len().max(1) as f64
+    };
     Row {
-        objects: told.len() as u64,
+        objects: answers.len() as u64,
         hidden: count(&|_, truly| truly),
         found: count(&|says, truly| says && truly),
         wrong: count(&|says, truly| says && !truly),
@@ -150,16 +151,16 @@ fn blank(kind: Kind, slats: u32, samples: u32) -> Row {
 }
 
 fn by_intervals(yards: &[Drawn], like: Row, boxes: [u32; 3], tile_px: u32) -> Row {
-    let (mut told, mut half_covered) = (Vec::new(), 0.0);
+    let (mut answers, mut half_covered) = (Vec::new(), 0.0);
     for drawn in yards {
         let (answers, half) = drawn.ask(boxes, tile_px);
         half_covered += half / yards.len() as f64;
         let all = answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
             ((answer.hidden, [answer.tests(), answer.bytes(), answer.madds]), seen.passed == 0)
         });
-        told.extend(all);
+        answers.extend(all);
     }
-    row(Row { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &told)
+    row(Row { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answers)
 }
 
 fn by_samples(yards: &[Drawn], like: Row) -> Row {
@@ -201,8 +202,8 @@ pub(super) fn measure(effort: Effort, progress: &Progress) -> Result<OcclusionCh
 fn drawn(effort: &Effort, kind: Kind, slats: u32, samples: u32, bar: &Bar) -> Result<Vec<Drawn>, StudyError> {
     let gaps = if slats > 1 { GAPS } else { 0.0 };
     let drawn = |seed| {
-        let yard = WallSceneSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
-        Drawn::new(effort.size, &yard, samples)
+        let scene = WallSceneSpec { slats, gaps, ..kind.spec(effort.boxes, seed) };
+        Drawn::new(effort.size, &scene, samples)
     };
     let yards = (0..effort.yards).map(drawn).collect();
     bar.inc();

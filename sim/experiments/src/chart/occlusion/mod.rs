@@ -19,7 +19,7 @@ pub(crate) use measure::Drawn;
 pub struct Effort {
     /// Pixels of the image.
     pub size: [u32; 2],
-    /// Boxes that are asked for, in each yard.
+    /// Boxes queried in each scene.
     pub boxes: u32,
     /// Yards of each kind.
     pub yards: u64,
@@ -57,7 +57,7 @@ impl Kind {
     }
 }
 
-/// A way to ask, on one kind of yard. Costs are means over all objects.
+/// A kind of query on one kind of scene. Costs are means over all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// What blurs.

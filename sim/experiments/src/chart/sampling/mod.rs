@@ -38,7 +38,7 @@ pub struct Effort {
     pub reference_samples: u32,
     /// Seeds that an error is the root mean square of.
     pub seeds: u32,
-    /// Samples per pixel, one by one, up to which powers of two are held against the rest.
+    /// Samples per pixel, one by one, up to which powers of two are compared with the rest.
     pub every_up_to: u32,
 }
 

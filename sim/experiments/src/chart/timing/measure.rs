@@ -52,7 +52,7 @@ pub struct Row {
     pub warns: Vec<&'static str>,
     /// Seconds of the host's processor, timing alone: the stream is written.
     pub host_s: f64,
-    /// Seconds of the host's processor to turn packets into what units owe, once for all levels.
+    /// Seconds of the host's processor to turn packets into service demands, once for all levels.
     pub written_s: f64,
     /// Seconds of the host for the reference over these.
     pub speedup_over_stepped: f64,
@@ -127,7 +127,7 @@ pub(super) fn rows(
     Ok(rows)
 }
 
-/// A frame's packets as what the units of one machine owe, written once for all levels.
+/// A frame's packets as service demands of one machine, written once for all levels.
 pub(super) struct Written {
     clocks: Clocks,
     builder: DemandBuilder,
