@@ -48,3 +48,39 @@ pub(super) fn check(paper: Paper, options: &Options, out: &Destination) -> Resul
         ids.join(", ")
     )))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_larger_result_is_not_replaced_by_a_smaller_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Destination::new(folder.path());
+        let options = |quick, rows: &[&str]| Options {
+            quick,
+            rows: rows.iter().map(|row| (*row).to_owned()).collect(),
+            ..Options::default()
+        };
+        let refusal =
+            |options: &Options| check(Paper::Six, options, &out).err().map(|error| error.to_string());
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "an empty folder");
+        let file = folder.path().join("reproduce_VI.json");
+        fs::write(&file, r#"{"form": "full", "rows": [{"id": "VI-1"}, {"id": "VI-2"}]}"#).unwrap();
+        for (smaller, why) in [
+            (options(false, &["vi-2"]), "1 of them are not computed now"),
+            (options(true, &[]), "this is the quick form"),
+        ] {
+            let message = refusal(&smaller).unwrap();
+            assert!(message.contains("a full result of Paper VI with 2 rows (VI-1, VI-2)"), "{message}");
+            assert!(message.contains(why) && message.contains("--force"), "{message}");
+        }
+        assert_eq!(refusal(&options(false, &[])), None, "all rows anew");
+        assert_eq!(refusal(&options(false, &["VI-1", "vi-2"])), None);
+        let forced = Destination { force: true, ..out.clone() };
+        assert!(check(Paper::Six, &options(true, &["VI-2"]), &forced).is_ok());
+        assert!(check(Paper::Two, &options(true, &[]), &out).is_ok(), "a result of another paper");
+        fs::write(&file, "mine").unwrap();
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is asked elsewhere");
+    }
+}

@@ -125,7 +125,7 @@ fn said(public: &Public, given: bool) -> String {
         n => format!(" (which {n} of them are is not known; they are counted for `quintile ccd` alone)"),
     };
     format!(
-        "; {} public scenes with {} pairs that collide{unknown}, of which no other pair is drawn; {} public queries in {} files, all drawn, of which {} collide",
+        "; {} public scenes with {} pairs that collide{unknown}, their other pairs not drawn; {} public queries in {} files, all drawn, of which {} collide",
         public.scenes,
         public.known,
         public.queries,
