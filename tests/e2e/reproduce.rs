@@ -101,6 +101,7 @@ fn rows_are_whole(json: &Value, (ids, number): (&[&str], u32), folder: &Path) {
         assert_eq!(row["settings_sha256"], json["settings"]["sha256"]);
         ran_something(row);
         verdict_follows_from_band(row);
+        quick_verdict_says_so(row);
         assert!(!row["ours"].as_str().unwrap_or_default().is_empty());
         assert!(
             row["numbers"].as_array().is_some_and(|list| list.iter().all(|n| n["value"].is_f64())),
@@ -113,6 +114,24 @@ fn rows_are_whole(json: &Value, (ids, number): (&[&str], u32), folder: &Path) {
             assert!(fs::read(path.with_extension("png")).expect("a PNG").starts_with(b"\x89PNG"));
         }
     }
+}
+
+/// A verdict of the quick form is never a bare one: it says at how many of the settings of the full form it was reached.
+fn quick_verdict_says_so(row: &Value) {
+    assert_eq!(row["form"], "quick");
+    let [verdict, text] = ["verdict", "verdict_text"].map(|field| row[field].as_str().unwrap_or_default());
+    let less = row["less_work"].as_array().expect("a list").is_empty();
+    let less = if less { "quick form" } else { "quick form, less work" };
+    let expected = match row["band"]["tried"].as_u64() {
+        _ if verdict == "not yet" => verdict.to_owned(),
+        Some(tried) => {
+            let full = row["band"]["full"].as_u64().expect("a number");
+            assert!(tried <= full, "{row}");
+            format!("{verdict} at the {tried} of {full} settings tried ({less})")
+        }
+        None => format!("{verdict} ({less})"),
+    };
+    assert_eq!(text, expected, "{row}");
 }
 
 /// A row reports how much was run; the amount is not zero.
@@ -189,6 +208,10 @@ fn paper_three_is_whole_and_the_same_for_any_number_of_threads() {
     assert_eq!(row(json, "III-2")["kind"], "E");
     assert_eq!(ended.code == Some(0), row(json, "III-2")["verdict"] == "holds");
     verdicts_follow_from_numbers(json);
+    assert_eq!(
+        row(json, "III-3")["verdict_text"],
+        "holds at the 2 of 4 settings tried (quick form, less work)"
+    );
 }
 
 /// Verdicts follow from the numbers.
@@ -236,6 +259,36 @@ fn paper_six_is_whole_in_its_quick_form() {
         assert_eq!(row(&json, id)["verdict"], "holds", "{}", row(&json, id));
     }
     assert!(row(&json, "VI-1")["ours"].as_str().is_some_and(|ours| ours.contains("no public case")));
+    for (id, tried, full) in [("VI-4", 3, 6), ("VI-10", 2, 2), ("VI-11", 1, 4), ("VI-15", 4, 8)] {
+        let band = &row(&json, id)["band"];
+        assert_eq!((&band["tried"], &band["full"]), (&tried.into(), &full.into()), "{id}");
+    }
+    let says = |id: &str, field: &str, words: &str| {
+        let text = row(&json, id)[field].as_str().unwrap_or_default();
+        assert!(text.contains(words), "{id}: {text}");
+    };
+    // What is varied, and how, is part of every band.
+    for id in ["VI-4", "VI-6", "VI-11"] {
+        says(id, "note", "one at a time about the values given");
+    }
+    for id in ["VI-13", "VI-14"] {
+        says(id, "note", "eyes and size_px jointly, and two corners");
+        says(id, "ours", "every open setting at the value of its range that lowers or raises");
+        says(id, "limits", "64 entries (");
+        assert_eq!(row(&json, id)["band"]["full"], if id == "VI-13" { 23 } else { 25 });
+        let [low, high] = ["lowering", "raising"]
+            .map(|corner| number(row(&json, id), &format!("increase_{corner}_corner_percent")));
+        assert!(low < high, "{id}");
+    }
+    // Lens lines alone are compared with brute force as all other machines are.
+    says("VI-16", "ours", "lens lines and no other tile test: 0 of ");
+    assert_eq!(number(row(&json, "VI-16"), "machines"), 10.0);
+    // What planes gain beyond the tile's own time.
+    says("VI-15", "ours", "null, vertices within the tile's time");
+    says("VI-15", "note", "against the null");
+    assert!(!row(&json, "VI-8")["limits"].as_str().is_some_and(|limits| limits.contains("generous")));
+    says("VI-8", "limits", "deviations of count and integral found here");
+    says("VI-1", "note", "no public case that collides was tested");
     let worse =
         number(row(&json, "VI-3"), "cases_more") > 0.0 || number(row(&json, "VI-3"), "cases_fewer") == 0.0;
     assert_eq!(row(&json, "VI-3")["verdict"] == "differs", worse);
@@ -329,11 +382,19 @@ fn public_cases_are_run_where_their_folder_is_given() {
     let row = row(&json, "VI-1");
     assert_eq!((ended.code, &row["verdict"]), (Some(0), &"holds".into()), "{row}");
     assert_eq!([number(row, "public_queries"), number(row, "public_cases_that_collide_drawn")], [2.0, 1.0]);
+    let ours = row["ours"].as_str().unwrap_or_default();
+    assert!(ours.contains("2 public queries in 1 files, all drawn, of which 1 collide"), "{ours}");
     assert!(
-        row["ours"]
-            .as_str()
-            .is_some_and(|ours| ours.contains("2 public queries in 1 files, of which 1 collide"))
+        ours.contains("of 1 public queries that do not collide, all drawn, the passes clear 1 to 1"),
+        "{ours}"
     );
+    assert_eq!(number(row, "public_queries_that_do_not_collide_drawn"), 1.0);
+    assert!(!row["note"].as_str().unwrap_or_default().contains("no public case"), "{row}");
+    // Where nothing public collides, nothing public was tested.
+    write(&query(2, 0));
+    let (_, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
+    let note = self::row(&json, "VI-1")["note"].as_str().unwrap_or_default();
+    assert!(note.starts_with("no public case that collides was tested"), "{note}");
     // A truth that is wrong shows: the point that stays above does not collide, so it is missed.
     write(&query(2, 1));
     let (ended, json) = reproduce("VI", out.path(), &["--row", "VI-1", "--collision-data", &data]);
@@ -360,6 +421,7 @@ fn no_public_case_is_missed() {
     assert_eq!([number(row, "public_scenes"), number(row, "public_query_files")], [5.0, 42.0]);
     // 132 pairs of scenes that are identified, and 435 queries.
     assert_eq!(number(row, "public_cases_that_collide_drawn"), 567.0);
+    assert_eq!(number(row, "public_queries_that_do_not_collide_drawn"), 6844.0);
 }
 
 #[test]
@@ -387,6 +449,10 @@ fn settings_that_cannot_be_are_refused_with_their_place() {
     refused(
         &text.replace("vi_16: (", "vi_61: ("),
         &["settings.ron:", "unknown field `vi_61`, did you mean `vi_1`?"],
+    );
+    refused(
+        &text.replace("paper: \"VI\"", "paper: \"III\""),
+        &["settings.ron: `paper` is \"III\"; settings of Paper VI have \"VI\""],
     );
     let missing = quintile().call(["reproduce", "VI", "--settings", &inputs.path("none.ron"), "--out", &out]);
     assert_eq!(missing.code, Some(1));
@@ -422,6 +488,39 @@ fn paper_two_waits_for_its_passes_and_says_so() {
     assert!(wrong > right && (right / whole - 1.0).abs() < 1e-9);
     assert_eq!((ended.code, json["equalities_hold"].as_bool()), (Some(1), Some(false)));
     assert!(ended.stderr.contains("II-1") && !ended.stderr.contains("II-2"), "{}", ended.stderr);
+    one_row_does_not_replace_both(&out);
+}
+
+/// A row run alone into the folder of a whole result.
+fn one_row_does_not_replace_both(out: &Path) {
+    let before = files(out);
+    let folder = out.display().to_string();
+    let alone = ["reproduce", "II", "--quick", "--row", "II-2", "--out", &folder];
+    let refused = quintile().call(alone);
+    assert_eq!((refused.code, files(out)), (Some(2), before), "{}", refused.stderr);
+    for part in
+        [&folder, "quick result of Paper II with 2 rows (II-1, II-2)", "1 of them", "--out", "--force"]
+    {
+        assert!(refused.stderr.contains(part), "{part}: {}", refused.stderr);
+    }
+    let forced = quintile().call(alone.iter().chain(&["--force"]));
+    assert_eq!(forced.code, Some(0), "{}", forced.stderr);
+    let again = quintile().call(alone);
+    assert_eq!(again.code, Some(0), "the same row again loses nothing: {}", again.stderr);
+}
+
+/// Data that no row reads are no data that were run.
+#[test]
+fn collision_data_without_the_row_that_reads_them_are_refused() {
+    let inputs = Inputs::new();
+    let (data, out) = (inputs.path(""), inputs.path("out"));
+    for paper in [&["II"][..], &["III"], &["VI", "--row", "VI-2", "--row", "VI-12"]] {
+        let args = ["--collision-data", data.as_str(), "--quick", "--out", &out];
+        let ended = quintile().call(["reproduce"].iter().chain(paper).chain(&args));
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        assert!(ended.stderr.contains("--collision-data is read by row VI-1 alone"), "{}", ended.stderr);
+    }
+    assert!(!Path::new(&out).exists());
 }
 
 #[test]

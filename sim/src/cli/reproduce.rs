@@ -28,7 +28,7 @@ pub struct ReproduceArgs {
     /// Which paper
     #[arg(value_enum, value_name = "PAPER", ignore_case = true)]
     pub paper: Paper,
-    /// Fewer values, frames and repetitions: less than a minute
+    /// Fewer values, frames and repetitions: less than a minute. Verdicts then say at how many of the settings they were reached
     #[arg(long)]
     pub quick: bool,
     /// Only this row, for example VI-13; may be given more than once
@@ -37,13 +37,13 @@ pub struct ReproduceArgs {
     /// Settings in place of the committed ones; a copy of sim/experiments/papers/paper6.ron with other values
     #[arg(long, value_name = "FILE")]
     pub settings: Option<PathBuf>,
-    /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is run
+    /// Folder with public cases of collision detection for row VI-1 (*.mts.gz, queries/); without it none is run, and other rows refuse it
     #[arg(long, value_name = "DIR")]
     pub collision_data: Option<PathBuf>,
     /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
     pub out: PathBuf,
-    /// Overwrite files in DIR that Quintile did not write
+    /// Overwrite files in DIR that Quintile did not write, and a result of the paper with more rows or in full
     #[arg(long)]
     pub force: bool,
     /// Worker threads [default: all cores]; results do not depend on it

@@ -33,12 +33,16 @@ pub struct Turn {
 pub struct Band {
     /// What `number` is, with its unit.
     pub of: &'static str,
+    /// Which settings were varied, and how: one at a time or jointly.
+    pub varied: &'static str,
     /// Least number.
     pub min: f64,
     /// Greatest number.
     pub max: f64,
     /// How many different cases there are.
     pub tried: usize,
+    /// How many the full form tries.
+    pub full: usize,
     /// At how many of them the condition is met.
     pub held: usize,
     /// Where it turns.
@@ -51,14 +55,15 @@ pub struct Band {
 #[derive(Debug)]
 pub(super) struct Cases {
     of: &'static str,
+    varied: &'static str,
     cases: Vec<Case>,
     turns: Vec<Turn>,
 }
 
 impl Cases {
-    /// None yet; `of` names the number and its unit.
-    pub fn new(of: &'static str) -> Self {
-        Self { of, cases: Vec::new(), turns: Vec::new() }
+    /// None yet; `of` names the number and its unit, `varied` the settings that are varied, and how.
+    pub fn new(of: &'static str, varied: &'static str) -> Self {
+        Self { of, varied, cases: Vec::new(), turns: Vec::new() }
     }
 
     /// Adds all values of one setting, in order, the others standing: each with its number and whether the condition is met.
@@ -91,15 +96,16 @@ impl Cases {
         own.for_each(|case| case.base = case.value == value);
     }
 
-    /// The band, or `None` without a case.
-    pub fn band(self) -> Option<Band> {
+    /// The band, or `None` without a case; the full form tries `full` cases.
+    pub fn band(self, full: usize) -> Option<Band> {
         let numbers = || self.cases.iter().map(|case| case.number);
         let (min, max) = (numbers().reduce(f64::min)?, numbers().reduce(f64::max)?);
         let mut counted = false;
         let mut first = |case: &&Case| !case.base || !std::mem::replace(&mut counted, true);
         let different: Vec<&Case> = self.cases.iter().filter(&mut first).collect();
         let (tried, held) = (different.len(), different.iter().filter(|case| case.holds).count());
-        Some(Band { of: self.of, min, max, tried, held, turns: self.turns, cases: self.cases })
+        let Self { of, varied, cases, turns } = self;
+        Some(Band { of, varied, min, max, tried, full, held, turns, cases })
     }
 }
 
@@ -123,14 +129,20 @@ impl Band {
         let turns =
             if turns.is_empty() { String::new() } else { format!("; turns along {}", turns.join(", ")) };
         format!(
-            "{} from {} to {} over the settings tried; the condition is met at {} of {}{turns}",
+            "{} from {} to {} over the settings tried ({}); the condition is met at {} of {}{turns}",
             self.of,
             short(self.min),
             short(self.max),
+            self.varied,
             self.held,
             self.tried
         )
     }
+}
+
+/// How many cases there are where settings with so many values each are varied one at a time about the same point.
+pub(super) fn one_at_a_time<const N: usize>(values: [usize; N]) -> usize {
+    values.into_iter().sum::<usize>() + 1 - N
 }
 
 /// Four digits that count.
@@ -146,9 +158,9 @@ mod tests {
     use super::*;
 
     fn band(holds: &[bool]) -> Band {
-        let mut cases = Cases::new("increase in %");
+        let mut cases = Cases::new("increase in %", "eyes alone");
         cases.along("eyes", (1..).zip(holds).map(|(eye, holds)| (eye, 2.5 * f64::from(eye), *holds)));
-        cases.band().unwrap()
+        cases.band(holds.len()).unwrap()
     }
 
     #[test]
@@ -156,7 +168,7 @@ mod tests {
         assert_eq!(band(&[true, true]).verdict(), Verdict::Holds);
         assert_eq!(band(&[false, false]).verdict(), Verdict::Differs);
         assert_eq!(band(&[true, false, true]).verdict(), Verdict::Depends);
-        assert!(Cases::new("x").band().is_none());
+        assert!(Cases::new("x", "y alone").band(0).is_none());
     }
 
     #[test]
@@ -165,16 +177,16 @@ mod tests {
         assert_eq!((band.min, band.max, band.held), (2.5, 7.5, 2));
         assert_eq!(
             band.text(),
-            "increase in % from 2.500 to 7.500 over the settings tried; the condition is met at 2 of 3; turns along eyes between 2 and 3"
+            "increase in % from 2.500 to 7.500 over the settings tried (eyes alone); the condition is met at 2 of 3; turns along eyes between 2 and 3"
         );
     }
 
     #[test]
     fn the_case_at_which_all_stand_counts_once() {
-        let mut cases = Cases::new("increase in %");
+        let mut cases = Cases::new("increase in %", "eyes and lens one at a time");
         cases.along("eyes", [(1, 5.0, true), (2, 9.0, false)]).standing_at(1);
         cases.along("lens", [(7, 5.0, true), (8, 6.0, true)]).standing_at(7);
-        let band = cases.band().unwrap();
+        let band = cases.band(3).unwrap();
         assert_eq!((band.tried, band.held, band.cases.len()), (3, 2, 4));
         assert_eq!(band.verdict(), Verdict::Depends);
     }

@@ -9,6 +9,7 @@
 //! settings for each paper; a row is judged over all that is left open (`Band`).
 
 mod band;
+mod earlier;
 mod figure;
 mod paper2;
 mod paper3;
@@ -75,6 +76,17 @@ impl Paper {
     }
 }
 
+impl Paper {
+    /// The ids of its rows.
+    fn rows(self) -> Vec<&'static str> {
+        match self {
+            Self::Two => paper2::ids(),
+            Self::Three => paper3::ids(),
+            Self::Six => paper6::ids(),
+        }
+    }
+}
+
 /// How, and how much, to compute.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -98,13 +110,22 @@ impl Options {
         self.rows.is_empty() || self.rows.iter().any(|row| row.eq_ignore_ascii_case(id))
     }
 
-    /// Refuses rows that the paper does not have.
-    fn check(&self, paper: Paper, ids: &[&str]) -> Result<(), RunError> {
+    /// Refuses rows that the paper does not have, and data that no row reads.
+    fn check(&self, paper: Paper) -> Result<(), RunError> {
+        let ids = paper.rows();
         let unknown = self.rows.iter().find(|row| !ids.iter().any(|id| id.eq_ignore_ascii_case(row)));
-        unknown.map_or(Ok(()), |row| {
+        if let Some(row) = unknown {
             let message = format!("no row `{row}` in Paper {}; its rows: {}", paper.number(), ids.join(", "));
-            Err(RunError::Setting(message))
-        })
+            return Err(RunError::Setting(message));
+        }
+        if self.collision_data.is_some() && !(paper == Paper::Six && self.wants(paper6::READS_COLLISION_DATA))
+        {
+            let row = paper6::READS_COLLISION_DATA;
+            let message =
+                format!("--collision-data is read by row {row} alone: leave it out, or compute that row");
+            return Err(RunError::Setting(message));
+        }
+        Ok(())
     }
 }
 
@@ -126,6 +147,7 @@ impl Done {
 /// # Errors
 /// When settings cannot be used or a part of the line fails; a row that differs is none.
 pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<Report, RunError> {
+    options.check(paper)?;
     let (origin, done) = match paper {
         Paper::Two => paper2::rows(options, progress),
         Paper::Three => paper3::rows(options, progress),
@@ -137,13 +159,15 @@ pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<R
 /// Computes them and writes table and figures into `out`.
 ///
 /// # Errors
-/// As [`compute`], and when `out` cannot be written.
+/// As [`compute`], and when `out` cannot be written or holds a larger result that was not told to go.
 pub fn reproduce(
     paper: Paper,
     options: &Options,
     out: &Destination,
     progress: &Progress,
 ) -> Result<Report, RunError> {
+    options.check(paper)?;
+    earlier::check(paper, options, out)?;
     // The folder first: that it cannot be made is better known before the work than after it.
     let mut dir = out.open([report::claim(paper)])?;
     let report = compute(paper, options, progress)?;

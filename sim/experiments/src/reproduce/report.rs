@@ -37,7 +37,7 @@ pub(super) fn claim(paper: Paper) -> Claim {
         .files([format!("{stem}.md"), format!("{stem}.json")])
 }
 
-fn stem(paper: Paper) -> String {
+pub(super) fn stem(paper: Paper) -> String {
     format!("reproduce_{}", paper.number())
 }
 
@@ -66,7 +66,7 @@ impl Report {
             table.row([
                 format!("{:<6} {}", row.about.id, row.about.claim),
                 letters(row),
-                row.verdict.name().to_owned(),
+                row.verdict_text.clone(),
             ]);
         }
         let mut text =
@@ -74,7 +74,8 @@ impl Report {
         self.rows.iter().for_each(|row| text += &said(row));
         let count = |verdict| self.rows.iter().filter(|row| row.verdict == verdict).count();
         let [holds, differs, depends, not_yet] = Verdict::ALL.map(count);
-        text + &format!("\n{holds} hold, {differs} differ, {depends} depend, {not_yet} not yet\n")
+        let where_ = if self.form == Form::Quick { " at the settings of the quick form" } else { "" };
+        text + &format!("\n{holds} hold, {differs} differ, {depends} depend, {not_yet} not yet{where_}\n")
     }
 
     /// Which settings these are.
@@ -90,8 +91,8 @@ impl Report {
         text += "| id | kind | paper | ours | verdict |\n|---|---|---|---|---|\n";
         for row in &self.rows {
             let verdict = match row.note.as_str() {
-                "" => format!("*{}*", row.verdict.name()),
-                note => format!("*{}*: {note}", row.verdict.name()),
+                "" => format!("*{}*", row.verdict_text),
+                note => format!("*{}*: {note}", row.verdict_text),
             };
             text += &format!(
                 "| {} | {} | {} | {} | {verdict} |\n",
@@ -140,7 +141,7 @@ impl Report {
 /// A row as it is printed.
 fn said(row: &Row) -> String {
     let about = &row.about;
-    let mut text = format!("\n{}: {}\n", about.id, row.verdict.name());
+    let mut text = format!("\n{}: {}\n", about.id, row.verdict_text);
     let mut line = |name: &str, what: &str| {
         if !what.is_empty() {
             text += &format!("  {name:<8} {what}\n");
@@ -152,6 +153,7 @@ fn said(row: &Row) -> String {
     line("note", &row.note);
     line("limits", &about.limits);
     line("run", &ran(row));
+    line("less", &row.less_work.join(", "));
     for (name, basis) in [("stated", "stated"), ("open", "open")] {
         line(name, &settings(&row.settings, basis));
     }
@@ -229,7 +231,7 @@ mod tests {
             "limits   Little.",
             "settings SHA-256 abc",
             "SHA-256 abc), which is NOT the committed one, quick form",
-            "0 hold, 1 differ, 0 depend, 1 not yet",
+            "0 hold, 1 differ, 0 depend, 1 not yet at the settings of the quick form",
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::band::Band;
-use super::settings::{About, Form, Listed, listed};
+use super::settings::{About, Form, Listed, listed, reduced};
 use super::verdict::{Kind, Verdict};
 
 /// A row of the list of claims.
@@ -16,6 +16,12 @@ pub struct Row {
     pub ours: String,
     /// Whether that agrees.
     pub verdict: Verdict,
+    /// The verdict as it is printed: that of the quick form says at how many of all settings it was reached.
+    pub verdict_text: String,
+    /// How much was computed.
+    pub form: Form,
+    /// The amounts of work that the quick form reduces.
+    pub less_work: Vec<String>,
     /// Over what the verdict was reached, where settings were varied.
     pub band: Option<Band>,
     /// Why it differs, where it turns, or what it waits for.
@@ -61,15 +67,21 @@ pub(super) struct With<'a, S> {
     pub form: Form,
     /// SHA-256 of the file.
     pub sha256: &'a str,
+    /// Amounts of work that all rows share and the form reduces.
+    pub shared_less: Vec<String>,
 }
 
 impl<S: Serialize> With<'_, S> {
     /// The row with what came out: `ours`, the verdict and a note.
     pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> Row {
+        let own = reduced(self.settings, self.form);
         Row {
             about: about.clone(),
             ours,
             verdict,
+            verdict_text: String::new(),
+            form: self.form,
+            less_work: self.shared_less.iter().cloned().chain(own).collect(),
             band: None,
             note,
             ran: Vec::new(),
@@ -104,9 +116,35 @@ impl Row {
         self.is_unequal() || self.ran_nothing()
     }
 
-    /// A row that has run nothing has shown nothing, whatever its condition says.
+    /// The row with another sentence on what it does not show.
+    #[must_use]
+    pub(super) fn limited(mut self, more: &str) -> Self {
+        self.about.limits = format!("{} {more}", self.about.limits);
+        self
+    }
+
+    /// The row as it is reported: with its verdict in words, and without numbers that were not measured.
     #[must_use]
     pub(super) fn judged(self) -> Self {
+        let mut row = self.shown();
+        row.verdict_text = row.verdict_text();
+        row.numbers.retain(|number| number.value.is_finite());
+        row
+    }
+
+    /// The verdict; of the quick form, at how many of the settings of the full one.
+    fn verdict_text(&self) -> String {
+        let verdict = self.verdict.name();
+        let less = if self.less_work.is_empty() { "quick form" } else { "quick form, less work" };
+        match &self.band {
+            _ if self.form == Form::Full || self.verdict == Verdict::NotYet => verdict.to_owned(),
+            Some(band) => format!("{verdict} at the {} of {} settings tried ({less})", band.tried, band.full),
+            None => format!("{verdict} ({less})"),
+        }
+    }
+
+    /// A row that has run nothing has shown nothing, whatever its condition says.
+    fn shown(self) -> Self {
         if !self.ran_nothing() || self.verdict == Verdict::NotYet {
             return self;
         }
@@ -119,6 +157,7 @@ impl Row {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::band::Cases;
     use super::*;
 
     pub fn row(id: &str, kind: Kind, verdict: Verdict) -> Row {
@@ -130,7 +169,7 @@ pub(super) mod tests {
             holds_when: "it does".to_owned(),
             limits: "Little.".to_owned(),
         };
-        let with = With { settings: &(), form: Form::Full, sha256: "abc" };
+        let with = With { settings: &(), form: Form::Full, sha256: "abc", shared_less: Vec::new() };
         let row = with.row(&about, ("two".to_owned(), verdict, "because".to_owned()));
         Row { ran: numbers([("draws", 3.0)]), numbers: numbers([("n", 2.0)]), ..row }
     }
@@ -159,6 +198,30 @@ pub(super) mod tests {
             assert!(judged.note.starts_with("nothing was run"), "{}", judged.note);
         }
         let good = row("X-1", Kind::Order, Verdict::Holds);
-        assert_eq!(good.clone().judged(), good);
+        assert_eq!(good.clone().judged(), Row { verdict_text: "holds".to_owned(), ..good });
+    }
+
+    /// The quick form may leave out the very values at which a row turns.
+    #[test]
+    fn a_quick_verdict_says_at_how_many_settings_it_was_reached() {
+        let quick = Row { form: Form::Quick, ..row("X-1", Kind::Order, Verdict::Holds) };
+        assert_eq!(quick.clone().judged().verdict_text, "holds (quick form)");
+        let mut cases = Cases::new("share", "tiles alone");
+        cases.along("tiles", [(4, 0.5, true), (8, 0.2, true)]);
+        let less_work = vec!["yards".to_owned()];
+        let banded = Row { band: cases.band(6), less_work, ..quick };
+        let text = "holds at the 2 of 6 settings tried (quick form, less work)";
+        assert_eq!(banded.clone().judged().verdict_text, text);
+        assert_eq!(Row { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");
+        assert_eq!(Row { verdict: Verdict::NotYet, ..banded }.judged().verdict_text, "not yet");
+    }
+
+    #[test]
+    fn numbers_that_were_not_measured_are_left_out() {
+        let some = Row {
+            numbers: numbers([("n", 2.0), ("at_64", f64::NAN)]),
+            ..row("X-1", Kind::Order, Verdict::Holds)
+        };
+        assert_eq!(some.judged().numbers, numbers([("n", 2.0)]));
     }
 }

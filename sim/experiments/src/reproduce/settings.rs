@@ -11,18 +11,29 @@ use activity::spec::{self, SpecError};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::Paper;
 use super::verdict::Kind;
 use output::dir::sha256_of_text;
 use run::RunError;
 
 /// How much is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
     /// All of it: minutes.
     Full,
     /// Fewer values and less work: less than a minute.
     Quick,
+}
+
+impl Form {
+    /// As printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Quick => "quick",
+        }
+    }
 }
 
 /// What a row says whatever comes out.
@@ -105,6 +116,11 @@ impl<T> Setting<T> {
         }
     }
 
+    /// How many values the full form tries.
+    pub fn values(&self) -> usize {
+        self.all(Form::Full).len()
+    }
+
     /// Every value that the file has for it.
     fn written(&self) -> Vec<&T> {
         match self {
@@ -182,10 +198,15 @@ pub(super) use row_settings;
 
 /// All settings of a paper.
 pub trait PaperSettings: DeserializeOwned {
+    /// Which paper.
+    const PAPER: Paper;
     /// The committed file, from the root of the repository.
     const FILE: &str;
     /// What is in it.
     const TEXT: &str;
+
+    /// The number of the paper that the file names.
+    fn paper(&self) -> &str;
 
     /// Checks every value.
     ///
@@ -219,6 +240,11 @@ pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunErr
 
 fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunError> {
     let settings: T = spec::parse(text, name)?;
+    let (paper, number) = (settings.paper(), T::PAPER.number());
+    if paper != number {
+        let message = format!("{name}: `paper` is \"{paper}\"; settings of Paper {number} have \"{number}\"");
+        return Err(RunError::Setting(message));
+    }
     settings.check().map_err(|message| RunError::Setting(format!("{name}: {message}")))?;
     Ok((settings, Origin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT }))
 }
@@ -242,6 +268,17 @@ pub struct Listed {
 pub fn listed(row: &impl Serialize, form: Form) -> Vec<Listed> {
     let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(row) else { return Vec::new() };
     fields.into_iter().filter_map(|(name, value)| one(name, value, form)).collect()
+}
+
+/// The amounts of work of a row that the form reduces, by name; values to try are none.
+pub fn reduced(row: &impl Serialize, form: Form) -> Vec<String> {
+    let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(row) else { return Vec::new() };
+    let less = |(name, value)| {
+        let setting: Setting<serde_json::Value> = serde_json::from_value(value).ok()?;
+        let open = matches!(setting, Setting::Open { .. });
+        (!open && setting.get(form) != setting.get(Form::Full)).then_some(name)
+    };
+    fields.into_iter().filter_map(less).collect()
 }
 
 fn one(name: String, value: serde_json::Value, form: Form) -> Option<Listed> {
@@ -303,8 +340,10 @@ mod tests {
             holds_when: String::new(),
             limits: String::new(),
         };
-        let cells = Setting::Stated { value: (2, 3), quick: None, passage: "section 1".to_owned() };
-        let row = Row { about, px: open(2, &[1, 2], &[]), cells };
+        let cells = Setting::Stated { value: (2, 3), quick: Some((1, 1)), passage: "section 1".to_owned() };
+        let row = Row { about, px: open(2, &[1, 2], &[1]), cells };
+        assert!(reduced(&row, Form::Full).is_empty());
+        assert_eq!(reduced(&row, Form::Quick), ["cells"], "px has fewer values, not less work");
         let found = listed(&row, Form::Full);
         let brief: Vec<_> = found.iter().map(|one| (one.name.as_str(), one.basis, one.tried.len())).collect();
         assert_eq!(brief, [("cells", "stated", 0), ("px", "open", 2)]);

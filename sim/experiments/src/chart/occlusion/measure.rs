@@ -151,16 +151,16 @@ fn blank(kind: Kind, slats: u32, samples: u32) -> Row {
 }
 
 fn by_intervals(yards: &[Drawn], like: Row, boxes: [u32; 3], tile_px: u32) -> Row {
-    let (mut answers, mut half_covered) = (Vec::new(), 0.0);
+    let (mut answered, mut half_covered) = (Vec::new(), 0.0);
     for drawn in yards {
         let (answers, half) = drawn.ask(boxes, tile_px);
         half_covered += half / yards.len() as f64;
         let all = answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
             ((answer.hidden, [answer.tests(), answer.bytes(), answer.madds]), seen.passed == 0)
         });
-        answers.extend(all);
+        answered.extend(all);
     }
-    row(Row { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answers)
+    row(Row { tile_px: Some(tile_px), boxes: Some(boxes), half_covered, ..like }, &answered)
 }
 
 fn by_samples(yards: &[Drawn], like: Row) -> Row {

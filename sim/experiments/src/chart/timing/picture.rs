@@ -47,7 +47,9 @@ impl TimingChart {
         };
         let frames = self.animations.first().map_or(0, |row| row.frames);
         let subject = format!(
-            "animations of {frames} frames and single frames, each on three GPUs; lower and further left is better"
+            "animations of {frames} frames and single frames, each on three GPUs; lower and further left is better. Errors of \
+             animations, median (middle half, number of points): {}",
+            self.medians()
         );
         let panels = vec![ChartPanel::over("", [across, up], series)];
         Chart::new("Speed against accuracy of the levels of timing", &subject, panels).picture(look)
@@ -63,6 +65,18 @@ impl TimingChart {
     fn animations_at(&self, level: &str) -> Vec<Point> {
         let rows = self.animations.iter().filter(|row| row.level == level);
         rows.map(|row| (row.relative_host, row.cycle_error_percent.abs())).collect()
+    }
+
+    /// The error of every level but the reference, with its middle half and the number of points that it is the median of.
+    fn medians(&self) -> String {
+        let one = |level: &&str| {
+            let points = self.animations_at(level);
+            let Spread { at, up, .. } = spread(&points, level)?;
+            let (median, [low, high]) = (at.1, up);
+            Some(format!("{level} {median:.3} % ({low:.3} to {high:.3} %, {})", points.len()))
+        };
+        let medians: Vec<String> = LEVELS.iter().skip(1).filter_map(one).collect();
+        medians.join("; ")
     }
 
     /// Medians of animations that no other level beats in host time and in error at once, from the fastest on.
@@ -128,6 +142,22 @@ mod tests {
             ("sampled", &[(0.05, 1.0), (0.06, -2.0), (0.07, 0.5)]),
         ]);
         assert_eq!(chart.frontier(), [(0.06, 1.0), (0.5, 0.1), (1.0, 0.0)], "sampled beats bound");
+    }
+
+    /// A median of six, and of one, is as good as its number of points and their spread.
+    #[test]
+    fn medians_are_shown_with_their_spread_and_the_number_of_points() {
+        let six = [0.002, 0.006, 0.021, 0.126, 0.243, 0.753].map(|error| (0.5, error));
+        let chart = chart([
+            ("stepped", &[(1.0, 0.0)]),
+            ("packet", &six),
+            ("bound", &[(0.45, 4.0)]),
+            ("sampled", &[(0.05, 1.0)]),
+        ]);
+        let expected = "packet 0.073 % (0.010 to 0.214 %, 6); bound 4.000 % (4.000 to 4.000 %, 1)";
+        assert!(chart.medians().starts_with(expected), "{}", chart.medians());
+        assert!((chart.frontier()[1].1 - 0.0735).abs() < 1e-12, "{:?}", chart.frontier());
+        assert!(chart.picture(&Look::default()).svg().unwrap().contains("(0.010"));
     }
 
     #[test]

@@ -8,19 +8,23 @@ use traces::energy::PowerIntegral;
 use super::figure::{POWER, TIME, line};
 use super::recording::{Frames, MARKED, Recording, looped};
 use super::row::{Number, Row, With, numbers};
-use super::settings::{Origin, load};
+use super::settings::{Origin, load, reduced};
 use super::stage::Stage;
 use super::verdict::Verdict;
-use super::{Done, Figure, Options, Paper};
+use super::{Done, Figure, Options};
 use output::progress::Progress;
 use run::RunError;
 use settings::{Inverses, Passes, Settings};
+
+/// The ids of its rows.
+pub(super) fn ids() -> Vec<&'static str> {
+    vec!["II-1", "II-2"]
+}
 
 /// Pixels of the PC's image.
 const PIXELS: f64 = 1280.0 * 720.0;
 
 pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
-    options.check(Paper::Two, &["II-1", "II-2"])?;
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let form = options.form();
     let pc = Stage::pc()?;
@@ -35,13 +39,13 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
     )?;
     let found = recording.find(MARKED)?;
     let idle_w = pc.platform.idle_w.value();
-    let mut done = Vec::new();
+    let (mut done, less) = (Vec::new(), reduced(&settings.work, form));
     if options.wants("II-1") {
-        let with = With { settings: &settings.ii_1, form, sha256: &origin.sha256 };
+        let with = With { settings: &settings.ii_1, form, sha256: &origin.sha256, shared_less: less.clone() };
         done.push(passes(&with, &recording, &frames, idle_w));
     }
     if options.wants("II-2") {
-        let with = With { settings: &settings.ii_2, form, sha256: &origin.sha256 };
+        let with = With { settings: &settings.ii_2, form, sha256: &origin.sha256, shared_less: less };
         done.push(inverses(&with, &recording, &found));
     }
     Ok((origin, done))

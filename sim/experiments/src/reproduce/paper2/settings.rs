@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::Paper;
 use super::super::settings::{About, PaperSettings, Setting, row_settings};
 
 /// The file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Settings {
-    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
     paper: String,
-    #[allow(dead_code, reason = "as above")]
+    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
     source: String,
     pub work: Work,
     pub ii_1: Passes,
@@ -40,8 +40,13 @@ row_settings! {
 }
 
 impl PaperSettings for Settings {
+    const PAPER: Paper = Paper::Two;
     const FILE: &str = "sim/experiments/papers/paper2.ron";
     const TEXT: &str = include_str!("../../../papers/paper2.ron");
+
+    fn paper(&self) -> &str {
+        &self.paper
+    }
 
     fn check(&self) -> Result<(), String> {
         self.work.pc_frames.within("work.pc_frames", 1..=36)?;

@@ -3,7 +3,7 @@
 use power_model::{Circumstances, FramePower};
 use traces::energy::{Pooled, pooled};
 
-use super::super::band::Cases;
+use super::super::band::{Cases, one_at_a_time};
 use super::super::figure::{ENERGY, POWER, TIME, level, line};
 use super::super::recording::{MARKED, looped};
 use super::super::row::{Row, numbers};
@@ -82,12 +82,16 @@ pub(super) fn phone(bench: &Bench<'_>) -> Result<Done, RunError> {
         Ok((waiting_w, share, both))
     });
     let at: Vec<_> = at.collect::<Result<_, RunError>>()?;
-    let mut tried = Cases::new("share of frames for which the old method gives more");
+    let mut tried = Cases::new(
+        "share of frames for which the old method gives more",
+        "waiting_w, idle_w and edge one at a time about the values given",
+    );
     let over_waiting = at.iter().map(|(waiting_w, share, _)| (*waiting_w, *share)).collect();
     tried.along("waiting_w", at).standing_at(waiting_w);
     tried.along("idle_w", over_idle(bench, row, waiting_w)?).standing_at(idle_w);
     tried.along("edge", over_edge(bench, row, &base_stage)?).standing_at(edge);
-    let band = tried.band().ok_or_else(|| RunError::setting("III-4 has nothing to try"))?;
+    let full = one_at_a_time([row.waiting_w.values(), row.idle_w.values(), row.edge.values()]);
+    let band = tried.band(full).ok_or_else(|| RunError::setting("III-4 has nothing to try"))?;
     let base = Methods::of(bench, &base_stage, &bench.phone_frames)?;
     let (least, most) = (base.gain_mj(f64::min), base.gain_mj(f64::max));
     let ours = format!(
@@ -250,7 +254,10 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
         let (over, below) = other.as_ref().unwrap_or(&base).judged();
         Ok((other_w, over, below))
     });
-    let mut tried = Cases::new("difference of the means over the smaller deviation");
+    let mut tried = Cases::new(
+        "difference of the means over the smaller deviation",
+        "waiting_w and background_w one at a time about the values given",
+    );
     let at: Vec<_> = at.collect::<Result<_, RunError>>()?;
     let over_waiting = at.iter().map(|(watts, over, _)| (*watts, *over)).collect();
     tried.along("waiting_w", at).standing_at(waiting_w);
@@ -264,7 +271,8 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
         });
         tried.along("background_w", at.collect::<Result<Vec<_>, RunError>>()?).standing_at(background_w);
     }
-    let band = tried.band().ok_or_else(|| RunError::setting("III-5 has nothing to try"))?;
+    let full = one_at_a_time([row.waiting_w.values(), row.background_w.values()]);
+    let band = tried.band(full).ok_or_else(|| RunError::setting("III-5 has nothing to try"))?;
     let Both { with, without } = &base;
     let ours = format!(
         "with {waiting_w} W waiting and {background_w} W of services: {} with, {} without, {} and {} frames",

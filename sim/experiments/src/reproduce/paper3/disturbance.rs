@@ -109,9 +109,10 @@ pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
         let right = still.tally.both as f64 / still.tally.touched.max(still.tally.flagged).max(1) as f64;
         Ok((extra_w, right, still.holds(frames)))
     });
-    let mut tried = Cases::new("share of the frames touched or flagged that are both");
+    let mut tried = Cases::new("share of the frames touched or flagged that are both", "extra_w alone");
     tried.along("extra_w", at.collect::<Result<Vec<_>, RunError>>()?);
-    let band = tried.band().ok_or_else(|| RunError::setting("III-6 has nothing to try"))?;
+    let band =
+        tried.band(row.extra_w.values()).ok_or_else(|| RunError::setting("III-6 has nothing to try"))?;
     let Tally { touched, flagged: flags, both, frames: [fewest, most], disturbances } = base.tally;
     let [all_mj, without_mj] = base.deviations_mj;
     let ours = format!(

@@ -75,7 +75,8 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
     let with = bench.with(|settings| &settings.iii_3);
     let (row, form) = (with.settings, with.form);
     let near = *row.near.get(form);
-    let (mut tried, mut said, mut base) = (Cases::new("frames found off what was planted"), Vec::new(), None);
+    let mut tried = Cases::new("frames found off what was planted", "planted_s alone");
+    let (mut said, mut base) = (Vec::new(), None);
     let mut at = Vec::new();
     for &planted_s in row.planted_s.all(form) {
         let planted = Planted::new(bench, planted_s)?;
@@ -89,7 +90,7 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
     }
     tried.along("planted_s", at);
     let nothing = || RunError::setting("III-3 has nothing to try");
-    let (band, base) = (tried.band().ok_or_else(nothing)?, base.ok_or_else(nothing)?);
+    let (band, base) = (tried.band(row.planted_s.values()).ok_or_else(nothing)?, base.ok_or_else(nothing)?);
     let recorded = *row.recorded.get(form);
     let pc_shown = looped(&bench.pc_frames[..1], recorded);
     let pc = bench.on(&bench.pc, &pc_shown, launched(1))?;

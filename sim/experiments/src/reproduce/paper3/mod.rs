@@ -10,9 +10,9 @@ use power_model::{Circumstances, FramePower, Pacing};
 
 use super::recording::{Recording, looped};
 use super::row::With;
-use super::settings::{Form, Origin, load};
+use super::settings::{Form, Origin, load, reduced};
 use super::stage::Stage;
-use super::{Done, Options, Paper};
+use super::{Done, Options};
 use output::progress::Progress;
 use run::RunError;
 use settings::Settings;
@@ -46,7 +46,12 @@ fn unflagged(energies_j: &[f64], flags: &[bool]) -> Vec<f64> {
 impl Bench<'_> {
     /// The settings of one row.
     fn with<'s, S>(&'s self, row: fn(&'s Settings) -> &'s S) -> With<'s, S> {
-        With { settings: row(&self.settings), form: self.form, sha256: &self.origin.sha256 }
+        With {
+            settings: row(&self.settings),
+            form: self.form,
+            sha256: &self.origin.sha256,
+            shared_less: reduced(&self.settings.work, self.form),
+        }
     }
 
     /// Recordings of the same thing.
@@ -102,8 +107,12 @@ const ROWS: [(&str, Compute); 6] = [
     ("III-6", disturbance::five_seconds),
 ];
 
+/// The ids of its rows.
+pub(super) fn ids() -> Vec<&'static str> {
+    ROWS.iter().map(|(id, _)| *id).collect()
+}
+
 pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
-    options.check(Paper::Three, &ROWS.map(|(id, _)| id))?;
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let form = options.form();
     let (pc, phone) = (Stage::pc()?, Stage::phone()?);

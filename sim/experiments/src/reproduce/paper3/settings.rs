@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::Paper;
 use super::super::settings::{About, PaperSettings, Setting, row_settings};
 
 /// The file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Settings {
-    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
     paper: String,
-    #[allow(dead_code, reason = "as above")]
+    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
     source: String,
     pub work: Work,
     pub iii_1: Finding,
@@ -78,8 +78,13 @@ fn energy((mean, deviation): &(f64, f64)) -> bool {
 const ENERGY: &str = "a mean and a deviation above 0";
 
 impl PaperSettings for Settings {
+    const PAPER: Paper = Paper::Three;
     const FILE: &str = "sim/experiments/papers/paper3.ron";
     const TEXT: &str = include_str!("../../../papers/paper3.ron");
+
+    fn paper(&self) -> &str {
+        &self.paper
+    }
 
     fn check(&self) -> Result<(), String> {
         self.work.check()?;

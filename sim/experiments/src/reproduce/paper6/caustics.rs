@@ -4,7 +4,7 @@ use glam::DVec3;
 use workloads::caustics::generator::{Ocean, turned_beams};
 use workloads::caustics::{Coverage, Eye, Floor, Method, receivers};
 
-use super::super::band::Cases;
+use super::super::band::{Cases, one_at_a_time};
 use super::super::figure::line;
 use super::super::row::{Row, numbers};
 use super::super::{Done, Figure};
@@ -44,11 +44,15 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
         let counted = if at == depth_m { base.clone() } else { count(slope, at)? };
         depths.push((at, counted));
     }
-    let mut tried = Cases::new("executions over those of the bounding volume with fewer");
+    let mut tried = Cases::new(
+        "executions over those of the bounding volume with fewer",
+        "slope and depth_m one at a time about the values given",
+    );
     let judged = |(at, counted): &(f64, Counted)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
     tried.along("slope", slopes.iter().map(judged)).standing_at(slope);
     tried.along("depth_m", depths.iter().map(judged)).standing_at(depth_m);
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-6 has nothing to try"))?;
+    let full = one_at_a_time([row.slope.values(), row.depth_m.values()]);
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-6 has nothing to try"))?;
     let [moving, refined, hull, prism] = base.executions;
     let part = |total: u64| total as f64 / prism as f64;
     let ours = format!(
@@ -113,8 +117,11 @@ const OVERSHOOT: f64 = 0.25;
 pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_7);
     let (row, form) = (with.settings, with.form);
-    let (mut tried, mut all) =
-        (Cases::new("pairs of a pixel and a beam that are missed"), Coverage::default());
+    let mut tried = Cases::new(
+        "pairs of a pixel and a beam that are missed",
+        "slope and pleat jointly, and floors of turned beams",
+    );
+    let mut all = Coverage::default();
     for &pleat in row.pleat.all(form) {
         let mut at = Vec::new();
         for &slope in row.slope.all(form) {
@@ -131,7 +138,8 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
         at.push((height_m, found.missed as f64, found.missed == 0));
     }
     tried.along("floor of turned beams", at);
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-7 has nothing to try"))?;
+    let full = row.slope.values() * row.pleat.values() + row.turned_floors.get(Form::Full).len();
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-7 has nothing to try"))?;
     let [once, twice, thrice] = all.by_hits;
     let ours = format!(
         "{} missed of {} pairs of a pixel and a beam; {once} of them are hit once, {twice} twice and {thrice} three times",

@@ -13,6 +13,7 @@ use super::super::{Done, Figure};
 use super::Task;
 use super::public::{Pair, Public};
 use super::settings::{Moving, Shape, TwoObjects};
+use crate::reproduce::settings::Form;
 use output::plot::Series;
 use run::RunError;
 
@@ -35,7 +36,7 @@ fn ran(drawn: &PlainResult) -> Vec<Number> {
     ])
 }
 
-/// How many of these pairs, all of which collide, the passes clear, and what they drew.
+/// How many of these pairs the passes clear, and what they drew.
 fn cleared(pairs: &[Pair], method: Method, resolution: u32) -> (u64, PlainResult) {
     let one = |passes: &mut PlainPasses, [a, b]: &Pair| {
         let drawn = passes.pair(a, b);
@@ -57,13 +58,17 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         Some(folder) => super::public::load(folder, row.public_scenes.get(form))?,
         None => Public::default(),
     };
-    let (mut tried, mut drawn, mut missed) = (Cases::new("pairs missed"), PlainResult::default(), 0);
+    let varied = "methods and resolution_px jointly, and `quintile ccd`";
+    let (mut tried, mut drawn, mut missed) = (Cases::new("pairs missed", varied), PlainResult::default(), 0);
+    let mut apart = Vec::new();
     for &method in row.methods.get(form) {
         let mut at = Vec::new();
         for &resolution in row.resolution_px.all(form) {
             let (own, own_drawn) = cleared(&generated, method, resolution);
             let (theirs, their_drawn) = cleared(&public.collide, method, resolution);
-            drawn = drawn.and(&own_drawn).and(&their_drawn);
+            let (apart_cleared, apart_drawn) = cleared(&public.apart, method, resolution);
+            apart.push(apart_cleared);
+            drawn = drawn.and(&own_drawn).and(&their_drawn).and(&apart_drawn);
             missed += own + theirs;
             at.push((resolution, (own + theirs) as f64, own + theirs == 0));
         }
@@ -72,13 +77,15 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
     let closer: usize = own.iter().map(missed_closer).sum::<usize>() + public.missed_closer;
     tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
     let ours = format!(
-        "{} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`",
+        "{} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`{}",
         missed + closer as u64,
         generated.len(),
         said(&public, task.collision_data.is_some()),
-        row.methods.get(form).len() * row.resolution_px.all(form).len()
+        row.methods.get(form).len() * row.resolution_px.all(form).len(),
+        said_of_others(&apart, public.apart.len())
     );
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-1 has nothing to try"))?;
+    let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-1 has nothing to try"))?;
     let facts = numbers([
         ("missed", missed as f64 + closer as f64),
         ("generated_cases", own.len() as f64),
@@ -89,8 +96,23 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         ("public_query_files", public.query_files as f64),
         ("public_queries", public.queries as f64),
         ("public_cases_that_collide_drawn", public.collide.len() as f64),
+        ("public_queries_that_do_not_collide_drawn", public.apart.len() as f64),
+        ("fewest_of_these_cleared", apart.iter().copied().min().unwrap_or(0) as f64),
+        ("most_of_these_cleared", apart.iter().copied().max().unwrap_or(0) as f64),
     ]);
-    Ok(Done::bare(Row { numbers: facts, ran: ran(&drawn), ..with.banded(&row.about, ours, band) }))
+    let made = with.banded(&row.about, ours, band);
+    let note = match public.collide.len() + public.known {
+        0 => format!("no public case that collides was tested; {}", made.note),
+        _ => made.note.clone(),
+    };
+    Ok(Done::bare(Row { numbers: facts, ran: ran(&drawn), note, ..made }))
+}
+
+/// What the passes say of public queries that do not collide: to keep them is no error, only work.
+fn said_of_others(cleared: &[u64], drawn: usize) -> String {
+    let ends = cleared.iter().min().zip(cleared.iter().max());
+    let Some((fewest, most)) = ends.filter(|_| drawn > 0) else { return String::new() };
+    format!("; of {drawn} public queries that do not collide, all drawn, the passes clear {fewest} to {most}")
 }
 
 /// What of the public data was run.
@@ -103,7 +125,7 @@ fn said(public: &Public, given: bool) -> String {
         n => format!(" (which {n} of them are is not known; they are counted for `quintile ccd` alone)"),
     };
     format!(
-        "; {} public scenes with {} pairs that collide{unknown}; {} public queries in {} files, of which {} collide",
+        "; {} public scenes with {} pairs that collide{unknown}, their other pairs not drawn; {} public queries in {} files, all drawn, of which {} collide",
         public.scenes,
         public.known,
         public.queries,
@@ -161,8 +183,11 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_2);
     let (row, form) = (with.settings, with.form);
     let refused = || RunError::setting("VI-2: a coordinate is beyond 1e60 or not a number");
-    let (mut tried, mut drawn, mut said) =
-        (Cases::new("pixels left of a pair"), PlainResult::default(), Vec::new());
+    let (mut tried, mut drawn, mut said) = (
+        Cases::new("pixels left of a pair", "cases, methods and resolution_px jointly"),
+        PlainResult::default(),
+        Vec::new(),
+    );
     for case in row.objects.get(form).iter().filter(|case| row.cases.all(form).contains(&case.name)) {
         let objects = [object(&case.first).ok_or_else(refused)?, object(&case.second).ok_or_else(refused)?];
         let looked = Looked { case, objects };
@@ -183,7 +208,8 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
             tried.along(&format!("resolution_px ({}, {})", case.name, name(method)), at);
         }
     }
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-2 has no case to try"))?;
+    let full = row.cases.values() * row.methods.get(Form::Full).len() * row.resolution_px.values();
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-2 has no case to try"))?;
     let made = with.banded(&row.about, said.join("; "), band);
     Ok(Done::bare(Row { ran: ran(&drawn), ..made }))
 }
@@ -224,7 +250,10 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         resolutions.iter().map(at).collect()
     };
     let (boxes, fragments) = (kept(Method::BoxBox), kept(Method::FragmentBox));
-    let mut tried = Cases::new("cases with fewer false positives for fragments, less those with more");
+    let mut tried = Cases::new(
+        "cases with fewer false positives for fragments, less those with more",
+        "resolution_px alone",
+    );
     let judged = |(at, (fragments, boxes)): (&u32, (&Vec<usize>, &Vec<usize>))| {
         let count =
             |is: fn(&usize, &usize) -> bool| fragments.iter().zip(boxes).filter(|(f, b)| is(f, b)).count();
@@ -232,7 +261,8 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         (*at, better as f64 - worse as f64, worse == 0 && better > 0)
     };
     tried.along("resolution_px", resolutions.iter().zip(fragments.iter().zip(&boxes)).map(judged));
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-3 has nothing to try"))?;
+    let band =
+        tried.band(row.resolution_px.values()).ok_or_else(|| RunError::setting("VI-3 has nothing to try"))?;
     let each = || fragments.iter().flatten().zip(boxes.iter().flatten());
     let (worse, better) = (each().filter(|(f, b)| f > b).count(), each().filter(|(f, b)| f < b).count());
     let sums =

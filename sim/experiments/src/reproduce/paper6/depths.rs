@@ -24,9 +24,9 @@ use run::RunError;
 /// Widths of depth intervals in tiles, over those of the vertices.
 #[derive(Clone, Debug, Default)]
 struct Widths {
-    /// Sums over tiles of triangles whose facing does not change, and of those whose does: by the planes that are judged, and by those
-    /// at the ends of the tile's time.
-    sums: [[f64; 2]; 2],
+    /// Sums over tiles of triangles whose facing does not change, and of those whose does: by the planes that are judged, by those
+    /// at the ends of the tile's time, and without any plane, by the vertices within that time.
+    sums: [[f64; 3]; 2],
     tiles: [u64; 2],
     /// Tiles, or places, with a depth outside.
     violations: u64,
@@ -38,17 +38,20 @@ struct Widths {
 }
 
 impl Widths {
-    fn add(&mut self, turns: bool, vertices: f64, [planes, local]: [f64; 2]) {
+    /// Widths of a tile by the planes that are judged, by local ones, and by the vertices within the tile's time, with that by
+    /// vertices over the whole shutter.
+    fn add(&mut self, turns: bool, vertices: f64, widths: [f64; 3]) {
         let class = usize::from(turns);
-        self.sums[class][0] += planes / vertices;
-        self.sums[class][1] += local / vertices;
+        for (sum, width) in self.sums[class].iter_mut().zip(widths) {
+            *sum += width / vertices;
+        }
         self.tiles[class] += 1;
-        self.ratios[class].push(planes / vertices);
+        self.ratios[class].push(widths[0] / vertices);
     }
 
     fn and(mut self, other: Self) -> Self {
         for class in 0..2 {
-            for which in 0..2 {
+            for which in 0..3 {
                 self.sums[class][which] += other.sums[class][which];
             }
             self.tiles[class] += other.tiles[class];
@@ -79,12 +82,60 @@ impl Widths {
         turning / steady
     }
 
+    /// Without any plane: the means by the vertices within the tile's time, over those of the whole shutter.
+    fn null(&self) -> [f64; 3] {
+        self.means(2)
+    }
+
+    /// What planes gain beyond that, the gain by time taken out: over all tiles, where the facing changes, and elsewhere.
+    fn over_null(&self) -> [f64; 3] {
+        let (planes, null) = (self.means(0), self.null());
+        [0, 1, 2].map(|class| planes[class] / null[class])
+    }
+
     fn text(&self, what: &str) -> String {
-        let [all, turning, steady] = self.means(0);
+        let ([all, turning, steady], null) = (self.means(0), self.null());
         format!(
             "{what}: {all:.3} of the vertices' width, {turning:.3} in {} tiles where the facing changes and {steady:.3} in {} where it does \
-             not, {} violations",
-            self.tiles[1], self.tiles[0], self.violations
+             not, {} violations (null, vertices within the tile's time: {:.3}, {:.3} and {:.3})",
+            self.tiles[1], self.tiles[0], self.violations, null[0], null[1], null[2]
+        )
+    }
+}
+
+/// Whether planes are narrower than the null, which has none: the vertices within the tile's own time. The condition of the row is
+/// about the vertices over the whole shutter, which that time alone beats.
+#[derive(Default)]
+struct AgainstNull {
+    /// How many cases there are.
+    cases: usize,
+    /// In how many the planes are narrower where the facing changes, and elsewhere.
+    beaten: [usize; 2],
+    /// In how many they gain more on the null where the facing changes than elsewhere.
+    turning_more: usize,
+    /// Least and greatest width over the null's, where the facing changes and elsewhere.
+    ranges: [[f64; 2]; 2],
+}
+
+impl AgainstNull {
+    fn add(&mut self, widths: &Widths) {
+        let [_, turning, steady] = widths.over_null();
+        for (class, over) in [turning, steady].into_iter().enumerate() {
+            let [low, high] = if self.cases == 0 { [over; 2] } else { self.ranges[class] };
+            self.ranges[class] = [low.min(over), high.max(over)];
+            self.beaten[class] += usize::from(over < 1.0);
+        }
+        self.turning_more += usize::from(turning < steady);
+        self.cases += 1;
+    }
+
+    fn text(&self) -> String {
+        let Self { cases, beaten, turning_more, ranges: [turning, steady] } = self;
+        format!(
+            "against the null, vertices within the tile's own time and no plane, planes are narrower in {} of {cases} cases where the facing \
+             changes ({:.3} to {:.3} of it) and in {} of {cases} elsewhere ({:.3} to {:.3}), and gain more where the facing changes in \
+             {turning_more}",
+            beaten[0], turning[0], turning[1], beaten[1], steady[0], steady[1]
         )
     }
 }
@@ -94,10 +145,11 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_15);
     let (row, form) = (with.settings, with.form);
     let all = Scenes::new(row, form)?;
-    let (mut tried, mut said, mut total) =
-        (Cases::new("width where the facing changes over that elsewhere"), Vec::new(), Widths::default());
+    let (mut tried, mut said, mut total) = (Cases::new(OF, VARIED), Vec::new(), Widths::default());
+    let mut against_null = AgainstNull::default();
     let mut keep = |what: String, widths: &Widths| {
         said.push(widths.text(&what));
+        against_null.add(widths);
         let Widths { violations, places, triangles, tiles, .. } = widths;
         total.violations += violations;
         total.places += places;
@@ -126,7 +178,8 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
             tried.along(&format!("tile_px ({}, {})", mode_name(mode), triangles_name(triangles)), at);
         }
     }
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-15 has nothing to try"))?;
+    let full = row.triangles.values() * (row.tile_px.values() + row.mode.values() - 1);
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-15 has nothing to try"))?;
     let ours = format!(
         "{}; by the planes at the ends of the tile's own time, in standard mode: {}",
         said.join("; "),
@@ -136,6 +189,13 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         ("least_turning_over_steady", band.min),
         ("most_turning_over_steady", band.max),
         ("violations", total.violations as f64),
+        ("cases", against_null.cases as f64),
+        ("cases_narrower_than_null_turning", against_null.beaten[0] as f64),
+        ("cases_narrower_than_null_steady", against_null.beaten[1] as f64),
+        ("least_over_null_turning", against_null.ranges[0][0]),
+        ("most_over_null_turning", against_null.ranges[0][1]),
+        ("least_over_null_steady", against_null.ranges[1][0]),
+        ("most_over_null_steady", against_null.ranges[1][1]),
     ]);
     let ran = numbers([
         ("triangles", total.triangles as f64),
@@ -143,8 +203,13 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         ("depths_checked", total.places as f64),
     ]);
     let figures = figure.into_iter().collect();
-    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }, figures })
+    let made = with.banded(&row.about, ours, band);
+    let note = format!("{}; {}", made.note, against_null.text());
+    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures })
 }
+
+const OF: &str = "width where the facing changes over that elsewhere";
+const VARIED: &str = "mode and triangles jointly, in standard mode with tile_px";
 
 const fn mode_name(mode: Mode) -> &'static str {
     match mode {
@@ -264,10 +329,17 @@ impl<'a> Alone<'a> {
 
     /// Depths by the vertices at both ends of the shutter, in front of the near depth.
     fn by_vertices(&self) -> [f64; 2] {
-        let depths = self.vertices.iter().flat_map(|vertex| [vertex.open[2], vertex.close[2]]).map(f64::from);
-        let [low, high] =
-            depths.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], w| [lo.min(w), hi.max(w)]);
+        let [low, high] = self.vertices_within([0.0, 1.0]);
         [low.max(self.near()), high]
+    }
+
+    /// Depths by the vertices at both ends of a time.
+    fn vertices_within(&self, times: [f64; 2]) -> [f64; 2] {
+        let depths = self.vertices.iter().flat_map(|vertex| {
+            let [open, close] = [vertex.open[2], vertex.close[2]].map(f64::from);
+            times.map(|t| (1.0 - t) * open + t * close)
+        });
+        depths.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], w| [low.min(w), high.max(w)])
     }
 
     fn width(&self, [low, high]: [f64; 2]) -> f64 {
@@ -283,7 +355,7 @@ impl<'a> Alone<'a> {
             Planes::Shutter => DepthBound::Planes,
             Planes::Tile => DepthBound::LocalPlanes,
         };
-        let bounders = [judged, DepthBound::LocalPlanes]
+        let bounders = [judged, DepthBound::LocalPlanes, DepthBound::VerticesInTime]
             .map(|bound| Bounder::new(&self.triangle, &self.projection.shear, bound));
         let vertices = self.width(self.by_vertices());
         let across = self.scene.viewport.width();
@@ -353,8 +425,8 @@ impl<'a> Alone<'a> {
             tiles.touched.iter().zip(&hit).filter(|(_, hit)| **hit).filter_map(|(touch, _)| touch.as_ref())
         {
             if vertices > 0.0 {
-                let width = self.width(touch.z);
-                widths.add(self.turns, vertices, [width; 2]);
+                let [width, null] = [touch.z, self.vertices_within(touch.t)].map(|range| self.width(range));
+                widths.add(self.turns, vertices, [width, width, null]);
             }
         }
         widths
@@ -480,4 +552,44 @@ fn cumulative(widths: &Widths) -> Figure {
         [("width over that by vertices", ""), ("share of tiles at most so wide", "")],
         vec![line("facing stays", shares(0)), line("facing changes", shares(1))],
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widths(turning: [f64; 3], steady: [f64; 3]) -> Widths {
+        let mut widths = Widths::default();
+        widths.add(true, 2.0, turning);
+        widths.add(false, 2.0, steady);
+        widths
+    }
+
+    /// Narrower than the vertices over the whole shutter, with no gain by planes at all: the condition holds, and the row says that
+    /// the null is not beaten.
+    #[test]
+    fn planes_that_gain_nothing_are_not_narrower_than_the_null() {
+        let idle = widths([1.0, 1.0, 1.0], [1.8, 1.8, 1.8]);
+        assert!(idle.holds() && idle.null() == [0.7, 0.5, 0.9]);
+        assert_eq!(idle.over_null(), [1.0; 3]);
+        let useful = widths([0.5, 0.5, 1.0], [1.8, 1.8, 1.8]);
+        let mut against = AgainstNull::default();
+        against.add(&idle);
+        assert_eq!((against.cases, against.beaten, against.turning_more), (1, [0, 0], 0));
+        against.add(&useful);
+        assert_eq!((against.cases, against.beaten, against.turning_more), (2, [1, 0], 1));
+        assert_eq!(against.ranges, [[0.5, 1.0], [1.0, 1.0]]);
+        assert!(against.text().contains("in 1 of 2 cases where the facing changes (0.500 to 1.000 of it)"));
+    }
+
+    /// With the committed settings the null of vertices within the tile's time is itself below 1.
+    #[test]
+    fn the_null_alone_is_narrower_than_the_vertices() {
+        let scene = random(40, 32, 6).unwrap();
+        let all = scene.triangles.iter().filter_map(|corners| Alone::new(&scene, corners).unwrap());
+        let widths = all.map(|alone| alone.standard(8, Planes::Shutter));
+        let widths = widths.fold(Widths::default(), Widths::and);
+        let (planes, null) = (widths.means(0), widths.null());
+        assert!(planes[0] < null[0] && null[0] < 1.0, "{planes:?} {null:?}");
+    }
 }

@@ -5,7 +5,7 @@ use workloads::glossy::Effect;
 use super::Task;
 use super::settings::Glossy;
 use crate::chart::glossy::{Bench, Blur, Effort as Size, Row as Measured};
-use crate::reproduce::band::Cases;
+use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::line;
 use crate::reproduce::row::{Row, numbers};
 use crate::reproduce::settings::Form;
@@ -59,7 +59,11 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let found = |settings| Found::new(row, form, settings).map_err(RunError::setting);
     let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
-    let (mut tried, off) = (Cases::new("error of many samples over that of few"), *row.blur_off.get(form));
+    let mut tried = Cases::new(
+        "error of many samples over that of few",
+        "lens_radius and index one at a time about the values given",
+    );
+    let off = *row.blur_off.get(form);
     let base = found([radius, index])?;
     let (mut at, mut widest, mut runs) = (Vec::new(), Vec::new(), 1);
     let mut radii = row.lens_radius.all(form).to_vec();
@@ -83,7 +87,8 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         at.push((one, found.ratio(), found.falls() && found.hardens(off)));
     }
     tried.along("index", at).standing_at(index);
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-11 has nothing to try"))?;
+    let full = one_at_a_time([row.lens_radius.values(), row.index.values()]);
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-11 has nothing to try"))?;
     let [reflected, refracted] = base.errors.map(|both| both.map(|row| row.rmse));
     let (first, last) = (&base.blurs[0], &base.blurs[base.blurs.len() - 1]);
     let ours = format!(

@@ -19,7 +19,7 @@ use workloads::stress::{Size, StressScene, families};
 
 use super::row::With;
 use super::settings::{Form, Origin, load};
-use super::{Done, Options, Paper};
+use super::{Done, Options};
 use output::progress::Progress;
 use run::RunError;
 use settings::Settings;
@@ -37,7 +37,12 @@ struct Task<'a> {
 impl Task<'_> {
     /// The settings of one row.
     fn with<'s, S>(&'s self, row: fn(&'s Settings) -> &'s S) -> With<'s, S> {
-        With { settings: row(&self.settings), form: self.form, sha256: &self.origin.sha256 }
+        With {
+            settings: row(&self.settings),
+            form: self.form,
+            sha256: &self.origin.sha256,
+            shared_less: Vec::new(),
+        }
     }
 }
 
@@ -62,8 +67,15 @@ const ROWS: [(&str, Compute); 16] = [
     ("VI-16", culling::unchanged),
 ];
 
+/// The row that reads public cases of collision detection.
+pub(super) const READS_COLLISION_DATA: &str = "VI-1";
+
+/// The ids of its rows.
+pub(super) fn ids() -> Vec<&'static str> {
+    ROWS.iter().map(|(id, _)| *id).collect()
+}
+
 pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
-    options.check(Paper::Six, &ROWS.map(|(id, _)| id))?;
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let task = Task {
         settings,

@@ -3,7 +3,7 @@
 use workloads::occlusion::{Answer, SampledAnswer, WallSceneSpec};
 
 use super::super::Done;
-use super::super::band::{Cases, short};
+use super::super::band::{Cases, one_at_a_time, short};
 use super::super::figure::over_doublings;
 use super::super::row::{Row, numbers};
 use super::Task;
@@ -88,12 +88,16 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
         motions.push((motion, gain(&rates), grows(&rates)));
     }
     let wrong = total.wrong;
-    let mut tried = Cases::new("share found gained by more boxes");
+    let mut tried = Cases::new(
+        "share found gained by more boxes",
+        "tile_px and motion_m one at a time about the values given",
+    );
     let at = tiles.into_iter().map(|(side, gain, grows)| (side, gain, grows && wrong == 0));
     tried.along("tile_px", at).standing_at(tile_px);
     let at = motions.into_iter().map(|(motion, gain, grows)| (motion, gain, grows && wrong == 0));
     tried.along("motion_m", at).standing_at(motion);
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-4 has nothing to try"))?;
+    let full = one_at_a_time([row.tile_px.values(), row.motion_m.values()]);
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-4 has nothing to try"))?;
     let base = curves.iter().find(|(name, _)| *name == format!("{tile_px}-pixel tiles"));
     let listed: Vec<String> =
         base.iter().flat_map(|(_, rates)| rates).map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
@@ -194,7 +198,8 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
     let costs =
         |objects, charged| queried.iter().map(|yards| Costs::of(yards, objects, charged)).collect::<Vec<_>>();
     let far = *row.far_fewer.get(form);
-    let mut tried = Cases::new("times fewer tests or bytes, whichever are nearer");
+    let mut tried =
+        Cases::new("times fewer tests or bytes, whichever are nearer", "objects and boxes_charged jointly");
     for &objects in row.objects.all(form) {
         let at = row.boxes_charged.all(form).iter().map(|&charged| {
             let [tests, bytes, _] = least(&costs(objects, charged));
@@ -203,7 +208,8 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         let which = if objects == Asked::All { "all objects" } else { "hidden objects" };
         tried.along(&format!("boxes_charged ({which})"), at.collect::<Vec<_>>());
     }
-    let band = tried.band().ok_or_else(|| RunError::setting("VI-5 has nothing to try"))?;
+    let full = row.objects.values() * row.boxes_charged.values();
+    let band = tried.band(full).ok_or_else(|| RunError::setting("VI-5 has nothing to try"))?;
     let base = costs(*row.objects.get(form), *row.boxes_charged.get(form));
     let [tests, bytes, madds] = least(&base);
     let charged = least(&costs(*row.objects.get(form), 1.0));

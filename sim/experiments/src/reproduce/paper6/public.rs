@@ -31,6 +31,8 @@ pub(super) struct Public {
     pub queries: usize,
     /// What passes have to keep: the pairs seen, and the queries that collide.
     pub collide: Vec<Pair>,
+    /// The queries that do not collide, which passes may clear or keep.
+    pub apart: Vec<Pair>,
 }
 
 fn wrong(message: String) -> RunError {
@@ -124,9 +126,6 @@ impl Public {
         let vertex_face = path.parent().is_some_and(|folder| folder.ends_with("vertex-face"));
         for query in rows.chunks_exact(8) {
             self.queries += 1;
-            if !query[0].1 {
-                continue;
-            }
             let [from, to] = [0, 4].map(|end| [0, 1, 2, 3].map(|corner| query[end + corner].0));
             let ends = if vertex_face {
                 [[from, to].map(|p| [p[0]; 3]), [from, to].map(|p| [p[1], p[2], p[3]])]
@@ -138,6 +137,10 @@ impl Public {
                 return Err(wrong(format!("{}: a coordinate is beyond 1e60", path.display())));
             };
             let pair = [one, other];
+            if !query[0].1 {
+                self.apart.push(pair);
+                continue;
+            }
             let kept = detect(&pair, &Search::default()).iter().any(|answer| answer.verdict.may_collide());
             self.missed_closer += usize::from(!kept);
             self.collide.push(pair);

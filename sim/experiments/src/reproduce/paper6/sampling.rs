@@ -19,7 +19,7 @@ use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
 use super::settings::Darts;
-use crate::reproduce::settings::Form;
+use crate::reproduce::settings::{About, Form};
 use run::GpuSpec;
 use run::RunError;
 
@@ -53,6 +53,24 @@ fn fill(torus: &Torus, seed: u64, [side, samples]: [u32; 2]) -> Result<Filled, R
     Ok(Filled { found, inside: n, expected: all * share, integral, off })
 }
 
+/// What the file says of the tolerance. It is not so, but files of settings are not changed once a number was computed with them.
+const SAID_OF_TOLERANCE: &str =
+    "The samples of a pixel are stratified, so that 3 standard errors of independent ones are generous.";
+
+/// The limits of the file, with what the deviations show in the place of that sentence.
+fn limits(said: &str, off: &[[f64; 2]]) -> String {
+    let squares = || off.iter().flatten().map(|off| off * off);
+    let rms = (squares().sum::<f64>() / squares().count() as f64).sqrt();
+    let most = squares().fold(0.0, f64::max).sqrt();
+    let found = format!(
+        "The standard errors are those of independent samples; those of a pixel are stratified. The {} deviations of count and integral \
+         found here have a root mean square of {rms:.2} standard errors, {most:.2} at most; of independent samples it is 1.",
+        squares().count()
+    );
+    let kept = said.replace(SAID_OF_TOLERANCE, "");
+    format!("{} {found}", kept.trim_end())
+}
+
 /// VI-8: as many samples in a torus as its volume says, and the integral over it.
 pub(super) fn torus(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_8);
@@ -63,12 +81,12 @@ pub(super) fn torus(task: &Task<'_>) -> Result<Done, RunError> {
     let filled = row.seed.all(form).iter().map(|&seed| fill(&torus, seed, size));
     let filled: Vec<Filled> = filled.collect::<Result<_, _>>()?;
     let farther = |one: &Filled| one.off.iter().fold(0.0, |most: f64, off| most.max(off.abs()));
-    let mut tried = Cases::new("standard errors off, count or integral, whichever is farther");
+    let mut tried = Cases::new("standard errors off, count or integral, whichever is farther", "seed alone");
     let judged = |(seed, one): (&u64, &Filled)| {
         (*seed, farther(one), farther(one) <= most && one.found.samples as f64 >= least)
     };
     tried.along("seed", row.seed.all(form).iter().zip(&filled).map(judged));
-    let band = tried.band().ok_or_else(|| failed("no seed"))?;
+    let band = tried.band(row.seed.values()).ok_or_else(|| failed("no seed"))?;
     let first = &filled[0];
     let ours = format!(
         "{:.0} of {} samples, {:.0} expected ({:+.2} standard errors); the integral of the squared distance from the axis is {:.6}, exactly \
@@ -94,10 +112,9 @@ pub(super) fn torus(task: &Task<'_>) -> Result<Done, RunError> {
         ("samples_inside", filled.iter().map(|one| one.inside).sum()),
     ]);
     let figure = slice(&first.found);
-    Ok(Done {
-        row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
-        figures: vec![figure],
-    })
+    let off: Vec<[f64; 2]> = filled.iter().map(|one| one.off).collect();
+    let about = About { limits: limits(&row.about.limits, &off), ..row.about.clone() };
+    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&about, ours, band) }, figures: vec![figure] })
 }
 
 /// Figure 9: the samples near a plane through the axis.
@@ -282,13 +299,13 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
     let four = |p: [f64; 4]| p.map(|p| format!("{p:.4}")).join(", ");
     // The p that is nearest to either end of the range, by its distance from one half.
     let farthest = |p: [f64; 4]| p.into_iter().max_by(|a, b| (a - 0.5).abs().total_cmp(&(b - 0.5).abs()));
-    let mut tried = Cases::new("p farthest from one half");
+    let mut tried = Cases::new("p farthest from one half", "sets alone");
     let judged = |&sets: &u64| {
         let p = p(&own, sets);
         (sets, farthest(p).unwrap_or(f64::NAN), p.iter().all(|p| fits.contains(p)))
     };
     tried.along("sets", all.iter().map(judged));
-    let band = tried.band().ok_or_else(|| failed("no set"))?;
+    let band = tried.band(row.sets.values()).ok_or_else(|| failed("no set"))?;
     let tests = 4 * most;
     let ours = format!(
         "chi-square of {points} points of a bell a set, 1D to 4D: p = {} for {base} sets together, {} for one; {} of the {tests} sets alone are \
@@ -338,4 +355,23 @@ fn histogram(count: usize) -> Result<Figure, RunError> {
         [("x", ""), ("points", "")],
         vec![line("density", expected.collect()), dots("points", found.collect())],
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reproduce::paper6::settings::Settings;
+    use crate::reproduce::settings::load;
+
+    /// The committed file calls the tolerance generous; what is printed are the deviations.
+    #[test]
+    fn the_tolerance_is_not_called_generous() {
+        let (settings, _) = load::<Settings>(None).unwrap();
+        let file = &settings.vi_8.about.limits;
+        assert!(file.contains(SAID_OF_TOLERANCE));
+        let text = limits(file, &[[0.6, -0.8], [1.0, -2.0]]);
+        assert!(!text.contains("generous") && text.starts_with("Standard mode, in x, y and t"), "{text}");
+        assert!(text.contains("The 4 deviations") && text.contains("root mean square of 1.22"), "{text}");
+        assert!(text.contains("2.00 at most"), "{text}");
+    }
 }

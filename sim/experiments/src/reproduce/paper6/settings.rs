@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use workloads::collision::Method;
 
+use super::super::Paper;
 use super::super::settings::{About, Form, PaperSettings, Setting, row_settings};
 
 /// Width and height of an image in pixels.
@@ -14,9 +15,8 @@ pub(super) type Point = (f64, f64, f64);
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Settings {
-    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
     paper: String,
-    #[allow(dead_code, reason = "as above")]
+    #[allow(dead_code, reason = "names what passages refer to, for readers of the file")]
     source: String,
     pub vi_1: Missed,
     pub vi_2: Dodged,
@@ -274,6 +274,16 @@ pub(super) enum Policy {
     Fifo,
 }
 
+impl Policy {
+    /// As the file has it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Lru => "lru",
+            Self::Fifo => "fifo",
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Mode {
@@ -322,8 +332,13 @@ pub(super) enum Bound {
 }
 
 impl PaperSettings for Settings {
+    const PAPER: Paper = Paper::Six;
     const FILE: &str = "sim/experiments/papers/paper6.ron";
     const TEXT: &str = include_str!("../../../papers/paper6.ron");
+
+    fn paper(&self) -> &str {
+        &self.paper
+    }
 
     fn check(&self) -> Result<(), String> {
         self.vi_1.check("vi_1")?;

@@ -6,7 +6,7 @@ use workloads::multiview::Layout;
 use super::Task;
 use super::settings::{Policy, Size, Views};
 use crate::chart::views::{Bench, Lanes};
-use crate::reproduce::band::{Band, Cases};
+use crate::reproduce::band::{Cases, one_at_a_time};
 use crate::reproduce::figure::{level, line, over_doublings};
 use crate::reproduce::row::{Row, With, numbers};
 use crate::reproduce::settings::Form;
@@ -26,7 +26,7 @@ pub(super) fn seven(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// One value of everything that is left open.
-#[derive(Clone, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Point {
     samples: u32,
     eyes: f64,
@@ -54,6 +54,20 @@ impl Point {
         }
     }
 
+    /// All of it in words.
+    fn name(&self) -> String {
+        let Self { samples, eyes, size_px, lens_over_eyes, shutter, scene, quads, ways, policy } = self;
+        format!(
+            "eyes {eyes}, {}x{} pixels, lens_over_eyes {lens_over_eyes}, shutter {shutter}, scene {} {}, samples {samples}, quads {quads}, ways \
+             {ways}, {}",
+            size_px.0,
+            size_px.1,
+            scene.0,
+            scene.1,
+            policy.name()
+        )
+    }
+
     /// Lanes of all views and of one, for `views` that are two lenses apart or `overlap` steps of a line.
     fn lanes(&self, [views, overlap]: [u32; 2]) -> Result<Lanes, StudyError> {
         let aperture = self.lens_over_eyes * self.eyes;
@@ -77,6 +91,8 @@ struct Tried<'a> {
     row: &'a Views,
     form: Form,
     cases: Cases,
+    /// Every point of the sweeps, with its increase in %.
+    found: Vec<(Point, f64)>,
     draws: u64,
     samples_hit: u64,
     passes: u64,
@@ -95,9 +111,7 @@ impl Tried<'_> {
     }
 
     fn holds(&self, increase: f64) -> bool {
-        let (expected, off) =
-            (self.row.increase_percent.get(self.form), self.row.within_points.get(self.form));
-        (increase - expected).abs() <= *off
+        meets(self.row, self.form, increase)
     }
 
     /// All points along one setting, each with what its value is called.
@@ -114,12 +128,62 @@ impl Tried<'_> {
             }
             let increase = self.increase(&point)?;
             at.push((value, increase, self.holds(increase)));
+            self.found.push((point, increase));
         }
         let found = at.iter().map(|(_, increase, _)| *increase).collect();
         let cases = self.cases.along(setting, at);
         standing.into_iter().for_each(|value| cases.standing_at(value));
         Ok(found)
     }
+}
+
+/// What is varied together: copies one such setting, or the two, from a point to another.
+type Group = fn(&mut Point, &Point);
+
+const GROUPS: [Group; 8] = [
+    |to, from| (to.eyes, to.size_px) = (from.eyes, from.size_px),
+    |to, from| to.lens_over_eyes = from.lens_over_eyes,
+    |to, from| to.shutter = from.shutter,
+    |to, from| to.scene = from.scene.clone(),
+    |to, from| to.samples = from.samples,
+    |to, from| to.quads = from.quads,
+    |to, from| to.ways = from.ways,
+    |to, from| to.policy = from.policy,
+];
+
+/// The point at which every setting has the value that `better` takes for the best by itself, the others as in `base`.
+fn corner(base: &Point, found: &[(Point, f64)], better: fn(f64, f64) -> bool) -> Point {
+    let mut corner = base.clone();
+    for copy in GROUPS {
+        let only = |point: &Point| {
+            let mut same = base.clone();
+            copy(&mut same, point);
+            same == *point
+        };
+        let own = found.iter().filter(|(point, _)| only(point));
+        let best = own.reduce(|best, one| if better(one.1, best.1) { one } else { best });
+        best.into_iter().for_each(|(point, _)| copy(&mut corner, point));
+    }
+    corner
+}
+
+/// All settings together at the values that raise, and that lower, the number by themselves; those not met in a sweep.
+fn over_corners(tried: &mut Tried<'_>, base: &Point) -> Result<[f64; 2], RunError> {
+    let ends: [(&str, fn(f64, f64) -> bool); 2] = [
+        ("every setting as it lowers the number", |a, b| a < b),
+        ("every setting as it raises it", |a, b| a > b),
+    ];
+    let mut increases = [f64::NAN; 2];
+    for ((setting, better), increase) in ends.into_iter().zip(&mut increases) {
+        let point = corner(base, &tried.found, better);
+        let met = tried.found.iter().find(|(other, _)| *other == point).map(|(_, met)| *met);
+        *increase = met.map_or_else(|| tried.increase(&point), Ok)?;
+        if met.is_none() {
+            let case = (point.name(), *increase, tried.holds(*increase));
+            tried.cases.along(setting, [case]);
+        }
+    }
+    Ok(increases)
 }
 
 /// Every value of a setting, the others as in `base`.
@@ -137,42 +201,92 @@ fn each<T: Clone>(
     values.iter().map(one).collect()
 }
 
+/// Entries of the cache, and lanes a pixel of all views and of one.
+type Entries = (u32, f64, f64);
+
 /// Increases in % over the distance of the eyes, for images of one size.
 type Curves = Vec<(Size, Vec<(f64, f64)>)>;
 
 fn done(with: &With<'_, Views>, figures: [&'static str; 2]) -> Result<Done, RunError> {
     let (row, form) = (with.settings, with.form);
     let base = Point::base(row, form);
-    let cases = Cases::new("increase of shader invocations in %");
-    let mut tried = Tried { row, form, cases, draws: 0, samples_hit: 0, passes: 0 };
+    let cases = Cases::new("increase of shader invocations in %", VARIED);
+    let found = Vec::new();
+    let mut tried = Tried { row, form, cases, found, draws: 0, samples_hit: 0, passes: 0 };
     let curves = over_eyes(&mut tried, &base)?;
     over_the_rest(&mut tried, &base)?;
+    let corners = over_corners(&mut tried, &base)?;
     let ours = tried.increase(&base)?;
     let entries = entries(row, form, &base)?;
     let Tried { cases, draws, samples_hit, passes, .. } = tried;
-    let band = cases.band().ok_or_else(|| RunError::setting("no setting of the views is varied"))?;
+    let band = cases.band(full(row)).ok_or_else(|| RunError::setting("no setting of the views is varied"))?;
     let at = |quads: u32| {
         entries.iter().find(|(count, ..)| *count == quads).map(|(_, all, one)| 100.0 * (all / one - 1.0))
     };
-    let text = said(&base, ours, &band);
+    let text = said(&base, ours, corners);
     let facts = numbers([
         ("increase_percent", ours),
         ("increase_least_percent", band.min),
         ("increase_most_percent", band.max),
+        ("increase_lowering_corner_percent", corners[0]),
+        ("increase_raising_corner_percent", corners[1]),
         ("increase_at_64_entries_percent", at(64).unwrap_or(f64::NAN)),
         ("increase_at_16384_entries_percent", at(16_384).unwrap_or(f64::NAN)),
     ]);
     let ran =
         numbers([("passes", passes as f64), ("draws", draws as f64), ("samples_hit", samples_hit as f64)]);
     let figures = vec![over_entries(figures[0], row, &entries), banded(figures[1], row, form, &curves)];
-    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&row.about, text, band) }, figures })
+    let judged = Row { numbers: facts, ran, ..with.banded(&row.about, text, band) };
+    Ok(Done { row: judged.limited(&cache_sizes(row, form, &entries)), figures })
 }
 
-fn said(base: &Point, ours: f64, band: &Band) -> String {
+const VARIED: &str =
+    "one at a time about the values given, eyes and size_px jointly, and two corners of the ranges";
+
+/// Cases of the full form: one at a time, eyes with sizes, and both corners.
+fn full(row: &Views) -> usize {
+    let jointly = row.eyes.values() * row.size_px.values();
+    let views = [row.lens_over_eyes.values(), row.shutter.values(), row.scene.values(), row.samples.values()];
+    one_at_a_time([jointly, one_at_a_time(views), row.quads.values(), row.ways.values(), row.policy.values()])
+        + 2
+}
+
+fn said(base: &Point, ours: f64, [low, high]: [f64; 2]) -> String {
     format!(
-        "{ours:+.1} % with eyes {} apart, {}x{} pixels a view; {:+.1} to {:+.1} % over all that is left open",
-        base.eyes, base.size_px.0, base.size_px.1, band.min, band.max
+        "{ours:+.1} % with eyes {} apart, {}x{} pixels a view, and the other settings as given; {low:+.1} to {high:+.1} % with every open \
+         setting at the value of its range that lowers or raises the number by itself",
+        base.eyes, base.size_px.0, base.size_px.1
     )
+}
+
+/// At which sizes of the cache the condition is met: at all of them it says nothing about the size that the claim names.
+fn cache_sizes(row: &Views, form: Form, entries: &[Entries]) -> String {
+    let increase = |(quads, all, one): &Entries| (*quads, 100.0 * (all / one - 1.0));
+    let (met, not): (Vec<_>, Vec<_>) =
+        entries.iter().map(increase).partition(|(_, increase)| meets(row, form, *increase));
+    let list = |some: &[(u32, f64)]| -> String {
+        let each = some.iter().map(|(quads, increase)| format!("{quads} entries ({increase:+.1} %)"));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    match (met.is_empty(), not.is_empty()) {
+        (_, true) => format!(
+            "The condition says nothing about the size of the cache: with the other settings as given it is met at {}.",
+            list(&met)
+        ),
+        (true, false) => {
+            format!("With the other settings as given the condition is not met at {}.", list(&not))
+        }
+        (false, false) => format!(
+            "With the other settings as given the condition is met at {}, not at {}.",
+            list(&met),
+            list(&not)
+        ),
+    }
+}
+
+/// Whether an increase in % is as near as it has to be to what the paper reports.
+fn meets(row: &Views, form: Form, increase: f64) -> bool {
+    (increase - row.increase_percent.get(form)).abs() <= *row.within_points.get(form)
 }
 
 /// Every distance of the eyes with every size of the image.
@@ -208,13 +322,17 @@ fn over_the_rest(tried: &mut Tried<'_>, base: &Point) -> Result<(), RunError> {
     tried.along("quads", points)?;
     let points = each(row.ways.all(form), count, |point, value| point.ways = value, base);
     tried.along("ways", points)?;
-    let name = |policy: &Policy| format!("{policy:?}").to_lowercase();
-    let points = each(row.policy.all(form), name, |point, value| point.policy = value, base);
+    let points = each(
+        row.policy.all(form),
+        |policy| policy.name().to_owned(),
+        |point, value| point.policy = value,
+        base,
+    );
     tried.along("policy", points).map(|_| ())
 }
 
 /// Lanes of all views and of one over the entries of the cache, for the figure.
-fn entries(row: &Views, form: Form, base: &Point) -> Result<Vec<(u32, f64, f64)>, RunError> {
+fn entries(row: &Views, form: Form, base: &Point) -> Result<Vec<Entries>, RunError> {
     let shape = [*row.views.get(form), *row.overlap.get(form)];
     let pixels = f64::from(base.size_px.0) * f64::from(base.size_px.1);
     let at = |&quads: &u32| {
@@ -224,10 +342,9 @@ fn entries(row: &Views, form: Form, base: &Point) -> Result<Vec<(u32, f64, f64)>
     row.curve_entries.get(form).iter().map(at).collect()
 }
 
-fn over_entries(name: &'static str, row: &Views, entries: &[(u32, f64, f64)]) -> Figure {
-    let over = |of: fn(&(u32, f64, f64)) -> f64| {
-        entries.iter().map(|at| (f64::from(at.0), of(at))).collect::<Vec<_>>()
-    };
+fn over_entries(name: &'static str, row: &Views, entries: &[Entries]) -> Figure {
+    let over =
+        |of: fn(&Entries) -> f64| entries.iter().map(|at| (f64::from(at.0), of(at))).collect::<Vec<_>>();
     over_doublings(
         name,
         [
@@ -261,4 +378,38 @@ fn banded(name: &'static str, row: &Views, form: Form, curves: &Curves) -> Figur
         [("distance of the eyes in scene units", ""), ("increase in %", "")],
         series,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn base() -> Point {
+        Point {
+            samples: 8,
+            eyes: 0.065,
+            size_px: (640, 360),
+            lens_over_eyes: 0.4,
+            shutter: 0.5,
+            scene: ("default".to_owned(), 18),
+            quads: 1024,
+            ways: 4,
+            policy: Policy::Lru,
+        }
+    }
+
+    /// Open settings add up: neither end is in a sweep that varies them one at a time.
+    #[test]
+    fn corners_join_what_raises_and_what_lowers_the_number_by_itself() {
+        let far = Point { eyes: 0.28, size_px: (320, 180), ..base() };
+        let near = Point { eyes: 0.02, ..base() };
+        let (small, fifo) = (Point { quads: 256, ..base() }, Point { policy: Policy::Fifo, ..base() });
+        let found = [(base(), 10.0), (far, 40.0), (near, 3.0), (small, 12.0), (fifo, 9.0)];
+        let most = corner(&base(), &found, |a, b| a > b);
+        assert_eq!((most.eyes, most.size_px, most.quads), (0.28, (320, 180), 256));
+        assert!(most.policy == Policy::Lru && most.lens_over_eyes == 0.4);
+        let least = corner(&base(), &found, |a, b| a < b);
+        assert_eq!((least.eyes, least.size_px, least.quads), (0.02, (640, 360), 1024));
+        assert_eq!(least.policy, Policy::Fifo);
+    }
 }
