@@ -50,7 +50,7 @@ fn an_automatic_near_depth_yields_to_what_is_in_view_and_a_given_one_does_not() 
     assert_close([near("position: (0, 0, 3), target: (0, 0, 10003)"); 2], [10.0; 2]);
     // On the surface itself there is an end.
     let touching = near("position: (0, 0, 1.0000001), target: (0, 0, -9)");
-    assert!(touching >= 0.99e-5 && touching < 1.1e-5, "{touching}");
+    assert!((0.99e-5..1.1e-5).contains(&touching), "{touching}");
 }
 
 /// The camera comes nearer, frame by frame, with its target far away; given back it is the same in every frame.
