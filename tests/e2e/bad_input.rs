@@ -229,8 +229,8 @@ fn invalid_scene_files() {
         ("(".to_owned(), ":1:", "end of RON"),
         (String::new(), ":1:", "Expected opening `(`"),
     ];
-    for (text, place, mend) in cases {
-        refusals.file("scene.ron", text, 2, &[place, mend]);
+    for (text, place, remedy) in cases {
+        refusals.file("scene.ron", text, 2, &[place, remedy]);
     }
     refusals.file("scene.ron", b"(\xff\xfe)", 1, &["UTF-8"]);
 }

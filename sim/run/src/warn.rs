@@ -307,7 +307,7 @@ fn slivers(simulated: &Simulated) -> Option<Warning> {
     Some(Warning::new(
         Code::SliverTriangles,
         format!(
-            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; mend the mesh \
+            "{which} are more than a hundred times as long as high: they touch many tiles and few samples; fix the mesh \
              where it was made"
         ),
     ))
