@@ -174,8 +174,8 @@ fn a_room_is_seen_from_inside_and_a_solid_from_outside() {
     }
     assert_eq!(info(&solid, &[])["camera"]["side"], "Outside");
     assert!(images(&solid, &[]) == images(&solid, &["--camera", "outside"]));
-    let asked = info(&solid, &["--camera", "inside"]);
-    assert_eq!(asked["camera"]["side"], "Inside");
+    let inside = info(&solid, &["--camera", "inside"]);
+    assert_eq!(inside["camera"]["side"], "Inside");
     let wide = info(&room_file, &["--camera", "fitted: Inside, fov_deg: 85"]);
     assert_eq!((&wide["camera"]["fov_deg"], &wide["camera"]["position"]), (&json!(85.0), &eye["position"]));
 }

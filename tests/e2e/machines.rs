@@ -41,7 +41,7 @@ fn another_platform_is_reported() {
     assert!(mismatch(&crossed) && message.contains("`mobile` belongs to platform `iphone_4s`"), "{message}");
 }
 
-/// A copy of `file` with its name changed and whatever else `change` does.
+/// A copy of `file` with another name and the changes of `change`.
 fn copy(inputs: &Inputs, file: &str, name: &str, change: impl Fn(String) -> String) -> String {
     let path = root().join(file);
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -23,7 +23,7 @@ fn predicted_frames_are_marked_in_every_file() {
     for row in &rows {
         let known = simulated.contains(&row["frame"]);
         assert_eq!(row["predicted"] == false, known);
-        // Images, hashes and intervals: each where it belongs.
+        // Simulated frames have images and hashes, predicted ones have intervals.
         let image = format!("images/frame_{:04}.png", row["frame"].as_u64().unwrap_or_default());
         assert_eq!(results.path(&image).exists(), known, "{image}");
         assert_eq!(row["image"].as_str(), known.then_some(image.as_str()));
@@ -94,10 +94,10 @@ fn the_requested_accuracy_is_met() {
     for (frames, accuracy) in [("0..3", "2%"), ("0..3", "30%"), ("0..36", "3%")] {
         let results = run(&["--frames", frames, "--accuracy", accuracy, "--verify"]);
         let summary = results.summary();
-        let asked = number(&summary, "/choice/accuracy");
+        let requested = number(&summary, "/choice/accuracy");
         let [expected, actual] = ["/choice/expected_error", "/verified/error"].map(|at| number(&summary, at));
-        assert!(expected <= asked, "{frames} {accuracy}: expected {expected}");
-        assert!(actual <= asked, "{frames} {accuracy}: actual {actual}, expected {expected}");
+        assert!(expected <= requested, "{frames} {accuracy}: expected {expected}");
+        assert!(actual <= requested, "{frames} {accuracy}: actual {actual}, expected {expected}");
         assert_eq!(summary["choice"]["meets_accuracy"], true);
         for text in ["chosen: ", "actual error: "] {
             assert!(results.ended.stdout.contains(text), "{}", results.ended.stdout);

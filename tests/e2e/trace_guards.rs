@@ -134,14 +134,14 @@ fn an_idle_recording_that_is_too_short_is_refused_by_instant() {
 fn pareto_reads_units_or_refuses_them() {
     let inputs = Inputs::new();
     let table = inputs.put("table.csv", "Time [ms],energy_kWh,power_W\n10,1,3\n");
-    let asked = |time: &str, energy: &str| {
+    let pareto = |time: &str, energy: &str| {
         quintile().call(["trace", "pareto", &table, "--time", time, "--energy", energy, "--json"])
     };
-    let printed: Value = serde_json::from_str(&asked("Time [ms]", "energy_kWh").stdout).unwrap_or_default();
+    let printed: Value = serde_json::from_str(&pareto("Time [ms]", "energy_kWh").stdout).unwrap_or_default();
     let text = printed.to_string();
     assert!(text.contains("0.01") && text.contains("3600000"), "{text}");
     for (time, energy) in [("power_W", "energy_kWh"), ("energy_kWh", "Time [ms]"), ("Time [ms]", "power_W")] {
-        assert_eq!(asked(time, energy).code, Some(2), "{time} {energy}");
+        assert_eq!(pareto(time, energy).code, Some(2), "{time} {energy}");
     }
 }
 

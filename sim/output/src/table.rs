@@ -58,12 +58,12 @@ pub(crate) fn power_of_ten(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(f64::NAN)
 }
 
-/// `value` with three significant digits and a prefix: `12.3 mJ`, `4.56 ms`. Values that are not finite read `n/a`.
+/// Value with three significant digits and a prefix: `12.3 mJ`, `4.56 ms`; `n/a` if not finite.
 pub fn si(value: f64, unit: &str) -> String {
     si_digits(value, unit, 3)
 }
 
-/// `value` with `digits` significant digits (at least 1) and a prefix; a number without a unit has none, as a prefix alone says nothing.
+/// Value with `digits` significant digits (at least 1) and a prefix. A number without a unit has no prefix.
 pub fn si_digits(value: f64, unit: &str, digits: usize) -> String {
     if !value.is_finite() {
         return "n/a".to_owned();

@@ -8,7 +8,7 @@ use clap::builder::Styles;
 use clap::builder::styling::{AnsiColor, Style};
 use warnings::{Code, Warning};
 
-/// How much is printed on standard error. Results on standard output do not depend on it.
+/// Amount of messages on standard error. Results on standard output do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verbosity {
     /// Errors only.
@@ -20,8 +20,8 @@ pub enum Verbosity {
     Verbose,
 }
 
-/// Standard error: what may be printed there and whether in colour. Made once from the command line and handed to what
-/// prints; it may be used from any thread.
+/// Standard error with its verbosity and colours. It is created once from the command line and usable from
+/// any thread.
 #[derive(Clone, Debug, Default)]
 pub struct Terminal {
     verbosity: Verbosity,
@@ -40,17 +40,18 @@ impl Terminal {
         Self { verbosity, colored }
     }
 
-    /// How much is printed.
+    /// Amount of messages.
     pub fn verbosity(&self) -> Verbosity {
         self.verbosity
     }
 
-    /// Prints why the command failed.
+    /// Prints an error.
     pub fn error(&self, message: &str) {
         self.line("error", *Styles::styled().get_error(), message);
     }
 
-    /// Prints a warning with its code on one line, unless quiet; a line for each of several details where these are wanted.
+    /// Prints a warning with its code on one line, unless quiet. Under `--verbose` each detail has a line,
+    /// too.
     pub fn warn(&self, warning: &Warning) {
         if self.verbosity < Verbosity::Verbose || warning.details.len() < 2 {
             return self.warn_of(warning.code, &warning.line());
@@ -69,22 +70,22 @@ impl Terminal {
         }
     }
 
-    /// Prints what is worth knowing and changes no result, unless quiet.
+    /// Prints a note that does not affect results, unless quiet.
     pub fn note(&self, message: &str) {
         if self.verbosity >= Verbosity::Normal {
             self.line("note", AnsiColor::Cyan.on_default().bold(), message);
         }
     }
 
-    /// Prints a detail where details are wanted.
+    /// Prints a detail under `--verbose`.
     pub fn detail(&self, message: &str) {
         if self.verbosity >= Verbosity::Verbose {
             self.line("detail", Style::new().dimmed(), message);
         }
     }
 
-    /// One line in one write, so that lines of several threads do not mix. If standard error cannot be written to there
-    /// is nowhere left to say so.
+    /// Writes a line at once, so that lines of several threads do not mix. Errors of standard error are
+    /// ignored.
     fn line(&self, kind: &str, style: Style, message: &str) {
         let line = match self.colored {
             true => format!("{style}{kind}:{style:#} {message}\n"),

@@ -59,7 +59,7 @@ fn panic_if_requested(number: u32) {
     if cfg!(debug_assertions)
         && std::env::var("QUINTILE_PANIC_IN_FRAME").is_ok_and(|frame| frame == number.to_string())
     {
-        panic!("a test asked for it");
+        panic!("requested by a test");
     }
 }
 

@@ -145,10 +145,10 @@ mod tests {
         let length = points.len().div_ceil(limit.max(4) / 2 - 1);
         let mut kept = vec![0, points.len() - 1];
         for start in (0..points.len()).step_by(length) {
-            let stretch = start..(start + length).min(points.len());
+            let segment = start..(start + length).min(points.len());
             let value = |index: &usize| points[*index].1;
-            kept.extend(stretch.clone().min_by(|a, b| value(a).total_cmp(&value(b))));
-            kept.extend(stretch.max_by(|a, b| value(a).total_cmp(&value(b))));
+            kept.extend(segment.clone().min_by(|a, b| value(a).total_cmp(&value(b))));
+            kept.extend(segment.max_by(|a, b| value(a).total_cmp(&value(b))));
         }
         kept.sort_unstable();
         kept.dedup();

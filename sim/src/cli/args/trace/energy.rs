@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::{pass, stretch};
+use super::parse::{pass, segment};
 use super::{FindArgs, InputArgs};
 use crate::cli::quantity::{power, size_of_power, time};
 
@@ -42,7 +42,7 @@ pub struct EnergyArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = time, conflicts_with_all = OF_FRAMES)]
     pub to: Option<f64>,
     /// A segment without rendering, in seconds or with units; its mean power is subtracted
-    #[arg(long, value_name = "A..B", value_parser = stretch, allow_hyphen_values = true, conflicts_with_all = ["idle_w", "idle_trace"])]
+    #[arg(long, value_name = "A..B", value_parser = segment, allow_hyphen_values = true, conflicts_with_all = ["idle_w", "idle_trace"])]
     pub idle: Option<(f64, f64)>,
     /// Idle power to subtract, in W
     #[arg(long, value_name = "W", conflicts_with = "idle_trace", allow_hyphen_values = true, value_parser = size_of_power)]

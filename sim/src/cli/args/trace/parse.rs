@@ -21,7 +21,7 @@ pub(super) fn window(text: &str) -> Result<(f64, f64), String> {
 }
 
 /// A segment of a trace, s.
-pub(super) fn stretch(text: &str) -> Result<(f64, f64), String> {
+pub(super) fn segment(text: &str) -> Result<(f64, f64), String> {
     let (a, b) =
         two(text, "..", "A..B in seconds or with units, for example 0.1..0.4 or 100ms..400ms", time)?;
     if a < b {
