@@ -17,7 +17,7 @@ struct Gpu {
 
 impl Gpu {
     fn builtin(name: &str) -> Self {
-        let path = format!("{}/../gpus/{name}.ron", env!("CARGO_MANIFEST_DIR"));
+        let path = format!("{}/../run/gpus/{name}.ron", env!("CARGO_MANIFEST_DIR"));
         activity::spec::load(path.as_ref()).unwrap()
     }
 
