@@ -167,9 +167,12 @@ fn corner(base: &Point, found: &[(Point, f64)], better: fn(f64, f64) -> bool) ->
     corner
 }
 
+/// Whether the first of two numbers lies further towards an end of a range.
+type Further = fn(f64, f64) -> bool;
+
 /// All settings together at the values that raise, and that lower, the number by themselves; those not met in a sweep.
 fn over_corners(tried: &mut Tried<'_>, base: &Point) -> Result<[f64; 2], RunError> {
-    let ends: [(&str, fn(f64, f64) -> bool); 2] = [
+    let ends: [(&str, Further); 2] = [
         ("every setting as it lowers the number", |a, b| a < b),
         ("every setting as it raises it", |a, b| a > b),
     ];
