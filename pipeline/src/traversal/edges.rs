@@ -173,7 +173,7 @@ impl<N: Number> EdgeBounds<N> {
     }
 
     /// The same for each piece of `times`, for the `drawn` faces; `edges` are those bounded. The second
-    /// result is the cost in multiply-adds beyond [`Edges::bounds`].
+    /// result is the cost in multiply-adds beyond those of the edges themselves.
     pub fn timeline(&self, edges: &Edges<N>, times: &Timeline, drawn: Faces) -> (Timeline, u32) {
         let (mut left, mut madds) = (Timeline::empty(), 0);
         for piece in times.pieces() {

@@ -24,7 +24,7 @@ pub struct Regime {
     pub blurred: u64,
     /// Triangles whose products of coordinates leave the range of f32.
     pub extreme: u64,
-    /// Triangles with a corner in view where one step of 32-bit coordinates exceeds [`MAX_STEP_PX`].
+    /// Triangles with a corner in view where one step of 32-bit coordinates exceeds a quarter of a pixel.
     pub coarse: u64,
     /// Triangles in front of the camera and in view that the near plane cuts off, as a whole or in part.
     pub cut: u64,
