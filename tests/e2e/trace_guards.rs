@@ -281,9 +281,9 @@ fn warned(args: &[&str], code: &str) -> String {
 #[test]
 fn a_pass_that_begins_after_the_end_of_some_frames_is_warned_about() {
     let inputs = Inputs::new();
-    let trace = inputs.put("t.csv", frames_of(&[50, 60].repeat(10)));
+    let trace = inputs.put("t.csv", frames_of(&[&[60; 7][..], &[50], &[60; 8]].concat()));
     let energy = ["trace", "energy", &trace, "--mark", "0.1", "--pass", "late=11"];
-    assert!(warned(&energy, "pass-beyond").contains(" of 20 frames end before pass late begins, 11 ms"));
+    assert!(warned(&energy, "pass-beyond").contains("] 1 of 15 frames end before pass late begins, 11 ms"));
 }
 
 #[test]
