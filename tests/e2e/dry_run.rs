@@ -75,8 +75,21 @@ fn choice_and_warnings_are_shown_before_the_run() {
     assert!(chosen["chosen"].as_str().is_some_and(|line| line.contains("expected error")), "{chosen}");
     let warned = dry(&[&["default", "--frames", "0..2", "--gpu", "discrete"], &SMALL[..]].concat());
     assert_eq!(warned["warnings"][0]["code"], "platform-mismatch");
-    let workload = dry(&["occlusion", "--size", "64x36", "--frames", "0..3"]);
-    assert!(workload["expected"].is_null() && number(&workload, "/distinct_frames") == 1.0, "{workload}");
+}
+
+/// Workloads are drawn at reduced sizes too, whether by `--size` or by an option of their own.
+#[test]
+fn workloads_have_an_expected_time() {
+    for workload in workloads::catalog::names().map(|(name, _)| name) {
+        let found = dry(&[workload, "--frames", "0..3"]);
+        let seconds = number(&found, "/expected/host_s");
+        assert!(seconds > 0.0 && seconds < 3600.0, "{workload}: {seconds} s");
+        assert!(found["expected"]["memory_bytes"].is_null(), "{workload}");
+    }
+    let [small, large] = ["32", "512"].map(|resolution| {
+        number(&dry(&["ccd", "--set", &format!("resolution={resolution}")]), "/expected/host_s")
+    });
+    assert!(large > 2.0 * small, "{small} s and {large} s");
 }
 
 #[test]

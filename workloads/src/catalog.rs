@@ -89,3 +89,24 @@ pub fn find(
     let job = JOBS.iter().find(|job| job.name == name)?;
     Some(job.flags.check(name, request.overrides).and_then(|()| (job.make)(options, request)))
 }
+
+/// Makes the job with a name at another size of its image, by `--size` or by the option that stands for it. A
+/// run's expected time is scaled up from small images.
+///
+/// # Errors
+/// As [`find`]; [`LoadError::Setting`] if the size cannot be changed.
+pub fn at_size(
+    name: &str,
+    options: &OptionSource,
+    request: &Request<'_>,
+    size: [u32; 2],
+) -> Option<Result<Box<dyn Job>, LoadError>> {
+    let job = JOBS.iter().find(|job| job.name == name)?;
+    let mut options = options.clone();
+    let mut overrides = request.overrides.clone();
+    match job.flags.instead_of_size() {
+        Some(option) => options.set.push((option.to_owned(), size[1].to_string())),
+        None => overrides.size = Some((size[0], size[1])),
+    }
+    find(name, &options, &Request { overrides: &overrides, ..*request })
+}

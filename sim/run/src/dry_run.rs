@@ -7,7 +7,8 @@ use pipeline::{Draw, Settings, Viewport};
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
 use warnings::Warning;
-use workloads::{Frame, FrameMesh, Scene};
+use workloads::job::Request;
+use workloads::{Frame, FrameMesh, Scene, catalog};
 
 use crate::plan::BYTES_PER_SAMPLE;
 use crate::regime::Regime;
@@ -52,8 +53,8 @@ pub struct DryRun {
     pub trace_rate_hz: Option<f64>,
     /// Choice for `--accuracy` or `--budget`.
     pub chosen: Option<String>,
-    /// Expected time and memory; `None` for a workload.
-    pub expected: Option<Expected>,
+    /// Expected time and memory.
+    pub expected: Expected,
     /// Warnings found before the run.
     pub warnings: Vec<Warning>,
 }
@@ -106,8 +107,6 @@ impl DryRun {
         let rate = self
             .trace_rate_hz
             .map_or("50 kHz, more where frames are short".to_owned(), |rate_hz| si(rate_hz, "Hz"));
-        let expected =
-            self.expected.map_or("not known for a workload".to_owned(), |expected| expected.line());
         let mut rows = vec![
             ("scene", format!("{}{triangles}", self.scene)),
             (
@@ -132,7 +131,7 @@ impl DryRun {
             ("recorder", rate),
         ];
         rows.extend(self.chosen.clone().map(|line| ("chosen", line)));
-        rows.push(("expected", expected));
+        rows.push(("expected", self.expected.line()));
         rows
     }
 }
@@ -142,8 +141,8 @@ impl DryRun {
 pub struct Expected {
     /// Wall-clock seconds to the last file; accurate to a factor of two on an otherwise idle host.
     pub host_s: f64,
-    /// Memory in bytes.
-    pub memory_bytes: u64,
+    /// Memory in bytes; `None` for a workload, whose passes keep surfaces of their own.
+    pub memory_bytes: Option<u64>,
 }
 
 /// Samples of the smaller of two probe images; the larger one has four times as many.
@@ -158,43 +157,44 @@ const TRACE_SAMPLE_S: f64 = 0.9e-6;
 const TRACE_SAMPLE_BYTES: f64 = 70.0;
 /// Time of a preview over the time of a frame.
 const PREVIEW_TIME_RATIO: f64 = 0.05;
+/// Least number of differing frames of a workload for which the estimate costs less than it tells.
+pub(super) const MIN_WORKLOAD_FRAMES: usize = 4;
 /// Memory of the program with a small scene, in bytes.
 const PROGRAM_BYTES: u64 = 30_000_000;
 /// Memory of one triangle of the scene in bytes.
 const TRIANGLE_BYTES: u64 = 150;
 
 impl Expected {
-    /// Expected time and memory of `plan` on the threads of the current pool; `None` for a workload, which cannot be
-    /// reduced.
+    /// Expected time and memory of `plan` on the threads of the current pool.
     ///
     /// # Errors
     /// If a frame cannot be rendered or timed.
-    pub(super) fn new(plan: &Plan, distinct: &Distinct) -> Result<Option<Self>, RunError> {
-        let Work::Scene(scene) = &plan.work else { return Ok(None) };
+    pub(super) fn new(plan: &Plan, distinct: &Distinct) -> Result<Self, RunError> {
         let (all, differ) = (distinct.groups().len(), distinct.numbers().len());
         let (whole, previews) = match plan.options.sampling {
             Sampling::Every => (differ, 0.0),
             sampling => (sampling.first(all).min(differ), PREVIEW_TIME_RATIO * differ as f64),
         };
-        let probe = Probe::new(plan, scene, distinct.numbers()[differ / 2])?;
+        let probe = Probe::new(plan, distinct.numbers()[differ / 2])?;
         let mut frames_s = probe.frame_s(plan.options.timing)? * (whole as f64 + previews);
         if plan.options.verify {
             frames_s += probe.frame_s(Level::Stepped)? * differ as f64;
         }
         let threads = rayon::current_num_threads();
         let trace_samples = plan.size().trace_samples();
-        let samples = plan.pixels() * u64::from(plan.samples.per_pixel());
-        let memory_bytes = PROGRAM_BYTES
-            + TRIANGLE_BYTES * scene.triangle_count() as u64
-            + BYTES_PER_SAMPLE * samples * threads.min(differ) as u64
-            + (TRACE_SAMPLE_BYTES * trace_samples) as u64;
-        let host_s = FILES_S + TRACE_SAMPLE_S * trace_samples + frames_s / threads as f64;
-        Ok(Some(Self { host_s, memory_bytes }))
+        // Tiles of a scene are drawn side by side, passes of a workload one after another.
+        let (workers, memory_bytes) = match &plan.work {
+            Work::Scene(scene) => (threads, Some(memory_bytes(plan, scene, threads.min(differ)))),
+            Work::Job { .. } => (threads.min(differ), None),
+        };
+        let host_s = FILES_S + TRACE_SAMPLE_S * trace_samples + frames_s / workers as f64;
+        Ok(Self { host_s, memory_bytes })
     }
 
     /// Time and memory as text.
     pub fn line(&self) -> String {
-        format!("about {}, {:.0} MB of memory", duration(self.host_s), self.memory_bytes as f64 / 1e6)
+        let memory = self.memory_bytes.map(|bytes| format!(", {:.0} MB of memory", bytes as f64 / 1e6));
+        format!("about {}{}", duration(self.host_s), memory.unwrap_or_default())
     }
 }
 
@@ -208,19 +208,42 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// A frame with part of its triangles, to be rendered at reduced sizes.
+/// Memory in bytes of a run that draws `frames` frames of `scene` at once.
+fn memory_bytes(plan: &Plan, scene: &Scene, frames: usize) -> u64 {
+    let samples = plan.pixels() * u64::from(plan.samples.per_pixel());
+    PROGRAM_BYTES
+        + TRIANGLE_BYTES * scene.triangle_count() as u64
+        + BYTES_PER_SAMPLE * samples * frames as u64
+        + (TRACE_SAMPLE_BYTES * plan.size().trace_samples()) as u64
+}
+
+/// A frame of the run, to be rendered at reduced sizes.
 struct Probe<'a> {
     plan: &'a Plan,
-    scene: &'a Scene,
-    frame: Frame,
+    source: ProbeSource<'a>,
     /// Triangles of the frame per rendered triangle.
     triangle_ratio: f64,
     /// CPU seconds for making the frame.
     made_s: f64,
 }
 
+/// Work of a probe.
+enum ProbeSource<'a> {
+    /// A frame with part of its triangles.
+    Scene(&'a Scene, Frame),
+    /// Name and frame number of a workload.
+    Job(&'a str, u32),
+}
+
 impl<'a> Probe<'a> {
-    fn new(plan: &'a Plan, scene: &'a Scene, number: u32) -> Result<Self, RunError> {
+    fn new(plan: &'a Plan, number: u32) -> Result<Self, RunError> {
+        let scene = match &plan.work {
+            Work::Scene(scene) => scene,
+            Work::Job { name, .. } => {
+                let source = ProbeSource::Job(name, number);
+                return Ok(Self { plan, source, triangle_ratio: 1.0, made_s: 0.0 });
+            }
+        };
         let started = ProcessTime::now();
         let mut frame = scene.frame(number)?;
         let made_s = started.elapsed().as_secs_f64();
@@ -228,14 +251,15 @@ impl<'a> Probe<'a> {
         let all = frame.triangle_count();
         frame.meshes.iter_mut().for_each(|mesh| thin_out(mesh, step));
         let triangle_ratio = all as f64 / frame.triangle_count().max(1) as f64;
-        Ok(Self { plan, scene, frame, triangle_ratio, made_s })
+        Ok(Self { plan, source: ProbeSource::Scene(scene, frame), triangle_ratio, made_s })
     }
 
     /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes.
     fn frame_s(&self, level: Level) -> Result<f64, RunError> {
         let samples = self.plan.pixels() as f64 * f64::from(self.plan.samples.per_pixel());
         let by = (samples / PROBE_SAMPLES).sqrt().max(1.0);
-        let [small, large] = [self.drawn(by, level)?, self.drawn((0.5 * by).max(1.0), level)?];
+        let small = self.drawn(by, level)?;
+        let large = if by > 1.0 { self.drawn((0.5 * by).max(1.0), level)? } else { small };
         let a_and_b = |[(x0, y0), (x1, y1)]: [(f64, f64); 2]| {
             let b = if x1 > x0 { ((y1 - y0) / (x1 - x0)).clamp(0.0, y1 / x1) } else { y1 / x1 };
             (y1 - b * x1, b)
@@ -251,17 +275,49 @@ impl<'a> Probe<'a> {
         let viewport = Viewport::new(side(plan.viewport.width()), side(plan.viewport.height()))
             .ok_or_else(|| RunError::Setting("size of the probe".to_owned()))?;
         let started = ProcessTime::now();
-        let draws: Vec<Draw<'_>> = self.frame.draws(self.scene)?;
-        let background = self.scene.background();
-        let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
         let recorder = Recorder::new(frame::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
-        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        render_with_heat(&self.frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;
+        match &self.source {
+            ProbeSource::Scene(scene, frame) => draw_scene(plan, scene, frame, viewport, &mut clock)?,
+            &ProbeSource::Job(name, number) => draw_job(plan, name, number, viewport, &mut clock)?,
+        }
         clock.finish()?;
-        Regime::of(&self.frame.camera, &draws, viewport, plan.samples.per_pixel());
         Ok((viewport.pixels() as f64, started.elapsed().as_secs_f64()))
     }
+}
+
+/// Draws and times a frame of a scene at the size of `viewport`.
+fn draw_scene(
+    plan: &Plan,
+    scene: &Scene,
+    frame: &Frame,
+    viewport: Viewport,
+    clock: &mut FrameClock,
+) -> Result<(), RunError> {
+    let draws: Vec<Draw<'_>> = frame.draws(scene)?;
+    let background = scene.background();
+    let settings = Settings { spec: &plan.gpu.pipeline, viewport, samples: &*plan.samples, background };
+    let emit = |packet: &_, lines: &_| clock.push(packet, lines);
+    render_with_heat(&frame.camera, &draws, &settings, &[], emit).map_err(RunError::setting)?;
+    Regime::of(&frame.camera, &draws, viewport, plan.samples.per_pixel());
+    Ok(())
+}
+
+/// Draws and times frame `number` of the workload `name` at the size of `viewport`.
+fn draw_job(
+    plan: &Plan,
+    name: &str,
+    number: u32,
+    viewport: Viewport,
+    clock: &mut FrameClock,
+) -> Result<(), RunError> {
+    let options = &plan.options;
+    let request = Request { overrides: &options.overrides, seed: options.seed };
+    let size = [viewport.width(), viewport.height()];
+    if let Some(job) = catalog::at_size(name, &options.options, &request, size) {
+        job?.frame(number, &plan.gpu.pipeline, &mut |packet, lines| clock.push(packet, lines))?;
+    }
+    Ok(())
 }
 
 /// Keeps one in `step` triangles.

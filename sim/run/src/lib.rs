@@ -91,12 +91,19 @@ pub fn prepare(
 }
 
 impl Prepared {
-    /// Expected time and memory, from one frame at a reduced size; `None` for a workload.
+    /// Expected time and memory, from one frame at reduced sizes.
     ///
     /// # Errors
     /// If that frame cannot be rendered.
-    pub fn expected(&self) -> Result<Option<Expected>, RunError> {
+    pub fn expected(&self) -> Result<Expected, RunError> {
         Expected::new(&self.plan, &self.distinct)
+    }
+
+    /// Whether the estimate takes little time beside the run. Small images of a workload may take as long as a
+    /// whole frame, as its passes over light or objects stay as they are.
+    pub fn is_worth_estimating(&self) -> bool {
+        let frames = self.distinct.numbers().len();
+        matches!(self.plan.work, Work::Scene(_)) || frames >= dry_run::MIN_WORKLOAD_FRAMES
     }
 
     /// Simulates, measures and writes the results into `dir`.

@@ -44,10 +44,10 @@ pub(super) fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), Failure> {
     print(&format!("{}took {:.1} s", text(args, &outcome), started.elapsed().as_secs_f64()))
 }
 
-/// Prints the expected time of a run of a scene.
+/// Prints the expected time of a run.
 fn note_expected(prepared: &Prepared, progress: &Progress) -> Result<(), RunError> {
-    if let Some(expected) = prepared.expected()? {
-        progress.note(&format!("expected time: {}", expected.line()));
+    if prepared.is_worth_estimating() {
+        progress.note(&format!("expected time: {}", prepared.expected()?.line()));
     }
     Ok(())
 }

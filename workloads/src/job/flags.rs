@@ -35,6 +35,11 @@ impl Flags {
         let message = format!("the workload `{job}` has no use for it: {remedy}");
         Err(LoadError::Setting { setting: flag.name(), message })
     }
+
+    /// Name of the job option that stands for `--size`, if there is one.
+    pub fn instead_of_size(&self) -> Option<&'static str> {
+        self.instead.iter().find(|(flag, _)| *flag == Flag::Size).map(|(_, option)| *option)
+    }
 }
 
 impl Flag {
