@@ -11,6 +11,7 @@ mod public;
 mod sampling;
 mod settings;
 mod shadows;
+mod torus;
 mod views;
 
 use std::path::Path;
@@ -56,7 +57,7 @@ const ROWS: [(&str, Compute); 16] = [
     ("VI-5", occlusion::cost),
     ("VI-6", caustics::executions),
     ("VI-7", caustics::no_light_is_lost),
-    ("VI-8", sampling::torus),
+    ("VI-8", torus::row),
     ("VI-9", sampling::darts),
     ("VI-10", sampling::densities),
     ("VI-11", glossy::row),

@@ -1,13 +1,11 @@
-//! Rows VI-8 to VI-10: sampling.
+//! Rows VI-9 and VI-10: points by darts, and points that follow a density.
 
 use std::ops::RangeInclusive;
 
 use activity::Event;
-use pipeline::sampling::{HashedSamples, LensShape};
 use workloads::points::job::{self, rasterized};
 use workloads::points::poisson::{Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk, saturation};
 use workloads::points::quality::{ChiSquare, chi_square, closer_than, free_share, largest_hole, upper_tail};
-use workloads::points::volume::{Covered, Torus, standard_mode};
 use workloads::points::white::{
     Density, Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
 };
@@ -19,116 +17,12 @@ use super::super::verdict::Verdict;
 use super::super::{Done, Figure};
 use super::Task;
 use super::settings::Darts;
-use crate::reproduce::settings::{About, Form};
+use crate::reproduce::settings::Form;
 use run::GpuSpec;
 use run::RunError;
 
 fn failed(error: impl std::fmt::Display) -> RunError {
     RunError::Setting(format!("sampling: {error}"))
-}
-
-/// What a torus is found to hold, with how many standard errors count and integral are off.
-struct Filled {
-    found: Covered,
-    inside: f64,
-    expected: f64,
-    integral: f64,
-    off: [f64; 2],
-}
-
-fn fill(torus: &Torus, seed: u64, [side, samples]: [u32; 2]) -> Result<Filled, RunError> {
-    let gpu = GpuSpec::load("reference")?;
-    let samples =
-        HashedSamples::new(seed, side, samples, LensShape::Square).ok_or_else(|| failed("samples"))?;
-    let found = standard_mode(torus, side, &samples, &gpu.pipeline).map_err(failed)?;
-    let (n, all, share) = (found.points.len() as f64, found.samples as f64, torus.volume());
-    let from_axis = |[x, y, _]: &[f64; 3]| (x - 0.5).powi(2) + (y - 0.5).powi(2);
-    let values: Vec<f64> = found.points.iter().map(from_axis).collect();
-    let integral = values.iter().sum::<f64>() / all;
-    let squares = values.iter().map(|value| value * value).sum::<f64>() / all;
-    let off = [
-        (n - all * share) / (all * share * (1.0 - share)).sqrt(),
-        (integral - torus.moment()) / ((squares - integral * integral) / all).sqrt(),
-    ];
-    Ok(Filled { found, inside: n, expected: all * share, integral, off })
-}
-
-/// What the file says of the tolerance. It is not so, but files of settings are not changed once a number was computed with them.
-const SAID_OF_TOLERANCE: &str =
-    "The samples of a pixel are stratified, so that 3 standard errors of independent ones are generous.";
-
-/// The limits of the file, with what the deviations show in the place of that sentence.
-fn limits(said: &str, off: &[[f64; 2]]) -> String {
-    let squares = || off.iter().flatten().map(|off| off * off);
-    let rms = (squares().sum::<f64>() / squares().count() as f64).sqrt();
-    let most = squares().fold(0.0, f64::max).sqrt();
-    let found = format!(
-        "The standard errors are those of independent samples; those of a pixel are stratified. The {} deviations of count and integral \
-         found here have a root mean square of {rms:.2} standard errors, {most:.2} at most; of independent samples it is 1.",
-        squares().count()
-    );
-    let kept = said.replace(SAID_OF_TOLERANCE, "");
-    format!("{} {found}", kept.trim_end())
-}
-
-/// VI-8: as many samples in a torus as its volume says, and the integral over it.
-pub(super) fn torus(task: &Task<'_>) -> Result<Done, RunError> {
-    let with = task.with(|settings| &settings.vi_8);
-    let (row, form) = (with.settings, with.form);
-    let torus = Torus { ring: *row.ring.get(form), tube: *row.tube.get(form) };
-    let size = [*row.side_px.get(form), *row.samples.get(form)];
-    let (most, least) = (*row.standard_errors.get(form), *row.least_samples.get(form));
-    let filled = row.seed.all(form).iter().map(|&seed| fill(&torus, seed, size));
-    let filled: Vec<Filled> = filled.collect::<Result<_, _>>()?;
-    let farther = |one: &Filled| one.off.iter().fold(0.0, |most: f64, off| most.max(off.abs()));
-    let mut tried = Cases::new("standard errors off, count or integral, whichever is farther", "seed alone");
-    let judged = |(seed, one): (&u64, &Filled)| {
-        (*seed, farther(one), farther(one) <= most && one.found.samples as f64 >= least)
-    };
-    tried.along("seed", row.seed.all(form).iter().zip(&filled).map(judged));
-    let band = tried.band(row.seed.values()).ok_or_else(|| failed("no seed"))?;
-    let first = &filled[0];
-    let ours = format!(
-        "{:.0} of {} samples, {:.0} expected ({:+.2} standard errors); the integral of the squared distance from the axis is {:.6}, exactly \
-         {:.6} ({:+.2})",
-        first.inside,
-        first.found.samples,
-        first.expected,
-        first.off[0],
-        first.integral,
-        torus.moment(),
-        first.off[1]
-    );
-    let facts = numbers([
-        ("inside", first.inside),
-        ("expected", first.expected),
-        ("deviation_of_count", first.off[0]),
-        ("integral", first.integral),
-        ("deviation_of_integral", first.off[1]),
-    ]);
-    let ran = numbers([
-        ("samples", filled.iter().map(|one| one.found.samples as f64).sum()),
-        ("samples_covered_by_triangles", filled.iter().map(|one| one.found.covered as f64).sum()),
-        ("samples_inside", filled.iter().map(|one| one.inside).sum()),
-    ]);
-    let figure = slice(&first.found);
-    let off: Vec<[f64; 2]> = filled.iter().map(|one| one.off).collect();
-    let about = About { limits: limits(&row.about.limits, &off), ..row.about.clone() };
-    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&about, ours, band) }, figures: vec![figure] })
-}
-
-/// Figure 9: the samples near a plane through the axis.
-fn slice(found: &Covered) -> Figure {
-    let near = found.points.iter().filter(|[_, y, _]| (y - 0.5).abs() < 0.01);
-    Figure::plane(
-        "VI_fig9",
-        [
-            "Samples in a torus drawn as moving triangles (Paper VI, Figure 9)",
-            "those within 0.01 of a plane through its axis",
-        ],
-        ["x", "t"],
-        vec![dots("samples", near.map(|[x, _, t]| (*x, *t)).collect())],
-    )
 }
 
 /// Maximal points and what is wrong with them: pairs that are closer than r, and whether a hole is larger.
@@ -355,23 +249,4 @@ fn histogram(count: usize) -> Result<Figure, RunError> {
         [("x", ""), ("points", "")],
         vec![line("density", expected.collect()), dots("points", found.collect())],
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::reproduce::paper6::settings::Settings;
-    use crate::reproduce::settings::load;
-
-    /// The committed file calls the tolerance generous; what is printed are the deviations.
-    #[test]
-    fn the_tolerance_is_not_called_generous() {
-        let (settings, _) = load::<Settings>(None).unwrap();
-        let file = &settings.vi_8.about.limits;
-        assert!(file.contains(SAID_OF_TOLERANCE));
-        let text = limits(file, &[[0.6, -0.8], [1.0, -2.0]]);
-        assert!(!text.contains("generous") && text.starts_with("Standard mode, in x, y and t"), "{text}");
-        assert!(text.contains("The 4 deviations") && text.contains("root mean square of 1.22"), "{text}");
-        assert!(text.contains("2.00 at most"), "{text}");
-    }
 }
