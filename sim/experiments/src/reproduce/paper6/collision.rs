@@ -36,14 +36,104 @@ fn ran(drawn: &PlainResult) -> Vec<Number> {
     ])
 }
 
-/// How many of these pairs the passes clear, and what they drew.
-fn cleared(pairs: &[Pair], method: Method, resolution: u32) -> (u64, PlainResult) {
-    let one = |passes: &mut PlainPasses, [a, b]: &Pair| {
-        let drawn = passes.pair(a, b);
-        (u64::from(!drawn.may_collide()), drawn)
-    };
-    let each = pairs.par_iter().map_init(|| PlainPasses::new(method, resolution), one);
-    each.reduce(Default::default, |(n, all), (m, drawn)| (n + m, all.and(&drawn)))
+/// Pairs of one kind, and what a way of drawing them says.
+#[derive(Clone, Copy, Debug, Default)]
+struct Drawn {
+    pairs: usize,
+    cleared: u64,
+    work: PlainResult,
+}
+
+impl Drawn {
+    fn new(pairs: &[Pair], method: Method, resolution: u32) -> Self {
+        let one = |passes: &mut PlainPasses, [a, b]: &Pair| {
+            let drawn = passes.pair(a, b);
+            (u64::from(!drawn.may_collide()), drawn)
+        };
+        let each = pairs.par_iter().map_init(|| PlainPasses::new(method, resolution), one);
+        let (cleared, work) = each.reduce(Default::default, |(n, all), (m, drawn)| (n + m, all.and(&drawn)));
+        Self { pairs: pairs.len(), cleared, work }
+    }
+
+    /// Share of the pairs that are kept, in percent.
+    fn kept_percent(&self) -> f64 {
+        100.0 * (self.pairs as f64 - self.cleared as f64) / self.pairs as f64
+    }
+}
+
+/// Work of several ways of drawing.
+fn work_of(drawn: &[Drawn]) -> PlainResult {
+    drawn.iter().fold(PlainResult::default(), |all, one| all.and(&one.work))
+}
+
+/// Every method at every resolution.
+#[derive(Default)]
+struct Looks {
+    names: Vec<(Method, u32)>,
+    generated: Vec<Drawn>,
+    /// Public cases that collide.
+    collide: Vec<Drawn>,
+    /// Public queries that do not.
+    apart: Vec<Drawn>,
+}
+
+impl Looks {
+    fn new(ways: Vec<(Method, u32)>, generated: &[Pair], public: &Public) -> Self {
+        let each = |pairs: &[Pair]| ways.iter().map(|(method, px)| Drawn::new(pairs, *method, *px)).collect();
+        let [generated, collide, apart] = [generated, &public.collide, &public.apart].map(each);
+        Self { names: ways, generated, collide, apart }
+    }
+
+    /// Pairs missed by each way.
+    fn missed(&self) -> impl Iterator<Item = (Method, u32, u64)> {
+        let both = self.generated.iter().zip(&self.collide);
+        let of = |((method, px), (own, theirs)): (&(Method, u32), (&Drawn, &Drawn))| {
+            (*method, *px, own.cleared + theirs.cleared)
+        };
+        self.names.iter().zip(both).map(of)
+    }
+
+    /// All work, and that of each kind of public case that there is.
+    fn ran(&self) -> Vec<Number> {
+        let [own, collide, apart] = [&self.generated, &self.collide, &self.apart].map(|drawn| work_of(drawn));
+        let mut all = ran(&own.and(&collide).and(&apart));
+        let some = |drawn: &[Drawn]| drawn.iter().any(|one| one.pairs > 0);
+        if some(&self.collide) {
+            all.extend(numbers([
+                ("draws_of_public_cases_that_collide", collide.draws as f64),
+                ("fragments_of_public_cases_that_collide", collide.fragments as f64),
+            ]));
+        }
+        if some(&self.apart) {
+            all.extend(numbers([
+                ("draws_of_public_queries_that_do_not", apart.draws as f64),
+                ("fragments_of_public_queries_that_do_not", apart.fragments as f64),
+            ]));
+        }
+        all
+    }
+
+    /// Least and greatest share of public queries that are kept although they do not collide, in percent.
+    fn false_positives(&self) -> Option<[f64; 2]> {
+        let shares = || self.apart.iter().filter(|one| one.pairs > 0).map(Drawn::kept_percent);
+        Some([shares().reduce(f64::min)?, shares().reduce(f64::max)?])
+    }
+
+    /// What each way keeps of public queries that do not collide: no error, only work.
+    fn said_of_others(&self, public: &Public) -> String {
+        if self.false_positives().is_none() {
+            return String::new();
+        }
+        let each = self.names.iter().zip(&self.apart);
+        let each = each
+            .map(|((method, px), one)| format!("{} at {px} px {:.1} %", name(*method), one.kept_percent()));
+        let ccd = 100.0 * public.kept_closer as f64 / public.apart.len() as f64;
+        let each = each.collect::<Vec<_>>().join(", ");
+        format!(
+            "; false positives of {} public queries that do not collide, all drawn, not judged: {each}, `quintile ccd` {ccd:.1} %",
+            public.apart.len()
+        )
+    }
 }
 
 /// VI-1: no pair that collides is missed.
@@ -58,38 +148,45 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         Some(folder) => super::public::load(folder, row.public_scenes.get(form))?,
         None => Public::default(),
     };
-    let varied = "methods and resolution_px jointly, and `quintile ccd`";
-    let (mut tried, mut drawn, mut missed) = (Cases::new("pairs missed", varied), PlainResult::default(), 0);
-    let mut apart = Vec::new();
-    for &method in row.methods.get(form) {
-        let mut at = Vec::new();
-        for &resolution in row.resolution_px.all(form) {
-            let (own, own_drawn) = cleared(&generated, method, resolution);
-            let (theirs, their_drawn) = cleared(&public.collide, method, resolution);
-            let (apart_cleared, apart_drawn) = cleared(&public.apart, method, resolution);
-            apart.push(apart_cleared);
-            drawn = drawn.and(&own_drawn).and(&their_drawn).and(&apart_drawn);
-            missed += own + theirs;
-            at.push((resolution, (own + theirs) as f64, own + theirs == 0));
-        }
-        tried.along(&format!("resolution_px ({})", name(method)), at);
+    let at =
+        |&method: &Method| row.resolution_px.all(form).iter().map(move |&resolution| (method, resolution));
+    let looks = Looks::new(row.methods.get(form).iter().flat_map(at).collect(), &generated, &public);
+    let mut tried = Cases::new("pairs missed", "methods and resolution_px jointly, and `quintile ccd`");
+    for &of in row.methods.get(form) {
+        let at = looks.missed().filter(|(method, ..)| *method == of);
+        tried.along(
+            &format!("resolution_px ({})", name(of)),
+            at.map(|(_, px, missed)| (px, missed as f64, missed == 0)),
+        );
     }
     let closer: usize = own.iter().map(missed_closer).sum::<usize>() + public.missed_closer;
     tried.along("quintile ccd", [("default search", closer as f64, closer == 0)]);
+    let missed = looks.missed().map(|(.., missed)| missed).sum::<u64>() + closer as u64;
     let ours = format!(
-        "{} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`{}",
-        missed + closer as u64,
+        "{missed} missed: {} generated pairs that collide{}, by {} kinds of passes and by `quintile ccd`{}",
         generated.len(),
         said(&public, task.collision_data.is_some()),
-        row.methods.get(form).len() * row.resolution_px.all(form).len(),
-        said_of_others(&apart, public.apart.len())
+        looks.names.len(),
+        looks.said_of_others(&public)
     );
     let full = row.methods.get(Form::Full).len() * row.resolution_px.values() + 1;
     let band = tried.band(full).ok_or_else(|| RunError::setting("VI-1 has nothing to try"))?;
-    let facts = numbers([
-        ("missed", missed as f64 + closer as f64),
-        ("generated_cases", own.len() as f64),
-        ("generated_pairs_that_collide", generated.len() as f64),
+    let made = with.banded(&row.about, ours, band);
+    let note = match public.collide.len() + public.known {
+        0 => format!("no public case that collides was tested; {}", made.note),
+        _ => made.note.clone(),
+    };
+    let counted = [("missed", missed as f64), ("generated_cases", own.len() as f64)];
+    let facts = numbers(counted).into_iter().chain(facts(&looks, &public)).collect();
+    Ok(Done::bare(Row { numbers: facts, ran: looks.ran(), note, ..made }))
+}
+
+/// How many cases of each kind there are, and how many of those that do not collide are kept.
+fn facts(looks: &Looks, public: &Public) -> Vec<Number> {
+    let [fewest, most] = looks.false_positives().unwrap_or([f64::NAN; 2]);
+    let cleared = || looks.apart.iter().map(|one| one.cleared);
+    numbers([
+        ("generated_pairs_that_collide", looks.generated.first().map_or(0, |one| one.pairs) as f64),
         ("public_scenes", public.scenes as f64),
         ("public_scene_pairs_that_collide", public.known as f64),
         ("public_scene_pairs_identified", public.seen as f64),
@@ -97,22 +194,12 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         ("public_queries", public.queries as f64),
         ("public_cases_that_collide_drawn", public.collide.len() as f64),
         ("public_queries_that_do_not_collide_drawn", public.apart.len() as f64),
-        ("fewest_of_these_cleared", apart.iter().copied().min().unwrap_or(0) as f64),
-        ("most_of_these_cleared", apart.iter().copied().max().unwrap_or(0) as f64),
-    ]);
-    let made = with.banded(&row.about, ours, band);
-    let note = match public.collide.len() + public.known {
-        0 => format!("no public case that collides was tested; {}", made.note),
-        _ => made.note.clone(),
-    };
-    Ok(Done::bare(Row { numbers: facts, ran: ran(&drawn), note, ..made }))
-}
-
-/// What the passes say of public queries that do not collide: to keep them is no error, only work.
-fn said_of_others(cleared: &[u64], drawn: usize) -> String {
-    let ends = cleared.iter().min().zip(cleared.iter().max());
-    let Some((fewest, most)) = ends.filter(|_| drawn > 0) else { return String::new() };
-    format!("; of {drawn} public queries that do not collide, all drawn, the passes clear {fewest} to {most}")
+        ("fewest_of_these_cleared", cleared().min().unwrap_or(0) as f64),
+        ("most_of_these_cleared", cleared().max().unwrap_or(0) as f64),
+        ("least_false_positives_percent", fewest),
+        ("most_false_positives_percent", most),
+        ("kept_of_these_by_ccd", public.kept_closer as f64),
+    ])
 }
 
 /// What of the public data was run.
@@ -310,4 +397,49 @@ fn curves(resolutions: &[u32], kept: [(&str, &Vec<usize>); 2]) -> Figure {
         ["pixels across", "false positives"],
         kept.into_iter().map(curve).collect(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point that goes down by two at a place, and the triangle below the diagonal of the unit square.
+    fn query(x: f64, y: f64, down: f64) -> Pair {
+        let point = [[[x, y, 1.0]; 3], [[x, y, 1.0 - down]; 3]];
+        let face = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        [point, [face, face]].map(|ends| Object::from_ends(vec![ends], 0.0).unwrap())
+    }
+
+    fn looks(public: &Public) -> Looks {
+        Looks::new(vec![(Method::BoxBox, 8), (Method::FragmentBox, 8)], &[], public)
+    }
+
+    #[test]
+    fn public_queries_of_both_kinds_are_drawn_and_counted() {
+        // The point beside the diagonal passes within a pixel of the triangle; that above it stays away.
+        let apart = vec![query(0.51, 0.51, 2.0), query(0.25, 0.25, 0.5)];
+        let public = Public { collide: vec![query(0.25, 0.25, 2.0)], apart, ..Public::default() };
+        let looks = looks(&public);
+        assert!(looks.missed().all(|(.., missed)| missed == 0));
+        assert_eq!(looks.false_positives(), Some([50.0, 50.0]));
+        let ran = looks.ran();
+        let of = |name: &str| ran.iter().find(|number| number.name == name).unwrap().value;
+        assert_eq!(of("draws_of_public_queries_that_do_not"), 2.0 * of("draws_of_public_cases_that_collide"));
+        assert_eq!(of("draws"), 3.0 * of("draws_of_public_cases_that_collide"));
+        let both =
+            ["collide", "do_not"].map(|end| ran.iter().filter(|n| n.name.ends_with(end)).collect::<Vec<_>>());
+        assert!(both.iter().all(|kind| kind.len() == 2 && kind.iter().all(|number| number.value > 0.0)));
+        let said = looks.said_of_others(&public);
+        assert!(said.contains("of 2 public queries that do not collide"), "{said}");
+        assert!(said.contains("box against box at 8 px 50.0 %") && said.contains("`quintile ccd` 0.0 %"));
+    }
+
+    #[test]
+    fn a_pair_that_is_cleared_and_collides_is_missed() {
+        let public = Public { collide: vec![query(0.25, 0.25, 0.5)], ..Public::default() };
+        let looks = looks(&public);
+        assert!(looks.missed().all(|(.., missed)| missed == 1));
+        assert_eq!((looks.false_positives(), looks.said_of_others(&public)), (None, String::new()));
+        assert!(looks.ran().iter().all(|number| !number.name.ends_with("do_not")));
+    }
 }

@@ -33,6 +33,8 @@ pub(super) struct Public {
     pub collide: Vec<Pair>,
     /// The queries that do not collide, which passes may clear or keep.
     pub apart: Vec<Pair>,
+    /// Those of them that `quintile ccd` keeps.
+    pub kept_closer: usize,
 }
 
 fn wrong(message: String) -> RunError {
@@ -137,13 +139,14 @@ impl Public {
                 return Err(wrong(format!("{}: a coordinate is beyond 1e60", path.display())));
             };
             let pair = [one, other];
-            if !query[0].1 {
-                self.apart.push(pair);
-                continue;
-            }
             let kept = detect(&pair, &Search::default()).iter().any(|answer| answer.verdict.may_collide());
-            self.missed_closer += usize::from(!kept);
-            self.collide.push(pair);
+            if query[0].1 {
+                self.missed_closer += usize::from(!kept);
+                self.collide.push(pair);
+            } else {
+                self.kept_closer += usize::from(kept);
+                self.apart.push(pair);
+            }
         }
         self.query_files += 1;
         Ok(())
