@@ -281,7 +281,7 @@ mod tests {
         assert!((same.by_chance(1.0) - 20.31).abs() < 0.01 && (same.by_chance(3.0) - 0.173).abs() < 0.001);
         assert!(same.text(3.0).contains("no sign that 3 standard errors are generous"));
         assert!(
-            times(0.5).text(3.0).contains("of whose standard errors are 6.")
+            times(0.5).text(3.0).contains("of whose standard errors are 5.4 of these")
                 && times(0.5).is_of_independent(3.0)
         );
         assert!(!times(1.5).is_of_independent(3.0), "{}", times(1.5).text(3.0));
