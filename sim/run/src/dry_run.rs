@@ -230,7 +230,7 @@ struct Probe<'a> {
 /// Work of a probe.
 enum ProbeSource<'a> {
     /// A frame with part of its triangles.
-    Scene(&'a Scene, Frame),
+    Scene(&'a Scene, Box<Frame>),
     /// Name and frame number of a workload.
     Job(&'a str, u32),
 }
@@ -251,7 +251,7 @@ impl<'a> Probe<'a> {
         let all = frame.triangle_count();
         frame.meshes.iter_mut().for_each(|mesh| thin_out(mesh, step));
         let triangle_ratio = all as f64 / frame.triangle_count().max(1) as f64;
-        Ok(Self { plan, source: ProbeSource::Scene(scene, frame), triangle_ratio, made_s })
+        Ok(Self { plan, source: ProbeSource::Scene(scene, Box::new(frame)), triangle_ratio, made_s })
     }
 
     /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes.
