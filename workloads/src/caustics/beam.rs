@@ -217,7 +217,7 @@ impl Cubic {
 
 /// Real roots of a quadratic by its Bernstein coefficients, in order and unbounded; a double root may occur
 /// twice.
-pub(super) fn quadratic_roots([a, b, c]: [f64; 3]) -> impl Iterator<Item = f64> {
+fn quadratic_roots([a, b, c]: [f64; 3]) -> impl Iterator<Item = f64> {
     // a (1 - t)^2 + 2 b t (1 - t) + c t^2 = p t^2 + 2 q t + a
     let (p, q) = (a - 2.0 * b + c, b - a);
     let discriminant = q * q - p * a;

@@ -77,7 +77,7 @@ fn corners(beam: &Beam) -> [DVec3; 6] {
 const COPLANAR: f64 = 1e-12;
 
 /// Adds the faces of the hull. For more than three corners in one plane, every triangle of them is a face.
-pub(super) fn hull_faces(beam: &Beam, into: &mut BoundingVolume) {
+fn hull_faces(beam: &Beam, into: &mut BoundingVolume) {
     let points = corners(beam);
     let size = points.iter().map(|p| (*p - points[0]).length()).fold(0.0, f64::max);
     for i in 0..6 {
@@ -103,7 +103,7 @@ const MIN_SINE: f64 = 1e-6;
 const TOUCH_TOLERANCE: f64 = 1e-9;
 
 /// Adds the faces of the prism.
-pub(super) fn prism_faces(beam: &Beam, into: &mut BoundingVolume) {
+fn prism_faces(beam: &Beam, into: &mut BoundingVolume) {
     let Some([base, top]) = ends(beam) else { return hull_faces(beam, into) };
     let outward = (base[1] - base[0]).cross(base[2] - base[0]).dot(top[0] - base[0]) > 0.0;
     let mut face = |a, b, c| into.push(if outward { [a, b, c] } else { [a, c, b] });
@@ -154,7 +154,7 @@ fn side(beam: &Beam, i: usize, j: usize) -> Option<DVec3> {
 }
 
 /// Adds the faces of all parts.
-pub(super) fn refined_faces(beam: &Beam, into: &mut BoundingVolume) {
+fn refined_faces(beam: &Beam, into: &mut BoundingVolume) {
     for ends in beam.cuts().windows(2) {
         let part = beam.part(ends[0], ends[1]);
         match beam.sign(0.5 * (ends[0] + ends[1])) {
@@ -165,7 +165,7 @@ pub(super) fn refined_faces(beam: &Beam, into: &mut BoundingVolume) {
 }
 
 /// Adds the ends and outer faces of the whole beam, without cuts at folds.
-pub(super) fn uncut_faces(beam: &Beam, into: &mut BoundingVolume) {
+fn uncut_faces(beam: &Beam, into: &mut BoundingVolume) {
     let folds = beam.cuts();
     let first = beam.sign(0.5 * (folds[0] + folds[1]));
     outer(beam, first.unwrap_or(1.0), into);

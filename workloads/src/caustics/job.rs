@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use pipeline::PipelineSpec;
 use serde::{Deserialize, Serialize};
 
-use super::accuracy::{accuracy_warnings, crossing};
+use super::check::{accuracy_warnings, crossing};
 use super::draw::{Covered, draw_with_work};
 use super::generator::Ocean;
 use super::{Beam, Eye, Floor, Light, Method, Picture};

@@ -17,7 +17,6 @@
 //!
 //! All views are orthographic. In perspective a beam may reach behind the camera, and no method here clips.
 
-mod accuracy;
 mod beam;
 mod bound;
 mod check;
@@ -30,10 +29,9 @@ mod light;
 pub mod optics;
 mod photons;
 
-pub use accuracy::{MAX_CROSSED_SHARE, MIN_SQUARES_PER_WAVE, accuracy_warnings, crossing};
 pub use beam::{Beam, Hit};
 pub use bound::Method;
-pub use check::{Coverage, receivers};
+pub use check::{Coverage, MAX_CROSSED_SHARE, MIN_SQUARES_PER_WAVE, accuracy_warnings, crossing, receivers};
 pub use draw::{Picture, draw};
 pub use eye::Eye;
 pub(crate) use job::FLAGS;
