@@ -5,9 +5,8 @@ use glam::Vec3;
 use pipeline::PipelineSpec;
 
 use super::bounds::Bounds;
-use super::compare::Observer;
 use super::object::Object;
-use super::pass::{Fragment, Part, Pass};
+use super::pass::{Fragment, Observer, Part, Pass};
 use super::{Method, Search};
 use crate::job::{FrontEnd, Passes, TileWork, Touch};
 

@@ -6,10 +6,10 @@ use pipeline::PipelineSpec;
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::cases::load_objects;
-use super::compare::Scratch;
 use super::emitter::{Emitted, PacketEmitter};
 use super::families::swarm_of;
+use super::object::load_objects;
+use super::pass::Scratch;
 use super::{Method, Object, Search, Verdict, candidates};
 use crate::error::LoadError;
 use crate::job::{
@@ -154,11 +154,12 @@ fn near_everywhere(pairs: usize, kept: u32) -> Option<Warning> {
 
 #[cfg(test)]
 mod tests {
+    use activity::{Counts, Event, LineAccess, Packet};
+
     use super::*;
     use crate::collision::detect;
     use crate::job::testing::hardware;
     use crate::scene::Overrides;
-    use activity::{Counts, Event, LineAccess, Packet};
 
     fn made(set: &[(&str, &str)]) -> Result<Box<dyn Job>, LoadError> {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();

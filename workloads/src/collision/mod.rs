@@ -20,8 +20,6 @@
 //! - [`job`]: the passes as a workload of the modelled hardware.
 
 mod bounds;
-mod cases;
-mod compare;
 mod contact_probe;
 mod detect;
 mod emitter;
@@ -31,14 +29,11 @@ mod object;
 mod pair;
 mod pass;
 mod plain;
-mod reference_frame;
-mod search;
 
 pub use bounds::Bounds;
-pub use cases::{CaseFiles, CollisionCase, load_cases};
 pub use detect::{Answer, candidates, detect, detect_each};
 pub(crate) use job::FLAGS;
 pub use job::{Options, job};
-pub use object::{Object, components};
+pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
+pub use pair::{Method, Search, Verdict};
 pub use plain::{PlainPasses, PlainResult};
-pub use search::{Method, Search, Verdict};

@@ -1,11 +1,78 @@
-//! A pair of objects, the space and time that remain of it, and its search with and without refinement.
+//! The search of a pair of objects: its parameters, its result, and the space and time that remain.
+
+use serde::{Deserialize, Serialize};
 
 use super::bounds::Bounds;
-use super::compare::{Comparison, Observer, Scratch, Survivors};
 use super::contact_probe::cross;
 use super::object::Object;
-use super::pass::{Fit, FragmentBudget, Part, Pass, Tiling};
-use super::search::{Method, Search, Verdict};
+use super::pass::{Comparison, Fit, FragmentBudget, Observer, Part, Pass, Scratch, Survivors, Tiling};
+
+/// What a pass compares in a tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Each fragment of one object with the box of the other (thesis, Paper VI, Fig. 5, right).
+    #[default]
+    FragmentBox,
+    /// The boxes of both objects (Fig. 5, left).
+    BoxBox,
+    /// Depths alone, in six passes (Govindaraju et al. 2003, "CULLIDE").
+    DepthOnly,
+}
+
+/// Parameters of the search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Search {
+    /// Tiles across, 1 to 1024.
+    pub resolution: u32,
+    /// Time bins per tile, 1 to 256.
+    pub bins: u32,
+    /// What is compared.
+    pub method: Method,
+    /// Whether to refine: search the remaining space and time again with smaller tiles.
+    pub zoom: bool,
+}
+
+impl Default for Search {
+    fn default() -> Self {
+        Self { resolution: 128, bins: 16, method: Method::FragmentBox, zoom: true }
+    }
+}
+
+/// Result of a search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// The objects do not collide.
+    Apart,
+    /// The objects may collide; every contact lies within `bounds`.
+    Maybe {
+        /// Space and time that contain every contact.
+        bounds: Bounds,
+        /// Overlapping tiles of the last pass.
+        tiles: u64,
+        /// Whether two triangles were found to cross or to share a corner, beyond rounding errors.
+        seen: bool,
+    },
+}
+
+impl Verdict {
+    /// Scales the bounds by `factor`.
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        let Self::Maybe { bounds, tiles, seen } = self else { return self };
+        let space = bounds.space.map(|range| range.map(|at| at * factor));
+        Self::Maybe { bounds: Bounds { space, ..bounds }, tiles, seen }
+    }
+
+    /// Whether the pair stays in the potentially colliding set.
+    pub fn may_collide(&self) -> bool {
+        *self != Self::Apart
+    }
+
+    /// Whether two triangles were found to cross or to share a corner.
+    pub fn is_contact(&self) -> bool {
+        matches!(self, Self::Maybe { seen: true, .. })
+    }
+}
 
 /// Most tiles, over all time bins, in memory at once; each takes about 50 bytes per object.
 const MAX_TILES_IN_MEMORY: usize = 1 << 21;

@@ -3,11 +3,10 @@
 //! CPU narrows nothing, the passes are independent, and all of them are drawn.
 
 use super::bounds::Bounds;
-use super::compare::{Comparison, Observer, Scratch};
 use super::detect::{MAX_SCALED_COORDINATE, upscale_factor};
 use super::object::Object;
-use super::pass::{Fit, Fragment, FragmentBudget, Part, Pass, Tiling};
-use super::search::Method;
+use super::pair::Method;
+use super::pass::{Comparison, Fit, Fragment, FragmentBudget, Observer, Part, Pass, Scratch, Tiling};
 
 /// Work of the passes, and the overlapping pixels of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

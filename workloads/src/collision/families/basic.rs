@@ -2,8 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::Case;
-use super::rng::{Moving, Rng, ball, cube};
+use super::{Case, Moving, Rng, ball, cube};
 use crate::collision::Object;
 use crate::shapes;
 

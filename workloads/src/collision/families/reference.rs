@@ -7,8 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::rng::{Moving, Rng, cube};
-use super::{Case, Maker};
+use super::{Case, Maker, Moving, Rng, cube};
 use crate::collision::bounds::meet;
 
 /// Kinds with two objects.
