@@ -14,10 +14,8 @@
 mod job;
 mod map;
 mod receiver;
-mod stage;
 
 pub(crate) use job::FLAGS;
-pub use job::{Glossy, Options, job};
+pub use job::{Glossy, Options, job, receiver, stage};
 pub use map::{Lobe, Map};
 pub use receiver::{Effect, Receiver, ReceiverShader};
-pub use stage::{receiver, stage};
