@@ -5,8 +5,7 @@ use pipeline::{CacheSpec, Draw, PipelineSpec, Viewport};
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::layout::Layout;
-use super::lenticular::Panel;
+use super::layout::{Layout, Panel};
 use super::rig::{Rig, Target, Views};
 use crate::error::LoadError;
 use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};

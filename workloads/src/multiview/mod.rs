@@ -12,12 +12,9 @@
 
 mod job;
 mod layout;
-mod lenticular;
 mod rig;
-mod rivals;
 
 pub(crate) use job::FLAGS;
 pub use job::{MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG, MultiView, Options, Show, job};
-pub use layout::Layout;
-pub use lenticular::Panel;
+pub use layout::{Layout, Panel};
 pub use rig::{Rig, Target, Views};
