@@ -15,10 +15,8 @@
 mod job;
 mod pyramid;
 mod query;
-mod walls;
 
 pub(crate) use job::FLAGS;
-pub use job::{MAX_HALF_COVERED_SHARE, Options, job};
+pub use job::{MAX_HALF_COVERED_SHARE, Options, WallScene, WallSceneSpec, job};
 pub use pyramid::Pyramid;
 pub use query::{Answer, MovingBox, Queries, SampledAnswer, Samples, depths};
-pub use walls::{WallScene, WallSceneSpec};
