@@ -3,11 +3,12 @@
 //! A [`Job`] draws frames like a scene, but in its own passes. It emits every packet of work, for timing and
 //! power models. [`crate::catalog`] makes jobs by name from their options ([`OptionSource`]).
 
-mod flags;
 mod options;
 mod passes;
-#[cfg(test)]
-pub(crate) mod testing;
+
+pub use options::OptionSource;
+pub(crate) use options::{Flag, Flags, must_hold};
+pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
 use activity::{Counts, LineAccess, Packet};
 use glam::Vec3;
@@ -18,11 +19,6 @@ use warnings::Warning;
 
 use crate::fingerprint::{Fingerprint, FingerprintError};
 use crate::scene::{FrameError, Overrides, Settings};
-
-pub(crate) use flags::{Flag, Flags};
-pub use options::OptionSource;
-pub(crate) use options::must_hold;
-pub use passes::{FrontEnd, Passes, TileWork, Touch};
 
 /// Receiver of a frame's packets, each with its L2 accesses, in the order of the modelled hardware.
 pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
@@ -167,4 +163,28 @@ pub struct Request<'a> {
     pub overrides: &'a Overrides,
     /// Seed of all random numbers.
     pub seed: u64,
+}
+
+/// Hardware for tests of jobs.
+#[cfg(test)]
+pub(crate) mod testing {
+    use pipeline::depth::DepthSpec;
+    use pipeline::{CacheSpec, Features, MemorySpec, PipelineSpec, Shading};
+
+    /// Small caches, with all features on.
+    pub(crate) fn hardware() -> PipelineSpec {
+        let lines = CacheSpec::lru(256, 4);
+        let compression = Default::default();
+        PipelineSpec {
+            tile_px: 8,
+            coarse_tile_px: 16,
+            batch_triangles: 1000,
+            vertex_reuse: 16,
+            shading: Shading::default(),
+            shading_cache: CacheSpec::lru(1024, 4),
+            memory: MemorySpec { depth: lines, colour: lines, texture: lines, l2: lines, compression },
+            features: Features::ALL,
+            depth: DepthSpec::default(),
+        }
+    }
 }
