@@ -1,11 +1,63 @@
-//! The surface shader: Lambert under one lamp and a sky, with a Blinn-Phong highlight.
+//! Materials, the light of a scene, and the surface shader: Lambert under one lamp and a sky, with a
+//! Blinn-Phong highlight.
 
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use pipeline::{Shader, ShaderCost, ShadingPoint, Texture};
 
-use super::{Light, Material};
+/// How a surface looks. Surfaces are opaque and diffuse, with a faint highlight.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name for messages.
+    pub name: String,
+    /// Linear RGB reflectance; multiplies the texture where there is one.
+    pub base_color: Vec3,
+    /// Colour texture.
+    pub texture: Option<Arc<Texture>>,
+    /// Whether back faces are drawn, too.
+    pub double_sided: bool,
+    /// Whether the base colour is shown as it is, whatever the light.
+    pub unlit: bool,
+}
+
+impl Material {
+    /// A matt, single-sided surface of one colour (linear RGB reflectance).
+    pub fn colored(name: impl Into<String>, base_color: Vec3) -> Self {
+        Self { name: name.into(), base_color, texture: None, double_sided: false, unlit: false }
+    }
+
+    /// The same surface with a texture.
+    #[must_use]
+    pub fn textured(self, texture: Arc<Texture>) -> Self {
+        Self { texture: Some(texture), ..self }
+    }
+}
+
+/// One directional light and an ambient term that depends on which way a surface looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector from the scene towards the lamp; `None` for a lamp over the camera's shoulder, placed when
+    /// the camera is known.
+    pub toward: Option<Vec3>,
+    /// Linear RGB radiance that a white surface facing the lamp sends back.
+    pub color: Vec3,
+    /// Linear RGB radiance of a white surface that looks straight up, from the sky alone.
+    pub sky: Vec3,
+    /// The same for one that looks straight down.
+    pub ground: Vec3,
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Self {
+            toward: None,
+            color: Vec3::new(0.74, 0.71, 0.66),
+            sky: Vec3::new(0.26, 0.29, 0.34),
+            ground: Vec3::new(0.12, 0.11, 0.10),
+        }
+    }
+}
 
 /// Colours a material under a scene's light.
 ///
