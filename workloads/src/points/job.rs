@@ -277,7 +277,7 @@ mod tests {
     fn points_of_drawn_regions_are_maximal_poisson_disk_points() {
         let requested =
             PoissonSpec { radius: 0.07, domain: Domain::Torus, seed: 1, spacing: Spacing::Double };
-        let stream = super::super::random::Stream::new(1, 1);
+        let stream = crate::points::Stream::new(1, 1);
         let draw = |cubes: &[Cube<2>]| {
             let near = |n: u64| {
                 let cube = &cubes[stream.below(3 * n, cubes.len() as u64) as usize];

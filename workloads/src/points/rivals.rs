@@ -5,8 +5,8 @@
 //! - [`bridson`]: candidates around existing points (Bridson 2007, "Fast Poisson Disk Sampling in Arbitrary
 //!   Dimensions"; the method of scipy); fast, not maximal, and with another distribution than dart throwing.
 
+use super::Stream;
 use super::poisson::{Domain, PoissonError, PoissonSpec, check_room, closer};
-use super::random::Stream;
 
 /// Plain dart throwing until `misses` in a row (Cook 1986).
 ///
@@ -28,7 +28,7 @@ pub fn plain_darts<const D: usize>(spec: &PoissonSpec, misses: u64) -> Result<Ve
 }
 
 /// The next lower multiple of 2^-52.
-pub(super) fn rounded_down(x: f64) -> f64 {
+fn rounded_down(x: f64) -> f64 {
     let whole = (1_u64 << 52) as f64;
     (x * whole).floor() / whole
 }

@@ -246,7 +246,7 @@ pub fn closer<const D: usize>(a: &[f64; D], b: &[f64; D], radius: f64, domain: D
 mod tests {
     use super::super::Spacing;
     use super::*;
-    use crate::points::random::Stream;
+    use crate::points::Stream;
 
     fn grid(radius: f64, domain: Domain, spacing: Spacing) -> Grid<2> {
         Grid::new(&PoissonSpec { radius, domain, seed: 1, spacing }).unwrap()

@@ -3,7 +3,7 @@
 use super::grid::{Dart, Grid};
 use super::uncovered::{Cube, DartProcess, Place, ThrownDarts, UncoveredCells};
 use super::{PoissonDisk, PoissonError, PoissonSpec, span};
-use crate::points::random::Stream;
+use crate::points::Stream;
 
 /// Darts per uncovered cell of the first level.
 const DARTS_PER_FIRST_CELL: f64 = 0.9;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::grid::{Dart, Grid};
-use crate::points::random::Stream;
+use crate::points::Stream;
 
 /// Integer type of a cell's coordinate along an axis.
 pub(super) trait Place: Copy + Send + Sync {

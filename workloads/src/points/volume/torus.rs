@@ -9,8 +9,7 @@ use pipeline::memory::CacheError;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::{Camera, Clip, Cull, Draw, Geometry, PipelineSpec, Settings, Viewport};
 
-use super::Inside;
-use super::bounds::{Bounds, Hull};
+use super::{Bounds, Hull, Inside};
 use crate::visibility::Unshaded;
 
 /// A torus in the middle of the unit cube, with its axis along the third coordinate.
@@ -132,7 +131,7 @@ const LAYERS: u32 = 16;
 const SECTORS: u32 = 48;
 
 /// Geometry of one draw.
-pub(in crate::points) struct Prisms {
+struct Prisms {
     ends: [Vec<Vec3>; 2],
     triangles: Vec<[u32; 3]>,
     clip: Clip,
