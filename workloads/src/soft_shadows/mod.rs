@@ -13,15 +13,11 @@
 
 mod job;
 mod light;
-mod look_up;
 mod map;
 mod shade;
-mod stage;
 
 pub(crate) use job::FLAGS;
-pub use job::{Options, SoftShadows, job};
+pub use job::{Options, SoftShadows, job, stage};
 pub use light::{AreaLight, LightSpec};
-pub use look_up::look_up_packets;
 pub use map::{DepthPass, Method, Renderer, ShadowMap, View, depth_pass};
-pub use shade::{Shadows, World};
-pub use stage::stage;
+pub use shade::{Shadows, World, look_up_packets};
