@@ -1,9 +1,7 @@
 //! Importers: one folder or file for each format, all of them giving [`Parts`].
 
-mod foreign;
 mod gltf;
 mod ignored;
-mod image;
 mod obj;
 mod off;
 mod ply;
@@ -12,14 +10,14 @@ pub(crate) mod ron;
 mod soup;
 mod stl;
 
+pub(crate) use obj::{Face, statements};
+
 use std::path::Path;
 
 use glam::DVec3;
 
 use crate::error::LoadError;
 use crate::scene::{Local, Node, Parts, Trs};
-pub(crate) use foreign::foreign;
-pub(crate) use obj::{Face, statements};
 use soup::{Looks, Soup};
 
 /// The endings of scene files, for messages.
@@ -124,4 +122,51 @@ fn solid(path: &Path, mut soup: Soup) -> Result<Parts, LoadError> {
     parts.graph.materials = materials;
     meshes.into_iter().for_each(|mesh| parts.graph.hang(mesh, node));
     Ok(parts)
+}
+
+/// Endings of formats that others use for scenes and shapes, and their names.
+const FORMATS: &[(&[&str], &str)] = &[
+    (&["3dm"], "a Rhino"),
+    (&["3ds"], "a 3DS"),
+    (&["3mf"], "a 3MF"),
+    (&["abc"], "an Alembic"),
+    (&["blend"], "a Blender"),
+    (&["c4d"], "a Cinema 4D"),
+    (&["dae"], "a COLLADA"),
+    (&["dwg", "dxf"], "an AutoCAD"),
+    (&["fbx"], "an FBX"),
+    (&["ifc"], "an IFC"),
+    (&["igs", "iges"], "an IGES"),
+    (&["lwo", "lws"], "a LightWave"),
+    (&["ma", "mb"], "a Maya"),
+    (&["max"], "a 3ds Max"),
+    (&["pbrt"], "a PBRT"),
+    (&["skp"], "a SketchUp"),
+    (&["step", "stp"], "a STEP"),
+    (&["usd", "usda", "usdc", "usdz"], "a USD"),
+    (&["vtk", "vtp", "vtu"], "a VTK"),
+    (&["wrl", "vrml"], "a VRML"),
+    (&["x3d", "x3dv"], "an X3D"),
+];
+
+/// What to say of the file at `path`, if its ending is that of a format that is known and not read.
+pub(crate) fn foreign(path: &Path) -> Option<String> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    let (_, name) = FORMATS.iter().find(|(endings, _)| endings.contains(&ending.as_str()))?;
+    let convert = "convert it to glTF, for example with Blender: File > Export > glTF 2.0";
+    Some(format!("it is {name} file, which is not read; {convert}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_named_with_the_way_out() {
+        let text = foreign(Path::new("dir/Car.FBX")).unwrap();
+        assert!(text.contains("an FBX file, which is not read") && text.contains("glTF 2.0"), "{text}");
+        for known in ["a.obj", "a.gltf", "fbx", "a.txt", ""] {
+            assert_eq!(foreign(Path::new(known)), None, "{known}");
+        }
+    }
 }

@@ -1,10 +1,12 @@
 //! Opening files that may be gzipped, with a limit on what a small file can unpack to.
 
-use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read};
 use std::path::Path;
 
 use activity::inputs;
 use flate2::read::MultiGzDecoder;
+use image::{ImageFormat, ImageReader, Limits};
+use pipeline::{Texture, Wrap};
 
 use crate::error::{LoadError, Source};
 
@@ -83,6 +85,114 @@ pub(crate) fn head<const N: usize>(path: &Path) -> Result<Vec<u8>, LoadError> {
 pub(super) fn damaged(path: &Path, error: &std::io::Error) -> LoadError {
     Source { path }
         .broken("contents", format!("reading stops here: {error}; the file may be damaged: get it again"))
+}
+
+/// Largest side of a texture in texels.
+const MOST_TEXELS: u32 = 16_384;
+
+/// Most bytes a decoder may take.
+const MOST_BYTES: u64 = 512 << 20;
+
+/// A PNG or JPEG image as a texture, or in words why it is none.
+pub(super) fn decode_texture(bytes: &[u8], wrap: [Wrap; 2]) -> Result<Texture, String> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    texture(reader, wrap)
+}
+
+fn texture(mut reader: ImageReader<Cursor<&[u8]>>, wrap: [Wrap; 2]) -> Result<Texture, String> {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MOST_TEXELS);
+    limits.max_image_height = Some(MOST_TEXELS);
+    limits.max_alloc = Some(MOST_BYTES);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| error.to_string())?.into_rgba8();
+    let (width, height) = image.dimensions();
+    let texels = image.pixels().map(|pixel| pixel.0).collect();
+    Texture::from_srgb8(width, height, texels, wrap).map_err(|error| error.to_string())
+}
+
+/// The image file at `path` as a texture, or in words why it is none. TGA files do not begin in a way of their own, so what does
+/// not is what its ending says.
+pub(super) fn load_texture(path: &Path, wrap: [Wrap; 2]) -> Result<Texture, String> {
+    let bytes = named(path).map_err(|error| error.to_string())?;
+    let named = ImageFormat::from_path(path).ok().filter(|_| ::image::guess_format(&bytes).is_err());
+    match named {
+        Some(format) => texture(ImageReader::with_format(Cursor::new(&bytes), format), wrap),
+        None => decode_texture(&bytes, wrap),
+    }
+}
+
+/// A file and the current read position.
+pub(crate) struct Bytes<'a> {
+    source: Source<'a>,
+    data: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Bytes<'a> {
+    /// Starts reading a file that begins with `magic`.
+    pub fn new<const N: usize>(path: &'a Path, data: &'a [u8], magic: &[u8; N]) -> Result<Self, LoadError> {
+        let mut bytes = Self { source: Source { path }, data, at: 0 };
+        if bytes.take::<N>()? != *magic {
+            let name = String::from_utf8_lossy(magic).trim_end_matches('\0').to_owned();
+            return Err(bytes.wrong(format!("it does not start with `{name}`; is it another kind of file?")));
+        }
+        Ok(bytes)
+    }
+
+    /// The next `N` bytes.
+    pub fn take<const N: usize>(&mut self) -> Result<[u8; N], LoadError> {
+        let found = self.data.get(self.at..).and_then(|rest| rest.first_chunk());
+        let found = found.ok_or_else(|| {
+            self.wrong("the file ends here; it is truncated: get the file again".to_owned())
+        })?;
+        self.at += N;
+        Ok(*found)
+    }
+
+    pub fn u32(&mut self) -> Result<u32, LoadError> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self) -> Result<u64, LoadError> {
+        self.take().map(u64::from_le_bytes)
+    }
+
+    pub fn f64(&mut self) -> Result<f64, LoadError> {
+        self.take().map(f64::from_le_bytes)
+    }
+
+    /// The next number, which must be finite.
+    pub fn f32(&mut self) -> Result<f32, LoadError> {
+        let value = self.take().map(f32::from_le_bytes)?;
+        if value.is_finite() { Ok(value) } else { Err(self.wrong(format!("{value} is not a finite number"))) }
+    }
+
+    /// Number of remaining bytes.
+    pub fn remaining(&self) -> u64 {
+        (self.data.len() - self.at) as u64
+    }
+
+    /// Checks that exactly `count` records of `size` bytes remain.
+    pub fn expect_records(&self, count: u64, size: u64) -> Result<(), LoadError> {
+        let remaining = self.remaining();
+        match count.checked_mul(size) {
+            Some(needed) if needed == remaining => Ok(()),
+            _ => Err(self.wrong(format!(
+                "{count} records of {size} bytes are announced, but {remaining} bytes follow"
+            ))),
+        }
+    }
+
+    /// An error at the current position.
+    pub fn wrong(&self, message: String) -> LoadError {
+        self.wrong_in(format!("byte {}", self.at), message)
+    }
+
+    /// An error in a named part.
+    pub fn wrong_in(&self, place: impl Into<String>, message: String) -> LoadError {
+        self.source.broken(place, message)
+    }
 }
 
 #[cfg(test)]

@@ -3,9 +3,8 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::far::Bounds;
-use super::graph::Graph;
+use super::graph::{Graph, world_poses};
 use super::mesh::{Influences, Instance, Mesh, Normals, unit};
-use super::node::world_poses;
 use super::track::Instant;
 
 /// Poses of all nodes and what the tracks say about weights, at one moment.

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Affine3A, DAffine3, DVec3, DVec4, Vec2, Vec3};
 use pipeline::{Camera, Cull, Draw, Geometry};
 use serde::Serialize;
 
 use super::Scene;
 use super::deform::{Carriage, Pose};
 use super::mesh::{Instance, Mesh, Normals, smooth_normals};
-use super::near::NearSpace;
 
 /// A scene between the opening and the closing of one frame's shutter: everything that changes from frame to frame.
 ///
@@ -224,5 +223,173 @@ fn normals(
             let of = |index| middle.normal(mesh, index, &cofactors).unwrap_or(Vec3::Y);
             (0..mesh.positions.len()).map(of).collect()
         }
+    }
+}
+
+/// Instants at which a moving triangle is looked at.
+const INSTANTS: u32 = 9;
+
+/// The space in view of a camera between its own plane and a depth.
+#[derive(Clone, Debug)]
+pub struct NearSpace {
+    open: DAffine3,
+    close: DAffine3,
+    orthographic: bool,
+    /// Where it ends, in scene units.
+    depth: f64,
+    /// A point `p` of camera space is inside a plane where `plane . (p, 1) >= 0`.
+    planes: [DVec4; 6],
+}
+
+impl NearSpace {
+    /// What `camera` sees below `depth`, from all over its lens, in an image `aspect` times as wide as high.
+    pub fn new(camera: &Camera, aspect: f64, depth: f64) -> Self {
+        let half = f64::from(camera.half_height());
+        let shift = 2.0 * half * camera.shift().as_dvec2();
+        // A lens widens the view by `radius |z / focus - 1|`; a chord of that holds it.
+        let [blur, growth] = camera.lens().map_or([0.0; 2], |lens| {
+            let [radius, focus] = [lens.radius(), lens.focus()].map(f64::from);
+            [radius, radius * ((depth / focus - 1.0).abs() - 1.0) / depth]
+        });
+        let side = |toward: DVec3, half: f64| {
+            let [by_depth, constant] = if camera.is_orthographic() { [0.0, half] } else { [half, 0.0] };
+            (toward + (by_depth + growth) * DVec3::Z).extend(constant + blur)
+        };
+        // The image moves by the shift, and what is seen against it.
+        let [x, y] = [shift.x, -shift.y];
+        let planes = [
+            DVec3::Z.extend(0.0),
+            DVec3::NEG_Z.extend(depth),
+            side(DVec3::X, half * aspect + x),
+            side(DVec3::NEG_X, half * aspect - x),
+            side(DVec3::Y, half + y),
+            side(DVec3::NEG_Y, half - y),
+        ];
+        let [open, close] = [camera.open(), camera.close()].map(widen);
+        Self { open, close, orthographic: camera.is_orthographic(), depth, planes }
+    }
+
+    /// The depth of the nearest point inside of a triangle whose corners move from `open` to `close` in world space, and of
+    /// which the faces are drawn that `cull` leaves; `None` where nothing of it is inside.
+    pub fn nearest(&self, open: [Vec3; 3], close: [Vec3; 3], cull: Cull) -> Option<f64> {
+        let from = open.map(|corner| self.open.transform_point3(corner.as_dvec3()));
+        let to = close.map(|corner| self.close.transform_point3(corner.as_dvec3()));
+        let depths = || from.iter().chain(&to).map(|corner| corner.z);
+        if depths().all(|depth| depth >= self.depth) || depths().all(|depth| depth <= 0.0) {
+            return None;
+        }
+        let instants = if from == to { 1 } else { INSTANTS };
+        let at = |instant: u32| {
+            let time = f64::from(instant) / f64::from(INSTANTS - 1);
+            [0, 1, 2].map(|corner| from[corner].lerp(to[corner], time))
+        };
+        (0..instants).filter_map(|instant| self.nearest_at_once(at(instant), cull)).min_by(f64::total_cmp)
+    }
+
+    fn nearest_at_once(&self, corners: [DVec3; 3], cull: Cull) -> Option<f64> {
+        let is_drawn = match (cull, self.facing(&corners)) {
+            (_, 0.0) => false,
+            (Cull::None, _) => true,
+            (Cull::Back, facing) => facing > 0.0,
+            (Cull::Front, facing) => facing < 0.0,
+        };
+        if !is_drawn {
+            return None;
+        }
+        let inside = self.planes.iter().fold(corners.to_vec(), |polygon, plane| clipped(&polygon, *plane));
+        inside.iter().map(|point| point.z).min_by(f64::total_cmp)
+    }
+
+    /// Above zero where the front of a triangle is seen, zero where it is seen from its edge.
+    fn facing(&self, [a, b, c]: &[DVec3; 3]) -> f64 {
+        let normal = (*b - *a).cross(*c - *a);
+        let along = if self.orthographic { DVec3::Z } else { *a };
+        let facing = normal.dot(along);
+        if facing.abs() <= 1e-12 * normal.length() * along.length() { 0.0 } else { facing }
+    }
+}
+
+fn widen(pose: Affine3A) -> DAffine3 {
+    DAffine3::from_cols_array(&pose.to_cols_array().map(f64::from))
+}
+
+/// The part of a convex polygon inside a plane (Sutherland and Hodgman 1974).
+fn clipped(polygon: &[DVec3], plane: DVec4) -> Vec<DVec3> {
+    let height = |point: DVec3| plane.dot(point.extend(1.0));
+    let mut inside = Vec::with_capacity(polygon.len() + 1);
+    for (&from, &to) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        let [start, end] = [height(from), height(to)];
+        if start >= 0.0 {
+            inside.push(from);
+        }
+        if (start >= 0.0) != (end >= 0.0) {
+            inside.push(from.lerp(to, start / (start - end)));
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pipeline::Lens;
+
+    /// A wall across the view at a depth, reaching `low` to `high` on both axes; it faces the camera.
+    fn wall(depth: f32, low: f32, high: f32) -> [Vec3; 3] {
+        [[low, low], [2.0 * high - low, low], [low, 2.0 * high - low]].map(|[x, y]| Vec3::new(x, y, depth))
+    }
+
+    fn pinhole() -> Camera {
+        Camera::new(Affine3A::IDENTITY, 0.5, 1.0).unwrap()
+    }
+
+    fn nearest(camera: &Camera, open: [Vec3; 3], close: [Vec3; 3]) -> Option<f64> {
+        NearSpace::new(camera, 2.0, 1.0).nearest(open, close, Cull::None)
+    }
+
+    #[test]
+    fn what_is_in_view_below_the_depth_is_found() {
+        let still = |triangle: [Vec3; 3]| nearest(&pinhole(), triangle, triangle);
+        assert_eq!(still(wall(0.25, -1.0, 1.0)), Some(0.25));
+        assert_eq!(still(wall(1.5, -1.0, 1.0)), None, "beyond");
+        assert_eq!(still(wall(-0.5, -1.0, 1.0)), None, "behind");
+        assert_eq!(still(wall(0.25, 0.3, 9.0)), None, "beside");
+        // A floor half below the eye enters the view at the depth of 1, whose half height is 0.5.
+        let floor = |y: f32| [[-99.0, -99.0], [0.0, 199.0], [99.0, -99.0]].map(|[x, z]| Vec3::new(x, y, z));
+        assert_eq!(still(floor(-0.51)), None);
+        let depth = still(floor(-0.25)).unwrap();
+        assert!((depth - 0.5).abs() < 1e-6, "{depth}");
+        assert_eq!(still(floor(0.0)), None, "seen from its edge");
+    }
+
+    #[test]
+    fn moving_shifted_orthographic_and_lens_views_are_their_own() {
+        let far = wall(3.0, -1.0, 1.0);
+        let depth = nearest(&pinhole(), far, wall(0.5, -1.0, 1.0)).unwrap();
+        assert_eq!(depth, 0.5);
+        let aside = wall(0.5, 0.3, 0.6);
+        assert_eq!(nearest(&pinhole(), aside, aside), None);
+        // Moved by a quarter of the image down, the view holds what was above it.
+        let shifted = pinhole().with_shift(Vec2::new(0.0, 0.25)).unwrap();
+        assert!(nearest(&shifted, aside, aside).is_some());
+        let wide = Camera::orthographic(Affine3A::IDENTITY, 0.5, 1.0).unwrap();
+        assert!(nearest(&wide, aside, aside).is_some());
+        let lens = pinhole().with_lens(Some(Lens::new(0.2, 4.0).unwrap()));
+        assert!(nearest(&lens, aside, aside).is_some());
+    }
+
+    #[test]
+    fn faces_that_are_not_drawn_are_not_seen() {
+        let space = NearSpace::new(&pinhole(), 2.0, 1.0);
+        let [a, b, c] = wall(0.5, -1.0, 1.0);
+        let seen = |corners, cull| space.nearest(corners, corners, cull).is_some();
+        assert_eq!(
+            [Cull::None, Cull::Back, Cull::Front].map(|cull| seen([a, b, c], cull)),
+            [true, true, false]
+        );
+        assert_eq!(
+            [Cull::None, Cull::Back, Cull::Front].map(|cull| seen([a, c, b], cull)),
+            [true, false, true]
+        );
     }
 }

@@ -11,7 +11,7 @@ use super::Scene;
 use super::camera::{Rig, View};
 use super::camera_used::{CameraUsed, field_of_view};
 use super::frame::FrameError;
-use super::node::movers;
+use super::graph::movers;
 use super::settings::Settings;
 
 /// A scene in numbers. Lengths are in scene units; bounds are those of the first frame asked for, while its shutter is open.

@@ -1,10 +1,8 @@
 //! A scene: what there is, how it moves, and what of it one frame's shutter sees.
 
 pub(crate) mod camera;
-mod camera_choice;
 mod camera_spec;
 mod camera_used;
-pub(crate) mod clip;
 mod deform;
 pub(crate) mod far;
 pub(crate) mod fit;
@@ -14,38 +12,30 @@ mod info;
 pub(crate) mod inside;
 pub(crate) mod measure;
 mod mesh;
-mod near;
-mod node;
-mod parts;
 mod rays;
 mod settings;
 mod track;
+
+pub use camera::{Aim, DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, Side, View, tan_half};
+pub(crate) use camera_spec::Wrong;
+pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
+pub use camera_used::{CameraSource, CameraUsed, OwnCamera};
+pub use frame::{Frame, FrameError, FrameMesh, NearSpace};
+pub use graph::{Channels, Clip, Graph, Local, Motion, Node, Property, Spin, Trs, world_poses};
+pub use info::{
+    CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
+};
+pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
+pub(crate) use rays::hit;
+pub use settings::{Overrides, Settings};
+pub use track::{Instant, Interpolation, Track};
+pub(crate) use track::{rotation, unit_quat};
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
 use glam::{DVec3, Vec3};
 use warnings::Warning;
-
-pub use camera::{Aim, DEFAULT_FOV_DEG, LookAt, Place, Rig, SceneCamera, Side, View, tan_half};
-pub use camera_choice::OwnCamera;
-pub(crate) use camera_spec::Wrong;
-pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
-pub use camera_used::{CameraSource, CameraUsed};
-pub use clip::{Clip, Property};
-pub use frame::{Frame, FrameError, FrameMesh};
-pub use graph::Graph;
-pub use info::{
-    CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
-};
-pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
-pub use near::NearSpace;
-pub use node::{Channels, Local, Motion, Node, Spin, Trs, world_poses};
-pub use parts::{DEFAULT_BACKGROUND, Parts};
-pub(crate) use rays::hit;
-pub use settings::{Overrides, Settings};
-pub use track::{Instant, Interpolation, Track};
-pub(crate) use track::{rotation, unit_quat};
 
 use crate::error::LoadError;
 use crate::material::{Light, Material, SurfaceShader};
@@ -107,7 +97,7 @@ impl Scene {
     /// [`LoadError`] when the settings make no sense, there is nothing to draw, or something is not finite.
     pub fn new(parts: Parts) -> Result<Self, LoadError> {
         parts.settings.check()?;
-        let (cameras, camera_source) = camera_choice::cameras(parts.cameras, &parts.camera);
+        let (cameras, camera_source) = camera_used::cameras(parts.cameras, &parts.camera);
         let mut scene = Self {
             name: parts.name,
             graph: parts.graph,
@@ -201,8 +191,8 @@ impl Scene {
         let lens = self.choose_camera(overrides)?;
         self.settings = self.settings.with(&lens.over(overrides))?;
         if let Some(wanted) = &overrides.clip {
-            let index = clip::find(&self.clips, wanted)?;
-            clip::play(&mut self.graph.nodes, &self.clips[index]);
+            let index = Clip::find(&self.clips, wanted)?;
+            self.clips[index].play(&mut self.graph.nodes);
             self.playing = Some(index);
             self.room = None;
         }
@@ -372,4 +362,47 @@ impl Scene {
 /// Direction towards a lamp over the right shoulder of a camera with the axes `right`, `up`, `forward`.
 fn over_the_shoulder(right: Vec3, up: Vec3, forward: Vec3) -> Vec3 {
     mesh::unit((0.45 * right + 0.75 * up - 0.65 * forward).as_dvec3())
+}
+
+/// What an importer or a program puts together; [`Scene::new`](Scene::new) makes it renderable.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// Name of the scene, or the file it came from.
+    pub name: String,
+    /// Shapes, materials and their hierarchy.
+    pub graph: Graph,
+    /// Animation clips of which one at a time is played.
+    pub clips: Vec<Clip>,
+    /// The camera that sees the scene unless another is chosen.
+    pub camera: SceneCamera,
+    /// Cameras that can be chosen by name or number; where there are none, `camera` can be, unless it is placed by itself.
+    pub cameras: Vec<OwnCamera>,
+    /// The light.
+    pub light: Light,
+    /// Linear RGB radiance where nothing is hit.
+    pub background: Vec3,
+    /// Size of the image, sampling, time and lens.
+    pub settings: Settings,
+    /// What the importer has to say.
+    pub warnings: Vec<Warning>,
+}
+
+/// A light blue-grey.
+pub const DEFAULT_BACKGROUND: Vec3 = Vec3::new(0.42, 0.50, 0.60);
+
+impl Parts {
+    /// Parts with nothing but a name: no shapes, a fitted camera, default light, background and settings.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            graph: Graph::default(),
+            clips: Vec::new(),
+            camera: SceneCamera::default(),
+            cameras: Vec::new(),
+            light: Light::default(),
+            background: DEFAULT_BACKGROUND,
+            settings: Settings::default(),
+            warnings: Vec::new(),
+        }
+    }
 }

@@ -213,7 +213,7 @@ pub(crate) fn unit_quat(q: DQuat) -> DQuat {
 }
 
 /// Spherical interpolation on the shorter way (glTF 2.0, appendix C.4), through `libm`.
-pub(crate) fn slerp(from: DQuat, to: DQuat, t: f64) -> DQuat {
+fn slerp(from: DQuat, to: DQuat, t: f64) -> DQuat {
     let dot = from.dot(to);
     let (to, dot) = if dot < 0.0 { (-to, -dot) } else { (to, dot) };
     if dot > 1.0 - 1e-9 {

@@ -6,11 +6,10 @@ use std::path::Path;
 use glam::{Affine3A, DVec3, Vec3};
 use pipeline::{Camera, Lens, LensShape, Viewport};
 
-use super::bytes::Bytes;
 use super::mesh::MovingMesh;
 use super::scene::VisibilityScene;
 use crate::error::LoadError;
-use crate::import::reader;
+use crate::import::reader::{self, Bytes};
 
 /// First bytes of the file.
 pub(super) const MAGIC: &[u8; 8] = b"M5DSCN1\0";

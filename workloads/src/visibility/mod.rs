@@ -4,9 +4,7 @@
 //! results are little endian and packed; `docs/formats.md` describes them. They are shared with a ray caster,
 //! so that results can be compared sample by sample. `.mts` is read by [`load_mts`] for other workloads, too.
 
-mod bytes;
 mod camera;
-mod load;
 mod m5d;
 mod mesh;
 mod mts;
@@ -14,11 +12,129 @@ mod scene;
 mod table;
 
 pub use crate::scene::CameraSpec;
-pub(crate) use load::Kind;
-pub use load::{load, load_surface};
 pub use m5d::parse as parse_m5d;
 pub use mesh::MovingMesh;
 pub(crate) use mesh::moving;
 pub use mts::{load_mts, parse_mts};
 pub use scene::{Unshaded, VisibilityScene};
 pub use table::{FixedSamples, write_hits, write_samples};
+
+use std::path::Path;
+
+use crate::error::LoadError;
+use crate::import::{Format, reader};
+use scene::Subject;
+
+/// Accepted files, for messages.
+const KNOWN: &str = ".m5d, .mts, and .ply, .obj, .off or .stl, alone or as a pair (each also gzipped)";
+
+/// Formats with a mesh, or with one end of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    M5d,
+    Mts,
+    Surface(Format),
+}
+
+impl Kind {
+    /// Format by the first bytes of the file, or else by its name.
+    pub fn of(path: &Path) -> Result<Self, LoadError> {
+        let head = reader::head::<8>(path)?;
+        // An empty file has no known format.
+        if !head.is_empty() && path.metadata().is_ok_and(|data| !data.is_file()) {
+            return Err(not_a_regular_file(path));
+        }
+        let begins = |magic: &[u8]| head.starts_with(magic);
+        if begins(m5d::MAGIC) {
+            return Ok(Self::M5d);
+        }
+        if begins(mts::MAGIC) {
+            return Ok(Self::Mts);
+        }
+        if begins(b"ply\n") || begins(b"ply\r") {
+            return Ok(Self::Surface(Format::Ply));
+        }
+        let named = Self::named(path);
+        named.ok_or_else(|| LoadError::Kind { file: path.display().to_string(), known: KNOWN })
+    }
+
+    /// Format by file name.
+    pub fn named(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let bare = name.strip_suffix(".gz").unwrap_or(&name);
+        match (bare.rsplit_once('.')?.1, Format::of(path)) {
+            ("m5d", _) => Some(Self::M5d),
+            ("mts", _) => Some(Self::Mts),
+            (_, Some(format)) if format.is_surface() => Some(Self::Surface(format)),
+            _ => None,
+        }
+    }
+}
+
+/// Loads the moving mesh in `files`: an `.m5d` or `.mts`, a still PLY, OBJ, OFF or STL file, or two of these
+/// as the two ends of the shutter. `camera` is the argument of [`CameraSpec::flag`]. Without it an `.m5d`
+/// uses its own camera, and the others get a fitted one.
+///
+/// # Errors
+/// [`LoadError`]: [`LoadError::is_usage`] for incompatible files, unknown formats and mistakes in the camera;
+/// else invalid content, with its place in the file.
+pub fn load(files: &[impl AsRef<Path>], camera: Option<&str>) -> Result<VisibilityScene, LoadError> {
+    let spec = camera.map(parsed_camera).transpose()?;
+    let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
+    let kinds = files.iter().map(|path| Kind::of(path)).collect::<Result<Vec<_>, _>>()?;
+    let (path, objects) = match (&files[..], &kinds[..]) {
+        ([file], [Kind::M5d]) => match &spec {
+            None => return m5d::load(file),
+            Some(_) => (*file, vec![m5d::world(&m5d::load(file)?)]),
+        },
+        ([file], [Kind::Mts]) => (*file, load_mts(file)?),
+        ([file], [Kind::Surface(format)]) => (*file, vec![mesh::still((file, *format))?]),
+        ([start, end], [Kind::Surface(one), Kind::Surface(other)]) => {
+            (*start, vec![moving((start, *one), (end, *other))?])
+        }
+        _ => return Err(wrong_number(&files, &kinds)),
+    };
+    VisibilityScene::from_subject(Subject { path, objects }, &spec.unwrap_or_default())
+}
+
+/// Parses the camera for a moving mesh.
+fn parsed_camera(text: &str) -> Result<CameraSpec, LoadError> {
+    let (spec, file) = CameraSpec::flag(text)?;
+    spec.check_for_meshes().map_err(|wrong| CameraSpec::wrong(&file, wrong))?;
+    Ok(spec)
+}
+
+/// Loads a still mesh from a PLY, OBJ, OFF or STL file.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_surface(path: &Path) -> Result<MovingMesh, LoadError> {
+    match Kind::of(path)? {
+        Kind::Surface(format) => mesh::still((path, format)),
+        _ => Err(LoadError::Kind {
+            file: path.display().to_string(),
+            known: ".ply, .obj, .off and .stl (also gzipped)",
+        }),
+    }
+}
+
+/// Error for a pipe: the bytes read for the format would be missing from the content.
+fn not_a_regular_file(path: &Path) -> LoadError {
+    let message =
+        format!("{} is a pipe or a device, and it is read twice: write it to a file first", path.display());
+    LoadError::Setting { setting: "files", message }
+}
+
+fn wrong_number(files: &[&Path], kinds: &[Kind]) -> LoadError {
+    let whole = files.iter().zip(kinds).find(|(_, kind)| !matches!(kind, Kind::Surface(_)));
+    let message = match whole {
+        Some((file, _)) if files.len() > 1 => {
+            format!("{} holds both ends of the shutter: give it alone", file.display())
+        }
+        _ => format!(
+            "{} were given: give one, or two PLY, OBJ, OFF or STL files as the ends of the shutter",
+            files.len()
+        ),
+    };
+    LoadError::Setting { setting: "files", message }
+}

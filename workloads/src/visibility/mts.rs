@@ -7,10 +7,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::bytes::Bytes;
 use super::mesh::MovingMesh;
 use crate::error::LoadError;
-use crate::import::reader;
+use crate::import::reader::{self, Bytes};
 
 /// First bytes of the file.
 pub(super) const MAGIC: &[u8; 4] = b"MTS1";

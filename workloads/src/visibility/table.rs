@@ -7,8 +7,8 @@ use std::path::Path;
 use pipeline::Viewport;
 use pipeline::sampling::{Sample, SampleSource};
 
-use super::bytes::Bytes;
 use crate::error::{LoadError, Source};
+use crate::import::reader::Bytes;
 
 /// A sample table for a block of pixels of any size, repeated over the image.
 #[derive(Clone, Debug)]

@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::Vec3;
+use gltf::json::material::{AlphaMode, Material as Described};
 use gltf::json::texture::{MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use pipeline::{Texture, Wrap};
 use warnings::{Code, Warning};
 
-use super::buffers;
-use super::document::Document;
-use super::left_out::Used;
-use crate::import::{ignored, image};
+use super::Looks;
+use super::document::{self, Document};
+use super::nodes::Tree;
+use crate::import::ignored::{self, about_material};
+use crate::import::reader;
 use crate::material::Material;
 
 /// All materials and, last, the default one for primitives without any (glTF 2.0, 3.9.6). Textures of those that are not in use
@@ -46,7 +48,7 @@ impl Images<'_, '_> {
         let (image, wrap) = (texture.source.value(), self.wrap(index));
         if self.is_blocky(index) {
             let what = "without filter drawn with one: magnified texels have soft edges";
-            warnings.push(ignored::about_material(Code::TextureFilterIgnored, "texture", what, material));
+            warnings.push(about_material(Code::TextureFilterIgnored, "texture", what, material));
         }
         let document = self.document;
         let key = (image, wrap.map(|wrap| wrap as u8));
@@ -86,13 +88,118 @@ fn load(document: &Document, index: usize, wrap: [Wrap; 2]) -> Result<Texture, S
     match (&described.uri, described.buffer_view) {
         (Some(uri), _) => {
             let shown = if uri.starts_with("data:") { "data URI" } else { uri };
-            let bytes = buffers::fetch(document.source, uri).map_err(|why| format!("`{shown}`: {why}"))?;
-            image::decode(&bytes, wrap).map_err(|why| format!("`{shown}`: {why}"))
+            let bytes = document::fetch(document.source, uri).map_err(|why| format!("`{shown}`: {why}"))?;
+            reader::decode_texture(&bytes, wrap).map_err(|why| format!("`{shown}`: {why}"))
         }
         (None, Some(view)) => {
             let bytes = document.view(view.value()).map_err(|why| format!("{index}: {why}"))?;
-            image::decode(bytes, wrap).map_err(|why| format!("{index}: {why}"))
+            reader::decode_texture(bytes, wrap).map_err(|why| format!("{index}: {why}"))
         }
         (None, None) => Err(format!("{index} has neither a URI nor a buffer view")),
+    }
+}
+
+/// Meshes and materials that nodes of the scene show: what is wrong with others changes no picture.
+pub(super) struct Used {
+    pub meshes: Vec<bool>,
+    pub materials: Vec<bool>,
+}
+
+impl Used {
+    pub fn new(document: &Document, tree: &Tree, looks: Looks) -> Self {
+        let root = &document.root;
+        let mut used =
+            Self { meshes: vec![false; root.meshes.len()], materials: vec![false; root.materials.len()] };
+        for (index, node) in root.nodes.iter().enumerate() {
+            let Some(mesh) = node.mesh.filter(|_| tree.in_scene[index]) else { continue };
+            used.meshes[mesh.value()] = true;
+            if looks == Looks::Own {
+                let primitives = root.meshes[mesh.value()].primitives.iter();
+                let named = primitives.filter_map(|primitive| primitive.material);
+                named.for_each(|material| used.materials[material.value()] = true);
+            }
+        }
+        used
+    }
+}
+
+/// Warnings about the materials in use, whose lowest vertex alpha is in `alpha`, and about extensions.
+pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alpha: &[f32]) -> Vec<Warning> {
+    let root = &document.root;
+    let mut warnings = Vec::new();
+    for (index, described) in root.materials.iter().enumerate().filter(|(index, _)| used.materials[*index]) {
+        let name = &made[index].name;
+        warnings.extend(transparent(described, &made[index], alpha[index]));
+        // Unlit materials have none of these (KHR_materials_unlit).
+        if !made[index].unlit {
+            warnings.extend(maps(described, name));
+        }
+    }
+    let what = "ignored: what it describes looks or moves in another way";
+    let changing = root.extensions_used.iter().filter(|name| changes_the_picture(name));
+    warnings.extend(changing.map(|name| Warning::about(Code::ExtensionIgnored, "extension", what, name)));
+    warnings
+}
+
+/// Whether alpha would change anything: opaque texels of blended materials are drawn as they should be.
+fn transparent(described: &Described, made: &Material, vertex_alpha: f32) -> Option<Warning> {
+    let texture = made.texture.as_ref().map_or(1.0, |texture| f32::from(texture.min_alpha()) / 255.0);
+    let least = described.pbr_metallic_roughness.base_color_factor.0[3] * texture * vertex_alpha;
+    match described.alpha_mode {
+        Checked::Valid(AlphaMode::Mask) => {
+            let cutoff = described.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0);
+            (least < cutoff).then(|| ignored::cut_out(&made.name))
+        }
+        Checked::Valid(AlphaMode::Blend) => (least < 1.0).then(|| ignored::blended(&made.name)),
+        _ => None,
+    }
+}
+
+fn maps(described: &Described, name: &str) -> Vec<Warning> {
+    let surface = &described.pbr_metallic_roughness;
+    let normal = described.normal_texture.as_ref().is_some_and(|map| map.scale != 0.0);
+    let occlusion = described.occlusion_texture.as_ref().is_some_and(|map| map.strength.0 > 0.0);
+    let emissive = described.emissive_factor.0.iter().any(|channel| *channel > 0.0);
+    let metallic = surface.metallic_factor.0 > 0.0 && surface.metallic_roughness_texture.is_none();
+    let rough = surface.metallic_roughness_texture.is_some();
+    let glossy = surface.metallic_factor.0 <= 0.0 && surface.roughness_factor.0 < 1.0 && !rough;
+    let gloss = "ignored: every surface has the same faint highlight";
+    let shaded = "ignored: nothing darkens the corners";
+    let found = [
+        normal.then(|| ignored::normal_map(name)),
+        emissive.then(|| ignored::emissive(name)),
+        occlusion.then(|| about_material(Code::OcclusionMapIgnored, "occlusion map", shaded, name)),
+        metallic.then(|| ignored::metallic(name)),
+        glossy.then(|| ignored::reflection(name)),
+        rough.then(|| about_material(Code::MetallicIgnored, "metallic-roughness map", gloss, name)),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// Whether an extension that is not read changes the picture. Those of compression and of image formats bring what is due without
+/// them, or the file requires them and is refused; variants of materials change nothing until one is chosen.
+fn changes_the_picture(name: &str) -> bool {
+    let known = ["KHR_materials_unlit", "KHR_lights_punctual", "KHR_materials_variants"];
+    let others = ["EXT_mesh_gpu_instancing", "KHR_animation_pointer", "KHR_node_visibility"];
+    let kind = ["_materials_", "_lights_"].iter().any(|kind| name.contains(kind));
+    !known.contains(&name) && (kind || others.contains(&name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extensions_count_where_they_change_the_picture() {
+        let of = ["KHR_materials_clearcoat", "EXT_lights_image_based", "KHR_animation_pointer"];
+        assert!(of.into_iter().all(changes_the_picture));
+        let harmless = [
+            "KHR_materials_unlit",
+            "KHR_texture_transform",
+            "KHR_mesh_quantization",
+            "EXT_texture_webp",
+            "KHR_xmp",
+        ];
+        assert!(!harmless.into_iter().any(changes_the_picture));
     }
 }

@@ -3,15 +3,10 @@
 //! The crate `gltf` parses and checks the JSON; whether accessors fit their buffers it does not check, and some
 //! of its readers panic where they do not, so buffers and accessors are read here.
 
-mod accessor;
-mod buffers;
-mod clips;
 mod document;
-mod left_out;
 mod materials;
 mod nodes;
 mod primitive;
-mod view;
 
 use std::path::Path;
 
@@ -19,9 +14,9 @@ use warnings::Warning;
 
 use crate::error::{LoadError, Source};
 use crate::scene::far::Bounds;
-use crate::scene::{Instance, Mesh, Parts, clip};
+use crate::scene::{Clip, Instance, Mesh, Parts};
 use document::Document;
-use left_out::Used;
+use materials::Used;
 
 /// Whose materials are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,19 +34,19 @@ pub(super) fn import(path: &Path, clip: Option<&str>, looks: Looks) -> Result<Pa
     let tree = nodes::tree(&document)?;
     let used = Used::new(&document, &tree, looks);
     let mut parts = Parts::new(path.display().to_string());
-    parts.clips = clips::clips(&document, &tree)?;
-    parts.graph.skins = clips::skins(&document, &tree)?;
+    parts.clips = nodes::clips(&document, &tree)?;
+    parts.graph.skins = nodes::skins(&document, &tree)?;
     parts.graph.materials = materials::materials(&document, &used, &mut parts.warnings);
     let of_mesh = meshes(&document, &used, &mut parts)?;
     parts.graph.instances = instances(&document, &tree, &of_mesh, &parts.graph)?;
-    (parts.cameras, parts.light) = view::view(&document, &tree, &mut parts.warnings);
+    (parts.cameras, parts.light) = nodes::view(&document, &tree, &mut parts.warnings);
     parts.camera = parts.cameras.first().map(|own| own.camera.clone()).unwrap_or_default();
     parts.graph.nodes = tree.nodes;
     if !parts.clips.is_empty() {
-        let chosen = clip.map_or(Ok(0), |wanted| clip::find(&parts.clips, wanted))?;
-        clip::play(&mut parts.graph.nodes, &parts.clips[chosen]);
+        let chosen = clip.map_or(Ok(0), |wanted| Clip::find(&parts.clips, wanted))?;
+        parts.clips[chosen].play(&mut parts.graph.nodes);
     } else if let Some(wanted) = clip {
-        clip::find(&parts.clips, wanted)?;
+        Clip::find(&parts.clips, wanted)?;
     }
     Ok(parts)
 }
@@ -84,7 +79,7 @@ fn meshes(
         warnings.clear();
         ranges.push(first..graph.meshes.len());
     }
-    parts.warnings.extend(left_out::left_out(document, used, &graph.materials, &alpha));
+    parts.warnings.extend(materials::left_out(document, used, &graph.materials, &alpha));
     Ok(ranges)
 }
 

@@ -8,11 +8,10 @@ use glam::{Vec2, Vec3};
 use pipeline::{Texture, Wrap};
 use warnings::{Code, Warning};
 
-use super::mtl::{self, Described, Map};
-use super::statements::Statements;
+use super::statements::{Statements, broken, lines};
 use crate::error::{LoadError, Source};
 use crate::import::soup::{Looks, Paint, Soup, grey, linear};
-use crate::import::{ignored, image, reader};
+use crate::import::{ignored, reader};
 use crate::material::Material;
 
 /// Gives each triangle of `soup` the material that the file at `path` names for it.
@@ -54,7 +53,7 @@ impl Library {
         let mut library = Self { described: BTreeMap::new(), whole: true };
         for file in files(&found.libraries, folder) {
             let there = reader::check_named(&file).map_err(|error| Source { path: &file }.unreadable(error));
-            match there.and_then(|()| mtl::read(&file)) {
+            match there.and_then(|()| read(&file)) {
                 Ok(materials) => {
                     let folder = file.parent().unwrap_or(Path::new("")).to_owned();
                     let named = materials.into_iter().map(|one| (one.name.clone(), (one, folder.clone())));
@@ -130,7 +129,9 @@ impl Textures {
     fn texture(&mut self, map: &Map, folder: &Path) -> Result<Arc<Texture>, String> {
         let wrap = [if map.clamped { Wrap::Clamp } else { Wrap::Repeat }; 2];
         let file = found_beside(&map.file, folder);
-        let read = || image::load(&file, wrap).map(Arc::new).map_err(|why| format!("`{}`: {why}", map.file));
+        let read = || {
+            reader::load_texture(&file, wrap).map(Arc::new).map_err(|why| format!("`{}`: {why}", map.file))
+        };
         self.known.entry((file.clone(), map.clamped)).or_insert_with(read).clone()
     }
 }
@@ -162,6 +163,191 @@ fn untextured(found: &Statements, looks: &Looks) -> Vec<Warning> {
             ignored::about_material(Code::MissingTexcoord, "textured material", what, &material.name)
         })
         .collect()
+}
+
+/// A material as the file describes it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Described {
+    pub name: String,
+    /// `Kd`, as shown on a screen.
+    pub color: Option<[f32; 3]>,
+    /// `map_Kd`.
+    pub texture: Option<Map>,
+    /// `d`, or what `Tr` leaves: 1 is opaque.
+    pub opacity: f32,
+    /// Whether there is a `map_d`.
+    pub cut_out: bool,
+    /// Whether there is a normal or bump map.
+    pub bumpy: bool,
+    /// Whether there is a displacement map.
+    pub displaced: bool,
+    /// Whether it sheds light (`Ke`, `map_Ke`).
+    pub emissive: bool,
+    /// `Pm`: how metallic it is.
+    pub metallic: f32,
+    shine: Shine,
+}
+
+/// What a material says about its highlight, its reflections and the light that it lets through.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Shine {
+    /// `Ks` is not black; `None` where it is not given.
+    specular: Option<bool>,
+    /// Whether there is a `map_Ks` or `map_Ns`.
+    mapped: bool,
+    /// `refl`, or a coat.
+    reflects: bool,
+    /// `Pr`.
+    roughness: Option<f32>,
+    /// `Tf` is neither white, which filters nothing, nor black.
+    filters: bool,
+    /// `illum`: 0 and 1 have no highlight.
+    model: Option<u8>,
+}
+
+/// A texture and its options.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Map {
+    /// The file as named, with slashes.
+    pub file: String,
+    /// `-s`.
+    pub scale: Vec2,
+    /// `-o`.
+    pub offset: Vec2,
+    /// `-clamp on`.
+    pub clamped: bool,
+}
+
+/// Reads the materials in the file at `path`.
+pub(super) fn read(path: &Path) -> Result<Vec<Described>, LoadError> {
+    let mut found: Vec<Described> = Vec::new();
+    for (number, line) in lines(path)? {
+        let line = line?;
+        let line = line.trim_start();
+        let (word, rest) = line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
+        let rest = rest.trim();
+        if word == "newmtl" {
+            found.push(Described { name: rest.to_owned(), opacity: 1.0, ..Described::default() });
+        } else if let Some(material) = found.last_mut() {
+            material.statement(word, rest).map_err(|what| broken(path, number, &what))?;
+        }
+    }
+    Ok(found)
+}
+
+impl Described {
+    fn statement(&mut self, word: &str, rest: &str) -> Result<(), String> {
+        match word {
+            "Kd" => self.color = color(rest)?,
+            "Ke" => self.emissive = color(rest)?.is_some_and(is_bright),
+            "Ks" => self.shine.specular = Some(color(rest)?.is_some_and(is_bright)),
+            "Tf" => self.shine.filters = color(rest)?.is_some_and(|c| is_bright(c) && c != [1.0; 3]),
+            "illum" => self.shine.model = rest.parse().ok(),
+            "Pm" => self.metallic = number(rest)?,
+            "Pr" => self.shine.roughness = Some(number(rest)?),
+            "Pc" | "Ps" => self.shine.reflects |= color(rest)?.is_some_and(is_bright),
+            "d" => self.opacity = opacity(rest)?,
+            "Tr" => self.opacity = 1.0 - opacity(rest)?,
+            "map_Kd" => self.texture = Some(Map::new(rest)?),
+            "map_d" => self.cut_out = true,
+            "map_Ke" => self.emissive = true,
+            "map_Ks" | "map_Ns" | "map_Pr" => self.shine.mapped = true,
+            "map_Pm" => self.metallic = 1.0,
+            "refl" => self.shine.reflects = true,
+            "disp" => self.displaced = true,
+            "bump" | "norm" => self.bumpy = true,
+            _ if word.eq_ignore_ascii_case("map_bump") => self.bumpy = true,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Whether it has another highlight than every surface has, or reflections.
+    pub fn shines(&self) -> bool {
+        let Shine { specular, mapped, reflects, roughness, model, .. } = self.shine;
+        let has_highlight = !matches!(model, Some(0 | 1)) && specular.unwrap_or(mapped);
+        has_highlight || reflects || self.metallic <= 0.0 && roughness.is_some_and(|rough| rough < 1.0)
+    }
+
+    /// Whether what is behind it shows.
+    pub fn is_see_through(&self) -> bool {
+        self.opacity < 1.0 || self.shine.filters
+    }
+}
+
+fn is_bright(color: [f32; 3]) -> bool {
+    color.iter().any(|channel| *channel > 0.0)
+}
+
+/// One number for grey, or three; nothing for a spectrum or another colour space.
+fn color(text: &str) -> Result<Option<[f32; 3]>, String> {
+    if text.starts_with("spectral") || text.starts_with("xyz") {
+        return Ok(None);
+    }
+    let numbers: Vec<f32> = text.split_ascii_whitespace().map(number).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [grey] => Ok(Some([grey; 3])),
+        [red, green, blue, ..] => Ok(Some([red, green, blue])),
+        _ => Err(format!("a colour of {} numbers where 1 or 3 are due", numbers.len())),
+    }
+}
+
+/// `d` may be `-halo 0.5`.
+fn opacity(text: &str) -> Result<f32, String> {
+    number(text.split_ascii_whitespace().next_back().unwrap_or_default())
+}
+
+fn number(word: &str) -> Result<f32, String> {
+    let number = word.parse().ok().filter(|number: &f32| number.is_finite());
+    number.ok_or_else(|| format!("`{word}` where a number is due"))
+}
+
+impl Map {
+    /// Options, each with its values, and then a name that may have spaces.
+    fn new(text: &str) -> Result<Self, String> {
+        let mut map = Self { file: String::new(), scale: Vec2::ONE, offset: Vec2::ZERO, clamped: false };
+        let mut rest = text;
+        while let Some((option, after)) = rest.split_once(|c: char| c.is_ascii_whitespace()) {
+            let Some(most) = values_of(option) else { break };
+            let mut values = Vec::new();
+            rest = after.trim_start();
+            while values.len() < most {
+                let (word, after) = rest.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((rest, ""));
+                let is_number = word.parse::<f32>().is_ok_and(f32::is_finite);
+                // Vectors may be cut short; a value that is a word is always there.
+                if most > 1 && !is_number || after.trim().is_empty() {
+                    break;
+                }
+                values.push(word);
+                rest = after.trim_start();
+            }
+            map.option(option, &values);
+        }
+        map.file = rest.trim().replace('\\', "/");
+        if map.file.is_empty() { Err("a map without a file".to_owned()) } else { Ok(map) }
+    }
+
+    fn option(&mut self, option: &str, values: &[&str]) {
+        let value = |index: usize| values.get(index).and_then(|word| word.parse().ok());
+        match option {
+            "-s" => self.scale = Vec2::new(value(0).unwrap_or(1.0), value(1).unwrap_or(1.0)),
+            "-o" => self.offset = Vec2::new(value(0).unwrap_or(0.0), value(1).unwrap_or(0.0)),
+            "-clamp" => self.clamped = values == ["on"],
+            _ => {}
+        }
+    }
+}
+
+/// The most values of an option of a map; nothing for a word that is none.
+fn values_of(option: &str) -> Option<usize> {
+    match option {
+        "-s" | "-o" | "-t" => Some(3),
+        "-mm" => Some(2),
+        "-blendu" | "-blendv" | "-clamp" | "-cc" | "-bm" | "-boost" | "-texres" | "-imfchan" | "-type" => {
+            Some(1)
+        }
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -213,5 +399,99 @@ mod tests {
         assert!(
             warnings.iter().any(|warning| warning.contains("missing-image") && warning.contains("wall.png"))
         );
+    }
+
+    fn parse(text: &str) -> Result<Vec<Described>, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        read(file.path()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn materials_are_read_as_exporters_write_them() {
+        let text = "# a comment\nNs 10\nnewmtl red paint\n  Kd 1 0 0\n\tTr 0.25\nillum 2\n\nnewmtl wall\nmap_Kd -s 2 4 -o 0.5 -clamp on \
+                    dir\\a b.png\nmap_bump n.png\nmap_d -imfchan m a.png\nKe 0 0 0\nKd 0.5\nnewmtl lamp\nKe 1 1 1\nd -halo 0.5\nKd spectral a.rfl\n";
+        let found = parse(text).unwrap();
+        assert_eq!(found.len(), 3);
+        assert_eq!(
+            (found[0].name.as_str(), found[0].color, found[0].opacity),
+            ("red paint", Some([1.0, 0.0, 0.0]), 0.75)
+        );
+        let map = Map {
+            file: "dir/a b.png".to_owned(),
+            scale: Vec2::new(2.0, 4.0),
+            offset: Vec2::new(0.5, 0.0),
+            clamped: true,
+        };
+        assert_eq!((&found[1].texture, found[1].color), (&Some(map), Some([0.5; 3])));
+        assert_eq!(
+            (found[1].bumpy, found[1].cut_out, found[1].emissive, found[1].opacity),
+            (true, true, false, 1.0)
+        );
+        assert_eq!((found[2].emissive, found[2].opacity, found[2].color), (true, 0.5, None));
+    }
+
+    #[test]
+    fn only_what_changes_the_picture_shines_or_shows_what_is_behind() {
+        let of = |text: &str| {
+            let found = parse(&format!("newmtl a\n{text}\n")).unwrap();
+            (found[0].shines(), found[0].is_see_through())
+        };
+        for harmless in [
+            "Ks 0 0 0\nNs 500\nillum 2",
+            "Ks 1 1 1\nillum 1",
+            "Ns 10",
+            "Tf 1 1 1",
+            "Tf 0 0 0",
+            "Pr 1",
+            "illum 2",
+        ] {
+            assert_eq!(of(harmless), (false, false), "{harmless}");
+        }
+        for shiny in [
+            "Ks 1 1 1",
+            "Ks 0.5\nNs 10\nillum 2",
+            "map_Ks a.png",
+            "refl -type sphere a.png",
+            "Pr 0.2",
+            "Pc 0.5",
+        ] {
+            assert_eq!(of(shiny), (true, false), "{shiny}");
+        }
+        for clear in ["d 0.5", "Tr 0.5", "Tf 0.2 0.9 0.2"] {
+            assert_eq!(of(clear), (false, true), "{clear}");
+        }
+    }
+
+    #[test]
+    fn maps_are_files_with_options_before_them() {
+        let file = |text| Map::new(text).map(|map| map.file);
+        for (text, expected) in [
+            ("a.png", "a.png"),
+            ("-bm 0.2 a b.png", "a b.png"),
+            ("-s 1 1 1 2.png", "2.png"),
+            ("-s 1 1 2", "2"),
+            ("-mm 0 1 c:\\x\\y.png", "c:/x/y.png"),
+            ("-texres 512 a.png", "a.png"),
+            ("-unknown a.png", "-unknown a.png"),
+        ] {
+            assert_eq!(file(text).as_deref(), Ok(expected), "{text}");
+        }
+        assert!(file("").is_err());
+    }
+
+    #[test]
+    fn broken_lines_are_named() {
+        for (text, expected) in [
+            ("newmtl a\nKd 1 2\n", "line 2: a colour of 2 numbers"),
+            ("newmtl a\n\nKd\n", "line 3: a colour of 0 numbers"),
+            ("newmtl a\nd x\n", "line 2: `x` where a number is due"),
+            ("newmtl a\nKd 1 nan 0\n", "line 2: `nan` where a number is due"),
+            ("newmtl a\nmap_Kd\n", "line 2: a map without a file"),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert!(error.contains(expected), "{text:?}: {error}");
+        }
+        assert_eq!(parse("").unwrap(), []);
     }
 }

@@ -1,7 +1,6 @@
 //! OBJ files: positions, colours, normals, texture coordinates, polygons and materials.
 
 mod materials;
-mod mtl;
 mod statements;
 
 use std::collections::HashMap;

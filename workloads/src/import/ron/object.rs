@@ -11,7 +11,7 @@ use super::spec::{MaterialSpec, ObjectSpec, ShapeSpec, TextureSpec};
 use super::{Context, broken, color, vector};
 use crate::builtin::checker;
 use crate::error::LoadError;
-use crate::import::{Format, bare, foreign, gltf, ignored, image, soup};
+use crate::import::{self, Format, bare, gltf, ignored, reader, soup};
 use crate::material::Material;
 use crate::scene::{Interpolation, Local, Mesh, Node, Parts, Spin, Target, Track, Trs, rotation};
 use crate::shapes;
@@ -63,7 +63,8 @@ fn add_file(
             add_surface(context, parts, place, object, ((&path, format), node))
         }
         _ => {
-            let known = foreign(&path).unwrap_or_else(|| format!("it is no .gltf, .glb or {SURFACES} file"));
+            let known =
+                import::foreign(&path).unwrap_or_else(|| format!("it is no .gltf, .glb or {SURFACES} file"));
             Err(context.wrong(place, format!("`{file}`: {known}")))
         }
     }
@@ -193,13 +194,15 @@ fn make_material(
         Some(TextureSpec::Checker { colors, texels }) => {
             checker(*texels, colors.map(|color| color.map(linear_to_srgb8))).map(Arc::new)
         }
-        Some(TextureSpec::Image { file }) => match image::load(&context.beside(file), [Wrap::Repeat; 2]) {
-            Ok(texture) => Some(Arc::new(texture)),
-            Err(why) => {
-                warnings.push(ignored::texture(place, &format!("`{file}`: {why}")));
-                None
+        Some(TextureSpec::Image { file }) => {
+            match reader::load_texture(&context.beside(file), [Wrap::Repeat; 2]) {
+                Ok(texture) => Some(Arc::new(texture)),
+                Err(why) => {
+                    warnings.push(ignored::texture(place, &format!("`{file}`: {why}")));
+                    None
+                }
             }
-        },
+        }
         None => None,
     };
     let (double_sided, unlit) = (spec.double_sided, spec.unlit);
