@@ -11,7 +11,6 @@ mod grid;
 
 mod number;
 pub mod plane;
-mod rounding;
 
 pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
 pub use boxes::{DepthBoxes, DepthTile, Visible};

@@ -6,8 +6,7 @@ use activity::{Event, LineAccess, Packet, PacketKind};
 use rayon::prelude::*;
 
 use super::Features;
-use super::pass::Draw;
-use super::pass::{Pass, Staged};
+use super::pass::{Draw, Pass, Staged};
 use super::replay::Replay;
 use crate::setup::{Outcome, PixelRect, Triangle, bounds, is_flat, madds, set_up};
 use crate::traversal::{self, Box5, LensLines, thresholds};

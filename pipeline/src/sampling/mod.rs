@@ -1,17 +1,52 @@
-//! Sampling: sample tables over the image, the lens and the shutter.
+//! Sampling: samples, their sources, and sample tables over the image, the lens and the shutter.
 
-mod hashed;
 mod lens;
 mod pattern;
-mod region;
-mod sample;
 mod table;
 mod tile;
 
-pub use hashed::HashedSamples;
-pub use lens::LensShape;
-pub use pattern::Pattern;
-pub use region::{LensRegion, LensRegions};
-pub use sample::{Sample, SampleSource};
+pub use lens::{LensRegion, LensRegions, LensShape};
+pub use pattern::{HashedSamples, Pattern};
 pub use table::{SampleSpec, SampleTable, TableError};
 pub use tile::TileSamples;
+
+/// One sample of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Position in the pixel, [0, 1).
+    pub x: f32,
+    /// Position in the pixel, [0, 1), downwards.
+    pub y: f32,
+    /// Lens position, [-1, 1].
+    pub u: f32,
+    /// Lens position, [-1, 1], upwards.
+    pub v: f32,
+    /// Time, [0, 1) over the shutter.
+    pub t: f32,
+}
+
+impl Sample {
+    /// Whether it is in its pixel, in the square of the lens and in the shutter.
+    pub fn is_in_range(&self) -> bool {
+        let unit = 0.0..1.0;
+        let lens = -1.0..=1.0;
+        [self.x, self.y, self.t].iter().all(|c| unit.contains(c))
+            && [self.u, self.v].iter().all(|c| lens.contains(c))
+    }
+}
+
+/// Source of samples. A sample is a pure function of the source, the pixel and the index; workers request the
+/// same samples repeatedly.
+pub trait SampleSource: Send + Sync + std::fmt::Debug {
+    /// Samples per pixel, 1 to 256.
+    fn per_pixel(&self) -> u32;
+
+    /// Write the [`Self::per_pixel`] samples of pixel (`px`, `py`) into `into`.
+    fn pixel_into(&self, px: u32, py: u32, into: &mut [Sample]);
+
+    /// Samples of the block of 8x8 pixels that starts at (`px`, `py`), sorted by time, if the source has
+    /// them. Each is the pixel in the block times `per_pixel` plus the index in the pixel.
+    fn block_by_time(&self, _px: u32, _py: u32) -> Option<&[u16]> {
+        None
+    }
+}

@@ -20,8 +20,7 @@
 //! form, so bounds of its coefficients hold at all times. (Munkberg and Akenine-Moeller 2012 bound edges this
 //! way; the form relative to the middle of the box is new here.)
 
-use super::number::Number;
-use super::quadratic::Quadratic;
+use super::number::{Number, Quadratic};
 use super::region::{Faces, Piece, Timeline};
 use super::{View, cost};
 

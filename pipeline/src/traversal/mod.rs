@@ -9,7 +9,6 @@ mod edges;
 mod facing;
 mod lens_lines;
 mod number;
-mod quadratic;
 mod region;
 mod screen;
 mod side_planes;
@@ -17,7 +16,6 @@ mod side_planes;
 mod testing;
 pub mod thresholds;
 mod time_interval;
-mod view;
 
 pub use cost::{
     edge_bound_madds, edge_madds, facing_madds, lens_line_madds, lens_line_setup_madds, screen_setup_madds,
@@ -26,10 +24,8 @@ pub use cost::{
 pub use edges::{EdgeBounds, Edges};
 pub use facing::Facing;
 pub use lens_lines::LensLines;
-pub use number::Number;
-pub use quadratic::{Pieces, Quadratic};
-pub use region::{Box5, Faces, Piece, TileRect, Timeline};
+pub use number::{Number, Pieces, Quadratic};
+pub use region::{Box5, Faces, Piece, TileRect, Timeline, View};
 pub use screen::{SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_counted};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_over};
-pub use view::View;

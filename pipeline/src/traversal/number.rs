@@ -1,4 +1,5 @@
-//! Numbers of the tile tests: `f64` at run time, and in tests a number that counts its operations.
+//! Numbers of the tile tests: `f64` at run time, and in tests a number that counts its operations. Quadratics
+//! of time in Bernstein form, and the intervals where they are not negative.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -50,6 +51,105 @@ impl Number for f64 {
 
     fn sqrt(self) -> Self {
         Self::sqrt(self)
+    }
+}
+
+/// `b0 (1-s)^2 + 2 b1 s (1-s) + b2 s^2` for `s` in [0, 1]. Its values are between the smallest and the
+/// largest coefficient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quadratic<N = f64>(pub [N; 3]);
+
+/// Up to two intervals of [0, 1], in order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pieces<N> {
+    /// No interval.
+    None,
+    /// One interval.
+    One([N; 2]),
+    /// Two intervals with a gap in between.
+    Two([N; 2], [N; 2]),
+}
+
+impl<N: Number> Quadratic<N> {
+    /// A constant.
+    pub fn constant(value: N) -> Self {
+        Self([value; 3])
+    }
+
+    /// A linear function from `start` to `end`.
+    pub fn linear(start: N, end: N) -> Self {
+        Self([start, (start + end) * N::from(0.5), end])
+    }
+
+    /// Combine two quadratics coefficient by coefficient.
+    pub fn zip(&self, other: &Self, f: impl Fn(N, N) -> N) -> Self {
+        Self([0, 1, 2].map(|k| f(self.0[k], other.0[k])))
+    }
+
+    /// The same function over `part` of [0, 1]: its blossom at the ends (Ramshaw 1987).
+    pub fn over(&self, [start, end]: [N; 2]) -> Self {
+        let [b0, b1, b2] = self.0;
+        let (slope, bend) = (b1 - b0, b0 - b1 - b1 + b2);
+        Self([[start, start], [start, end], [end, end]].map(|[r, s]| b0 + (r + s) * slope + r * s * bend))
+    }
+
+    /// `m0 + m1 c + m2 c^2` with `c` from -1 to 1 over the interval.
+    pub fn centred(&self) -> [N; 3] {
+        let [b0, b1, b2] = self.0;
+        let (ends, quarter) = (b0 + b2, N::from(0.25));
+        let twice = b1 + b1;
+        [(ends + twice) * quarter, (b2 - b0) * N::from(0.5), (ends - twice) * quarter]
+    }
+
+    /// Hull of the times at which it is not negative. If the coefficients alone decide for all or none of the
+    /// interval, no root is computed; the flag says whether one was.
+    pub fn hull_above(&self) -> (Option<[N; 2]>, bool) {
+        let [b0, b1, b2] = self.0;
+        let (zero, one) = (N::zero(), N::from(1.0));
+        let (starts_below, ends_below) = (b0 < zero, b2 < zero);
+        if !starts_below && !ends_below {
+            (Some([zero, one]), false)
+        } else if starts_below && ends_below && b1 <= zero {
+            (None, false)
+        } else {
+            match self.above() {
+                Pieces::None => (None, true),
+                Pieces::One(piece) => (Some(piece), true),
+                Pieces::Two(first, last) => (Some([first[0], last[1]]), true),
+            }
+        }
+    }
+
+    /// Intervals where it is not negative. With `r = s / (1 - s)` it is `b2 r^2 + 2 b1 r + b0`, whose roots
+    /// are `q / b2` and `b0 / q` with `q = -(b1 +- sqrt(b1^2 - b0 b2))`. The sign is that of `b1`, so there
+    /// is no cancellation (Kahan). Mapped back to [0, 1] they are `q / (q + b2)` and `b0 / (b0 + q)`, both
+    /// sums of equal signs for roots inside.
+    pub fn above(&self) -> Pieces<N> {
+        let [b0, b1, b2] = self.0;
+        let (zero, one) = (N::zero(), N::from(1.0));
+        let discriminant = b1 * b1 - b0 * b2;
+        let (starts_below, ends_below) = (b0 < zero, b2 < zero);
+        let bends_over = if starts_below { b1 > zero } else { b1 < zero };
+        if starts_below == ends_below && (discriminant < zero || !bends_over) {
+            // No root inside.
+            return if starts_below { Pieces::None } else { Pieces::One([zero, one]) };
+        }
+        let root = discriminant.max(zero).sqrt();
+        let q = if b1 < zero { root - b1 } else { -(b1 + root) };
+        let [by_end, by_start] = [q / (q + b2), b0 / (b0 + q)].map(|s| s.max(zero).min(one));
+        match (starts_below, ends_below) {
+            (true, true) => Pieces::One([by_start, by_end]),
+            (false, false) => Pieces::Two([zero, by_start], [by_end, one]),
+            (true, false) => Pieces::One([if b1 < zero { by_end } else { by_start }, one]),
+            (false, true) => Pieces::One([zero, if b1 < zero { by_start } else { by_end }]),
+        }
+    }
+}
+
+impl<N: Number> Neg for Quadratic<N> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(self.0.map(|b| -b))
     }
 }
 
@@ -173,5 +273,69 @@ pub mod counted {
         assert_eq!(count(|| (a + b * c).value), (1, 7.0));
         assert_eq!(count(|| (a + b + c).value), (2, 6.0));
         assert_eq!(count(|| (-(a / b)).abs().value), (1, 0.5));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at(b: [f64; 3], s: f64) -> f64 {
+        b[0] * (1.0 - s) * (1.0 - s) + 2.0 * b[1] * s * (1.0 - s) + b[2] * s * s
+    }
+
+    fn holds(pieces: Pieces<f64>, s: f64) -> bool {
+        let within = |[lo, hi]: [f64; 2]| (lo..=hi).contains(&s);
+        match pieces {
+            Pieces::None => false,
+            Pieces::One(piece) => within(piece),
+            Pieces::Two(first, last) => within(first) || within(last),
+        }
+    }
+
+    #[test]
+    fn roots_known_by_hand() {
+        // (4 s - 1)(4 s - 3) = 16 s^2 - 16 s + 3
+        let dip = Quadratic([3.0, -5.0, 3.0]);
+        assert_eq!(dip.above(), Pieces::Two([0.0, 0.25], [0.75, 1.0]));
+        assert_eq!(dip.hull_above(), (Some([0.0, 1.0]), false));
+        let hill = Quadratic(dip.0.map(|b| -b));
+        assert_eq!(hill.above(), Pieces::One([0.25, 0.75]));
+        assert_eq!(Quadratic([-1.0, 0.5, -1.0]).above(), Pieces::None);
+        assert_eq!(Quadratic([-1.0, 0.0, 1.0]).above(), Pieces::One([0.5, 1.0]));
+        assert_eq!(Quadratic([1.0, 0.0, -1.0]).above(), Pieces::One([0.0, 0.5]));
+        assert_eq!(Quadratic([0.0_f64; 3]).above(), Pieces::One([0.0, 1.0]));
+    }
+
+    proptest! {
+        #[test]
+        fn every_sign_is_that_of_the_function(b in [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0], flat: bool) {
+            let b = if flat { [b[0], b[0] * (1.0 + 1e-9 * b[1]), b[0] * (1.0 + 1e-9 * b[2])] } else { b };
+            let pieces = Quadratic(b).above();
+            let (hull, _) = Quadratic(b).hull_above();
+            for step in 0..=1000 {
+                let s = f64::from(step) / 1000.0;
+                let value = at(b, s);
+                if value.abs() > 1e-14 {
+                    prop_assert_eq!(holds(pieces, s), value > 0.0, "{} at {}: {:?}", value, s, pieces);
+                }
+                if value > 1e-14 {
+                    prop_assert!(hull.is_some_and(|[lo, hi]| lo <= s && s <= hi));
+                }
+            }
+        }
+
+        #[test]
+        fn a_part_is_the_same_function(b in [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0], lo in 0.0..0.5_f64, hi in 0.5..1.0_f64) {
+            let part = Quadratic(b).over([lo, hi]);
+            let [m0, m1, m2] = part.centred();
+            for step in 0..=10 {
+                let s = f64::from(step) / 10.0;
+                let (whole, c) = (at(b, lo + s * (hi - lo)), 2.0 * s - 1.0);
+                prop_assert!((at(part.0, s) - whole).abs() < 1e-14);
+                prop_assert!((m0 + m1 * c + m2 * c * c - whole).abs() < 1e-14);
+            }
+        }
     }
 }

@@ -2,10 +2,8 @@
 //! whose hyperplanes these are; the remainder bound is new here).
 
 use super::edges::{Edge, Edges};
-use super::number::Number;
-use super::quadratic::Quadratic;
-use super::region::Faces;
-use super::view::View;
+use super::number::{Number, Quadratic};
+use super::region::{Faces, View};
 
 /// Linear edges in the arithmetic of the sample test. A sample is outside if one edge is below `-margin` and
 /// another above `margin`.

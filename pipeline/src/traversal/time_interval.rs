@@ -10,7 +10,7 @@
 //! A homogeneous triangle also covers its mirror image behind the camera. If vertices have depths of both
 //! signs, the caller has to check the depth at the times found.
 
-use super::quadratic::{Pieces, Quadratic};
+use super::number::{Pieces, Quadratic};
 use super::{EdgeBounds, Edges, Faces, TileRect, View};
 use crate::geometry::Shear;
 use crate::setup::Triangle;

@@ -16,8 +16,6 @@
 mod bin;
 mod cells;
 mod edges;
-mod facing;
-mod layout;
 mod raster;
 mod sorter;
 
@@ -27,10 +25,10 @@ use crate::depth::vertex_range;
 use crate::geometry::{Clip, Cull, Geometry, MovingVertex, Projection};
 use crate::setup::{Outcome, PixelRect, Triangle, bounds, distribute, set_up};
 use crate::simd::{Width, dispatch};
-use facing::Facing;
-pub use layout::SampleLayout;
+use cells::Facing;
 pub use raster::Tally;
 use raster::{BinSurface, Queue, Worker};
+pub use sorter::SampleLayout;
 
 /// Visible triangle of every sample of a layout.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use super::BinTriangle;
 use super::bin::BinSamples;
 use super::cells::{CellBounds, CellSetup, Scene, all, in_front_of_edges};
-use super::layout::SampleLayout;
+use super::sorter::SampleLayout;
 use crate::sample_test::block::{Crossing, View};
 use crate::sample_test::exact;
 use crate::setup::Triangle;
