@@ -347,6 +347,14 @@ impl TestPlan {
         self.0 & test != 0
     }
 
+    /// The plans of its first test, of its first two tests and so on, up to the plan itself.
+    pub fn steps(self) -> impl Iterator<Item = Self> {
+        [Self::SIDES, Self::FACING, Self::EDGES]
+            .into_iter()
+            .filter(move |&test| self.has(test))
+            .map(move |test| Self(self.0 & (2 * test - 1)))
+    }
+
     /// The last test of the plan, and the plan without it.
     pub fn last(self) -> Option<(u8, Self)> {
         let last = [Self::EDGES, Self::FACING, Self::SIDES].into_iter().find(|&test| self.has(test))?;

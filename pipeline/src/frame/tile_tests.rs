@@ -102,7 +102,9 @@ impl Subject<'_> {
         }
         let workload = self.workload(allowed, tile, &remaining);
         match context.selector.choose(&workload) {
-            Some(plan) => self.run_recorded(&workload, plan, tile, remaining, context),
+            Some(plan) => plan.steps().try_fold(remaining, |remaining, step| {
+                self.step_recorded(&workload, step, tile, remaining, context)
+            }),
             None => self.explore(&workload, tile, remaining, context),
         }
     }
@@ -132,20 +134,6 @@ impl Subject<'_> {
             .into_iter()
             .filter(|&test| plan.has(test))
             .try_fold(remaining, |remaining, test| self.step(test, tile, remaining, context))
-    }
-
-    /// Run a plan and record its outcome.
-    fn run_recorded(
-        &self,
-        workload: &Workload,
-        plan: TestPlan,
-        tile: &TestTile,
-        remaining: Remaining,
-        context: &mut TestContext<'_>,
-    ) -> Option<Remaining> {
-        let Some((_, parent)) = plan.last() else { return Some(remaining) };
-        let remaining = self.run_recorded(workload, parent, tile, remaining, context)?;
-        self.step_recorded(workload, plan, tile, remaining, context)
     }
 
     /// Run the last test of a plan on the part kept by the tests before it, and record the outcome.

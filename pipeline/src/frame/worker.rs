@@ -11,7 +11,7 @@ use super::{Settings, Shading};
 use crate::depth::{Bounder, BoxGrid, DepthTile, Visible, interval_madds, set_up_madds};
 use crate::geometry::Shear;
 use crate::memory::depths_fit;
-use crate::sample_test::{Hits, Target, test_screened};
+use crate::sample_test::{Hits, SampleTest, Target, Width};
 use crate::sampling::TileSamples;
 use crate::setup::{PixelRect, Triangle};
 use crate::shading::QuadSet;
@@ -192,10 +192,12 @@ impl<'a, 'p> Worker<'a, 'p> {
                 TestContext { features, work: &mut self.tests, selector: &mut self.bin.selector };
             let screen = screen.filter(|screen| subject.pays(screen, within.lens, &mut context));
             let before = [hits.screened, hits.tested];
-            test_screened(&triangle, samples, &within, screen.as_ref(), near, &mut target, hits);
+            let (triangle, within, screen, target) = (&triangle, &within, screen.as_ref(), &mut target);
+            SampleTest { triangle, samples, within, screen, near, target, hits: &mut *hits }
+                .run(Width::widest());
             if features.auto {
                 let counts = [hits.screened - before[0], hits.tested - before[1]];
-                savings.add(counts, screen.as_ref(), &mut self.bin.selector);
+                savings.add(counts, screen, &mut self.bin.selector);
             }
         }
         if self.pass.settings.spec.features.auto {

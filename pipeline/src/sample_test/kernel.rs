@@ -79,53 +79,38 @@ pub fn test_run(
     target: &mut Target<'_>,
     hits: &mut Hits,
 ) {
-    test_screened(triangle, samples, within, None, near, target, hits);
+    SampleTest { triangle, samples, within, screen: None, near, target, hits }.run(Width::widest());
 }
 
-/// Test only the samples that pass the screen, if given.
-pub fn test_screened(
-    triangle: &Triangle,
-    samples: &TileSamples,
-    within: &Box5,
-    screen: Option<&Screen>,
-    near: f32,
-    target: &mut Target<'_>,
-    hits: &mut Hits,
-) {
-    start(Width::widest(), Job { triangle, samples, within, screen, near, target, hits });
+/// A triangle to be tested against the samples of a tile, and the memory of the result.
+pub struct SampleTest<'a, 'b> {
+    /// The triangle.
+    pub triangle: &'a Triangle,
+    /// Samples of the tile.
+    pub samples: &'a TileSamples,
+    /// The part of lens and time that is tested.
+    pub within: &'a Box5,
+    /// If given, only samples that pass it are tested.
+    pub screen: Option<&'a Screen>,
+    /// Near depth.
+    pub near: f32,
+    /// Stored samples, updated with those that see the triangle.
+    pub target: &'a mut Target<'b>,
+    /// Counts and written samples.
+    pub hits: &'a mut Hits,
 }
 
-/// [`test_run`] with vectors of a given width, to check that all widths give the same bytes.
-pub fn test_run_at(
-    width: Width,
-    triangle: &Triangle,
-    samples: &TileSamples,
-    within: &Box5,
-    near: f32,
-    target: &mut Target<'_>,
-    hits: &mut Hits,
-) {
-    start(width, Job { triangle, samples, within, screen: None, near, target, hits });
-}
-
-struct Job<'a, 'b> {
-    triangle: &'a Triangle,
-    samples: &'a TileSamples,
-    within: &'a Box5,
-    screen: Option<&'a Screen>,
-    near: f32,
-    target: &'a mut Target<'b>,
-    hits: &'a mut Hits,
+impl SampleTest<'_, '_> {
+    /// Run the test with vectors of a given width; all widths give the same bytes.
+    pub fn run(self, width: Width) {
+        if self.samples.parallel { start_in::<true>(width, self) } else { start_in::<false>(width, self) }
+    }
 }
 
 /// A run of the kernel in the dimensions it needs.
-struct Run<'a, 'b, const MOTION: bool, const LENS: bool, const PARALLEL: bool>(Job<'a, 'b>);
+struct Run<'a, 'b, const MOTION: bool, const LENS: bool, const PARALLEL: bool>(SampleTest<'a, 'b>);
 
-fn start(width: Width, job: Job<'_, '_>) {
-    if job.samples.parallel { start_in::<true>(width, job) } else { start_in::<false>(width, job) }
-}
-
-fn start_in<const PARALLEL: bool>(width: Width, job: Job<'_, '_>) {
+fn start_in<const PARALLEL: bool>(width: Width, job: SampleTest<'_, '_>) {
     match (job.triangle.moving, job.within.lens) {
         (false, false) => dispatch(width, Run::<false, false, PARALLEL>(job)),
         (true, false) => dispatch(width, Run::<true, false, PARALLEL>(job)),
@@ -163,7 +148,7 @@ impl<const MOTION: bool, const LENS: bool, const PARALLEL: bool> Kernel
     }
 }
 
-impl Job<'_, '_> {
+impl SampleTest<'_, '_> {
     #[inline(always)]
     fn rows(&self, base: usize) -> SampleRows<'_> {
         let samples = self.samples;

@@ -26,4 +26,4 @@ pub mod exact;
 mod kernel;
 
 pub use crate::simd::Width;
-pub use kernel::{Hits, PixelHits, Target, madds, test_run, test_run_at, test_screened};
+pub use kernel::{Hits, PixelHits, SampleTest, Target, madds, test_run};

@@ -4,7 +4,7 @@
 
 use crate::common::case::{Case, NEAR, cases, setting};
 use crate::common::*;
-use pipeline::sample_test::{Hits, Target, test_screened};
+use pipeline::sample_test::{Hits, SampleTest, Target, Width};
 use pipeline::setup::{Outcome, Triangle};
 use pipeline::traversal::*;
 use pipeline::*;
@@ -56,7 +56,9 @@ fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5
             let mut depth = vec![f32::INFINITY; probe.samples.len];
             let mut owner = vec![u32::MAX; probe.samples.len];
             let mut target = Target { depth: &mut depth, triangle: &mut owner };
-            test_screened(&seen, &probe.samples, within, screen, -1.0, &mut target, &mut Hits::default());
+            let (samples, near, hits) = (&probe.samples, -1.0, &mut Hits::default());
+            let target = &mut target;
+            SampleTest { triangle: &seen, samples, within, screen, near, target, hits }.run(Width::widest());
             owner[slot] == triangle.id
         };
         if !hit(None) {

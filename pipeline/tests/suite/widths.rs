@@ -1,7 +1,7 @@
 //! All vector widths of this machine find the same hits with the same depths.
 
 use crate::common::*;
-use pipeline::sample_test::{Hits, Target, Width, test_run_at};
+use pipeline::sample_test::{Hits, SampleTest, Target, Width};
 use pipeline::sampling::TileSamples;
 use pipeline::setup::{Outcome, set_up};
 use pipeline::traversal::Box5;
@@ -27,7 +27,9 @@ fn hits_at(width: Width, kind: Kind, Optics { lens, parallel }: Optics) -> (Vec<
             continue;
         };
         let mut target = Target { depth: &mut depth, triangle: &mut seen };
-        test_run_at(width, &ready, &samples, &Box5::whole(lens), 0.25, &mut target, &mut hits);
+        let (within, target, hits) = (&Box5::whole(lens), &mut target, &mut hits);
+        let (triangle, samples, screen, near) = (&ready, &samples, None, 0.25);
+        SampleTest { triangle, samples, within, screen, near, target, hits }.run(width);
     }
     (seen, depth.into_iter().map(f32::to_bits).collect(), hits)
 }
