@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::bounds::Bounds;
 use super::contact_probe::cross;
 use super::object::Object;
-use super::pass::{Comparison, Fit, FragmentBudget, Observer, Part, Pass, Scratch, Survivors, Tiling};
+use super::pass::{
+    Comparison, Fit, FragmentBudget, Observer, Part, Pass, Resources, Scratch, Survivors, Tiling,
+};
 
 /// What a pass compares in a tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -125,27 +127,22 @@ impl<'a> Pair<'a> {
     /// Searches by depths alone, without time bins.
     pub fn by_depth(&self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
         let resolution = self.search.resolution;
-        match self.depths(resolution, &mut FragmentBudget::unlimited(), scratch, observer) {
+        let budget = FragmentBudget::unlimited();
+        match self.depths(resolution, &mut Resources { scratch, budget, observer }) {
             Some(0) => Verdict::Apart,
             tiles => self.maybe(tiles.unwrap_or(0), false),
         }
     }
 
     /// Fewest overlapping tiles of the six passes by depths alone; 0 means apart. `None` if the fragments
-    /// exceed `budget`.
-    pub fn depths(
-        &self,
-        resolution: u32,
-        budget: &mut FragmentBudget,
-        scratch: &mut Scratch,
-        observer: &mut impl Observer,
-    ) -> Option<u64> {
+    /// exceed the budget.
+    pub fn depths(&self, resolution: u32, resources: &mut Resources<'_, impl Observer>) -> Option<u64> {
         let tiling = Tiling { resolution, min_width: self.min_tile_width() };
         let mut fewest = u64::MAX;
         for axis in 0..3 {
             let pass = Pass::new(axis, &self.window, tiling, Fit::Edges);
             let comparison = Comparison { pass: &pass, parts: self.parts(), bins: &[Some(self.window)] };
-            let [in_front, behind] = comparison.depths(scratch, budget, observer)?;
+            let [in_front, behind] = comparison.depths(resources)?;
             fewest = fewest.min(in_front).min(behind);
         }
         Some(fewest)
@@ -155,7 +152,8 @@ impl<'a> Pair<'a> {
     pub fn once(&mut self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
         let Search { resolution, bins, .. } = *self.search;
         let params = PassParams { resolution, bins, fit: Fit::Edges };
-        match self.round(params, &mut FragmentBudget::unlimited(), scratch, observer) {
+        let budget = FragmentBudget::unlimited();
+        match self.round(params, &mut Resources { scratch, budget, observer }) {
             Outcome::Apart => Verdict::Apart,
             Outcome::BudgetExceeded => self.maybe(0, false),
             Outcome::Overlap(Round { window, tiles, seen }) => Verdict::Maybe { bounds: window, tiles, seen },
@@ -203,20 +201,14 @@ impl<'a> Pair<'a> {
     }
 
     /// Runs three passes. When refining, drops triangles that touch nothing after each pass.
-    pub fn round(
-        &mut self,
-        params: PassParams,
-        budget: &mut FragmentBudget,
-        scratch: &mut Scratch,
-        observer: &mut impl Observer,
-    ) -> Outcome {
+    pub fn round(&mut self, params: PassParams, resources: &mut Resources<'_, impl Observer>) -> Outcome {
         let mut remaining = time_bins(&self.window, params.bins);
         let (mut tiles, mut seen) = (0, false);
         for axis in 0..3 {
             let Some(hull) = joined(&remaining) else { return Outcome::Apart };
             let tiling = Tiling { resolution: params.resolution, min_width: self.min_tile_width() };
             let pass = Pass::new(axis, &hull, tiling, params.fit);
-            let Some(found) = self.compare(&pass, &remaining, budget, scratch, observer) else {
+            let Some(found) = self.compare(&pass, &remaining, resources) else {
                 return Outcome::BudgetExceeded;
             };
             tiles = found.tiles;
@@ -233,21 +225,19 @@ impl<'a> Pair<'a> {
     }
 
     /// Compares both objects in one pass, in chunks of time bins that fit in memory; `None` if the fragments
-    /// exceed `budget`.
+    /// exceed the budget.
     fn compare(
         &self,
         pass: &Pass,
         remaining: &[Option<Bounds>],
-        budget: &mut FragmentBudget,
-        scratch: &mut Scratch,
-        observer: &mut impl Observer,
+        resources: &mut Resources<'_, impl Observer>,
     ) -> Option<Survivors> {
         let mut all = Survivors::none(0, self.parts());
         for bins in remaining.chunks((MAX_TILES_IN_MEMORY / pass.tiles()).max(1)) {
             let comparison = Comparison { pass, parts: self.parts(), bins };
             all.join(match self.search.method {
-                Method::BoxBox => comparison.boxes_against_boxes(scratch, budget, observer),
-                _ => comparison.fragments_against_boxes(scratch, budget, observer),
+                Method::BoxBox => comparison.boxes_against_boxes(resources),
+                _ => comparison.fragments_against_boxes(resources),
             }?);
         }
         Some(all)
@@ -318,14 +308,14 @@ impl Pair<'_> {
             return Verdict::Apart;
         }
         let most = self.search.resolution;
-        let mut budget = self.budget();
+        let mut resources = Resources { scratch, budget: self.budget(), observer };
         let mut fit = if self.triangles() > MIN_TRIANGLES_FOR_BOXES { Fit::Boxes } else { Fit::Edges };
         let first = (self.triangles() as f64 / TRIANGLES_PER_TILE).sqrt() as u32;
         let (mut resolution, mut last) = (first.max(MIN_FIRST_TILES).min(most), self.maybe(0, false));
         for _ in 0..MAX_ROUNDS {
             let (before, triangles) = (self.window, self.triangles());
             let params = PassParams { resolution, bins: self.bins(resolution), fit };
-            let round = match self.round(params, &mut budget, scratch, observer) {
+            let round = match self.round(params, &mut resources) {
                 Outcome::Apart => return Verdict::Apart,
                 Outcome::BudgetExceeded => break,
                 Outcome::Overlap(round) => round,
@@ -362,8 +352,9 @@ impl Pair<'_> {
     /// pair that exceeds its budget stays.
     pub fn refine_by_depth(&self, scratch: &mut Scratch, observer: &mut impl Observer) -> Verdict {
         let most = self.search.resolution;
-        let (mut budget, mut resolution, mut last) = (self.budget(), MIN_FIRST_TILES.min(most), 0);
-        while let Some(tiles) = self.depths(resolution, &mut budget, scratch, observer) {
+        let mut resources = Resources { scratch, budget: self.budget(), observer };
+        let (mut resolution, mut last) = (MIN_FIRST_TILES.min(most), 0);
+        while let Some(tiles) = self.depths(resolution, &mut resources) {
             if tiles == 0 {
                 return Verdict::Apart;
             }

@@ -279,6 +279,13 @@ pub(super) struct Scratch {
     fragments: [Vec<StoredFragment>; 2],
 }
 
+/// Buffers, remaining fragments and observer of a search.
+pub(super) struct Resources<'a, O> {
+    pub scratch: &'a mut Scratch,
+    pub budget: FragmentBudget,
+    pub observer: &'a mut O,
+}
+
 /// A fragment that is compared with the overlapping tiles after the pass.
 struct StoredFragment {
     place: u32,
@@ -363,20 +370,15 @@ pub(super) struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Draws part `which` into its boxes and stores its fragments; `None` if they exceed `budget`.
-    fn fill(
-        &self,
-        which: usize,
-        scratch: &mut Scratch,
-        budget: &mut FragmentBudget,
-        observer: &mut impl Observer,
-    ) -> Option<()> {
+    /// Draws part `which` into its boxes and stores its fragments; `None` if they exceed the budget.
+    fn fill(&self, which: usize, resources: &mut Resources<'_, impl Observer>) -> Option<()> {
+        let Resources { scratch, budget, observer } = resources;
         let (boxes, stored) = (&mut scratch.boxes[which], &mut scratch.fragments[which]);
         stored.clear();
-        self.boxed(which, boxes, budget, observer, |fragment| stored.push(fragment))
+        self.boxed(which, boxes, budget, *observer, |fragment| stored.push(fragment))
     }
 
-    /// Draws part `which` into its boxes and passes its fragments to `each`; `None` if they exceed `budget`.
+    /// Draws part `which` into its boxes and passes its fragments to `each`; `None` if they exceed the budget.
     fn boxed(
         &self,
         which: usize,
@@ -402,15 +404,11 @@ impl Comparison<'_> {
     }
 
     /// Compares the first part's box in each tile with each fragment of the second, per time bin (thesis,
-    /// Paper VI, Fig. 5, right). `None` if the fragments exceed `budget`.
-    pub fn fragments_against_boxes(
-        &self,
-        scratch: &mut Scratch,
-        budget: &mut FragmentBudget,
-        observer: &mut impl Observer,
-    ) -> Option<Survivors> {
+    /// Paper VI, Fig. 5, right). `None` if the fragments exceed the budget.
+    pub fn fragments_against_boxes(&self, resources: &mut Resources<'_, impl Observer>) -> Option<Survivors> {
         let mut result = Survivors::none(self.bins.len(), self.parts);
-        self.fill(0, scratch, budget, observer)?;
+        self.fill(0, resources)?;
+        let Resources { scratch, budget, observer } = resources;
         let [boxes, met] = &mut scratch.boxes;
         met.clear(self.pass.tiles() * self.bins.len());
         observer.part(self.pass, 1, self.parts[1]);
@@ -432,15 +430,11 @@ impl Comparison<'_> {
 
     /// Compares the boxes of both parts in each tile, per time bin (Fig. 5, left). `None` if the fragments
     /// exceed `budget`.
-    pub fn boxes_against_boxes(
-        &self,
-        scratch: &mut Scratch,
-        budget: &mut FragmentBudget,
-        observer: &mut impl Observer,
-    ) -> Option<Survivors> {
+    pub fn boxes_against_boxes(&self, resources: &mut Resources<'_, impl Observer>) -> Option<Survivors> {
         let mut result = Survivors::none(self.bins.len(), self.parts);
-        self.fill(0, scratch, budget, observer)?;
-        self.fill(1, scratch, budget, observer)?;
+        self.fill(0, resources)?;
+        self.fill(1, resources)?;
+        let Resources { scratch, observer, .. } = resources;
         let [first, second] = &scratch.boxes;
         for (place, one) in first.used() {
             let other = second.at(place);
@@ -458,15 +452,11 @@ impl Comparison<'_> {
     }
 
     /// Overlapping tiles by depths alone: where the second part is in front of the first's farthest depth,
-    /// and where it is behind the nearest. `None` if the fragments exceed `budget`.
-    pub fn depths(
-        &self,
-        scratch: &mut Scratch,
-        budget: &mut FragmentBudget,
-        observer: &mut impl Observer,
-    ) -> Option<[u64; 2]> {
+    /// and where it is behind the nearest. `None` if the fragments exceed the budget.
+    pub fn depths(&self, resources: &mut Resources<'_, impl Observer>) -> Option<[u64; 2]> {
+        let Resources { scratch, budget, observer } = resources;
         for which in [0, 1] {
-            self.boxed(which, &mut scratch.boxes[which], budget, observer, |_| ())?;
+            self.boxed(which, &mut scratch.boxes[which], budget, *observer, |_| ())?;
         }
         let [first, second] = &scratch.boxes;
         let both = || {

@@ -6,7 +6,9 @@ use super::bounds::Bounds;
 use super::detect::{MAX_SCALED_COORDINATE, upscale_factor};
 use super::object::Object;
 use super::pair::Method;
-use super::pass::{Comparison, Fit, Fragment, FragmentBudget, Observer, Part, Pass, Scratch, Tiling};
+use super::pass::{
+    Comparison, Fit, Fragment, FragmentBudget, Observer, Part, Pass, Resources, Scratch, Tiling,
+};
 
 /// Work of the passes, and the overlapping pixels of a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -99,18 +101,15 @@ impl PlainPasses {
 
     /// Pixels of a pass in which both objects may touch.
     fn overlaps(&mut self, comparison: &Comparison<'_>, result: &mut PlainResult) -> u64 {
-        let (scratch, budget) = (&mut self.scratch, &mut FragmentBudget::unlimited());
+        let (scratch, budget) = (&mut self.scratch, FragmentBudget::unlimited());
+        let resources = &mut Resources { scratch, budget, observer: result };
         // The budget is unlimited, so there always is a result. Without one, the pair would have to stay.
         match self.method {
-            Method::DepthOnly => {
-                comparison.depths(scratch, budget, result).map_or(1, |[front, behind]| front.min(behind))
+            Method::DepthOnly => comparison.depths(resources).map_or(1, |[front, behind]| front.min(behind)),
+            Method::BoxBox => comparison.boxes_against_boxes(resources).map_or(1, |overlaps| overlaps.tiles),
+            Method::FragmentBox => {
+                comparison.fragments_against_boxes(resources).map_or(1, |overlaps| overlaps.tiles)
             }
-            Method::BoxBox => {
-                comparison.boxes_against_boxes(scratch, budget, result).map_or(1, |overlaps| overlaps.tiles)
-            }
-            Method::FragmentBox => comparison
-                .fragments_against_boxes(scratch, budget, result)
-                .map_or(1, |overlaps| overlaps.tiles),
         }
     }
 }

@@ -11,7 +11,7 @@ use warnings::{Code, Warning};
 use super::map::Map;
 use super::receiver::{Effect, Receiver, ReceiverShader};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, DrawsScene, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::material::Material;
 use crate::scene::{
     Frame, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, View, tan_half,
@@ -184,22 +184,12 @@ impl Glossy {
     }
 }
 
-impl Draws for Glossy {
-    type Input = Frame;
-
-    fn settings(&self) -> &Settings {
-        self.scene.settings()
+impl DrawsScene for Glossy {
+    fn scene(&self) -> &Scene {
+        &self.scene
     }
 
-    fn warnings(&self) -> &[Warning] {
-        self.scene.warnings()
-    }
-
-    fn input(&self, number: u32) -> Result<Frame, JobError> {
-        Ok(self.scene.frame(number)?)
-    }
-
-    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
         let map = self.map(frame).map_err(refused)?;
         let draws: Vec<_> =
             frame.draws(&self.scene)?.into_iter().map(|draw| Draw { cull: Cull::None, ..draw }).collect();

@@ -18,7 +18,7 @@ use serde::Serialize;
 use warnings::Warning;
 
 use crate::fingerprint::{Fingerprint, FingerprintError};
-use crate::scene::{FrameError, Overrides, Settings};
+use crate::scene::{Frame, FrameError, Overrides, Scene, Settings};
 
 /// Receiver of a frame's packets, each with its L2 accesses, in the order of the modelled hardware.
 pub type Emit<'a> = &'a mut dyn FnMut(&Packet, &[LineAccess]);
@@ -92,6 +92,43 @@ pub trait Draws: Sync + Send {
     /// # Errors
     /// [`JobError`] if the hardware cannot be built or the frame cannot be drawn.
     fn draw(&self, input: &Self::Input, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+}
+
+/// A job whose frames are those of a scene.
+pub trait DrawsScene: Sync + Send {
+    /// The scene.
+    fn scene(&self) -> &Scene;
+
+    /// Size of the image, frames and frame rate.
+    fn settings(&self) -> &Settings {
+        self.scene().settings()
+    }
+
+    /// Draws a frame, as [`Draws::draw`].
+    ///
+    /// # Errors
+    /// As [`Draws::draw`].
+    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError>;
+}
+
+impl<D: DrawsScene> Draws for D {
+    type Input = Frame;
+
+    fn settings(&self) -> &Settings {
+        DrawsScene::settings(self)
+    }
+
+    fn warnings(&self) -> &[Warning] {
+        self.scene().warnings()
+    }
+
+    fn input(&self, number: u32) -> Result<Frame, JobError> {
+        Ok(self.scene().frame(number)?)
+    }
+
+    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+        self.draw_frame(frame, spec, emit)
+    }
 }
 
 /// A job: work for the rasterizer beyond one rendering of a scene. Every type that implements [`Draws`] is a

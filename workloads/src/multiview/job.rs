@@ -8,7 +8,7 @@ use warnings::{Code, Warning};
 use super::layout::{Layout, Panel};
 use super::rig::{Rig, Target, Views};
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
+use crate::job::{Drawn, DrawsScene, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request};
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 /// Arrangement of the views in the image.
@@ -159,22 +159,16 @@ const INFINITE_CACHE: CacheSpec = CacheSpec::lru(1 << 22, 16);
 /// Shader executions, relative to those with an infinite cache, above which the cache is too small.
 pub const MAX_RUNS_OVER_INFINITE_CACHE: f64 = 1.25;
 
-impl Draws for MultiView {
-    type Input = Frame;
+impl DrawsScene for MultiView {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
 
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    fn warnings(&self) -> &[Warning] {
-        self.scene.warnings()
-    }
-
-    fn input(&self, number: u32) -> Result<Frame, JobError> {
-        Ok(self.scene.frame(number)?)
-    }
-
-    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
         let draws = frame.draws(&self.scene)?;
         let rig = self.rig(frame).map_err(|error| JobError::Setting(error.to_string()))?;
         let to = Target { viewport: self.view, spec, background: self.scene.background() };

@@ -15,7 +15,7 @@ use super::map::{Method, Renderer, ShadowMap, View, depth_pass};
 use super::shade::{Shadows, World, look_up_packets};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
+use crate::job::{Drawn, DrawsScene, Emit, Fact, Flag, Flags, Job, JobError, OptionSource, Request, shifted};
 use crate::material::Material;
 use crate::scene::{
     self, Frame, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs,
@@ -153,22 +153,12 @@ impl SoftShadows {
     const BIAS_RANGE_TEXELS: [f64; 2] = [0.5, 8.0];
 }
 
-impl Draws for SoftShadows {
-    type Input = Frame;
-
-    fn settings(&self) -> &Settings {
-        self.scene.settings()
+impl DrawsScene for SoftShadows {
+    fn scene(&self) -> &Scene {
+        &self.scene
     }
 
-    fn warnings(&self) -> &[Warning] {
-        self.scene.warnings()
-    }
-
-    fn input(&self, number: u32) -> Result<Frame, JobError> {
-        Ok(self.scene.frame(number)?)
-    }
-
-    fn draw(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
+    fn draw_frame(&self, frame: &Frame, spec: &PipelineSpec, emit: Emit<'_>) -> Result<Drawn, JobError> {
         let settings = self.scene.settings();
         let (draws, albedos) = parts(&self.scene, frame)?;
         let viewport = Viewport::new(settings.width, settings.height)

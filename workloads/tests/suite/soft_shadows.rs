@@ -9,7 +9,8 @@ use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
 use workloads::job::Job;
 use workloads::soft_shadows::{
-    AreaLight, LightSpec, Method, Options, Renderer, ShadowMap, Shadows, SoftShadows, View, World, depth_pass,
+    AreaLight, DepthPass, LightSpec, Method, Options, Renderer, ShadowMap, Shadows, SoftShadows, View, World,
+    depth_pass,
 };
 use workloads::visibility::Unshaded;
 
@@ -151,6 +152,12 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
     assert!((lit as f64 / 256.0 - 0.75).abs() < 0.01, "{lit}");
 }
 
+/// The visible samples of a view, in one pass.
+fn visible(view: &View<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPass {
+    let renderer = Renderer { method: Method::OnePass, spec: &spec() };
+    depth_pass(view, viewport, set, renderer, &mut |_, _| ()).unwrap()
+}
+
 /// Lambert's law: a floor has the cosine of its angle to the light at the time of the sample, plus ambient
 /// light, with either winding.
 #[test]
@@ -167,14 +174,7 @@ fn a_floor_in_the_light_follows_the_cosine_while_it_tilts() {
         let set = SharedSamples::new(vec![sample; 3]).unwrap();
         let draws = [draw(&open, &close, &triangles)];
         let view = View { camera: &camera, draws: &draws };
-        let seen = depth_pass(
-            &view,
-            viewport,
-            &set,
-            Renderer { method: Method::OnePass, spec: &spec() },
-            &mut |_, _| (),
-        )
-        .unwrap();
+        let seen = visible(&view, viewport, &set);
         let world = World::new(&view, viewport, &light, std::slice::from_ref(&albedo), Vec3::ZERO);
         let image = world.image(&set, &seen.samples, Shadows::None);
         let normal = DVec3::new(-f64::from(t), 1.0, 0.0).normalize();
@@ -197,14 +197,7 @@ fn rays_and_a_fine_map_agree() {
     let viewport = Viewport::new(48, 27).unwrap();
     let (camera, set) = (frame.camera.with_lens(None), set(16, 5));
     let view = View { camera: &camera, draws: &draws };
-    let seen = depth_pass(
-        &view,
-        viewport,
-        &set,
-        Renderer { method: Method::OnePass, spec: &spec() },
-        &mut |_, _| (),
-    )
-    .unwrap();
+    let seen = visible(&view, viewport, &set);
     let world = World::new(&view, viewport, &light, &[], Vec3::ZERO);
     let map = map(&light, &draws, 512, &set, Method::OnePass);
     let of = |shadows| world.lit_and_unlit(&set, &seen.samples, shadows);
