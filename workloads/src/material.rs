@@ -6,18 +6,18 @@ use std::sync::Arc;
 use glam::{Vec3, Vec4};
 use pipeline::{Shader, ShaderCost, ShadingPoint, Texture};
 
-/// How a surface looks. Surfaces are opaque and diffuse, with a faint highlight.
+/// Appearance of a surface. Surfaces are opaque and diffuse, with a faint highlight.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Name for messages.
     pub name: String,
-    /// Linear RGB reflectance; multiplies the texture where there is one.
+    /// Linear RGB reflectance; a factor of the texture, if there is one.
     pub base_color: Vec3,
     /// Colour texture.
     pub texture: Option<Arc<Texture>>,
     /// Whether back faces are drawn, too.
     pub double_sided: bool,
-    /// Whether the base colour is shown as it is, whatever the light.
+    /// Whether the base colour is shown without lighting.
     pub unlit: bool,
 }
 
@@ -34,17 +34,17 @@ impl Material {
     }
 }
 
-/// One directional light and an ambient term that depends on which way a surface looks.
+/// One directional light, and an ambient term that depends on the normal of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// Unit vector from the scene towards the lamp; `None` for a lamp over the camera's shoulder, placed when
-    /// the camera is known.
+    /// Unit vector from the scene towards the lamp; `None` for a lamp over the camera's shoulder, placed with
+    /// the camera.
     pub toward: Option<Vec3>,
-    /// Linear RGB radiance that a white surface facing the lamp sends back.
+    /// Linear RGB radiance of a white surface that faces the lamp, by the lamp alone.
     pub color: Vec3,
-    /// Linear RGB radiance of a white surface that looks straight up, from the sky alone.
+    /// Linear RGB radiance of a white surface with its normal upwards, by the sky alone.
     pub sky: Vec3,
-    /// The same for one that looks straight down.
+    /// The same with the normal downwards.
     pub ground: Vec3,
 }
 
@@ -76,7 +76,7 @@ pub struct SurfaceShader {
     sky_over_ground: Vec3,
 }
 
-/// Share of the lamp that the highlight sends back at its brightest.
+/// Largest share of the lamp's light in the highlight.
 const HIGHLIGHT: f32 = 0.12;
 
 /// Base colour by texel: one multiplication for each of three channels.

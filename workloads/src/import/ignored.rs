@@ -1,4 +1,4 @@
-//! Warnings about what a file asks for and is not drawn; one kind each, whatever the format.
+//! Warnings about content that is not drawn, the same for all formats.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub(super) fn normal_map(material: &str) -> Warning {
     )
 }
 
-/// A material that sheds light.
+/// An emissive material.
 pub(super) fn emissive(material: &str) -> Warning {
     about_material(
         Code::EmissiveIgnored,
@@ -24,19 +24,19 @@ pub(super) fn emissive(material: &str) -> Warning {
     )
 }
 
-/// A material that is cut out by its alpha.
+/// A material with an alpha cut-out.
 pub(super) fn cut_out(material: &str) -> Warning {
     let what = "drawn whole, with what should be cut away";
     about_material(Code::AlphaIgnored, "cut-out material", what, material)
 }
 
-/// A material that is blended with what is behind it.
+/// A material with alpha blending.
 pub(super) fn blended(material: &str) -> Warning {
     let what = "drawn opaque: what is behind is hidden";
     about_material(Code::AlphaIgnored, "see-through material", what, material)
 }
 
-/// A texture that cannot be read, in words `why`.
+/// A texture that cannot be read, for the reason `why`.
 pub(super) fn texture(material: &str, why: &str) -> Warning {
     let detail = format!("material `{material}`: {why}");
     Warning::about(Code::MissingImage, "texture", "not read: the material's colour is used alone", detail)
@@ -48,7 +48,7 @@ pub(super) fn metallic(material: &str) -> Warning {
     about_material(Code::MetallicIgnored, "metallic material", what, material)
 }
 
-/// A material with a highlight, a roughness or reflections of its own.
+/// A material with its own highlight, roughness or reflections.
 pub(super) fn reflection(material: &str) -> Warning {
     let what = "with a highlight or reflections of its own: every surface has the same faint highlight";
     about_material(Code::ReflectionIgnored, "material", what, material)
@@ -60,7 +60,7 @@ pub(super) fn displacement(material: &str) -> Warning {
     about_material(Code::DisplacementIgnored, "displacement map", what, material)
 }
 
-/// A file whose faces have colours of their own.
+/// A file with face colours.
 pub(super) fn face_colors(path: &Path) -> Warning {
     let what = "with colours for faces, which are drawn without them";
     Warning::about(Code::FaceColorsIgnored, "file", what, path.display().to_string())

@@ -1,4 +1,4 @@
-//! Importers: one folder or file for each format, all of them giving [`Parts`].
+//! Importers: one folder or file for each format. Each returns [`Parts`].
 
 mod gltf;
 mod ignored;
@@ -20,7 +20,7 @@ use crate::error::LoadError;
 use crate::scene::{Local, Node, Parts, Trs};
 use soup::{Looks, Soup};
 
-/// The endings of scene files, for messages.
+/// Name extensions of scene files, for messages.
 pub(crate) const ENDINGS: &str = ".ron, .gltf, .glb, .obj, .ply, .off or .stl";
 
 /// File formats, by the end of the name.
@@ -124,7 +124,7 @@ fn solid(path: &Path, mut soup: Soup) -> Result<Parts, LoadError> {
     Ok(parts)
 }
 
-/// Endings of formats that others use for scenes and shapes, and their names.
+/// Name extensions and names of scene formats that are not supported.
 const FORMATS: &[(&[&str], &str)] = &[
     (&["3dm"], "a Rhino"),
     (&["3ds"], "a 3DS"),
@@ -149,7 +149,7 @@ const FORMATS: &[(&[&str], &str)] = &[
     (&["x3d", "x3dv"], "an X3D"),
 ];
 
-/// What to say of the file at `path`, if its ending is that of a format that is known and not read.
+/// The message about the file at `path`, if its extension is that of a known, unsupported format.
 pub(crate) fn foreign(path: &Path) -> Option<String> {
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
     let (_, name) = FORMATS.iter().find(|(endings, _)| endings.contains(&ending.as_str()))?;

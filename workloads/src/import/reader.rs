@@ -1,4 +1,4 @@
-//! Opening files that may be gzipped, with a limit on what a small file can unpack to.
+//! Readers: files that may be gzipped, textures, and packed binary data, with limits on sizes.
 
 use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read};
 use std::path::Path;
@@ -10,13 +10,13 @@ use pipeline::{Texture, Wrap};
 
 use crate::error::{LoadError, Source};
 
-/// How gzipped files begin (RFC 1952, 2.3.1).
+/// First bytes of gzipped files (RFC 1952, 2.3.1).
 const GZIP: &[u8] = &[0x1f, 0x8b];
 
-/// How some editors begin text files; it is no part of the text.
+/// Byte order mark at the start of some text files.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Most bytes a gzipped file may hold.
+/// Most bytes of an unpacked file.
 const MOST_UNPACKED: u64 = 2 << 30;
 
 /// The contents of `path` after a byte order mark, unpacked where they begin as gzip does, whatever the name.
@@ -40,7 +40,7 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn BufRead>, LoadError> {
     Ok(contents)
 }
 
-/// Passes on what is unpacked and fails beyond a limit, so that no file is cut without a word.
+/// Reader that fails beyond a limit, so that a large file is not truncated silently.
 struct Limited<R> {
     inner: R,
     left: u64,
@@ -56,7 +56,7 @@ impl<R: Read> Read for Limited<R> {
     }
 }
 
-/// All bytes of a file that another file names: of nothing else, as a device may have no end.
+/// All bytes of a file named by another file. Devices and folders are refused, as they may have no end.
 pub(super) fn named(path: &Path) -> std::io::Result<Vec<u8>> {
     check_named(path)?;
     inputs::read(path)
@@ -90,7 +90,7 @@ pub(super) fn damaged(path: &Path, error: &std::io::Error) -> LoadError {
 /// Largest side of a texture in texels.
 const MOST_TEXELS: u32 = 16_384;
 
-/// Most bytes a decoder may take.
+/// Most memory of an image decoder, in bytes.
 const MOST_BYTES: u64 = 512 << 20;
 
 /// A PNG or JPEG image as a texture, or in words why it is none.

@@ -1,4 +1,4 @@
-//! Triangles as PLY, OBJ, OFF and STL files give them.
+//! Triangles of PLY, OBJ, OFF and STL files.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::scene::{Mesh, Normals};
 /// Vertices and triangles of one file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Soup {
-    /// As precise as the file gives them.
+    /// Positions in the precision of the file.
     pub positions: Vec<DVec3>,
     /// One for each vertex, or none.
     pub normals: Vec<Vec3>,
@@ -28,7 +28,7 @@ pub(super) struct Soup {
     pub warnings: Vec<Warning>,
 }
 
-/// What the triangles of a file look like; without materials they are grey, or as bright as their vertex colours.
+/// Materials of a file's triangles; without materials they are grey, or have their vertex colours.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Looks {
     pub materials: Vec<Paint>,
@@ -36,7 +36,7 @@ pub(super) struct Looks {
     pub of_triangle: Vec<u32>,
 }
 
-/// A material, and where its texture lies on a surface.
+/// A material, and the transform of its texture coordinates.
 #[derive(Clone, Debug)]
 pub(super) struct Paint {
     pub material: Material,
@@ -46,12 +46,12 @@ pub(super) struct Paint {
     pub offset: Vec2,
 }
 
-/// What files without materials are made of. Scans often have holes through which back faces show.
+/// Material of files without materials. It is double-sided, because scans often have holes.
 pub(super) fn grey() -> Material {
     Material { double_sided: true, ..Material::colored("grey", Vec3::splat(0.55)) }
 }
 
-/// What vertex colours multiply where a file has them and no materials.
+/// Material of files with vertex colours and without materials.
 pub(super) fn white() -> Material {
     Material { double_sided: true, ..Material::colored("white", Vec3::ONE) }
 }

@@ -7,98 +7,98 @@ use serde::{Deserialize, Serialize};
 use super::deform::Pose;
 use super::track::{Instant, Track};
 
-/// A point that may move.
+/// A point that may move along a track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
-    /// Where it is when no track says otherwise.
+    /// Position without a track.
     pub rest: DVec3,
-    /// Where it goes.
+    /// Positions over time.
     pub track: Option<Track>,
 }
 
 impl Place {
-    /// A point that stays at `rest`.
+    /// A still point.
     pub fn fixed(rest: DVec3) -> Self {
         Self { rest, track: None }
     }
 
-    /// The point at `at`.
+    /// Position at time `at`.
     pub fn at(&self, at: Instant) -> DVec3 {
         self.track.as_ref().map_or(self.rest, |track| track.vec3(at))
     }
 }
 
-/// Which way a camera looks.
+/// Direction in which a camera looks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Aim {
-    /// At a point, on which a lens is focused unless another depth is given.
+    /// Towards a point. A lens is focused on it unless a focus depth is given.
     At(Place),
     /// Along a direction of any length.
     Along(DVec3),
 }
 
-/// A line of sight.
+/// Position and direction of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookAt {
-    /// Where the camera is.
+    /// Position of the camera.
     pub position: Place,
-    /// Which way it looks.
+    /// Direction of the view.
     pub aim: Aim,
-    /// Which way is up.
+    /// Upward direction.
     pub up: DVec3,
 }
 
-/// What holds a camera.
+/// Placement of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rig {
-    /// It looks from a point at another or along a direction.
+    /// By position and target, or by position and direction.
     LookAt(Box<LookAt>),
-    /// It hangs on a node, looking down the node's -z with +y up (glTF 2.0, 3.10).
+    /// By a node: it looks along the node's -z, with +y up (glTF 2.0, 3.10).
     Node(usize),
-    /// It is placed by itself.
+    /// Automatic.
     Fitted(Side),
 }
 
-/// From which side a camera that is placed by itself sees the scene.
+/// Side from which an automatically placed camera sees the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Side {
-    /// From inside where most of the scene's surface is enclosed by the rest of it, else from outside.
+    /// Inside if most of the scene's surface is enclosed by the rest of it, else outside.
     #[default]
     Auto,
-    /// From inside, at eye height, along the deepest view.
+    /// Inside, at eye height, along the deepest view.
     Inside,
-    /// From above the front and to the right, so that the whole scene is in view over all frames.
+    /// In front, above and to the right, with the whole scene in view over all frames.
     Outside,
 }
 
 impl Rig {
-    /// A camera that stays at `position` and looks at `target`, +y up.
+    /// A still camera at `position` that looks at `target`, with +y up.
     pub fn look_at(position: DVec3, target: DVec3) -> Self {
         let [position, target] = [position, target].map(Place::fixed);
         Self::LookAt(Box::new(LookAt { position, aim: Aim::At(target), up: DVec3::Y }))
     }
 }
 
-/// How much a camera sees.
+/// Extent of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum View {
-    /// What lies within a field of view.
+    /// Perspective.
     Perspective {
-        /// Tangent of half of it, vertically.
+        /// Tangent of half the vertical field of view.
         tan_half_height: f64,
     },
-    /// The same height at any depth.
+    /// Orthographic.
     Orthographic {
-        /// Half of it, in scene units.
+        /// Half the height of the view, in scene units.
         half_height: f64,
     },
 }
 
 impl View {
-    /// What is said by a vertical field of view in degrees, 40 by default, or by the height of what is seen in scene units.
+    /// The view with a vertical field of view in degrees (40 by default), or with a height in scene units.
     ///
     /// # Errors
-    /// In words, when both are given.
+    /// A message if both are given.
     pub fn given(fov_deg: Option<f64>, view_height: Option<f64>) -> Result<Self, String> {
         match (fov_deg, view_height) {
             (Some(_), Some(_)) => Err(
@@ -112,7 +112,7 @@ impl View {
         }
     }
 
-    /// The still pipeline camera that sees so much.
+    /// The still pipeline camera with this view.
     pub(crate) fn camera(self, pose: Affine3A, near: f32) -> Result<Camera, CameraError> {
         match self {
             Self::Perspective { tan_half_height } => Camera::new(pose, tan_half_height as f32, near),
@@ -130,19 +130,19 @@ impl Default for View {
 /// A scene's camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCamera {
-    /// What holds it.
+    /// Placement.
     pub rig: Rig,
-    /// How much it sees; `None` for a field of view of 40 degrees (60 for a camera that is placed inside).
+    /// View; `None` for a field of view of 40 degrees (60 for a camera that is placed inside).
     pub view: Option<View>,
-    /// Depth in scene units below which nothing is seen; `None` for a thousandth of the depth of the target (a quarter of
-    /// the nearest vertex's depth for a fitted camera), or less where something nearer is in view.
+    /// Near depth in scene units. `None` for a thousandth of the depth of the target (a quarter of the
+    /// nearest vertex's depth for a fitted camera), or less if something nearer is in view.
     pub near: Option<f64>,
 }
 
-/// Vertical field of view of cameras that do not say, in degrees.
+/// Default vertical field of view, in degrees.
 pub const DEFAULT_FOV_DEG: f64 = 40.0;
 
-/// Tangent of half of an angle in degrees.
+/// Tangent of half an angle in degrees.
 pub fn tan_half(fov_deg: f64) -> f64 {
     libm::tan(fov_deg.to_radians() / 2.0)
 }
@@ -153,7 +153,7 @@ impl Default for SceneCamera {
     }
 }
 
-/// Where a camera is and how it is turned.
+/// Position and axes of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stand {
     pub eye: DVec3,
@@ -163,8 +163,8 @@ pub(crate) struct Stand {
 }
 
 impl Stand {
-    /// At `eye`, looking along `forward`; `None` where that has no length or is not finite. Where `up` is
-    /// parallel to it another axis serves.
+    /// A camera at `eye` that looks along `forward`; `None` if `forward` has no length or is not finite. If `up`
+    /// is parallel to `forward`, another axis is used as up.
     pub fn new(eye: DVec3, forward: DVec3, up: DVec3) -> Option<Self> {
         let forward = unit(forward)?;
         let right = [up, DVec3::Y, DVec3::NEG_Z, DVec3::X].into_iter().find_map(|up| {
@@ -174,7 +174,7 @@ impl Stand {
         eye.is_finite().then(|| Self { eye, right, up: right.cross(forward), forward })
     }
 
-    /// On a node whose transform to the world is `world`; scale and shear do not count.
+    /// A camera on a node with the world transform `world`; scale and shear are ignored.
     pub fn on_node(world: DAffine3) -> Option<Self> {
         Self::new(world.translation, -world.matrix3.z_axis, world.matrix3.y_axis)
     }
@@ -184,13 +184,13 @@ impl Stand {
         (point - self.eye).dot(self.forward)
     }
 
-    /// A point of the world in camera space: x right, y up, z forward.
+    /// Camera coordinates of a world point: x right, y up, z forward.
     pub fn view(&self, point: DVec3) -> DVec3 {
         let from = point - self.eye;
         DVec3::new(from.dot(self.right), from.dot(self.up), from.dot(self.forward))
     }
 
-    /// World to camera: x right, y up, z forward.
+    /// Transform from the world to the camera: x right, y up, z forward.
     pub fn pose(&self) -> Affine3A {
         let to_axes = DMat3::from_cols(self.right, self.up, self.forward).transpose();
         let place = to_axes * -self.eye;
@@ -204,7 +204,7 @@ fn unit(v: DVec3) -> Option<DVec3> {
 }
 
 impl SceneCamera {
-    /// Where the camera stands in `pose`, relative to its origin; `None` for a camera that still has to be fitted or has no direction.
+    /// Position and axes in `pose`, relative to its origin; `None` for a camera that is not fitted yet or has no direction.
     pub(super) fn stand(&self, pose: &Pose, at: Instant) -> Option<Stand> {
         match &self.rig {
             Rig::LookAt(sight) => {
@@ -220,14 +220,14 @@ impl SceneCamera {
         }
     }
 
-    /// Depth of the target of a camera that has one.
+    /// Depth of the target, if the camera has one.
     pub(super) fn target_depth(&self, stand: &Stand, (pose, at): (&Pose, Instant)) -> Option<f64> {
         let Rig::LookAt(sight) = &self.rig else { return None };
         let Aim::At(target) = &sight.aim else { return None };
         Some(stand.depth(target.at(at) - pose.origin))
     }
 
-    /// Whether a track moves it; a camera on a node moves if the node does.
+    /// Whether a track moves the camera. A camera on a node moves if the node does.
     pub(super) fn has_track(&self) -> bool {
         let Rig::LookAt(sight) = &self.rig else { return false };
         let aimed = matches!(&sight.aim, Aim::At(Place { track: Some(_), .. }));
@@ -235,18 +235,18 @@ impl SceneCamera {
     }
 }
 
-/// Where a camera is while one frame's shutter is open.
+/// A camera during one shutter interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
     pub open: Stand,
     pub close: Stand,
-    /// Depth in scene units below which nothing is seen.
+    /// Near depth in scene units.
     pub near: f64,
-    /// Depth in scene units of what a lens is focused on by itself.
+    /// Default focus depth in scene units.
     pub focus: f64,
 }
 
-/// The pipeline's camera that stands so.
+/// The pipeline's camera.
 pub(super) fn between(
     Standing { open, close, near, .. }: &Standing,
     view: View,

@@ -1,4 +1,4 @@
-//! Cameras as people write them: one RON form for scene files, `--camera` and `quintile visibility`.
+//! Camera descriptions: one RON form for scene files, `--camera` and `quintile visibility`.
 
 use std::path::Path;
 
@@ -13,73 +13,73 @@ use super::track::{Interpolation, Track};
 use crate::bounded;
 use crate::error::{LoadError, Source};
 
-/// A camera in RON. Whatever is left out takes its default; without a position the camera is placed by itself.
+/// A camera in RON. Omitted fields have defaults; without a position the camera is placed automatically.
 ///
 /// Lengths are in scene units, angles in degrees. The world is right-handed with y up.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSpec {
-    /// Where it is; in `quintile visibility`, where it is when the shutter opens.
+    /// Position; in `quintile visibility`, the position at shutter open.
     #[serde(deserialize_with = "bounded::vector", skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// What it looks at.
+    /// Target.
     #[serde(
         alias = "look_at",
         deserialize_with = "bounded::vector",
         skip_serializing_if = "Option::is_none"
     )]
     pub target: Option<[f64; 3]>,
-    /// Which way it looks, of any length, instead of a target.
+    /// Direction of the view, of any length, instead of a target.
     #[serde(deserialize_with = "bounded::vector", skip_serializing_if = "Option::is_none")]
     pub direction: Option<[f64; 3]>,
-    /// Which way is up, +y by default.
+    /// Upward direction, +y by default.
     #[serde(deserialize_with = "bounded::vector", skip_serializing_if = "Option::is_none")]
     pub up: Option<[f64; 3]>,
-    /// Instead of a position: the side from which a camera that is placed by itself sees the scene.
+    /// Side of an automatic placement, instead of a position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted: Option<Side>,
     /// Vertical field of view in degrees, 40 by default (60 for a camera that is placed inside).
     #[serde(deserialize_with = "bounded::field_of_view", skip_serializing_if = "Option::is_none")]
     pub fov_deg: Option<f64>,
-    /// Height of what is seen, at any depth: an orthographic view, instead of a field of view.
+    /// Height of an orthographic view, instead of a field of view.
     #[serde(deserialize_with = "bounded::height", skip_serializing_if = "Option::is_none")]
     pub view_height: Option<f64>,
-    /// Depth below which nothing is seen; a thousandth of the target's by default.
+    /// Near depth; a thousandth of the target's depth by default.
     #[serde(deserialize_with = "bounded::near", skip_serializing_if = "Option::is_none")]
     pub near: Option<f64>,
     /// Radius of the lens; zero, the default, is a pinhole.
     #[serde(deserialize_with = "bounded::radius", skip_serializing_if = "Option::is_none")]
     pub lens_radius: Option<f32>,
-    /// Depth at which the lens is sharp; that of the target by default.
+    /// Focus depth; that of the target by default.
     #[serde(deserialize_with = "bounded::depth", skip_serializing_if = "Option::is_none")]
     pub focus: Option<f32>,
-    /// Where it goes on a straight line: by the end of the last frame, from time zero; in `quintile visibility`, by the
-    /// time the shutter closes.
+    /// End of a straight motion, which lasts from time zero to the end of the last frame; in
+    /// `quintile visibility`, until the shutter closes.
     #[serde(deserialize_with = "bounded::vector", skip_serializing_if = "Option::is_none")]
     pub end_position: Option<[f64; 3]>,
-    /// What it looks at by then.
+    /// Target at the end.
     #[serde(
         alias = "end_look_at",
         deserialize_with = "bounded::vector",
         skip_serializing_if = "Option::is_none"
     )]
     pub end_target: Option<[f64; 3]>,
-    /// Which way is up by then; `quintile visibility` only.
+    /// Upward direction at the end; `quintile visibility` only.
     #[serde(deserialize_with = "bounded::vector", skip_serializing_if = "Option::is_none")]
     pub end_up: Option<[f64; 3]>,
-    /// Instead of an end, where it is when; scenes only.
+    /// Positions and targets over time, instead of an end; scenes only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub keyframes: Vec<CameraKey>,
-    /// How it goes from one key to the next.
+    /// Interpolation between keys.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interpolation: Option<InterpolationSpec>,
-    /// Pixels across. This and the fields below are not for scene files, which have `settings`.
+    /// Image width in pixels. Scene files have `settings` instead of this field and those below.
     #[serde(deserialize_with = "bounded::side", skip_serializing_if = "Option::is_none")]
     pub width: Option<u32>,
-    /// Pixels down.
+    /// Image height in pixels.
     #[serde(deserialize_with = "bounded::side", skip_serializing_if = "Option::is_none")]
     pub height: Option<u32>,
-    /// Samples in a pixel.
+    /// Samples per pixel.
     #[serde(deserialize_with = "bounded::samples", skip_serializing_if = "Option::is_none")]
     pub samples: Option<u32>,
     /// Seed of the samples, 1 by default; `quintile visibility` only.
@@ -88,32 +88,32 @@ pub struct CameraSpec {
     /// Shape of the aperture, a disk by default; `quintile visibility` only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens_shape: Option<LensShape>,
-    /// How far the image is moved to the right and down, in image heights; `quintile visibility` only.
+    /// Shift of the image to the right and down, in image heights; `quintile visibility` only.
     #[serde(deserialize_with = "bounded::vector", skip_serializing_if = "Option::is_none")]
     pub shift: Option<[f64; 2]>,
 }
 
-/// Where a camera is at one time; what is left out is the camera's own.
+/// A camera at one time. Omitted fields are those of the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraKey {
     /// Seconds from the start of the scene.
     pub time_s: f64,
-    /// Where it is then.
+    /// Position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// What it looks at.
+    /// Target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<[f64; 3]>,
 }
 
-/// How a value goes from one key to the next, as files write it.
+/// Interpolation between keys, as written in files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum InterpolationSpec {
-    /// Straight lines and even turns.
+    /// Straight lines, and turns at a constant rate.
     #[default]
     Linear,
-    /// Jumps.
+    /// The value of the earlier key, until the next one.
     Step,
 }
 
@@ -126,10 +126,10 @@ impl From<InterpolationSpec> for Interpolation {
     }
 }
 
-/// What a camera can be given as, for messages.
+/// Accepted forms of a camera, for messages.
 pub(crate) const FORMS: &str = "give `inside` or `outside`, a .ron file, or its fields, for example 'position: (1, 2, 3), target: (0, 0, 0)'";
 
-/// The field that is wrong (`camera` for how several go together), and how, in words.
+/// The wrong field (`camera` for a conflict of several), and a message.
 pub(crate) type Wrong = (&'static str, String);
 
 /// Reading and writing.
@@ -137,7 +137,7 @@ impl CameraSpec {
     /// Reads the camera in the file at `path`.
     ///
     /// # Errors
-    /// When it cannot be read, or as [`Self::parse`].
+    /// If the file cannot be read, or as [`Self::parse`].
     pub fn load(path: &Path) -> Result<Self, LoadError> {
         if path.is_dir() {
             return Err(Source { path }.unreadable(std::io::ErrorKind::IsADirectory.into()));
@@ -151,14 +151,14 @@ impl CameraSpec {
     /// Reads the RON in `text`; `file` names it in messages.
     ///
     /// # Errors
-    /// With line and column where the text is no camera; where its fields do not go together, with their names.
+    /// With line and column if the text is not a camera; with the names of fields that conflict.
     pub fn parse(text: &str, file: &str) -> Result<Self, LoadError> {
         let spec: Self = activity::spec::parse(text, file)?;
         spec.check().map_err(|wrong| Self::wrong(file, wrong))?;
         Ok(spec)
     }
 
-    /// Reads what was typed for a flag: as [`Self::parse`], the parentheses around it may be left out.
+    /// Reads the value of a flag, as [`Self::parse`] but with optional parentheses.
     ///
     /// # Errors
     /// As [`Self::parse`].
@@ -174,11 +174,11 @@ impl CameraSpec {
         })
     }
 
-    /// The camera that the value of a flag describes, and what names it in messages: `inside` or `outside` for one that is
-    /// placed by itself, the name of a `.ron` file, or else fields as in [`Self::typed`].
+    /// The camera in the value of a flag, and its name for messages. The value is `inside` or `outside` for
+    /// automatic placement, the name of a `.ron` file, or fields as in [`Self::typed`].
     ///
     /// # Errors
-    /// When there is no such file, or what is in it or in `text` is no camera.
+    /// [`LoadError`] if the file cannot be read, or the content is not a camera.
     pub fn flag(text: &str) -> Result<(Self, String), LoadError> {
         let flag = "--camera".to_owned();
         let placed = |side| Self { fitted: Some(side), ..Self::default() };
@@ -201,11 +201,11 @@ impl CameraSpec {
     /// The camera as a file, in RON.
     pub fn to_ron(&self) -> String {
         let style = ron::ser::PrettyConfig::new().compact_arrays(true);
-        // Numbers and names always have a RON form.
+        // Writing numbers and names as RON cannot fail.
         Self::ron_options().to_string_pretty(self, style).unwrap_or_default()
     }
 
-    /// The camera on one line, in RON, to be pasted into a command.
+    /// The camera on one line of RON, for a command line.
     pub fn to_ron_line(&self) -> String {
         let style = ron::ser::PrettyConfig::new().compact_arrays(true).compact_structs(true);
         Self::ron_options().to_string_pretty(self, style).unwrap_or_default()
@@ -216,17 +216,17 @@ impl CameraSpec {
     }
 }
 
-/// What goes together.
+/// Checks of fields that depend on each other.
 impl CameraSpec {
-    /// Whether it says where it is, rather than being placed by itself.
+    /// Whether the position is given, so that the camera is not placed automatically.
     pub fn is_placed(&self) -> bool {
         self.position.is_some()
     }
 
-    /// That its fields go together.
+    /// Checks that the fields are consistent.
     ///
     /// # Errors
-    /// The first that does not.
+    /// The first field that is not.
     pub(crate) fn check(&self) -> Result<(), Wrong> {
         let ensure = |holds: bool, place, message: &str| {
             if holds { Ok(()) } else { Err((place, message.to_owned())) }
@@ -262,7 +262,7 @@ impl CameraSpec {
         self.check_sight()
     }
 
-    /// That it looks somewhere, at its start and at its end.
+    /// Checks that the direction of the view is defined at the start and at the end.
     fn check_sight(&self) -> Result<(), Wrong> {
         let Some(position) = self.position else { return Ok(()) };
         let message = "the camera looks nowhere, because it coincides with its target or is too far from it: move one of them";
@@ -278,7 +278,7 @@ impl CameraSpec {
         looks("end_target", self.end_position.unwrap_or(position), self.end_target.or(self.target))
     }
 
-    /// How much it sees, where it says so.
+    /// The view, if given.
     pub(crate) fn view(&self) -> Option<View> {
         let given = self.fov_deg.is_some() || self.view_height.is_some();
         given.then(|| View::given(self.fov_deg, self.view_height).unwrap_or_default())
@@ -295,7 +295,7 @@ impl CameraSpec {
     /// The camera of a scene with these `settings`. Lens, image and samples are not part of it.
     ///
     /// # Errors
-    /// What is wrong: two ways of moving, keys that make no track, or a field that scenes have no use for.
+    /// The wrong field: two kinds of motion, invalid keys, or a field that scenes do not use.
     pub(crate) fn scene_camera(&self, settings: &Settings) -> Result<SceneCamera, Wrong> {
         let unused = [
             ("end_up", self.end_up.is_some()),
@@ -332,7 +332,7 @@ impl CameraSpec {
         Ok(LookAt { position, aim, up: self.up.map_or(DVec3::Y, DVec3::from) })
     }
 
-    /// A point that goes from `rest` to an end by `end_s`, or from key to key.
+    /// A point that moves from `rest` to an end until `end_s`, or from key to key.
     fn path(
         &self,
         place: &'static str,

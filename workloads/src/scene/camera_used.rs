@@ -1,4 +1,4 @@
-//! The camera that sees a scene, in numbers that make the same camera again.
+//! The camera of a scene: its choice, and a description that reproduces it.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -12,27 +12,27 @@ use super::settings::Overrides;
 use super::track::{Interpolation, Track};
 use crate::error::LoadError;
 
-/// Where a camera comes from.
+/// Source of a camera.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(into = "SourceFields")]
 pub enum CameraSource {
-    /// It is the scene's own.
+    /// One of the scene's own.
     Own {
-        /// Its number among them.
+        /// Number among the scene's own cameras.
         index: usize,
-        /// Its name.
+        /// Name.
         name: String,
     },
-    /// It was described by the caller.
+    /// Given by the caller.
     Given,
-    /// It was placed by itself.
+    /// Placed automatically.
     Placed {
-        /// The side from which it sees the scene.
+        /// Side from which the camera sees the scene.
         side: Side,
     },
 }
 
-/// The same with all fields, those of other kinds null.
+/// [`CameraSource`] with the fields of all kinds; those of other kinds are null.
 #[derive(Serialize)]
 struct SourceFields {
     kind: &'static str,
@@ -63,41 +63,41 @@ impl std::fmt::Display for CameraSource {
     }
 }
 
-/// The camera of a scene. Its numbers are those of the moment when the first frame's shutter opens.
+/// The camera of a scene, when the shutter of the first frame opens.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CameraUsed {
-    /// Where it comes from.
+    /// Source.
     #[serde(flatten)]
     pub source: CameraSource,
-    /// Whether it moves.
+    /// Whether the camera moves.
     pub moves: bool,
-    /// Where it is, in scene units.
+    /// Position in scene units.
     pub position: [f64; 3],
-    /// Which way it looks, a unit vector.
+    /// Direction of the view, a unit vector.
     pub direction: [f64; 3],
-    /// Which way is up in the image, a unit vector.
+    /// Upward direction in the image, a unit vector.
     pub up: [f64; 3],
     /// Vertical field of view in degrees; `None` for an orthographic view.
     pub fov_deg: Option<f64>,
     /// Height of an orthographic view in scene units.
     pub view_height: Option<f64>,
-    /// Depth in scene units below which nothing is seen.
+    /// Near depth in scene units.
     pub near: f64,
     /// Radius of the lens in scene units; zero for a pinhole.
     pub lens_radius: f32,
-    /// Depth in scene units at which the lens is sharp; for a pinhole, at which a lens would be.
+    /// Focus depth in scene units; for a pinhole, that of a lens added to it.
     pub focus: f32,
-    /// The camera on one line of RON, to be given back with `--camera`.
+    /// The camera on one line of RON, for `--camera`.
     pub ron: String,
-    /// Whether `ron` makes the same camera in every frame. If not, it is the camera of the first frame, standing still.
+    /// Whether `ron` gives the same camera in every frame. Otherwise `ron` is the still camera of the first frame.
     pub exact: bool,
 }
 
 impl Scene {
-    /// The camera that sees the scene.
+    /// The camera of the scene.
     ///
     /// # Errors
-    /// [`FrameError::Camera`] when it looks nowhere in the first frame.
+    /// [`FrameError::Camera`] if its direction is undefined in the first frame.
     pub fn camera_used(&self) -> Result<CameraUsed, FrameError> {
         let first = self.interval(self.settings.frames.start);
         let Standing { open: stand, near, focus, .. } =
@@ -134,7 +134,7 @@ impl Scene {
         })
     }
 
-    /// Whether the near depth of another frame may yield to something else than that of the first.
+    /// Whether the near depth may differ between frames.
     fn near_may_change(&self) -> bool {
         self.placed.is_none() && self.moving.contains(&true)
     }
@@ -154,8 +154,8 @@ impl Scene {
         }
     }
 
-    /// `described` with which way it looks and how it moves, and whether that is all of it. Directions are given as they came
-    /// in, before they were normalized, so that the camera made from them is the same to the bit.
+    /// Adds direction and motion to `described`, and returns whether the description is complete. Directions are those
+    /// of the input, before normalization, so that the camera made from them has the same bits.
     fn with_sight(&self, first: &Interval, described: CameraSpec) -> (CameraSpec, bool) {
         let along = |direction: DVec3, up: DVec3| CameraSpec {
             direction: Some(direction.to_array()),
@@ -191,7 +191,7 @@ impl Scene {
         if !self.camera.has_track() {
             return (spec, true);
         }
-        // What follows the camera by itself, frame by frame, must go on doing so.
+        // Values that are computed for each frame stay undefined here, so that they are computed again.
         (spec.near, spec.focus) = (self.camera.near, self.settings.focus);
         let tracks =
             [Some(&sight.position), target].map(|place| place.and_then(|place| place.track.as_ref()));
@@ -205,7 +205,7 @@ impl Scene {
     }
 }
 
-/// The keys of the tracks of a position and of a target; `None` where files cannot describe them.
+/// Keys of the tracks of position and target; `None` if files cannot describe them.
 fn keys([position, target]: [Option<&Track>; 2]) -> Option<(Vec<CameraKey>, Option<InterpolationSpec>)> {
     let first = position.or(target)?;
     let alike = |track: &Track| {
@@ -232,7 +232,7 @@ fn keys([position, target]: [Option<&Track>; 2]) -> Option<(Vec<CameraKey>, Opti
     Some((first.times_s().iter().enumerate().map(key).collect(), interpolation))
 }
 
-/// The vertical field of view in degrees whose half has the tangent `tan` in single precision, in as few digits as that takes.
+/// The vertical field of view in degrees with `tan` as the tangent of its half in f32, with as few digits as needed.
 pub(super) fn field_of_view(tan: f64) -> f64 {
     let degrees = 2.0 * libm::atan(tan).to_degrees();
     let same = |degrees: &f64| tan_half(*degrees) as f32 == tan as f32;
@@ -241,19 +241,19 @@ pub(super) fn field_of_view(tan: f64) -> f64 {
     short.into_iter().chain(near).find(same).unwrap_or(degrees)
 }
 
-/// A camera that a scene brings along.
+/// A camera of the scene's file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnCamera {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// The camera.
     pub camera: SceneCamera,
 }
 
-/// Name of the camera of a scene whose cameras have none.
+/// Name of the scene's camera, if the scene lists no cameras.
 const UNNAMED: &str = "scene";
 
-/// The scene's own cameras, and where the one that sees it comes from.
+/// The scene's own cameras, and the source of the one in use.
 pub(super) fn cameras(own: Vec<OwnCamera>, seeing: &SceneCamera) -> (Vec<OwnCamera>, CameraSource) {
     if let Rig::Fitted(side) = seeing.rig {
         return (own, CameraSource::Placed { side });
@@ -268,7 +268,7 @@ pub(super) fn cameras(own: Vec<OwnCamera>, seeing: &SceneCamera) -> (Vec<OwnCame
     (own, CameraSource::Own { index, name })
 }
 
-/// What a camera says about its lens and its image.
+/// Lens and image settings in a camera's description.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CameraSettings {
     size: Option<(u32, u32)>,
@@ -278,10 +278,10 @@ pub(super) struct CameraSettings {
 }
 
 impl CameraSettings {
-    /// `overrides` with what the camera says where they say nothing.
+    /// `overrides`, completed by the settings of the camera.
     pub fn over(&self, overrides: &Overrides) -> Overrides {
         let lens_radius = overrides.lens_radius.or(self.lens_radius);
-        // A camera that says it is a pinhole may say where a lens would be sharp.
+        // The focus depth of a pinhole is ignored.
         let focus = self.focus.filter(|_| lens_radius != Some(0.0));
         Overrides {
             size: overrides.size.or(self.size),
@@ -294,10 +294,10 @@ impl CameraSettings {
 }
 
 impl Scene {
-    /// Takes the camera that `overrides` ask for; gives what it says beside its place.
+    /// Selects the camera in `overrides`; returns the lens and image settings of its description.
     ///
     /// # Errors
-    /// When there is no such camera, or what describes it is wrong.
+    /// [`LoadError`] for an unknown camera or a wrong description.
     pub(super) fn choose_camera(&mut self, overrides: &Overrides) -> Result<CameraSettings, LoadError> {
         let Some(wanted) = &overrides.camera else { return Ok(CameraSettings::default()) };
         if let Some(index) = self.own_camera(wanted) {
@@ -324,7 +324,7 @@ impl Scene {
         Ok(CameraSettings { size, samples: spec.samples, lens_radius: spec.lens_radius, focus: spec.focus })
     }
 
-    /// Another camera sees the scene from now on: the focus depth of the one before means nothing to it.
+    /// Replaces the camera. The focus depth of the previous one is dropped.
     fn take_camera(&mut self, camera: SceneCamera, source: CameraSource) {
         if camera != self.camera {
             self.settings.focus = None;
@@ -332,13 +332,13 @@ impl Scene {
         (self.camera, self.camera_source) = (camera, source);
     }
 
-    /// Index of the scene's own camera called `wanted`, or with that number.
+    /// Index of the scene's own camera with the name or the number `wanted`.
     fn own_camera(&self, wanted: &str) -> Option<usize> {
         let by_name = self.cameras.iter().position(|own| own.name == wanted);
         by_name.or_else(|| wanted.parse().ok().filter(|index| *index < self.cameras.len()))
     }
 
-    /// `error`, with the cameras that there are where it says that `wanted` is none.
+    /// `error`; if `wanted` is unknown, a message with the scene's own cameras.
     fn no_camera(&self, wanted: &str, error: LoadError) -> LoadError {
         let LoadError::Setting { setting, .. } = error else { return error };
         let names: Vec<&str> = self.cameras.iter().map(|own| own.name.as_str()).collect();

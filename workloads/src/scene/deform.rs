@@ -1,4 +1,4 @@
-//! Vertices of an instance at one moment: morphed, then carried by its node or blended between its joints.
+//! Vertices of an instance at one time: morphed, then transformed by its node or by a blend of its joints.
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -7,15 +7,15 @@ use super::graph::{Graph, world_poses};
 use super::mesh::{Influences, Instance, Mesh, Normals, unit};
 use super::track::Instant;
 
-/// Poses of all nodes and what the tracks say about weights, at one moment.
+/// Poses of all nodes and morph weights at one time.
 pub(super) struct Pose {
     at: Instant,
-    /// What the transforms are relative to, in the coordinates of the scene's files.
+    /// Origin of the transforms, in the coordinates of the scene's files.
     pub origin: DVec3,
     worlds: Vec<DAffine3>,
 }
 
-/// What carries the vertices of one instance at one moment.
+/// Transforms of the vertices of one instance at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Carriage {
     /// One matrix for a rigid instance, one for each joint of a skinned one.
@@ -24,7 +24,7 @@ pub(super) struct Carriage {
 }
 
 impl Pose {
-    /// The pose of `graph` at `at`, everything relative to `origin`.
+    /// The pose of `graph` at time `at`, relative to `origin`.
     pub fn new(graph: &Graph, at: Instant, origin: DVec3) -> Self {
         let mut worlds = world_poses(&graph.nodes, at);
         worlds.iter_mut().for_each(|world| world.translation -= origin);
@@ -59,12 +59,12 @@ impl Pose {
 }
 
 impl Carriage {
-    /// Whether a rigid carrier turns the mesh inside out, so that triangles have to be turned back.
+    /// Whether a rigid transform mirrors the mesh, so that the winding of its triangles has to be reversed.
     pub fn mirrors(&self) -> bool {
         matches!(&self.matrices[..], [matrix] if matrix.matrix3.determinant() < 0.0)
     }
 
-    /// The box around the vertices of a mesh that is `bounded` at rest; morph targets are not considered.
+    /// Bounding box of the transformed vertices, from the bounding box `bounded` at rest; morph targets are ignored.
     pub fn place(&self, bounded: &Bounds, into: &mut Bounds) {
         self.matrices.iter().for_each(|matrix| into.add_placed(bounded, matrix));
     }
@@ -96,7 +96,7 @@ impl Carriage {
         Some(unit(turned))
     }
 
-    /// For each carrier the matrix that takes normals to the world.
+    /// For each transform, the matrix of normals.
     pub fn cofactors(&self) -> Vec<DMat3> {
         self.matrices.iter().map(|matrix| cofactor(matrix.matrix3)).collect()
     }
@@ -112,8 +112,8 @@ impl Carriage {
 }
 
 impl Influences {
-    /// Sum over the joints of vertex `index`; importers have checked that every joint is below `joints`, an
-    /// instance whose skin has fewer ignores the rest.
+    /// Sum over the joints of vertex `index`. Importers check that every joint is below `joints`; an instance
+    /// whose skin has fewer ignores the others.
     fn sum(&self, index: usize, joints: usize, of: impl Fn(usize) -> DVec3) -> DVec3 {
         let span = index * self.per_vertex..(index + 1) * self.per_vertex;
         let mut total = DVec3::ZERO;
@@ -127,7 +127,7 @@ impl Influences {
     }
 }
 
-/// The transpose of the inverse up to a positive factor, without dividing: it serves flattened meshes too.
+/// The transpose of the inverse up to a positive factor, without division, so that flat meshes work, too.
 fn cofactor(m: DMat3) -> DMat3 {
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
     DMat3::from_cols(

@@ -1,15 +1,15 @@
-//! Coordinates far from the origin: which are kept relative to the middle of a scene, and which have lost their shape.
+//! Coordinates far from the origin: positions relative to the middle of the scene, and loss of precision.
 
 use glam::{DAffine3, DVec3};
 use warnings::{Code, Warning};
 
-/// Distance from the origin, in sizes of the scene, beyond which positions are kept relative to the scene's middle.
+/// Distance from the origin, in sizes of the scene, beyond which positions are relative to the scene's middle.
 const FAR: f64 = 100.0;
 
-/// Distinct f32 positions along the longest side of a mesh; with fewer its shape suffers visibly.
+/// Least number of f32 values along the longest side of a mesh; with fewer, rounding is visible.
 const MIN_STEPS: f64 = 4096.0;
 
-/// The box around some points.
+/// A bounding box of points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     low: DVec3,
@@ -23,7 +23,7 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    /// The box around `points`.
+    /// The bounding box of `points`.
     pub fn of(points: impl IntoIterator<Item = DVec3>) -> Self {
         let mut bounds = Self::default();
         points.into_iter().for_each(|point| bounds.add(point));
@@ -35,7 +35,7 @@ impl Bounds {
         self.high = self.high.max(point);
     }
 
-    /// Takes in a box that is placed by `matrix`.
+    /// Includes a box that is transformed by `matrix`.
     pub fn add_placed(&mut self, other: &Self, matrix: &DAffine3) {
         for corner in 0..8 {
             let choose =
@@ -44,18 +44,18 @@ impl Bounds {
         }
     }
 
-    /// The longest side, and the largest coordinate; nothing where the box is empty, a point or not finite.
+    /// The longest side, and the largest coordinate; `None` if the box is empty, a point or not finite.
     fn size_and_distance(&self) -> Option<[f64; 2]> {
         let size = (self.high - self.low).max_element();
         let distance = self.low.abs().max(self.high.abs()).max_element();
         (size > 0.0 && distance.is_finite()).then_some([size, distance])
     }
 
-    /// What has to be subtracted from positions before they are rounded to f32, so that the shape survives: zero, unless the
-    /// box is far from the origin for its size.
+    /// Origin to subtract from positions before rounding to f32, so that the shape keeps its precision; zero unless
+    /// the box is far from the origin for its size.
     pub fn origin(&self) -> DVec3 {
         match self.size_and_distance() {
-            // In few bits, so that subtracting it is exact.
+            // Rounded to few bits, so that the subtraction is exact.
             Some([size, distance]) if distance > FAR * size => {
                 (0.5 * self.low + 0.5 * self.high).as_vec3().as_dvec3()
             }
@@ -63,14 +63,14 @@ impl Bounds {
         }
     }
 
-    /// Distinct f32 positions along the longest side, if these are too few for the shape.
+    /// Number of f32 values along the longest side, if it is too small for the shape.
     fn too_few_steps(&self) -> Option<f64> {
         let [size, distance] = self.size_and_distance()?;
         let steps = size / (distance * f64::from(f32::EPSILON));
         (steps < MIN_STEPS).then_some(steps)
     }
 
-    /// The warning that the surface called `name`, whose positions are stored as f32 and fill the box, has lost its shape.
+    /// Warns if the surface `name`, whose positions are f32 and fill the box, is distorted by rounding.
     pub fn rounded(&self, name: &str) -> Option<Warning> {
         let steps = self.too_few_steps()?;
         let what = "stored so far from the origin that 32-bit positions lose the shape: move the geometry to the origin in the \
@@ -81,7 +81,7 @@ impl Bounds {
     }
 }
 
-/// Reports which point positions are relative to.
+/// Reports the origin of positions.
 pub(super) fn recentred(origin: DVec3) -> Warning {
     let message = format!(
         "the scene is more than {FAR} times its size away from its origin, so positions are computed relative to ({}, {}, {}), \
@@ -116,7 +116,7 @@ mod tests {
         let square =
             |x: f64, side: f64| Bounds::of([DVec3::new(x, 0.0, 0.0), DVec3::new(x + side, 1.0, 0.0)]);
         assert!(square(4e6, 1.0).rounded("a").unwrap().to_string().contains("`a`: about 2 different"));
-        // Four kilometres at the same distance are stored to half a metre, which is enough.
+        // Four kilometres at the same distance have a resolution of half a metre, which is enough.
         assert!(square(4e6, 4e3).rounded("b").is_none());
         assert!(square(100.0, 1.0).rounded("c").is_none() && Bounds::default().rounded("d").is_none());
     }

@@ -10,22 +10,22 @@ use glam::DVec3;
 
 use super::camera::Stand;
 
-/// The part of the image's half width and half height that a fitted scene fills.
+/// Share of the image's width and height that a fitted scene fills.
 const FILL: f64 = 0.92;
 
-/// Steps back that are tried for a lens.
+/// Most steps back that are tried for a lens.
 const STEPS: u32 = 64;
 
-/// How much more room than is left a lens may need: well within what [`FILL`] leaves over.
+/// Accepted excess of a lens over the free room, well below the margin of [`FILL`].
 const SLACK: f64 = 1.001;
 
-/// How many times as far as for a pinhole a camera may stand to hold a lens: farther away a scene is a dot.
+/// Largest distance with a lens, relative to that of a pinhole; farther away the scene is too small to see.
 const FARTHEST: f64 = 32.0;
 
-/// From the scene towards the camera: the front (glTF's +z), a little to the right and above.
+/// Direction from the scene to the camera: the front (glTF's +z), a little to the right and above.
 const TOWARD_EYE: DVec3 = DVec3::new(0.55, 0.42, 1.0);
 
-/// What a fit needs to know of all the points.
+/// Extremes of all points, from which a camera is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
     axes: Stand,
@@ -36,17 +36,17 @@ pub(crate) struct Extent {
     high: DVec3,
 }
 
-/// Where the camera goes.
+/// Position of a fitted camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fit {
     pub stand: Stand,
-    /// Which way it looks, as it was before it was normalized; up is +y.
+    /// Direction of the view before normalization; up is +y.
     pub direction: DVec3,
-    /// A depth before the nearest point.
+    /// A depth nearer than the nearest point.
     pub near: f64,
     /// Depth of the middle of the scene.
     pub focus: f64,
-    /// Whether points stay in view from all over the lens, too.
+    /// Whether all points are in view from the whole lens.
     pub holds_lens: bool,
 }
 
@@ -74,9 +74,9 @@ impl Extent {
         self.high = self.high.max(p);
     }
 
-    /// The nearest camera that sees all points; `lens` is its radius and, where given, its focus depth.
-    /// `None` without points. Where the lens is so large that not all of them stay in view from all over it, or
-    /// only as a dot, the camera stands where a pinhole's would.
+    /// The nearest camera that sees all points; `lens` is its radius and, if given, its focus depth.
+    /// `None` without points. If the lens is so large that not all points are in view from the whole lens, or
+    /// the scene would be too small, the camera has the position of a pinhole.
     pub fn fit(&self, lens: Option<(f64, Option<f64>)>) -> Option<Fit> {
         if !(self.low.is_finite() && self.high.is_finite()) {
             return None;
@@ -92,7 +92,7 @@ impl Extent {
             }
             room = needed;
             fit = self.place(room);
-            // A step back spreads what lies beyond a fixed focus depth further, and never catches up where
+            // A step back blurs points beyond a fixed focus depth further. It cannot succeed if
             // the lens is wider than the view at that depth.
             if fit.focus > FARTHEST * pinhole.focus {
                 break;
@@ -108,7 +108,7 @@ impl Extent {
         p.x.abs() <= across && p.y.abs() <= up
     }
 
-    /// How far the lens moves any point across the view, in scene units.
+    /// Largest displacement of any point across the view by the lens, in scene units.
     fn blur(&self, fit: &Fit, radius: f64, focus: Option<f64>) -> f64 {
         let focus = focus.unwrap_or(fit.focus);
         let eye = fit.stand.eye.dot(self.axes.forward);
@@ -116,7 +116,7 @@ impl Extent {
         at(self.low.z - eye).max(at(self.high.z - eye))
     }
 
-    /// The nearest eye that leaves `room` scene units beside every point.
+    /// The nearest position that leaves `room` scene units beside every point.
     fn place(&self, room: f64) -> Fit {
         let [right, left, top, bottom] = self.sides.map(|side| side + room);
         let [tx, ty] = self.slopes;

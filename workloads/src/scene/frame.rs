@@ -10,10 +10,10 @@ use super::Scene;
 use super::deform::{Carriage, Pose};
 use super::mesh::{Instance, Mesh, Normals, smooth_normals};
 
-/// A scene between the opening and the closing of one frame's shutter: everything that changes from frame to frame.
+/// A scene during one shutter interval: everything that changes from frame to frame.
 ///
-/// It does not know its number or its time, so two frames of a scene with the same content draw the same picture with the same
-/// work; their [`Fingerprint`](crate::Fingerprint)s show it.
+/// It contains neither its number nor its time. Two frames with the same content give the same image and the same
+/// work, and their [`Fingerprint`](crate::Fingerprint)s are equal.
 #[derive(Clone, Debug, Serialize)]
 pub struct Frame {
     /// The camera, its motion and its lens.
@@ -25,7 +25,7 @@ pub struct Frame {
 /// A mesh in world space at both ends of the shutter.
 ///
 /// A mesh that does not move during the shutter shares one storage for both ends, and one that never moves
-/// shares it between frames. A vertex that stays put in a moving mesh has the same bits at both ends.
+/// shares it between frames. A still vertex of a moving mesh has the same bits at both ends.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameMesh {
     /// Name for messages.
@@ -46,10 +46,10 @@ pub struct FrameMesh {
     pub material: usize,
 }
 
-/// Why a frame cannot be made.
+/// Reason why a frame cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FrameError {
-    /// A vertex leaves the range of numbers.
+    /// A vertex position overflows.
     #[error(
         "frame {frame}: mesh `{mesh}`: the position of vertex {vertex} is not finite, because a transform or an animation overflows: fix its scale or its keys"
     )]
@@ -66,25 +66,25 @@ pub enum FrameError {
     Camera {
         /// The frame.
         frame: u32,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
-    /// The pipeline does not take a mesh.
+    /// The pipeline rejects a mesh.
     #[error("mesh `{mesh}`: {message}")]
     Draw {
         /// The mesh.
         mesh: String,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
 }
 
 impl Frame {
-    /// The frame as the pipeline takes it, one draw for each mesh that has triangles. `scene` has to be the
-    /// one that made this frame.
+    /// Draws of the frame, one for each mesh that has triangles. `scene` has to be the
+    /// scene that made this frame.
     ///
     /// # Errors
-    /// [`FrameError::Draw`] when the pipeline does not take a mesh.
+    /// [`FrameError::Draw`] if the pipeline rejects a mesh.
     pub fn draws<'a>(&'a self, scene: &'a Scene) -> Result<Vec<Draw<'a>>, FrameError> {
         self.meshes.iter().filter(|mesh| !mesh.triangles.is_empty()).map(|mesh| mesh.draw(scene)).collect()
     }
@@ -101,7 +101,7 @@ impl Frame {
 }
 
 impl FrameMesh {
-    /// Whether nothing of the mesh moves while the shutter is open.
+    /// Whether the mesh is still while the shutter is open.
     pub fn is_still(&self) -> bool {
         Arc::ptr_eq(&self.open, &self.close)
     }
@@ -201,7 +201,7 @@ fn moving(mesh: &Mesh, open: &Carriage, close: &Carriage) -> Path {
     (from, to)
 }
 
-/// A vertex on the axis of a spin stays put but for the rounding of f64; rounding must not look like motion.
+/// Whether a displacement is only f64 rounding, as of a vertex on the axis of a spin. It must not count as motion.
 fn is_noise(from: DVec3, to: DVec3) -> bool {
     (to - from).abs().max_element() <= 1e-13 * from.abs().max_element().max(to.abs().max_element())
 }
@@ -226,27 +226,27 @@ fn normals(
     }
 }
 
-/// Instants at which a moving triangle is looked at.
+/// Number of times at which a moving triangle is tested.
 const INSTANTS: u32 = 9;
 
-/// The space in view of a camera between its own plane and a depth.
+/// The space in view between the plane of the camera and a depth.
 #[derive(Clone, Debug)]
 pub struct NearSpace {
     open: DAffine3,
     close: DAffine3,
     orthographic: bool,
-    /// Where it ends, in scene units.
+    /// Largest depth, in scene units.
     depth: f64,
     /// A point `p` of camera space is inside a plane where `plane . (p, 1) >= 0`.
     planes: [DVec4; 6],
 }
 
 impl NearSpace {
-    /// What `camera` sees below `depth`, from all over its lens, in an image `aspect` times as wide as high.
+    /// The space in view of `camera` nearer than `depth`, from the whole lens, for an image `aspect` times as wide as high.
     pub fn new(camera: &Camera, aspect: f64, depth: f64) -> Self {
         let half = f64::from(camera.half_height());
         let shift = 2.0 * half * camera.shift().as_dvec2();
-        // A lens widens the view by `radius |z / focus - 1|`; a chord of that holds it.
+        // A lens widens the view by `radius |z / focus - 1|`, which a chord bounds.
         let [blur, growth] = camera.lens().map_or([0.0; 2], |lens| {
             let [radius, focus] = [lens.radius(), lens.focus()].map(f64::from);
             [radius, radius * ((depth / focus - 1.0).abs() - 1.0) / depth]
@@ -255,7 +255,7 @@ impl NearSpace {
             let [by_depth, constant] = if camera.is_orthographic() { [0.0, half] } else { [half, 0.0] };
             (toward + (by_depth + growth) * DVec3::Z).extend(constant + blur)
         };
-        // The image moves by the shift, and what is seen against it.
+        // A shift of the image moves the view the other way.
         let [x, y] = [shift.x, -shift.y];
         let planes = [
             DVec3::Z.extend(0.0),

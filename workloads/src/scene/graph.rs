@@ -1,4 +1,4 @@
-//! Everything in a scene that has a shape: nodes, meshes, skins, materials and what hangs where.
+//! The scene graph: nodes and their motion, meshes, skins, materials, instances and animation clips.
 
 use glam::{DAffine3, DQuat, DVec3};
 
@@ -7,14 +7,14 @@ use super::track::{Instant, Track, rotation};
 use crate::error::LoadError;
 use crate::material::Material;
 
-/// Nodes in order (parents first), and what they carry.
+/// Nodes, parents first, and their meshes, skins and materials.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     /// Nodes; a parent comes before its children.
     pub nodes: Vec<Node>,
     /// Meshes.
     pub meshes: Vec<Mesh>,
-    /// Which mesh hangs on which node.
+    /// Instances: meshes on nodes.
     pub instances: Vec<Instance>,
     /// Skins.
     pub skins: Vec<Skin>,
@@ -23,25 +23,25 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Adds a node and gives its index.
+    /// Adds a node and returns its index.
     pub fn push_node(&mut self, node: Node) -> usize {
         self.nodes.push(node);
         self.nodes.len() - 1
     }
 
-    /// Adds a material and gives its index.
+    /// Adds a material and returns its index.
     pub fn push_material(&mut self, material: Material) -> usize {
         self.materials.push(material);
         self.materials.len() - 1
     }
 
-    /// Hangs a mesh on a node.
+    /// Adds a mesh as an instance on a node.
     pub fn hang(&mut self, mesh: Mesh, node: usize) {
         self.meshes.push(mesh);
         self.instances.push(Instance { node, mesh: self.meshes.len() - 1, skin: None });
     }
 
-    /// Takes in all of `other` as children of `parent`.
+    /// Adds all of `other` as children of `parent`.
     pub fn adopt(&mut self, other: Self, parent: usize) {
         let (nodes, meshes) = (self.nodes.len(), self.meshes.len());
         let (skins, materials) = (self.skins.len(), self.materials.len());
@@ -65,10 +65,10 @@ impl Graph {
         self.materials.extend(other.materials);
     }
 
-    /// Checks every index, so that nothing later has to.
+    /// Checks every index, once for all later uses.
     ///
     /// # Errors
-    /// In words, the first one that is out of range, or lists of joints and weights that do not fit.
+    /// A message about the first index out of range, or about lists of joints and weights of wrong length.
     pub fn check(&self) -> Result<(), String> {
         let nodes = self.nodes.len();
         for (index, node) in self.nodes.iter().enumerate() {
@@ -105,7 +105,7 @@ impl Graph {
         self.instances.iter().map(|instance| self.meshes[instance.mesh].positions.len()).sum()
     }
 
-    /// For each instance whether its vertices depend on time.
+    /// For each instance, whether its vertices depend on time.
     pub fn moving_instances(&self) -> Vec<bool> {
         let moving = movers(&self.nodes);
         let moves = |node: &usize| moving.get(*node).copied().unwrap_or(false);
@@ -119,7 +119,7 @@ impl Graph {
         self.instances.iter().map(of).collect()
     }
 
-    /// Time of the last key of any track, in seconds; zero where there is none.
+    /// Time of the last key of any track, in seconds; zero without keys.
     pub fn last_key_s(&self) -> f64 {
         let tracks = self.nodes.iter().flat_map(|node| {
             let channels = &node.channels;
@@ -152,7 +152,7 @@ impl Default for Trs {
     }
 }
 
-/// A node's transform to its parent where nothing animates it.
+/// Transform of a node to its parent, without animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Local {
     /// Any affine map; such a node takes no channels.
@@ -174,16 +174,16 @@ pub struct Channels {
     pub weights: Option<Track>,
 }
 
-/// Endless motion on top of the channels.
+/// Constant motion, in addition to the channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     /// Scene units per second, in the parent's axes.
     pub velocity: DVec3,
-    /// Turning about an axis of the node itself.
+    /// Rotation about an axis of the node itself.
     pub spin: Option<Spin>,
 }
 
-/// Steady turning.
+/// Constant rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spin {
     axis: DVec3,
@@ -200,25 +200,25 @@ impl Spin {
     }
 }
 
-/// A node: a place in its parent that may move, and weights for a mesh that hangs there.
+/// A node: a transform to its parent that may depend on time, and morph weights for the meshes on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Name for messages.
     pub name: String,
     /// Index of the parent, always smaller than the node's own.
     pub parent: Option<usize>,
-    /// The transform where nothing animates it.
+    /// Transform without animation.
     pub local: Local,
-    /// Tracks that replace parts of it.
+    /// Tracks that replace parts of the transform.
     pub channels: Channels,
-    /// Endless motion on top.
+    /// Constant motion, in addition.
     pub motion: Motion,
     /// Weights of the morph targets where no track gives them; empty for the mesh's own.
     pub weights: Vec<f64>,
 }
 
 impl Node {
-    /// A node that rests at `local` in `parent`.
+    /// A still node with the transform `local` in `parent`.
     pub fn new(name: impl Into<String>, parent: Option<usize>, local: Local) -> Self {
         Self {
             name: name.into(),
@@ -284,7 +284,7 @@ pub fn world_poses(nodes: &[Node], at: Instant) -> Vec<DAffine3> {
     worlds
 }
 
-/// For every node whether it moves in the world, by itself or with an ancestor.
+/// For every node, whether it moves in the world, by itself or with an ancestor.
 pub fn movers(nodes: &[Node]) -> Vec<bool> {
     let mut moving: Vec<bool> = Vec::with_capacity(nodes.len());
     for node in nodes {
@@ -294,7 +294,7 @@ pub fn movers(nodes: &[Node]) -> Vec<bool> {
     moving
 }
 
-/// What a track of a clip drives.
+/// Property that a track drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Property {
     /// Translation of a node.
@@ -307,12 +307,12 @@ pub enum Property {
     Weights,
 }
 
-/// Tracks that play together, over and over.
+/// An animation clip: tracks that play together in a loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
-    /// Name; `clip 0` and so on where the file gives none.
+    /// Name; `clip 0` and so on if the file has none.
     pub name: String,
-    /// Time of the last key of any track in seconds; the clip starts over there.
+    /// Time in seconds of the last key of any track, where the clip repeats.
     pub duration_s: f64,
     /// Node, property and track.
     pub tracks: Vec<(usize, Property, Track)>,

@@ -1,4 +1,4 @@
-//! What is in a scene, for people who want to know before they render it.
+//! Summary of a scene's content, for display before rendering.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::frame::FrameError;
 use super::graph::movers;
 use super::settings::Settings;
 
-/// A scene in numbers. Lengths are in scene units; bounds are those of the first frame asked for, while its shutter is open.
+/// Summary of a scene. Lengths are in scene units; bounds are those of the first requested frame, while its shutter is open.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneInfo {
     /// Name of the scene, or the file it came from.
@@ -23,7 +23,7 @@ pub struct SceneInfo {
     pub triangles: usize,
     /// Vertices in every frame.
     pub vertices: usize,
-    /// Meshes as they hang in the scene: a mesh that hangs twice counts twice.
+    /// Instances of meshes; a mesh on two nodes counts twice.
     pub meshes: Vec<MeshInfo>,
     /// Materials.
     pub materials: Vec<MaterialInfo>,
@@ -35,7 +35,7 @@ pub struct SceneInfo {
     pub extent: [f64; 3],
     /// Whether any vertex moves.
     pub animated: bool,
-    /// Animation clips, of which one at a time plays.
+    /// Animation clips; one plays at a time.
     pub clips: Vec<ClipInfo>,
     /// Joints of each skin.
     pub skins: Vec<usize>,
@@ -45,11 +45,11 @@ pub struct SceneInfo {
     pub light: LightInfo,
     /// Size of the image, sampling, time and lens.
     pub settings: SettingsInfo,
-    /// The camera that sees the scene.
+    /// The camera of the scene.
     pub camera: CameraUsed,
-    /// A lens to begin with.
+    /// A suggested lens.
     pub suggested: Option<LensInfo>,
-    /// What is ignored, replaced or repaired.
+    /// Warnings about ignored, replaced or repaired content.
     pub warnings: Vec<Warning>,
 }
 
@@ -94,9 +94,9 @@ pub struct TextureInfo {
 /// An animation clip.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClipInfo {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Seconds until it starts over.
+    /// Duration of the loop in seconds.
     pub duration_s: f64,
     /// Tracks, each of one property of one node.
     pub tracks: usize,
@@ -104,29 +104,29 @@ pub struct ClipInfo {
     pub keys: usize,
 }
 
-/// A camera that the scene brings along.
+/// A camera of the scene's file.
 #[derive(Clone, Debug, Serialize)]
 pub struct CameraInfo {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Vertical field of view in degrees; `None` for an orthographic camera.
     pub fov_deg: Option<f64>,
     /// Height of an orthographic view.
     pub view_height: Option<f64>,
-    /// Whether it moves.
+    /// Whether the camera moves.
     pub moves: bool,
 }
 
 /// The lamp.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct LightInfo {
-    /// Unit vector from the scene to the lamp; `None` for one over the camera's shoulder.
+    /// Unit vector from the scene to the lamp; `None` for a lamp over the camera's shoulder.
     pub toward: Option<[f32; 3]>,
-    /// Linear RGB radiance that a white surface facing the lamp sends back.
+    /// Linear RGB radiance of a white surface that faces the lamp, by the lamp alone.
     pub color: [f32; 3],
 }
 
-/// How the scene is rendered.
+/// Render settings.
 #[derive(Clone, Debug, Serialize)]
 #[allow(missing_docs, reason = "the names say it, documented at `Settings`")]
 pub struct SettingsInfo {
@@ -140,7 +140,7 @@ pub struct SettingsInfo {
 }
 
 impl SettingsInfo {
-    /// `settings`, but for the lens, which is the camera's.
+    /// `settings`, without the lens, which belongs to the camera.
     pub fn new(settings: &Settings) -> Self {
         Self {
             width: settings.width,
@@ -154,26 +154,26 @@ impl SettingsInfo {
     }
 }
 
-/// A lens that blurs what is nearest or farthest over a fiftieth of the image's height.
+/// A lens that blurs the nearest or the farthest corner over a fiftieth of the image's height.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LensInfo {
     /// Radius of the lens in scene units.
     pub lens_radius: f32,
-    /// Depth in scene units at which it is sharp.
+    /// Focus depth in scene units.
     pub focus: f32,
 }
 
-/// Radius of the widest lens that is suggested, in depths of what is sharp.
+/// Radius of the widest suggested lens, in focus depths.
 const WIDEST: f64 = 0.05;
 
-/// How far a suggested lens blurs, in heights of the image.
+/// Blur of a suggested lens, in heights of the image.
 const BLUR: f64 = 0.02;
 
 impl Scene {
-    /// What is in the scene, and what sees it.
+    /// Summary of the scene and its camera.
     ///
     /// # Errors
-    /// When the first frame cannot be made.
+    /// If the first frame cannot be made.
     pub fn info(&self) -> Result<SceneInfo, FrameError> {
         let [low, high] = self.bounds(self.settings.frames.start)?;
         let camera = self.camera_used()?;
@@ -218,7 +218,7 @@ impl Scene {
         self.graph.instances.iter().zip(&self.moving).map(of).collect()
     }
 
-    /// The materials that meshes wear, and the different textures on them. Materials keep their numbers.
+    /// The materials of meshes, and their distinct textures. Materials keep their numbers.
     fn surfaces(&self) -> (Vec<MaterialInfo>, Vec<TextureInfo>) {
         let worn: BTreeSet<usize> =
             self.graph.instances.iter().map(|instance| self.graph.meshes[instance.mesh].material).collect();
@@ -274,7 +274,7 @@ impl Scene {
         self.cameras.iter().map(of).collect()
     }
 
-    /// A lens for `camera`: what it blurs most lies at the nearest or the farthest corner of the bounds that it sees.
+    /// A lens for `camera`. Its blur is largest at the nearest or the farthest visible corner of the bounds.
     fn suggested(&self, camera: &CameraUsed, [low, high]: [DVec3; 2]) -> Option<LensInfo> {
         let (eye, along) = (DVec3::from(camera.position), DVec3::from(camera.direction));
         let corner = |index: usize| {
@@ -284,12 +284,12 @@ impl Scene {
         };
         let depths = (0..8).map(|index| (corner(index) - eye).dot(along).max(camera.near));
         let focus = f64::from(camera.focus);
-        // The diameter of the blur in heights of the image, for a lens of radius 1.
+        // Diameter of the blur in heights of the image, for a lens of radius 1.
         let blur = |depth: f64| match self.sees() {
             View::Perspective { tan_half_height } => (1.0 / focus - 1.0 / depth).abs() / tan_half_height,
             View::Orthographic { half_height } => (depth / focus - 1.0).abs() / half_height,
         };
-        // What is much nearer than the focus is out of focus whatever the lens.
+        // Points much nearer than the focus are blurred by any lens.
         let most = depths.map(|depth| blur(depth.max(0.2 * focus))).fold(0.0, f64::max);
         let radius = (BLUR / most).min(WIDEST * focus);
         let power = libm::pow(10.0, libm::floor(libm::log10(radius)) - 1.0);

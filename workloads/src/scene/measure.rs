@@ -33,7 +33,7 @@ fn camera_inside(room: &Inside) -> Warning {
 pub(super) struct Placed {
     pub fit: Fit,
     pub view: View,
-    /// The side from which it sees the scene.
+    /// Side from which the camera sees the scene.
     pub side: Side,
 }
 

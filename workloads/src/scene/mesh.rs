@@ -4,19 +4,19 @@ use std::sync::Arc;
 
 use glam::{DAffine3, Vec2, Vec3};
 
-/// Where the normals of a mesh come from.
+/// Source of a mesh's normals.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Normals {
-    /// None are stored: every face is flat.
+    /// None: faces are flat.
     #[default]
     Flat,
-    /// Made from the faces around each vertex, weighted by area, wherever the vertices are at mid-shutter.
+    /// The mean of the faces around each vertex, weighted by area, at mid-shutter.
     Smooth,
     /// One for each vertex, as stored.
     Given(Vec<Vec3>),
 }
 
-/// One morph target: what is added to each vertex at weight one. Either list may be empty for nothing.
+/// One morph target: displacements of the vertices at weight one. Either list may be empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Target {
     /// Displacements in the mesh's units.
@@ -25,10 +25,10 @@ pub struct Target {
     pub normals: Vec<Vec3>,
 }
 
-/// Which joints of a skin carry each vertex.
+/// Joints of a skin that move each vertex, and their weights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Influences {
-    /// Joints for each vertex.
+    /// Number of joints per vertex.
     pub per_vertex: usize,
     /// Indices into the skin's joints, `per_vertex` for each vertex.
     pub joints: Vec<u16>,
@@ -36,18 +36,18 @@ pub struct Influences {
     pub weights: Vec<f32>,
 }
 
-/// Triangles of one material in their own space.
+/// Triangles of one material, in local coordinates.
 #[derive(Clone, Debug)]
 pub struct Mesh {
     /// Name for messages.
     pub name: String,
     /// Positions in the mesh's units.
     pub positions: Vec<Vec3>,
-    /// Where normals come from.
+    /// Source of the normals.
     pub normals: Normals,
     /// Texture coordinates, one for each vertex or none.
     pub uvs: Arc<[Vec2]>,
-    /// Linear RGB by which the material's colour is multiplied, one for each vertex or none.
+    /// Linear RGB factors of the material's colour, one for each vertex or none.
     pub colors: Arc<[Vec3]>,
     /// Vertex indices of each triangle, all in range.
     pub triangles: Arc<[[u32; 3]]>,
@@ -55,22 +55,22 @@ pub struct Mesh {
     pub material: usize,
     /// Morph targets.
     pub targets: Vec<Target>,
-    /// Weights of the targets where neither node nor track gives them.
+    /// Default weights of the targets, without weights of a node or track.
     pub weights: Vec<f64>,
-    /// Joints that carry each vertex, for skinned meshes.
+    /// Joints and weights of each vertex, for skinned meshes.
     pub influences: Option<Influences>,
 }
 
-/// Joints and the poses in which the mesh was bound to them.
+/// Joints of a skin and their bind poses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Skin {
     /// Node of each joint.
     pub joints: Vec<usize>,
-    /// Mesh to joint when bound, one for each joint.
+    /// Inverse bind matrices, from the mesh to each joint.
     pub inverse_bind: Vec<DAffine3>,
 }
 
-/// A mesh hung on a node.
+/// An instance of a mesh on a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instance {
     /// Index of the node.
@@ -85,7 +85,7 @@ impl Mesh {
     /// A rigid mesh of `triangles` over `positions`, flat, without texture coordinates.
     ///
     /// # Errors
-    /// In words, the first index out of range or position that is not finite.
+    /// A message about the first index out of range or position that is not finite.
     pub fn new(
         name: impl Into<String>,
         positions: Vec<Vec3>,

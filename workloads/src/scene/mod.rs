@@ -1,4 +1,4 @@
-//! A scene: what there is, how it moves, and what of it one frame's shutter sees.
+//! A scene: its content and motion, and its frames.
 
 pub(crate) mod camera;
 mod camera_spec;
@@ -45,15 +45,15 @@ use frame::Interval;
 use inside::Inside;
 use measure::Placed;
 
-/// A scene that can be asked for its frames.
+/// A scene that can be rendered frame by frame.
 #[derive(Clone, Debug)]
 pub struct Scene {
     name: String,
     graph: Graph,
     clips: Vec<Clip>,
-    /// The clip that plays, where there are any.
+    /// The playing clip, if there are any.
     playing: Option<usize>,
-    /// Cameras that the scene brings along.
+    /// Cameras of the scene's file.
     cameras: Vec<OwnCamera>,
     camera: SceneCamera,
     camera_source: CameraSource,
@@ -65,16 +65,16 @@ pub struct Scene {
     /// frames are rendered with it.
     own_frames: Range<u32>,
     warnings: Vec<Warning>,
-    /// Of each material the shader without vertex colours and the one with them.
+    /// Shaders of each material, without and with vertex colours.
     shaders: Vec<[SurfaceShader; 2]>,
     moving: Vec<bool>,
-    /// Meshes that never move, made when first asked for.
+    /// Meshes that never move, made on first use.
     still: Vec<OnceLock<FrameMesh>>,
-    /// What positions of frames are relative to.
+    /// Origin of the positions in frames.
     origin: DVec3,
-    /// Where a camera that is placed by itself has been put, relative to `origin`.
+    /// Camera of an automatic placement, relative to `origin`.
     placed: Option<Placed>,
-    /// The place inside, once it is known whether there is one.
+    /// Position inside the scene, computed on first use.
     room: Option<Option<Inside>>,
     /// Middle of the scene's bounds in the first of its own frames, relative to `origin`.
     centre: DVec3,
@@ -86,7 +86,7 @@ const MOST: usize = 100_000_000;
 /// The automatic near depth, in depths of the camera's target.
 const NEAR: f64 = 1e-3;
 
-/// How far the automatic near depth yields to what is in view, in its own size.
+/// Least near depth for objects in view, relative to the automatic near depth.
 const LEAST_NEAR: f64 = 1e-3;
 
 impl Scene {
@@ -202,10 +202,10 @@ impl Scene {
         Ok(self)
     }
 
-    /// The scene while the shutter of frame `index` is open, whether or not the settings ask for that frame.
+    /// The scene while the shutter of frame `index` is open. The frame need not be in the range of the settings.
     ///
     /// # Errors
-    /// [`FrameError`] when something leaves the range of numbers.
+    /// [`FrameError`] if a position overflows.
     pub fn frame(&self, index: u32) -> Result<Frame, FrameError> {
         let interval = self.interval(index);
         let meshes = self.frame_meshes(&interval)?;
@@ -241,7 +241,7 @@ impl Scene {
         Interval { frame, open, middle, close }
     }
 
-    /// Where the camera stands, and the depths that follow from where it looks.
+    /// Position of the camera, and the near and focus depths that depend on its target.
     fn standing(&self, interval: &Interval) -> Result<Standing, FrameError> {
         if let Some(Placed { fit, .. }) = &self.placed {
             let near = self.camera.near.unwrap_or(fit.near);
@@ -266,7 +266,7 @@ impl Scene {
         Ok(Standing { open, close, near: self.camera.near.unwrap_or(near), focus })
     }
 
-    /// Where the camera stands in a frame of `meshes`: a near depth that nobody gave yields to what is in view.
+    /// The camera in a frame of `meshes`. An automatic near depth is reduced for objects in view.
     fn standing_before(&self, interval: &Interval, meshes: &[FrameMesh]) -> Result<Standing, FrameError> {
         let standing = self.standing(interval)?;
         if self.camera.near.is_some() {
@@ -282,7 +282,7 @@ impl Scene {
         Ok(Standing { near: near.max(LEAST_NEAR * standing.near), ..standing })
     }
 
-    /// How much the camera sees.
+    /// View of the camera.
     fn sees(&self) -> View {
         self.placed.as_ref().map_or_else(|| self.camera.view.unwrap_or_default(), |placed| placed.view)
     }
@@ -305,7 +305,7 @@ impl Scene {
     }
 }
 
-/// What there is to know about a scene.
+/// Properties of a scene.
 impl Scene {
     /// Name of the scene, or the file it came from.
     pub fn name(&self) -> &str {
@@ -317,7 +317,7 @@ impl Scene {
         &self.settings
     }
 
-    /// Remarks of the importer, with stable codes.
+    /// Warnings of the importer, with stable codes.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
@@ -328,7 +328,7 @@ impl Scene {
         self.origin
     }
 
-    /// Linear RGB radiance where nothing is hit.
+    /// Linear RGB radiance of the background.
     pub fn background(&self) -> Vec3 {
         self.background
     }
@@ -373,17 +373,17 @@ pub struct Parts {
     pub graph: Graph,
     /// Animation clips of which one at a time is played.
     pub clips: Vec<Clip>,
-    /// The camera that sees the scene unless another is chosen.
+    /// Default camera.
     pub camera: SceneCamera,
-    /// Cameras that can be chosen by name or number; where there are none, `camera` can be, unless it is placed by itself.
+    /// Cameras to choose from by name or number. If empty, `camera` is one, unless it is placed automatically.
     pub cameras: Vec<OwnCamera>,
     /// The light.
     pub light: Light,
-    /// Linear RGB radiance where nothing is hit.
+    /// Linear RGB radiance of the background.
     pub background: Vec3,
     /// Size of the image, sampling, time and lens.
     pub settings: Settings,
-    /// What the importer has to say.
+    /// Warnings of the importer.
     pub warnings: Vec<Warning>,
 }
 
@@ -391,7 +391,7 @@ pub struct Parts {
 pub const DEFAULT_BACKGROUND: Vec3 = Vec3::new(0.42, 0.50, 0.60);
 
 impl Parts {
-    /// Parts with nothing but a name: no shapes, a fitted camera, default light, background and settings.
+    /// Parts without shapes, with a fitted camera and default light, background and settings.
     pub fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),

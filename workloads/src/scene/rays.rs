@@ -1,4 +1,4 @@
-//! Rays through triangles that stand still, for questions about a scene's geometry before it is rendered.
+//! Ray casting against still triangles, for measuring a scene before it is rendered.
 
 use glam::DVec3;
 
@@ -12,10 +12,10 @@ pub(super) struct Rays {
     boxes: Vec<[DVec3; 2]>,
 }
 
-/// What a ray met first.
+/// First hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
-    /// How far away, in lengths of the ray's direction.
+    /// Distance, in lengths of the ray's direction.
     pub distance: f64,
     /// Unit normal of the triangle, to the side from which its corners run counter-clockwise; zero if it has no area.
     pub normal: DVec3,
@@ -56,7 +56,7 @@ impl Rays {
         own
     }
 
-    /// The triangles, in an order of their own.
+    /// The triangles, in the order of the tree.
     pub fn triangles(&self) -> &[[DVec3; 3]] {
         &self.triangles
     }
@@ -68,7 +68,7 @@ impl Rays {
 
     /// The first triangle along a ray, farther than `beyond` lengths of `along`.
     pub fn first(&self, from: DVec3, along: DVec3, beyond: f64) -> Option<Hit> {
-        // A ray in the plane of a side must not become a ray nowhere: 0 / 0 is not a number.
+        // A ray in the plane of a side needs a nonzero divisor, because 0 / 0 is NaN.
         let inverse =
             DVec3::from_array(along.to_array().map(|part| 1.0 / if part == 0.0 { 1e-300 } else { part }));
         let (mut nearest, mut found) = (f64::INFINITY, None);
@@ -80,7 +80,7 @@ impl Rays {
             if 2 * node + 2 < self.boxes.len() {
                 let middle = first + (end - first) / 2;
                 let mut children = [(2 * node + 1, first, middle), (2 * node + 2, middle, end)];
-                // The child whose box starts nearer is tried first: it comes last.
+                // The child with the nearer box is pushed last, so that it is visited first.
                 let start = |node: usize| (self.boxes[node][0] + self.boxes[node][1]).dot(along);
                 if start(children[0].0) < start(children[1].0) {
                     children.swap(0, 1);

@@ -1,4 +1,4 @@
-//! How a scene is rendered where nothing else is said, and what a command line may change.
+//! Render settings of a scene, and the changes by a command line.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ pub struct Settings {
     pub samples: u32,
     /// Frames in a second of the scene's time.
     pub frame_rate_hz: f64,
-    /// How long the shutter is open, as a fraction of the frame period, 0 to 1.
+    /// Open time of the shutter, as a fraction of the frame period, 0 to 1.
     pub shutter: f64,
     /// Frames to render; frame `i` opens its shutter at `i / frame_rate_hz`.
     pub frames: Range<u32>,
@@ -26,7 +26,7 @@ pub struct Settings {
     /// Depth in scene units at which the lens is sharp; without it the camera's target is, or, for cameras
     /// that have none, the centre of the scene.
     pub focus: Option<f32>,
-    /// Where and when each pixel looks: the name or file of a sample table.
+    /// Name or file of a sample table.
     pub table: String,
 }
 
@@ -46,13 +46,13 @@ impl Default for Settings {
     }
 }
 
-/// Changes to [`Settings`] and to the choice of an animation; `None` keeps what the scene says.
+/// Changes to [`Settings`], clip and camera; `None` keeps the scene's value.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Overrides {
     /// Width and height of the image in pixels.
     pub size: Option<(u32, u32)>,
-    /// Samples in a pixel.
+    /// Samples per pixel.
     pub samples: Option<u32>,
     /// Frames in a second.
     pub frame_rate_hz: Option<f64>,
@@ -79,7 +79,7 @@ impl Settings {
     /// These settings with the changes in `overrides`.
     ///
     /// # Errors
-    /// [`LoadError::Setting`] where the result makes no sense.
+    /// [`LoadError::Setting`] if a value is invalid.
     pub fn with(&self, overrides: &Overrides) -> Result<Self, LoadError> {
         let (width, height) = overrides.size.unwrap_or((self.width, self.height));
         let changed = Self {
@@ -90,7 +90,7 @@ impl Settings {
             shutter: overrides.shutter.unwrap_or(self.shutter),
             frames: overrides.frames.clone().unwrap_or_else(|| self.frames.clone()),
             lens_radius: overrides.lens_radius.unwrap_or(self.lens_radius),
-            // A pinhole asked for explicitly drops the focus that the scene had for its lens.
+            // An explicit pinhole removes the focus depth of the scene's lens.
             table: overrides.table.clone().unwrap_or_else(|| self.table.clone()),
             focus: overrides.focus.or(self.focus.filter(|_| overrides.lens_radius != Some(0.0))),
         };
@@ -100,7 +100,7 @@ impl Settings {
     /// Checks every value.
     ///
     /// # Errors
-    /// [`LoadError::Setting`] naming the first one that makes no sense.
+    /// [`LoadError::Setting`] with the first invalid value.
     pub fn check(&self) -> Result<(), LoadError> {
         let side = 1..=16_384;
         ensure(side.contains(&self.width) && side.contains(&self.height), "size", || {

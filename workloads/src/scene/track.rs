@@ -1,8 +1,8 @@
-//! Values over time: keyframes and how to go from one to the next.
+//! Values over time: keyframes and their interpolation.
 
 use glam::{DQuat, DVec3};
 
-/// How a track goes from one key to the next (glTF 2.0, appendix C).
+/// Interpolation between keys (glTF 2.0, appendix C).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Interpolation {
     /// On a straight line; rotations on the shortest great circle.
@@ -14,7 +14,7 @@ pub enum Interpolation {
     CubicSpline,
 }
 
-/// A moment: a frame's opening time and what has passed since then.
+/// A time: the opening of a frame's shutter, and the time since then.
 ///
 /// The two are kept apart because a looping track wraps at the opening only: a shutter that crosses the end
 /// of the loop sees the last key held, not a jump back to the first one smeared over the image.
@@ -79,7 +79,7 @@ impl Track {
         Ok(Self { times_s, values, width, interpolation, period_s: None })
     }
 
-    /// The same track, starting over every `period_s` seconds; a period that is not above zero means never.
+    /// The same track, repeated every `period_s` seconds; not repeated if the period is not above zero.
     #[must_use]
     pub fn looping(self, period_s: f64) -> Self {
         Self { period_s: (period_s.is_finite() && period_s > 0.0).then_some(period_s), ..self }
@@ -100,12 +100,12 @@ impl Track {
         &self.times_s
     }
 
-    /// How it goes from one key to the next.
+    /// Interpolation between keys.
     pub(super) fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 
-    /// Seconds after which it starts over, where it does.
+    /// Period of repetition in seconds, if it repeats.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.period_s
     }

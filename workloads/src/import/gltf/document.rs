@@ -1,4 +1,4 @@
-//! The file itself: its JSON, checked, and its buffers.
+//! The glTF file: its JSON, checked, and the bytes of its buffers.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use gltf::json::{Path as JsonPath, Root};
 use crate::error::{LoadError, Source};
 use crate::import::reader;
 
-/// A glTF file: indices in the JSON are in range, buffers are there. Accessors are checked when read.
+/// A glTF file whose JSON indices and buffers are checked. Accessors are checked when they are read.
 pub(super) struct Document<'a> {
     pub source: Source<'a>,
     pub root: Root,
@@ -107,14 +107,14 @@ fn supported() -> String {
     gltf::json::extensions::ENABLED_EXTENSIONS.join(", ")
 }
 
-/// Bounds of positions are not used, and a texture without an image that we know is a missing image.
+/// Bounds of positions are not used. A texture without a known image is reported as a missing image.
 fn is_harmless(path: &str, error: Error) -> bool {
     let bounds = path.contains("POSITION") && (path.ends_with("min") || path.ends_with("max"));
     let source = path.starts_with("textures[") && path.ends_with("].source") && error == Error::Missing;
     bounds || source
 }
 
-/// The bytes of every buffer, as many as it claims to have.
+/// The bytes of every buffer, with the declared length.
 pub(super) fn load(source: Source, root: &Root, binary: Option<&[u8]>) -> Result<Vec<Vec<u8>>, LoadError> {
     let mut buffers = Vec::with_capacity(root.buffers.len());
     for (index, buffer) in root.buffers.iter().enumerate() {
@@ -139,7 +139,7 @@ pub(super) fn load(source: Source, root: &Root, binary: Option<&[u8]>) -> Result
     Ok(buffers)
 }
 
-/// What a URI stands for: a data URI or a file beside the scene's own.
+/// Content of a URI: a data URI, or a file beside the scene's file.
 pub(super) fn fetch(source: Source, uri: &str) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (kind, payload) = data.split_once(',').ok_or("a data URI without a comma")?;

@@ -1,4 +1,4 @@
-//! Materials and their base-colour textures.
+//! Materials, their base-colour textures, and warnings about content that is not drawn.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ pub(super) fn materials(document: &Document, used: &Used, warnings: &mut Vec<War
 
 struct Images<'d, 'a> {
     document: &'d Document<'a>,
-    /// By image and wrap, so that materials that share an image share its texture.
+    /// Textures by image and wrap, shared between materials.
     made: BTreeMap<(usize, [u8; 2]), Result<Arc<Texture>, String>>,
 }
 
@@ -62,7 +62,7 @@ impl Images<'_, '_> {
         }
     }
 
-    /// Whether texels should show as squares.
+    /// Whether magnified texels are not filtered.
     fn is_blocky(&self, texture: usize) -> bool {
         let root = &self.document.root;
         let sampler = root.textures[texture].sampler.and_then(|sampler| root.samplers.get(sampler.value()));
@@ -99,7 +99,7 @@ fn load(document: &Document, index: usize, wrap: [Wrap; 2]) -> Result<Texture, S
     }
 }
 
-/// Meshes and materials that nodes of the scene show: what is wrong with others changes no picture.
+/// Meshes and materials in use. Errors in others do not change the image.
 pub(super) struct Used {
     pub meshes: Vec<bool>,
     pub materials: Vec<bool>,
@@ -141,7 +141,7 @@ pub(super) fn left_out(document: &Document, used: &Used, made: &[Material], alph
     warnings
 }
 
-/// Whether alpha would change anything: opaque texels of blended materials are drawn as they should be.
+/// Warns about alpha that would change the image. Opaque texels of blended materials are drawn correctly.
 fn transparent(described: &Described, made: &Material, vertex_alpha: f32) -> Option<Warning> {
     let texture = made.texture.as_ref().map_or(1.0, |texture| f32::from(texture.min_alpha()) / 255.0);
     let least = described.pbr_metallic_roughness.base_color_factor.0[3] * texture * vertex_alpha;

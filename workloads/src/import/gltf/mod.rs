@@ -18,16 +18,16 @@ use crate::scene::{Clip, Instance, Mesh, Parts};
 use document::Document;
 use materials::Used;
 
-/// Whose materials are drawn.
+/// Source of the materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Looks {
-    /// The file's.
+    /// The file's materials.
     Own,
-    /// Others: those of the file are not read, and nothing is said of them.
+    /// Other materials. Those of the file are not read and cause no warnings.
     Replaced,
 }
 
-/// Reads the file at `path` and plays the clip called `clip`, or the first.
+/// Reads the file at `path` and selects the clip named `clip`, or the first.
 pub(super) fn import(path: &Path, clip: Option<&str>, looks: Looks) -> Result<Parts, LoadError> {
     let source = Source { path };
     let document = Document::read(source)?;
@@ -51,7 +51,7 @@ pub(super) fn import(path: &Path, clip: Option<&str>, looks: Looks) -> Result<Pa
     Ok(parts)
 }
 
-/// Reads all primitives as meshes; gives for each glTF mesh the range of its own.
+/// Reads all primitives as meshes; returns the range of meshes for each glTF mesh.
 fn meshes(
     document: &Document,
     used: &Used,
@@ -72,7 +72,7 @@ fn meshes(
                 graph.meshes.push(made);
             }
         }
-        // What no node of the scene shows changes no picture.
+        // Meshes without a node in the scene do not change the image.
         if used.meshes[mesh] {
             parts.warnings.append(&mut warnings);
         }
@@ -83,7 +83,7 @@ fn meshes(
     Ok(ranges)
 }
 
-/// The warning that f32 is too coarse for where a mesh is in its own space.
+/// Warns if the coordinates of a mesh are too large for f32 in its local space.
 fn rounded(mesh: &Mesh) -> Option<Warning> {
     Bounds::of(mesh.positions.iter().map(|point| point.as_dvec3())).rounded(&mesh.name)
 }
@@ -105,7 +105,7 @@ fn instances(
             instances.push(Instance { node: tree.place[index], mesh, skin });
         }
     }
-    // Without a skin, joint influences mean nothing.
+    // Joint influences need a skin.
     Ok(instances)
 }
 

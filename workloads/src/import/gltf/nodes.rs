@@ -1,4 +1,4 @@
-//! The node hierarchy, put in an order in which parents come before their children.
+//! The node hierarchy with parents before children, and its clips, skins, cameras and light.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use gltf::json;
@@ -69,7 +69,7 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>, LoadError> {
     Ok(parents)
 }
 
-/// Nodes, parents first; those on a cycle are never reached.
+/// Nodes, parents first. Nodes on a cycle are not reached.
 fn order(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, LoadError> {
     let nodes = &document.root.nodes;
     let mut order: Vec<usize> = (0..nodes.len()).filter(|node| parents[*node].is_none()).collect();
@@ -87,7 +87,7 @@ fn order(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, L
     Err(document.source.broken(format!("nodes[{lost}]"), "it is its own ancestor: export it again"))
 }
 
-/// Without a default scene the first one is shown; without any scene everything is.
+/// The nodes of the default scene, or of the first scene, or all nodes if there is no scene.
 fn in_scene(document: &Document, parents: &[Option<usize>], order: &[usize]) -> Vec<bool> {
     let root = &document.root;
     let scene = root.scene.map_or(0, |scene| scene.value());
@@ -214,7 +214,7 @@ fn affine(columns: &[f64]) -> DAffine3 {
     DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
 }
 
-/// The usable cameras of the default scene, of which the first sees it, and the first directional light or what stands in.
+/// The usable cameras of the default scene, and its first directional light or a default one.
 pub(super) fn view(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> (Vec<OwnCamera>, Light) {
     (cameras(document, tree, warnings), light(document, tree, warnings))
 }
@@ -291,7 +291,7 @@ fn light(document: &Document, tree: &Tree, warnings: &mut Vec<Warning>) -> Light
     found.map_or_else(Light::default, |(toward, color)| lamp(toward, color))
 }
 
-/// The lamp keeps the file's direction and hue, but not its intensity: there is no exposure to go with it.
+/// The lamp has the file's direction and hue. Its intensity is ignored, because there is no exposure.
 fn lamp(toward: DVec3, color: [f32; 3]) -> Light {
     let plain = Light::default();
     let hue = Vec3::from_array(color.map(|part| if part.is_finite() { part.clamp(0.0, 1.0) } else { 1.0 }));

@@ -1,4 +1,4 @@
-//! One primitive of a mesh: its vertices, triangles, morph targets and joints.
+//! One primitive of a mesh: its vertices, triangles, morph targets and joints, read from checked accessors.
 
 use glam::{Vec2, Vec3};
 use gltf::json::accessor::{ComponentType, Type};
@@ -11,7 +11,7 @@ use crate::error::LoadError;
 use crate::material::Material;
 use crate::scene::{Influences, Mesh, Normals, Target};
 
-/// Where errors about a primitive point.
+/// The primitive being read, and its place for error messages.
 struct Reading<'d, 'a> {
     document: &'d Document<'a>,
     primitive: &'d Primitive,
@@ -21,11 +21,11 @@ struct Reading<'d, 'a> {
 /// A primitive as a mesh.
 pub(super) struct Read {
     pub mesh: Mesh,
-    /// The lowest alpha of its vertex colours; 1 where it has none.
+    /// Lowest alpha of the vertex colours; 1 without vertex colours.
     pub least_alpha: f32,
 }
 
-/// Reads a primitive; nothing for points and lines.
+/// Reads a primitive; `None` for points and lines.
 pub(super) fn read(
     document: &Document,
     [mesh, index]: [usize; 2],
@@ -134,7 +134,7 @@ impl Reading<'_, '_> {
         Ok(Normals::Given(normals.into_iter().map(Vec3::from_array).collect()))
     }
 
-    /// Gives `mesh` its vertex colours, unless all are white; says how low their alpha goes.
+    /// Sets the vertex colours of `mesh`, unless all are white; returns their lowest alpha.
     fn colors(&self, mesh: &mut Mesh) -> Result<f32, LoadError> {
         let Some(values) = self.attribute(Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? else {
             return Ok(1.0);
@@ -194,7 +194,7 @@ impl Reading<'_, '_> {
         Ok(targets)
     }
 
-    /// Joints and weights of all sets together, weights made to add up to one.
+    /// Joints and weights of all sets, with weights normalized to a sum of one.
     fn influences(&self, count: usize) -> Result<Option<Influences>, LoadError> {
         let mut sets: Vec<[Vec<[f32; 4]>; 2]> = Vec::new();
         for set in 0.. {
@@ -214,7 +214,7 @@ impl Reading<'_, '_> {
                 influences.joints.extend(joints[vertex].map(|joint| joint as u16));
                 influences.weights.extend(weights[vertex].map(|weight| weight * scale));
             }
-            // A vertex that nothing carries follows the first joint instead of falling to the origin.
+            // A vertex without weights follows the first joint instead of collapsing to the origin.
             if sum <= 0.0 {
                 influences.weights[vertex * 4 * sets.len()] = 1.0;
             }
@@ -244,7 +244,7 @@ fn place(uv: [f32; 2], transform: &gltf::json::extensions::texture::TextureTrans
     turned + Vec2::from_array(transform.offset.0)
 }
 
-/// Numbers read from an accessor; every integer of glTF is exact in f64.
+/// Numbers of an accessor. Every integer of glTF is exact in f64.
 #[derive(Clone, Debug)]
 pub(super) struct Values {
     /// `width` numbers for each element.
@@ -274,7 +274,7 @@ impl Values {
 }
 
 impl Document<'_> {
-    /// The numbers of accessor `index`, which has to be of one of `kinds`; `role` says whose it is.
+    /// The numbers of accessor `index`, of one of `kinds`; `role` names its use in messages.
     pub fn values(&self, index: usize, kinds: &[Type], role: &str) -> Result<Values, LoadError> {
         let fail = |message: String| {
             let place = format!("{role}, accessor {index}");
@@ -339,7 +339,7 @@ impl Document<'_> {
         Ok(())
     }
 
-    /// `count` elements of `size` bytes in a buffer view, all of which have to lie inside it.
+    /// `count` elements of `size` bytes, all inside the buffer view.
     fn bytes(&self, view: usize, offset: u64, count: u64, size: usize) -> Result<Strided<'_>, String> {
         let body = self.view(view)?;
         let described = self.root.buffer_views.get(view).and_then(|view| view.byte_stride.as_ref());

@@ -18,7 +18,7 @@ use crate::material::Material;
 pub(super) fn dress(soup: &mut Soup, found: &Statements, path: &Path) -> Result<(), LoadError> {
     let library = Library::read(found, path, &mut soup.warnings)?;
     let mut textures = Textures::default();
-    // What is not described is grey, all of it one material.
+    // All materials without a description are one grey material.
     let described = |name: u32| library.described.get(&found.materials[name as usize]);
     let mut numbers: BTreeMap<Option<u32>, u32> = BTreeMap::new();
     let mut looks = Looks::default();
@@ -39,11 +39,11 @@ pub(super) fn dress(soup: &mut Soup, found: &Statements, path: &Path) -> Result<
     Ok(())
 }
 
-/// What the files of materials describe.
+/// Contents of the material files.
 struct Library {
     /// By name, each with the folder of its file.
     described: BTreeMap<String, (Described, PathBuf)>,
-    /// Whether every file that is named was read.
+    /// Whether all named files were read.
     whole: bool,
 }
 
@@ -71,7 +71,7 @@ impl Library {
         Ok(library)
     }
 
-    /// Materials that faces use and no file describes. Where a file is missing they are most likely in it.
+    /// Warns about materials in use without a description, unless a material file is missing, too.
     fn undescribed(&self, found: &Statements) -> Vec<Warning> {
         let mut used = vec![false; found.materials.len()];
         found.faces.iter().filter_map(|face| face.material).for_each(|name| used[name as usize] = true);
@@ -82,7 +82,7 @@ impl Library {
     }
 }
 
-/// The files that `mtllib` statements name, beside the OBJ file: each one name, or several without spaces in them.
+/// Files named by `mtllib` statements, beside the OBJ file: one name, or several without spaces.
 fn files(libraries: &[String], folder: &Path) -> Vec<PathBuf> {
     let beside = |name: &str| folder.join(name.replace('\\', "/"));
     let of_one = |name: &String| match beside(name) {
@@ -92,14 +92,14 @@ fn files(libraries: &[String], folder: &Path) -> Vec<PathBuf> {
     libraries.iter().flat_map(of_one).collect()
 }
 
-/// Textures that have been read, so that materials share them.
+/// Textures that were read, shared between materials.
 #[derive(Default)]
 struct Textures {
     known: BTreeMap<(PathBuf, bool), Result<Arc<Texture>, String>>,
 }
 
 impl Textures {
-    /// The material as it is drawn; what is left out of it becomes a warning.
+    /// The drawn material, and warnings about its ignored parts.
     fn paint(&mut self, described: &Described, folder: &Path, warnings: &mut Vec<Warning>) -> Paint {
         let name = &described.name;
         let left_out = [
@@ -165,7 +165,7 @@ fn untextured(found: &Statements, looks: &Looks) -> Vec<Warning> {
         .collect()
 }
 
-/// A material as the file describes it.
+/// A material of the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Described {
     pub name: String,
@@ -173,7 +173,7 @@ pub(super) struct Described {
     pub color: Option<[f32; 3]>,
     /// `map_Kd`.
     pub texture: Option<Map>,
-    /// `d`, or what `Tr` leaves: 1 is opaque.
+    /// `d`, or `1 - Tr`; 1 is opaque.
     pub opacity: f32,
     /// Whether there is a `map_d`.
     pub cut_out: bool,
@@ -181,17 +181,17 @@ pub(super) struct Described {
     pub bumpy: bool,
     /// Whether there is a displacement map.
     pub displaced: bool,
-    /// Whether it sheds light (`Ke`, `map_Ke`).
+    /// Whether it is emissive (`Ke`, `map_Ke`).
     pub emissive: bool,
-    /// `Pm`: how metallic it is.
+    /// `Pm`: metalness.
     pub metallic: f32,
     shine: Shine,
 }
 
-/// What a material says about its highlight, its reflections and the light that it lets through.
+/// Highlight, reflections and transmission of a material.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Shine {
-    /// `Ks` is not black; `None` where it is not given.
+    /// Whether `Ks` is not black; `None` if it is not given.
     specular: Option<bool>,
     /// Whether there is a `map_Ks` or `map_Ns`.
     mapped: bool,
@@ -262,14 +262,14 @@ impl Described {
         Ok(())
     }
 
-    /// Whether it has another highlight than every surface has, or reflections.
+    /// Whether the highlight or reflections differ from those drawn.
     pub fn shines(&self) -> bool {
         let Shine { specular, mapped, reflects, roughness, model, .. } = self.shine;
         let has_highlight = !matches!(model, Some(0 | 1)) && specular.unwrap_or(mapped);
         has_highlight || reflects || self.metallic <= 0.0 && roughness.is_some_and(|rough| rough < 1.0)
     }
 
-    /// Whether what is behind it shows.
+    /// Whether it is transparent.
     pub fn is_see_through(&self) -> bool {
         self.opacity < 1.0 || self.shine.filters
     }
@@ -314,7 +314,7 @@ impl Map {
             while values.len() < most {
                 let (word, after) = rest.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((rest, ""));
                 let is_number = word.parse::<f32>().is_ok_and(f32::is_finite);
-                // Vectors may be cut short; a value that is a word is always there.
+                // Vectors may have fewer values; a word is always present.
                 if most > 1 && !is_number || after.trim().is_empty() {
                     break;
                 }
@@ -338,7 +338,7 @@ impl Map {
     }
 }
 
-/// The most values of an option of a map; nothing for a word that is none.
+/// Largest number of values of an option; `None` for an unknown option.
 fn values_of(option: &str) -> Option<usize> {
     match option {
         "-s" | "-o" | "-t" => Some(3),

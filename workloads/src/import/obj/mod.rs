@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path) -> Result<Soup, LoadError> {
     Ok(soup)
 }
 
-/// The triangles alone; `materials` are not read.
+/// Triangles without materials.
 pub(super) fn surface(path: &Path) -> Result<Soup, LoadError> {
     statements(path).map(|found| geometry(&found))
 }
@@ -58,7 +58,7 @@ fn geometry(found: &Statements) -> Soup {
     if !colors.is_empty() {
         soup.colors = corners.iter().map(|corner| colors[of_position(corner)]).collect();
     }
-    // A vertex without a normal among those that have one is seldom meant: all are made from the faces then.
+    // If any vertex has no normal, all normals are computed from the faces.
     let normals = corners.iter().map(|corner| corner.normal.map(|normal| found.normals[normal as usize]));
     soup.normals = normals.collect::<Option<_>>().unwrap_or_default();
     if corners.iter().any(|corner| corner.uv.is_some()) {

@@ -1,4 +1,4 @@
-//! The statements of an OBJ file: vertices, faces and which material each face has.
+//! The statements of an OBJ file: vertices, faces and the material of each face.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub(crate) struct Face {
     pub material: Option<u32>,
 }
 
-/// What the statements of a file say, checked: every number of a corner is that of something in the file.
+/// Statements of a file. All indices of corners are checked.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Statements {
     pub positions: Vec<DVec3>,
@@ -47,10 +47,10 @@ pub(crate) struct Statements {
     pub dropped: Vec<usize>,
 }
 
-/// The most of anything in one file.
+/// Most elements of a kind in one file.
 const MOST: usize = 100_000_000;
 
-/// Reads the statements of the OBJ file at `path`, gzipped or not. Those that say nothing of surfaces are left out.
+/// Reads the statements of the OBJ file at `path`, gzipped or not. Statements about other things than surfaces are skipped.
 pub(crate) fn statements(path: &Path) -> Result<Statements, LoadError> {
     let mut reading = Reading::default();
     for (line, words) in lines(path)? {
@@ -95,7 +95,7 @@ pub(super) fn lines(
     }))
 }
 
-/// What comes before a comment, which begins a word: names may hold the sign.
+/// The text before a comment. A comment begins a word, because names may contain `#`.
 fn without_comment(line: &str) -> &str {
     let begins =
         |(at, _): &(usize, &str)| *at == 0 || line[..*at].ends_with(|c: char| c.is_ascii_whitespace());
@@ -177,7 +177,7 @@ impl Reading {
     fn face(&mut self, rest: &str) -> Result<(), String> {
         let corners = rest.split_ascii_whitespace().map(|word| self.corner(word));
         let corners = corners.collect::<Result<Vec<_>, _>>()?;
-        // Two corners are an edge and no face.
+        // Two corners are an edge, which is not drawn.
         if (1..3).contains(&corners.len()) {
             self.statements.dropped.push(self.line);
         }
@@ -246,7 +246,7 @@ fn numbers<T: std::str::FromStr + Into<f64> + Copy>(text: &str, least: usize) ->
 }
 
 impl Statements {
-    /// Faces may come before what they name.
+    /// Checks the indices of faces at the end, because faces may precede their vertices.
     fn check(&self) -> Result<(), (usize, String)> {
         let within = |what: &str, number: Option<u32>, count: usize| match number {
             Some(number) if number as usize >= count => {

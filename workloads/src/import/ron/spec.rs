@@ -114,7 +114,7 @@ pub(super) struct ObjectSpec {
     /// Where it is when, instead of `position`, `rotation_deg` and `scale`.
     #[serde(default)]
     pub keyframes: Vec<ObjectKey>,
-    /// How it goes from one key to the next.
+    /// Interpolation.
     #[serde(default)]
     pub interpolation: InterpolationSpec,
     /// Whether the keys start over after the last.
@@ -136,7 +136,7 @@ pub(super) struct ObjectKey {
     pub scale: Option<[f64; 3]>,
 }
 
-/// Steady turning.
+/// Constant rotation.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SpinSpec {
