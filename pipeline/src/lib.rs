@@ -19,6 +19,20 @@
 //! - [`conservative`]: the tiles that a triangle may touch, without samples,
 //! - [`frame`]: all stages in order.
 //!
+//! ```
+//! use glam::Vec3;
+//! use pipeline::Geometry;
+//!
+//! // A triangle that moves to the right while the shutter is open.
+//! let open = [Vec3::new(0.0, 0.0, 3.0), Vec3::new(1.0, 0.0, 3.0), Vec3::new(0.0, 1.0, 3.0)];
+//! let close = open.map(|corner| corner + Vec3::X);
+//! let geometry = Geometry::new(&open, &close, &[[0, 1, 2]])?;
+//! assert_eq!(geometry.triangles().len(), 1);
+//! # Ok::<(), pipeline::DrawError>(())
+//! ```
+//!
+//! `examples/triangle.rs` renders it.
+//!
 //! Guarantees:
 //!
 //! - *Culling changes nothing*: the image is the same bit for bit with any tests enabled, because a tile test

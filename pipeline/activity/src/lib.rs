@@ -11,6 +11,15 @@
 //! - [`Bounded`]: an integer with a range in its type.
 //! - [`spec`]: reading of RON files, with line, column and a suggestion in each error.
 //!
+//! ```
+//! use activity::{Counts, Event};
+//!
+//! let mut counts = Counts::default();
+//! counts[Event::SamplesTested] = 64;
+//! counts[Event::SamplesHit] = 16;
+//! assert_eq!(counts.sample_test_efficiency(), Some(0.25));
+//! ```
+//!
 //! The crate contains no geometry, clock rate or energy, and depends on no other crate of the workspace.
 
 mod bounded;
